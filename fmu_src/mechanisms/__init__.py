@@ -1,0 +1,1 @@
+"""Shipped mechanisms, one TOML file each: data, no code."""

@@ -1,0 +1,52 @@
+"""Pseudo-rigid-body impact models of planar compliant mechanisms.
+
+A mechanism is data (:mod:`prbm.mechanism`); :class:`Simulation` moves it; statics and modes are
+functions of its arrays (:mod:`prbm.assembly`).  NumPy and SciPy only, no files, no FMI.
+"""
+
+from .assembly import System, assemble
+from .errors import (
+    EquilibriumError,
+    MechanismError,
+    ParameterError,
+    PrbmError,
+    SimulationError,
+)
+from .hybrid import Impact, Simulation
+from .mechanism import (
+    Body,
+    Flexure,
+    FlexureType,
+    Force,
+    Friction,
+    Mechanism,
+    Parameter,
+    Release,
+    Stop,
+)
+from .modal import modal_restitution, modes
+from .statics import equilibrium
+
+__all__ = [
+    "Body",
+    "EquilibriumError",
+    "Flexure",
+    "FlexureType",
+    "Force",
+    "Friction",
+    "Impact",
+    "Mechanism",
+    "MechanismError",
+    "Parameter",
+    "ParameterError",
+    "PrbmError",
+    "Release",
+    "Simulation",
+    "SimulationError",
+    "Stop",
+    "System",
+    "assemble",
+    "equilibrium",
+    "modal_restitution",
+    "modes",
+]

@@ -1,0 +1,342 @@
+r"""The equations of motion in one discrete state: which stops hold, what slides, what sticks.
+
+    [ M    R^T ] [  a   ]   [ Q - C v^2 ]
+    [ R     0  ] [ -lam ] = [ Re(B e) v^2 ]
+
+with R the rows of the loops, of the stops that hold and of what sticks.  A stop that holds and
+slides pushes along its gap and, by Coulomb's law, along its wall: its column differs from its
+row.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from . import constraints, forces
+from .assembly import Complex, Real, System
+from .errors import ParameterError
+from .kinetics import inertia, kinetic_energy, mass_accelerations
+from .mechanism import unknown, value
+
+STICKS = 0  # and +1, -1: slides along, against the direction
+IDLE = 2  # no friction acts: open, frictionless, or the stop carries everything
+
+
+@dataclass(frozen=True)
+class Discrete:
+    """The discrete state.
+
+    Parameters
+    ----------
+    holds : (s,) bools
+        Whether each stop holds (resting contact).
+    slides : (s,) of {-1, 0, 1, 2}
+        Sliding of each stop along its wall: its sign, :data:`STICKS` or :data:`IDLE`.
+    rubs : (f,) of {-1, 0, 1, 2}
+        The same for each friction point.
+    """
+
+    holds: tuple[bool, ...]
+    slides: tuple[int, ...]
+    rubs: tuple[int, ...]
+
+    def with_hold(self, stop: int, holds: bool) -> "Discrete":
+        """Return the state in which a stop holds or not."""
+        changed = list(self.holds)
+        changed[stop] = holds
+        return replace(self, holds=tuple(changed))
+
+
+@dataclass(frozen=True)
+class Wall:
+    """A wall in uniform motion: its position along the direction of the stop."""
+
+    position: float
+    rate: float = 0.0
+    since: float = 0.0
+
+    def at(self, t: float) -> float:
+        """Return the position at time t [m]."""
+        return self.position + self.rate * (t - self.since)
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Inputs of the mechanism, constant from one change to the next.
+
+    Parameters
+    ----------
+    forces : (b,) tuple of complex
+        Forces on centres of mass, in the order of ``mechanism.forces`` [N].
+    moments : (b,) tuple of float
+        Moments on these bodies [N m].
+    base : complex
+        Acceleration of the base [m/s^2].
+    walls : (s,) tuple of Wall
+        The walls of the stops.
+    """
+
+    forces: tuple[complex, ...]
+    moments: tuple[float, ...]
+    base: complex
+    walls: tuple[Wall, ...]
+
+
+def input_names(system: System) -> tuple[str, ...]:
+    """Return the names of the inputs in the order of the interface."""
+    mechanism = system.mechanism
+    names = [f"{f.name}.{axis}" for f in mechanism.forces for axis in ("x", "y", "moment")]
+    names += [f"{s.name}.{what}" for s in mechanism.stops for what in ("displacement", "velocity")]
+    return (*names, "base.acceleration.x", "base.acceleration.y")
+
+
+def check_input(name: str, number: float, known: Mapping[str, float]) -> float:
+    """Return an input as a float.
+
+    Raises
+    ------
+    ParameterError
+        If there is no such input or the value is not finite.
+    """
+    if name not in known:
+        raise ParameterError(unknown(name, known))
+    number = float(number)
+    if not np.isfinite(number):
+        raise ParameterError(f"{name} = {number} must be a finite number")
+    return number
+
+
+class Equations:
+    """Accelerations, multipliers and powers of a system in one discrete state.
+
+    Parameters
+    ----------
+    system : System
+        The constant arrays.
+    inputs : Inputs
+        What acts from outside.
+    discrete : Discrete
+        What holds, sticks and slides.
+    omega : float
+        Angular frequency of the fundamental mode, for the damping ratio [rad/s].
+    """
+
+    def __init__(
+        self, system: System, inputs: Inputs, discrete: Discrete, omega: float
+    ) -> None:
+        self.system, self.inputs, self.discrete = system, inputs, discrete
+        values, mechanism = system.values, system.mechanism
+        self.n = system.n
+        self.J = np.diag(system.J)
+        self.beta = values["damping.beta"]
+        self.mass_damping = 2.0 * values["damping.zeta"] * omega
+
+        held = [i for i, holds in enumerate(discrete.holds) if holds]
+        stuck = [i for i in held if discrete.slides[i] == STICKS]
+        rubbing = [i for i, s in enumerate(discrete.rubs) if s == STICKS]
+        self.held, self.stuck, self.rubbing = held, stuck, rubbing
+        self.B: Complex = np.vstack(
+            [system.loops, system.gaps[held], system.slides[stuck], system.rubs[rubbing]]
+        )
+        self.first_hold = len(system.loops)
+        self.first_stick = self.first_hold + len(held)
+        self.first_rub = self.first_stick + len(stuck)
+        self.sliding = [i for i in held if abs(discrete.slides[i]) == 1]
+        self.stop_friction = [value(s, "friction", values) for s in mechanism.stops]
+        self.rub_law = [
+            tuple(
+                value(f, what, values)
+                for what in ("coefficient", "normal_force", "normal_stiffness")
+            )
+            for f in mechanism.frictions
+        ]
+        self.rub_slides = [
+            i
+            for i, s in enumerate(discrete.rubs)
+            if abs(s) == 1 and self.rub_law[i][0] > 0.0
+        ]
+
+        frames = [system.bodies[f.body] for f in mechanism.forces]
+        self.w_input: Complex = forces.field_row(system.S, -inputs.base)
+        self.moment = np.zeros(self.n)
+        for frame, force, moment in zip(frames, inputs.forces, inputs.moments, strict=True):
+            self.w_input = self.w_input + forces.force_row(frame.A, force)
+            self.moment[frame.j] += moment
+        self.w: Complex = self.w_input + forces.field_row(system.S, system.gravity)
+        self.driven = bool(np.any(self.w_input) or np.any(self.moment))
+
+    # -- motion --
+
+    def accelerations(self, q: Real, v: Real) -> tuple[Real, Real, Real]:
+        """Return accelerations, multipliers and the mass matrix.
+
+        Parameters
+        ----------
+        q, v : (n,)
+            Angles and rates [rad], [rad/s].
+
+        Returns
+        -------
+        a : (n,)
+            [rad/s^2].
+        lam : (r,)
+            Loops, then the forces of the stops that hold (> 0 pushes), of what sticks [N].
+        M : (n, n)
+            Mass matrix [kg m^2].
+        """
+        system, n = self.system, self.n
+        e = np.exp(1j * q)
+        M, C = inertia(system.H, self.J, e)
+        v2 = v * v
+        Be = self.B * e
+        rows = -Be.imag
+        right = np.empty(n + len(rows))
+        Q = forces.springs(system.K, q - system.q0 + self.beta * v)
+        Q += forces.generalised(self.w, e)
+        if self.driven:
+            Q += self.moment
+        if self.mass_damping:
+            Q -= self.mass_damping * (M @ v)
+        for i in self.rub_slides:
+            Q += self._rub_force(i, e) * constraints.jacobian(system.rubs[i], e)
+        right[:n] = Q - C @ v2
+        right[n:] = Be.real @ v2
+        columns = self._columns(rows, e) if self.sliding else rows
+        x = constraints.solve(constraints.saddle(M, columns, rows), right)
+        return x[:n], -x[n:], M
+
+    def _columns(self, rows: Real, e: Complex) -> Real:
+        """Return the directions of the constraint forces: sliding stops push askew."""
+        columns = rows.copy()
+        for i in self.sliding:
+            share = -self.stop_friction[i] * self.discrete.slides[i]
+            columns[self.first_hold + self.held.index(i)] += share * constraints.jacobian(
+                self.system.slides[i], e
+            )
+        return columns
+
+    def _rub_force(self, i: int, e: Complex) -> float:
+        """Return the friction force of a sliding friction point along its direction [N]."""
+        return -self.discrete.rubs[i] * self.rub_limit(i, e)
+
+    def rub_limit(self, i: int, e: Complex) -> float:
+        """Return mu N of a friction point [N]."""
+        mu, preload, stiffness = self.rub_law[i]
+        lift = float((self.system.lifts[i] @ e).real) + self.system.lifts_c[i]
+        return mu * forces.normal_force(lift, preload, stiffness)
+
+    def rate(self, t: float, y: Real) -> Real:
+        """Return dy/dt for y = (q, v, dissipated energy, work)."""
+        n = self.n
+        q, v = y[:n], y[n : 2 * n]
+        a, lam, M = self.accelerations(q, v)
+        result = np.empty(2 * n + 2)
+        result[:n] = v
+        result[n : 2 * n] = a
+        result[2 * n] = self.dissipation(q, v, lam, M)
+        result[2 * n + 1] = self.power(q, v, lam)
+        return result
+
+    def dissipation(self, q: Real, v: Real, lam: Real, M: Real) -> float:
+        """Return the power of damping and friction [W]."""
+        system = self.system
+        power = 0.0
+        if self.beta:
+            power += self.beta * float(v @ system.K @ v)
+        if self.mass_damping:
+            power += 2.0 * self.mass_damping * kinetic_energy(M, v)
+        if self.rub_slides or self.sliding:
+            e = np.exp(1j * q)
+            for i in self.rub_slides:
+                rate = float(constraints.jacobian(system.rubs[i], e) @ v)
+                power -= self._rub_force(i, e) * rate
+            for i in self.sliding:
+                rate = float(constraints.jacobian(system.slides[i], e) @ v)
+                force = float(lam[self.first_hold + self.held.index(i)])
+                power += self.stop_friction[i] * force * self.discrete.slides[i] * rate
+        return power
+
+    def power(self, q: Real, v: Real, lam: Real) -> float:
+        """Return the power of the inputs and of the moving walls that hold [W]."""
+        power = 0.0
+        if self.driven:
+            e = np.exp(1j * q)
+            power += float((forces.generalised(self.w_input, e) + self.moment) @ v)
+        for k, i in enumerate(self.held):
+            power -= float(lam[self.first_hold + k]) * self.inputs.walls[i].rate
+        return power
+
+    # -- constraints --
+
+    def offsets(self, t: float) -> Real:
+        """Return the constant parts of the active constraints at time t [m]."""
+        system = self.system
+        c = np.zeros(len(self.B))
+        c[: self.first_hold] = system.loops_c
+        for k, i in enumerate(self.held):
+            c[self.first_hold + k] = system.gaps_c[i] + self.inputs.walls[i].at(t)
+        return c
+
+    def project(self, t: float, y: Real) -> Real:
+        """Return the state on the constraints, positions and velocities.
+
+        What sticks is kept by its velocity alone: where it stuck is not a constraint.
+        """
+        n, r = self.n, self.first_stick
+        q, e = constraints.project_positions(
+            self.system.H, self.J, self.B[:r], self.offsets(t)[:r], y[:n], self.system.length
+        )
+        rows = constraints.jacobian(self.B, e)
+        rates = np.zeros(len(rows))
+        for k, i in enumerate(self.held):
+            rates[self.first_hold + k] = self.inputs.walls[i].rate
+        result = y.copy()
+        result[:n] = q
+        M, _ = inertia(self.system.H, self.J, e)
+        result[n : 2 * n] = constraints.project_velocities(M, rows, rates, y[n : 2 * n])
+        return result
+
+    # -- stops --
+
+    def gaps(self, t: float, e: Complex) -> Real:
+        """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row a time t."""
+        walls = np.array([wall.at(t) for wall in self.inputs.walls]).T
+        result: Real = (e @ self.system.gaps.T).real + self.system.gaps_c + walls
+        return result
+
+    def gap_rates(self, e: Complex, v: Real) -> Real:
+        """Return the rates of all gaps [m/s]; ``e`` and ``v`` may be stacks (m, n)."""
+        walls = np.array([wall.rate for wall in self.inputs.walls])
+        result: Real = -((e * v) @ self.system.gaps.T).imag + walls
+        return result
+
+    def stop_forces(self, lam: Real) -> Real:
+        """Return the normal forces of all stops, zero where open [N]."""
+        result = np.zeros(len(self.discrete.holds))
+        result[self.held] = lam[self.first_hold : self.first_stick]
+        return result
+
+    # -- reactions --
+
+    def base_reaction(self, q: Real, v: Real, a: Real) -> tuple[complex, float]:
+        """Return the force [N] and the moment about the first clamp [N m] on the ground.
+
+        From the balance of momentum of everything that moves: what the ground, its stops and
+        its friction points put in is what gravity, the inputs and inertia leave.
+        """
+        system = self.system
+        e = np.exp(1j * q)
+        z = system.A @ e + system.c - system.anchor
+        field = system.gravity - self.inputs.base
+        load = system.m * (field - mass_accelerations(system.A, e, v, a))
+        force = complex(load.sum())
+        moment = float((z.conj() * load).imag.sum() - system.J @ a)
+        for f, m, F in zip(
+            self.inputs.forces, self.inputs.moments, system.mechanism.forces, strict=True
+        ):
+            frame = system.bodies[F.body]
+            centre = complex(frame.A @ e) + frame.c - system.anchor
+            force += f
+            moment += (centre.conjugate() * f).imag + m
+        return force, moment

@@ -1,0 +1,947 @@
+r"""The one state machine: integrate, locate, impact, continue.
+
+A :class:`Simulation` steps past the times at which it is asked and interpolates, so that its
+trajectory does not depend on them.  It restarts only when an input or a tunable parameter
+changes.  An event is the domain change z > 0 -> z <= 0 of
+
+* the gap of an open stop, once it has been open (impact or capture),
+* the force of a stop that holds (release),
+* the sliding velocity in its own direction (stick, or slide back),
+* the friction that is left to what sticks (slip),
+
+located on the dense output.  Rest is a discrete state: a stop that holds is a constraint, not a
+spring and not a series of small bounces.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from . import constraints, contact, forces
+from .assembly import Complex, Real, assemble, calculated
+from .dynamics import IDLE, STICKS, Discrete, Equations, Inputs, Wall, check_input, input_names
+from .errors import ParameterError, SimulationError
+from .kinetics import inertia, kinetic_energy
+from .mechanism import Mechanism, unknown, value
+from .modal import fundamental_at, modes, simulated_restitution
+from .runge_kutta import DORMAND_PRINCE as PAIR
+from .runge_kutta import interpolate, powers, stages
+from .statics import Equilibrium, equilibrium, release_velocity
+
+TIME_RESOLUTION = 1e-13  # s; events are located to 1e-12 s, some of which the projection needs
+TOUCHING = 1e-10  # of the size: gaps that close together with one that is being resolved
+RELEASE_GAP = 1e-9  # m; a wall may be touched at release by no more than this
+SHORTEST_FLIGHT = 1e-7 # s; the arc of a shorter bounce is below the resolution of a position
+DEPENDENT = 1e-4  # share of a row's mobility that the stops leave; below, the stop carries all
+STILL = 1e-11  # of the velocity scale: what is left of a rate after an impact that stopped it
+CHATTER = 1000  # events ...
+CHATTER_SPAN = 1e-3  # ... within so many seconds are a motion that the model cannot follow
+WATCHED = 8  # parts of a step at which the guards are looked at
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # of the step size control
+STEP_EXPONENT = -1.0 / PAIR.order
+LARGEST_STEP = 0.05  # of the fundamental period
+SMALLEST_STEP = 1e-13  # s
+
+
+@dataclass(frozen=True)
+class Latched:
+    """What the last impact at a stop was like; zeros before the first."""
+
+    impact_count: int = 0
+    impact_time: float = 0.0
+    approach_speed: float = 0.0
+    rebound_speed: float = 0.0
+    impulse: float = 0.0
+    energy_lost: float = 0.0
+    modal_restitution: float = 0.0
+
+
+@dataclass(frozen=True)
+class Impact:
+    """An impact, for those who keep a record: the stop, the time, the state around it."""
+
+    stop: str
+    time: float
+    q: Real
+    before: Real
+    after: Real
+    impulse: float
+    latched: Latched
+
+
+@dataclass(frozen=True)
+class Event:
+    """What happens next: at which time, to which stop or friction point."""
+
+    time: float
+    kind: str
+    index: int
+
+
+@dataclass(frozen=True)
+class Arc:
+    """A step that was taken: y(t) for start <= t <= end, with its stages.
+
+    ``h`` is the whole step, ``end`` where it was cut by an event.
+    """
+
+    start: float
+    h: float
+    end: float
+    y: Real
+    k: Real
+    event: Event | None
+
+    def at(self, t: float) -> Real:
+        """Return the state at time t, not projected."""
+        return interpolate(PAIR, self.y, self.k, self.h, (t - self.start) / self.h)
+
+
+GRID = powers(PAIR, np.linspace(0.0, 1.0, WATCHED + 1))
+FRACTIONS = np.linspace(0.0, 1.0, WATCHED + 1)
+
+
+class Simulation:
+    """A mechanism in motion.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What moves.
+    values : mapping
+        Parameters and inputs that differ from their defaults.
+    start_time : float
+        [s].
+    tolerance : float or None
+        Relative tolerance of the integration; None: ``solver.tolerance``.
+    step : float or None
+        Fixed step size for studies of convergence [s]; None: adaptive.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, a value out of bounds, or the wall is penetrated at release.
+    EquilibriumError
+        If no equilibrium has the displacement of the release.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        values: Mapping[str, float] | None = None,
+        *,
+        start_time: float = 0.0,
+        tolerance: float | None = None,
+        step: float | None = None,
+    ) -> None:
+        changes = dict(values or {})
+        self.mechanism = mechanism
+        defaults = mechanism.values()
+        self.values = mechanism.values({k: x for k, x in changes.items() if k in defaults})
+        self.system = assemble(mechanism, self.values)
+        self.calculated = calculated(mechanism, self.values)
+        self.given = dict.fromkeys(input_names(self.system), 0.0)
+        for name in changes.keys() - defaults.keys():
+            if name not in self.given:
+                raise ParameterError(unknown(name, {**defaults, **self.given}))
+            self.given[name] = check_input(name, changes[name], self.given)
+        self.tolerance = _tolerance(
+            self.values["solver.tolerance"] if tolerance is None else tolerance
+        )
+        self.step = step
+        self.time = float(start_time)
+        self.frequency = fundamental_frequency(self)
+        self.omega = 2 * math.pi * self.frequency
+
+        shape = self.release_shape()
+        velocity = release_velocity(
+            self.system, shape.q, value(mechanism.release, "velocity", self.values, "release")
+        )
+        walls = tuple(Wall(self._wall_target(i, 0.0)) for i in range(len(mechanism.stops)))
+        self.discrete = Discrete(
+            (False,) * len(walls), (IDLE,) * len(walls), (IDLE,) * len(mechanism.frictions)
+        )
+        self._set_equations(self._inputs(walls))
+        self.latched = [Latched() for _ in walls]
+        self.record: list[Impact] | None = None
+        self._window = (self.time, 0)
+        self.arc: Arc | None = None
+        self.h = 0.0
+        self.changed = False
+        y = np.concatenate([shape.q, velocity, np.zeros(2)])
+        self.front_time, self.front = self.time, self.equations.project(self.time, y)
+        self._check_walls()
+        self._settle(resting=range(len(walls)))
+        self.k1: Real | None = None
+        self._output_cache: tuple[float, dict[str, Any]] | None = None
+
+    # -- start --
+
+    def release_shape(self) -> Equilibrium:
+        """Return the static shape from which the motion starts."""
+        release = self.mechanism.release
+        return equilibrium(
+            self.system, value(release, "displacement", self.values, "release")
+        )
+
+    def _check_walls(self) -> None:
+        n = self.system.n
+        e, v = np.exp(1j * self.front[:n]), self.front[n : 2 * n]
+        gaps = self.equations.gaps(self.front_time, e)
+        for stop, gap in zip(self.mechanism.stops, gaps, strict=True):
+            if gap < -RELEASE_GAP:
+                raise ParameterError(
+                    f"the wall {stop.name} is penetrated by {-gap:.6g} m at release: "
+                    f"{stop.name}.position = {self._wall_target_of(stop.name):.6g} m, the hit "
+                    f"point is at {self._wall_target_of(stop.name) - gap:.6g} m; move the stop "
+                    "or release further back"
+                )
+        rates = self.equations.gap_rates(e, v)
+        for i, gap in enumerate(gaps):
+            if gap <= RELEASE_GAP and rates[i] < 0.0:
+                self._impact(i)
+                break
+
+    def _wall_target_of(self, stop: str) -> float:
+        return self._wall_target([s.name for s in self.mechanism.stops].index(stop), 0.0)
+
+    # -- inputs and parameters --
+
+    def set(self, changes: Mapping[str, float]) -> None:
+        """Change inputs and tunable parameters from the present time on.
+
+        Parameters
+        ----------
+        changes : mapping
+            Names to values.  None is applied if one of them is refused.
+
+        Raises
+        ------
+        ParameterError
+            If a name is unknown or belongs to a fixed parameter, or a value is out of bounds.
+        """
+        parameters = {p.name: p for p in self.mechanism.parameters}
+        values, given = dict(self.values), dict(self.given)
+        for name, x in changes.items():
+            if name in parameters:
+                number = parameters[name].check(x)
+                if not parameters[name].tunable and number != values[name]:
+                    raise ParameterError(
+                        f"{name} is fixed once the motion has started; set it before"
+                    )
+                values[name] = number
+            elif name in given:
+                given[name] = check_input(name, x, given)
+            else:
+                raise ParameterError(unknown(name, {**parameters, **given}))
+        if values == self.values and given == self.given:
+            return
+        if values != self.values:
+            self.values = values
+            self.system = assemble(self.mechanism, values)
+        self.given = given
+        self.changed = True
+        self._output_cache = None
+
+    def _wall_target(self, i: int, h: float) -> float:
+        """Return where the wall is to be a time h from now [m]."""
+        stop = self.mechanism.stops[i]
+        return (
+            value(stop, "position", self.values)
+            + self.given[f"{stop.name}.displacement"]
+            + self.given[f"{stop.name}.velocity"] * h
+        )
+
+    def _inputs(self, walls: tuple[Wall, ...]) -> Inputs:
+        given, mechanism = self.given, self.mechanism
+        return Inputs(
+            tuple(complex(given[f"{f.name}.x"], given[f"{f.name}.y"]) for f in mechanism.forces),
+            tuple(given[f"{f.name}.moment"] for f in mechanism.forces),
+            complex(given["base.acceleration.x"], given["base.acceleration.y"]),
+            walls,
+        )
+
+    def _set_equations(self, inputs: Inputs) -> None:
+        self.inputs = inputs
+        self.equations = Equations(self.system, inputs, self.discrete, self.omega)
+
+    # -- time --
+
+    def advance(self, time: float) -> None:
+        """Continue the motion to a time.
+
+        The walls move uniformly from where they are to ``position + displacement + velocity *
+        (time - now)``.
+
+        Parameters
+        ----------
+        time : float
+            Not before the present time [s].
+
+        Raises
+        ------
+        SimulationError
+            If time runs backwards, the step size vanishes or the events do not end.
+        """
+        if not math.isfinite(time) or time < self.time:
+            raise SimulationError(
+                f"cannot go from t = {self.time:.12g} s to t = {time:.12g} s: time only runs on"
+            )
+        if time == self.time:
+            return
+        self._move_walls(time)
+        if self.changed:
+            self._restart()
+        while True:
+            event = self.arc.event if self.arc else None
+            if event is not None and event.time <= time and self.front_time == event.time:
+                self.arc = None
+                self._happen(event)
+            if self.front_time >= time:
+                break
+            self._take_step()
+        self.time = time
+        self._output_cache = None
+
+    def _move_walls(self, time: float) -> None:
+        """Turn the inputs of the walls into uniform motions up to a time."""
+        walls = list(self.inputs.walls)
+        for i, wall in enumerate(walls):
+            target = self._wall_target(i, time - self.time)
+            if abs(wall.at(time) - target) > 1e-13 * self.system.length:
+                here = wall.at(self.time)
+                walls[i] = Wall(here, (target - here) / (time - self.time), self.time)
+        if tuple(walls) != self.inputs.walls:
+            self.inputs = replace(self.inputs, walls=tuple(walls))
+            self.changed = True
+
+    def _restart(self) -> None:
+        """Go on from the present state with the present inputs and parameters."""
+        self.front = self.state()
+        self.front_time = self.time
+        self.arc, self.k1, self.changed = None, None, False
+        self._set_equations(self._inputs(self.inputs.walls))
+        self.front = self.equations.project(self.time, self.front)
+        self._settle()
+
+    def state(self) -> Real:
+        """Return y = (q, v, dissipated energy, work) at the present time, on the constraints."""
+        if self.arc is None or self.time >= self.front_time:
+            return self.front
+        return self.equations.project(self.time, self.arc.at(self.time))
+
+    # -- steps --
+
+    def _take_step(self) -> None:
+        """Take one step from the front, cut it at the first event."""
+        f, t, y = self.equations.rate, self.front_time, self.front
+        if self.k1 is None:
+            self.k1 = f(t, y)
+        h = self.step or self.h or self._first_step(self.k1)
+        h = h if self.step else min(h, self._largest_step())
+        while True:
+            k, y1 = stages(PAIR, f, t, y, h, self.k1)
+            error = self._error(h * (PAIR.error @ k), y, y1)
+            if self.step or error <= 1.0:
+                break
+            h *= max(SHRINK, SAFETY * error**STEP_EXPONENT) if math.isfinite(error) else SHRINK
+            if h < SMALLEST_STEP:
+                raise SimulationError(
+                    f"the step size fell below {SMALLEST_STEP:g} s at t = {t:.9g} s: the motion "
+                    "is too violent for the model; check the parameters, or add damping.beta"
+                )
+        growth = GROW if error == 0.0 else min(GROW, SAFETY * error**STEP_EXPONENT)
+        self.h = h * max(SHRINK, growth)
+        arc = Arc(t, h, t + h, y, k, None)
+        event = self._first_event(arc)
+        if event is None:
+            self.front_time, self.k1 = arc.end, k[-1]
+            self.front = self.equations.project(arc.end, y1)
+        else:
+            # a step cut short says little about the next one: keep its size
+            self.h = h
+            arc = replace(arc, end=event.time, event=event)
+            self.front_time, self.k1 = event.time, None
+            self.front = self.equations.project(event.time, arc.at(event.time))
+        self.arc = arc
+
+    def _scales(self, y: Real) -> Real:
+        """Return the magnitudes against which errors of a state are measured."""
+        n = self.system.n
+        scale = np.empty(2 * n + 2)
+        scale[:n] = 1.0
+        scale[n : 2 * n] = np.maximum(np.abs(y[n : 2 * n]), self._omega_scale())
+        scale[2 * n :] = np.maximum(np.abs(y[2 * n :]), self._energy_scale())
+        return scale
+
+    def _omega_scale(self) -> float:
+        return self.omega or math.sqrt(
+            float(np.abs(self.system.K).max() / np.abs(self.system.H).max())
+        )
+
+    def _energy_scale(self) -> float:
+        """Return the energy of one radian in the softest direction of the springs [J]."""
+        return float(np.abs(self.system.K).max())
+
+    def _error(self, difference: Real, y: Real, y1: Real) -> float:
+        scale = self.tolerance * self._scales(np.maximum(np.abs(y), np.abs(y1)))
+        ratio = difference / scale
+        return math.sqrt(float(ratio @ ratio) / len(ratio))
+
+    def _first_step(self, k1: Real) -> float:
+        """Return a first step size from the size of the rates (Hairer, II.4)."""
+        rate = k1 / self._scales(self.front)
+        size = math.sqrt(float(rate @ rate) / len(rate))
+        return min(self._largest_step(), 0.1 * self.tolerance**0.2 / max(size, 1e-6))
+
+    def _largest_step(self) -> float:
+        return LARGEST_STEP * 2 * math.pi / self._omega_scale()
+
+    # -- locating events --
+
+    def _first_event(self, arc: Arc) -> Event | None:
+        """Return the first event within a step, or None."""
+        found: list[Event] = []
+        discrete, n = self.discrete, self.system.n
+        looking = not all(discrete.holds) or bool(self.equations.rub_slides)
+        if looking or self.equations.sliding:
+            times = arc.start + arc.h * FRACTIONS
+            Y = arc.y + arc.h * (GRID @ arc.k)
+            e, v = np.exp(1j * Y[:, :n]), Y[:, n : 2 * n]
+            gaps = self.equations.gaps(times, e)
+            rates = self.equations.gap_rates(e, v)
+            for i, holds in enumerate(discrete.holds):
+                if not holds:
+                    t = self._closing(arc, i, times, gaps[:, i], rates[:, i])
+                    if t is not None:
+                        found.append(Event(t, "impact", i))
+            for i in self.equations.rub_slides:
+                found += self._turning(arc, "rub", i, times, e, v)
+            for i in self.equations.sliding:
+                found += self._turning(arc, "slide", i, times, e, v)
+        if self.equations.held or self.equations.rubbing:
+            found += self._yielding(arc)
+        return min(found, key=lambda event: event.time) if found else None
+
+    def _gap_at(self, arc: Arc, i: int) -> Callable[[float], float]:
+        n = self.system.n
+        return lambda t: float(self.equations.gaps(t, np.exp(1j * arc.at(t)[:n]))[i])
+
+    def _gap_rate_at(self, arc: Arc, i: int) -> Callable[[float], float]:
+        n = self.system.n
+
+        def rate(t: float) -> float:
+            y = arc.at(t)
+            return float(self.equations.gap_rates(np.exp(1j * y[:n]), y[n : 2 * n])[i])
+
+        return rate
+
+    def _closing(self, arc: Arc, i: int, times: Real, gaps: Real, rates: Real) -> float | None:
+        """Return when a gap closes: once positive, then zero at a closing rate.
+
+        The gap is zero at the start of a step that follows an impact; then it must have opened
+        before it can close.  A dip below zero between two looks shows in the rates.
+        """
+        for j in range(WATCHED):
+            a, b = times[j], times[j + 1]
+            if gaps[j + 1] <= 0.0 or (rates[j] < 0.0 < rates[j + 1] and gaps[j + 1] > 0.0):
+                if gaps[j] <= 0.0:
+                    if not rates[j] > 0.0 > rates[j + 1]:
+                        if rates[j + 1] < 0.0 and gaps[j + 1] < -TOUCHING * self.system.length:
+                            return float(a)
+                        continue
+                    a = brentq(self._gap_rate_at(arc, i), a, b, xtol=TIME_RESOLUTION)
+                    if self._gap_at(arc, i)(a) <= 0.0:
+                        return float(a)
+                if gaps[j + 1] > 0.0:
+                    b = brentq(self._gap_rate_at(arc, i), a, b, xtol=TIME_RESOLUTION)
+                    if self._gap_at(arc, i)(b) > 0.0:
+                        continue
+                t = float(brentq(self._gap_at(arc, i), a, b, xtol=TIME_RESOLUTION))
+                return self._polished(arc, i, t)
+        return None
+
+    def _polished(self, arc: Arc, i: int, t: float) -> float:
+        """Move the time of a closing gap to where the projected state closes it."""
+        n = self.system.n
+        for _ in range(3):
+            y = self.equations.project(t, arc.at(t))
+            e = np.exp(1j * y[:n])
+            gap = float(self.equations.gaps(t, e)[i])
+            rate = float(self.equations.gap_rates(e, y[n : 2 * n])[i])
+            if rate >= 0.0 or abs(gap) <= TIME_RESOLUTION * abs(rate):
+                break
+            change = -gap / rate
+            if abs(change) > 1e-2 * arc.h:  # grazing: the dense output has the better root
+                break
+            t = max(arc.start, t + change)
+        return t
+
+    def _turning(
+        self, arc: Arc, kind: str, i: int, times: Real, e: Complex, v: Real
+    ) -> list[Event]:
+        """Return when a sliding velocity changes its sign."""
+        sign, row, n = self._sliding(kind, i), self._slide_row(kind, i), self.system.n
+        z = -sign * ((e * v) @ row).imag
+        for j in range(WATCHED):
+            if z[j] > 0.0 >= z[j + 1]:
+
+                def speed(t: float) -> float:
+                    y = arc.at(t)
+                    return -sign * float(((np.exp(1j * y[:n]) * y[n : 2 * n]) @ row).imag)
+
+                t = float(brentq(speed, times[j], times[j + 1], xtol=TIME_RESOLUTION))
+                return [Event(t, kind, i)]
+        if z[-1] < 0.0 and z[0] <= 0.0:
+            return [Event(arc.start, kind, i)]
+        return []
+
+    def _sliding(self, kind: str, i: int) -> int:
+        return self.discrete.rubs[i] if kind == "rub" else self.discrete.slides[i]
+
+    def _slide_row(self, kind: str, i: int) -> Complex:
+        row: Complex = self.system.rubs[i] if kind == "rub" else self.system.slides[i]
+        return row
+
+    def _yielding(self, arc: Arc) -> list[Event]:
+        """Return when a hold releases or a stick slips: a margin that is used up."""
+        n, equations = self.system.n, self.equations
+
+        def margins(t: float) -> dict[tuple[str, int], float]:
+            y = arc.at(t)
+            _, lam, _ = equations.accelerations(y[:n], y[n : 2 * n])
+            return self._margins(lam, np.exp(1j * y[:n]))
+
+        found = []
+        middle, end = arc.start + arc.h / 2, arc.start + arc.h
+        looks = [(t, margins(t)) for t in (arc.start, middle, end)]
+        for key in looks[0][1]:
+            for (a, before), (b, after) in zip(looks, looks[1:], strict=False):
+                if after[key] <= 0.0:
+                    t = a
+                    if before[key] > 0.0:
+                        t = float(
+                            brentq(lambda s, key=key: margins(s)[key], a, b, xtol=TIME_RESOLUTION)
+                        )
+                    found.append(Event(t, *key))
+                    break
+        return found
+
+    def _margins(self, lam: Real, e: Complex) -> dict[tuple[str, int], float]:
+        """Return what is left before each hold releases and each stick slips [N]."""
+        equations = self.equations
+        result = {}
+        for k, i in enumerate(equations.held):
+            result["release", i] = float(lam[equations.first_hold + k])
+        for k, i in enumerate(equations.stuck):
+            normal = float(lam[equations.first_hold + equations.held.index(i)])
+            friction = abs(float(lam[equations.first_stick + k]))
+            result["slip", i] = equations.stop_friction[i] * normal - friction
+        for k, i in enumerate(equations.rubbing):
+            friction = abs(float(lam[equations.first_rub + k]))
+            result["budge", i] = equations.rub_limit(i, e) - friction
+        return result
+
+    # -- events --
+
+    def _happen(self, event: Event) -> None:
+        """Apply an event at the front and choose the discrete state that follows."""
+        self._count(event)
+        if event.kind == "impact":
+            self._impact(event.index)
+        elif event.kind == "release":
+            self._set_discrete(self.discrete.with_hold(event.index, False))
+            self._settle()
+        else:
+            self._settle()
+
+    def _count(self, event: Event) -> None:
+        """Stop a chatter that does not end."""
+        since, count = self._window
+        if event.time - since > CHATTER_SPAN:
+            since, count = event.time, 0
+        self._window = (since, count + 1)
+        if count + 1 > CHATTER:
+            raise SimulationError(
+                f"more than {CHATTER} events ({event.kind} the last) within "
+                f"{event.time - since:.3g} s at t = {event.time:.9g} s: the contact chatters; "
+                "raise rest_speed or damping.beta, or lower the restitution"
+            )
+
+    def _set_discrete(self, discrete: Discrete) -> None:
+        self.discrete, self.k1 = discrete, None
+        self._set_equations(self.inputs)
+
+    def _impact(self, hit: int) -> None:
+        """Resolve the impact of a stop and of all that touch with it."""
+        t, n = self.front_time, self.system.n
+        q, v = self.front[:n], self.front[n : 2 * n]
+        e = np.exp(1j * q)
+        gaps, rates = self.equations.gaps(t, e), self.equations.gap_rates(e, v)
+        near = TOUCHING * self.system.length
+        struck = [
+            i
+            for i, holds in enumerate(self.discrete.holds)
+            if not holds and rates[i] < 0.0 and (i == hit or gaps[i] <= near)
+        ]
+        if not struck:
+            self._settle(resting=[hit] if abs(rates[hit]) <= self._still() else [])
+            return
+        held = [i for i, holds in enumerate(self.discrete.holds) if holds]
+        soft = [i for i in struck if self._captured(i, held, q, v, float(-rates[i]))]
+        restitution = np.array(
+            [0.0 if i in soft else self._field(i, "restitution") for i in struck]
+        )
+        after, normal, tangential = self._impulse(q, v, struck, held, restitution)
+        self._book(struck, soft, q, v, after, normal)
+        rates_after = self.equations.gap_rates(e, after)
+        resting = [i for i in (*struck, *held) if rates_after[i] <= self._still()]
+        self._set_discrete(replace(self.discrete, holds=(False,) * len(gaps)))
+        self._settle(resting=resting)
+
+    def _field(self, i: int, name: str) -> float:
+        return value(self.mechanism.stops[i], name, self.values)
+
+    def _still(self) -> float:
+        return STILL * self._omega_scale() * self.system.length
+
+    def _captured(self, i: int, held: list[int], q: Real, v: Real, speed: float) -> bool:
+        """Tell whether a stop that is struck slowly comes to rest.
+
+        It does if, after an impact without restitution, it is pressed, and it closes below
+        ``rest_speed`` or would bounce for less than :data:`SHORTEST_FLIGHT`.
+        """
+        limit = self._field(i, "rest_speed")
+        eps = self._field(i, "restitution")
+        if speed > max(limit, 1.0 * SHORTEST_FLIGHT * 9.81e3):
+            return False
+        after, _, _ = self._impulse(q, v, [i], held, np.zeros(1))
+        trial = self._holding([i, *held], q, after)
+        if i not in trial:
+            return False
+        if speed < limit:
+            return True
+        equations = Equations(
+            self.system, self.inputs, Discrete(
+                tuple(j in trial for j in range(len(self.discrete.holds))),
+                (IDLE,) * len(self.discrete.slides),
+                (IDLE,) * len(self.discrete.rubs),
+            ), self.omega,
+        )  # fmt: skip
+        _, lam, M = equations.accelerations(q, after)
+        e = np.exp(1j * q)
+        loops = constraints.jacobian(self.system.loops, e)
+        G = constraints.jacobian(self.system.gaps[i : i + 1], e)
+        mobility = float((G @ contact.response(M, loops, G)).item())
+        pressing = float(equations.stop_forces(lam)[i]) * mobility
+        return 2.0 * eps * speed < pressing * SHORTEST_FLIGHT
+
+    def _impulse(
+        self, q: Real, v: Real, struck: list[int], held: list[int], restitution: Real
+    ) -> tuple[Real, Real, Real]:
+        """Return the velocities after an impact and the impulses at the struck stops.
+
+        Stops that hold take part: without friction as partners of the complementarity problem,
+        with friction as constraints that are let go if they would pull.  Their own friction, and
+        that of friction points, is finite and has no impulse.
+        """
+        system = self.system
+        e = np.exp(1j * q)
+        M, _ = inertia(system.H, self.equations.J, e)
+        loops = constraints.jacobian(system.loops, e)
+        u = self.equations.gap_rates(e, v)
+        mu = np.array([self._field(i, "friction") for i in struck])
+        if not mu.any():
+            partners = struck + held
+            G = constraints.jacobian(system.gaps[partners], e)
+            X = contact.response(M, loops, G)
+            rates = np.minimum(u[partners], 0.0)
+            eps = np.concatenate([restitution, np.zeros(len(held))])
+            P = contact.newton(G @ X, rates, eps)
+            return v + X @ P, P[: len(struck)], np.zeros(len(struck))
+        kept = list(held)
+        while True:
+            rows = constraints.jacobian(np.vstack([system.loops, system.gaps[kept]]), e)
+            G = constraints.jacobian(system.gaps[struck], e)
+            T = constraints.jacobian(system.slides[struck], e)
+            X = contact.response(M, rows, np.vstack([G, T]))
+            W = np.vstack([G, T]) @ X
+            rates = np.concatenate([u[struck], T @ v])
+            if len(struck) == 1:
+                P = np.array(contact.stronge(W, rates, float(mu[0]), float(restitution[0])))
+            else:
+                P = contact.several(W, rates, mu, restitution)
+            after = v + X @ P
+            pull = M @ (after - v) - np.vstack([G, T]).T @ P
+            reaction = np.linalg.lstsq(rows.T, pull, rcond=1e-12)[0][len(loops) :]
+            pulling = [i for i, p in zip(kept, reaction, strict=True) if p < 0.0]
+            if not pulling:
+                k = len(struck)
+                return after, P[:k], P[k:]
+            kept = [i for i in kept if i not in pulling]
+
+    def _book(
+        self, struck: list[int], soft: list[int], q: Real, v: Real, after: Real, normal: Real
+    ) -> None:
+        """Put the impact into the state, the energies and the latched outputs."""
+        n = self.system.n
+        e = np.exp(1j * q)
+        M, _ = inertia(self.system.H, self.equations.J, e)
+        before_rates = self.equations.gap_rates(e, v)
+        after_rates = self.equations.gap_rates(e, after)
+        walls = self.inputs.walls
+        work = -sum(float(P) * walls[i].rate for i, P in zip(struck, normal, strict=True))
+        lost = kinetic_energy(M, v) - kinetic_energy(M, after) + work
+        self.front = self.front.copy()
+        self.front[n : 2 * n] = after
+        self.front[2 * n] += lost
+        self.front[2 * n + 1] += work
+        counted = [i for i in struck if i not in soft]
+        if not counted:
+            return
+        phi, M_shape = fundamental_at(self.system, q)
+        modal = simulated_restitution(phi, M_shape, v, after)
+        total = float(sum(normal))
+        for i, P in zip(struck, normal, strict=True):
+            if i in soft:
+                continue
+            self.latched[i] = Latched(
+                self.latched[i].impact_count + 1,
+                self.front_time,
+                float(-before_rates[i]),
+                float(after_rates[i]),
+                float(P),
+                lost * (float(P) / total if total else 1.0),
+                modal,
+            )
+            if self.record is not None:
+                stop = self.mechanism.stops[i].name
+                self.record.append(
+                    Impact(stop, self.front_time, q, v, after, float(P), self.latched[i])
+                )
+
+    def _holding(self, candidates: list[int], q: Real, v: Real) -> list[int]:
+        """Return which of the stops at rest are pressed: their forces are positive together."""
+        holding = sorted(set(candidates))
+        while holding:
+            discrete = Discrete(
+                tuple(i in holding for i in range(len(self.discrete.holds))),
+                (IDLE,) * len(self.discrete.slides),
+                (IDLE,) * len(self.discrete.rubs),
+            )
+            equations = Equations(self.system, self.inputs, discrete, self.omega)
+            _, lam, _ = equations.accelerations(q, v)
+            pressed = equations.stop_forces(lam)
+            worst = min(holding, key=lambda i: float(pressed[i]))
+            if pressed[worst] > 0.0:
+                return holding
+            holding.remove(worst)
+        return []
+
+    def _settle(self, resting: list[int] | range = ()) -> None:  # type: ignore[assignment]
+        """Choose what holds, sticks and slides at the front, from its state alone.
+
+        ``resting`` are open stops that touch without closing or opening.
+        """
+        n, t = self.system.n, self.front_time
+        q, v = self.front[:n], self.front[n : 2 * n]
+        e = np.exp(1j * q)
+        gaps, rates = self.equations.gaps(t, e), self.equations.gap_rates(e, v)
+        near, still = TOUCHING * self.system.length + RELEASE_GAP, self._still()
+        candidates = [i for i, holds in enumerate(self.discrete.holds) if holds]
+        candidates += [
+            i for i in resting if i not in candidates and gaps[i] <= near and rates[i] <= still
+        ]
+        holding = self._holding(candidates, q, v)
+        holds = tuple(i in holding for i in range(len(gaps)))
+        slides = [IDLE] * len(gaps)
+        rubs = [IDLE] * len(self.discrete.rubs)
+        self._set_discrete(Discrete(holds, tuple(slides), tuple(rubs)))
+        for i in holding:
+            if self._field(i, "friction") > 0.0:
+                slides[i] = self._slide_state("slide", i, q, v)
+                self._set_discrete(replace(self.discrete, slides=tuple(slides)))
+        for i in range(len(rubs)):
+            if self.equations.rub_law[i][0] > 0.0:
+                rubs[i] = self._slide_state("rub", i, q, v)
+                self._set_discrete(replace(self.discrete, rubs=tuple(rubs)))
+        if holding:
+            self.front = self.equations.project(t, self.front)
+
+    def _slide_state(self, kind: str, i: int, q: Real, v: Real) -> int:
+        """Return whether something slides (its sign), sticks, or is idle.
+
+        Where the loops and the stops that hold leave the row no mobility of its own, the stop
+        carries everything and the friction nothing.
+        """
+        e = np.exp(1j * q)
+        M, _ = inertia(self.system.H, self.equations.J, e)
+        row = constraints.jacobian(self._slide_row(kind, i)[None, :], e)
+        loops = constraints.jacobian(self.system.loops, e)
+        held = constraints.jacobian(self.equations.B, e)
+        free = float((row @ contact.response(M, loops, row)).item())
+        left = float((row @ contact.response(M, held, row)).item())
+        if left <= DEPENDENT * free or free == 0.0:
+            return IDLE
+        speed = float((row @ v).item())
+        if abs(speed) > self._still():
+            return 1 if speed > 0.0 else -1
+        trial = self._with_slide(kind, i, STICKS)
+        equations = Equations(self.system, self.inputs, trial, self.omega)
+        _, lam, _ = equations.accelerations(q, v)
+        if kind == "rub":
+            friction = float(lam[equations.first_rub + equations.rubbing.index(i)])
+            limit = equations.rub_limit(i, e)
+        else:
+            friction = float(lam[equations.first_stick + equations.stuck.index(i)])
+            normal = float(lam[equations.first_hold + equations.held.index(i)])
+            limit = equations.stop_friction[i] * normal
+        if abs(friction) <= limit:
+            return STICKS
+        return -1 if friction > 0.0 else 1
+
+    def _with_slide(self, kind: str, i: int, state: int) -> Discrete:
+        name = "rubs" if kind == "rub" else "slides"
+        states = list(getattr(self.discrete, name))
+        states[i] = state
+        return replace(self.discrete, **{name: tuple(states)})
+
+    # -- outputs --
+
+    def outputs(self) -> dict[str, float | int | bool]:
+        """Return all outputs, locals and calculated parameters at the present time, by name.
+
+        Lengths in m, angles in rad, forces in N, energies in J; displacements and energies from
+        the straight shape.
+        """
+        if self._output_cache is None or self._output_cache[0] != self.time:
+            self._output_cache = (self.time, self._outputs())
+        return dict(self._output_cache[1])
+
+    def _outputs(self) -> dict[str, float | int | bool]:
+        system, equations, n, t = self.system, self.equations, self.system.n, self.time
+        y = self.state()
+        q, v = y[:n], y[n : 2 * n]
+        e = np.exp(1j * q)
+        a, lam, M = equations.accelerations(q, v)
+        out: dict[str, float | int | bool] = {}
+        for name, frame in system.bodies.items():
+            place = complex(frame.A @ e) + frame.c - frame.drawn
+            velocity = complex(1j * (frame.A @ (e * v)))
+            out[f"{name}.x"], out[f"{name}.y"] = place.real, place.imag
+            out[f"{name}.angle"] = float(q[frame.j])
+            out[f"{name}.vx"], out[f"{name}.vy"] = velocity.real, velocity.imag
+            out[f"{name}.omega"] = float(v[frame.j])
+        gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
+        pressed = equations.stop_forces(lam)
+        for i, stop in enumerate(self.mechanism.stops):
+            out[f"{stop.name}.gap"] = float(gaps[i])
+            out[f"{stop.name}.gap_rate"] = float(rates[i])
+            out[f"{stop.name}.force"] = float(pressed[i])
+        force, moment = equations.base_reaction(q, v, a)
+        out["base.force.x"], out["base.force.y"] = force.real, force.imag
+        out["base.moment"] = moment
+        deflection = q - system.q0
+        out["energy.kinetic"] = kinetic_energy(M, v)
+        out["energy.elastic"] = forces.elastic_energy(system.K, deflection)
+        out["energy.gravitational"] = forces.gravitational_energy(system, e)
+        out["energy.dissipated"] = float(y[2 * n])
+        out["energy.work"] = float(y[2 * n + 1])
+        for i, stop in enumerate(self.mechanism.stops):
+            out[f"{stop.name}.contact"] = self.discrete.holds[i]
+            for name, x in asdict(self.latched[i]).items():
+                out[f"{stop.name}.{name}"] = x
+        for number, j in enumerate(system.links, start=1):
+            out[f"link[{number}].angle"] = float(q[j])
+            out[f"link[{number}].omega"] = float(v[j])
+        out["mode.frequency"] = self.frequency
+        out.update(self.calculated)
+        return out
+
+    # -- saving and restoring --
+
+    def snapshot(self) -> dict[str, Any]:
+        """Return the complete state as plain values that JSON keeps exactly."""
+        arc = self.arc
+        return {
+            "values": dict(self.values),
+            "given": dict(self.given),
+            "tolerance": self.tolerance,
+            "step": self.step,
+            "time": self.time,
+            "walls": [asdict(wall) for wall in self.inputs.walls],
+            "discrete": asdict(self.discrete),
+            "latched": [asdict(latched) for latched in self.latched],
+            "window": list(self._window),
+            "h": self.h,
+            "changed": self.changed,
+            "frequency": self.frequency,
+            "front_time": self.front_time,
+            "front": self.front.tolist(),
+            "k1": None if self.k1 is None else self.k1.tolist(),
+            "arc": None
+            if arc is None
+            else {
+                "start": arc.start,
+                "h": arc.h,
+                "end": arc.end,
+                "y": arc.y.tolist(),
+                "k": arc.k.tolist(),
+                "event": None if arc.event is None else asdict(arc.event),
+            },
+        }
+
+    def restore(self, snapshot: Mapping[str, Any]) -> None:
+        """Return to a state that :meth:`snapshot` gave; what follows is the same to the bit.
+
+        Raises
+        ------
+        ParameterError
+            If the snapshot is not one of this mechanism.
+        """
+        if snapshot["values"].keys() != self.values.keys() or len(snapshot["front"]) != len(
+            self.front
+        ):
+            raise ParameterError("the saved state belongs to another mechanism")
+        s = snapshot
+        if s["values"] != self.values:
+            self.values = dict(s["values"])
+            self.system = assemble(self.mechanism, self.values)
+            self.calculated = calculated(self.mechanism, self.values)
+        self.given = dict(s["given"])
+        self.tolerance, self.step, self.time = s["tolerance"], s["step"], s["time"]
+        self.frequency = s["frequency"]
+        self.omega = 2 * math.pi * self.frequency
+        d = s["discrete"]
+        self.discrete = Discrete(tuple(d["holds"]), tuple(d["slides"]), tuple(d["rubs"]))
+        self._set_equations(self._inputs(tuple(Wall(**wall) for wall in s["walls"])))
+        self.latched = [Latched(**latched) for latched in s["latched"]]
+        self._window = (s["window"][0], s["window"][1])
+        self.h, self.changed = s["h"], s["changed"]
+        self.front_time, self.front = s["front_time"], np.array(s["front"])
+        self.k1 = None if s["k1"] is None else np.array(s["k1"])
+        arc = s["arc"]
+        self.arc = arc and Arc(
+            arc["start"], arc["h"], arc["end"], np.array(arc["y"]), np.array(arc["k"]),
+            arc["event"] and Event(**arc["event"]),
+        )  # fmt: skip
+        self._output_cache = None
+
+
+def fundamental_frequency(simulation: Simulation) -> float:
+    """Return the fundamental frequency about the equilibrium under gravity [Hz].
+
+    Zero if that equilibrium is unstable.
+    """
+    system = simulation.system
+    return max(0.0, float(modes(system, equilibrium(system)).frequency[0]))
+
+
+def _tolerance(x: float) -> float:
+    if not (math.isfinite(x) and 1e-13 <= x <= 1e-2):
+        raise ParameterError(f"tolerance = {x:g} must lie between 1e-13 and 1e-2")
+    return float(x)

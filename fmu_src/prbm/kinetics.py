@@ -1,0 +1,69 @@
+r"""Mass matrix, quadratic velocities, kinetic energy and momentum.
+
+The TMT method (Newton-Euler in generalised coordinates) for absolute angles: with the positions
+z = c + A e, e = exp(i q), the projection T = dz/dq = i A diag(e) gives M = Re(T^H diag(m) T) + J,
+and H = A^H diag(m) A is constant.
+
+Sources
+-------
+.. [1] H. Vallery, A. L. Schwab, Advanced Dynamics, Delft (the TMT method).
+"""
+
+import numpy as np
+
+from .assembly import Complex, Real
+
+
+def inertia(H: Complex, J: Real, e: Complex) -> tuple[Real, Real]:
+    r"""Mass matrix M and quadratic-velocity matrix C of M a + C v^2 = Q.
+
+    With Hq = diag(e)^H H diag(e) and e = exp(i q),
+
+        M = Re Hq + diag(J),    C = -Im Hq,
+
+    so one Hermitian product yields both.  C multiplies the *squares* v^2: with absolute angles
+    there are no cross products v_i v_j.
+
+    Parameters
+    ----------
+    H : (n, n) complex
+        A^H diag(m) A [kg m^2]; Hermitian.
+    J : (n, n)
+        Rotary inertia of each coordinate about its own mass centres, diagonal [kg m^2].
+    e : (n,) complex
+        Unit directions exp(i q) of the links [-].
+
+    Returns
+    -------
+    M : (n, n)
+        Symmetric; positive definite iff no motion is massless [kg m^2].
+    C : (n, n)
+        Antisymmetric [kg m^2].
+
+    Examples
+    --------
+    A pendulum of length 2 m and mass 3 kg has m l^2 = 12 kg m^2:
+
+    >>> M, _ = inertia(np.array([[12.0 + 0j]]), np.zeros((1, 1)), np.array([1j]))
+    >>> M.item()
+    12.0
+    """
+    Hq = e.conj()[:, None] * H * e
+    return Hq.real + J, -Hq.imag
+
+
+def kinetic_energy(M: Real, v: Real) -> float:
+    """Kinetic energy v^T M v / 2 [J].
+
+    Examples
+    --------
+    >>> kinetic_energy(np.array([[12.0]]), np.array([2.0]))
+    24.0
+    """
+    return 0.5 * float(v @ M @ v)
+
+
+def mass_accelerations(A: Complex, e: Complex, v: Real, a: Real) -> Complex:
+    """Accelerations z'' = A (i e a - e v^2) of the mass points [m/s^2]."""
+    result: Complex = A @ (1j * e * a - e * v * v)
+    return result

@@ -1,0 +1,179 @@
+r"""Static equilibrium under gravity and a holding force, and the tangent stiffness there.
+
+At rest the torques balance: K (q - q0) - Re(w e) - J^T lam - r^T F = 0 with w the row of gravity,
+J the Jacobian of the loops, r that of the held displacement and F the holding force.  All
+second derivatives are diagonal, because every position is linear in e = exp(i q).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import constraints
+from .assembly import Complex, Real, System
+from .errors import EquilibriumError, SimulationError
+from .forces import field_row, springs
+from .kinetics import inertia
+
+NEWTON_STEPS = 30
+LARGEST_TURN = 0.5  # rad per Newton step: further the tangent says nothing
+SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
+BALANCED = 1e-12  # of the largest torsion rate times one radian
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A static shape.
+
+    Parameters
+    ----------
+    q : (n,)
+        Angles [rad].
+    lam : (r,)
+        Multipliers of the loops: forces at their closures [N].
+    force : float
+        Holding force on the released body along the direction of the release [N]; 0 if free.
+    """
+
+    q: Real
+    lam: Real
+    force: float
+
+
+def tangent_stiffness(K: Real, w: Complex, B: Complex, lam: Real, e: Complex) -> Real:
+    r"""Stiffness about a shape, K + diag(Im(w e) + Re(lam^T B e)) [N m/rad].
+
+    Parameters
+    ----------
+    K : (n, n)
+        Torsion springs [N m/rad].
+    w : (n,) complex
+        Row of the dead loads, Q = Re(w e) [N m].
+    B, lam : (r, n) complex, (r,)
+        Constraints and their multipliers [m], [N].
+    e : (n,) complex
+        exp(i q).
+
+    Examples
+    --------
+    A pendulum of length l hanging along -y under the weight m g has the stiffness m g l:
+
+    >>> l, mg = 2.0, 3.0
+    >>> w = 1j * np.conj(-1j * mg) * np.array([l + 0j])
+    >>> none = np.zeros((0, 1), complex)
+    >>> tangent_stiffness(np.zeros((1, 1)), w, none, np.zeros(0), np.array([-1j])).item()
+    6.0
+    """
+    geometric = (w * e).imag + ((lam @ B) * e).real
+    return K + np.diag(geometric)
+
+
+def equilibrium(system: System, displacement: float | None = None) -> Equilibrium:
+    """Return the shape under gravity, free or held at a displacement of the released body.
+
+    The load and the displacement are raised together from the straight, unloaded shape, so that
+    the shape found is the one that the mechanism reaches when it is loaded slowly.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    displacement : float or None
+        Of the released body's centre of mass along the direction of the release [m]; held by a
+        force along that direction.  None: no holding force.
+
+    Raises
+    ------
+    EquilibriumError
+        If there is no such shape, or the loading does not lead there.
+    """
+    B, c = system.loops, system.loops_c
+    if displacement is not None:
+        B = np.vstack([B, system.release])
+        c = np.append(c, system.release_c)
+    state = np.concatenate([system.q0, np.zeros(len(c))])
+    done, fraction = 0.0, 1.0
+    while done < 1.0:
+        target = min(1.0, done + fraction)
+        trial = _newton(system, B, c, displacement or 0.0, target, state)
+        if trial is not None:
+            state, done = trial, target
+            fraction = min(1.0, 2 * fraction)
+        else:
+            fraction /= 2
+            if fraction < SMALLEST_FRACTION:
+                raise EquilibriumError(_unreachable(system, displacement, done))
+    n, r = system.n, len(system.loops)
+    force = float(state[n + r]) if displacement is not None else 0.0
+    return Equilibrium(state[:n], state[n : n + r], force)
+
+
+def _newton(
+    system: System, B: Complex, c: Real, displacement: float, fraction: float, start: Real
+) -> Real | None:
+    """Solve the balance at a fraction of the load; None if it does not converge."""
+    n = system.n
+    w = fraction * field_row(system.S, system.gravity)
+    shift = np.zeros(len(c))
+    if len(c) > len(system.loops):
+        shift[-1] = fraction * displacement
+    scale = BALANCED * float(np.abs(system.K).max())
+    state = start.copy()
+    for _ in range(NEWTON_STEPS):
+        q, lam = state[:n], state[n:]
+        e = np.exp(1j * q)
+        rows = constraints.jacobian(B, e)
+        torque = springs(system.K, q - system.q0) + (w * e).real + lam @ rows
+        open_by = constraints.values(B, c, e) - shift
+        closed = not len(open_by) or np.abs(open_by).max() <= 1e-13 * system.length
+        if closed and np.abs(torque).max() <= scale:
+            return state
+        kkt = constraints.saddle(tangent_stiffness(system.K, w, B, lam, e), rows, rows)
+        try:
+            change = constraints.solve(kkt, np.concatenate([torque, -open_by]))
+        except SimulationError:
+            return None
+        change[n:] *= -1.0
+        turn = float(np.abs(change[:n]).max())
+        if not np.isfinite(turn):
+            return None
+        state = state + change * min(1.0, LARGEST_TURN / max(turn, 1e-300))
+    return None
+
+
+def _unreachable(system: System, displacement: float | None, done: float) -> str:
+    if displacement is None:
+        return (
+            "no static equilibrium under gravity was found: the flexures are too weak for this "
+            "load; reduce gravity or the masses, or stiffen the flexures"
+        )
+    return (
+        f"release.displacement = {displacement:g} m cannot be reached: no equilibrium was found "
+        f"beyond {done * displacement:.4g} m (gravity raised in proportion); release closer to "
+        "the straight shape"
+    )
+
+
+def release_velocity(system: System, q: Real, speed: float) -> Real:
+    """Return the velocity of least kinetic energy with a given speed of the released body.
+
+    Parameters
+    ----------
+    q : (n,)
+        Angles at release [rad].
+    speed : float
+        Of the centre of mass along the direction of the release [m/s].
+
+    Returns
+    -------
+    v : (n,)
+        What an impulse on the centre of mass along that direction gives [rad/s].
+    """
+    if speed == 0.0:
+        return np.zeros(system.n)
+    e = np.exp(1j * q)
+    M, _ = inertia(system.H, np.diag(system.J), e)
+    rows = constraints.jacobian(np.vstack([system.loops, system.release]), e)
+    rates = np.zeros(len(rows))
+    rates[-1] = -speed
+    return constraints.project_velocities(M, rows, rates, np.zeros(system.n))
