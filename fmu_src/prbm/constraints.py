@@ -11,13 +11,16 @@ Sources
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import get_lapack_funcs
 
 from .assembly import Complex, Real
 from .errors import SimulationError
 from .kinetics import inertia
 
-(gesv,) = get_lapack_funcs(("gesv",), (np.zeros(1),))
+gesv, getrs = get_lapack_funcs(("gesv", "getrs"), (np.zeros(1),))
+
+Factors = tuple[Real, NDArray[np.int32]]
 
 CLOSED = 1e-14  # of the size of the mechanism: a few roundings of its coordinates
 BARELY_CLOSED = 1e-12  # of that size: accepted if the iteration can do no better
@@ -60,14 +63,30 @@ def solve(kkt: Real, right: Real) -> Real:
         If the matrix is singular: two constraints contradict or repeat each other, or a motion
         has no mass.
     """
-    _, _, x, info = gesv(kkt, right)
+    return factor_and_solve(kkt, right)[0]
+
+
+def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
+    """Solve a saddle-point system and return its factors too, for :func:`solve_again`.
+
+    Raises
+    ------
+    SimulationError
+        As :func:`solve`.
+    """
+    lu, pivots, x, info = gesv(kkt, right)
     if info != 0:
         raise SimulationError(
             "the equations of motion are singular here: two constraints repeat each other, or a "
             "part that can move has no mass"
         )
-    result: Real = x
-    return result
+    return x, (lu, pivots)
+
+
+def solve_again(factors: Factors, right: Real) -> Real:
+    """Solve with the factors of :func:`factor_and_solve` and another right side."""
+    x: Real = getrs(*factors, right)[0]
+    return x
 
 
 def project_positions(

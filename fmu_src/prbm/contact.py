@@ -102,9 +102,7 @@ def newton(W: Real, u: Real, restitution: Real) -> Real:
     return best
 
 
-def stronge(
-    W: Real, u: Real, friction: float, restitution: float
-) -> tuple[float, float]:
+def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[float, float]:
     r"""Return the normal and tangential impulse of one hit with friction (Routh, Stronge).
 
     The normal impulse p grows; the contact slips (P_t' = -mu sign(u_t)), sticks or slips back

@@ -87,7 +87,9 @@ def input_names(system: System) -> tuple[str, ...]:
     """Return the names of the inputs in the order of the interface."""
     mechanism = system.mechanism
     names = [f"{f.name}.{axis}" for f in mechanism.forces for axis in ("x", "y", "moment")]
-    names += [f"{s.name}.{what}" for s in mechanism.stops for what in ("displacement", "velocity")]
+    names += [
+        f"{s.name}.{what}" for s in mechanism.stops for what in ("displacement", "velocity")
+    ]
     return (*names, "base.acceleration.x", "base.acceleration.y")
 
 
@@ -152,9 +154,7 @@ class Equations:
             for f in mechanism.frictions
         ]
         self.rub_slides = [
-            i
-            for i, s in enumerate(discrete.rubs)
-            if abs(s) == 1 and self.rub_law[i][0] > 0.0
+            i for i, s in enumerate(discrete.rubs) if abs(s) == 1 and self.rub_law[i][0] > 0.0
         ]
 
         frames = [system.bodies[f.body] for f in mechanism.forces]
@@ -165,6 +165,15 @@ class Equations:
             self.moment[frame.j] += moment
         self.w: Complex = self.w_input + forces.field_row(system.S, system.gravity)
         self.driven = bool(np.any(self.w_input) or np.any(self.moment))
+        self.walls_push = any(inputs.walls[i].rate for i in held)
+
+        # one product with e serves loads, inertia and constraints: see accelerations
+        self.stack: Complex = np.vstack([self.w, system.H, 1j * self.B])
+        self.J_stack = np.zeros((self.n + len(self.B), self.n))
+        self.J_stack[: self.n] = self.J
+        self.kkt = np.zeros((self.n + len(self.B),) * 2, order="F")
+        self.beta_K = self.beta * system.K
+        self.trace: list[Real] = []
 
     # -- motion --
 
@@ -185,36 +194,42 @@ class Equations:
         M : (n, n)
             Mass matrix [kg m^2].
         """
-        system, n = self.system, self.n
+        return self._solve(q, v, self.beta_K @ v)
+
+    def _solve(self, q: Real, v: Real, damping: Real) -> tuple[Real, Real, Real]:
+        """Return accelerations, multipliers and mass matrix for a given damping torque.
+
+        All that depends on e = exp(i q) comes from one product, row by row:
+
+            G = [w e;  diag(e)^H H diag(e);  i B e],
+
+        whose real parts are the load, M - J and the constraint rows, and whose imaginary parts
+        are -C (:func:`prbm.kinetics.inertia`) and the convective terms Re(B e).
+        """
+        n, kkt = self.n, self.kkt
         e = np.exp(1j * q)
-        M, C = inertia(system.H, self.J, e)
-        v2 = v * v
-        Be = self.B * e
-        rows = -Be.imag
-        right = np.empty(n + len(rows))
-        Q = forces.springs(system.K, q - system.q0 + self.beta * v)
-        Q += forces.generalised(self.w, e)
+        G = self.stack * e
+        G[1 : n + 1] *= e.conj()[:, None]
+        np.add(G.real[1:], self.J_stack, out=kkt[:, :n])
+        kkt[:n, n:] = kkt[n:, :n].T
+        M = kkt[:n, :n]
+        right = G.imag[1:] @ (v * v)
+        Q = right[:n]
+        Q += G.real[0]
+        Q += forces.springs(self.system.K, q - self.system.q0)
+        Q -= damping
         if self.driven:
             Q += self.moment
         if self.mass_damping:
             Q -= self.mass_damping * (M @ v)
         for i in self.rub_slides:
-            Q += self._rub_force(i, e) * constraints.jacobian(system.rubs[i], e)
-        right[:n] = Q - C @ v2
-        right[n:] = Be.real @ v2
-        columns = self._columns(rows, e) if self.sliding else rows
-        x = constraints.solve(constraints.saddle(M, columns, rows), right)
-        return x[:n], -x[n:], M
-
-    def _columns(self, rows: Real, e: Complex) -> Real:
-        """Return the directions of the constraint forces: sliding stops push askew."""
-        columns = rows.copy()
+            Q += self._rub_force(i, e) * constraints.jacobian(self.system.rubs[i], e)
         for i in self.sliding:
             share = -self.stop_friction[i] * self.discrete.slides[i]
-            columns[self.first_hold + self.held.index(i)] += share * constraints.jacobian(
-                self.system.slides[i], e
-            )
-        return columns
+            column = n + self.first_hold + self.held.index(i)
+            kkt[:n, column] += share * constraints.jacobian(self.system.slides[i], e)
+        x, self.factors = constraints.factor_and_solve(kkt, right)
+        return x[:n], -x[n:], M
 
     def _rub_force(self, i: int, e: Complex) -> float:
         """Return the friction force of a sliding friction point along its direction [N]."""
@@ -230,34 +245,36 @@ class Equations:
         """Return dy/dt for y = (q, v, dissipated energy, work)."""
         n = self.n
         q, v = y[:n], y[n : 2 * n]
-        a, lam, M = self.accelerations(q, v)
+        damping = self.beta_K @ v
+        a, lam, M = self._solve(q, v, damping)
+        self.trace.append(lam)
         result = np.empty(2 * n + 2)
         result[:n] = v
         result[n : 2 * n] = a
-        result[2 * n] = self.dissipation(q, v, lam, M)
-        result[2 * n + 1] = self.power(q, v, lam)
+        result[2 * n] = v @ damping
+        result[2 * n + 1] = 0.0
+        if self.mass_damping:
+            result[2 * n] += 2.0 * self.mass_damping * kinetic_energy(M, v)
+        if self.rub_slides or self.sliding:
+            result[2 * n] += self._rubbing_power(q, v, lam)
+        if self.driven or self.walls_push:
+            result[2 * n + 1] = self._input_power(q, v, lam)
         return result
 
-    def dissipation(self, q: Real, v: Real, lam: Real, M: Real) -> float:
-        """Return the power of damping and friction [W]."""
-        system = self.system
+    def _rubbing_power(self, q: Real, v: Real, lam: Real) -> float:
+        """Return the power that friction takes out [W]."""
+        e = np.exp(1j * q)
         power = 0.0
-        if self.beta:
-            power += self.beta * float(v @ system.K @ v)
-        if self.mass_damping:
-            power += 2.0 * self.mass_damping * kinetic_energy(M, v)
-        if self.rub_slides or self.sliding:
-            e = np.exp(1j * q)
-            for i in self.rub_slides:
-                rate = float(constraints.jacobian(system.rubs[i], e) @ v)
-                power -= self._rub_force(i, e) * rate
-            for i in self.sliding:
-                rate = float(constraints.jacobian(system.slides[i], e) @ v)
-                force = float(lam[self.first_hold + self.held.index(i)])
-                power += self.stop_friction[i] * force * self.discrete.slides[i] * rate
+        for i in self.rub_slides:
+            rate = float(constraints.jacobian(self.system.rubs[i], e) @ v)
+            power -= self._rub_force(i, e) * rate
+        for i in self.sliding:
+            rate = float(constraints.jacobian(self.system.slides[i], e) @ v)
+            force = float(lam[self.first_hold + self.held.index(i)])
+            power += self.stop_friction[i] * force * self.discrete.slides[i] * rate
         return power
 
-    def power(self, q: Real, v: Real, lam: Real) -> float:
+    def _input_power(self, q: Real, v: Real, lam: Real) -> float:
         """Return the power of the inputs and of the moving walls that hold [W]."""
         power = 0.0
         if self.driven:
@@ -295,6 +312,32 @@ class Equations:
         result[:n] = q
         M, _ = inertia(self.system.H, self.J, e)
         result[n : 2 * n] = constraints.project_velocities(M, rows, rates, y[n : 2 * n])
+        return result
+
+    def project_from_here(self, t: float, y: Real) -> Real:
+        """Return what :meth:`project` does, for the state at which ``rate`` was called last.
+
+        Its matrix is at hand and the state is as close to the constraints as a step leaves it,
+        so that one correction of the positions and one of the velocities are enough; if they
+        are not, the iteration does the rest.
+        """
+        if self.sliding:
+            return self.project(t, y)
+        system, n, r = self.system, self.n, self.first_stick
+        c = self.offsets(t)
+        right = np.zeros(n + len(c))
+        right[n : n + r] = -constraints.values(self.B, c, np.exp(1j * y[:n]))[:r]
+        result = y.copy()
+        result[:n] += constraints.solve_again(self.factors, right)[:n]
+        e = np.exp(1j * result[:n])
+        open_by = constraints.values(self.B, c, e)[:r]
+        if len(open_by) and np.abs(open_by).max() > constraints.CLOSED * system.length:
+            return self.project(t, y)
+        rates = constraints.jacobian(self.B, e) @ result[n : 2 * n]
+        for k, i in enumerate(self.held):
+            rates[self.first_hold + k] += self.inputs.walls[i].rate
+        right[n:] = -rates
+        result[n : 2 * n] += constraints.solve_again(self.factors, right)[:n]
         return result
 
     # -- stops --

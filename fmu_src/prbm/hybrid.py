@@ -14,7 +14,7 @@ spring and not a series of small bounces.
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from . import constraints, contact, forces
-from .assembly import Complex, Real, assemble, calculated
+from .assembly import Complex, Real, System, assemble, calculated
 from .dynamics import IDLE, STICKS, Discrete, Equations, Inputs, Wall, check_input, input_names
 from .errors import ParameterError, SimulationError
 from .kinetics import inertia, kinetic_energy
@@ -35,11 +35,12 @@ from .statics import Equilibrium, equilibrium, release_velocity
 TIME_RESOLUTION = 1e-13  # s; events are located to 1e-12 s, some of which the projection needs
 TOUCHING = 1e-10  # of the size: gaps that close together with one that is being resolved
 RELEASE_GAP = 1e-9  # m; a wall may be touched at release by no more than this
-SHORTEST_FLIGHT = 1e-7 # s; the arc of a shorter bounce is below the resolution of a position
+SHORTEST_FLIGHT = 1e-7  # s; the arc of a shorter bounce is below the resolution of a position
 DEPENDENT = 1e-4  # share of a row's mobility that the stops leave; below, the stop carries all
 STILL = 1e-11  # of the velocity scale: what is left of a rate after an impact that stopped it
 CHATTER = 1000  # events ...
 CHATTER_SPAN = 1e-3  # ... within so many seconds are a motion that the model cannot follow
+DOUBT = 0.5  # of the largest force of a stop within a step: below, its release is looked for
 WATCHED = 8  # parts of a step at which the guards are looked at
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # of the step size control
 STEP_EXPONENT = -1.0 / PAIR.order
@@ -154,7 +155,7 @@ class Simulation:
         )
         self.step = step
         self.time = float(start_time)
-        self.frequency = fundamental_frequency(self)
+        self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
 
         shape = self.release_shape()
@@ -184,30 +185,26 @@ class Simulation:
     def release_shape(self) -> Equilibrium:
         """Return the static shape from which the motion starts."""
         release = self.mechanism.release
-        return equilibrium(
-            self.system, value(release, "displacement", self.values, "release")
-        )
+        return equilibrium(self.system, value(release, "displacement", self.values, "release"))
 
     def _check_walls(self) -> None:
+        """Refuse a penetrated wall, and begin with the impact if one is hit at once."""
         n = self.system.n
         e, v = np.exp(1j * self.front[:n]), self.front[n : 2 * n]
         gaps = self.equations.gaps(self.front_time, e)
-        for stop, gap in zip(self.mechanism.stops, gaps, strict=True):
-            if gap < -RELEASE_GAP:
-                raise ParameterError(
-                    f"the wall {stop.name} is penetrated by {-gap:.6g} m at release: "
-                    f"{stop.name}.position = {self._wall_target_of(stop.name):.6g} m, the hit "
-                    f"point is at {self._wall_target_of(stop.name) - gap:.6g} m; move the stop "
-                    "or release further back"
-                )
         rates = self.equations.gap_rates(e, v)
-        for i, gap in enumerate(gaps):
-            if gap <= RELEASE_GAP and rates[i] < 0.0:
+        for i, stop in enumerate(self.mechanism.stops):
+            if gaps[i] < -RELEASE_GAP:
+                wall = self.inputs.walls[i].position
+                raise ParameterError(
+                    f"the wall {stop.name} is penetrated by {-gaps[i]:.6g} m at release: "
+                    f"{stop.name}.position = {wall:.6g} m, the hit point is at "
+                    f"{wall - gaps[i]:.6g} m; move the stop or release further back"
+                )
+        for i in range(len(gaps)):
+            if gaps[i] <= RELEASE_GAP and rates[i] < 0.0:
                 self._impact(i)
                 break
-
-    def _wall_target_of(self, stop: str) -> float:
-        return self._wall_target([s.name for s in self.mechanism.stops].index(stop), 0.0)
 
     # -- inputs and parameters --
 
@@ -259,7 +256,9 @@ class Simulation:
     def _inputs(self, walls: tuple[Wall, ...]) -> Inputs:
         given, mechanism = self.given, self.mechanism
         return Inputs(
-            tuple(complex(given[f"{f.name}.x"], given[f"{f.name}.y"]) for f in mechanism.forces),
+            tuple(
+                complex(given[f"{f.name}.x"], given[f"{f.name}.y"]) for f in mechanism.forces
+            ),
             tuple(given[f"{f.name}.moment"] for f in mechanism.forces),
             complex(given["base.acceleration.x"], given["base.acceleration.y"]),
             walls,
@@ -293,12 +292,20 @@ class Simulation:
             )
         if time == self.time:
             return
+        before = dict(vars(self), latched=list(self.latched))
+        try:
+            self._advance(time)
+        except SimulationError:
+            vars(self).update(before)
+            raise
+
+    def _advance(self, time: float) -> None:
         self._move_walls(time)
         if self.changed:
             self._restart()
         while True:
             event = self.arc.event if self.arc else None
-            if event is not None and event.time <= time and self.front_time == event.time:
+            if event is not None and event.time <= time:
                 self.arc = None
                 self._happen(event)
             if self.front_time >= time:
@@ -332,6 +339,7 @@ class Simulation:
         """Return y = (q, v, dissipated energy, work) at the present time, on the constraints."""
         if self.arc is None or self.time >= self.front_time:
             return self.front
+        # the step that leads past the present time was taken under the present equations
         return self.equations.project(self.time, self.arc.at(self.time))
 
     # -- steps --
@@ -344,8 +352,14 @@ class Simulation:
         h = self.step or self.h or self._first_step(self.k1)
         h = h if self.step else min(h, self._largest_step())
         while True:
+            self.equations.trace.clear()
             k, y1 = stages(PAIR, f, t, y, h, self.k1)
             error = self._error(h * (PAIR.error @ k), y, y1)
+            if self.step and not error * self.tolerance <= 1.0:
+                raise SimulationError(
+                    f"the fixed step of {h:g} s is too long at t = {t:.9g} s: the state it leads "
+                    "to is not even near; shorten it"
+                )
             if self.step or error <= 1.0:
                 break
             h *= max(SHRINK, SAFETY * error**STEP_EXPONENT) if math.isfinite(error) else SHRINK
@@ -360,7 +374,7 @@ class Simulation:
         event = self._first_event(arc)
         if event is None:
             self.front_time, self.k1 = arc.end, k[-1]
-            self.front = self.equations.project(arc.end, y1)
+            self.front = self.equations.project_from_here(arc.end, y1)
         else:
             # a step cut short says little about the next one: keep its size
             self.h = h
@@ -423,7 +437,7 @@ class Simulation:
                 found += self._turning(arc, "rub", i, times, e, v)
             for i in self.equations.sliding:
                 found += self._turning(arc, "slide", i, times, e, v)
-        if self.equations.held or self.equations.rubbing:
+        if self._may_yield():
             found += self._yielding(arc)
         return min(found, key=lambda event: event.time) if found else None
 
@@ -507,6 +521,16 @@ class Simulation:
         row: Complex = self.system.rubs[i] if kind == "rub" else self.system.slides[i]
         return row
 
+    def _may_yield(self) -> bool:
+        """Tell whether the stages of the step come near to releasing or slipping."""
+        equations = self.equations
+        if equations.stuck or equations.rubbing:
+            return True
+        if not equations.held:
+            return False
+        forces_held = np.array(equations.trace)[:, equations.first_hold :]
+        return bool((forces_held.min(axis=0) <= DOUBT * forces_held.max(axis=0)).any())
+
     def _yielding(self, arc: Arc) -> list[Event]:
         """Return when a hold releases or a stick slips: a margin that is used up."""
         n, equations = self.system.n, self.equations
@@ -525,7 +549,9 @@ class Simulation:
                     t = a
                     if before[key] > 0.0:
                         t = float(
-                            brentq(lambda s, key=key: margins(s)[key], a, b, xtol=TIME_RESOLUTION)
+                            brentq(
+                                lambda s, key=key: margins(s)[key], a, b, xtol=TIME_RESOLUTION
+                            )
                         )
                     found.append(Event(t, *key))
                     break
@@ -540,10 +566,10 @@ class Simulation:
         for k, i in enumerate(equations.stuck):
             normal = float(lam[equations.first_hold + equations.held.index(i)])
             friction = abs(float(lam[equations.first_stick + k]))
-            result["slip", i] = equations.stop_friction[i] * normal - friction
+            result["slip slide", i] = equations.stop_friction[i] * normal - friction
         for k, i in enumerate(equations.rubbing):
             friction = abs(float(lam[equations.first_rub + k]))
-            result["budge", i] = equations.rub_limit(i, e) - friction
+            result["slip rub", i] = equations.rub_limit(i, e) - friction
         return result
 
     # -- events --
@@ -556,6 +582,8 @@ class Simulation:
         elif event.kind == "release":
             self._set_discrete(self.discrete.with_hold(event.index, False))
             self._settle()
+        elif event.kind.startswith("slip "):
+            self._settle(yields=(event.kind.removeprefix("slip "), event.index))
         else:
             self._settle()
 
@@ -613,32 +641,21 @@ class Simulation:
         """Tell whether a stop that is struck slowly comes to rest.
 
         It does if, after an impact without restitution, it is pressed, and it closes below
-        ``rest_speed`` or would bounce for less than :data:`SHORTEST_FLIGHT`.
+        ``rest_speed`` or comes from a bounce shorter than :data:`SHORTEST_FLIGHT`.
         """
-        limit = self._field(i, "rest_speed")
-        eps = self._field(i, "restitution")
-        if speed > max(limit, 1.0 * SHORTEST_FLIGHT * 9.81e3):
-            return False
         after, _, _ = self._impulse(q, v, [i], held, np.zeros(1))
-        trial = self._holding([i, *held], q, after)
-        if i not in trial:
+        holding = self._holding([i, *held], q, after)
+        if i not in holding:
             return False
-        if speed < limit:
+        if speed < self._field(i, "rest_speed"):
             return True
-        equations = Equations(
-            self.system, self.inputs, Discrete(
-                tuple(j in trial for j in range(len(self.discrete.holds))),
-                (IDLE,) * len(self.discrete.slides),
-                (IDLE,) * len(self.discrete.rubs),
-            ), self.omega,
-        )  # fmt: skip
+        equations = self._equations_holding(holding)
         _, lam, M = equations.accelerations(q, after)
         e = np.exp(1j * q)
         loops = constraints.jacobian(self.system.loops, e)
         G = constraints.jacobian(self.system.gaps[i : i + 1], e)
-        mobility = float((G @ contact.response(M, loops, G)).item())
-        pressing = float(equations.stop_forces(lam)[i]) * mobility
-        return 2.0 * eps * speed < pressing * SHORTEST_FLIGHT
+        pressing = float(equations.stop_forces(lam)[i]) * _mobility(M, loops, G)
+        return 2.0 * speed < pressing * SHORTEST_FLIGHT
 
     def _impulse(
         self, q: Real, v: Real, struck: list[int], held: list[int], restitution: Real
@@ -725,15 +742,13 @@ class Simulation:
                 )
 
     def _holding(self, candidates: list[int], q: Real, v: Real) -> list[int]:
-        """Return which of the stops at rest are pressed: their forces are positive together."""
-        holding = sorted(set(candidates))
+        """Return which of the stops at rest are pressed: their forces are positive together.
+
+        A stop that can move only with others that hold is left to them.
+        """
+        holding = self._independent(sorted(set(candidates)), q)
         while holding:
-            discrete = Discrete(
-                tuple(i in holding for i in range(len(self.discrete.holds))),
-                (IDLE,) * len(self.discrete.slides),
-                (IDLE,) * len(self.discrete.rubs),
-            )
-            equations = Equations(self.system, self.inputs, discrete, self.omega)
+            equations = self._equations_holding(holding)
             _, lam, _ = equations.accelerations(q, v)
             pressed = equations.stop_forces(lam)
             worst = min(holding, key=lambda i: float(pressed[i]))
@@ -742,10 +757,41 @@ class Simulation:
             holding.remove(worst)
         return []
 
-    def _settle(self, resting: list[int] | range = ()) -> None:  # type: ignore[assignment]
+    def _independent(self, stops: list[int], q: Real) -> list[int]:
+        """Return the stops of a list that keep a mobility of their own, first come first."""
+        if len(stops) < 2:
+            return stops
+        e = np.exp(1j * q)
+        M, _ = inertia(self.system.H, self.equations.J, e)
+        loops = constraints.jacobian(self.system.loops, e)
+        kept: list[int] = []
+        for i in stops:
+            held = np.vstack([loops, constraints.jacobian(self.system.gaps[kept], e)])
+            G = constraints.jacobian(self.system.gaps[i : i + 1], e)
+            if _mobility(M, held, G) > DEPENDENT * _mobility(M, loops, G):
+                kept.append(i)
+        return kept
+
+    def _equations_holding(self, stops: list[int]) -> Equations:
+        """Return the equations in which these stops hold and nothing rubs."""
+        discrete = Discrete(
+            tuple(i in stops for i in range(len(self.discrete.holds))),
+            (IDLE,) * len(self.discrete.slides),
+            (IDLE,) * len(self.discrete.rubs),
+        )
+        return Equations(self.system, self.inputs, discrete, self.omega)
+
+    def _settle(
+        self, resting: Sequence[int] = (), yields: tuple[str, int] | None = None
+    ) -> None:
         """Choose what holds, sticks and slides at the front, from its state alone.
 
-        ``resting`` are open stops that touch without closing or opening.
+        Parameters
+        ----------
+        resting : sequence of int
+            Open stops that touch without closing or opening.
+        yields : (str, int) or None
+            What has just used up its friction and cannot stick.
         """
         n, t = self.system.n, self.front_time
         q, v = self.front[:n], self.front[n : 2 * n]
@@ -763,16 +809,16 @@ class Simulation:
         self._set_discrete(Discrete(holds, tuple(slides), tuple(rubs)))
         for i in holding:
             if self._field(i, "friction") > 0.0:
-                slides[i] = self._slide_state("slide", i, q, v)
+                slides[i] = self._slide_state("slide", i, q, v, yields == ("slide", i))
                 self._set_discrete(replace(self.discrete, slides=tuple(slides)))
         for i in range(len(rubs)):
             if self.equations.rub_law[i][0] > 0.0:
-                rubs[i] = self._slide_state("rub", i, q, v)
+                rubs[i] = self._slide_state("rub", i, q, v, yields == ("rub", i))
                 self._set_discrete(replace(self.discrete, rubs=tuple(rubs)))
         if holding:
             self.front = self.equations.project(t, self.front)
 
-    def _slide_state(self, kind: str, i: int, q: Real, v: Real) -> int:
+    def _slide_state(self, kind: str, i: int, q: Real, v: Real, yields: bool) -> int:
         """Return whether something slides (its sign), sticks, or is idle.
 
         Where the loops and the stops that hold leave the row no mobility of its own, the stop
@@ -783,9 +829,7 @@ class Simulation:
         row = constraints.jacobian(self._slide_row(kind, i)[None, :], e)
         loops = constraints.jacobian(self.system.loops, e)
         held = constraints.jacobian(self.equations.B, e)
-        free = float((row @ contact.response(M, loops, row)).item())
-        left = float((row @ contact.response(M, held, row)).item())
-        if left <= DEPENDENT * free or free == 0.0:
+        if _mobility(M, held, row) <= DEPENDENT * _mobility(M, loops, row):
             return IDLE
         speed = float((row @ v).item())
         if abs(speed) > self._still():
@@ -800,7 +844,7 @@ class Simulation:
             friction = float(lam[equations.first_stick + equations.stuck.index(i)])
             normal = float(lam[equations.first_hold + equations.held.index(i)])
             limit = equations.stop_friction[i] * normal
-        if abs(friction) <= limit:
+        if abs(friction) <= limit and not yields:
             return STICKS
         return -1 if friction > 0.0 else 1
 
@@ -853,7 +897,7 @@ class Simulation:
         out["energy.work"] = float(y[2 * n + 1])
         for i, stop in enumerate(self.mechanism.stops):
             out[f"{stop.name}.contact"] = self.discrete.holds[i]
-            for name, x in asdict(self.latched[i]).items():
+            for name, x in vars(self.latched[i]).items():
                 out[f"{stop.name}.{name}"] = x
         for number, j in enumerate(system.links, start=1):
             out[f"link[{number}].angle"] = float(q[j])
@@ -932,12 +976,16 @@ class Simulation:
         self._output_cache = None
 
 
-def fundamental_frequency(simulation: Simulation) -> float:
+def _mobility(M: Real, held: Real, row: Real) -> float:
+    """Return the inverse mass along a row (1, n) while others are held [1/kg]."""
+    return float((row @ contact.response(M, held, row)).item())
+
+
+def fundamental_frequency(system: System) -> float:
     """Return the fundamental frequency about the equilibrium under gravity [Hz].
 
     Zero if that equilibrium is unstable.
     """
-    system = simulation.system
     return max(0.0, float(modes(system, equilibrium(system)).frequency[0]))
 
 

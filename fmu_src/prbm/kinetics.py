@@ -9,7 +9,6 @@ Sources
 .. [1] H. Vallery, A. L. Schwab, Advanced Dynamics, Delft (the TMT method).
 """
 
-import numpy as np
 
 from .assembly import Complex, Real
 

@@ -156,10 +156,14 @@ class Parameter:
             If it is not a finite number within the bounds.
         """
         unit = f" {self.unit}" if self.unit else ""
-        if isinstance(value, bool) or not isinstance(value, int | float) and not hasattr(
-            value, "__float__"
+        if (
+            isinstance(value, bool)
+            or (not isinstance(value, int | float)
+            and not hasattr(value, "__float__"))
         ):
-            raise ParameterError(f"{self.name} = {value!r} must be a number{unit and ' in'}{unit}")
+            raise ParameterError(
+                f"{self.name} = {value!r} must be a number{unit and ' in'}{unit}"
+            )
         number = float(value)
         if not math.isfinite(number):
             raise ParameterError(f"{self.name} = {number}{unit} must be a finite number")
@@ -589,7 +593,7 @@ def value(part: object, name: str, values: Mapping[str, float], prefix: str = ""
     quantity = getattr(part, name)
     if isinstance(quantity, str):
         return affine(quantity)(values)
-    return values[f"{prefix or getattr(part, 'name')}.{name}"]
+    return values[f"{prefix or part.name}.{name}"]
 
 
 def body_of(reference: str) -> str:

@@ -100,7 +100,9 @@ DORMAND_PRINCE = Tableau(
 )  # fmt: skip
 
 
-def stages(tableau: Tableau, f: Rate, t: float, y: Real, h: float, k1: Real) -> tuple[Real, Real]:
+def stages(
+    tableau: Tableau, f: Rate, t: float, y: Real, h: float, k1: Real
+) -> tuple[Real, Real]:
     """Return the stages k (s, n) and the new state y1 (n,) of a step of size h from t, y.
 
     Examples
