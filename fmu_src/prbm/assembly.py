@@ -466,9 +466,7 @@ def unit(degrees: float) -> complex:
     1j
     """
     quarter, rest = divmod(degrees, 90.0)
-    return complex(1j ** int(quarter % 4)) * (
-        cmath.exp(1j * math.radians(rest)) if rest else 1.0
-    )
+    return complex(1j ** int(quarter % 4)) * (cmath.exp(1j * math.radians(rest)) if rest else 1.0)
 
 
 def along(u: complex, place: Place, e0: Complex) -> tuple[Complex, float]:

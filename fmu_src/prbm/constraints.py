@@ -12,13 +12,11 @@ Sources
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import get_lapack_funcs
+from scipy.linalg.lapack import dgesv, dgetrs
 
 from .assembly import Complex, Real
 from .errors import SimulationError
 from .kinetics import inertia
-
-gesv, getrs = get_lapack_funcs(("gesv", "getrs"), (np.zeros(1),))
 
 Factors = tuple[Real, NDArray[np.int32]]
 
@@ -74,7 +72,7 @@ def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
     SimulationError
         As :func:`solve`.
     """
-    lu, pivots, x, info = gesv(kkt, right)
+    lu, pivots, x, info = dgesv(kkt, right)
     if info != 0:
         raise SimulationError(
             "the equations of motion are singular here: two constraints repeat each other, or a "
@@ -85,7 +83,7 @@ def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
 
 def solve_again(factors: Factors, right: Real) -> Real:
     """Solve with the factors of :func:`factor_and_solve` and another right side."""
-    x: Real = getrs(*factors, right)[0]
+    x: Real = dgetrs(*factors, right)[0]
     return x
 
 

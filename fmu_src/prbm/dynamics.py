@@ -10,6 +10,7 @@ row.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -48,6 +49,9 @@ class Discrete:
         return replace(self, holds=tuple(changed))
 
 
+T = TypeVar("T", float, Real, float | Real)
+
+
 @dataclass(frozen=True)
 class Wall:
     """A wall in uniform motion: its position along the direction of the stop."""
@@ -56,7 +60,7 @@ class Wall:
     rate: float = 0.0
     since: float = 0.0
 
-    def at(self, t: float) -> float:
+    def at(self, t: T) -> T:
         """Return the position at time t [m]."""
         return self.position + self.rate * (t - self.since)
 
@@ -87,9 +91,7 @@ def input_names(system: System) -> tuple[str, ...]:
     """Return the names of the inputs in the order of the interface."""
     mechanism = system.mechanism
     names = [f"{f.name}.{axis}" for f in mechanism.forces for axis in ("x", "y", "moment")]
-    names += [
-        f"{s.name}.{what}" for s in mechanism.stops for what in ("displacement", "velocity")
-    ]
+    names += [f"{s.name}.{what}" for s in mechanism.stops for what in ("displacement", "velocity")]
     return (*names, "base.acceleration.x", "base.acceleration.y")
 
 
@@ -124,9 +126,7 @@ class Equations:
         Angular frequency of the fundamental mode, for the damping ratio [rad/s].
     """
 
-    def __init__(
-        self, system: System, inputs: Inputs, discrete: Discrete, omega: float
-    ) -> None:
+    def __init__(self, system: System, inputs: Inputs, discrete: Discrete, omega: float) -> None:
         self.system, self.inputs, self.discrete = system, inputs, discrete
         values, mechanism = system.values, system.mechanism
         self.n = system.n
@@ -342,7 +342,7 @@ class Equations:
 
     # -- stops --
 
-    def gaps(self, t: float, e: Complex) -> Real:
+    def gaps(self, t: float | Real, e: Complex) -> Real:
         """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row a time t."""
         walls = np.array([wall.at(t) for wall in self.inputs.walls]).T
         result: Real = (e @ self.system.gaps.T).real + self.system.gaps_c + walls

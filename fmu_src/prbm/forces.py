@@ -42,7 +42,7 @@ def field_row(S: Complex, acceleration: complex) -> Complex:
     acceleration : complex
         Of gravity, or minus that of the base [m/s^2].
     """
-    return 1j * np.conj(acceleration) * S
+    return 1j * acceleration.conjugate() * S
 
 
 def force_row(A: Complex, force: complex) -> Complex:
@@ -56,7 +56,7 @@ def force_row(A: Complex, force: complex) -> Complex:
     >>> float((w @ np.array([1j])).real)
     -6.0
     """
-    return 1j * np.conj(force) * A
+    return 1j * force.conjugate() * A
 
 
 def generalised(w: Complex, e: Complex) -> Real:

@@ -16,6 +16,7 @@ spring and not a series of small bounces.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -160,7 +161,7 @@ class Simulation:
 
         shape = self.release_shape()
         velocity = release_velocity(
-            self.system, shape.q, value(mechanism.release, "velocity", self.values, "release")
+            self.system, shape.q, value(mechanism.release, "velocity", self.values)
         )
         walls = tuple(Wall(self._wall_target(i, 0.0)) for i in range(len(mechanism.stops)))
         self.discrete = Discrete(
@@ -185,7 +186,7 @@ class Simulation:
     def release_shape(self) -> Equilibrium:
         """Return the static shape from which the motion starts."""
         release = self.mechanism.release
-        return equilibrium(self.system, value(release, "displacement", self.values, "release"))
+        return equilibrium(self.system, value(release, "displacement", self.values))
 
     def _check_walls(self) -> None:
         """Refuse a penetrated wall, and begin with the impact if one is hit at once."""
@@ -256,9 +257,7 @@ class Simulation:
     def _inputs(self, walls: tuple[Wall, ...]) -> Inputs:
         given, mechanism = self.given, self.mechanism
         return Inputs(
-            tuple(
-                complex(given[f"{f.name}.x"], given[f"{f.name}.y"]) for f in mechanism.forces
-            ),
+            tuple(complex(given[f"{f.name}.x"], given[f"{f.name}.y"]) for f in mechanism.forces),
             tuple(given[f"{f.name}.moment"] for f in mechanism.forces),
             complex(given["base.acceleration.x"], given["base.acceleration.y"]),
             walls,
@@ -393,9 +392,11 @@ class Simulation:
         return scale
 
     def _omega_scale(self) -> float:
-        return self.omega or math.sqrt(
-            float(np.abs(self.system.K).max() / np.abs(self.system.H).max())
-        )
+        """Return the angular frequency against which rates are measured [rad/s]."""
+        if self.omega > 0.0:
+            return self.omega
+        ratio: float = np.abs(self.system.K).max() / np.abs(self.system.H).max()
+        return math.sqrt(ratio)
 
     def _energy_scale(self) -> float:
         """Return the energy of one radian in the softest direction of the springs [J]."""
@@ -410,7 +411,7 @@ class Simulation:
         """Return a first step size from the size of the rates (Hairer, II.4)."""
         rate = k1 / self._scales(self.front)
         size = math.sqrt(float(rate @ rate) / len(rate))
-        return min(self._largest_step(), 0.1 * self.tolerance**0.2 / max(size, 1e-6))
+        return min(self._largest_step(), 0.1 * math.pow(self.tolerance, 0.2) / max(size, 1e-6))
 
     def _largest_step(self) -> float:
         return LARGEST_STEP * 2 * math.pi / self._omega_scale()
@@ -544,14 +545,12 @@ class Simulation:
         middle, end = arc.start + arc.h / 2, arc.start + arc.h
         looks = [(t, margins(t)) for t in (arc.start, middle, end)]
         for key in looks[0][1]:
-            for (a, before), (b, after) in zip(looks, looks[1:], strict=False):
+            for (a, before), (b, after) in pairwise(looks):
                 if after[key] <= 0.0:
                     t = a
                     if before[key] > 0.0:
                         t = float(
-                            brentq(
-                                lambda s, key=key: margins(s)[key], a, b, xtol=TIME_RESOLUTION
-                            )
+                            brentq(lambda s, key=key: margins(s)[key], a, b, xtol=TIME_RESOLUTION)
                         )
                     found.append(Event(t, *key))
                     break
@@ -624,7 +623,7 @@ class Simulation:
         restitution = np.array(
             [0.0 if i in soft else self._field(i, "restitution") for i in struck]
         )
-        after, normal, tangential = self._impulse(q, v, struck, held, restitution)
+        after, normal, _ = self._impulse(q, v, struck, held, restitution)
         self._book(struck, soft, q, v, after, normal)
         rates_after = self.equations.gap_rates(e, after)
         resting = [i for i in (*struck, *held) if rates_after[i] <= self._still()]
@@ -781,9 +780,7 @@ class Simulation:
         )
         return Equations(self.system, self.inputs, discrete, self.omega)
 
-    def _settle(
-        self, resting: Sequence[int] = (), yields: tuple[str, int] | None = None
-    ) -> None:
+    def _settle(self, resting: Sequence[int] = (), yields: tuple[str, int] | None = None) -> None:
         """Choose what holds, sticks and slides at the front, from its state alone.
 
         Parameters

@@ -9,7 +9,6 @@ Sources
 .. [1] H. Vallery, A. L. Schwab, Advanced Dynamics, Delft (the TMT method).
 """
 
-
 from .assembly import Complex, Real
 
 

@@ -15,6 +15,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 from .errors import MechanismError, ParameterError
 from .flexure import MODELS, FlexureModel
@@ -156,14 +157,10 @@ class Parameter:
             If it is not a finite number within the bounds.
         """
         unit = f" {self.unit}" if self.unit else ""
-        if (
-            isinstance(value, bool)
-            or (not isinstance(value, int | float)
-            and not hasattr(value, "__float__"))
+        if isinstance(value, bool) or (
+            not isinstance(value, int | float) and not hasattr(value, "__float__")
         ):
-            raise ParameterError(
-                f"{self.name} = {value!r} must be a number{unit and ' in'}{unit}"
-            )
+            raise ParameterError(f"{self.name} = {value!r} must be a number{unit and ' in'}{unit}")
         number = float(value)
         if not math.isfinite(number):
             raise ParameterError(f"{self.name} = {number}{unit} must be a finite number")
@@ -285,11 +282,14 @@ class Release:
     ``velocity`` [m/s] along it, with the least kinetic energy.
     """
 
+    name: ClassVar[str] = "release"
     body: str
     direction: float = 0.0
     displacement: Quantity = 0.0
     velocity: Quantity = 0.0
 
+
+Part = Body | FlexureType | Flexure | Stop | Friction | Force | Release
 
 TINY_LENGTH = 1e-9  # m; below this a dimension of a mechanism is a mistake, not a nanostructure
 TINY_MASS = 1e-15  # kg; a cubic micrometre of silicon has 2e-15 kg
@@ -440,7 +440,7 @@ class Mechanism:
     def _parameters(self) -> Iterator[Parameter]:
         yield from self.geometry
         for kind in self.flexure_types:
-            yield from _fields(kind, kind.name)
+            yield from _fields(kind)
             for c in self.model(kind).coefficients:
                 value = kind.coefficients.get(c.name, c.value)
                 if not isinstance(value, str):
@@ -448,13 +448,13 @@ class Mechanism:
                         f"{kind.name}.{c.name}", value, "", c.description, c.minimum, c.maximum
                     )
         for body in self.bodies:
-            yield from _fields(body, body.name)
+            yield from _fields(body)
         for axis, g in zip("xy", self.gravity, strict=True):
             yield Parameter(
                 f"gravity.{axis}", g, "m/s2", f"Acceleration of gravity along {axis}",
                 -1e6, 1e6, 10.0,
             )  # fmt: skip
-        yield from _fields(self.release, "release")
+        yield from _fields(self.release)
         yield Parameter(
             "solver.tolerance", 1e-8, "",
             "Relative tolerance of the integration, unless the importer gives one", 1e-13, 1e-2,
@@ -470,8 +470,9 @@ class Mechanism:
             "Damping in proportion to the rate of every spring, as a time constant", 0.0, 1.0,
             1e-5, tunable=True,
         )  # fmt: skip
-        for part in (*self.frictions, *self.stops):
-            yield from _fields(part, part.name)
+        tuned: tuple[Part, ...] = (*self.frictions, *self.stops)
+        for part in tuned:
+            yield from _fields(part)
 
     def model(self, kind: FlexureType) -> FlexureModel:
         """Return the flexure model of a type."""
@@ -497,7 +498,13 @@ class Mechanism:
 
     def _check_names(self) -> None:
         seen: set[str] = {GROUND}
-        parts = (*self.bodies, *self.flexures, *self.stops, *self.frictions, *self.forces)
+        parts: tuple[Part, ...] = (
+            *self.bodies,
+            *self.flexures,
+            *self.stops,
+            *self.frictions,
+            *self.forces,
+        )
         for name in (part.name for part in parts):
             if name in seen:
                 raise MechanismError(f"the name {name!r} is used twice: give each part its own")
@@ -539,7 +546,8 @@ class Mechanism:
                     f"{flexure.name}.ends = {flexure.ends!r}: each end is a clamp or a pin, and "
                     "at least one is a clamp"
                 )
-        for part in (*self.stops, *self.frictions, *self.forces):
+        attached: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
+        for part in attached:
             if part.body not in bodies:
                 raise MechanismError(f"{part.name}.body = {part.body!r} is not described")
         if self.release.body not in bodies:
@@ -574,26 +582,25 @@ class Mechanism:
             yield from ((f"{stop.name}.point", c) for c in stop.point)
         for kind in self.flexure_types:
             yield from ((f"{kind.name}.{n}", c) for n, c in kind.coefficients.items())
-        named = [(part.name, part) for part in (*self.flexure_types, *self.bodies)]
-        named += [(part.name, part) for part in (*self.frictions, *self.stops)]
-        for name, part in (*named, ("release", self.release)):
-            yield from ((f"{name}.{f}", getattr(part, f)) for f in FIELDS[type(part)])
+        parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.frictions)
+        for part in (*parts, *self.stops, self.release):
+            yield from ((f"{part.name}.{f}", getattr(part, f)) for f in FIELDS[type(part)])
 
 
-def _fields(part: object, prefix: str) -> Iterator[Parameter]:
+def _fields(part: Part) -> Iterator[Parameter]:
     """Yield the parameters that a part's numbers are."""
     for name, meta in FIELDS[type(part)].items():
-        value = getattr(part, name)
-        if not isinstance(value, str):
-            yield Parameter(f"{prefix}.{name}", value, *meta)
+        quantity = getattr(part, name)
+        if not isinstance(quantity, str):
+            yield Parameter(f"{part.name}.{name}", quantity, *meta)
 
 
-def value(part: object, name: str, values: Mapping[str, float], prefix: str = "") -> float:
+def value(part: Part, name: str, values: Mapping[str, float]) -> float:
     """Return a field of a part: the parameter ``part.field``, or the expression that it is."""
     quantity = getattr(part, name)
     if isinstance(quantity, str):
         return affine(quantity)(values)
-    return values[f"{prefix or part.name}.{name}"]
+    return values[f"{part.name}.{name}"]
 
 
 def body_of(reference: str) -> str:

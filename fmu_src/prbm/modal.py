@@ -104,9 +104,7 @@ def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> floa
     return -float(momentum @ after) / arriving
 
 
-def modal_restitution(
-    system: System, shape: Equilibrium, stop: int, restitution: float
-) -> float:
+def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution: float) -> float:
     r"""Return the modal restitution of an arriving pure fundamental mode (algebraic) [-].
 
     With the effective share of the fundamental mode in the hit,

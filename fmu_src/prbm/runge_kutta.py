@@ -60,7 +60,8 @@ class Tableau:
     @property
     def weights(self) -> Real:
         """Weights of the solution, the last row of a."""
-        return self.a[-1]
+        result: Real = self.a[-1]
+        return result
 
 
 def _lower(*rows: tuple[float, ...]) -> Real:
@@ -100,9 +101,7 @@ DORMAND_PRINCE = Tableau(
 )  # fmt: skip
 
 
-def stages(
-    tableau: Tableau, f: Rate, t: float, y: Real, h: float, k1: Real
-) -> tuple[Real, Real]:
+def stages(tableau: Tableau, f: Rate, t: float, y: Real, h: float, k1: Real) -> tuple[Real, Real]:
     """Return the stages k (s, n) and the new state y1 (n,) of a step of size h from t, y.
 
     Examples
