@@ -305,7 +305,8 @@ class _Assembler:
             self.J[j] += mass * abs(vector) ** 2 / 12
 
     def mass(self, place: Place, mass: float) -> None:
-        if mass > 0.0:
+        """Add a point mass, unless it is part of the ground."""
+        if mass > 0.0 and place.A:
             self.masses.append((place, mass))
 
     def segments(self, flexure: Flexure) -> Segments:

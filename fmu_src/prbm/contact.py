@@ -23,10 +23,13 @@ import numpy as np
 
 from . import constraints
 from .assembly import Real
+from .errors import SimulationError
 
 FEASIBLE = 1e-10  # of the largest approach: what the complementarity may be violated by
 SWEEPS = 2000  # of Gauss-Seidel over several contacts with friction
 WEDGED = 1e-10  # of the inverse normal mass: a smaller rate of the approach is a rounding
+ROUNDING = 1e-12  # of the rates before: what is left of a rate that has vanished
+RELAXATIONS = (1.0, 0.3, 0.05)  # of the sweeps, tried in this order
 SETTLED = 1e-14  # change of the impulses at which the sweeps end, relative
 
 
@@ -133,6 +136,8 @@ def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[floa
     """
     nn, nt, tt = float(W[0, 0]), float(W[0, 1]), float(W[1, 1])
     u_n, u_t = float(u[0]), float(u[1])
+    small_n = ROUNDING * abs(u_n)
+    small_t = ROUNDING * (abs(u_t) + abs(u_n) * math.sqrt(tt / nn) if nn > 0.0 else abs(u_t))
     p_n = p_t = work = 0.0
     while u_n < 0.0:
         ratio = _friction_ratio(nt, tt, u_t, friction)
@@ -146,6 +151,9 @@ def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[floa
         p_n, p_t = p_n + step, p_t + ratio * step
         u_n = 0.0 if step == stops_closing else u_n + rate_n * step
         u_t = 0.0 if step == stops_sliding else u_t + rate_t * step
+    # with one degree of freedom both rates vanish together, up to a rounding
+    u_n = u_n if u_n > small_n else 0.0
+    u_t = u_t if abs(u_t) > small_t else 0.0
     left = restitution**2 * work
     while left > 0.0:
         ratio = _friction_ratio(nt, tt, u_t, friction)
@@ -159,16 +167,17 @@ def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[floa
         p_n, p_t = p_n + step, p_t + ratio * step
         if step == spent:
             break
-        u_n, u_t = u_n + rate_n * step, 0.0
+        u_n, u_t = max(0.0, u_n + rate_n * step), 0.0
     return p_n, p_t
 
 
 def _restitution_ends(u_n: float, rate_n: float, left: float) -> float:
     """Return the impulse after which the work of restitution is done, or opening stops."""
     root = u_n**2 + 2.0 * rate_n * left
-    if root > 0.0:
-        return 2.0 * left / (u_n + math.sqrt(root))
-    return -u_n / rate_n if rate_n < 0.0 else math.inf
+    if root < 0.0:
+        return -u_n / rate_n
+    total = u_n + math.sqrt(root)
+    return 2.0 * left / total if total > 0.0 else math.inf
 
 
 def _friction_ratio(nt: float, tt: float, u_t: float, friction: float) -> float:
@@ -184,9 +193,10 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
     r"""Return the impulses of several hits at once with friction, without an order.
 
     Compression: P_n >= 0, u_n >= 0, complementary, and Coulomb's law in each contact, solved by
-    Gauss-Seidel to a fixed point (where the order no longer matters).  Restitution: each normal
-    impulse again, times s eps, with friction; s in [0, 1] is the largest for which the work of
-    the normal impulses does not exceed eps^2 times that of the compression.
+    Gauss-Seidel to a fixed point (where the order no longer matters).  Restitution: at least
+    s eps times each normal impulse again, more where a gap would close, with friction; s in
+    [0, 1] is the largest for which the work of the normal impulses does not exceed eps^2 times
+    that of the compression.
 
     Parameters
     ----------
@@ -201,9 +211,14 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
     -------
     P : (2 k,)
         Impulses, the normal ones first [N s].
+
+    Raises
+    ------
+    SimulationError
+        If the sweeps find no impulses that satisfy both laws.
     """
     k = len(friction)
-    P = _sweep(W, u, friction, None)
+    P = _sweep(W, u, friction, np.zeros(k))
     after = u + W @ P
     lost = float(-(P[:k] * (u + after)[:k] / 2) @ restitution**2)
     wanted = restitution * P[:k]
@@ -216,28 +231,32 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
     low, high = 0.0, 1.0
     while gain > lost and high - low > 1e-12:
         s = (low + high) / 2
-        R, trial = rebound(s)
-        low, high = (s, high) if trial <= lost else (low, s)
-        if high - low <= 1e-12:
-            R, gain = rebound(low)
-    return P + R
+        low, high = (s, high) if rebound(s)[1] <= lost else (low, s)
+    return P + (R if gain <= lost else rebound(low)[0])
 
 
-def _sweep(W: Real, u: Real, friction: Real, normal: Real | None) -> Real:
-    """Gauss-Seidel over contacts with Coulomb friction; ``normal`` impulses given or sought."""
+def _sweep(W: Real, u: Real, friction: Real, least: Real) -> Real:
+    """Gauss-Seidel over contacts: P_n >= least, u_n >= 0, complementary; Coulomb's law.
+
+    Strongly coupled contacts can make the sweeps run in circles; shorter steps lead out.
+    """
     k = len(friction)
-    P = np.zeros(2 * k)
-    if normal is not None:
-        P[:k] = normal
-    for _ in range(SWEEPS):
-        last = P.copy()
-        for i in range(k):
-            if normal is None and W[i, i] > 0.0:
-                P[i] = max(0.0, P[i] - float(u[i] + W[i] @ P) / W[i, i])
-            j = k + i
-            if W[j, j] > 0.0:
-                limit = friction[i] * P[i]
-                P[j] = min(limit, max(-limit, P[j] - float(u[j] + W[j] @ P) / W[j, j]))
-        if np.abs(P - last).max() <= SETTLED * np.abs(P).max():
-            break
-    return P
+    for relaxation in RELAXATIONS:
+        P = np.concatenate([least, np.zeros(k)])
+        for _ in range(SWEEPS):
+            last = P.copy()
+            for i in range(k):
+                if W[i, i] > 0.0:
+                    wanted = P[i] - relaxation * float(u[i] + W[i] @ P) / W[i, i]
+                    P[i] = max(least[i], wanted)
+                j = k + i
+                if W[j, j] > 0.0:
+                    limit = friction[i] * P[i]
+                    wanted = P[j] - relaxation * float(u[j] + W[j] @ P) / W[j, j]
+                    P[j] = min(limit, max(-limit, wanted))
+            if np.abs(P - last).max() <= SETTLED * relaxation * np.abs(P).max():
+                return P
+    raise SimulationError(
+        "several stops are hit at once with friction, and Coulomb's law has no answer for them; "
+        "reduce the friction of the stops, or move them apart"
+    )

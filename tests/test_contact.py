@@ -1,0 +1,168 @@
+"""Impacts in contact space: Newton for several stops, Routh and Stronge with friction."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from prbm import contact
+
+RNG = np.random.default_rng(0)
+
+
+def energy_change(W, u, P):
+    """Return T+ - T- = P.u + P.W P/2 for walls at rest."""
+    return float(P @ u + P @ W @ P / 2)
+
+
+def random_mobility(rng, size, rank):
+    A = rng.normal(size=(size, rank)) * 10 ** rng.uniform(-2, 2)
+    return A @ A.T
+
+
+@pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
+def test_single_hit_opens_at_restitution_times_closing(restitution):
+    """Newton's law, and Carnot's loss: T+ - T- = -(1 - eps^2) m_eff u^2 / 2."""
+    W, u = np.array([[2.5]]), np.array([-1.7])
+    P = contact.newton(W, u, np.array([restitution]))
+    assert (u + W @ P).item() == pytest.approx(-restitution * u.item(), abs=1e-15)
+    assert energy_change(W, u, P) == pytest.approx(
+        -0.5 * (1 - restitution**2) / 2.5 * 1.7**2, abs=1e-15
+    )
+
+
+def test_several_hits_satisfy_the_complementarity_and_never_gain():
+    """P >= 0, u+ + eps u- >= 0, complementary; the loss is sum P (1 - eps) |u-| / 2."""
+    for _ in range(2000):
+        k = int(RNG.integers(2, 5))
+        W = random_mobility(RNG, k, int(RNG.integers(1, k + 1)))
+        u = W @ RNG.normal(size=k)  # rates that the mechanism can have
+        closing = np.minimum(u, 0.0) < 0
+        u, W = u[closing], W[np.ix_(closing, closing)]
+        if not len(u):
+            continue
+        eps = RNG.uniform(0, 1, len(u))
+        P = contact.newton(W, u, eps)
+        slack = u + W @ P + eps * u
+        size = np.abs(u).max()
+        assert (P >= 0).all()
+        assert slack.min() >= -1e-8 * size
+        assert np.abs(P * slack).max() <= 1e-8 * size * max(1.0, P.max())
+        assert energy_change(W, u, P) <= 1e-9 * size * max(1.0, P.max())
+
+
+def test_two_stops_hit_at_once_need_no_order():
+    """Exchanging the stops exchanges the impulses."""
+    for _ in range(300):
+        W = random_mobility(RNG, 2, 2)
+        u, eps = -RNG.uniform(0.1, 1, 2), RNG.uniform(0, 1, 2)
+        swap = np.array([1, 0])
+        P = contact.newton(W, u, eps)
+        Q = contact.newton(W[np.ix_(swap, swap)], u[swap], eps[swap])
+        np.testing.assert_allclose(P, Q[swap], rtol=1e-9, atol=1e-12 * P.max())
+
+
+def test_a_bar_that_falls_flat_on_two_stops_rebounds_flat():
+    """A free bar (m = 2, J = 0.5) hits stops at +-1: each gets half of (1 + eps) m v."""
+    m, J = 2.0, 0.5
+    G = np.array([[1.0, 1.0], [1.0, -1.0]])  # gap rates from (y', phi')
+    W = G @ np.diag([1 / m, 1 / J]) @ G.T
+    P = contact.newton(W, np.array([-3.0, -3.0]), np.array([0.5, 0.5]))
+    np.testing.assert_allclose(P, (1 + 0.5) * m * 3.0 / 2, rtol=1e-13)
+
+
+def newton_with_coulomb(W, u, mu, eps):
+    """Return what Newton's law with sliding friction says; Kane's paradox lives here."""
+    ratio = -mu * np.sign(u[1])
+    P_n = -(1 + eps) * u[0] / (W[0, 0] + ratio * W[0, 1])
+    u_t = u[1] + (W[1, 0] + ratio * W[1, 1]) * P_n
+    if u_t * u[1] >= 0 and P_n > 0:
+        return np.array([P_n, ratio * P_n])
+    return np.linalg.solve(W, np.array([-(1 + eps) * u[0], -u[1]]))  # sticks
+
+
+def test_friction_never_gains_energy_where_newton_with_coulomb_does():
+    """A random search over mobilities and directions; the paradox is among them."""
+    worst_ours, worst_newton, coulomb = 0.0, 0.0, 0
+    for _ in range(20000):
+        W = random_mobility(RNG, 2, 2)
+        u = np.array([-RNG.uniform(0, 1), RNG.normal()]) * np.sqrt(np.diag(W))
+        mu, eps = RNG.uniform(0, 2), RNG.uniform(0, 1)
+        before = u @ np.linalg.solve(W, u) / 2
+        P = np.array(contact.stronge(W, u, mu, eps))
+        after = u + W @ P
+        assert P[0] > 0
+        assert abs(P[1]) <= mu * P[0] * (1 + 1e-12)
+        assert after[0] >= -1e-9 * abs(u[0])
+        worst_ours = max(worst_ours, energy_change(W, u, P) / before)
+        R = newton_with_coulomb(W, u, mu, eps)
+        worst_newton = max(worst_newton, energy_change(W, u, R) / before)
+        coulomb += after[1] == 0.0
+    assert worst_ours <= 1e-12
+    assert worst_newton > 0.5, "the search does reach the paradox"
+
+
+def test_work_of_restitution_is_eps_squared_of_compression():
+    """Stronge's hypothesis, by integrating the normal impulse in small increments."""
+    for _ in range(8):
+        W = random_mobility(RNG, 2, 5)
+        u = np.array([-1.0, RNG.normal()]) * np.sqrt(np.diag(W))
+        mu, eps = RNG.uniform(0, 1), RNG.uniform(0.2, 1)
+        P = contact.stronge(W, u, mu, eps)
+        N = 20_000
+        dp, v, compress, restore = P[0] / N, u.copy(), 0.0, 0.0
+        for _ in range(N):
+            stick = -W[0, 1] / W[1, 1]
+            sliding = abs(v[1]) > 2 * np.abs(W[1]).sum() * dp
+            ratio = -mu * np.sign(v[1]) if sliding else np.clip(stick, -mu, mu)
+            step = W @ np.array([1.0, ratio]) * dp
+            work = (v[0] + step[0] / 2) * dp
+            compress, restore = compress - min(work, 0.0), restore + max(work, 0.0)
+            v = v + step
+        assert restore == pytest.approx(eps**2 * compress, rel=2e-2)
+        np.testing.assert_allclose(v, u + W @ np.array(P), atol=3e-3 * np.abs(u).max())
+
+
+@given(
+    st.floats(-1.5, 1.5), st.floats(0.1, 10), st.floats(0.0, 2.0), st.floats(0.0, 1.0)
+)  # fmt: skip
+@settings(max_examples=300, deadline=None)
+def test_one_degree_of_freedom_with_friction(angle, mobility, mu, eps):
+    """Rank one: normal and sliding rates stay in proportion; jammed if mu >= |a/b|."""
+    a, b = np.sqrt(mobility) * np.cos(angle), np.sqrt(mobility) * np.sin(angle)
+    W = np.outer([a, b], [a, b])
+    u = np.array([a, b]) * (-1.0 / a)
+    P = np.array(contact.stronge(W, u, mu, eps))
+    after = u + W @ P
+    assert energy_change(W, u, P) <= 1e-12
+    assert after[1] * a == pytest.approx(after[0] * b, abs=1e-9 * (1 + abs(b / a)))
+    if mu * abs(b) > abs(a) * (1 + 1e-6):
+        assert after[0] == pytest.approx(0.0, abs=1e-9)
+    elif mu * abs(b) < abs(a) * (1 - 1e-6):
+        # the work of restitution against that of compression, friction with and against
+        gain = abs(b / a) * mu
+        assert after[0] == pytest.approx(eps * np.sqrt((1 - gain) / (1 + gain)), rel=1e-6)
+
+
+def test_newton_and_stronge_agree_without_reversal():
+    """A hit that slides on in its direction has u_n+ = -eps u_n-."""
+    W = np.array([[2.0, 0.3], [0.3, 1.0]])
+    P = np.array(contact.stronge(W, np.array([-1.0, 5.0]), 0.2, 0.7))
+    assert (np.array([-1.0, 5.0]) + W @ P)[0] == pytest.approx(0.7, rel=1e-12)
+
+
+def test_several_hits_with_friction_do_not_depend_on_their_order_and_never_gain():
+    """Coulomb's cone, no penetration, no gain; exchanging the stops exchanges the impulses."""
+    for _ in range(150):
+        W = random_mobility(RNG, 4, 6)
+        u = np.concatenate([-RNG.uniform(0.1, 1, 2), RNG.normal(size=2)])
+        u *= np.sqrt(np.diag(W))
+        mu, eps = RNG.uniform(0.05, 0.6, 2), RNG.uniform(0, 1, 2)
+        P = contact.several(W, u, mu, eps)
+        after = u + W @ P
+        assert energy_change(W, u, P) <= 1e-10 * np.abs(P @ u)
+        assert (after[:2] >= -1e-7 * np.abs(u).max()).all()
+        assert (np.abs(P[2:]) <= mu * P[:2] * (1 + 1e-9) + 1e-14).all()
+        swap = np.array([1, 0, 3, 2])
+        Q = contact.several(W[np.ix_(swap, swap)], u[swap], mu[::-1], eps[::-1])
+        np.testing.assert_allclose(P, Q[swap], rtol=1e-5, atol=1e-7 * np.abs(P).max())
