@@ -331,8 +331,37 @@ class Simulation:
         self.front_time = self.time
         self.arc, self.k1, self.changed = None, None, False
         self._set_equations(self._inputs(self.inputs.walls))
-        self.front = self.equations.project(self.time, self.front)
-        self._settle()
+        struck = self._follow_walls()
+        if struck is not None:
+            self._impact(struck)
+        else:
+            self.front = self.equations.project(self.time, self.front)
+            self._settle()
+
+    def _follow_walls(self) -> int | None:
+        """Let what rests on a wall take up a change of the wall's velocity.
+
+        A change below ``rest_speed`` is taken up without restitution, as a capture is.  A wall
+        that retreats faster lets go; one that advances faster strikes: its stop is returned.
+        """
+        n = self.system.n
+        q, v = self.front[:n], self.front[n : 2 * n]
+        e = np.exp(1j * q)
+        rates = self.equations.gap_rates(e, v)
+        struck = None
+        for i in list(self.equations.held):
+            if abs(rates[i]) >= max(self._field(i, "rest_speed"), self._still()):
+                self._set_discrete(self.discrete.with_hold(i, False))
+                struck = i if rates[i] < 0.0 else struck
+        held = self.equations.held
+        if held and np.abs(rates[held]).max() > self._still():
+            M, _ = inertia(self.system.H, self.equations.J, e)
+            loops = constraints.jacobian(self.system.loops, e)
+            G = constraints.jacobian(self.system.gaps[held], e)
+            X = contact.response(M, loops, G)
+            P = np.linalg.solve(G @ X, -rates[held])
+            self._book(held, held, q, v, v + X @ P, P)
+        return struck
 
     def state(self) -> Real:
         """Return y = (q, v, dissipated energy, work) at the present time, on the constraints."""

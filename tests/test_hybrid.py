@@ -1,0 +1,392 @@
+"""Events, rest, friction, moving walls, saving and refusing."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from prbm import EquilibriumError, ParameterError, Simulation, SimulationError
+from support import ScalarGuide, energy_balance, mechanism, simulation
+
+QUIET = {"gravity.x": 0.0, "damping.beta": 0.0}
+
+
+def guide(values):
+    return ScalarGuide.of(mechanism("PRBDM").values(values))
+
+
+# --- friction point ---------------------------------------------------------------------------
+
+
+def test_coulomb_friction_takes_four_mu_N_off_a_period():
+    """A linear oscillator under Coulomb friction loses 2 mu N/k of amplitude each half period."""
+    mu_N, x0 = 2e-3, -1e-3
+    values = QUIET | {
+        "release.displacement": x0, "stop.position": 0.01,
+        "friction.coefficient": 1.0, "friction.normal_force": mu_N,
+    }  # fmt: skip
+    one = guide(values)
+    stiffness = 4 * one.k / one.r**2
+    sim = simulation("PRBDM", values, tolerance=1e-11)
+    omega = 2 * math.pi * sim.frequency
+    amplitude = abs(x0)
+    for half in range(1, 4):
+        amplitude -= 2 * mu_N / stiffness
+        sim.advance(half * math.pi / omega)
+        # the softening of the path is a third-order term, (x/r)^2 = 1e-3
+        assert abs(sim.outputs()["shuttle.x"]) == pytest.approx(amplitude, rel=2e-3)
+
+
+def test_friction_sticks_where_the_spring_is_weaker_and_stays():
+    """It ends stuck, with |k x| <= mu N, and the energy that is left is elastic."""
+    values = QUIET | {
+        "release.displacement": -1e-3, "stop.position": 0.01,
+        "friction.coefficient": 0.5, "friction.normal_force": 0.02,
+    }  # fmt: skip
+    one = guide(values)
+    sim = simulation("PRBDM", values)
+    sim.advance(1.0)
+    out = sim.outputs()
+    assert sim.discrete.rubs == (0,)
+    assert abs(out["shuttle.vx"]) < 1e-12
+    assert 4 * one.k / one.r**2 * abs(out["shuttle.x"]) <= 0.01 * (1 + 1e-3)
+    assert out["energy.elastic"] + out["energy.dissipated"] == pytest.approx(
+        one.potential(math.asin(1e-3 / one.r)), rel=1e-5
+    )
+
+
+def test_a_stuck_shuttle_budges_when_the_input_exceeds_friction():
+    """Static friction carries mu N; beyond, it slides with the force that is left."""
+    values = QUIET | {
+        "release.displacement": 0.0, "stop.position": 0.02,
+        "friction.coefficient": 1.0, "friction.normal_force": 0.5,
+    }  # fmt: skip
+    sim = simulation("PRBDM", values)
+    sim.set({"force.x": 0.49})
+    sim.advance(0.01)
+    assert sim.outputs()["shuttle.x"] == pytest.approx(0.0, abs=1e-15)
+    sim.set({"force.x": 0.6})
+    sim.advance(0.0101)
+    acceleration = 0.1 / guide(values).mass
+    assert sim.outputs()["shuttle.vx"] == pytest.approx(acceleration * 1e-4, rel=1e-4)
+
+
+def test_normal_force_grows_towards_the_neutral_position():
+    """N = max(0, N0 + k y): with y <= 0 friction vanishes where the guide has dipped enough."""
+    values = QUIET | {
+        "release.displacement": -0.01, "stop.position": 0.03,
+        "friction.coefficient": 1.0, "friction.normal_force": 0.01,
+        "friction.normal_stiffness": 1e3,
+    }  # fmt: skip
+    sim = simulation("PRBDM", values)
+    early = sim.outputs()
+    assert 0.01 + 1e3 * early["shuttle.y"] < 0
+    sim.advance(1e-3)
+    assert sim.outputs()["energy.dissipated"] == 0.0
+    sim.advance(0.2)
+    assert sim.outputs()["energy.dissipated"] > 0.0
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+def test_held_and_stuck_at_once(model):
+    """Friction on while the stop holds: the stop carries all, steadily, to the end."""
+    values = {"friction.coefficient": 0.3, "friction.normal_force": 0.2}
+    sim = simulation(model, values)
+    sim.advance(0.6)
+    first = sim.outputs()
+    sim.advance(1.0)
+    out = sim.outputs()
+    assert first["stop.contact"]
+    assert out["stop.contact"]
+    assert sim.discrete.rubs == (2,)
+    assert out["stop.force"] == pytest.approx(first["stop.force"], rel=1e-3)
+    assert energy_balance(out) == pytest.approx(
+        energy_balance(simulation(model).outputs()), rel=1e-6
+    )
+
+
+# --- friction at the stop ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+@pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
+def test_friction_at_the_stop_never_gains_energy(model, restitution):
+    """Impacts away from straight slide along the wall; dissipation only grows."""
+    values = {
+        "stop.position": -0.005, "stop.friction": 0.4, "stop.offset": 0.003,
+        "stop.restitution": restitution,
+    }  # fmt: skip
+    sim = simulation(model, values)
+    start = energy_balance(sim.outputs())
+    dissipated = 0.0
+    for t in np.linspace(0, 0.4, 201)[1:]:
+        sim.advance(t)
+        out = sim.outputs()
+        assert out["energy.dissipated"] >= dissipated - 1e-12
+        dissipated = out["energy.dissipated"]
+        assert energy_balance(out) == pytest.approx(start, abs=1e-7 * 0.02)
+        assert out["stop.gap"] > -1e-9
+    assert sim.record
+    for impact in sim.record:
+        assert impact.latched.energy_lost >= -1e-15
+
+
+def test_sliding_contact_pushes_within_the_cone_of_friction():
+    """A stop that is dragged along its wall carries mu N: the base feels it across."""
+    values = {"stop.position": -0.01, "stop.friction": 0.2, "release.displacement": -0.0101}
+    sim = simulation("PRBDM2R", values)
+    sim.advance(0.5)
+    out = sim.outputs()
+    assert out["stop.contact"]
+    assert out["stop.force"] > 0
+
+
+# --- walls ------------------------------------------------------------------------------------
+
+
+def test_moving_wall_hits_a_resting_shuttle():
+    """Newton in the frame of the wall: v+ = (1 + eps) w; the work of the wall is P w."""
+    values = QUIET | {"release.displacement": 0.0, "stop.position": 1e-4, "stop.restitution": 0.5}
+    sim = simulation("PRBDM", values)
+    sim.set({"stop.velocity": -0.1})
+    t = 0.0
+    while not sim.record:
+        t += 1e-4
+        sim.set({"stop.displacement": -0.1 * (t - 1e-4)})
+        sim.advance(t)
+    (impact,) = sim.record
+    assert impact.time == pytest.approx(1e-3, abs=1e-9)
+    assert impact.latched.approach_speed == pytest.approx(0.1, rel=1e-6)
+    mass = guide(values).mass
+    assert impact.impulse == pytest.approx(mass * 1.5 * 0.1, rel=1e-5)
+    out = sim.outputs()
+    assert out["energy.work"] == pytest.approx(impact.impulse * 0.1, rel=1e-9)
+    assert energy_balance(out) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+def test_held_shuttle_follows_a_gently_moving_wall(model):
+    """A wall that starts below the rest speed takes the shuttle along and does the work."""
+    sim = simulation(model)
+    sim.advance(0.5)
+    start, impacts = energy_balance(sim.outputs()), len(sim.record)
+    speed = 0.0
+    for k in range(200):
+        sim.set({"stop.displacement": sim.inputs.walls[0].at(sim.time), "stop.velocity": -speed})
+        speed += 2e-4 if k < 100 else -2e-4
+        sim.advance(0.5 + (k + 1) * 1e-3)
+        out = sim.outputs()
+        assert out["stop.contact"]
+        assert abs(out["stop.gap"]) < 1e-12
+        assert energy_balance(out) == pytest.approx(start, abs=1e-9)
+    assert len(sim.record) == impacts
+    assert out["shuttle.x"] == pytest.approx(-2e-3, rel=0.02)
+    assert out["energy.work"] > 0
+
+
+def test_a_wall_that_starts_at_speed_strikes_what_rests_on_it():
+    """Below the rest speed it is followed, above it is an impact with restitution."""
+    sim = simulation("PRBDM", {"damping.beta": 0.0})
+    sim.advance(0.4)
+    count, start = len(sim.record), energy_balance(sim.outputs())
+    sim.set({"stop.velocity": -0.02})
+    sim.advance(0.4005)
+    out = sim.outputs()
+    assert len(sim.record) == count + 1
+    assert sim.record[-1].latched.approach_speed == pytest.approx(0.02, rel=1e-9)
+    assert sim.record[-1].latched.rebound_speed == pytest.approx(0.012, rel=1e-9)
+    assert energy_balance(out) == pytest.approx(start, abs=1e-10)
+    assert not out["stop.contact"]
+
+
+def test_a_pulled_shuttle_leaves_its_stop():
+    """The contact releases when its force reaches zero, and the gap closes again later."""
+    sim = simulation("PRBDM", {"damping.beta": 0.0})
+    sim.advance(0.4)
+    weight = sim.outputs()["stop.force"]
+    sim.set({"force.x": -0.99 * weight})
+    sim.advance(0.41)
+    assert sim.outputs()["stop.contact"]
+    sim.set({"force.x": -1.5 * weight})
+    sim.advance(0.45)
+    out = sim.outputs()
+    assert not out["stop.contact"]
+    assert out["stop.gap"] > 1e-4
+    sim.set({"force.x": 0.0})
+    sim.advance(1.0)
+    assert sim.outputs()["stop.contact"]
+
+
+def test_base_acceleration_is_gravity_the_other_way():
+    """-m a adds to gravity; its work is counted as work, that of gravity as potential energy."""
+    values = {"release.displacement": 0.0, "stop.position": 0.03}
+    falls = simulation("PRBDM", values | {"gravity.x": 9.81})
+    shaken = simulation("PRBDM", values | {"gravity.x": 0.0})
+    shaken.set({"base.acceleration.x": -9.81})
+    # the damping and the error scales know only gravity: compare at a tight tolerance
+    for sim in (falls, shaken):
+        sim.tolerance = 1e-12
+        sim.advance(0.08)
+    a, b = falls.outputs(), shaken.outputs()
+    assert b["shuttle.x"] == pytest.approx(a["shuttle.x"], rel=1e-9)
+    assert b["energy.work"] == pytest.approx(-a["energy.gravitational"], rel=1e-9)
+    assert b["base.force.x"] == pytest.approx(a["base.force.x"], rel=1e-8)
+
+
+def test_base_force_is_the_rate_of_momentum_it_leaves():
+    """Integral of (base force - loads) over a free arc = - change of momentum."""
+    values = QUIET | {"stop.position": 0.03, "release.displacement": -0.01}
+    sim = simulation("PRBDM2R", values, tolerance=1e-11)
+    n, times = sim.system.n, np.linspace(0, 0.01, 2001)
+
+    def momentum():
+        y = sim.state()
+        v = 1j * np.exp(1j * y[:n]) * y[n : 2 * n]
+        return complex(sim.system.m @ (sim.system.A @ v))
+
+    start, forces = momentum(), []
+    for t in times:
+        sim.advance(t)
+        out = sim.outputs()
+        forces.append(complex(out["base.force.x"], out["base.force.y"]))
+    from scipy.integrate import simpson
+
+    impulse = simpson(forces, x=times)
+    assert momentum() - start == pytest.approx(-impulse, abs=1e-7 * abs(impulse))
+
+
+# --- what is refused --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ({"flexure.length": -0.02}, "flexure.length = -0.02 m must be at least"),
+        ({"flexure.length": 0.0}, "flexure.length = 0 m"),
+        ({"shuttle.mass": 0.0}, "shuttle.mass = 0 kg"),
+        ({"shuttle.mass": -1.0}, "shuttle.mass = -1 kg"),
+        ({"stop.restitution": 1.5}, "stop.restitution = 1.5 must be at most 1"),
+        ({"flexure.thickness": math.nan}, "flexure.thickness = nan m must be a finite number"),
+        ({"gravity.x": math.inf}, "gravity.x = inf m/s2"),
+        ({"force.x": math.nan}, "force.x = nan"),
+        ({"stop.position": -0.019}, "penetrated by 0.001 m at release"),
+        ({"stop.positon": 0.0}, "did you mean stop.position"),
+        ({"flexure.gamma": 1.2}, "flexure.gamma = 1.2 must be at most 1"),
+        ({"solver.tolerance": 0.0}, "solver.tolerance = 0"),
+    ],
+)
+def test_bad_values_are_refused_by_name_value_and_unit(values, words):
+    with pytest.raises(ParameterError) as caught:
+        Simulation(mechanism("PRBDM"), values)
+    assert words in str(caught.value)
+
+
+def test_links_longer_than_the_flexure_are_refused():
+    with pytest.raises(ParameterError, match="gamma0 = -0.04"):
+        Simulation(mechanism("PRBDM2R"), {"flexure.gamma1": 0.58})
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+def test_a_release_that_no_equilibrium_reaches_is_refused(model):
+    with pytest.raises(EquilibriumError, match=r"release.displacement = -0.05 m cannot be reached"):
+        Simulation(mechanism(model), {"release.displacement": -0.05})
+
+
+def test_time_only_runs_on():
+    sim = simulation("PRBDM")
+    sim.advance(0.01)
+    with pytest.raises(SimulationError, match="time only runs on"):
+        sim.advance(0.005)
+    with pytest.raises(SimulationError):
+        sim.advance(math.nan)
+
+
+def test_fixed_parameters_stay_and_a_refused_change_changes_nothing():
+    sim = simulation("PRBDM")
+    sim.advance(0.01)
+    with pytest.raises(ParameterError, match="flexure.length is fixed"):
+        sim.set({"stop.restitution": 0.3, "flexure.length": 0.05})
+    with pytest.raises(ParameterError, match="at most 1"):
+        sim.set({"damping.zeta": 0.1, "stop.restitution": 2.0})
+    assert sim.values["damping.zeta"] == 0.0
+    assert sim.values["stop.restitution"] == 0.6
+
+
+def test_chatter_that_does_not_end_is_stopped_with_a_message():
+    """Elastic bounces of half a microsecond each under a huge force, for ever."""
+    values = QUIET | {
+        "release.displacement": -1e-8, "stop.restitution": 1.0, "stop.rest_speed": 0.0,
+        "force.x": 17000.0,
+    }  # fmt: skip
+    sim = simulation("PRBDM", values)
+    with pytest.raises(SimulationError, match="chatters"):
+        sim.advance(0.01)
+    assert sim.time == 0.0, "the last good state is kept"
+    assert sim.outputs()["stop.gap"] == pytest.approx(1e-8, rel=1e-6)
+
+
+def test_a_touching_release_rests_at_once():
+    """Released at the wall, pressed: held from the start, no impact."""
+    sim = simulation("PRBDM2R", {"release.displacement": 0.0})
+    assert sim.outputs()["stop.contact"]
+    sim.advance(0.1)
+    out = sim.outputs()
+    assert out["stop.contact"]
+    assert out["stop.impact_count"] == 0
+
+
+def test_a_touching_release_with_a_velocity_hits_at_once():
+    sim = Simulation(
+        mechanism("PRBDM"), {"release.displacement": 0.0, "release.velocity": 0.3} | QUIET
+    )
+    out = sim.outputs()
+    assert out["stop.impact_count"] == 1
+    assert out["shuttle.vx"] == pytest.approx(-0.6 * 0.3, rel=1e-12)
+
+
+# --- communication points ---------------------------------------------------------------------
+
+
+def test_the_trajectory_does_not_depend_on_when_it_is_looked_at():
+    coarse, fine = simulation("PRBDM2R"), simulation("PRBDM2R")
+    coarse.advance(0.12)
+    for t in np.sort(np.random.default_rng(0).uniform(0, 0.12, 400)):
+        fine.advance(float(t))
+        fine.outputs()
+    fine.advance(0.12)
+    assert fine.outputs() == coarse.outputs()
+
+
+@pytest.mark.parametrize(
+    ("model", "time", "end"),
+    [("PRBDM", 0.0, 0.4), ("PRBDM", 0.241, 0.4), ("PRBDM2R", 0.0405, 0.12), ("PRBDM", 0.3, 0.4)],
+)
+def test_a_saved_state_continues_to_the_bit(model, time, end):
+    """Also through JSON; the events that follow are the same to the last bit."""
+    sim = simulation(model, {"stop.friction": 0.1})
+    sim.set({"force.x": 0.01})
+    sim.advance(time)
+    saved = json.loads(json.dumps(sim.snapshot()))
+    sim.advance(end)
+    expected = sim.outputs()
+    other = Simulation(mechanism(model))
+    other.restore(saved)
+    other.advance(end)
+    assert other.outputs() == expected
+    sim.restore(saved)
+    sim.advance(end)
+    assert sim.outputs() == expected
+
+
+def test_a_state_of_another_mechanism_is_refused():
+    with pytest.raises(ParameterError, match="another mechanism"):
+        simulation("PRBDM").restore(simulation("PRBDM2R").snapshot())
+
+
+def test_a_start_time_shifts_everything():
+    late = simulation("PRBDM", start_time=5.0)
+    early = simulation("PRBDM")
+    late.advance(5.2)
+    early.advance(0.2)
+    assert late.record[2].time == pytest.approx(early.record[2].time + 5.0, abs=1e-9)
