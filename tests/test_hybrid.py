@@ -289,7 +289,7 @@ def test_links_longer_than_the_flexure_are_refused():
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_a_release_that_no_equilibrium_reaches_is_refused(model):
-    with pytest.raises(EquilibriumError, match=r"release.displacement = -0.05 m cannot be reached"):
+    with pytest.raises(EquilibriumError, match=r"release\.displacement = -0\.05 m cannot be reached"):
         Simulation(mechanism(model), {"release.displacement": -0.05})
 
 
@@ -305,7 +305,7 @@ def test_time_only_runs_on():
 def test_fixed_parameters_stay_and_a_refused_change_changes_nothing():
     sim = simulation("PRBDM")
     sim.advance(0.01)
-    with pytest.raises(ParameterError, match="flexure.length is fixed"):
+    with pytest.raises(ParameterError, match=r"flexure\.length is fixed"):
         sim.set({"stop.restitution": 0.3, "flexure.length": 0.05})
     with pytest.raises(ParameterError, match="at most 1"):
         sim.set({"damping.zeta": 0.1, "stop.restitution": 2.0})

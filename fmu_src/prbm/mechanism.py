@@ -419,8 +419,8 @@ class Mechanism:
                 f"mechanism name {self.name!r}: use letters, digits and _, not starting with a "
                 "digit (it becomes a file name and an identifier)"
             )
-        self._check_names()
         self._check_references()
+        self._check_names()
         known = {p.name for p in self.parameters}
         for where, quantity in self._quantities():
             for name in affine(quantity).terms:

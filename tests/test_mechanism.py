@@ -1,0 +1,197 @@
+"""Mechanisms as data: expressions, parameters, and everything that is refused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from prbm import (
+    Body,
+    Flexure,
+    FlexureType,
+    Mechanism,
+    MechanismError,
+    Parameter,
+    ParameterError,
+    Release,
+    Stop,
+    assemble,
+)
+from prbm.mechanism import affine
+from prbm_tools.mechanism_file import load, shipped
+from support import mechanism
+
+GUIDE = mechanism("PRBDM2R")
+
+INTERFACE = {
+    "flexure.length", "flexure.thickness", "flexure.width", "flexure.youngs_modulus",
+    "flexure.density", "shuttle.width", "shuttle.mass", "shuttle.inertia", "shuttle.com_height",
+    "gravity.x", "gravity.y", "release.displacement", "release.velocity", "solver.tolerance",
+    "damping.zeta", "damping.beta", "friction.coefficient", "friction.normal_force",
+    "friction.normal_stiffness", "stop.position", "stop.offset", "stop.restitution",
+    "stop.friction", "stop.rest_speed",
+}  # fmt: skip
+TUNABLE = {name for name in INTERFACE if name.split(".")[0] in ("damping", "friction", "stop")}
+
+
+@pytest.mark.parametrize(
+    ("model", "own"),
+    [
+        ("PRBDM", {"flexure.gamma", "flexure.K_theta"}),
+        ("PRBDM2R", {f"flexure.{n}" for n in ("gamma1", "gamma2", "K_theta1", "K_theta2")}),
+    ],
+)
+def test_parameters_are_those_of_the_public_interface(model, own):
+    parameters = mechanism(model).parameters
+    assert {p.name for p in parameters} == INTERFACE | own
+    assert {p.name for p in parameters if p.tunable} == TUNABLE
+    for p in parameters:
+        assert p.description
+        assert p.minimum <= p.value <= p.maximum
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("2*a - b/4 + 1", 2.5), ("-(a - 3)", 2.0), ("+a*2", 2.0), (7, 7.0), ("1e-3", 1e-3)],
+)
+def test_expressions_are_linear_in_parameters(text, expected):
+    assert affine(text)({"a": 1.0, "b": 2.0}) == expected
+
+
+@pytest.mark.parametrize(
+    "text", ["a*b", "1/a", "sin(a)", "a**2", "a +", "__import__('os')", "a/0", "(" * 500, "'x'"]
+)
+def test_anything_else_is_no_expression(text):
+    with pytest.raises(MechanismError, match="cannot read the expression"):
+        affine(text)
+
+
+def changed(**parts):
+    return dataclasses.replace(GUIDE, **parts)
+
+
+BODY = GUIDE.bodies[0]
+LEFT, RIGHT = GUIDE.flexures
+LEAF = GUIDE.flexure_types[0]
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ({"name": "2R"}, "use letters, digits"),
+        ({"bodies": ()}, "at least one body"),
+        ({"bodies": (BODY, BODY)}, "'shuttle' is used twice"),
+        ({"stops": (Stop("stop", "shutle", (0, 0)),)}, "'shutle' is not described"),
+        ({"release": Release("nobody")}, "'nobody' is not described"),
+        ({"flexures": (dataclasses.replace(LEFT, end="shuttle.top"), RIGHT)}, "'shuttle.top'"),
+        ({"flexures": (dataclasses.replace(LEFT, type="leaf"), RIGHT)}, "'leaf' is not"),
+        ({"flexures": (dataclasses.replace(LEFT, ends=("pin", "pin")), RIGHT)}, "a clamp or a pin"),
+        ({"flexures": (dataclasses.replace(LEFT, end="ground.right"), RIGHT)}, "to itself"),
+        ({"flexure_types": (dataclasses.replace(LEAF, model="4R"),)}, "choose one of 1R, 2R, 3R"),
+        (
+            {"flexure_types": (dataclasses.replace(LEAF, coefficients={"gamma": 0.8}),)},
+            "no coefficient of the 2R model",
+        ),
+        ({"geometry": ()}, "no parameter of PRBDM2R"),
+        ({"geometry": (*GUIDE.geometry, GUIDE.geometry[0])}, "defined twice"),
+    ],
+)
+def test_an_inconsistent_description_is_refused(parts, words):
+    with pytest.raises(MechanismError, match=words):
+        changed(**parts)
+
+
+def test_a_name_that_is_none_is_refused():
+    with pytest.raises(MechanismError, match="is no name"):
+        Parameter("two words", 1.0)
+
+
+@pytest.mark.parametrize("bad", [True, "1", None, float("nan"), 1j])
+def test_a_value_that_is_no_number_is_refused(bad):
+    with pytest.raises(ParameterError, match=r"flexure.length = "):
+        GUIDE.values({"flexure.length": bad})
+
+
+def test_a_mechanism_that_falls_apart_is_refused():
+    loose = Body("loose", 1.0, 1.0, (1.0, 1.0), {"a": (1.0, 1.0)})
+    other = Body("other", 1.0, 1.0, (2.0, 1.0), {"a": (2.0, 1.0)})
+    between = Flexure("between", "flexure", "loose.a", "other.a")
+    falls = changed(bodies=(BODY, loose, other), flexures=(LEFT, RIGHT, between))
+    with pytest.raises(MechanismError, match="falls apart"):
+        assemble(falls, falls.values())
+    alone = changed(bodies=(BODY, loose))
+    with pytest.raises(MechanismError, match="loose is not held"):
+        assemble(alone, alone.values())
+
+
+def test_a_flexure_without_length_is_refused():
+    short = changed(flexures=(LEFT, RIGHT), ground={"left": (0, "flexure.length"), "right": (0, 0)})
+    with pytest.raises(ParameterError, match="left_flexure from ground.left to shuttle.left"):
+        assemble(short, short.values())
+
+
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+@pytest.mark.parametrize("reverse", [False, True])
+def test_the_order_and_direction_of_the_flexures_do_not_matter(order, reverse):
+    """The same physics whichever flexure is the tree and from whichever end it is drawn."""
+    from prbm import equilibrium, modes
+
+    flexures = [GUIDE.flexures[i] for i in order]
+    if reverse:
+        flexures[0] = dataclasses.replace(flexures[0], start=flexures[0].end, end=flexures[0].start)
+    same = changed(flexures=tuple(flexures))
+    for guide in (GUIDE, same):
+        system = assemble(guide, guide.values())
+        rest = equilibrium(system)
+        found = modes(system, rest).frequency
+        x = float((system.release @ np.exp(1j * rest.q)).real) + system.release_c
+        reference = (found, x) if guide is GUIDE else reference
+    np.testing.assert_allclose(found, reference[0], rtol=1e-9)
+    assert x == pytest.approx(reference[1], rel=1e-9)
+
+
+def test_mass_is_kept():
+    """Rods on links and stubs: the 2R guide moves all of its mass but the stubs at the ground."""
+    system = assemble(GUIDE, GUIDE.values())
+    flexure = 7800 * 8e-3 * 1e-4 * 0.04
+    assert system.m.sum() == pytest.approx(0.053187 + 2 * flexure * (1 - 0.05), rel=1e-12)
+
+
+def test_files_that_are_no_mechanism_get_one_clear_message(tmp_path):
+    text = shipped()["PRBDM"].read_text()
+    cases = {
+        "no toml": ("= 3", "is no TOML file"),
+        "unknown key": (text + "\n[extra]\nx = 1\n", "extra: Unexpected keyword"),
+        "wrong type": (text.replace("mass = 0.053187", "mass = [1, 2]"), "bodies.0.mass"),
+        "missing": (text.replace('body = "shuttle"\ndisplacement', "displacement"), "release"),
+        "reference": (text.replace('"shuttle.right"', '"shuttle.wrong"'), "shuttle.wrong"),
+    }
+    for name, (content, words) in cases.items():
+        path = tmp_path / f"{name}.toml"
+        path.write_text(content)
+        with pytest.raises(MechanismError) as caught:
+            load(path)
+        assert str(path) in str(caught.value)
+        assert words in str(caught.value)
+    with pytest.raises(MechanismError, match="cannot be read"):
+        load(tmp_path / "none.toml")
+
+
+def test_a_mechanism_is_data_to_the_last_digit():
+    """Its representation is Python that makes it again: what an FMU carries."""
+    import prbm.mechanism
+
+    for name in shipped():
+        same = eval(repr(mechanism(name)), vars(prbm.mechanism))
+        assert same == mechanism(name)
+
+
+def test_types_that_share_a_name_are_refused():
+    twice = (LEAF, FlexureType("flexure", "1R", 1e-3, 1e-3, 1e9, 1e3))
+    with pytest.raises(MechanismError, match="twice"):
+        changed(flexure_types=twice)
+
+
+def test_mechanism_is_a_frozen_dataclass():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        GUIDE.name = "other"
+    assert isinstance(GUIDE, Mechanism)
