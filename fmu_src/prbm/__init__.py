@@ -12,6 +12,7 @@ from .errors import (
     PrbmError,
     SimulationError,
 )
+from .fixed_step import march
 from .hybrid import Impact, Simulation
 from .mechanism import (
     Body,
@@ -25,7 +26,7 @@ from .mechanism import (
     Stop,
 )
 from .modal import modal_restitution, modes
-from .statics import equilibrium
+from .statics import equilibrium, free_displacement
 
 __all__ = [
     "Body",
@@ -47,6 +48,8 @@ __all__ = [
     "System",
     "assemble",
     "equilibrium",
+    "free_displacement",
+    "march",
     "modal_restitution",
     "modes",
 ]

@@ -108,6 +108,15 @@ def equilibrium(system: System, displacement: float | None = None) -> Equilibriu
     return Equilibrium(state[:n], state[n : n + r], force)
 
 
+def free_displacement(system: System) -> float:
+    """Return where the released body would rest under gravity alone, without a stop [m].
+
+    The displacement of its centre of mass along the direction of the release, from straight.
+    """
+    e = np.exp(1j * equilibrium(system).q)
+    return float((system.release @ e).real) + system.release_c
+
+
 def _newton(
     system: System, B: Complex, c: Real, displacement: float, fraction: float, start: Real
 ) -> Real | None:

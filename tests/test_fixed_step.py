@@ -1,0 +1,37 @@
+"""The source's integration: fourth order on a smooth arc, impacts up to a step late."""
+
+import numpy as np
+import pytest
+from prbm import ParameterError, Simulation, march
+from support import ScalarGuide, mechanism
+
+FREE = {"stop.position": 0.03, "damping.beta": 0.0}
+
+
+def test_rk4_with_projection_is_of_fourth_order():
+    """Least-squares slope over five halvings, against the adaptive pair at 1e-13."""
+    exact = Simulation(mechanism("PRBDM"), FREE, tolerance=1e-13)
+    exact.advance(0.128)
+    steps = 0.016 / 2.0 ** np.arange(6)
+    errors = [
+        np.abs(march(mechanism("PRBDM"), FREE, stop_time=0.128, step=h).q[-1] - exact.state()[:3])
+        for h in steps
+    ]
+    slope = np.polyfit(np.log(steps), np.log(np.max(errors, axis=1)), 1)[0]
+    assert slope == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("step", [2**-9, 2**-11, 2**-13])
+def test_first_impact_is_noticed_up_to_a_step_late(step):
+    values = {"release.displacement": -0.01}
+    guide = ScalarGuide.of(mechanism("PRBDM").values(values))
+    (exact,), _ = guide.bounces(-0.01, 0.6, 1)
+    found = march(mechanism("PRBDM"), values, stop_time=0.05, step=step)
+    late = found.impacts[0][0] - exact
+    assert -1e-6 <= late <= step * (1 + 1e-6)
+
+
+def test_a_step_that_is_none_is_refused():
+    for step in (0.0, -1e-3, 2.0):
+        with pytest.raises(ParameterError, match="step = "):
+            march(mechanism("PRBDM"), stop_time=1.0, step=step)
