@@ -359,7 +359,7 @@ class Simulation:
             loops = constraints.jacobian(self.system.loops, e)
             G = constraints.jacobian(self.system.gaps[held], e)
             X = contact.response(M, loops, G)
-            P = np.linalg.solve(G @ X, -rates[held])
+            P = np.asarray(np.linalg.solve(G @ X, -rates[held]), dtype=np.float64)
             self._book(held, held, q, v, v + X @ P, P)
         return struck
 
