@@ -172,7 +172,11 @@ class Equations:
         self.J_stack = np.zeros((self.n + len(self.B), self.n))
         self.J_stack[: self.n] = self.J
         self.kkt = np.zeros((self.n + len(self.B),) * 2, order="F")
-        self.beta_K = self.beta * system.K
+        # springs and their damping in one product with y = (q, v, ...): see torques
+        self.K_y = np.block(
+            [[system.K, self.beta * system.K], [0 * system.K, self.beta * system.K]]
+        )
+        self.straight = np.concatenate([system.K @ system.q0, np.zeros(self.n)])
         self.trace: list[Real] = []
 
     # -- motion --
@@ -194,10 +198,28 @@ class Equations:
         M : (n, n)
             Mass matrix [kg m^2].
         """
-        return self._solve(q, v, self.beta_K @ v)
+        torques = self.torques(np.concatenate([q, v]))
+        return self._solve(q, v, torques[: self.n])
 
-    def _solve(self, q: Real, v: Real, damping: Real) -> tuple[Real, Real, Real]:
-        """Return accelerations, multipliers and mass matrix for a given damping torque.
+    def torques(self, y: Real) -> Real:
+        """Return what springs and their damping take up, and the share of the damping.
+
+        Parameters
+        ----------
+        y : (2 n,)
+            Angles, rates [rad], [rad/s].
+
+        Returns
+        -------
+        (2 n,)
+            K (q - q0) + beta K v, then beta K v [N m].
+        """
+        result: Real = self.K_y @ y
+        result -= self.straight
+        return result
+
+    def _solve(self, q: Real, v: Real, torques: Real) -> tuple[Real, Real, Real]:
+        """Return accelerations, multipliers and mass matrix for given torques of the springs.
 
         All that depends on e = exp(i q) comes from one product, row by row:
 
@@ -216,8 +238,7 @@ class Equations:
         right = G.imag[1:] @ (v * v)
         Q = right[:n]
         Q += G.real[0]
-        Q += forces.springs(self.system.K, q - self.system.q0)
-        Q -= damping
+        Q -= torques
         if self.driven:
             Q += self.moment
         if self.mass_damping:
@@ -245,13 +266,13 @@ class Equations:
         """Return dy/dt for y = (q, v, dissipated energy, work)."""
         n = self.n
         q, v = y[:n], y[n : 2 * n]
-        damping = self.beta_K @ v
-        a, lam, M = self._solve(q, v, damping)
+        torques = self.torques(y[: 2 * n])
+        a, lam, M = self._solve(q, v, torques[:n])
         self.trace.append(lam)
         result = np.empty(2 * n + 2)
         result[:n] = v
         result[n : 2 * n] = a
-        result[2 * n] = v @ damping
+        result[2 * n] = v @ torques[n:]
         result[2 * n + 1] = 0.0
         if self.mass_damping:
             result[2 * n] += 2.0 * self.mass_damping * kinetic_energy(M, v)

@@ -475,12 +475,12 @@ class Simulation:
         n = self.system.n
         return lambda t: float(self.equations.gaps(t, np.exp(1j * arc.at(t)[:n]))[i])
 
-    def _gap_rate_at(self, arc: Arc, i: int) -> Callable[[float], float]:
+    def _gap_rate_at(self, arc: Arc, i: int, sign: float = 1.0) -> Callable[[float], float]:
         n = self.system.n
 
         def rate(t: float) -> float:
             y = arc.at(t)
-            return float(self.equations.gap_rates(np.exp(1j * y[:n]), y[n : 2 * n])[i])
+            return sign * float(self.equations.gap_rates(np.exp(1j * y[:n]), y[n : 2 * n])[i])
 
         return rate
 
@@ -498,15 +498,14 @@ class Simulation:
                         if rates[j + 1] < 0.0 and gaps[j + 1] < -TOUCHING * self.system.length:
                             return float(a)
                         continue
-                    a = brentq(self._gap_rate_at(arc, i), a, b, xtol=TIME_RESOLUTION)
+                    a = _falls(self._gap_rate_at(arc, i), a, b)
                     if self._gap_at(arc, i)(a) <= 0.0:
                         return float(a)
                 if gaps[j + 1] > 0.0:
-                    b = brentq(self._gap_rate_at(arc, i), a, b, xtol=TIME_RESOLUTION)
+                    b = _falls(self._gap_rate_at(arc, i, sign=-1.0), a, b)
                     if self._gap_at(arc, i)(b) > 0.0:
                         continue
-                t = float(brentq(self._gap_at(arc, i), a, b, xtol=TIME_RESOLUTION))
-                return self._polished(arc, i, t)
+                return self._polished(arc, i, _falls(self._gap_at(arc, i), a, b))
         return None
 
     def _polished(self, arc: Arc, i: int, t: float) -> float:
@@ -538,8 +537,7 @@ class Simulation:
                     y = arc.at(t)
                     return -sign * float(((np.exp(1j * y[:n]) * y[n : 2 * n]) @ row).imag)
 
-                t = float(brentq(speed, times[j], times[j + 1], xtol=TIME_RESOLUTION))
-                return [Event(t, kind, i)]
+                return [Event(_falls(speed, times[j], times[j + 1]), kind, i)]
         if z[-1] < 0.0 and z[0] <= 0.0:
             return [Event(arc.start, kind, i)]
         return []
@@ -570,17 +568,16 @@ class Simulation:
             _, lam, _ = equations.accelerations(y[:n], y[n : 2 * n])
             return self._margins(lam, np.exp(1j * y[:n]))
 
+        def margin(key: tuple[str, int]) -> Callable[[float], float]:
+            return lambda t: margins(t)[key]
+
         found = []
         middle, end = arc.start + arc.h / 2, arc.start + arc.h
         looks = [(t, margins(t)) for t in (arc.start, middle, end)]
         for key in looks[0][1]:
             for (a, before), (b, after) in pairwise(looks):
                 if after[key] <= 0.0:
-                    t = a
-                    if before[key] > 0.0:
-                        t = float(
-                            brentq(lambda s, key=key: margins(s)[key], a, b, xtol=TIME_RESOLUTION)
-                        )
+                    t = _falls(margin(key), a, b) if before[key] > 0 else a
                     found.append(Event(t, *key))
                     break
         return found
@@ -1000,6 +997,18 @@ class Simulation:
             arc["event"] and Event(**arc["event"]),
         )  # fmt: skip
         self._output_cache = None
+
+
+def _falls(f: Callable[[float], float], a: float, b: float) -> float:
+    """Return when f falls to zero between a, where it is positive, and b, where it is not.
+
+    At the resolution of rounding either may already be otherwise; then it is there.
+    """
+    if f(a) <= 0.0:
+        return float(a)
+    if f(b) > 0.0:
+        return float(b)
+    return float(brentq(f, a, b, xtol=TIME_RESOLUTION))
 
 
 def _mobility(M: Real, held: Real, row: Real) -> float:

@@ -1,0 +1,374 @@
+"""A result in motion: links, flexures, bodies, walls and impacts, to a file or to a window.
+
+python -m prbm_tools.animation --model PRBDM2R motion.gif
+python -m prbm_tools.animation result.csv motion.mp4
+"""
+
+import argparse
+import functools
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from prbm import Mechanism, ParameterError
+from prbm.errors import PrbmError
+from prbm.mechanism import unknown
+
+from .mechanism_file import load, shipped
+from .motion import FPS, film, motion, needed
+from .scene import COLOURS, DPI, SIZE, Scene, pictures
+from .simulate import Columns, Progress, Result, ResultError, names, read_csv, simulate
+
+
+class AnimationError(PrbmError, RuntimeError):
+    """A film cannot be shown or written here."""
+
+
+def animate(
+    result: Result | Columns,
+    path: str | Path,
+    mechanism: Mechanism | None = None,
+    values: Mapping[str, float] | None = None,
+    *,
+    slow: float | None = None,
+    fps: float = FPS,
+    start: float | None = None,
+    stop: float | None = None,
+    progress: Progress | None = None,
+) -> Path:
+    """Write a film of a result to a GIF or MP4 file, whole or not at all.
+
+    Parameters
+    ----------
+    result, mechanism, values
+        As :func:`motion` has them.
+    path : str or Path
+        File to write: .gif (by Pillow) or .mp4 (by ffmpeg).
+    slow, fps, start, stop
+        As :func:`film` has them.
+    progress : callable or None
+        Told the fraction that is done, from 0 to 1.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ResultError, ParameterError
+        As :func:`motion` and :func:`film` do.
+    AnimationError
+        If the file cannot be written, or what writes it is not installed.
+    """
+    path = Path(path)
+    write = _writer(path)
+    moved = motion(result, mechanism, values)
+    scene = Scene(moved, film(moved, slow, fps, start, stop))
+    with _whole(path) as partial:
+        write(partial, scene, progress or (lambda fraction: None))
+    return path
+
+
+def show(
+    result: Result | Columns,
+    mechanism: Mechanism | None = None,
+    values: Mapping[str, float] | None = None,
+    *,
+    slow: float | None = None,
+    fps: float = FPS,
+    start: float | None = None,
+    stop: float | None = None,
+) -> None:
+    """Show a film of a result in a window, again and again until that is closed.
+
+    Parameters are those of :func:`animate`.
+
+    Raises
+    ------
+    AnimationError
+        If no window can be opened.
+    """
+    moved = motion(result, mechanism, values)
+    chosen = film(moved, slow, fps, start, stop)
+    pyplot, figure = _window()
+    from matplotlib.animation import FuncAnimation
+
+    scene = Scene(moved, chosen, figure)
+    running = FuncAnimation(
+        figure, scene.frame, frames=len(chosen.times), interval=1e3 / fps, cache_frame_data=False
+    )
+    pyplot.show(block=True)
+    del running  # a window only runs the film as long as somebody keeps it
+
+
+def _window() -> tuple[Any, Figure]:
+    """Return pyplot and a figure that has a window."""
+    remedy = (
+        "run it where there is a display, with PyQt6, PySide6 or tkinter installed, or write a "
+        "file: animate(result, 'motion.gif')"
+    )
+    try:
+        from matplotlib import pyplot
+
+        figure = pyplot.figure(figsize=SIZE, dpi=DPI)
+    except Exception as error:  # each toolkit raises its own
+        raise AnimationError(f"no window can be opened ({error}); {remedy}") from None
+    name = pyplot.get_backend()
+    if getattr(figure.canvas, "required_interactive_framework", None) is None and not (
+        name.lower() in ("nbagg", "webagg", "notebook") or "ipympl" in name
+    ):
+        pyplot.close(figure)
+        raise AnimationError(
+            f"no window can be opened: matplotlib draws to files only (backend {name}); {remedy}"
+        )
+    return pyplot, figure
+
+
+Write = Callable[[Path, Scene, Progress], None]
+
+
+def _writer(path: Path) -> Write:
+    """Return what writes a file of this kind."""
+    kind = path.suffix.lower()
+    if kind == ".gif":
+        try:
+            import PIL.Image  # noqa: F401
+        except ImportError:
+            raise AnimationError(
+                f"{path.name}: GIF files need Pillow; install it with: pip install pillow"
+            ) from None
+        return _write_gif
+    if kind == ".mp4":
+        return functools.partial(_write_mp4, ffmpeg=_ffmpeg(path))
+    raise AnimationError(f"{path}: cannot tell what to write; end the name in .gif or .mp4")
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[Path]:
+    """Give a name beside the file, which becomes the file if all goes well."""
+    partial = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        partial.touch()  # now rather than after the work
+        yield partial
+        os.replace(partial, path)
+    except OSError as error:
+        raise AnimationError(f"{path}: cannot be written ({error.strerror or error})") from None
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+Frame = TypeVar("Frame")
+
+
+def _told(frames: Iterator[Frame], count: int, progress: Progress) -> Iterator[Frame]:
+    for k, frame in enumerate(frames, start=1):
+        yield frame
+        progress(k / count)
+
+
+def _write_gif(path: Path, scene: Scene, progress: Progress) -> None:
+    from PIL import Image
+
+    colours = _Colours(scene)
+
+    def image(pixels: NDArray[np.uint8]) -> Image.Image:
+        result = Image.fromarray(colours.indices(pixels))
+        result.putpalette(colours.palette.tobytes())
+        return result
+
+    frames = map(image, pictures(scene))
+    with path.open("wb") as file:
+        next(frames).save(
+            file,
+            format="GIF",
+            save_all=True,
+            append_images=_told(frames, len(scene.film.times) - 1, progress),
+            duration=10 * round(100 / scene.film.fps),
+            loop=0,
+        )
+
+
+class _Colours:
+    """One palette of 256 colours for all frames, so that nothing flickers.
+
+    Those of the scene, then the most frequent: plain colours stay what they are and only blends
+    of two are rounded.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        last = len(scene.film.times) - 1
+        hits = sorted(scene.film.hits)[:1]
+        some = [0, *hits, *(min(k + 3, last) for k in hits), last // 2, last]
+        pixels = np.concatenate([_packed(frame).ravel() for frame in pictures(scene, some)])
+        colours, frequency = np.unique(pixels, return_counts=True)
+        own = np.array([int(colour[1:], 16) for colour in COLOURS])
+        common = colours[np.argsort(-frequency, kind="stable")]
+        chosen = np.concatenate([own, common[~np.isin(common, own)]])[:256]
+        chosen = np.pad(chosen, (0, 256 - len(chosen)), mode="edge")
+        self.palette = np.stack([chosen >> 16, chosen >> 8, chosen], axis=1).astype(np.uint8)
+        self.index = np.full(1 << 24, -1, np.int16)
+
+    def indices(self, pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return which colour of the palette is nearest to each pixel."""
+        packed = _packed(pixels)
+        new = np.unique(packed[self.index[packed] < 0])
+        if len(new):
+            rgb = np.stack([new >> 16, new >> 8 & 255, new & 255], axis=1)
+            difference = rgb[:, None, :] - self.palette.astype(int)
+            self.index[new] = (difference**2).sum(axis=2).argmin(axis=1)
+        return self.index[packed].astype(np.uint8)
+
+
+def _packed(pixels: NDArray[np.uint8]) -> NDArray[np.int64]:
+    """Return colours as numbers, 0xRRGGBB."""
+    result: NDArray[np.int64] = pixels.astype(np.int64) @ np.array([1 << 16, 1 << 8, 1])
+    return result
+
+
+def _ffmpeg(path: Path) -> str:
+    """Return the ffmpeg program of the system, or the one that imageio-ffmpeg brings."""
+    program = shutil.which("ffmpeg")
+    if program is None:
+        try:
+            import imageio_ffmpeg  # type: ignore[import-untyped, unused-ignore]
+
+            program = str(imageio_ffmpeg.get_ffmpeg_exe())
+        except (ImportError, RuntimeError):
+            raise AnimationError(
+                f"{path.name}: MP4 files need ffmpeg, which is not installed; install it with: "
+                "pip install imageio-ffmpeg, or write a .gif"
+            ) from None
+    return program
+
+
+def _write_mp4(path: Path, scene: Scene, progress: Progress, *, ffmpeg: str) -> None:
+    width, height = scene.figure.canvas.get_width_height()
+    command = [
+        ffmpeg, "-loglevel", "error", "-y",
+        "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+        "-r", f"{scene.film.fps:g}", "-i", "-",
+        "-an", "-c:v", "libx264", "-crf", "18", "-pix_fmt", "yuv420p",
+        "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-movflags", "+faststart", str(path),
+    ]  # fmt: skip
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdin is not None
+        assert process.stderr is not None
+        try:
+            for pixels in _told(pictures(scene), len(scene.film.times), progress):
+                process.stdin.write(pixels.tobytes())
+            process.stdin.close()
+        except BrokenPipeError:
+            pass
+        complaint = process.stderr.read().decode(errors="replace").strip()
+    if process.returncode:
+        raise AnimationError(f"{ffmpeg} failed: {complaint or 'without a word'}")
+
+
+# --- command ----------------------------------------------------------------------------------
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Animate a result, or a mechanism simulated now."""
+    parser = argparse.ArgumentParser(
+        prog="python -m prbm_tools.animation",
+        usage="%(prog)s [options] (RESULT.csv | --model NAME | --mechanism FILE) OUT.gif",
+        description="Write a GIF or MP4 film of a result, or of a mechanism simulated now.",
+    )
+    add = parser.add_argument
+    add("files", nargs="+", metavar="FILE", help="RESULT.csv to show; OUT.gif or OUT.mp4 to write")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--model", metavar="NAME", help="a mechanism that comes with the package")
+    which.add_argument("--mechanism", metavar="FILE.toml", help="one of your own")
+    add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter or input")
+    add("--stop-time", type=float, default=1.0, help="of the simulation [s]; %(default)s")
+    add("--slow", type=float, help="factor of slow motion; a round one for about ten seconds")
+    add("--fps", type=float, default=FPS, help="frames per second; %(default)g")
+    add("--from", dest="start", type=float, help="first time shown [s]")
+    add("--to", dest="stop", type=float, help="last time shown [s]")
+    options = parser.parse_args(arguments)
+    try:
+        path = animate(
+            _result(options),
+            options.files[-1],
+            slow=options.slow,
+            fps=options.fps,
+            start=options.start,
+            stop=options.stop,
+            progress=_percent if sys.stderr.isatty() else None,
+        )
+    except PrbmError as error:
+        parser.exit(2, f"{parser.prog}: {error}\n")
+    print(path)
+    return 0
+
+
+def _result(options: argparse.Namespace) -> Result:
+    """Return the result that was asked for: read, or simulated."""
+    _writer(Path(options.files[-1]))
+    changes = dict(_assignment(text) for text in options.set)
+    mechanism = None
+    if options.mechanism is not None:
+        mechanism = load(options.mechanism)
+    elif options.model is not None:
+        if options.model not in shipped():
+            raise ParameterError(unknown(options.model, shipped()).replace("variable", "model"))
+        mechanism = load(shipped()[options.model])
+    if len(options.files) == 1:
+        if mechanism is None:
+            raise ParameterError("name what to show: RESULT.csv, --model or --mechanism")
+        return simulate(mechanism, changes, options.stop_time)
+    if len(options.files) > 2:
+        raise ParameterError(f"{len(options.files)} files are given: RESULT.csv OUT, or OUT")
+    columns = read_csv(options.files[0])
+    mechanism = mechanism or _owner(columns)
+    known = mechanism.values()
+    for name in changes:
+        if name not in known:
+            raise ParameterError(unknown(name, known))
+    return Result(mechanism, mechanism.values(changes), columns)
+
+
+def _assignment(text: str) -> tuple[str, float]:
+    name, _, number = text.partition("=")
+    try:
+        return name.strip(), float(number)
+    except ValueError:
+        raise ParameterError(f"--set {text}: write a name and a number, as name=0.5") from None
+
+
+def _owner(columns: Columns) -> Mechanism:
+    """Return the one shipped mechanism that has just the angles that a result holds."""
+    recorded = {name for name in names(columns) if name.endswith(".angle")}
+    every = [load(path) for path in shipped().values()]
+    owners = [m for m in every if set(needed(m)) & _angle_names(m) == recorded]
+    if len(owners) != 1:
+        raise ResultError(
+            "cannot tell from its columns which mechanism this is the result of: say so with "
+            f"--model ({', '.join(shipped())}) or --mechanism FILE.toml"
+        )
+    return owners[0]
+
+
+def _angle_names(mechanism: Mechanism) -> set[str]:
+    return {name for name in needed(mechanism) if name.endswith(".angle")}
+
+
+def _percent(fraction: float) -> None:
+    end = "\n" if fraction >= 1.0 else ""
+    print(f"\r{fraction:4.0%}", end=end, file=sys.stderr, flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,221 @@
+"""A mechanism simulated without an FMU, with the result that FMPy would give for one."""
+
+import csv
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from prbm import Impact, Mechanism, ParameterError, Simulation
+from prbm.errors import PrbmError
+
+Columns = NDArray[Any]
+Source = Callable[[float], Mapping[str, float]]
+Progress = Callable[[float], object]
+
+MOST_ROWS = 10_000_000  # more communication points than this are a mistake in the units of step
+ROUND_OFF = 1e-9  # of a communication step: a last step shorter than this is none
+
+
+class ResultError(PrbmError, ValueError):
+    """A result lacks what is asked of it, or is no result of the mechanism."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A mechanism, what it was given, and what it did.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What moved.
+    values : mapping
+        All its parameters at the start, and the inputs that were given then.
+    columns : (m,) structured array
+        ``time`` and the variables by name, in SI units, one row a communication point.
+    impacts : tuple of Impact
+        All impacts in order, with the state around each, as far as they were recorded.
+    """
+
+    mechanism: Mechanism
+    values: Mapping[str, float]
+    columns: Columns
+    impacts: tuple[Impact, ...] = field(default=())
+
+    def __getitem__(self, name: str) -> Columns:
+        """Return a column by name."""
+        return column(self.columns, name)
+
+
+def column(columns: Columns, name: str) -> Columns:
+    """Return a column of a result.
+
+    Raises
+    ------
+    ResultError
+        If there is none of that name.
+    """
+    if name not in names(columns):
+        raise ResultError(
+            f"the result has no column {name!r}; record it, with FMPy as in "
+            f"simulate_fmu(..., output=[..., {name!r}])"
+        )
+    found: Columns = columns[name]
+    return found
+
+
+def names(columns: Columns) -> tuple[str, ...]:
+    """Return the names of the columns of a result."""
+    return columns.dtype.names or ()
+
+
+def simulate(
+    mechanism: Mechanism,
+    values: Mapping[str, float] | None = None,
+    stop_time: float = 1.0,
+    step: float = 1e-3,
+    tolerance: float | None = None,
+    source: Source | None = None,
+    progress: Progress | None = None,
+) -> Result:
+    """Simulate a mechanism from its release.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What moves.
+    values : mapping
+        Parameters and inputs that differ from their defaults.
+    stop_time, step : float
+        Duration and distance of the communication points [s]; the last step may be shorter.
+    tolerance : float or None
+        Relative tolerance of the integration; None: ``solver.tolerance``.
+    source : callable or None
+        Gives inputs and tunable parameters by name for the step that begins at a time [s].
+    progress : callable or None
+        Told the fraction that is done, from 0 to 1.
+
+    Returns
+    -------
+    Result
+        An input stands in the row at which it begins to act.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown, a value out of bounds or there is no step to take.
+    EquilibriumError, SimulationError
+        As :class:`prbm.Simulation` does.
+    """
+    times = communication_points(stop_time, step)
+    simulation = Simulation(mechanism, values, tolerance=tolerance)
+    simulation.record = []
+    start = {**simulation.values, **simulation.given}
+    rows = []
+    for k, t in enumerate(times):
+        simulation.advance(t)
+        outputs = simulation.outputs()
+        if source is not None:
+            simulation.set(source(t))
+        rows.append({"time": t, **simulation.given, **outputs})
+        if progress is not None:
+            progress(k / (len(times) - 1))
+    return Result(mechanism, start, structured(rows), tuple(simulation.record))
+
+
+def communication_points(stop_time: float, step: float) -> list[float]:
+    """Return 0, step, 2 step, ... up to the stop time [s].
+
+    Raises
+    ------
+    ParameterError
+        If that is not a finite number of steps forwards.
+
+    Examples
+    --------
+    >>> communication_points(1.0, 0.4)
+    [0.0, 0.4, 0.8, 1.0]
+    """
+    for name, value in (("stop_time", stop_time), ("step", step)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise ParameterError(f"{name} = {value:g} s must be positive and finite")
+    steps = math.ceil(stop_time / step - ROUND_OFF)
+    if steps > MOST_ROWS:
+        raise ParameterError(
+            f"step = {step:g} s makes {steps} steps in {stop_time:g} s: choose a larger one"
+        )
+    return [*(k * step for k in range(max(steps, 1))), stop_time]
+
+
+def structured(rows: Iterable[Mapping[str, float | int | bool]]) -> Columns:
+    """Return rows of values by name as a structured array with FMPy's types.
+
+    Examples
+    --------
+    >>> structured([{"time": 0.0, "stop.contact": True}])["stop.contact"]
+    array([ True])
+    """
+    table = list(rows)
+    kinds = {bool: np.bool_, int: np.int32}
+    dtype = [(name, kinds.get(type(x), np.float64)) for name, x in table[0].items()]
+    return np.array([tuple(row.values()) for row in table], dtype)
+
+
+WORDS = {"true": 1.0, "false": 0.0}
+
+
+def read_csv(path: str | Path) -> Columns:
+    """Read a result from a CSV file as FMPy writes it: names, then a row for every time.
+
+    Raises
+    ------
+    ResultError
+        If the file cannot be read or is no such table; the message names the line.
+    """
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            lines = [line for line in csv.reader(file) if line]
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be read ({error.strerror})") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ResultError(f"{path}: is no CSV file ({error})") from None
+    if len(lines) < 3 or lines[0][0].strip() != "time":
+        raise ResultError(
+            f"{path}: is no result; the first line names the columns, the first of them is "
+            "time, and two rows or more follow"
+        )
+    header = [name.strip() for name in lines[0]]
+    if len(set(header)) < len(header):
+        raise ResultError(f"{path}: a column stands there twice")
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        if len(line) != len(header):
+            raise ResultError(
+                f"{path}: row {number} has {len(line)} values for {len(header)} columns"
+            )
+        try:
+            rows.append(tuple(WORDS[x.lower()] if x.lower() in WORDS else float(x) for x in line))
+        except ValueError:
+            raise ResultError(f"{path}: row {number} holds what is no number") from None
+    return np.array(rows, [(name, np.float64) for name in header])
+
+
+def rest_time(columns: Columns, stop: str = "stop") -> float | None:
+    """Return the first recorded time from which on a stop holds to the end of the result [s].
+
+    None if it does not hold at the end.
+
+    Examples
+    --------
+    >>> rows = [{"time": 0.0, "stop.contact": False}, {"time": 0.5, "stop.contact": True}]
+    >>> rest_time(structured(rows))
+    0.5
+    """
+    open_rows = np.flatnonzero(column(columns, f"{stop}.contact") == 0)
+    first = int(open_rows[-1]) + 1 if len(open_rows) else 0
+    return float(columns["time"][first]) if first < len(columns) else None

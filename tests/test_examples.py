@@ -1,0 +1,133 @@
+"""Every example runs, and its headline agrees with the independent value beside it."""
+
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
+
+pytestmark = pytest.mark.fmu
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def example(name: str) -> SimpleNamespace:
+    """Return the functions of an example."""
+    return SimpleNamespace(**runpy.run_path(str(EXAMPLES / name)))
+
+
+def is_picture(path: str) -> bool:
+    with Image.open(path) as image:
+        return image.format == "PNG" and min(image.size) > 300
+
+
+def test_quickstart_has_the_frequency_of_finite_elements(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Within the model error of the 2R, 0.5 %, and twice the uncertainty of the experiment."""
+    quickstart = example("quickstart.py")
+    quickstart.main([])
+    printed = capsys.readouterr().out
+    frequency = float(printed.split()[2])
+    assert frequency == pytest.approx(quickstart.FINITE_ELEMENTS, rel=5e-3)
+    measured, uncertainty = quickstart.MEASURED
+    assert abs(frequency - measured) < 2 * uncertainty
+    assert "14 impacts, at rest from 0.24" in printed
+    assert is_picture("quickstart.png")
+    assert Path("PRBDM2R.fmu").exists()
+
+
+def test_quickstart_simulates_as_long_as_it_is_told(tmp_path: Path) -> None:
+    result = example("quickstart.py").simulate(tmp_path, stop_time=0.02)
+    assert result["time"][-1] == pytest.approx(0.02)
+    assert {"shuttle.x", "link[6].angle", "mode.frequency"} < set(result.dtype.names)
+
+
+def test_parameter_study_rests_when_the_scalar_equation_does() -> None:
+    """The bouncing ends early by 2 eps v_r / (a (1 - eps)) at most, a about g."""
+    study = example("parameter_study.py")
+    restitutions = (0.3, 0.6, 0.8)
+    table = study.study(restitutions)
+    np.testing.assert_allclose(table["rebound"], restitutions, rtol=1e-9)
+    eps = table["restitution"]
+    bound = 2 * eps * study.REST_SPEED / (9.0 * (1 - eps)) + 1e-6
+    early = table["exact"] - table["rest_time"]
+    assert (early > -1e-6).all()
+    assert (early < bound).all()
+
+
+def test_parameter_study_has_the_right_scalar_equation() -> None:
+    """Another program's times of the first impact and of the accumulation, to their digits."""
+    rest_time = example("parameter_study.py").exact_rest_time
+    assert rest_time(1e-9, release=-0.010, K_theta=2.5449) == pytest.approx(0.034981, abs=1e-6)
+    assert rest_time(0.6, release=-0.010, K_theta=2.5449) == pytest.approx(0.18034, abs=1e-5)
+
+
+def test_parameter_study_writes_its_table_and_figure(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    namespace = runpy.run_path(str(EXAMPLES / "parameter_study.py"))
+    main = namespace["main"]
+    monkeypatch.setitem(main.__globals__, "study", lambda: namespace["study"]((0.2, 0.4)))
+    main()
+    assert "largest difference" in capsys.readouterr().out
+    assert is_picture("parameter_study.png")
+
+
+def test_stroke_controller_keeps_the_books_and_the_stroke(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Its work is known to the guide, its bounce to beam theory.
+
+    Work and balance to the tolerance of the integration; the speed to the model error of the
+    1R, whose stiffness is 4 % above that of a beam, and the delay of a step.
+    """
+    run = example("stroke_controller/run.py")
+    record = run.simulate(stop_time=2.0)
+    np.testing.assert_allclose(run.work(record), record["energy.work"], atol=1e-9)
+    assert record["energy.work"][-1] > 0.1  # J, five times what the release put in
+    assert np.ptp(run.balance(record)) < 1e-6 * record["energy.dissipated"][-1]
+    rate, speed = run.steady(record)
+    assert speed == pytest.approx(run.expected_speed(run.STROKE), rel=0.03)
+    late = record["reached"][record["time"] > 1.0]
+    np.testing.assert_allclose(late, run.STROKE, rtol=0.05)
+    assert 10.0 < rate < 20.0
+
+
+def test_stroke_controller_prints_and_plots(capsys: pytest.CaptureFixture[str]) -> None:
+    example("stroke_controller/run.py").main(["--stop-time", "1.0"])
+    printed = capsys.readouterr().out
+    assert "wanted 8.000 mm" in printed
+    assert is_picture("stroke_controller.png")
+
+
+def test_stroke_controller_lifts_a_shuttle_that_lies_at_the_stop(tmp_path: Path) -> None:
+    controller = example("stroke_controller/stroke_controller.py").StrokeController(
+        instance_name="c", resources=str(tmp_path)
+    )
+    controller.do_step(0.0, 1e-3)
+    assert controller.force == -controller.limit
+    controller.velocity = 0.1
+    controller.do_step(1e-3, 1e-3)
+    assert controller.force == 0.0
+
+
+def test_stroke_controller_pushes_the_way_the_shuttle_goes(tmp_path: Path) -> None:
+    controller = example("stroke_controller/stroke_controller.py").StrokeController(
+        instance_name="c", resources=str(tmp_path)
+    )
+    for velocity, position in ((-0.1, -1e-3), (0.1, -3e-3)):
+        controller.velocity, controller.position = velocity, position
+        controller.do_step(0.0, 1e-3)
+    assert controller.reached == 3e-3
+    assert controller.force == pytest.approx(25.0 * 5e-3)
+    controller.velocity = -0.1
+    controller.do_step(0.0, 1e-3)
+    assert controller.force == pytest.approx(-25.0 * 5e-3)
