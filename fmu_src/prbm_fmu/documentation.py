@@ -1,0 +1,251 @@
+"""The page that an FMU carries: what it is, its equations, its variables, its limits."""
+
+import math
+from collections.abc import Iterable
+from html import escape
+
+from prbm import FlexureType, Mechanism
+
+from .description import GENERATION_TOOL, STOP_TIME
+from .variables import Variable
+
+STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto;
+  padding: 0 1rem; }
+h1 { line-height: 1.2; } h2 { margin-top: 2.2rem; border-bottom: 1px solid #ccc; }
+pre { background: #f5f7fa; padding: .8rem 1rem; overflow-x: auto; line-height: 1.3; }
+code { background: #f5f7fa; padding: 0 .2em; } pre code { padding: 0; }
+.table { overflow-x: auto; }
+table { border-collapse: collapse; width: 100%; font-size: .88rem; }
+th, td { text-align: left; padding: .25rem .6rem; border-bottom: 1px solid #ddd;
+  vertical-align: top; }
+th { background: #eef3f8; } td.number { text-align: right; white-space: nowrap; }
+td:first-child { white-space: nowrap; } caption { text-align: left; font-weight: 600;
+  padding: .8rem 0 .3rem; } figure { margin: 1rem 0; }
+"""
+
+KINDS = {
+    ("parameter", "fixed"): "Parameters, fixed when the simulation starts",
+    ("parameter", "tunable"): "Parameters that may change while the simulation runs",
+    ("calculatedParameter", "fixed"): "Calculated parameters",
+    ("input", "continuous"): "Inputs",
+    ("output", "continuous"): "Outputs",
+    ("output", "discrete"): "Outputs that an impact changes (latched)",
+    ("local", "continuous"): "Local variables",
+    ("local", "fixed"): "Local constants",
+}
+
+END_MOMENT = {"1R": 0.443, "2R": 0.772, "3R": 1.007}
+"""Tip slope of a cantilever under an end moment, as a share of the exact one."""
+
+SOURCES = (
+    "S. Boersma, Modelling and Validation of the Impact Response in Compliant Mechanisms, MSc "
+    "thesis, TU Delft, 2015.",
+    "L. L. Howell, Compliant Mechanisms, Wiley, 2001 (1R).",
+    "Y.-Q. Yu et al., Dynamic modeling of compliant mechanisms based on the pseudo-rigid-body "
+    "model, J. Mech. Des. 127 (2005) 760 (1R, masses).",
+    "Y.-Q. Yu, Z.-L. Feng, Q.-P. Xu, A pseudo-rigid-body 2R model of flexural beam in compliant "
+    "mechanisms, Mech. Mach. Theory 55 (2012) 18 (2R).",
+    "H.-J. Su, A pseudorigid-body 3R model, J. Mech. Robotics 1 (2009) 021008 (3R).",
+    "W. J. Stronge, Rigid body collisions with friction, Proc. R. Soc. A 431 (1990) 169 "
+    "(restitution with friction).",
+)
+
+
+def page(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
+    """Return the HTML page of a mechanism."""
+    name = escape(mechanism.name)
+    sections = (
+        _what(mechanism),
+        _use(mechanism),
+        _equations(mechanism),
+        _variables(variables),
+        _limits(mechanism, variables),
+        _list("Sources", (escape(source) for source in SOURCES), ordered=True),
+        _licenses(),
+    )
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{name}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n"
+        + "\n".join(sections)
+        + "\n</body>\n</html>\n"
+    )
+
+
+def _list(title: str, items: Iterable[str], *, ordered: bool = False) -> str:
+    tag = "ol" if ordered else "ul"
+    lines = "\n".join(f"<li>{item}</li>" for item in items)
+    return f"<h2>{title}</h2>\n<{tag}>\n{lines}\n</{tag}>"
+
+
+def _what(mechanism: Mechanism) -> str:
+    drawing = escape(mechanism.drawing.strip("\n"))
+    figure = f"<figure><pre>{drawing}</pre></figure>" if drawing else ""
+    return (
+        f"<h1>{escape(mechanism.name)}</h1>\n"
+        f"<p><strong>{escape(mechanism.title)}.</strong> "
+        f"{escape(mechanism.description.strip())}</p>\n{figure}\n"
+        "<p>Flexures are replaced by rigid links and torsion springs (a pseudo-rigid-body "
+        "model), so that impacts follow the laws of rigid bodies: they are located to "
+        "10<sup>-12</sup> s inside a communication step, and bouncing that dies out ends in "
+        "resting contact, which releases when the contact force reaches zero. FMI 2.0 "
+        f"co-simulation, made by {GENERATION_TOOL}.</p>"
+    )
+
+
+def _use(mechanism: Mechanism) -> str:
+    stops = [stop.name for stop in mechanism.stops]
+    start = f'    start_values={{"{stops[0]}.restitution": 0.4}},\n' if stops else ""
+    body = mechanism.release.body
+    output = f'"{body}.x"' + "".join(f', "{stop}.impact_count"' for stop in stops)
+    return (
+        "<h2>Use</h2>\n<pre><code>"
+        + escape(
+            "from fmpy import plot_result, simulate_fmu\n\n"
+            f'result = simulate_fmu(\n    "{mechanism.name}.fmu",\n    stop_time={STOP_TIME:g},\n'
+            f"{start}    output=[{output}],\n)\nplot_result(result)"
+        )
+        + "</code></pre>\n"
+        "<p>Where it runs it needs <strong>Python 3.11 or later with NumPy and SciPy</strong>: "
+        "inside a Python process (FMPy, PyFMI) nothing else; a tool that is not written in "
+        "Python must find the Python library when it loads the FMU (on Linux for instance "
+        "with <code>LD_PRELOAD=libpython3.11.so</code>). Linux and Windows on x86-64.</p>\n"
+        "<p>Unpack it to a folder whose path is plain ASCII without <code>% # ?</code>: the "
+        "wrapper library pythonfmu does not decode percent-encoded paths (other than a space) "
+        "and crashes the host. For FMPy that is the folder of temporary files; set the "
+        "environment variable <code>TMPDIR</code> (Linux) or <code>TMP</code> (Windows) if "
+        "your user name has other letters.</p>\n"
+        "<p>What is wrong with a value, a parameter set or a step is logged as a sentence, and "
+        "every <code>doStep</code> answers <code>fmi2Discard</code> until it is put right; what "
+        "was wrong when the simulation started needs a <code>reset</code>. "
+        "FMPy then ends the simulation early; the reason is also on the standard error "
+        "stream. The wrapper passes log messages on only if the importer asks for them "
+        "(FMPy: <code>debug_logging=True</code>), impacts included.</p>"
+    )
+
+
+def _equations(mechanism: Mechanism) -> str:
+    flexures = "".join(_flexure_row(mechanism, kind) for kind in mechanism.flexure_types)
+    return (
+        "<h2>Equations</h2>\n"
+        "<p>With the absolute angles q of the links and e = exp(i q), every point is "
+        "z = c + A e, and</p>\n<pre>"
+        "[ M      Phi_q^T  -G^T ] [ a      ]   [ Q - C v^2        ]\n"
+        "[ Phi_q  0         0   ] [ lambda ] = [ -(d/dt Phi_q) v  ]\n"
+        "[ G      0         0   ] [ force  ]   [ -(d/dt G) v      ]   while a stop holds\n\n"
+        "M = Re(conj(e)_i H_ij e_j) + diag(J),   C = -Im(conj(e)_i H_ij e_j)\n"
+        "Q = springs + gravity + damping (2 zeta omega_1 M v + beta K v) + friction + inputs"
+        "</pre>\n<p>Phi = 0 closes the loops; positions and velocities are projected onto "
+        "it. At an impact, where the gap g closes at the rate g' = G v + w, w the velocity of "
+        "the wall,</p>\n<pre>"
+        "M (v+ - v-) + Phi_q^T Lambda = G^T P,   Phi_q v+ = 0,   g'+ = -restitution g'-,   P >= 0"
+        "</pre>\n<p>With friction at the stop the coefficient of restitution is energetic "
+        "(Stronge), so that no impact gains energy; without friction that is the same as "
+        "Newton's.</p>\n"
+        '<div class="table"><table><caption>Flexure models</caption><thead><tr><th>type</th>'
+        "<th>model</th><th>coefficients (published)</th><th>source</th></tr></thead><tbody>"
+        f"{flexures}</tbody></table></div>\n"
+        "<p>Kinetic + elastic + gravitational + dissipated energy - work is constant, "
+        "through impacts too.</p>"
+    )
+
+
+def _flexure_row(mechanism: Mechanism, kind: FlexureType) -> str:
+    model = mechanism.model(kind)
+    coefficients = ", ".join(f"{c.name} = {c.value:g}" for c in model.coefficients)
+    cells = (kind.name, kind.model, coefficients, model.source)
+    return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
+
+
+def _variables(variables: tuple[Variable, ...]) -> str:
+    parts = ["<h2>Variables</h2>", "<p>SI units and radians.</p>"]
+    for (causality, variability), title in KINDS.items():
+        kind = [v for v in variables if (v.causality, v.variability) == (causality, variability)]
+        if kind:
+            parts.append(_table(title, kind))
+    return "\n".join(parts)
+
+
+def _table(title: str, variables: list[Variable]) -> str:
+    with_start = any(v.start is not None for v in variables)
+    head = ["name", "unit", *(["default", "range"] if with_start else []), "meaning"]
+    rows = []
+    for v in variables:
+        cells = [f"<td><code>{escape(v.name)}</code></td>"]
+        cells.append(f"<td>{escape(v.unit if v.type == 'Real' else v.type)}</td>")
+        if with_start:
+            cells.append(f'<td class="number">{v.start:.6g}</td>')
+            cells.append(f'<td class="number">{_range(v)}</td>')
+        cells.append(f"<td>{escape(v.description)}</td>")
+        rows.append(f"<tr>{''.join(cells)}</tr>")
+    titles = "".join(f'<th scope="col">{title}</th>' for title in head)
+    return (
+        f'<div class="table"><table><caption>{title}</caption><thead><tr>{titles}</tr></thead>'
+        f"<tbody>\n{chr(10).join(rows)}\n</tbody></table></div>"
+    )
+
+
+def _range(v: Variable) -> str:
+    low = f"{v.minimum:g}" if math.isfinite(v.minimum) else ""
+    high = f"{v.maximum:g}" if math.isfinite(v.maximum) else ""
+    if low and high:
+        return f"{low} to {high}"
+    return f"&ge; {low}" if low else f"&le; {high}" if high else ""
+
+
+def _limits(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
+    models = {kind.model for kind in mechanism.flexure_types}
+    items = [
+        "An impact of rigid bodies has an impulse, but no duration and no peak of force. A real "
+        "hit of 0.1 ms is comparable to the axial vibrations of the flexures (0.5 ms in the "
+        "steel structure of the source), which this model does not have: its links do not "
+        "stretch.",
+        "The motion is planar; flexures are slender, of uniform section and linear elastic "
+        "material, and neither yield nor touch each other.",
+        "Links that do not stretch keep a body on parallel, straight flexures from turning, so "
+        "that a hit off its centre of mass costs less than it does in reality.",
+    ]
+    for model in sorted(models & END_MOMENT.keys()):
+        items.append(
+            f"End moments are the weak side of pivots: under a moment at its end, the tip of a "
+            f"{model} cantilever turns by {END_MOMENT[model]:g} of what it should. Loads across "
+            "the end are modelled well."
+        )
+    if "2R" in models:
+        items.append(
+            "Without damping the motion of a 2R guide through its straight shape is chaotic: "
+            "two of its modes go from about a hundred hertz to infinite stiffness there. A "
+            "little damping in proportion to stiffness cures that, hence the default of "
+            f"<code>damping.beta</code> ({_default('damping.beta', variables)} s). With none, "
+            "single impacts mean little after a few bounces."
+        )
+    if mechanism.stops:
+        items.append(
+            "Below <code>rest_speed</code> an impact ends in rest if the stop stays pressed; "
+            "bouncing then ends earlier by at most 2 eps v / (a (1 - eps)), with v that speed, "
+            "eps the restitution and a the pressing acceleration."
+        )
+        items.append(
+            "The wall never jumps: within a communication step it moves uniformly from where "
+            "it was to <code>position + displacement + velocity h</code>, and that velocity "
+            "enters the impact law. Several impacts within one communication step are all "
+            "computed and counted; the latched outputs show the last one."
+        )
+    items.append(
+        "Inputs are constant within a communication step; outputs at a communication point do "
+        "not depend on the inputs that are set there."
+    )
+    return _list("Limits", items)
+
+
+def _default(name: str, variables: tuple[Variable, ...]) -> str:
+    return next(f"{v.start:g}" for v in variables if v.name == name)
+
+
+def _licenses() -> str:
+    return (
+        "<h2>Licences</h2>\n<p>The model and its engine: MIT, see "
+        '<a href="licenses/prbm-impact.txt">licenses/prbm-impact.txt</a>. The wrapper library '
+        'pythonfmu: MIT, see <a href="licenses/pythonfmu.txt">licenses/pythonfmu.txt</a>.</p>'
+    )

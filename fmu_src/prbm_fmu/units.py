@@ -1,0 +1,70 @@
+"""SI units of the interface: base units, display units and the quantities measured in them."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit by its exponents of the base units, with what it may be displayed in.
+
+    ``display`` maps a name to the factor in ``displayed value = factor * value``.
+    """
+
+    base: Mapping[str, int]
+    display: Mapping[str, float] = field(default_factory=dict)
+
+
+UNITS = {
+    "1": Unit({}),
+    "m": Unit({"m": 1}, {"mm": 1e3, "um": 1e6}),
+    "m/s": Unit({"m": 1, "s": -1}, {"mm/s": 1e3}),
+    "m/s2": Unit({"m": 1, "s": -2}),
+    "rad": Unit({"rad": 1}, {"deg": 180 / math.pi}),
+    "rad/s": Unit({"rad": 1, "s": -1}, {"deg/s": 180 / math.pi}),
+    "s": Unit({"s": 1}, {"ms": 1e3, "us": 1e6}),
+    "Hz": Unit({"s": -1}, {"kHz": 1e-3}),
+    "kg": Unit({"kg": 1}, {"g": 1e3}),
+    "kg.m2": Unit({"kg": 1, "m": 2}, {"g.mm2": 1e9}),
+    "kg/m3": Unit({"kg": 1, "m": -3}, {"g/cm3": 1e-3}),
+    "Pa": Unit({"kg": 1, "m": -1, "s": -2}, {"GPa": 1e-9}),
+    "N": Unit({"kg": 1, "m": 1, "s": -2}, {"mN": 1e3}),
+    "N/m": Unit({"kg": 1, "s": -2}, {"N/mm": 1e-3}),
+    "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {"mN.m": 1e3}),
+    "N.s": Unit({"kg": 1, "m": 1, "s": -1}, {"mN.s": 1e3}),
+    "J": Unit({"kg": 1, "m": 2, "s": -2}, {"mJ": 1e3}),
+}
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A physical quantity: what a variable measures, in which unit, displayed in which."""
+
+    name: str
+    unit: str
+    display: str | None = None
+
+
+QUANTITIES = {
+    quantity.unit: quantity
+    for quantity in (
+        Quantity("Ratio", "1"),
+        Quantity("Length", "m", "mm"),
+        Quantity("Velocity", "m/s", "mm/s"),
+        Quantity("Acceleration", "m/s2"),
+        Quantity("Angle", "rad", "deg"),
+        Quantity("AngularVelocity", "rad/s", "deg/s"),
+        Quantity("Time", "s", "ms"),
+        Quantity("Frequency", "Hz"),
+        Quantity("Mass", "kg", "g"),
+        Quantity("MomentOfInertia", "kg.m2", "g.mm2"),
+        Quantity("Density", "kg/m3", "g/cm3"),
+        Quantity("Stress", "Pa", "GPa"),
+        Quantity("Force", "N"),
+        Quantity("Stiffness", "N/m"),
+        Quantity("Torque", "N.m", "mN.m"),
+        Quantity("Impulse", "N.s", "mN.s"),
+        Quantity("Energy", "J", "mJ"),
+    )
+}

@@ -1,0 +1,378 @@
+"""The one list of a mechanism's FMI variables, for every flavour and version of FMI.
+
+Value references are part of the interface and depend on nothing but the name: the CRC-32 of the
+name in UTF-8, without its highest bit.  A variable keeps its reference when others are added,
+removed or moved, in every version and flavour, and nobody has to keep a register of them.
+"""
+
+import math
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from prbm import Mechanism, MechanismError, Parameter, ParameterError
+from prbm.mechanism import affine, unknown
+
+from .units import QUANTITIES, Quantity
+
+Number = float | int | bool
+
+BASE = "base"
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of the interface.
+
+    Parameters
+    ----------
+    name : str
+        Structured name.
+    description : str
+        What it is, for a person who does not know the model.
+    causality, variability, initial : str
+        As in FMI 2.0; ``initial`` is empty for inputs.
+    unit : str
+        SI unit of a Real; empty for other types.
+    type : {"Real", "Integer", "Boolean"}
+        Type in FMI 2.0.
+    start : number or None
+        Start value where there is one.
+    minimum, maximum : float
+        Inclusive bounds, infinite where there are none.
+    nominal : float or None
+        Typical magnitude.
+    derivative_of : str or None
+        Name of the variable whose time derivative this one is.
+    display : str or None
+        Display unit where it differs from the one of the quantity.
+    """
+
+    name: str
+    description: str
+    causality: str
+    variability: str
+    initial: str
+    unit: str = ""
+    type: str = "Real"
+    start: Number | None = None
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    nominal: float | None = None
+    derivative_of: str | None = None
+    display: str | None = None
+
+    @property
+    def reference(self) -> int:
+        """The value reference, see the module."""
+        return zlib.crc32(self.name.encode()) & 0x7FFFFFFF
+
+    @property
+    def quantity(self) -> Quantity:
+        """What a Real measures."""
+        return QUANTITIES[self.unit]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Typical magnitudes of a mechanism's motion, as powers of ten in SI units."""
+
+    by_unit: Mapping[str, float]
+
+    def __call__(self, unit: str) -> float | None:
+        """Return the nominal value in a unit, None where it says nothing."""
+        return self.by_unit.get(unit)
+
+
+def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
+    """Return typical magnitudes from the release, the masses and the fundamental frequency."""
+    values = mechanism.values()
+    span = extent(mechanism)
+    x = abs(affine(mechanism.release.displacement)(values)) or span / 10
+    omega = 2 * math.pi * float(sample["mode.frequency"]) or 1.0
+    mass = sum(_quantity(body.mass, f"{body.name}.mass", values) for body in mechanism.bodies)
+    magnitudes = {
+        "m": x,
+        "m/s": x * omega,
+        "rad": x / span,
+        "rad/s": x / span * omega,
+        "m/s2": x * omega**2,
+        "s": 1 / omega,
+        "Hz": omega / (2 * math.pi),
+        "N": mass * x * omega**2,
+        "N.m": mass * x * omega**2 * span,
+        "N.s": mass * x * omega,
+        "J": mass * (x * omega) ** 2,
+    }
+    return Scales({unit: _power_of_ten(value) for unit, value in magnitudes.items()})
+
+
+def extent(mechanism: Mechanism) -> float:
+    """Return the larger side of the box around all points of the straight shape [m]."""
+    values = mechanism.values()
+    points = [*mechanism.ground.values()]
+    for body in mechanism.bodies:
+        points += [body.centre, *body.points.values()]
+    sides = []
+    for axis in (0, 1):
+        along = [affine(point[axis])(values) for point in points]
+        sides.append(max(along) - min(along))
+    return max(sides)
+
+
+def _quantity(quantity: float | str, name: str, values: Mapping[str, float]) -> float:
+    return affine(quantity)(values) if isinstance(quantity, str) else values[name]
+
+
+def _power_of_ten(value: float) -> float:
+    return float(f"1e{round(math.log10(value))}")
+
+
+def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Variable, ...]:
+    """Return all variables of a mechanism, in the order of the interface.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    sample : mapping
+        All outputs of a simulation of it at its start: names and types.
+
+    Raises
+    ------
+    MechanismError
+        If two names share a value reference.
+    """
+    nominal = scales(mechanism, sample)
+    result = tuple(_variables(mechanism, sample, nominal))
+    missing = sample.keys() - {v.name for v in result}
+    if missing:
+        raise MechanismError(f"no description for the outputs {', '.join(sorted(missing))}")
+    seen: dict[int, str] = {}
+    for variable in result:
+        other = seen.setdefault(variable.reference, variable.name)
+        if other != variable.name:
+            raise MechanismError(
+                f"{variable.name} and {other} happen to have the same value reference "
+                f"{variable.reference}: rename one of them"
+            )
+    return result
+
+
+def with_starts(
+    variables: tuple[Variable, ...], changes: Mapping[str, float]
+) -> tuple[Variable, ...]:
+    """Return the variables with other start values.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown or has no start value that may be set.
+    """
+    by_name = {v.name: v for v in variables}
+    settable = {n: v for n, v in by_name.items() if v.causality in ("parameter", "input")}
+    for name in changes:
+        if name not in by_name:
+            raise ParameterError(unknown(name, settable))
+        if name not in settable:
+            raise ParameterError(
+                f"{name} is computed by the model and cannot be set; parameters and inputs can"
+            )
+    return tuple(
+        replace(v, start=float(changes[v.name])) if v.name in changes else v for v in variables
+    )
+
+
+def _variables(
+    mechanism: Mechanism, sample: Mapping[str, Number], nominal: Scales
+) -> Iterator[Variable]:
+    for parameter in mechanism.parameters:
+        yield _parameter(parameter)
+    known = {p.name for p in mechanism.parameters}
+    for name in sample:
+        if name.endswith(".gamma0") and name not in known:
+            yield Variable(
+                name,
+                "Length of the stubs at the clamps in units of the length of the cantilever: "
+                "what the other gammas leave of 1",
+                "calculatedParameter", "fixed", "calculated", "1", minimum=0.0, maximum=1.0,
+            )  # fmt: skip
+    yield from _inputs(mechanism, nominal)
+    for body in mechanism.bodies:
+        yield from _body(body.name, nominal)
+    for stop in mechanism.stops:
+        yield from _stop(stop.name, nominal)
+    yield from _base(nominal)
+    yield from _energies(nominal)
+    links = (n.removesuffix(".angle") for n in sample if n.startswith("link["))
+    for link in (n for n in links if not n.endswith(".omega")):
+        yield from _link(link, nominal)
+    yield Variable(
+        "mode.frequency",
+        "Fundamental frequency about the static equilibrium under gravity, without stops",
+        "local", "fixed", "calculated", "Hz", minimum=0.0, nominal=nominal("Hz"),
+    )  # fmt: skip
+
+
+DISPLAY = {"thickness": "um", "beta": "us", "offset": "mm"}
+
+
+def _parameter(p: Parameter) -> Variable:
+    return Variable(
+        p.name,
+        p.description,
+        "parameter",
+        "tunable" if p.tunable else "fixed",
+        "exact",
+        p.unit or "1",
+        start=p.value,
+        minimum=p.minimum,
+        maximum=p.maximum,
+        nominal=p.nominal,
+        display=DISPLAY.get(p.name.rpartition(".")[2]),
+    )
+
+
+def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
+    def given(name: str, unit: str, description: str) -> Variable:
+        return Variable(
+            name, description, "input", "continuous", "", unit, start=0.0, nominal=nominal(unit)
+        )
+
+    for force in mechanism.forces:
+        centre = f"the centre of mass of the {force.body}"
+        yield given(f"{force.name}.x", "N", f"Force on {centre} along x")
+        yield given(f"{force.name}.y", "N", f"Force on {centre} along y")
+        yield given(f"{force.name}.moment", "N.m", f"Moment on the {force.body}")
+    for stop in mechanism.stops:
+        yield given(
+            f"{stop.name}.displacement",
+            "m",
+            f"Displacement of the wall, added to {stop.name}.position; the wall moves "
+            "there uniformly within a communication step",
+        )
+        yield given(
+            f"{stop.name}.velocity",
+            "m/s",
+            f"Velocity of the wall, rate of {stop.name}.displacement",
+        )
+    for axis in "xy":
+        yield given(
+            f"{BASE}.acceleration.{axis}", "m/s2",
+            f"Acceleration of the base along {axis}; all motion is relative to the base",
+        )  # fmt: skip
+
+
+def _output(
+    name: str,
+    unit: str,
+    description: str,
+    nominal: Scales,
+    *,
+    minimum: float = -math.inf,
+    derivative_of: str | None = None,
+) -> Variable:
+    return Variable(
+        name, description, "output", "continuous", "calculated", unit,
+        minimum=minimum, nominal=nominal(unit), derivative_of=derivative_of,
+    )  # fmt: skip
+
+
+def _body(body: str, nominal: Scales) -> Iterator[Variable]:
+    centre = f"of the centre of mass of the {body}"
+    for axis in "xy":
+        yield _output(
+            f"{body}.{axis}", "m", f"Displacement {centre} along {axis} from straight", nominal
+        )
+    yield _output(f"{body}.angle", "rad", f"Rotation of the {body} from straight", nominal)
+    for axis in "xy":
+        yield _output(
+            f"{body}.v{axis}", "m/s", f"Velocity {centre} along {axis}", nominal,
+            derivative_of=f"{body}.{axis}",
+        )  # fmt: skip
+    yield _output(
+        f"{body}.omega", "rad/s", f"Angular velocity of the {body}", nominal,
+        derivative_of=f"{body}.angle",
+    )  # fmt: skip
+
+
+def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
+    yield _output(f"{stop}.gap", "m", "Distance of the hit point from the wall", nominal)
+    yield _output(
+        f"{stop}.gap_rate", "m/s", "Rate of the gap, negative while it closes", nominal,
+        derivative_of=f"{stop}.gap",
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.force", "N", "Force of the wall while the stop holds; an impact is an impulse, "
+        "not a force", nominal, minimum=0.0,
+    )  # fmt: skip
+    latched = Variable(
+        f"{stop}.contact", "Whether the stop holds the body in resting contact",
+        "output", "discrete", "calculated", type="Boolean",
+    )  # fmt: skip
+    yield latched
+    yield replace(
+        latched, name=f"{stop}.impact_count", type="Integer", minimum=0,
+        description="Number of impacts so far; the outputs of the last one mean something once "
+        "it is positive",
+    )  # fmt: skip
+
+    def last(name: str, unit: str, description: str, minimum: float = -math.inf) -> Variable:
+        return replace(
+            latched, name=f"{stop}.{name}", type="Real", unit=unit, description=description,
+            minimum=minimum, nominal=None if name == "impact_time" else nominal(unit),
+        )  # fmt: skip
+
+    yield last("impact_time", "s", "Time of the last impact")
+    yield last("approach_speed", "m/s", "Closing speed before the last impact", 0.0)
+    yield last("rebound_speed", "m/s", "Opening speed after the last impact")
+    yield last("impulse", "N.s", "Impulse of the wall at the last impact", 0.0)
+    yield last("energy_lost", "J", "Energy lost at the last impact")
+    yield last(
+        "modal_restitution", "1",
+        "Velocity of the fundamental mode after over before the last impact, sign changed",
+    )  # fmt: skip
+
+
+def _base(nominal: Scales) -> Iterator[Variable]:
+    for axis in "xy":
+        yield _output(
+            f"{BASE}.force.{axis}", "N", f"Force of the mechanism on the ground along {axis}",
+            nominal,
+        )  # fmt: skip
+    yield _output(
+        f"{BASE}.moment", "N.m", "Moment of the mechanism on the ground about the first clamp",
+        nominal,
+    )  # fmt: skip
+
+
+def _energies(nominal: Scales) -> Iterator[Variable]:
+    yield _output("energy.kinetic", "J", "Kinetic energy", nominal, minimum=0.0)
+    yield _output(
+        "energy.elastic", "J", "Energy of the flexures, zero when straight", nominal, minimum=0.0
+    )
+    yield _output(
+        "energy.gravitational", "J", "Potential energy of gravity, zero when straight", nominal
+    )
+    yield _output(
+        "energy.dissipated", "J", "Energy lost so far to damping, friction and impacts", nominal
+    )
+    yield _output(
+        "energy.work", "J", "Work done so far by the inputs and the moving walls", nominal
+    )
+
+
+def _link(link: str, nominal: Scales) -> Iterator[Variable]:
+    number = link.removeprefix("link[").removesuffix("]")
+    angle = replace(
+        _output(
+            f"{link}.angle", "rad",
+            f"Angle of link {number} of the flexures, counter-clockwise from +x", nominal,
+        ),
+        causality="local",
+    )  # fmt: skip
+    yield angle
+    yield replace(
+        angle, name=f"{link}.omega", description=f"Angular velocity of link {number}",
+        unit="rad/s", nominal=nominal("rad/s"), derivative_of=angle.name,
+    )  # fmt: skip

@@ -1,0 +1,29 @@
+"""What several test files need: the shipped mechanisms and their FMUs, built once."""
+
+from pathlib import Path
+
+import pytest
+
+from prbm import Mechanism
+from prbm_fmu import python_fmu
+from prbm_fmu.archive import write
+from prbm_tools.mechanism_file import load, shipped
+
+
+@pytest.fixture(scope="session")
+def mechanisms() -> dict[str, Mechanism]:
+    """Return the shipped mechanisms by name."""
+    return {name: load(path) for name, path in shipped().items()}
+
+
+@pytest.fixture(scope="session")
+def fmus(
+    mechanisms: dict[str, Mechanism], tmp_path_factory: pytest.TempPathFactory
+) -> dict[str, Path]:
+    """Return the Python FMUs of the shipped mechanisms by name."""
+    folder = tmp_path_factory.mktemp("fmus")
+    paths = {}
+    for name, mechanism in mechanisms.items():
+        paths[name] = folder / f"{name}.fmu"
+        write(paths[name], python_fmu.build(mechanism))
+    return paths

@@ -1,0 +1,240 @@
+"""What an FMU declares: units, start values, references, structure, what it carries."""
+
+import ast
+import importlib.metadata
+import json
+import re
+import sys
+import tomllib
+import zipfile
+import zlib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+
+import prbm
+import prbm_fmu
+from fmu_host import OK, Instance
+from prbm_fmu.description import Heading, model_description
+from prbm_fmu.documentation import page
+from prbm_fmu.python_fmu import interface, start_sample
+from prbm_fmu.slaves.resolved import mechanism_from, resolved
+from prbm_fmu.units import UNITS
+from prbm_fmu.variables import variables, with_starts
+
+MODELS = ("PRBDM", "PRBDM2R")
+ROOT = Path(__file__).parents[1]
+
+pytestmark = pytest.mark.fmu
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_fmpy_finds_nothing_to_complain_about(fmus, model):
+    assert validate_fmu(str(fmus[model])) == []
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_every_variable_has_a_unit_a_description_and_an_exact_start(fmus, mechanisms, model):
+    """Start values survive the way through text: repr, not sixteen digits."""
+    values = mechanisms[model].values()
+    for v in read_model_description(str(fmus[model])).modelVariables:
+        assert v.description, v.name
+        assert v.type != "Real" or v.unit, v.name
+        if v.causality in ("parameter", "input"):
+            assert float(v.start) == values.get(v.name, 0.0), v.name
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_value_reference_depends_on_the_name_alone(fmus, model):
+    listed = read_model_description(str(fmus[model])).modelVariables
+    for v in listed:
+        assert v.valueReference == zlib.crc32(v.name.encode()) & 0x7FFFFFFF
+    assert len({v.valueReference for v in listed}) == len(listed)
+
+
+NAMES = {
+    "parameter fixed": "flexure.length flexure.thickness flexure.width flexure.youngs_modulus "
+    "flexure.density shuttle.width shuttle.mass shuttle.inertia shuttle.com_height gravity.x "
+    "gravity.y release.displacement release.velocity solver.tolerance",
+    "parameter tunable": "damping.zeta damping.beta friction.coefficient friction.normal_force "
+    "friction.normal_stiffness stop.position stop.offset stop.restitution stop.friction "
+    "stop.rest_speed",
+    "input continuous": "force.x force.y force.moment stop.displacement stop.velocity "
+    "base.acceleration.x base.acceleration.y",
+    "output continuous": "shuttle.x shuttle.y shuttle.angle shuttle.vx shuttle.vy shuttle.omega "
+    "stop.gap stop.gap_rate stop.force base.force.x base.force.y base.moment energy.kinetic "
+    "energy.elastic energy.gravitational energy.dissipated energy.work",
+    "output discrete": "stop.contact stop.impact_count stop.impact_time stop.approach_speed "
+    "stop.rebound_speed stop.impulse stop.energy_lost stop.modal_restitution",
+    "local fixed": "mode.frequency",
+}
+FLEXURES = {
+    "PRBDM": {"parameter fixed": "flexure.gamma flexure.K_theta"},
+    "PRBDM2R": {
+        "parameter fixed": "flexure.gamma1 flexure.gamma2 flexure.K_theta1 flexure.K_theta2",
+        "calculatedParameter fixed": "flexure.gamma0",
+    },
+}
+LINKS = {"PRBDM": 2, "PRBDM2R": 6}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_names_are_the_interface_that_was_agreed(fmus, model):
+    """Names and causalities are kept from version to version."""
+    links = (f"link[{k + 1}].{what}" for k in range(LINKS[model]) for what in ("angle", "omega"))
+    agreed = {(name, "local continuous") for name in links}
+    for table in (NAMES, FLEXURES[model]):
+        agreed |= {(name, kind) for kind, names in table.items() for name in names.split()}
+    listed = read_model_description(str(fmus[model])).modelVariables
+    assert {(v.name, f"{v.causality} {v.variability}") for v in listed} == agreed
+
+
+def test_units_are_the_products_that_their_names_say():
+    """N.m = N m, kg/m3 = kg m^-3, ...: the exponents follow from the atoms."""
+    atoms = {name: UNITS[name].base for name in ("m", "s", "rad", "kg", "N")} | {"1": {}}
+    derived = {"Pa": "N/m2", "J": "N.m", "Hz": "1/s"}
+    for name, unit in UNITS.items():
+        above, _, below = derived.get(name, name).partition("/")
+        exponents: dict[str, int] = {}
+        for part, sign in ((above, 1), (below, -1)):
+            for factor in filter(None, part.split(".")):
+                atom, power = re.fullmatch(r"([A-Za-z]+|1)(\d*)", factor).groups()
+                for base, n in atoms[atom].items():
+                    exponents[base] = exponents.get(base, 0) + sign * n * int(power or 1)
+        assert {b: n for b, n in exponents.items() if n} == dict(unit.base), name
+
+
+def test_display_units_are_scaled_as_their_prefixes_say():
+    prefixes = {"m": 1e-3, "u": 1e-6, "k": 1e3, "G": 1e9}
+    for name, unit in UNITS.items():
+        for display, factor in unit.display.items():
+            if display in ("deg", "deg/s", "g", "g.mm2", "g/cm3"):
+                continue  # not a prefix before the unit's own name
+            by_parts = [
+                prefixes[part[0]] if part != plain else 1.0
+                for part, plain in zip(display.split("/"), name.split("/"), strict=True)
+            ]
+            scale = by_parts[0] / (by_parts[1] if len(by_parts) > 1 else 1.0)
+            assert factor == pytest.approx(1 / scale, rel=1e-15), display  # round-off
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_velocities_are_declared_as_derivatives(fmus, model):
+    listed = {v.name: v for v in read_model_description(str(fmus[model])).modelVariables}
+    assert listed["shuttle.vx"].derivative is listed["shuttle.x"]
+    assert listed["shuttle.omega"].derivative is listed["shuttle.angle"]
+    assert listed["stop.gap_rate"].derivative is listed["stop.gap"]
+    assert listed["link[1].omega"].derivative is listed["link[1].angle"]
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_declared_capabilities_and_default_experiment(fmus, model):
+    description = read_model_description(str(fmus[model]))
+    cs, experiment = description.coSimulation, description.defaultExperiment
+    assert cs.canGetAndSetFMUstate
+    assert cs.canSerializeFMUstate
+    assert cs.canHandleVariableCommunicationStepSize
+    assert (experiment.startTime, experiment.stopTime) == ("0.0", "1.0")
+    assert (float(experiment.stepSize), float(experiment.tolerance)) == (1e-3, 1e-8)
+    assert description.generationDateAndTime.endswith("Z")
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_no_output_depends_at_once_on_an_input(fmus, model):
+    """ModelStructure says so; here every input is moved at a communication point."""
+    with Instance(fmus[model]).initialize() as instance:
+        assert instance.step(0.0, 0.01) == OK
+        before = instance.values()
+        inputs = [n for n, v in instance.variables.items() if v.causality == "input"]
+        instance.set(dict.fromkeys(inputs, 1e-3))
+        after = instance.values()
+    outputs = [n for n, v in instance.variables.items() if v.causality == "output"]
+    assert len(inputs) == 7
+    assert {n: after[n] for n in outputs} == {n: before[n] for n in outputs}
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_outputs_are_within_their_declared_bounds_through_a_run(fmus, model):
+    with Instance(fmus[model]).initialize() as instance:
+        for k in range(100):
+            assert instance.step(k * 4e-3, 4e-3) == OK
+            for name, value in instance.values().items():
+                v = instance.variables[name]
+                assert v.min is None or value >= float(v.min), name
+                assert v.max is None or value <= float(v.max), name
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_mechanism_survives_the_way_through_json(mechanisms, model):
+    mechanism = mechanisms[model]
+    data = json.loads(json.dumps(resolved(mechanism, ())))
+    assert mechanism_from(data["mechanism"], prbm) == mechanism
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_start_values_that_were_set_are_the_defaults_of_the_fmu(mechanisms, model):
+    """To the last bit: 0.1 + 0.2 needs seventeen digits."""
+    listed = interface(mechanisms[model], {"stop.restitution": 0.1 + 0.2})
+    xml = ElementTree.fromstring(model_description(Heading("X", "", "", {}), listed))
+    start = xml.find(".//ScalarVariable[@name='stop.restitution']/Real").get("start")
+    assert float(start) == 0.1 + 0.2 != 0.3
+
+
+def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
+    mechanism = mechanisms["PRBDM"]
+    listed = variables(mechanism, start_sample(mechanism, {}))
+    with pytest.raises(prbm.ParameterError, match=r"shuttle\.x is computed"):
+        with_starts(listed, {"shuttle.x": 1.0})
+    with pytest.raises(prbm.ParameterError, match=r"did you mean stop\.restitution"):
+        with_starts(listed, {"stop.restitutoin": 1.0})
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_page_names_every_variable_and_the_limits(mechanisms, model):
+    listed = interface(mechanisms[model], {})
+    html = page(mechanisms[model], listed)
+    for v in listed:
+        assert f"<code>{v.name}</code>" in html
+    for limit in ("no duration", "Stronge", "NumPy", "percent-encoded", "End moments"):
+        assert limit in html
+    assert ("chaotic" in html) == (model == "PRBDM2R")
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_an_fmu_carries_documentation_icon_and_licences_and_no_bytecode(fmus, model):
+    with zipfile.ZipFile(fmus[model]) as archive:
+        names = archive.namelist()
+        assert (
+            archive.read("documentation/licenses/prbm-impact.txt")
+            == (ROOT / "LICENSE").read_bytes()
+        )
+        bundled = archive.read("documentation/licenses/pythonfmu.txt").decode()
+        assert archive.read("model.png").startswith(b"\x89PNG")
+    installed = importlib.metadata.distribution("pythonfmu")
+    license_file = next(f for f in installed.files if f.name == "LICENSE")
+    assert bundled.split() == license_file.read_text().split()
+    assert "documentation/index.html" in names
+    assert not [name for name in names if "pyc" in name]
+
+
+def test_the_bundle_imports_nothing_but_itself_numpy_scipy_and_the_standard_library(fmus):
+    allowed = {"numpy", "scipy", "pythonfmu"} | sys.stdlib_module_names
+    with zipfile.ZipFile(fmus["PRBDM"]) as archive:
+        bundled = [n for n in archive.namelist() if n.endswith(".py") and "/prbm_" in n]
+        for name in bundled:
+            for node in ast.walk(ast.parse(archive.read(name))):
+                imported = []
+                if isinstance(node, ast.Import):
+                    imported = [alias.name for alias in node.names]
+                elif isinstance(node, ast.ImportFrom) and node.level == 0:
+                    imported = [node.module]
+                assert {module.partition(".")[0] for module in imported} <= allowed, name
+    assert len(bundled) > 10
+
+
+def test_the_version_is_the_one_of_the_project():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert prbm_fmu.__version__ == project["version"]

@@ -1,0 +1,213 @@
+"""Whatever an importer does wrong: a sentence, a status that is not OK, a living process."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+
+from fmu_host import DISCARD, OK, Instance
+from prbm_fmu.slaves.slave import MechanismSlave
+
+NAN, INF = float("nan"), float("inf")
+CYCLES = 50
+AT_START = {
+    "a negative length": ("flexure.length", -0.04, "flexure.length = -0.04 m must be at least"),
+    "no thickness": ("flexure.thickness", 0.0, "flexure.thickness = 0 m must be at least"),
+    "no mass": ("shuttle.mass", 0.0, "shuttle.mass = 0 kg must be at least"),
+    "a negative mass": ("shuttle.mass", -1.0, "shuttle.mass = -1 kg must be at least"),
+    "restitution above 1": ("stop.restitution", 1.5, "stop.restitution = 1.5 must be at most 1"),
+    "NaN": ("release.displacement", NAN, "release.displacement = nan m must be a finite number"),
+    "infinity": ("gravity.x", INF, "gravity.x = inf m/s2 must be a finite number"),
+    "a NaN input": ("force.x", NAN, "force.x = nan"),
+    "a wall penetrated": ("stop.position", -0.03, "penetrated"),
+    "a shape out of reach": ("release.displacement", -0.2, "cannot be reached"),
+    "an output": ("shuttle.x", 0.1, "shuttle.x is no parameter or input"),
+}
+LATER = {
+    "a fixed parameter": ("shuttle.mass", 0.1, "shuttle.mass = 0.1 refused: it is fixed once"),
+    "a tunable one": ("stop.restitution", -0.1, "stop.restitution = -0.1 must be at least 0"),
+    "a NaN input": ("force.x", NAN, "force.x = nan"),
+    "an infinite input": ("base.acceleration.x", INF, "base.acceleration.x = inf"),
+}
+STEPS = {
+    "no step": (1e-3, 0.0, "communicationStepSize = 0 s must be positive"),
+    "a step backwards": (1e-3, -1e-3, "communicationStepSize = -0.001 s must be positive"),
+    "time running backwards": (0.0, 1e-3, "the last one ended at t = 0.001 s"),
+    "a jump forwards": (0.5, 1e-3, "the last one ended at t = 0.001 s"),
+    "NaN for a time": (NAN, 1e-3, "not finite"),
+    "infinity for a step": (1e-3, INF, "not finite"),
+}
+
+pytestmark = pytest.mark.fmu
+
+
+def said(instance: Instance, sentence: str) -> bool:
+    return any(sentence in message for message in instance.messages)
+
+
+@pytest.mark.parametrize("case", AT_START)
+def test_a_mistake_at_the_start_is_told_and_refuses_the_first_step(fmus, case):
+    name, value, sentence = AT_START[case]
+    with Instance(fmus["PRBDM"]) as instance:
+        instance.initialize(**{name.replace(".", "__"): value})
+        assert said(instance, sentence), instance.messages
+        assert np.isnan(instance.values()["shuttle.x"])
+        assert instance.step(0.0, 1e-3) == DISCARD
+        assert instance.step(0.0, 1e-3) == DISCARD
+
+
+def test_links_longer_than_the_flexure_are_refused(fmus):
+    with Instance(fmus["PRBDM2R"]).initialize(flexure__gamma1=0.7) as instance:
+        assert said(instance, "gamma0 = -0.16 < 0")
+        assert instance.step(0.0, 1e-3) == DISCARD
+
+
+@pytest.mark.parametrize("tolerance", [NAN, 0.0, -1e-6, 1.0])
+def test_a_tolerance_that_makes_no_sense_is_refused(fmus, tolerance):
+    with Instance(fmus["PRBDM"]).initialize(tolerance=tolerance) as instance:
+        assert said(instance, "the importer's relative tolerance")
+        assert instance.step(0.0, 1e-3) == DISCARD
+
+
+@pytest.mark.parametrize("case", LATER)
+def test_a_mistake_on_the_way_stops_the_run_until_it_is_put_right(fmus, case):
+    name, value, sentence = LATER[case]
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        assert instance.step(0.0, 1e-3) == OK
+        before = instance.values()
+        instance.set({name: value})
+        assert said(instance, sentence), instance.messages
+        assert instance.step(1e-3, 1e-3) == DISCARD
+        assert instance.values() == before
+        instance.set({name: before[name]})
+        assert instance.step(1e-3, 1e-3) == OK
+
+
+@pytest.mark.parametrize("case", STEPS)
+def test_a_step_that_makes_no_sense_is_refused_and_the_next_one_is_not(fmus, case):
+    time, size, sentence = STEPS[case]
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        assert instance.step(0.0, 1e-3) == OK
+        before = instance.bytes()
+        assert instance.step(time, size) == DISCARD
+        assert said(instance, sentence), instance.messages
+        assert instance.bytes() == before
+        assert instance.step(1e-3, 1e-3) == OK
+
+
+def test_a_step_before_initialization_is_refused(fmus):
+    with Instance(fmus["PRBDM"]) as instance:
+        instance.fmu.setupExperiment(startTime=0.0)
+        assert instance.step(0.0, 1e-3) == DISCARD
+        assert said(instance, "initialize the instance first")
+
+
+def test_a_value_that_is_put_right_before_the_start_leaves_nothing_behind(fmus):
+    with Instance(fmus["PRBDM"]) as instance:
+        instance.set({"stop.restitution": 1.5, "release.displacement": -0.2})
+        instance.fmu.enterInitializationMode()
+        assert np.isnan(instance.values()["shuttle.x"])
+        instance.set({"stop.restitution": 0.5, "release.displacement": -0.01})
+        instance.fmu.exitInitializationMode()
+        assert instance.values()["shuttle.x"] == pytest.approx(-0.01, abs=1e-12)  # statics
+        assert instance.step(0.0, 1e-3) == OK
+
+
+def test_unknown_value_references_and_types_are_refused(fmus):
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        assert np.isnan(instance.fmu.getReal([12345])).all()
+        assert said(instance, "value reference 12345 is not in modelDescription.xml")
+        assert instance.step(0.0, 1e-3) == DISCARD
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        counter = instance.variables["stop.impact_count"].valueReference
+        instance.fmu.setInteger([counter], [3])
+        assert said(instance, "stop.impact_count is no parameter or input")
+        assert instance.step(0.0, 1e-3) == DISCARD
+
+
+def test_impacts_are_logged_with_their_numbers(fmus):
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        assert instance.step(0.0, 0.05) == OK
+        values = instance.values()
+        told = [m for m in instance.messages if m.startswith("impact 1 at stop")]
+    assert len(told) == 1
+    assert f"t = {values['stop.impact_time']:.9g} s" in told[0]
+
+
+def test_fmpy_ends_early_and_the_reason_is_on_standard_error(fmus, capfd):
+    result = simulate_fmu(str(fmus["PRBDM"]), start_values={"stop.restitution": 1.5})
+    assert result["time"][-1] == 0.0
+    assert "PRBDM: stop.restitution = 1.5 must be at most 1" in capfd.readouterr().err
+
+
+SURVIVAL = """
+import sys
+from test_fmu_mistakes import AT_START, CYCLES, LATER, STEPS
+from fmu_host import DISCARD, OK, Instance
+from prbm_fmu.slaves.slave import MechanismSlave
+
+cases = [*AT_START.values()] + [*LATER.values()] + [*STEPS.values()]
+for cycle in range(CYCLES):
+    first, second, _ = cases[cycle % len(cases)]
+    with Instance(sys.argv[1]) as instance:
+        at_start = cycle % len(cases) < len(AT_START)
+        instance.initialize(**({first.replace(".", "__"): second} if at_start else {}))
+        if not at_start:
+            assert instance.step(0.0, 1e-3) == OK
+            if isinstance(first, str):
+                instance.set({first: second})
+                first, second = 1e-3, 1e-3
+            assert instance.step(first, second) == DISCARD
+        else:
+            assert instance.step(0.0, 1e-3) == DISCARD
+        instance.fmu.reset()
+        instance.initialize()
+        assert instance.step(0.0, 1e-3) == OK
+print("survived")
+"""
+
+
+def python(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    paths = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "fmu_src")]
+    return subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path[:0] = {paths!r}\n{script}",
+         *map(str, arguments)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+def test_the_process_survives_mistake_after_mistake(fmus):
+    """Every case, freed and loaded anew, and the instance works again after a reset."""
+    done = python(SURVIVAL, fmus["PRBDM"])
+    assert (done.returncode, done.stdout) == (0, "survived\n"), done.stderr[-2000:]
+
+
+WITHOUT_SCIPY = """
+import sys
+from fmu_host import Instance
+sys.modules["scipy"] = None  # what a Python without SciPy looks like to the FMU
+Instance._log = lambda self, *message: print(message[-1].decode())
+for attempt in range(3):
+    try:
+        Instance(sys.argv[1])
+    except Exception as error:
+        print(error)
+"""
+
+
+def test_a_missing_scipy_is_told_and_the_instance_refused(fmus):
+    done = python(WITHOUT_SCIPY, fmus["PRBDM"])
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert done.stdout.count("PRBDM.fmu needs NumPy and SciPy in the Python that runs it") == 3
+    assert done.stdout.count("python -m pip install numpy scipy") == 3
+    assert done.stdout.count("Failed to instantiate model") == 3
+
+
+def test_a_percent_sign_is_no_format_to_the_importers_printf():
+    slave = object.__new__(MechanismSlave)
+    slave.log_queue = []
+    slave.log("100 % of \udcff")
+    assert slave.log_queue[0].msg == "100 %% of ?"

@@ -1,0 +1,194 @@
+"""An FMU does what the engine does, whatever else happens in its process."""
+
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fmu_host import OK, Instance
+from prbm import Simulation
+from prbm_fmu import python_fmu
+from prbm_fmu.archive import write
+from prbm_fmu.python_fmu import interface
+
+MODELS = ("PRBDM", "PRBDM2R")
+END, SEEN = 0.3, 0.05  # s; the default run bounces until 0.243 s, then it rests
+
+pytestmark = pytest.mark.fmu
+
+
+def uneven(end: float) -> np.ndarray:
+    """Communication points with steps over three decades that include every SEEN."""
+    rng = np.random.default_rng(0)
+    inner = np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
+    return np.unique(np.concatenate([[0.0], inner[inner < end], points(SEEN, end)]))
+
+
+def points(step: float, end: float = END) -> np.ndarray:
+    return step * np.arange(round(end / step) + 1)
+
+
+GRIDS = {
+    "0.1 ms": points(1e-4), "1 ms": points(1e-3), "50 ms": points(SEEN), "uneven": uneven(END),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def engine_runs(mechanisms):
+    """Return what the engine says at every SEEN, all of it, by model."""
+    runs = {}
+    for model in MODELS:
+        listed = {v.name: v for v in interface(mechanisms[model], {})}
+        simulation = Simulation(mechanisms[model])
+        given = {n: v.start for n, v in listed.items() if v.start is not None}
+        rows = []
+        for t in points(SEEN):
+            simulation.advance(t)
+            rows.append(given | simulation.outputs())
+        runs[model] = listed, rows
+    return runs
+
+
+def assert_equal(found: dict, expected: dict, listed: dict) -> None:
+    """Every declared variable, and nothing else, agrees to 1e-9 of its nominal value."""
+    assert found.keys() == expected.keys() == listed.keys()
+    for name, value in expected.items():
+        scale = max(listed[name].nominal or 1.0, abs(value))
+        assert abs(found[name] - value) <= 1e-9 * scale, name
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("model", MODELS)
+def test_an_fmu_is_the_engine_whatever_the_communication_step(fmus, engine_runs, model, grid):
+    listed, rows = engine_runs[model]
+    times = GRIDS[grid]
+    with Instance(fmus[model]).initialize() as instance:
+        assert_equal(instance.values(), rows[0], listed)
+        compared = 0
+        for begin, end in pairwise(times):
+            assert instance.step(begin, end - begin) == OK
+            k = round(end / SEEN)
+            if abs(end - k * SEEN) < 1e-12:
+                assert_equal(instance.values(), rows[k], listed)
+                compared += 1
+    assert compared == len(rows) - 1 == 6
+    assert rows[-1]["stop.contact"]
+    assert rows[-1]["stop.impact_count"] > 8
+
+
+def test_inputs_walls_and_tunable_parameters_reach_the_engine(fmus, mechanisms):
+    listed = {v.name: v for v in interface(mechanisms["PRBDM"], {})}
+    start = {"release.displacement": -0.01, "stop.position": 2e-3, "force.x": 0.05}
+    changes = {
+        3: {"force.x": 0.3, "base.acceleration.y": 2.0},
+        5: {"stop.displacement": 1e-3, "stop.velocity": 0.0},
+        8: {"stop.restitution": 0.9, "damping.zeta": 0.05},
+        12: {"stop.displacement": -1e-3, "force.moment": 1e-3},
+    }
+    simulation = Simulation(mechanisms["PRBDM"], start, start_time=2.0, tolerance=1e-9)
+    given = {n: v.start for n, v in listed.items() if v.start is not None} | start
+    with Instance(fmus["PRBDM"]) as instance:
+        keywords = {name.replace(".", "__"): value for name, value in start.items()}
+        instance.initialize(start=2.0, tolerance=1e-9, **keywords)
+        for k in range(20):
+            change = changes.get(k, {})
+            instance.set(change)
+            simulation.set(change)
+            given |= change
+            assert instance.step(2.0 + k * 0.01, 0.01) == OK
+            simulation.advance(2.0 + k * 0.01 + 0.01)
+            assert_equal(instance.values(), given | simulation.outputs(), listed)
+    assert simulation.outputs()["stop.impact_count"] > 0
+
+
+def test_the_importers_tolerance_wins_over_the_parameter(fmus):
+    def last(tolerance: float | None, parameter: float) -> bytes:
+        with Instance(fmus["PRBDM2R"]) as instance:
+            instance.initialize(tolerance=tolerance, solver__tolerance=parameter)
+            assert instance.step(0.0, 0.1) == OK
+            return instance.fmu.getReal([instance.variables["shuttle.x"].valueReference])
+
+    assert last(1e-5, 1e-8) == last(1e-5, 1e-5) == last(None, 1e-5) != last(None, 1e-8)
+
+
+def test_values_in_initialization_mode_follow_the_parameters(fmus):
+    with Instance(fmus["PRBDM"]) as instance:
+        instance.fmu.setupExperiment(startTime=0.0)
+        instance.fmu.enterInitializationMode()
+        softer = instance.values()
+        instance.set({"flexure.youngs_modulus": 400e9, "release.displacement": -5e-3})
+        stiffer = instance.values()
+        instance.fmu.exitInitializationMode()
+        assert instance.values() == stiffer
+    assert softer["shuttle.x"] == pytest.approx(-18e-3, abs=1e-12)  # tolerance of the statics
+    assert stiffer["shuttle.x"] == pytest.approx(-5e-3, abs=1e-12)
+    assert stiffer["mode.frequency"] > softer["mode.frequency"] > 0.0
+
+
+def run_alone(fmu: Path) -> list[bytes]:
+    with Instance(fmu).initialize() as instance:
+        return instance.run(points(2e-3, 0.06))
+
+
+ALONE = """
+import sys
+from test_fmu_simulation import run_alone
+for row in run_alone(sys.argv[1]):
+    print(row.hex())
+"""
+
+
+def in_a_process_of_its_own(fmu: Path) -> list[bytes]:
+    paths = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "fmu_src")]
+    script = f"import sys; sys.path[:0] = {paths!r}\n{ALONE}"
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(fmu)], capture_output=True, text=True, check=True
+    )
+    return [bytes.fromhex(line) for line in done.stdout.split()]
+
+
+def test_instances_of_both_models_in_one_process_do_not_disturb_each_other(fmus):
+    alone = {model: in_a_process_of_its_own(fmus[model]) for model in MODELS}
+    times = points(2e-3, 0.06)
+    instances = [(m, Instance(fmus[m], f"{m} {k}").initialize()) for k in (1, 2) for m in MODELS]
+    for k, (begin, end) in enumerate(pairwise(times)):
+        for model, instance in instances:
+            assert instance.step(begin, end - begin) == OK
+            assert instance.bytes() == alone[model][k]
+    for _, instance in instances:
+        instance.__exit__(None, None, None)
+
+
+def test_two_builds_of_one_model_in_one_process_keep_their_own_content(fmus, mechanisms, tmp_path):
+    other = tmp_path / "PRBDM.fmu"
+    write(other, python_fmu.build(mechanisms["PRBDM"], {"stop.restitution": 0.1}))
+    with Instance(fmus["PRBDM"]).initialize() as a, Instance(other).initialize() as b:
+        for k in range(50):
+            assert a.step(k * 1e-3, 1e-3) == b.step(k * 1e-3, 1e-3) == OK
+        first, second = a.values(), b.values()
+    for values, restitution in ((first, 0.6), (second, 0.1)):
+        assert values["stop.restitution"] == restitution
+        assert values["stop.impact_count"] == 1
+        assert values["stop.rebound_speed"] == pytest.approx(
+            restitution * values["stop.approach_speed"], rel=1e-12
+        )  # round-off
+
+
+def test_hundreds_of_instances_one_after_the_other(fmus):
+    """The wrapper library releases a reference too many at each; the slave makes up for it."""
+    script = f"""
+import sys
+sys.path[:0] = {[str(Path(__file__).parent)]!r}
+from fmu_host import Instance
+for k in range(150):
+    with Instance({str(fmus["PRBDM"])!r}).initialize() as instance:
+        assert instance.step(0.0, 1e-3) == 0
+print("survived")
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout) == (0, "survived\n"), done.stderr

@@ -1,0 +1,117 @@
+"""Saving, restoring, serializing and resetting the state of an FMU."""
+
+from ctypes import byref, c_void_p
+
+import numpy as np
+import pytest
+
+from fmu_host import DISCARD, OK, Instance
+
+MODELS = ("PRBDM", "PRBDM2R")
+STEP = 2.5e-3
+BEFORE = STEP * np.arange(17)  # the first impact comes at 0.041 s, within the next step
+AFTER = STEP * np.arange(16, 64)  # and six more come until 0.1575 s or later
+
+pytestmark = pytest.mark.fmu
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_state_restored_before_an_impact_gives_the_same_bytes(fmus, model):
+    """Restored twice, the second time from a motion that has gone elsewhere."""
+    with Instance(fmus[model]).initialize() as instance:
+        instance.run(BEFORE)
+        assert instance.values()["stop.impact_count"] == 0
+        state = instance.fmu.getFMUState()
+        here = instance.bytes()
+        first = instance.run(AFTER)
+        instance.fmu.setFMUState(state)
+        assert instance.bytes() == here
+        assert instance.run(AFTER) == first
+        assert instance.values()["stop.impact_count"] >= 2
+        instance.set({"stop.restitution": 0.1, "force.x": 0.2})
+        assert instance.step(AFTER[-1], STEP) == OK
+        instance.fmu.setFMUState(state)
+        assert instance.run(AFTER) == first
+        instance.fmu.freeFMUState(state)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_state_through_bytes_into_another_instance_gives_the_same_bytes(fmus, model):
+    """Fixed and tunable parameters, inputs, tolerance and time go with it."""
+    with Instance(fmus[model]).initialize(tolerance=1e-7, shuttle__mass=0.06) as instance:
+        instance.run(BEFORE)
+        instance.set({"force.x": 0.05, "stop.restitution": 0.7})
+        state = instance.fmu.getFMUState()
+        data = instance.fmu.serializeFMUstate(state)
+        assert data == instance.fmu.serializeFMUstate(state)
+        instance.fmu.freeFMUState(state)
+        expected = instance.run(AFTER)
+    with Instance(fmus[model], "other").initialize(shuttle__mass=0.05) as other:
+        state = other.fmu.deSerializeFMUstate(data)
+        other.fmu.setFMUState(state)
+        assert other.run(AFTER) == expected
+        other.fmu.freeFMUState(state)
+        assert other.values()["shuttle.mass"] == 0.06
+
+
+def test_a_state_saved_before_initialization_is_one_too(fmus):
+    with Instance(fmus["PRBDM"]) as instance:
+        instance.fmu.setupExperiment(startTime=0.0)
+        instance.set({"release.displacement": -0.01})
+        state = instance.fmu.getFMUState()
+        instance.set({"release.displacement": -0.005})
+        instance.fmu.setFMUState(state)
+        instance.fmu.enterInitializationMode()
+        instance.fmu.exitInitializationMode()
+        assert instance.values()["shuttle.x"] == pytest.approx(-0.01, abs=1e-12)  # statics
+        instance.fmu.freeFMUState(state)
+
+
+@pytest.mark.parametrize("data", [b"no state", b"[1]", b"{}", b'{"model": "Other.Other_1"}'])
+def test_a_state_of_something_else_is_refused(fmus, data):
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        state = instance.fmu.deSerializeFMUstate(data)
+        instance.fmu.setFMUState(state)
+        assert any("not saved by this version" in m for m in instance.messages)
+        assert instance.step(0.0, 1e-3) == DISCARD
+        instance.fmu.freeFMUState(state)
+
+
+def test_a_state_of_the_other_model_is_refused(fmus):
+    with Instance(fmus["PRBDM2R"]).initialize() as instance:
+        state = instance.fmu.getFMUState()
+        data = instance.fmu.serializeFMUstate(state)
+        instance.fmu.freeFMUState(state)
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        state = instance.fmu.deSerializeFMUstate(data)
+        instance.fmu.setFMUState(state)
+        assert instance.step(0.0, 1e-3) == DISCARD
+        instance.fmu.freeFMUState(state)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_reset_is_a_new_instance(fmus, model):
+    times = STEP * np.arange(30)
+    with Instance(fmus[model]).initialize() as new:
+        start, expected = new.bytes(), new.run(times)
+    with Instance(fmus[model]) as used:
+        used.initialize(start=1.0, tolerance=1e-5, shuttle__mass=0.1, stop__restitution=0.2)
+        assert used.step(1.0, 0.05) == OK
+        used.set({"force.x": 1.0})
+        assert used.step(1.05, -1.0) == DISCARD
+        used.fmu.reset()
+        used.initialize()
+        assert used.bytes() == start
+        assert used.run(times) == expected
+
+
+def test_a_freed_state_leaves_the_instance_alone(fmus):
+    """Many states, none of them leaked into the next."""
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        for k in range(200):
+            state = instance.fmu.getFMUState()
+            assert instance.step(k * 1e-4, 1e-4) == OK
+            instance.fmu.setFMUState(state)
+            assert instance.step(k * 1e-4, 1e-4) == OK
+            instance.fmu.fmi2FreeFMUstate(instance.fmu.component, byref(c_void_p(state.value)))
+        assert instance.values()["stop.impact_count"] == 0
