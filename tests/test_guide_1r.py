@@ -129,7 +129,7 @@ def test_stiffness_proportional_damping_is_beta_omega_over_two():
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 1.0])
 def test_restitution_from_nothing_to_everything(restitution):
-    """With eps = 0 it stays on the wall at once; with eps = 1 it returns to the release, to round-off."""
+    """With eps = 0 it stays on the wall at once; with eps = 1 it returns to the release."""
     sim = simulation("PRBDM", STEEL | {"stop.restitution": restitution}, tolerance=1e-11)
     times, _ = scalar(STEEL).bounces(-0.01, 0.6, 1)
     sim.advance(2 * times[0])

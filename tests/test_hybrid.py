@@ -283,13 +283,13 @@ def test_bad_values_are_refused_by_name_value_and_unit(values, words):
 
 
 def test_links_longer_than_the_flexure_are_refused():
-    with pytest.raises(ParameterError, match="gamma0 = -0.04"):
+    with pytest.raises(ParameterError, match=r"gamma0 = -0\.04"):
         Simulation(mechanism("PRBDM2R"), {"flexure.gamma1": 0.58})
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_a_release_that_no_equilibrium_reaches_is_refused(model):
-    with pytest.raises(EquilibriumError, match=r"release\.displacement = -0\.05 m cannot be reached"):
+    with pytest.raises(EquilibriumError, match=r"displacement = -0\.05 m cannot be reached"):
         Simulation(mechanism(model), {"release.displacement": -0.05})
 
 
