@@ -80,9 +80,7 @@ def octave_cost(octave: str, runs: int) -> dict[str, float]:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument(
-        "--dist", type=Path, default=Path("dist/python"), help="where the FMUs are"
-    )
+    parser.add_argument("--dist", type=Path, default=Path("dist/python"), help="where the FMUs are")
     parser.add_argument("--runs", type=int, default=5, help="runs of which to take the median")
     arguments = parser.parse_args()
 

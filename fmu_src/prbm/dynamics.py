@@ -336,7 +336,7 @@ class Equations:
         return result
 
     def project_from_here(self, t: float, y: Real) -> Real:
-        """Return what :meth:`project` does, for the state at which ``rate`` was called last.
+        """Return what :meth:`project` does, for the state that was evaluated last.
 
         Its matrix is at hand and the state is as close to the constraints as a step leaves it,
         so that one correction of the positions and one of the velocities are enough; if they

@@ -29,7 +29,7 @@ from .errors import ParameterError, SimulationError
 from .kinetics import inertia, kinetic_energy
 from .mechanism import Mechanism, unknown, value
 from .modal import fundamental_at, modes, simulated_restitution
-from .runge_kutta import DORMAND_PRINCE as PAIR
+from .runge_kutta import BOGACKI_SHAMPINE as PAIR
 from .runge_kutta import interpolate, powers, stages
 from .statics import Equilibrium, equilibrium, release_velocity
 
@@ -44,7 +44,10 @@ CHATTER_SPAN = 1e-3  # ... within so many seconds are a motion that the model ca
 DOUBT = 0.5  # of the largest force of a stop within a step: below, its release is looked for
 WATCHED = 8  # parts of a step at which the guards are looked at
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # of the step size control
-STEP_EXPONENT = -1.0 / PAIR.order
+MEMORY = 0.04  # exponent of the previous error: steps that swing less (Hairer, IV.2)
+RETRY_EXPONENT = 1.0 / PAIR.order
+STEP_EXPONENT = RETRY_EXPONENT - 0.75 * MEMORY
+LEAST_ERROR = 1e-4  # of the tolerance: what a step better than that is remembered as
 LARGEST_STEP = 0.05  # of the fundamental period
 SMALLEST_STEP = 1e-13  # s
 
@@ -172,7 +175,7 @@ class Simulation:
         self.record: list[Impact] | None = None
         self._window = (self.time, 0)
         self.arc: Arc | None = None
-        self.h = 0.0
+        self.h, self.last_error = 0.0, LEAST_ERROR
         self.changed = False
         y = np.concatenate([shape.q, velocity, np.zeros(2)])
         self.front_time, self.front = self.time, self.equations.project(self.time, y)
@@ -368,7 +371,9 @@ class Simulation:
         if self.arc is None or self.time >= self.front_time:
             return self.front
         # the step that leads past the present time was taken under the present equations
-        return self.equations.project(self.time, self.arc.at(self.time))
+        n, y = self.system.n, self.arc.at(self.time)
+        self.equations.accelerations(y[:n], y[n : 2 * n])
+        return self.equations.project_from_here(self.time, y)
 
     # -- steps --
 
@@ -377,32 +382,34 @@ class Simulation:
         f, t, y = self.equations.rate, self.front_time, self.front
         if self.k1 is None:
             self.k1 = f(t, y)
-        h = self.step or self.h or self._first_step(self.k1)
-        h = h if self.step else min(h, self._largest_step())
+        h = self.step or min(self.h or self._first_step(self.k1), self._largest_step())
+        growth = GROW
         while True:
             self.equations.trace.clear()
             k, y1 = stages(PAIR, f, t, y, h, self.k1)
             error = self._error(h * (PAIR.error @ k), y, y1)
-            if self.step and not error * self.tolerance <= 1.0:
-                raise SimulationError(
-                    f"the fixed step of {h:g} s is too long at t = {t:.9g} s: the state it leads "
-                    "to is not even near; shorten it"
-                )
             if self.step or error <= 1.0:
                 break
-            h *= max(SHRINK, SAFETY * error**STEP_EXPONENT) if math.isfinite(error) else SHRINK
+            growth = 1.0  # a step that had to be repeated is not followed by a longer one
+            h *= max(SHRINK, SAFETY * error**-RETRY_EXPONENT) if math.isfinite(error) else SHRINK
             if h < SMALLEST_STEP:
                 raise SimulationError(
                     f"the step size fell below {SMALLEST_STEP:g} s at t = {t:.9g} s: the motion "
                     "is too violent for the model; check the parameters, or add damping.beta"
                 )
-        growth = GROW if error == 0.0 else min(GROW, SAFETY * error**STEP_EXPONENT)
-        self.h = h * max(SHRINK, growth)
+        if self.step and not error * self.tolerance <= 1.0:
+            raise SimulationError(
+                f"the fixed step of {h:g} s is too long at t = {t:.9g} s: the state it leads to "
+                "is not even near; shorten it"
+            )
+        error = max(error, LEAST_ERROR)
+        growth = min(growth, SAFETY * error**-STEP_EXPONENT * self.last_error**MEMORY)
+        self.h, self.last_error = h * max(SHRINK, growth), error
         arc = Arc(t, h, t + h, y, k, None)
+        projected = self.equations.project_from_here(arc.end, y1)  # the last stage was there
         event = self._first_event(arc)
         if event is None:
-            self.front_time, self.k1 = arc.end, k[-1]
-            self.front = self.equations.project_from_here(arc.end, y1)
+            self.front_time, self.k1, self.front = arc.end, k[-1], projected
         else:
             # a step cut short says little about the next one: keep its size
             self.h = h
@@ -945,6 +952,7 @@ class Simulation:
             "latched": [asdict(latched) for latched in self.latched],
             "window": list(self._window),
             "h": self.h,
+            "last_error": self.last_error,
             "changed": self.changed,
             "frequency": self.frequency,
             "front_time": self.front_time,
@@ -988,7 +996,7 @@ class Simulation:
         self._set_equations(self._inputs(tuple(Wall(**wall) for wall in s["walls"])))
         self.latched = [Latched(**latched) for latched in s["latched"]]
         self._window = (s["window"][0], s["window"][1])
-        self.h, self.changed = s["h"], s["changed"]
+        self.h, self.last_error, self.changed = s["h"], s["last_error"], s["changed"]
         self.front_time, self.front = s["front_time"], np.array(s["front"])
         self.k1 = None if s["k1"] is None else np.array(s["k1"])
         arc = s["arc"]

@@ -1,0 +1,143 @@
+"""Orders of convergence: of the pair with fixed steps, of the adaptive one with its tolerance."""
+
+import numpy as np
+import pytest
+
+from prbm import Simulation, SimulationError
+from prbm.runge_kutta import BOGACKI_SHAMPINE as PAIR
+from prbm.runge_kutta import Tableau, interpolate, stages
+from support import mechanism
+
+SMOOTH = {"stop.position": 0.05}
+
+
+def angles(model, values, time, **options):
+    """Return the angles at a time, reached without stopping in between [rad]."""
+    sim = Simulation(mechanism(model), values, **options)
+    sim.advance(time)
+    return sim.state()[: sim.system.n]
+
+
+CASES = {
+    "1R, smooth": ("PRBDM", SMOOTH, 0.9, 0.03, [-0.018]),
+    "1R, impact": ("PRBDM", {}, 0.09, 0.034, np.linspace(-0.02, -0.01, 32)),
+    "2R, smooth": ("PRBDM2R", SMOOTH, 0.02, 4e-4, [-0.018]),
+    "2R, impact": ("PRBDM2R", {"stop.position": 0.012}, 0.064, 5e-4, np.linspace(2e-3, 3e-3, 6)),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_observed_order_is_the_claimed_one(case):
+    """Least-squares slope over five halvings, of the mean error over several releases.
+
+    Across an impact the error of one run depends on where within its step the impact falls; the
+    mean does not.  The five halvings fill what lies between steps that are too long for the
+    motion and rounding: the error falls by a factor of 3e7.
+    """
+    model, values, time, longest, releases = CASES[case]
+    steps = longest / 2.0 ** np.arange(6)
+    errors = np.zeros(len(steps))
+    for release in releases:
+        start = values | {"release.displacement": float(release)}
+        exact = angles(model, start, time, tolerance=1e-13)
+        errors += [np.abs(angles(model, start, time, step=h) - exact).mean() for h in steps]
+    slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
+    print(f"{case}: observed order {slope:.3f}")
+    assert slope == pytest.approx(PAIR.order, abs=0.1)
+
+
+def test_error_falls_with_the_tolerance_over_four_decades():
+    """Tolerances 1e-6 to 1e-10: the error falls about in proportion, across an impact too."""
+    exact = angles("PRBDM2R", {}, 0.06, tolerance=1e-13)
+    tolerances = 10.0 ** -np.arange(6, 11)
+    errors = [np.abs(angles("PRBDM2R", {}, 0.06, tolerance=t) - exact).max() for t in tolerances]
+    slope = np.polyfit(np.log(tolerances), np.log(errors), 1)[0]
+    assert 0.8 < slope < 1.3
+    assert errors[0] / errors[-1] > 2e3
+
+
+def test_a_fixed_step_that_is_too_long_is_refused():
+    with pytest.raises(SimulationError, match=r"fixed step of 0\.002 s is too long"):
+        angles("PRBDM2R", {}, 0.1, step=2e-3)
+
+
+def trees(order):
+    """Return all rooted trees of an order, as nested sorted tuples."""
+    if order == 1:
+        return [()]
+    found = set()
+    for smaller in trees(order - 1):
+        found |= set(grafted(smaller))
+    return sorted(found, key=repr)
+
+
+def grafted(tree):
+    yield tuple(sorted((*tree, ()), key=repr))
+    for i, branch in enumerate(tree):
+        for new in grafted(branch):
+            yield tuple(sorted((*tree[:i], new, *tree[i + 1 :]), key=repr))
+
+
+def size(tree):
+    return 1 + sum(size(branch) for branch in tree)
+
+
+def density(tree):
+    return size(tree) * int(np.prod([density(branch) for branch in tree], dtype=int))
+
+
+def elementary(a, tree):
+    """Return the elementary weights of the stages for a tree."""
+    result = np.ones(len(a))
+    for branch in tree:
+        result = result * (a @ elementary(a, branch))
+    return result
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4, 5])
+def test_order_conditions_hold_for_every_rooted_tree(order):
+    """B . Phi(t) = 1/gamma(t) [Hairer II.2]; 1, 1, 2, 4, 9 trees."""
+    found = trees(order)
+    assert len(found) == [1, 1, 2, 4, 9][order - 1]
+    for tree in found:
+        weight = float(PAIR.weights @ elementary(PAIR.a, tree))
+        assert weight == pytest.approx(1 / density(tree), abs=1e-14)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize("theta", [0.2, 0.5, 0.9])
+def test_dense_output_is_of_fourth_order(order, theta):
+    """Weights b(theta) . Phi(t) = theta^order / gamma(t) up to order four, for every theta."""
+    b = PAIR.dense @ theta ** np.arange(1, 5)
+    for tree in trees(order):
+        weight = float(b @ elementary(PAIR.a, tree))
+        assert weight == pytest.approx(theta**order / density(tree), abs=1e-13)
+
+
+def test_error_estimate_is_of_fourth_order():
+    """The embedded solution satisfies the conditions up to order four, not five."""
+    embedded = PAIR.weights - PAIR.error
+    for order in (1, 2, 3, 4):
+        for tree in trees(order):
+            weight = float(embedded @ elementary(PAIR.a, tree))
+            assert weight == pytest.approx(1 / density(tree), abs=1e-14)
+    defects = [embedded @ elementary(PAIR.a, t) - 1 / density(t) for t in trees(5)]
+    assert np.abs(defects).max() > 1e-5
+
+
+def test_interpolation_ends_where_the_step_ends():
+    def rate(t, y):
+        return np.array([y[1], -y[0]])
+
+    y = np.array([1.0, 0.0])
+    k, y1 = stages(PAIR, rate, 0.0, y, 0.1, rate(0.0, y))
+    np.testing.assert_allclose(interpolate(PAIR, y, k, 0.1, 1.0), y1, atol=1e-15)
+    np.testing.assert_allclose(interpolate(PAIR, y, k, 0.1, 0.5)[0], np.cos(0.05), atol=1e-8)
+
+
+@pytest.mark.parametrize("field", ["a", "error", "dense"])
+def test_coefficients_that_contradict_each_other_cannot_be_constructed(field):
+    parts = {"a": PAIR.a.copy(), "error": PAIR.error.copy(), "dense": PAIR.dense.copy()}
+    parts[field][-1, ...] += 1e-3
+    with pytest.raises(ValueError, match=r"must|depend"):
+        Tableau(**parts, order=5)
