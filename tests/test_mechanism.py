@@ -1,6 +1,8 @@
 """Mechanisms as data: expressions, parameters, and everything that is refused."""
 
 import dataclasses
+import math
+import re
 
 import numpy as np
 import pytest
@@ -13,7 +15,9 @@ from prbm import (
     MechanismError,
     Parameter,
     ParameterError,
+    PrbmError,
     Release,
+    Simulation,
     Stop,
     assemble,
     equilibrium,
@@ -81,7 +85,14 @@ LEAF = GUIDE.flexure_types[0]
 @pytest.mark.parametrize(
     ("parts", "words"),
     [
-        ({"name": "2R"}, "use letters, digits"),
+        ({"name": "2R"}, "use letters a to z"),
+        ({"name": "class"}, "no word of Python"),
+        ({"name": "Führung"}, "use letters a to z"),
+        ({"gravity": (9.81,)}, "an x and a y"),
+        ({"stops": (Stop("energy", "shuttle", (0, 0)),)}, "used twice or reserved"),
+        ({"stops": (Stop("s", "shuttle", (0, 0), direction=math.nan),)}, "must be an angle"),
+        ({"ground": {"left": (math.nan, 0), "right": (0.1, 0)}}, "not finite"),
+        ({"ground": {"left": ("1e400", 0), "right": (0.1, 0)}}, "not finite"),
         ({"bodies": ()}, "at least one body"),
         ({"bodies": (BODY, BODY)}, "'shuttle' is used twice"),
         ({"stops": (Stop("stop", "shutle", (0, 0)),)}, "'shutle' is not described"),
@@ -102,6 +113,48 @@ LEAF = GUIDE.flexure_types[0]
 def test_an_inconsistent_description_is_refused(parts, words):
     with pytest.raises(MechanismError, match=words):
         changed(**parts)
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ({"bodies": (dataclasses.replace(BODY, mass="-shuttle.width"),)}, "shuttle.mass = -0.08"),
+        (
+            {"stops": (dataclasses.replace(GUIDE.stops[0], restitution="2 - shuttle.width*5"),)},
+            "stop.restitution = 1.6 must be at most 1",
+        ),
+        (
+            {"flexure_types": (dataclasses.replace(LEAF, thickness="-flexure.length/400"),)},
+            "flexure.thickness = -0.0001 m must be at least",
+        ),
+    ],
+)
+def test_bounds_hold_for_expressions_too(parts, words):
+    with pytest.raises(ParameterError, match=re.escape(words)):
+        changed(**parts).values()
+
+
+def test_what_moves_must_have_mass():
+    massless = changed(flexure_types=(dataclasses.replace(LEAF, density="1e-30*flexure.length"),))
+    values = GUIDE.values() | {"flexure.density": 0.0}
+    with pytest.raises(ParameterError, match="at least 1 kg/m3"):
+        massless.values()
+    with pytest.raises(ParameterError, match="has no mass"):
+        assemble(GUIDE, values)
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+def test_every_bound_of_every_parameter_works_or_says_why_not(model):
+    """At each end of its range a value runs a moment or is refused with a sentence."""
+    guide = mechanism(model)
+    for p in guide.parameters:
+        for bound in (p.minimum, p.maximum):
+            try:
+                Simulation(guide, {p.name: bound})
+                continue
+            except PrbmError as refused:
+                words = str(refused)
+            assert len(words) > 20, p.name
 
 
 def test_a_name_that_is_none_is_refused():

@@ -18,7 +18,7 @@ def tip_deflection(model, force):
     """Return the deflection of a cantilever under a tip force, in units of F h^3/EI."""
     L, EI = 0.05, 2e11 * 1e-2 * (2e-4) ** 3 / 12
     beam = cantilever(model)
-    values = beam.values({"gravity.x": 0.0, "tip.mass": 1.0, "leaf.density": 0.0})
+    values = beam.values({"gravity.x": 0.0, "tip.mass": 1.0, "leaf.density": 1.0})
     # the weight of the tip body is the force: across the beam, at the pin by zero lever
     values |= {"gravity.y": force}
     system = assemble(beam, values)

@@ -10,7 +10,7 @@ so that a stack of rows B serves them all.
 
 import cmath
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -104,9 +104,9 @@ class System:
         Loop closures Phi = Re(loops e) + loops_c [m].
     gaps, gaps_c : (s, n) complex, (s,)
         Gaps of the stops, without the wall's position: gap = wall + Re(gaps e) + gaps_c [m].
-    slides, slides_c : (s, n) complex, (s,)
+    slides : (s, n) complex
         Displacement of the hit points along their walls, to the left of the direction [m].
-    rubs, rubs_c, lifts, lifts_c : (f, n) complex, (f,)
+    rubs, lifts, lifts_c : (f, n) complex, (f, n) complex, (f,)
         Displacement along and to the left of the direction of each friction point [m].
     release, release_c : (n,) complex, float
         Displacement of the released body along the direction of the release [m].
@@ -136,9 +136,7 @@ class System:
     gaps: Complex
     gaps_c: Real
     slides: Complex
-    slides_c: Real
     rubs: Complex
-    rubs_c: Real
     lifts: Complex
     lifts_c: Real
     release: Complex
@@ -345,6 +343,7 @@ class _Assembler:
         loops_c = np.array([x for p in self.loops for x in (p.c.real, p.c.imag)])
         loops = loops.reshape(-1, n)
         check_loops(loops, e0)
+        check_masses((e0.conj()[:, None] * (A.conj().T @ (m[:, None] * A)) * e0).real, self.J)
 
         frames = {}
         for body in self.mechanism.bodies:
@@ -357,16 +356,14 @@ class _Assembler:
         hits = [(stop, self.hit(stop)) for stop in self.mechanism.stops]
         d = [unit(s.direction) for s, _ in hits]
         gaps, gaps_c = rows([along(-u, p, e0) for u, (_, p) in zip(d, hits, strict=True)], n)
-        slides, slides_c = rows(
-            [along(1j * u, p, e0) for u, (_, p) in zip(d, hits, strict=True)], n
-        )
+        slides, _ = rows([along(1j * u, p, e0) for u, (_, p) in zip(d, hits, strict=True)], n)
         for stop, place in hits:
             self.lines.append((stop.name, "stop", [place]))
         rubbed = [
             (unit(f.direction), self.on(f.body, frames[f.body].drawn))
             for f in self.mechanism.frictions
         ]
-        rubs, rubs_c = rows([along(u, p, e0) for u, p in rubbed], n)
+        rubs, _ = rows([along(u, p, e0) for u, p in rubbed], n)
         lifts, lifts_c = rows([along(1j * u, p, e0) for u, p in rubbed], n)
         held = self.mechanism.release.body
         release, release_c = along(
@@ -389,9 +386,7 @@ class _Assembler:
             gaps=gaps,
             gaps_c=gaps_c,
             slides=slides,
-            slides_c=slides_c,
             rubs=rubs,
-            rubs_c=rubs_c,
             lifts=lifts,
             lifts_c=lifts_c,
             release=release,
@@ -481,6 +476,33 @@ def rows(pairs: list[tuple[Complex, float]], n: int) -> tuple[Complex, Real]:
     """Stack pairs (B, c) into arrays of n columns, also when there are none."""
     B = np.array([b for b, _ in pairs], complex).reshape(-1, n)
     return B, np.array([c for _, c in pairs], float)
+
+
+def check_masses(M: Real, J: Sequence[float]) -> None:
+    """Refuse a motion that moves no mass.
+
+    Parameters
+    ----------
+    M : (n, n)
+        Mass matrix of the mass points at the straight shape [kg m^2].
+    J : (n,)
+        Rotary inertias [kg m^2].
+
+    Raises
+    ------
+    ParameterError
+        If the mass matrix is singular.
+    """
+    full = M + np.diag(J)
+    scale = np.sqrt(np.diag(full))
+    if np.all(scale > 0.0):
+        scaled = full / np.outer(scale, scale)
+        if np.linalg.eigvalsh(scaled)[0] > 1e-13:
+            return
+    raise ParameterError(
+        "something that can move has no mass: give the flexures a density and the bodies a mass "
+        "and an inertia"
+    )
 
 
 def check_loops(loops: Complex, e0: Complex) -> None:

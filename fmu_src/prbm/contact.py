@@ -96,7 +96,7 @@ def newton(W: Real, u: Real, restitution: Real) -> Real:
             violation = max(
                 float((-(W @ P + b)).max()),
                 float((-P * np.diag(W)).max()),
-                float(np.abs(P * (W @ P + b)).max() ** 0.5) if s else 0.0,
+                float(np.abs(P * np.diag(W) * (W @ P + b)).max()) ** 0.5,
             )
             if violation <= FEASIBLE * float(np.abs(u).max()):
                 return np.maximum(P, 0.0)
@@ -110,8 +110,8 @@ def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[floa
 
     The normal impulse p grows; the contact slips (P_t' = -mu sign(u_t)), sticks or slips back
     as Coulomb's law says at each p.  Compression ends when u_n = 0; restitution ends when its
-    work is eps^2 times the work of compression.  Energy is never gained, and without reversal
-    of the slip the result is Newton's.
+    work is eps^2 times the work of compression.  Energy is never gained, and where the contact
+    slips in one direction throughout the result is Newton's.
 
     Parameters
     ----------
@@ -257,6 +257,6 @@ def _sweep(W: Real, u: Real, friction: Real, least: Real) -> Real:
             if np.abs(P - last).max() <= SETTLED * relaxation * np.abs(P).max():
                 return P
     raise SimulationError(
-        "several stops are hit at once with friction, and Coulomb's law has no answer for them; "
-        "reduce the friction of the stops, or move them apart"
+        "several stops are hit at once with friction, and no impulses were found that satisfy "
+        "Coulomb's law at all of them; reduce the friction of the stops, or move them apart"
     )

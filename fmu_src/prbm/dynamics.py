@@ -18,7 +18,7 @@ from . import constraints, forces
 from .assembly import Complex, Real, System
 from .errors import ParameterError
 from .kinetics import inertia, kinetic_energy, mass_accelerations
-from .mechanism import unknown, value
+from .mechanism import finite, unknown, value
 
 STICKS = 0  # and +1, -1: slides along, against the direction
 IDLE = 2  # no friction acts: open, frictionless, or the stop carries everything
@@ -105,10 +105,7 @@ def check_input(name: str, number: float, known: Mapping[str, float]) -> float:
     """
     if name not in known:
         raise ParameterError(unknown(name, known))
-    number = float(number)
-    if not np.isfinite(number):
-        raise ParameterError(f"{name} = {number} must be a finite number")
-    return number
+    return finite(name, number)
 
 
 class Equations:

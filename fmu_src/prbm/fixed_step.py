@@ -12,6 +12,7 @@ import numpy as np
 
 from . import constraints, contact
 from .assembly import Real
+from .dynamics import IDLE, Discrete, Equations
 from .errors import ParameterError, SimulationError
 from .hybrid import Simulation
 from .kinetics import inertia
@@ -68,7 +69,12 @@ def march(
         raise ParameterError(f"step = {step:g} s must be positive and within {stop_time:g} s")
     simulation = Simulation(mechanism, values)
     system, n, y = simulation.system, simulation.system.n, simulation.front
-    equations = simulation._equations_holding([])
+    open_ = Discrete(
+        (False,) * len(mechanism.stops),
+        (IDLE,) * len(mechanism.stops),
+        (IDLE,) * len(mechanism.frictions),
+    )
+    equations = Equations(system, simulation.inputs, open_, simulation.omega)
     armed = [True] * len(mechanism.stops)
     times, states, impacts = [0.0], [y], []
     for k in range(1, round(stop_time / step) + 1):

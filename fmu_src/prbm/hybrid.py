@@ -36,11 +36,12 @@ from .statics import Equilibrium, equilibrium, release_velocity
 TIME_RESOLUTION = 1e-13  # s; events are located to 1e-12 s, some of which the projection needs
 TOUCHING = 1e-10  # of the size: gaps that close together with one that is being resolved
 RELEASE_GAP = 1e-9  # m; a wall may be touched at release by no more than this
-SHORTEST_FLIGHT = 1e-7  # s; the arc of a shorter bounce is below the resolution of a position
+SHORTEST_FLIGHT = 5e-7  # of the period: the arc of a shorter bounce is lost in rounding
 DEPENDENT = 1e-4  # share of a row's mobility that the stops leave; below, the stop carries all
-STILL = 1e-11  # of the velocity scale: what is left of a rate after an impact that stopped it
+STILL = 1e-9  # of the velocity scale: a slower rate is what rounding leaves of none
+SLACK = 1e-6  # of the limit of friction: what sticks may exceed it by this before it slips
 CHATTER = 1000  # events ...
-CHATTER_SPAN = 1e-3  # ... within so many seconds are a motion that the model cannot follow
+CHATTER_SPAN = 5e-3  # ... within so much of a period are a motion the model cannot follow
 DOUBT = 0.5  # of the largest force of a stop within a step: below, its release is looked for
 WATCHED = 8  # parts of a step at which the guards are looked at
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # of the step size control
@@ -159,6 +160,10 @@ class Simulation:
         )
         self.step = step
         self.time = float(start_time)
+        if not math.isfinite(self.time):
+            raise ParameterError(f"start_time = {start_time} s must be a finite number")
+        if step is not None and not (math.isfinite(step) and step > 0.0):
+            raise ParameterError(f"step = {step} s must be positive")
         self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
 
@@ -295,10 +300,13 @@ class Simulation:
         if time == self.time:
             return
         before = dict(vars(self), latched=list(self.latched))
+        recorded = len(self.record or ())
         try:
             self._advance(time)
-        except SimulationError:
+        except Exception:
             vars(self).update(before)
+            if self.record is not None:
+                del self.record[recorded:]
             raise
 
     def _advance(self, time: float) -> None:
@@ -334,36 +342,28 @@ class Simulation:
         self.front_time = self.time
         self.arc, self.k1, self.changed = None, None, False
         self._set_equations(self._inputs(self.inputs.walls))
-        struck = self._follow_walls()
+        struck = self._unsettled_by_walls()
         if struck is not None:
             self._impact(struck)
         else:
             self.front = self.equations.project(self.time, self.front)
             self._settle()
 
-    def _follow_walls(self) -> int | None:
-        """Let what rests on a wall take up a change of the wall's velocity.
+    def _unsettled_by_walls(self) -> int | None:
+        """Let go of what rested on a wall that has changed its velocity.
 
-        A change below ``rest_speed`` is taken up without restitution, as a capture is.  A wall
-        that retreats faster lets go; one that advances faster strikes: its stop is returned.
+        A wall that retreats leaves the body behind; gravity or whatever pressed it closes the
+        gap again and, below ``rest_speed``, captures it.  A wall that advances strikes: one such
+        stop is returned.
         """
         n = self.system.n
-        q, v = self.front[:n], self.front[n : 2 * n]
-        e = np.exp(1j * q)
+        e, v = np.exp(1j * self.front[:n]), self.front[n : 2 * n]
         rates = self.equations.gap_rates(e, v)
         struck = None
         for i in list(self.equations.held):
-            if abs(rates[i]) >= max(self._field(i, "rest_speed"), self._still()):
+            if abs(rates[i]) > self._still():
                 self._set_discrete(self.discrete.with_hold(i, False))
                 struck = i if rates[i] < 0.0 else struck
-        held = self.equations.held
-        if held and np.abs(rates[held]).max() > self._still():
-            M, _ = inertia(self.system.H, self.equations.J, e)
-            loops = constraints.jacobian(self.system.loops, e)
-            G = constraints.jacobian(self.system.gaps[held], e)
-            X = contact.response(M, loops, G)
-            P = np.asarray(np.linalg.solve(G @ X, -rates[held]), dtype=np.float64)
-            self._book(held, held, q, v, v + X @ P, P)
         return struck
 
     def state(self) -> Real:
@@ -385,6 +385,12 @@ class Simulation:
         h = self.step or min(self.h or self._first_step(self.k1), self._largest_step())
         growth = GROW
         while True:
+            if h < SMALLEST_STEP:
+                raise SimulationError(
+                    f"the step size fell below {SMALLEST_STEP:g} s at t = {t:.9g} s: the motion "
+                    "is too violent for the model; check the inputs and parameters, or add "
+                    "damping.beta"
+                )
             self.equations.trace.clear()
             k, y1 = stages(PAIR, f, t, y, h, self.k1)
             error = self._error(h * (PAIR.error @ k), y, y1)
@@ -392,11 +398,6 @@ class Simulation:
                 break
             growth = 1.0  # a step that had to be repeated is not followed by a longer one
             h *= max(SHRINK, SAFETY * error**-RETRY_EXPONENT) if math.isfinite(error) else SHRINK
-            if h < SMALLEST_STEP:
-                raise SimulationError(
-                    f"the step size fell below {SMALLEST_STEP:g} s at t = {t:.9g} s: the motion "
-                    "is too violent for the model; check the parameters, or add damping.beta"
-                )
         if self.step and not error * self.tolerance <= 1.0:
             raise SimulationError(
                 f"the fixed step of {h:g} s is too long at t = {t:.9g} s: the state it leads to "
@@ -450,7 +451,11 @@ class Simulation:
         return min(self._largest_step(), 0.1 * math.pow(self.tolerance, 0.2) / max(size, 1e-6))
 
     def _largest_step(self) -> float:
-        return LARGEST_STEP * 2 * math.pi / self._omega_scale()
+        return LARGEST_STEP * self._period()
+
+    def _period(self) -> float:
+        """Return the time scale of the motion [s]."""
+        return 2 * math.pi / self._omega_scale()
 
     # -- locating events --
 
@@ -492,27 +497,33 @@ class Simulation:
         return rate
 
     def _closing(self, arc: Arc, i: int, times: Real, gaps: Real, rates: Real) -> float | None:
-        """Return when a gap closes: once positive, then zero at a closing rate.
+        """Return when a gap closes: z > 0 -> z <= 0 at a closing rate.
 
-        The gap is zero at the start of a step that follows an impact; then it must have opened
-        before it can close.  A dip below zero between two looks shows in the rates.
+        A gap that is opening at the start of a part of the step closes only after its apex: so
+        the impact that has just been resolved, whose gap is zero up to a rounding of either
+        sign, is not found again.  A dip below zero between two looks shows in the rates.
         """
+        gap_at, near = self._gap_at(arc, i), TOUCHING * self.system.length
         for j in range(WATCHED):
-            a, b = times[j], times[j + 1]
-            if gaps[j + 1] <= 0.0 or (rates[j] < 0.0 < rates[j + 1] and gaps[j + 1] > 0.0):
-                if gaps[j] <= 0.0:
-                    if not rates[j] > 0.0 > rates[j + 1]:
-                        if rates[j + 1] < 0.0 and gaps[j + 1] < -TOUCHING * self.system.length:
-                            return float(a)
-                        continue
-                    a = _falls(self._gap_rate_at(arc, i), a, b)
-                    if self._gap_at(arc, i)(a) <= 0.0:
-                        return float(a)
-                if gaps[j + 1] > 0.0:
-                    b = _falls(self._gap_rate_at(arc, i, sign=-1.0), a, b)
-                    if self._gap_at(arc, i)(b) > 0.0:
-                        continue
-                return self._polished(arc, i, _falls(self._gap_at(arc, i), a, b))
+            a, b = float(times[j]), float(times[j + 1])
+            dips = rates[j] < 0.0 < rates[j + 1]
+            if gaps[j + 1] > 0.0 and not dips:
+                continue
+            if rates[j] > 0.0:
+                if rates[j + 1] >= 0.0:
+                    continue  # still opening from zero
+                a = _falls(self._gap_rate_at(arc, i), a, b)
+                if gap_at(a) <= 0.0:
+                    return a  # an arc below the resolution of a position
+            elif gaps[j] <= 0.0:
+                if gaps[j + 1] < -near:
+                    return a
+                continue  # touches without a rate of its own
+            if dips:
+                b = _falls(self._gap_rate_at(arc, i, sign=-1.0), a, b)
+                if gap_at(b) > 0.0:
+                    continue
+            return self._polished(arc, i, _falls(gap_at, a, b))
         return None
 
     def _polished(self, arc: Arc, i: int, t: float) -> float:
@@ -546,7 +557,7 @@ class Simulation:
 
                 return [Event(_falls(speed, times[j], times[j + 1]), kind, i)]
         if z[-1] < 0.0 and z[0] <= 0.0:
-            return [Event(arc.start, kind, i)]
+            return [Event(float(times[1]), kind, i)]  # went the other way from the start
         return []
 
     def _sliding(self, kind: str, i: int) -> int:
@@ -598,10 +609,11 @@ class Simulation:
         for k, i in enumerate(equations.stuck):
             normal = float(lam[equations.first_hold + equations.held.index(i)])
             friction = abs(float(lam[equations.first_stick + k]))
-            result["slip slide", i] = equations.stop_friction[i] * normal - friction
+            limit = equations.stop_friction[i] * normal
+            result["slip slide", i] = (1.0 + SLACK) * limit - friction
         for k, i in enumerate(equations.rubbing):
             friction = abs(float(lam[equations.first_rub + k]))
-            result["slip rub", i] = equations.rub_limit(i, e) - friction
+            result["slip rub", i] = (1.0 + SLACK) * equations.rub_limit(i, e) - friction
         return result
 
     # -- events --
@@ -622,7 +634,7 @@ class Simulation:
     def _count(self, event: Event) -> None:
         """Stop a chatter that does not end."""
         since, count = self._window
-        if event.time - since > CHATTER_SPAN:
+        if event.time - since > CHATTER_SPAN * self._period():
             since, count = event.time, 0
         self._window = (since, count + 1)
         if count + 1 > CHATTER:
@@ -656,8 +668,8 @@ class Simulation:
         restitution = np.array(
             [0.0 if i in soft else self._field(i, "restitution") for i in struck]
         )
-        after, normal, _ = self._impulse(q, v, struck, held, restitution)
-        self._book(struck, soft, q, v, after, normal)
+        after, normal, tangential = self._impulse(q, v, struck, held, restitution)
+        self._book([i for i in struck if i not in soft], q, v, after, normal, tangential)
         rates_after = self.equations.gap_rates(e, after)
         resting = [i for i in (*struck, *held) if rates_after[i] <= self._still()]
         self._set_discrete(replace(self.discrete, holds=(False,) * len(gaps)))
@@ -673,32 +685,35 @@ class Simulation:
         """Tell whether a stop that is struck slowly comes to rest.
 
         It does if, after an impact without restitution, it is pressed, and it closes below
-        ``rest_speed`` or comes from a bounce shorter than :data:`SHORTEST_FLIGHT`.
+        ``rest_speed`` or comes from a bounce shorter than :data:`SHORTEST_FLIGHT`.  A speed that
+        is none but rounding is neither counted nor returned.
         """
+        if speed <= self._still():
+            return True
         after, _, _ = self._impulse(q, v, [i], held, np.zeros(1))
         holding = self._holding([i, *held], q, after)
         if i not in holding:
             return False
         if speed < self._field(i, "rest_speed"):
             return True
-        equations = self._equations_holding(holding)
+        equations = self._equations_holding(holding, q, after)
         _, lam, M = equations.accelerations(q, after)
         e = np.exp(1j * q)
         loops = constraints.jacobian(self.system.loops, e)
         G = constraints.jacobian(self.system.gaps[i : i + 1], e)
         pressing = float(equations.stop_forces(lam)[i]) * _mobility(M, loops, G)
-        return 2.0 * speed < pressing * SHORTEST_FLIGHT
+        return 2.0 * speed < pressing * SHORTEST_FLIGHT * self._period()
 
     def _impulse(
         self, q: Real, v: Real, struck: list[int], held: list[int], restitution: Real
-    ) -> tuple[Real, Real, Real]:
-        """Return the velocities after an impact and the impulses at the struck stops.
+    ) -> tuple[Real, dict[int, float], dict[int, float]]:
+        """Return the velocities after an impact, the normal and the tangential impulses by stop.
 
         Stops that hold take part: without friction as partners of the complementarity problem,
         with friction as constraints that are let go if they would pull.  Their own friction, and
         that of friction points, is finite and has no impulse.
         """
-        system = self.system
+        system, k = self.system, len(struck)
         e = np.exp(1j * q)
         M, _ = inertia(system.H, self.equations.J, e)
         loops = constraints.jacobian(system.loops, e)
@@ -708,10 +723,9 @@ class Simulation:
             partners = struck + held
             G = constraints.jacobian(system.gaps[partners], e)
             X = contact.response(M, loops, G)
-            rates = np.minimum(u[partners], 0.0)
             eps = np.concatenate([restitution, np.zeros(len(held))])
-            P = contact.newton(G @ X, rates, eps)
-            return v + X @ P, P[: len(struck)], np.zeros(len(struck))
+            P = contact.newton(G @ X, np.minimum(u[partners], 0.0), eps)
+            return v + X @ P, dict(zip(partners, P.tolist(), strict=True)), {}
         kept = list(held)
         while True:
             rows = constraints.jacobian(np.vstack([system.loops, system.gaps[kept]]), e)
@@ -720,67 +734,75 @@ class Simulation:
             X = contact.response(M, rows, np.vstack([G, T]))
             W = np.vstack([G, T]) @ X
             rates = np.concatenate([u[struck], T @ v])
-            if len(struck) == 1:
+            if k == 1:
                 P = np.array(contact.stronge(W, rates, float(mu[0]), float(restitution[0])))
             else:
                 P = contact.several(W, rates, mu, restitution)
             after = v + X @ P
-            pull = M @ (after - v) - np.vstack([G, T]).T @ P
-            reaction = np.linalg.lstsq(rows.T, pull, rcond=1e-12)[0][len(loops) :]
+            left = M @ (after - v) - np.vstack([G, T]).T @ P
+            reaction = np.linalg.lstsq(rows.T, left, rcond=1e-12)[0][len(loops) :]
             pulling = [i for i, p in zip(kept, reaction, strict=True) if p < 0.0]
             if not pulling:
-                k = len(struck)
-                return after, P[:k], P[k:]
+                normal = dict(
+                    zip(struck + kept, [*P[:k].tolist(), *reaction.tolist()], strict=True)
+                )
+                return after, normal, dict(zip(struck, P[k:].tolist(), strict=True))
             kept = [i for i in kept if i not in pulling]
 
     def _book(
-        self, struck: list[int], soft: list[int], q: Real, v: Real, after: Real, normal: Real
+        self,
+        counted: list[int],
+        q: Real,
+        v: Real,
+        after: Real,
+        normal: Mapping[int, float],
+        tangential: Mapping[int, float],
     ) -> None:
-        """Put the impact into the state, the energies and the latched outputs."""
+        """Put an impact into the state, the energies and the latched outputs.
+
+        At each stop -P (u- + u+)/2 is lost, and as much along the wall; the wall does -P w.
+        """
         n = self.system.n
         e = np.exp(1j * q)
-        M, _ = inertia(self.system.H, self.equations.J, e)
-        before_rates = self.equations.gap_rates(e, v)
-        after_rates = self.equations.gap_rates(e, after)
-        walls = self.inputs.walls
-        work = -sum(float(P) * walls[i].rate for i, P in zip(struck, normal, strict=True))
-        lost = kinetic_energy(M, v) - kinetic_energy(M, after) + work
+        u = [self.equations.gap_rates(e, rates) for rates in (v, after)]
+        slides = constraints.jacobian(self.system.slides, e)
+        lost = {i: -P * float(u[0][i] + u[1][i]) / 2 for i, P in normal.items()}
+        for i, P in tangential.items():
+            lost[i] -= P * float(slides[i] @ (v + after)) / 2
+        work = -sum(P * self.inputs.walls[i].rate for i, P in normal.items())
         self.front = self.front.copy()
         self.front[n : 2 * n] = after
-        self.front[2 * n] += lost
+        self.front[2 * n] += sum(lost.values())
         self.front[2 * n + 1] += work
-        counted = [i for i in struck if i not in soft]
         if not counted:
             return
-        phi, M_shape = fundamental_at(self.system, q)
-        modal = simulated_restitution(phi, M_shape, v, after)
-        total = float(sum(normal))
-        for i, P in zip(struck, normal, strict=True):
-            if i in soft:
-                continue
+        phi, M = fundamental_at(self.system, q)
+        modal = simulated_restitution(phi, M, v, after)
+        for i in counted:
             self.latched[i] = Latched(
                 self.latched[i].impact_count + 1,
                 self.front_time,
-                float(-before_rates[i]),
-                float(after_rates[i]),
-                float(P),
-                lost * (float(P) / total if total else 1.0),
+                float(-u[0][i]),
+                float(u[1][i]),
+                normal[i],
+                lost[i],
                 modal,
             )
             if self.record is not None:
                 stop = self.mechanism.stops[i].name
                 self.record.append(
-                    Impact(stop, self.front_time, q, v, after, float(P), self.latched[i])
+                    Impact(stop, self.front_time, q, v, after, normal[i], self.latched[i])
                 )
 
     def _holding(self, candidates: list[int], q: Real, v: Real) -> list[int]:
         """Return which of the stops at rest are pressed: their forces are positive together.
 
-        A stop that can move only with others that hold is left to them.
+        What slides rubs meanwhile.  A stop that can move only with others that hold is left to
+        them.
         """
         holding = self._independent(sorted(set(candidates)), q)
         while holding:
-            equations = self._equations_holding(holding)
+            equations = self._equations_holding(holding, q, v)
             _, lam, _ = equations.accelerations(q, v)
             pressed = equations.stop_forces(lam)
             worst = min(holding, key=lambda i: float(pressed[i]))
@@ -804,14 +826,24 @@ class Simulation:
                 kept.append(i)
         return kept
 
-    def _equations_holding(self, stops: list[int]) -> Equations:
-        """Return the equations in which these stops hold and nothing rubs."""
+    def _equations_holding(self, stops: list[int], q: Real, v: Real) -> Equations:
+        """Return the equations in which these stops hold, and what slides rubs."""
+        e = np.exp(1j * q)
+        slides, rubs = (
+            constraints.jacobian(B, e) @ v for B in (self.system.slides, self.system.rubs)
+        )
         discrete = Discrete(
-            tuple(i in stops for i in range(len(self.discrete.holds))),
-            (IDLE,) * len(self.discrete.slides),
-            (IDLE,) * len(self.discrete.rubs),
+            tuple(i in stops for i in range(len(slides))),
+            tuple(self._sign(float(x)) if i in stops else IDLE for i, x in enumerate(slides)),
+            tuple(self._sign(float(x)) for x in rubs),
         )
         return Equations(self.system, self.inputs, discrete, self.omega)
+
+    def _sign(self, speed: float) -> int:
+        """Return the sign of a sliding velocity, IDLE if it is none but rounding."""
+        if abs(speed) <= self._still():
+            return IDLE
+        return 1 if speed > 0.0 else -1
 
     def _settle(self, resting: Sequence[int] = (), yields: tuple[str, int] | None = None) -> None:
         """Choose what holds, sticks and slides at the front, from its state alone.
@@ -834,38 +866,42 @@ class Simulation:
         ]
         holding = self._holding(candidates, q, v)
         holds = tuple(i in holding for i in range(len(gaps)))
-        slides = [IDLE] * len(gaps)
-        rubs = [IDLE] * len(self.discrete.rubs)
-        self._set_discrete(Discrete(holds, tuple(slides), tuple(rubs)))
-        for i in holding:
-            if self._field(i, "friction") > 0.0:
-                slides[i] = self._slide_state("slide", i, q, v, yields == ("slide", i))
-                self._set_discrete(replace(self.discrete, slides=tuple(slides)))
-        for i in range(len(rubs)):
-            if self.equations.rub_law[i][0] > 0.0:
-                rubs[i] = self._slide_state("rub", i, q, v, yields == ("rub", i))
-                self._set_discrete(replace(self.discrete, rubs=tuple(rubs)))
+        self._set_discrete(Discrete(holds, (IDLE,) * len(gaps), (IDLE,) * len(self.discrete.rubs)))
+        rubbing = [("slide", i) for i in holding if self._field(i, "friction") > 0.0]
+        rubbing += [("rub", i) for i, law in enumerate(self.equations.rub_law) if law[0] > 0.0]
+        for _ in range(len(rubbing) + 1):  # what one does may change what another must do
+            before = self.discrete
+            for kind, i in rubbing:
+                state = self._slide_state(kind, i, q, v, yields == (kind, i))
+                self._set_discrete(self._with_slide(kind, i, state))
+            if self.discrete == before:
+                break
         if holding:
             self.front = self.equations.project(t, self.front)
 
     def _slide_state(self, kind: str, i: int, q: Real, v: Real, yields: bool) -> int:
         """Return whether something slides (its sign), sticks, or is idle.
 
-        Where the loops and the stops that hold leave the row no mobility of its own, the stop
-        carries everything and the friction nothing.
+        What moves slides.  What is at rest is idle where the loops and the stops that hold leave
+        it no mobility of its own: the stop carries everything and the friction nothing.  Else it
+        sticks as far as Coulomb's law allows, and beyond slides in the direction in which
+        sliding accelerates it.
         """
         e = np.exp(1j * q)
+        B = self._slide_row(kind, i)[None, :]
+        row = constraints.jacobian(B, e)
+        moving = self._sign(float((row @ v).item()))
+        if moving != IDLE:
+            return moving
         M, _ = inertia(self.system.H, self.equations.J, e)
-        row = constraints.jacobian(self._slide_row(kind, i)[None, :], e)
         loops = constraints.jacobian(self.system.loops, e)
-        held = constraints.jacobian(self.equations.B, e)
+        others = Equations(self.system, self.inputs, self._with_slide(kind, i, IDLE), self.omega)
+        held = constraints.jacobian(others.B, e)
         if _mobility(M, held, row) <= DEPENDENT * _mobility(M, loops, row):
             return IDLE
-        speed = float((row @ v).item())
-        if abs(speed) > self._still():
-            return 1 if speed > 0.0 else -1
-        trial = self._with_slide(kind, i, STICKS)
-        equations = Equations(self.system, self.inputs, trial, self.omega)
+        equations = Equations(
+            self.system, self.inputs, self._with_slide(kind, i, STICKS), self.omega
+        )
         _, lam, _ = equations.accelerations(q, v)
         if kind == "rub":
             friction = float(lam[equations.first_rub + equations.rubbing.index(i)])
@@ -876,7 +912,13 @@ class Simulation:
             limit = equations.stop_friction[i] * normal
         if abs(friction) <= limit and not yields:
             return STICKS
-        return -1 if friction > 0.0 else 1
+        gives = -1 if friction > 0.0 else 1
+        for sign in (gives, -gives):
+            trial = Equations(self.system, self.inputs, self._with_slide(kind, i, sign), self.omega)
+            a, _, _ = trial.accelerations(q, v)
+            if sign * float((row @ a - constraints.convective(B, e, v)).item()) > 0.0:
+                return sign
+        return STICKS if not yields else IDLE
 
     def _with_slide(self, kind: str, i: int, state: int) -> Discrete:
         name = "rubs" if kind == "rub" else "slides"

@@ -15,6 +15,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from keyword import iskeyword
 from typing import ClassVar
 
 from .errors import MechanismError, ParameterError
@@ -24,6 +25,7 @@ Quantity = float | str
 Point = tuple[Quantity, Quantity]
 
 GROUND = "ground"
+RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "release", "solver")
 NAME = re.compile(r"[A-Za-z_]\w*(\[\d+\])?(\.[A-Za-z_]\w*(\[\d+\])?)*")
 
 
@@ -72,15 +74,26 @@ def affine(quantity: Quantity) -> Affine:
     >>> affine("flexure.length + shuttle.width/2")({"flexure.length": 2, "shuttle.width": 1})
     2.5
     """
-    if not isinstance(quantity, str):
-        return Affine(float(quantity))
     try:
-        return _affine(ast.parse(quantity.strip(), mode="eval").body)
-    except (SyntaxError, ValueError, ZeroDivisionError, RecursionError, MemoryError) as error:
+        if not isinstance(quantity, str):
+            result = Affine(float(quantity))
+        else:
+            result = _affine(ast.parse(quantity.strip(), mode="eval").body)
+    except (
+        TypeError,
+        SyntaxError,
+        ValueError,
+        ArithmeticError,
+        RecursionError,
+        MemoryError,
+    ) as why:
         raise MechanismError(
-            f"cannot read the expression {quantity[:80]!r}: write numbers and parameter names "
-            f"joined by + - * /, linear in the parameters ({error})"
+            f"cannot read the expression {str(quantity)[:80]!r}: write numbers and parameter names "
+            f"joined by + - * /, linear in the parameters ({why})"
         ) from None
+    if not all(map(math.isfinite, (result.constant, *result.terms.values()))):
+        raise MechanismError(f"cannot read the expression {quantity!r}: its numbers are not finite")
+    return result
 
 
 def _affine(node: ast.expr) -> Affine:
@@ -156,14 +169,8 @@ class Parameter:
         ParameterError
             If it is not a finite number within the bounds.
         """
+        number = finite(self.name, value, self.unit)
         unit = f" {self.unit}" if self.unit else ""
-        if isinstance(value, bool) or (
-            not isinstance(value, int | float) and not hasattr(value, "__float__")
-        ):
-            raise ParameterError(f"{self.name} = {value!r} must be a number{unit and ' in'}{unit}")
-        number = float(value)
-        if not math.isfinite(number):
-            raise ParameterError(f"{self.name} = {number}{unit} must be a finite number")
         if number < self.minimum:
             raise ParameterError(
                 f"{self.name} = {number:.10g}{unit} must be at least {self.minimum:g}{unit}"
@@ -173,6 +180,23 @@ class Parameter:
                 f"{self.name} = {number:.10g}{unit} must be at most {self.maximum:g}{unit}"
             )
         return number
+
+
+def finite(name: str, value: float, unit: str = "") -> float:
+    """Return a finite number as a float.
+
+    Raises
+    ------
+    ParameterError
+        If it is anything else.
+    """
+    unit = f" {unit}" if unit else ""
+    if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
+        raise ParameterError(f"{name} = {value!r} must be a number{unit and ' in'}{unit}")
+    number = float(value)
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} = {number}{unit} must be a finite number")
+    return number
 
 
 # --- parts ------------------------------------------------------------------------------------
@@ -313,7 +337,7 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
         "thickness": _meta("m", "Thickness in the plane of motion", TINY_LENGTH, 1.0, 1e-4),
         "width": _meta("m", "Width across the plane of motion", TINY_LENGTH, LARGE, 1e-2),
         "youngs_modulus": _meta("Pa", "Young's modulus", 1.0, 1e13, 1e11),
-        "density": _meta("kg/m3", "Density", 0.0, 1e5, 1e4),
+        "density": _meta("kg/m3", "Density", 1.0, 1e5, 1e4),
     },
     Body: {
         "mass": _meta("kg", "Mass", TINY_MASS, 1e6, 0.1),
@@ -414,11 +438,13 @@ class Mechanism:
     drawing: str = ""
 
     def __post_init__(self) -> None:
-        if not re.fullmatch(r"[A-Za-z_]\w*", self.name):
+        if not re.fullmatch(r"[A-Za-z_]\w*", self.name, re.ASCII) or iskeyword(self.name):
             raise MechanismError(
-                f"mechanism name {self.name!r}: use letters, digits and _, not starting with a "
-                "digit (it becomes a file name and an identifier)"
+                f"mechanism name {self.name!r}: use letters a to z, digits and _, not starting "
+                "with a digit, and no word of Python (it becomes a file name and an identifier)"
             )
+        if len(self.gravity) != 2:
+            raise MechanismError(f"gravity = {self.gravity!r} must have an x and a y component")
         self._check_references()
         self._check_names()
         known = {p.name for p in self.parameters}
@@ -467,7 +493,7 @@ class Mechanism:
         )  # fmt: skip
         yield Parameter(
             "damping.beta", self.damping_beta, "s",
-            "Damping in proportion to the rate of every spring, as a time constant", 0.0, 1.0,
+            "Damping in proportion to the rate of every spring, as a time constant", 0.0, 1e-2,
             1e-5, tunable=True,
         )  # fmt: skip
         tuned: tuple[Part, ...] = (*self.frictions, *self.stops)
@@ -492,22 +518,29 @@ class Mechanism:
             if name not in parameters:
                 raise ParameterError(unknown(name, parameters))
             result[name] = parameters[name].check(value)
+        for part in self._parts():
+            for name, meta in FIELDS[type(part)].items():
+                quantity = getattr(part, name)
+                if isinstance(quantity, str):  # bounds hold for expressions too
+                    Parameter(f"{part.name}.{name}", affine(quantity)(result), *meta)
         return result
+
+    def _parts(self) -> tuple[Part, ...]:
+        """Return the parts whose fields are parameters or expressions."""
+        parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.frictions)
+        return (*parts, *self.stops, self.release)
 
     # -- checks --
 
     def _check_names(self) -> None:
-        seen: set[str] = {GROUND}
-        parts: tuple[Part, ...] = (
-            *self.bodies,
-            *self.flexures,
-            *self.stops,
-            *self.frictions,
-            *self.forces,
-        )
+        seen = set(RESERVED)
+        parts: tuple[Part, ...] = (*self.bodies, *self.flexure_types, *self.flexures)
+        parts = (*parts, *self.stops, *self.frictions, *self.forces)
         for name in (part.name for part in parts):
             if name in seen:
-                raise MechanismError(f"the name {name!r} is used twice: give each part its own")
+                raise MechanismError(
+                    f"the name {name!r} is used twice or reserved: give each part its own"
+                )
             seen.add(name)
         names = [p.name for p in self.parameters]
         for name in names:
@@ -550,6 +583,10 @@ class Mechanism:
         for part in attached:
             if part.body not in bodies:
                 raise MechanismError(f"{part.name}.body = {part.body!r} is not described")
+        directed: tuple[Stop | Friction | Release, ...] = (*self.stops, *self.frictions)
+        for one in (*directed, self.release):
+            if not math.isfinite(one.direction):
+                raise MechanismError(f"{one.name}.direction = {one.direction} must be an angle")
         if self.release.body not in bodies:
             raise MechanismError(f"release.body = {self.release.body!r} is not described")
 
@@ -582,8 +619,7 @@ class Mechanism:
             yield from ((f"{stop.name}.point", c) for c in stop.point)
         for kind in self.flexure_types:
             yield from ((f"{kind.name}.{n}", c) for n, c in kind.coefficients.items())
-        parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.frictions)
-        for part in (*parts, *self.stops, self.release):
+        for part in self._parts():
             yield from ((f"{part.name}.{f}", getattr(part, f)) for f in FIELDS[type(part)])
 
 

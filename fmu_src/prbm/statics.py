@@ -16,7 +16,7 @@ from .forces import field_row, springs
 from .kinetics import inertia
 
 NEWTON_STEPS = 30
-LARGEST_TURN = 0.5  # rad per Newton step: further the tangent says nothing
+LARGEST_TURN = 0.5  # rad per Newton step and per step of the load: further is another shape
 SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
 BALANCED = 1e-12  # of the largest torsion rate times one radian
 
@@ -92,11 +92,12 @@ def equilibrium(system: System, displacement: float | None = None) -> Equilibriu
         B = np.vstack([B, system.release])
         c = np.append(c, system.release_c)
     state = np.concatenate([system.q0, np.zeros(len(c))])
-    done, fraction = 0.0, 1.0
+    done, fraction, links = 0.0, 1.0, list(system.links)
     while done < 1.0:
         target = min(1.0, done + fraction)
         trial = _newton(system, B, c, displacement or 0.0, target, state)
-        if trial is not None:
+        # a jump of a link leads to another branch, where slow loading does not take it
+        if trial is not None and np.abs((trial - state)[links]).max() <= LARGEST_TURN:
             state, done = trial, target
             fraction = min(1.0, 2 * fraction)
         else:
@@ -159,7 +160,7 @@ def _unreachable(system: System, displacement: float | None, done: float) -> str
     return (
         f"release.displacement = {displacement:g} m cannot be reached: no equilibrium was found "
         f"beyond {done * displacement:.4g} m (gravity raised in proportion); release closer to "
-        "the straight shape"
+        "the straight shape, or reduce gravity across the motion"
     )
 
 
