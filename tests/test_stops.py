@@ -81,27 +81,52 @@ def test_two_stops_hit_at_once_balance_momentum_and_each_its_energy(model):
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
-def test_a_held_stop_takes_part_in_an_impact_elsewhere(friction):
-    """It receives an impulse or opens, never pulls; a moving wall does the work of its impulse."""
-    guide = two_stops("PRBDM2R", high={"position": 0.0}, low={"position": 4e-4})
-    values = {"low.friction": friction, "low.restitution": 0.8}
-    sim = Simulation(guide, values)
+@pytest.mark.parametrize("lever", [0.01, 0.03])
+def test_a_held_stop_takes_part_in_an_impact_elsewhere(friction, lever):
+    """It receives an impulse or opens, never pulls; its moving wall does the work of its impulse.
+
+    Struck at a short lever it opens, at a long one it is pressed.
+    """
+    guide = two_stops(
+        "PRBDM2R",
+        high={"position": -0.006, "offset": lever, "rest_speed": 0.2},
+        low={"position": -0.0056, "offset": -lever, "restitution": 0.8, "friction": friction},
+    )
+    sim = Simulation(guide)
     sim.record = []
     sim.advance(0.5)
     assert sim.outputs()["high.contact"]
-    before, t = len(sim.record), sim.time
-    start = energy_balance(sim.outputs())
-    while sim.outputs()["low.impact_count"] == 0:
-        t += 1e-3  # the lower wall comes up under the shuttle that rests on the upper one
-        sim.set({"low.velocity": -0.05, "low.displacement": -0.05 * (sim.time - 0.5)})
-        sim.advance(t)
-        assert t < 0.6
-    impact = next(i for i in sim.record[before:] if i.stop == "low")
+    start, count = energy_balance(sim.outputs()), sim.outputs()["low.impact_count"]
+    while sim.outputs()["low.impact_count"] == count:
+        past = sim.time - 0.5  # the lower wall comes up faster than the one that carries
+        sim.set({"high.velocity": -0.05, "high.displacement": -0.05 * past})
+        sim.set({"low.velocity": -0.2, "low.displacement": -0.2 * past})
+        held = sim.outputs()["high.contact"]
+        sim.advance(sim.time + 5e-4)
+        assert sim.time < 0.52
+    assert held
+    impact = next(i for i in sim.record if i.stop == "low" and i.time > 0.5)
+    system = sim.system
     e = np.exp(1j * impact.q)
-    G = -(sim.system.gaps * e).imag
+    M = (e.conj()[:, None] * system.H * e).real + np.diag(system.J)
+    G = -(system.gaps * e).imag
     rates = G @ impact.after + [wall.rate for wall in sim.inputs.walls]
+    before = G @ impact.before + [wall.rate for wall in sim.inputs.walls]
+    assert abs(before[0]) < 1e-9, "it was held"
     assert rates[0] >= -1e-12
-    assert rates[1] > 0
+    if friction == 0.0:
+        assert (rates[0] < 1e-9) == (lever == 0.03), "pressed by the hit below"
+        assert rates[1] == pytest.approx(0.8 * impact.latched.approach_speed, rel=1e-9)
+        rows = np.vstack([-(system.loops * e).imag, G])
+        *_, P_high, P_low = np.linalg.lstsq(rows.T, M @ (impact.after - impact.before), rcond=None)[
+            0
+        ]
+        assert P_low == pytest.approx(impact.impulse, rel=1e-6)
+        assert P_high >= -1e-12
+        assert (P_high > 1e-6) == (lever == 0.03)
+        work = 0.05 * P_high + 0.2 * P_low
+        gained = 0.5 * (impact.after @ M @ impact.after - impact.before @ M @ impact.before)
+        assert impact.latched.energy_lost == pytest.approx(work - gained, rel=1e-6)
     assert impact.latched.energy_lost >= 0
     assert energy_balance(sim.outputs()) == pytest.approx(start, abs=1e-8)
 
