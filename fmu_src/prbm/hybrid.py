@@ -48,6 +48,7 @@ SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # of the step size control
 MEMORY = 0.04  # exponent of the previous error: steps that swing less (Hairer, IV.2)
 RETRY_EXPONENT = 1.0 / PAIR.order
 STEP_EXPONENT = RETRY_EXPONENT - 0.75 * MEMORY
+STRICTNESS = 0.6  # of the tolerance: what the dense output adds to the error has room too
 LEAST_ERROR = 1e-4  # of the tolerance: what a step better than that is remembered as
 LARGEST_STEP = 0.05  # of the fundamental period
 SMALLEST_STEP = 1e-13  # s
@@ -166,6 +167,8 @@ class Simulation:
             raise ParameterError(f"step = {step} s must be positive")
         self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
+        # one radian against the stiffest spring [J]
+        self._energy_scale = float(np.abs(self.system.K).max())
 
         shape = self.release_shape()
         velocity = release_velocity(
@@ -398,7 +401,7 @@ class Simulation:
                 break
             growth = 1.0  # a step that had to be repeated is not followed by a longer one
             h *= max(SHRINK, SAFETY * error**-RETRY_EXPONENT) if math.isfinite(error) else SHRINK
-        if self.step and not error * self.tolerance <= 1.0:
+        if self.step and not error * STRICTNESS * self.tolerance <= 1.0:
             raise SimulationError(
                 f"the fixed step of {h:g} s is too long at t = {t:.9g} s: the state it leads to "
                 "is not even near; shorten it"
@@ -420,12 +423,16 @@ class Simulation:
         self.arc = arc
 
     def _scales(self, y: Real) -> Real:
-        """Return the magnitudes against which errors of a state are measured."""
+        """Return the magnitudes against which errors of a state are measured.
+
+        One radian for angles, whatever they are; for rates and energies at least what one
+        radian means for them.
+        """
         n = self.system.n
-        scale = np.empty(2 * n + 2)
+        scale = np.abs(y)
         scale[:n] = 1.0
-        scale[n : 2 * n] = np.maximum(np.abs(y[n : 2 * n]), self._omega_scale())
-        scale[2 * n :] = np.maximum(np.abs(y[2 * n :]), self._energy_scale())
+        np.maximum(scale[n : 2 * n], self._omega_scale(), out=scale[n : 2 * n])
+        np.maximum(scale[2 * n :], self._energy_scale, out=scale[2 * n :])
         return scale
 
     def _omega_scale(self) -> float:
@@ -435,14 +442,10 @@ class Simulation:
         ratio: float = np.abs(self.system.K).max() / np.abs(self.system.H).max()
         return math.sqrt(ratio)
 
-    def _energy_scale(self) -> float:
-        """Return the energy of one radian in the softest direction of the springs [J]."""
-        return float(np.abs(self.system.K).max())
-
     def _error(self, difference: Real, y: Real, y1: Real) -> float:
-        scale = self.tolerance * self._scales(np.maximum(np.abs(y), np.abs(y1)))
-        ratio = difference / scale
-        return math.sqrt(float(ratio @ ratio) / len(ratio))
+        """Return the root mean square of an error in units of what the tolerance allows."""
+        ratio = difference / self._scales(np.maximum(np.abs(y), np.abs(y1)))
+        return math.sqrt(float(ratio @ ratio) / len(ratio)) / (STRICTNESS * self.tolerance)
 
     def _first_step(self, k1: Real) -> float:
         """Return a first step size from the size of the rates (Hairer, II.4)."""
