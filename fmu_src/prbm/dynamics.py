@@ -164,6 +164,11 @@ class Equations:
         self.driven = bool(np.any(self.w_input) or np.any(self.moment))
         self.walls_push = any(inputs.walls[i].rate for i in held)
 
+        self.c = np.zeros(len(self.B))
+        self.c[: self.first_hold] = system.loops_c
+        for k, i in enumerate(held):
+            self.c[self.first_hold + k] = system.gaps_c[i] + inputs.walls[i].position
+
         # one product with e serves loads, inertia and constraints: see accelerations
         self.stack: Complex = np.vstack([self.w, system.H, 1j * self.B])
         self.J_stack = np.zeros((self.n + len(self.B), self.n))
@@ -306,11 +311,11 @@ class Equations:
 
     def offsets(self, t: float) -> Real:
         """Return the constant parts of the active constraints at time t [m]."""
-        system = self.system
-        c = np.zeros(len(self.B))
-        c[: self.first_hold] = system.loops_c
+        if not self.walls_push:
+            return self.c
+        c = self.c.copy()
         for k, i in enumerate(self.held):
-            c[self.first_hold + k] = system.gaps_c[i] + self.inputs.walls[i].at(t)
+            c[self.first_hold + k] = self.system.gaps_c[i] + self.inputs.walls[i].at(t)
         return c
 
     def project(self, t: float, y: Real) -> Real:

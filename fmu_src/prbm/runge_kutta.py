@@ -8,6 +8,7 @@ Sources
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -50,7 +51,7 @@ class Tableau:
         if not np.allclose(self.dense.sum(axis=1), self.weights, rtol=0, atol=1e-14):
             raise ValueError("the dense output must end at the solution")
 
-    @property
+    @cached_property
     def c(self) -> Real:
         """Nodes, the row sums of a."""
         result: Real = self.a.sum(axis=1)
@@ -119,7 +120,7 @@ def stages(tableau: Tableau, f: Rate, t: float, y: Real, h: float, k1: Real) -> 
     >>> round(y1.item(), 12)
     0.2
     """
-    a, c = tableau.a * h, tableau.c * h
+    a, c = tableau.a * h, (tableau.c * h).tolist()
     k = np.empty((len(c), len(y)))
     k[0] = k1
     y1 = y
