@@ -299,3 +299,20 @@ def test_an_absurd_force_is_refused_not_integrated():
     sim.set({"force.x": 1e300})
     with np.errstate(all="ignore"), pytest.raises(RuntimeError, match="step size fell below"):
         sim.advance(1e-3)
+
+
+def test_two_stops_that_cannot_move_apart_share_a_rocking_load():
+    """2R, straight: it can hardly rotate; a moment takes the weight from one stop to the other."""
+    guide = two_stops("PRBDM2R")
+    sim = Simulation(guide, {"release.displacement": 0.0})
+    weight = sim.outputs()["high.force"] + sim.outputs()["low.force"]
+    carried = set()
+    for k in range(200):
+        sim.set({"force.moment": 0.02 * np.sin(2 * np.pi * 10 * sim.time)})
+        sim.advance((k + 1) * 1e-3)
+        out = sim.outputs()
+        assert out["high.force"] + out["low.force"] == pytest.approx(weight, rel=0.2)
+        assert min(out["high.gap"], out["low.gap"]) > -1e-9
+        carried |= {name for name in ("high", "low") if out[f"{name}.force"] > 0.3 * weight}
+    assert carried == {"high", "low"}
+    assert out["high.impact_count"] + out["low.impact_count"] == 0

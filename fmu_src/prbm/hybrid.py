@@ -16,7 +16,7 @@ spring and not a series of small bounces.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,7 @@ TOUCHING = 1e-10  # of the size: gaps that close together with one that is being
 RELEASE_GAP = 1e-9  # m; a wall may be touched at release by no more than this
 SHORTEST_FLIGHT = 5e-7  # of the period: the arc of a shorter bounce is lost in rounding
 DEPENDENT = 1e-4  # share of a row's mobility that the stops leave; below, the stop carries all
+ALIGNED = 1e-9  # the same for stops among each other; below, one of them holds for all
 STILL = 1e-9  # of the velocity scale: a slower rate is what rounding leaves of none
 SLACK = 1e-6  # of the limit of friction: what sticks may exceed it by this before it slips
 CHATTER = 1000  # events ...
@@ -644,7 +645,8 @@ class Simulation:
             raise SimulationError(
                 f"more than {CHATTER} events ({event.kind} the last) within "
                 f"{event.time - since:.3g} s at t = {event.time:.9g} s: the contact chatters; "
-                "raise rest_speed or damping.beta, or lower the restitution"
+                "raise rest_speed or damping.beta, lower the restitution, or give the body room "
+                "between its walls"
             )
 
     def _set_discrete(self, discrete: Discrete) -> None:
@@ -798,36 +800,47 @@ class Simulation:
                 )
 
     def _holding(self, candidates: list[int], q: Real, v: Real) -> list[int]:
-        """Return which of the stops at rest are pressed: their forces are positive together.
+        """Return which of the stops at rest hold: pressed together, while the others open.
 
-        What slides rubs meanwhile.  A stop that can move only with others that hold is left to
-        them.
+        What slides rubs meanwhile.  Of stops that can move only together, one holds: the one
+        that keeps the others from closing.
         """
-        holding = self._independent(sorted(set(candidates)), q)
-        while holding:
-            equations = self._equations_holding(holding, q, v)
-            _, lam, _ = equations.accelerations(q, v)
-            pressed = equations.stop_forces(lam)
-            worst = min(holding, key=lambda i: float(pressed[i]))
-            if pressed[worst] > 0.0:
-                return holding
-            holding.remove(worst)
-        return []
-
-    def _independent(self, stops: list[int], q: Real) -> list[int]:
-        """Return the stops of a list that keep a mobility of their own, first come first."""
-        if len(stops) < 2:
-            return stops
+        every = sorted(set(candidates))
         e = np.exp(1j * q)
         M, _ = inertia(self.system.H, self.equations.J, e)
+        G = constraints.jacobian(self.system.gaps, e)
+        bend = constraints.convective(self.system.gaps, e, v)
+        closes = -STILL * self._omega_scale() ** 2 * self.system.length
+        pressed_only: list[int] = []
+        for size in range(len(every), 0, -1):
+            found: list[tuple[float, list[int]]] = []
+            for members in combinations(every, size):
+                holding = list(members)
+                if not self._independent(holding, M, e):
+                    continue
+                equations = self._equations_holding(holding, q, v)
+                a, lam, _ = equations.accelerations(q, v)
+                if all(equations.stop_forces(lam)[i] > 0.0 for i in holding):
+                    others = [float(G[i] @ a - bend[i]) for i in every if i not in holding]
+                    found.append((min(others, default=0.0), holding))
+            if found:
+                opens, holding = max(found, key=lambda one: one[0])
+                if opens >= closes:
+                    return holding
+                pressed_only = pressed_only or holding
+        return pressed_only
+
+    def _independent(self, stops: list[int], M: Real, e: Complex) -> bool:
+        """Tell whether each of the stops keeps a mobility of its own beside the others."""
+        if len(stops) < 2:
+            return True
         loops = constraints.jacobian(self.system.loops, e)
-        kept: list[int] = []
-        for i in stops:
-            held = np.vstack([loops, constraints.jacobian(self.system.gaps[kept], e)])
-            G = constraints.jacobian(self.system.gaps[i : i + 1], e)
-            if _mobility(M, held, G) > DEPENDENT * _mobility(M, loops, G):
-                kept.append(i)
-        return kept
+        for n, i in enumerate(stops):
+            held = np.vstack([loops, constraints.jacobian(self.system.gaps[stops[:n]], e)])
+            row = constraints.jacobian(self.system.gaps[i : i + 1], e)
+            if _mobility(M, held, row) <= ALIGNED * _mobility(M, loops, row):
+                return False
+        return True
 
     def _equations_holding(self, stops: list[int], q: Real, v: Real) -> Equations:
         """Return the equations in which these stops hold, and what slides rubs."""
