@@ -213,8 +213,11 @@ def test_files_that_are_no_mechanism_get_one_clear_message(tmp_path):
     text = shipped()["PRBDM"].read_text()
     cases = {
         "no toml": ("= 3", "is no TOML file"),
-        "unknown key": (text + "\n[extra]\nx = 1\n", "extra is no key"),
-        "wrong type": (text.replace("mass = 0.053187", "mass = [1, 2]"), "bodies.0.mass"),
+        "unknown key": (text + "\n[extra]\nx = 1\n", "extra"),
+        "wrong type": (
+            text.replace("mass = 0.053187", "mass = [1, 2]"),
+            "= [1, 2]: write a number",
+        ),
         "missing": (text.replace('body = "shuttle"\ndisplacement', "displacement"), "release"),
         "reference": (text.replace('"shuttle.right"', '"shuttle.wrong"'), "shuttle.wrong"),
     }
