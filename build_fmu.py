@@ -6,21 +6,9 @@ Puts the source beside this file first, so that it needs no installation of the 
 import sys
 from pathlib import Path
 
-
-def main() -> int:
-    """Run the exporter of this source tree."""
-    sys.path.insert(0, str(Path(__file__).resolve().parent / "fmu_src"))
-    try:
-        from prbm_fmu import cli
-    except ModuleNotFoundError as error:
-        print(
-            f"build_fmu.py needs the Python package {error.name}; install what it needs with "
-            "'python -m pip install .' in its folder",
-            file=sys.stderr,
-        )
-        return 2
-    return cli.main()
-
-
 if __name__ == "__main__":
+    sys.path.insert(0, str(Path(__file__).resolve().parent / "fmu_src"))
+
+    from prbm_fmu.__main__ import main
+
     sys.exit(main())

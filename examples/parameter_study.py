@@ -12,6 +12,7 @@ and the guide rests at t_1 + T(eps v_1) + T(eps^2 v_1) + ...
 """
 
 import math
+import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -132,7 +133,10 @@ def main() -> None:
             f"{row['rest_time']:10.5f} s  {row['exact']:13.5f} s"
         )
     print(f"largest difference {np.abs(table['rest_time'] - table['exact']).max():.1e} s")
-    figure(table).savefig("parameter_study.png")
+    try:
+        figure(table).savefig("parameter_study.png")
+    except OSError as error:
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
     print("figure: parameter_study.png")
 
 

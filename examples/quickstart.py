@@ -7,14 +7,16 @@ writes PRBDM2R.fmu and quickstart.png into the current folder; with --gif a film
 """
 
 import argparse
+import sys
 from pathlib import Path
 
 import fmpy
 import numpy as np
 
+from prbm import PrbmError
 from prbm_fmu.python_fmu import build
 from prbm_tools.animation import animate
-from prbm_tools.figures import response
+from prbm_tools.figures import response, save
 from prbm_tools.mechanism_file import load, shipped
 from prbm_tools.simulate import rest_time
 
@@ -50,16 +52,25 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description="Build an FMU, simulate it, plot it.")
     parser.add_argument("--gif", action="store_true", help="write quickstart.gif too")
     options = parser.parse_args(arguments)
-    result = simulate(Path.cwd())
+    try:
+        _tell(simulate(Path.cwd()), film=options.gif)
+    except OSError as error:
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
+    except PrbmError as error:
+        sys.exit(str(error))
+
+
+def _tell(result: np.ndarray, *, film: bool) -> None:
     print(
         f"fundamental frequency {result['mode.frequency'][-1]:.3f} Hz; measured "
         f"{MEASURED[0]} +- {MEASURED[1]} Hz, finite elements {FINITE_ELEMENTS} Hz"
     )
-    print(f"{result['stop.impact_count'][-1]} impacts, at rest from {rest_time(result):.3f} s on")
-    response(result, MECHANISM).savefig("quickstart.png")
-    print("figure: quickstart.png")
-    if options.gif:
-        print("film:", animate(result, "quickstart.gif", MECHANISM, stop=0.35))
+    rest = rest_time(result)
+    then = "not at rest yet" if rest is None else f"at rest from {rest:.3f} s on"
+    print(f"{result['stop.impact_count'][-1]} impacts, {then}")
+    print("figure:", save(response(result, MECHANISM), "quickstart.png"))
+    if film:
+        print("film:", animate(result, "quickstart.gif", MECHANISM))
 
 
 if __name__ == "__main__":

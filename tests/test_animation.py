@@ -1,12 +1,14 @@
 """The film shows what the engine computed: to scale, at its times, whole files or none."""
 
 import math
+import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import fmpy
+import fmpy.cli
 import fmpy.util
 import matplotlib
 import numpy as np
@@ -225,13 +227,22 @@ def test_impacts_and_rest_show_in_the_caption_and_the_trace(
     mechanisms: dict[str, Mechanism],
 ) -> None:
     result = simulate(mechanisms["PRBDM"], stop_time=0.3)
-    scene = scene_of(result, slow=10.0)
+    scene = scene_of(result, slow=10.0, stop=0.3)
     scene.frame(len(scene.film.times) - 1)
     assert "t = 300.0 ms   10x slower   impacts 14   at rest" in scene.text.get_text()
     assert len(scene.ticks.get_xdata()) == 14
     scene.frame(0)
     assert "impacts  0" in scene.text.get_text()
     assert "rest" not in scene.text.get_text()
+
+
+def test_a_film_ends_shortly_after_the_motion(mechanisms: dict[str, Mechanism]) -> None:
+    """The guide rests at 0.243 s; what bounces to the end is shown to the end."""
+    moved = motion(simulate(mechanisms["PRBDM"], stop_time=0.6))
+    assert 0.23 < film(moved).times[-1] < 0.3
+    assert film(moved, start=0.3, slow=1.0).times[-1] == pytest.approx(0.6, abs=0.05)
+    bouncing = motion(simulate(mechanisms["PRBDM"], stop_time=0.1))
+    assert film(bouncing).times[-1] == pytest.approx(0.1, abs=1e-3)
 
 
 # --- files ------------------------------------------------------------------------------------
@@ -415,6 +426,38 @@ def test_the_command_tells_whose_result_a_file_holds(tmp_path: Path, short: Resu
     columns = replace(short, impacts=())
     animate(columns, tmp_path / "b.gif", slow=5.0, fps=10.0)
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
+
+
+def test_the_command_shows_a_part(tmp_path: Path) -> None:
+    path = tmp_path / "motion.gif"
+    span = ["--from", "0.02", "--to", "0.04", "--slow", "20", "--fps", "10"]
+    assert main(["--model", "PRBDM", "--stop-time", "0.05", *span, str(path)]) == 0
+    with Image.open(path) as image:
+        assert image.n_frames == 0.02 * 20 * 10 + 1
+
+
+@pytest.mark.fmu
+def test_a_result_without_the_links_leads_to_a_command_that_records_them(
+    tmp_path: Path,
+    fmus: dict[str, Path],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, path in fmus.items():
+        (tmp_path / f"{name}.fmu").write_bytes(path.read_bytes())
+    outputs = fmpy.simulate_fmu(fmus["PRBDM"], stop_time=0.01)
+    fmpy.util.write_csv("result.csv", outputs)
+    commands = []
+    for model in ([], ["--model", "PRBDM"]):
+        with pytest.raises(SystemExit):
+            main([*model, "result.csv", "out.gif"])
+        lines = capsys.readouterr().err.splitlines()
+        commands.append(next(line for line in lines if line.startswith("fmpy simulate PRBDM.fmu")))
+    assert commands[0] == commands[1]
+    monkeypatch.setattr(sys, "argv", [*shlex.split(commands[0]), "--stop-time", "0.02"])
+    fmpy.cli.main()
+    assert main(["result.csv", "out.gif", "--slow", "20", "--fps", "10"]) == 0
 
 
 @pytest.mark.parametrize(

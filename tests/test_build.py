@@ -1,16 +1,25 @@
 """The command that builds FMUs: the same bytes, whole files, one sentence for a mistake."""
 
+import io
 import os
 import re
+import signal
 import subprocess
 import sys
+import time
 import zipfile
 from pathlib import Path
 
+import matplotlib
 import pytest
+from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
-from prbm_fmu import archive, cli, python_fmu
+from prbm import MechanismError
+from prbm_fmu import __main__ as command
+from prbm_fmu import archive, cli, picture, python_fmu, report
+from prbm_fmu.description import Heading, model_description
+from prbm_tools.mechanism_file import load
 
 ROOT = Path(__file__).parents[1]
 BUILD = ROOT / "build_fmu.py"
@@ -25,6 +34,11 @@ def build(folder: Path, *options: str, **environment: str) -> subprocess.Complet
     )  # fmt: skip
 
 
+@pytest.fixture(autouse=True)
+def _typed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "argv", ["build_fmu.py"])
+
+
 def test_from_an_empty_folder_it_builds_simulates_tells_and_plots(tmp_path):
     """Free rest 10.42 and 10.78 mm, 4.957 and 4.889 Hz: the table of the design document."""
     done = build(tmp_path, "--simulate")
@@ -34,7 +48,7 @@ def test_from_an_empty_folder_it_builds_simulates_tells_and_plots(tmp_path):
         assert validate_fmu(str(fmu)) == []
         assert fmu.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
         told = done.stdout.partition(f"{model}: simulating")[2].partition("figure ")[0]
-        assert re.search(rf"shuttle\.x = {rest} mm", told)
+        assert re.search(rf"free rest position +shuttle {rest} mm from straight", told)
         assert re.search(rf"fundamental +{frequency} Hz", told)
         assert re.search(r"impacts at stop +\d+, the first at t = 0\.04", told)
         assert re.search(r"came to rest +at t = 0\.24", told)
@@ -84,11 +98,22 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch, failure):
 
 
 def test_nothing_is_written_if_one_of_the_models_fails(tmp_path, monkeypatch, capsys):
-    """flexure.gamma1 is a parameter of the 2R model only."""
+    """The 2R guide, which comes second, finds no shape under a weight that buckles it."""
     monkeypatch.chdir(tmp_path)
-    assert cli.main(["--set", "flexure.gamma1=0.4"]) == cli.MISTAKE
-    assert "PRBDM: there is no variable 'flexure.gamma1'" in capsys.readouterr().err
+    options = ["--set", "gravity.x=0", "--set", "gravity.y=-100"]
+    assert cli.main(options) == cli.MISTAKE
+    told = capsys.readouterr()
+    assert "PRBDM: packing" in told.out
+    assert "PRBDM2R: release.displacement = -0.018 m cannot be reached" in told.err
     assert [*tmp_path.iterdir()] == []
+
+
+def test_a_parameter_of_one_model_is_refused_before_any_is_built(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["--set", "flexure.gamma=0.8"]) == cli.MISTAKE
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert "PRBDM2R has no such parameter or input; add --model PRBDM " in told.err
 
 
 def test_ctrl_c_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
@@ -123,6 +148,7 @@ MISTAKES = {
     "--flavour wood": "invalid choice",
     "--nonsense": "unrecognized arguments: --nonsense",
 }
+FROM_1970 = {"999999999999999999": None, "soon": None, "86400": "1970-01-02T00:00:00Z"}
 
 
 @pytest.mark.parametrize("command", MISTAKES)
@@ -159,3 +185,234 @@ def test_a_path_that_pythonfmu_cannot_read_is_no_obstacle_to_our_own_simulation(
     done = build(awkward, "--model", "PRBDM", "--simulate", TMPDIR=str(awkward))
     assert done.returncode == 0, done.stderr
     assert (awkward / "dist" / "python" / "PRBDM.png").exists()
+
+
+@pytest.mark.parametrize("epoch", FROM_1970)
+def test_the_date_is_that_of_source_date_epoch(epoch, mechanisms, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
+    if FROM_1970[epoch] is None:
+        assert command.main() == cli.MISTAKE
+        assert f"SOURCE_DATE_EPOCH = {epoch!r} must be a number" in capsys.readouterr().err
+        assert [*tmp_path.iterdir()] == []
+    else:
+        listed = python_fmu.interface(mechanisms["PRBDM"], {})
+        xml = model_description(Heading("X", "", "", {}), listed).decode()
+        assert f'generationDateAndTime="{FROM_1970[epoch]}"' in xml
+
+
+def test_the_icon_does_not_depend_on_the_users_taste(mechanisms):
+    mechanism = mechanisms["PRBDM"]
+    sample = python_fmu.start_sample(mechanism, {})
+    plain = picture.icon(mechanism, sample)
+    taste = {"lines.linewidth": 5.0, "savefig.transparent": True, "lines.markersize": 20.0}
+    with matplotlib.rc_context(taste):
+        assert picture.icon(mechanism, sample) == plain
+
+
+def test_another_script_is_another_module(mechanisms, monkeypatch):
+    """FMUs in one process share modules, of which pythonfmu loads the script by its name."""
+
+    def name() -> bytes:
+        with zipfile.ZipFile(io.BytesIO(python_fmu.build(mechanisms["PRBDM"]))) as fmu:
+            return fmu.read("resources/slavemodule.txt")
+
+    before = name()
+    monkeypatch.setattr(python_fmu, "SCRIPT", python_fmu.SCRIPT + "# changed\n")
+    assert name() != before
+
+
+@pytest.mark.parametrize("name", ["PRBDM.fmu", "PRBDM.png"])
+def test_a_folder_where_a_file_is_to_be_is_named(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "dist" / "python" / name).mkdir(parents=True)
+    assert cli.main(["--model", "PRBDM", "--simulate"]) == cli.MISTAKE
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert f"{name}: it is a folder" in told.err
+
+
+def test_a_figure_that_cannot_be_written_is_a_sentence(fmus, tmp_path, capsys):
+    assert report.main([str(fmus["PRBDM"]), str(tmp_path)]) == cli.MISTAKE
+    told = capsys.readouterr()
+    assert "impacts at stop" in told.out
+    assert told.err.startswith(f"cannot write the figure {tmp_path}: ")
+
+
+@pytest.mark.parametrize(
+    ("typed", "named"),
+    [
+        ("/clone/build_fmu.py", "build_fmu.py"),
+        ("/venv/bin/prbm-build-fmu", "prbm-build-fmu"),
+        ("prbm-build-fmu.exe", "prbm-build-fmu"),
+        ("/site-packages/prbm_fmu/__main__.py", "python -m prbm_fmu"),
+    ],
+)
+def test_the_command_answers_by_the_name_that_was_typed(typed, named, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [typed])
+    assert cli.main(["--bogus"]) == cli.MISTAKE
+    assert capsys.readouterr().err.startswith(f"{named}: unrecognized arguments: --bogus")
+
+
+def test_the_version_is_told(capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["--version"])
+    assert end.value.code == 0
+    assert re.fullmatch(r"prbm-impact \d+\.\d+\.\d+\n", capsys.readouterr().out)
+
+
+def headline(mechanisms, tmp_path, **changes: float) -> str:
+    """Return what is told about a run with other start values, ``stop__position=...``."""
+    fmu = tmp_path / "PRBDM.fmu"
+    values = {name.replace("__", "."): value for name, value in changes.items()}
+    archive.write(fmu, python_fmu.build(mechanisms["PRBDM"], values))
+    return "\n".join(report.headline(report.simulate(fmu, lambda fraction: None)))
+
+
+def test_an_impact_at_the_start_is_the_first_one(mechanisms, tmp_path):
+    told = headline(
+        mechanisms, tmp_path,
+        release__displacement=0.0, release__velocity=0.5, stop__restitution=0.0,
+    )  # fmt: skip
+    assert re.search(r"impacts at stop +1, the first at t = 0\.00000 s with 0\.500 m/s", told)
+    assert "came to rest         at t = 0.000 s" in told
+
+
+def test_an_unstable_equilibrium_is_no_place_to_rest(mechanisms, tmp_path):
+    """A column under the shuttle's weight buckles."""
+    told = headline(
+        mechanisms, tmp_path, gravity__x=0.0, gravity__y=-200.0, release__displacement=-1e-3
+    )
+    assert "the equilibrium under gravity is unstable" in told
+    assert "rest position" not in told
+    assert "Hz" not in told
+
+
+@pytest.mark.skipif(os.name != "posix", reason="sends a signal to a group of processes")
+@pytest.mark.parametrize("moment", [0.3, 1.3], ids=["importing", "simulating"])
+def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
+    """What is told of a simulation that was broken off would be wrong."""
+    fmu = tmp_path / "PRBDM2R.fmu"
+    fmu.write_bytes(fmus["PRBDM2R"].read_bytes())
+    code = (
+        "import sys; from pathlib import Path; from prbm_fmu import cli\n"
+        "sys.argv = ['build_fmu.py']\n"
+        "try: cli._simulate([Path(sys.stdin.read())])\n"
+        "except KeyboardInterrupt: print('interrupted')"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, process_group=0,
+        env=os.environ | {"PYTHONPATH": str(ROOT / "fmu_src")},
+    ) as process:  # fmt: skip
+        process.stdin.write(str(fmu))
+        process.stdin.close()
+        assert "simulating" in process.stdout.readline()
+        time.sleep(moment)
+        os.killpg(process.pid, signal.SIGINT)
+        told, complaints = process.stdout.read(), process.stderr.read()
+    assert told == "interrupted\n"
+    assert "Traceback" not in complaints
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('unit = "m"', 'unit = "furlong"', r"flexure\.length has the unit 'furlong'"),
+        ("nominal = 1e-2", "nominal = inf", r"flexure\.length: nominal = inf must be positive"),
+        ('name = "stop"', 'name = "wänd"', r"wänd\.position: names of FMI .* rename the part"),
+        ('name = "PRBDM"', 'name = "__debug__"', "'__debug__': Python cannot give it to a class"),
+    ],
+)
+def test_what_no_fmu_can_have_is_a_sentence(tmp_path, old, new, sentence):
+    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace(old, new, 1), "utf-8")
+    with pytest.raises(MechanismError, match=sentence):
+        python_fmu.build(load(path))
+
+
+def test_a_name_of_pythons_own_is_one_like_others(tmp_path):
+    """The script is run twice, the second time beside the class of that name."""
+    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace('name = "PRBDM"', 'name = "globals"'), "utf-8")
+    fmu = tmp_path / "globals.fmu"
+    archive.write(fmu, python_fmu.build(load(path)))
+    assert len(simulate_fmu(str(fmu), stop_time=0.01)) > 1
+
+
+def test_odd_texts_do_no_harm(tmp_path):
+    """A title cannot leave the script's docstring, nor can control characters break the XML."""
+    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    odd = 'title = "{a} \\"\\"\\" \\\\ \\u0007 <b> %s é"'
+    path = tmp_path / "mine.toml"
+    path.write_text(re.sub(r"^title = .*$", lambda _: odd, text, flags=re.MULTILINE), "utf-8")
+    fmu = tmp_path / "PRBDM.fmu"
+    archive.write(fmu, python_fmu.build(load(path)))
+    assert validate_fmu(str(fmu)) == []
+    assert read_model_description(str(fmu)).description == '{a} """ \\   <b> %s é'
+
+
+@pytest.mark.parametrize("wrong", ["999999999999999999", "soon"])
+def test_a_wrong_date_is_a_sentence_though_it_keeps_scipy_from_being_imported(tmp_path, wrong):
+    done = build(tmp_path, "--list", SOURCE_DATE_EPOCH=wrong)
+    assert done.returncode == cli.MISTAKE
+    assert done.stderr.count("\n") == 1
+    assert f"SOURCE_DATE_EPOCH = {wrong!r}" in done.stderr
+
+
+def test_ctrl_c_while_it_imports_is_no_traceback(monkeypatch, capsys):
+    def interrupted() -> str:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(command, "date", interrupted)
+    assert command.main() == cli.INTERRUPTED
+    assert capsys.readouterr().err == "build_fmu.py: interrupted\n"
+
+
+def test_a_package_that_is_missing_is_named(monkeypatch, capsys):
+    monkeypatch.delitem(sys.modules, "prbm_fmu.cli")
+    monkeypatch.delattr(sys.modules["prbm_fmu"], "cli")
+    monkeypatch.setitem(sys.modules, "prbm.dynamics", None)
+    assert command.main() == cli.MISTAKE
+    assert "needs the Python package prbm.dynamics" in capsys.readouterr().err
+
+
+FILES = {
+    ("title =", "titel ="): "titel is no key that is known there; did you mean title?",
+    ("mass = 0.053187", "mass = [1]"): "bodies.0.mass (of shuttle) = [1]: write a number, or an",
+    ("mass = 0.053187", ""): "bodies.0.mass (of shuttle) is missing: add the key",
+    (
+        'point = ["shuttle.width"',
+        'bounce = 1\npoint = ["shuttle.width"',
+    ): "stops.0.bounce (of stop) is no key",
+    ("gravity = [9.81, 0.0]", "gravity = [9.81]"): "gravity = [9.81]: a number is missing; add it",
+    ("centre = [", "centre = [[1], "): "bodies.0.centre",
+    ("left = [0.0, 0.0]", "left = [0.0]"): "ground.left = [0.0]: a number is missing; add it",
+    ("[[stops]]", "[stops]"): "write a list, [...], or a table [[...]]",
+    ("value = 0.04", "value = -1.0"): "flexure.length = -1 m must be at least",
+}
+
+
+@pytest.mark.parametrize("change", FILES, ids=lambda change: change[1] or "nothing")
+def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, change):
+    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    assert change[0] in text
+    path = tmp_path / "mine.toml"
+    path.write_text(text.replace(*change, 1))
+    with pytest.raises(MechanismError) as error:
+        load(path)
+    assert FILES[change] in str(error.value)
+    for line in str(error.value).splitlines():
+        assert line.startswith(f"{path}: ")
+        assert "Value error" not in line
+        assert "Input should" not in line
+
+
+def test_a_byte_order_mark_is_no_part_of_a_mechanism_file(mechanisms, tmp_path):
+    """Editors on Windows write one."""
+    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8-sig")
+    assert load(path) == mechanisms["PRBDM"]

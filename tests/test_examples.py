@@ -1,5 +1,6 @@
 """Every example runs, and its headline agrees with the independent value beside it."""
 
+import functools
 import runpy
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,6 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from PIL import Image
+
+from prbm_tools.animation import animate
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 
@@ -48,6 +51,26 @@ def test_quickstart_simulates_as_long_as_it_is_told(tmp_path: Path) -> None:
     result = example("quickstart.py").simulate(tmp_path, stop_time=0.02)
     assert result["time"][-1] == pytest.approx(0.02)
     assert {"shuttle.x", "link[6].angle", "mode.frequency"} < set(result.dtype.names)
+
+
+def test_quickstart_says_where_it_cannot_write() -> None:
+    Path("PRBDM2R.fmu").mkdir()
+    with pytest.raises(SystemExit, match=r"cannot write .*PRBDM2R\.fmu: Is a directory; run this"):
+        example("quickstart.py").main([])
+
+
+def test_quickstart_films_what_does_not_come_to_rest(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main = example("quickstart.py").main
+    short = main.__globals__["simulate"]
+    monkeypatch.setitem(main.__globals__, "simulate", lambda folder: short(folder, 0.01))
+    film = functools.partial(animate, slow=50.0, fps=10.0)
+    monkeypatch.setitem(main.__globals__, "animate", film)
+    main(["--gif"])
+    printed = capsys.readouterr().out
+    assert "0 impacts, not at rest yet" in printed
+    assert Path("quickstart.gif").exists()
 
 
 def test_parameter_study_rests_when_the_scalar_equation_does() -> None:
@@ -106,6 +129,33 @@ def test_stroke_controller_prints_and_plots(capsys: pytest.CaptureFixture[str]) 
     printed = capsys.readouterr().out
     assert "wanted 8.000 mm" in printed
     assert is_picture("stroke_controller.png")
+
+
+@pytest.mark.parametrize("time", ["0", "-1", "nan", "inf"])
+def test_stroke_controller_refuses_a_time_that_is_none(
+    time: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        example("stroke_controller/run.py").main(["--stop-time", time])
+    assert end.value.code == 2
+    assert f"--stop-time {time}: must be 0.0005 s or longer" in capsys.readouterr().err
+
+
+def test_stroke_controller_tells_that_it_has_not_settled(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """With the other model, in a tenth of a second."""
+    example("stroke_controller/run.py").main(["--stop-time", "0.1", "--model", "PRBDM2R"])
+    assert "fewer than two impacts in the second half: simulate longer" in capsys.readouterr().out
+
+
+def test_stroke_controller_counts_an_impact_at_the_start() -> None:
+    record = np.zeros(5, [(n, float) for n in ("time", "stop.impact_count", "stop.approach_speed")])
+    record["time"] = np.arange(5)
+    record["stop.impact_count"] = 1, 1, 2, 2, 3
+    record["stop.approach_speed"] = 9, 9, 2, 2, 4
+    assert example("stroke_controller/run.py").steady(record) == (0.5, 3.0)
+    assert example("stroke_controller/run.py").steady(record[:1]) is None
 
 
 def test_stroke_controller_lifts_a_shuttle_that_lies_at_the_stop(tmp_path: Path) -> None:

@@ -198,7 +198,7 @@ def test_the_page_names_every_variable_and_the_limits(mechanisms, model):
     html = page(mechanisms[model], listed)
     for v in listed:
         assert f"<code>{v.name}</code>" in html
-    for limit in ("no duration", "Stronge", "NumPy", "percent-encoded", "End moments"):
+    for limit in ("no duration", "Stronge", "NumPy", "percent-encoded", "End moments", "retreats"):
         assert limit in html
     assert ("chaotic" in html) == (model == "PRBDM2R")
 

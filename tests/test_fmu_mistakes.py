@@ -27,7 +27,7 @@ AT_START = {
     "an output": ("shuttle.x", 0.1, "shuttle.x is no parameter or input"),
 }
 LATER = {
-    "a fixed parameter": ("shuttle.mass", 0.1, "shuttle.mass = 0.1 refused: it is fixed once"),
+    "a fixed parameter": ("shuttle.mass", 0.1, "shuttle.mass = 0.1 kg refused: it is fixed once"),
     "a tunable one": ("stop.restitution", -0.1, "stop.restitution = -0.1 must be at least 0"),
     "a NaN input": ("force.x", NAN, "force.x = nan"),
     "an infinite input": ("base.acceleration.x", INF, "base.acceleration.x = inf"),
@@ -116,16 +116,90 @@ def test_a_value_that_is_put_right_before_the_start_leaves_nothing_behind(fmus):
         assert instance.step(0.0, 1e-3) == OK
 
 
-def test_unknown_value_references_and_types_are_refused(fmus):
-    with Instance(fmus["PRBDM"]).initialize() as instance:
-        assert np.isnan(instance.fmu.getReal([12345])).all()
-        assert said(instance, "value reference 12345 is not in modelDescription.xml")
+@pytest.mark.parametrize("name", ["stop.restitution", "shuttle.mass", "stop.position"])
+def test_a_good_value_after_the_start_puts_right_a_bad_one_before_it(fmus, name):
+    """Also a wall that is penetrated; then the motion starts."""
+    bad = {"stop.position": -0.03}.get(name, -1.0)
+    good = {"stop.position": 1e-3}.get(name, 0.5)
+    with Instance(fmus["PRBDM"]).initialize(**{name.replace(".", "__"): bad}) as instance:
+        assert np.isnan(instance.values()["shuttle.x"])
         assert instance.step(0.0, 1e-3) == DISCARD
+        instance.set({name: good})
+        assert instance.step(0.0, 0.05) == OK
+        found = instance.values()
+    with Instance(fmus["PRBDM"]).initialize(**{name.replace(".", "__"): good}) as instance:
+        assert instance.step(0.0, 0.05) == OK
+        assert instance.values() == found
+
+
+def test_what_no_value_puts_right_asks_for_a_reset(fmus):
     with Instance(fmus["PRBDM"]).initialize() as instance:
         counter = instance.variables["stop.impact_count"].valueReference
-        instance.fmu.setInteger([counter], [3])
-        assert said(instance, "stop.impact_count is no parameter or input")
+        for wrong, sentence in (
+            (lambda: instance.fmu.setInteger([counter], [3]), "impact_count is no parameter or"),
+            (lambda: instance.fmu.setReal([12345], [3.0]), "value reference 12345 is not in"),
+            (lambda: instance.set({"shuttle.x": 0.1}), "shuttle.x is no parameter or input"),
+        ):
+            wrong()
+            assert said(instance, sentence), instance.messages
+            assert "reset the instance" in instance.messages[-1]
+            assert instance.step(0.0, 1e-3) == DISCARD
+            instance.fmu.reset()
+            instance.initialize()
+            assert instance.step(0.0, 1e-3) == OK
+            instance.fmu.reset()
+            instance.initialize()
+
+
+def test_a_set_of_the_wrong_type_is_put_right_by_one_of_the_right_type(fmus):
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        instance.fmu.setBoolean([instance.variables["force.x"].valueReference], [True])
+        assert said(instance, "force.x is of type Real: set it with fmi2SetReal")
         assert instance.step(0.0, 1e-3) == DISCARD
+        instance.set({"force.x": 0.0})
+        assert instance.step(0.0, 1e-3) == OK
+
+
+WRONG_GETS = {
+    "getReal": ("stop.contact", "stop.impact_count", None),
+    "getInteger": ("shuttle.x", "stop.contact", None),
+    "getBoolean": ("shuttle.x", "stop.impact_count", None),
+    "getString": ("shuttle.x", None),
+}
+
+
+@pytest.mark.parametrize("getter", WRONG_GETS)
+def test_a_wrong_get_has_no_value_and_harms_nothing(fmus, getter):
+    """Through ctypes, which would show an exception that is left behind."""
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        for name in WRONG_GETS[getter]:
+            reference = instance.variables[name].valueReference if name else 12345
+            for _ in range(2):
+                (value,) = getattr(instance.fmu, getter)([reference])
+                assert not value or np.isnan(value)
+            sentence = f"{name} is of type" if name else "12345 is not in modelDescription.xml"
+            assert sum(sentence in message for message in instance.messages) == 1
+        assert instance.step(0.0, 1e-3) == OK
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError("by nothing"), KeyboardInterrupt()])
+def test_an_exception_while_it_starts_is_the_reason_that_is_given(error, capsys):
+
+    class Slave(MechanismSlave):
+        def _start(self) -> None:
+            raise error
+
+    slave = object.__new__(Slave)
+    vars(slave).update(
+        failure=None, running=False, simulation=None, refused={}, told=set(), table=None,
+        log_queue=[], instance_name="it",
+    )  # fmt: skip
+    slave.exit_initialization_mode()
+    reason = "by nothing" if isinstance(error, ZeroDivisionError) else "was interrupted"
+    assert reason in slave.failure
+    assert not slave.do_step(0.0, 1e-3)
+    assert reason in capsys.readouterr().err
+    assert not any("came before" in entry.msg for entry in slave.log_queue)
 
 
 def test_impacts_are_logged_with_their_numbers(fmus):

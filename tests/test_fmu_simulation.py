@@ -104,6 +104,26 @@ def test_inputs_walls_and_tunable_parameters_reach_the_engine(fmus, mechanisms):
     assert simulation.outputs()["stop.impact_count"] > 0
 
 
+def test_a_wall_that_retreats_lets_go_and_captures_what_is_pressed_again(fmus):
+    """What the page says; gravity presses, and in the end the shuttle goes with the wall."""
+    speed, step = 0.02, 1e-3
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        assert instance.step(0.0, END) == OK
+        rested = instance.values()
+        held = []
+        for k in range(40):
+            instance.set({"stop.displacement": speed * k * step, "stop.velocity": speed})
+            assert instance.step(END + k * step, step) == OK
+            found = instance.values()
+            held.append(found["stop.contact"])
+    assert rested["stop.contact"]
+    assert not held[0]
+    assert held[-1]
+    assert found["stop.impact_count"] > rested["stop.impact_count"]
+    assert found["shuttle.vx"] == pytest.approx(speed, rel=1e-9)  # tolerance of the integration
+    assert found["shuttle.x"] == pytest.approx(40 * speed * step, rel=1e-9)
+
+
 def test_the_importers_tolerance_wins_over_the_parameter(fmus):
     def last(tolerance: float | None, parameter: float) -> bytes:
         with Instance(fmus["PRBDM2R"]) as instance:

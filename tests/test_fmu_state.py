@@ -1,5 +1,6 @@
 """Saving, restoring, serializing and resetting the state of an FMU."""
 
+import json
 from ctypes import byref, c_void_p
 
 import numpy as np
@@ -75,6 +76,28 @@ def test_a_state_of_something_else_is_refused(fmus, data):
         assert any("not saved by this version" in m for m in instance.messages)
         assert instance.step(0.0, 1e-3) == DISCARD
         instance.fmu.freeFMUState(state)
+
+
+@pytest.mark.parametrize("lost", ["clock", "snapshot", "snapshot front", "snapshot walls"])
+def test_a_state_that_misses_something_is_refused_whole(fmus, lost):
+    """Nothing of it is restored, and another state can be."""
+    with Instance(fmus["PRBDM"]).initialize() as instance:
+        instance.run(BEFORE)
+        good = instance.fmu.getFMUState()
+        data = json.loads(instance.fmu.serializeFMUstate(good))
+        instance.run(AFTER[:3])
+        here = instance.values()
+        *inside, key = lost.split()
+        del (data[inside[0]] if inside else data)[key]
+        bad = instance.fmu.deSerializeFMUstate(json.dumps(data).encode())
+        instance.fmu.setFMUState(bad)
+        assert any("is damaged (KeyError" in m for m in instance.messages)
+        assert instance.values() == here
+        assert instance.step(AFTER[2], STEP) == DISCARD
+        instance.fmu.setFMUState(good)
+        assert instance.step(BEFORE[-1], STEP) == OK
+        instance.fmu.freeFMUState(bad)
+        instance.fmu.freeFMUState(good)
 
 
 def test_a_state_of_the_other_model_is_refused(fmus):

@@ -1,15 +1,18 @@
 """Results: the columns that FMPy would give, and their figures."""
 
+import io
+import time
 from pathlib import Path
 
 import fmpy.util
+import matplotlib
 import numpy as np
 import pytest
 from PIL import Image
 
 from prbm import Mechanism, ParameterError, Simulation
-from prbm_tools.figures import response
-from prbm_tools.simulate import Result, ResultError, read_csv, rest_time, simulate
+from prbm_tools.figures import png, response
+from prbm_tools.simulate import Result, ResultError, read_csv, reporter, rest_time, simulate
 
 
 @pytest.fixture(scope="module")
@@ -134,6 +137,36 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
     (tmp_path / "result.csv").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ResultError, match="is no CSV file"):
         read_csv(tmp_path / "result.csv")
+
+
+def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path: Path) -> None:
+    (tmp_path / "result.csv").write_text("time,a\n0,0\n1,2\n", encoding="utf-8-sig")
+    assert read_csv(tmp_path / "result.csv").dtype.names == ("time", "a")
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_progress_is_told_after_a_second(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one line on a terminal; elsewhere in a line every other second."""
+    clock = iter([0.0, *np.arange(0.25, 5.25, 0.25)])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    stream = io.StringIO()
+    monkeypatch.setattr(stream, "isatty", lambda: terminal)
+    report = reporter(stream)
+    for k in range(1, 21):
+        report(k / 20)
+    told = stream.getvalue()
+    if terminal:
+        assert told.startswith("\r 20%\r 25%")
+        assert told.endswith("\r100%\n")
+    else:
+        assert told.split() == ["20%", "done", "60%", "done"]
+
+
+def test_a_figure_does_not_depend_on_the_users_taste(result: Result) -> None:
+    plain = png(response(result))
+    taste = {"lines.linewidth": 5.0, "savefig.transparent": True, "xtick.direction": "in"}
+    with matplotlib.rc_context(taste):
+        assert png(response(result)) == plain
 
 
 def test_the_response_shows_all_impacts_and_a_constant_balance(

@@ -9,6 +9,7 @@ the sum of force times displacement.  The stroke that it holds follows from an e
 
 import argparse
 import math
+import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -138,12 +139,17 @@ def balance(record: np.ndarray) -> np.ndarray:
     return kinetic + elastic + gravitational + dissipated - done
 
 
-def steady(record: np.ndarray) -> tuple[float, float]:
-    """Return rate [1/s] and mean closing speed [m/s] of the impacts in the second half."""
-    late = record[record["time"] >= record["time"][-1] / 2]
-    new = np.flatnonzero(np.diff(late["stop.impact_count"])) + 1
-    rate = (len(new) - 1) / (late["time"][new[-1]] - late["time"][new[0]])
-    return rate, late["stop.approach_speed"][new].mean()
+def steady(record: np.ndarray) -> tuple[float, float] | None:
+    """Return rate [1/s] and mean closing speed [m/s] of the impacts in the second half.
+
+    None if there are not two of them.
+    """
+    new = np.flatnonzero(np.diff(record["stop.impact_count"], prepend=0.0))
+    late = record[new][record["time"][new] >= record["time"][-1] / 2]
+    if len(late) < 2:
+        return None
+    rate = (len(late) - 1) / (late["time"][-1] - late["time"][0])
+    return rate, late["stop.approach_speed"].mean()
 
 
 def expected_speed(stroke: float) -> float:
@@ -190,9 +196,14 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--model", default=MODEL, choices=sorted(shipped()))
     parser.add_argument("--stop-time", type=float, default=3.0, help="[s]; %(default)s")
     options = parser.parse_args(arguments)
+    if not STEP <= options.stop_time < math.inf:
+        parser.error(f"--stop-time {options.stop_time:g}: must be {STEP:g} s or longer")
     record = simulate(options.stop_time, options.model)
-    rate, speed = steady(record)
-    print(f"impacts {rate:.2f} per second at {speed:.4f} m/s; ", end="")
+    settled = steady(record)
+    if settled is None:
+        print("fewer than two impacts in the second half: simulate longer; ", end="")
+    else:
+        print("impacts {:.2f} per second at {:.4f} m/s; ".format(*settled), end="")
     print(f"energy balance of a steady bounce {expected_speed(STROKE):.4f} m/s")
     print(f"stroke {1e3 * record['reached'][-1]:.3f} mm, wanted {1e3 * STROKE:.3f} mm")
     print(
@@ -200,7 +211,10 @@ def main(arguments: list[str] | None = None) -> None:
         f"energy.work of the guide {1e3 * record['energy.work'][-1]:.6f} mJ"
     )
     print(f"energy balance varies by {1e3 * np.ptp(balance(record)):.1e} mJ")
-    figure(record).savefig("stroke_controller.png")
+    try:
+        figure(record).savefig("stroke_controller.png")
+    except OSError as error:
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
     print("figure: stroke_controller.png")
 
 

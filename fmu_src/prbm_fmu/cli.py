@@ -3,20 +3,30 @@
 import argparse
 import math
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from prbm import Mechanism, PrbmError
+from prbm import Mechanism, PrbmError, assemble
+from prbm.dynamics import input_names
 from prbm_tools.mechanism_file import load, shipped
 
-from . import python_fmu
+from . import __version__, python_fmu
+from .__main__ import command_name
 from .archive import write
 
 OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 PYTHON_FOLDER = "python"
+PATIENCE = 2.0  # s for the process of a simulation to end after Ctrl-C
+REPORT = f"""
+import os, signal, sys
+signal.signal(signal.SIGINT, lambda *_: os._exit({INTERRUPTED}))
+from prbm_fmu.report import main
+sys.exit(main(sys.argv[1:]))
+"""  # Ctrl-C while it imports needs no traceback
 
 
 class UserMistake(Exception):
@@ -33,7 +43,7 @@ class _Parser(argparse.ArgumentParser):
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     p = _Parser(
-        prog="build_fmu.py",
+        prog=command_name(),
         description="Build FMUs of compliant mechanisms with impacts.",
         epilog="Without options, all shipped mechanisms are built into dist/.",
     )
@@ -64,6 +74,7 @@ def parser() -> argparse.ArgumentParser:
         help="simulate each FMU with FMPy, print what happens and plot it beside the FMU",
     )  # fmt: skip
     p.add_argument("--list", action="store_true", help="list the shipped mechanisms and stop")
+    p.add_argument("--version", action="version", version=f"prbm-impact {__version__}")
     return p
 
 
@@ -78,10 +89,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         built = _build(options)
         return _simulate(built) if options.simulate else OK
     except (UserMistake, PrbmError) as error:
-        print(f"build_fmu.py: {error}", file=sys.stderr)
+        print(f"{command_name()}: {error}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt:
-        print("build_fmu.py: interrupted", file=sys.stderr)
+        print(f"{command_name()}: interrupted", file=sys.stderr)
         return INTERRUPTED
 
 
@@ -164,25 +175,46 @@ def start_values(texts: Sequence[str]) -> dict[str, float]:
 def _build(options: argparse.Namespace) -> list[Path]:
     """Build everything, then write everything; return the files."""
     changes = start_values(options.changes)
+    chosen = mechanisms(options)
+    _check_names(chosen, changes)
     folder = options.out / PYTHON_FOLDER
+    paths = {m.name: folder / f"{m.name}.fmu" for m in chosen}
     _check_writable(folder)
+    for path in paths.values():
+        _check_no_folder(path)
+        if options.simulate:
+            _check_no_folder(path.with_suffix(".png"))
     built = {}
-    for mechanism in mechanisms(options):
+    for mechanism in chosen:
         name = mechanism.name
         try:
             built[name] = python_fmu.build(mechanism, changes, _progress(name))
         except PrbmError as error:
             raise UserMistake(f"{name}: {error}") from None
-    paths = []
     for name, content in built.items():
-        path = folder / f"{name}.fmu"
+        path = paths[name]
         try:
             write(path, content)
         except OSError as error:
-            raise _unwritable(folder, error) from None
+            raise UserMistake(
+                f"cannot write {path}: {error.strerror}; choose a folder with --out"
+            ) from None
         print(f"{name}: {path} ({len(content) / 1000:.0f} kB)", flush=True)
-        paths.append(path)
-    return paths
+    return [*paths.values()]
+
+
+def _check_names(chosen: Sequence[Mechanism], changes: Mapping[str, float]) -> None:
+    """Refuse start values that some of the mechanisms know and others do not."""
+    known = {m.name: {*m.values(), *input_names(assemble(m, m.values()))} for m in chosen}
+    for name in changes:
+        having = [model for model in known if name in known[model]]
+        lacking = [model for model in known if name not in known[model]]
+        if having and lacking:
+            options = " ".join(f"--model {model}" for model in having)
+            raise UserMistake(
+                f"--set {name}: {', '.join(lacking)} has no such parameter or input; add {options} "
+                "to build without it"
+            )
 
 
 def _progress(name: str) -> Callable[[str], None]:
@@ -204,8 +236,11 @@ def _check_writable(folder: Path) -> None:
         )
 
 
-def _unwritable(folder: Path, error: OSError) -> UserMistake:
-    return UserMistake(f"cannot write to {folder}: {error.strerror}; choose a folder with --out")
+def _check_no_folder(path: Path) -> None:
+    if path.is_dir():
+        raise UserMistake(
+            f"cannot write {path}: it is a folder; remove it, or choose another place with --out"
+        )
 
 
 def _simulate(fmus: Sequence[Path]) -> int:
@@ -214,17 +249,38 @@ def _simulate(fmus: Sequence[Path]) -> int:
     paths = os.pathsep.join(filter(None, (source, os.environ.get("PYTHONPATH"))))
     status = OK
     for fmu in fmus:
-        command = [sys.executable, "-m", "prbm_fmu.report", str(fmu), str(fmu.with_suffix(".png"))]
+        command = [sys.executable, "-c", REPORT, str(fmu), str(fmu.with_suffix(".png"))]
         print(f"{fmu.stem}: simulating ...", flush=True)
-        code = subprocess.run(
-            command, env=os.environ | {"PYTHONPATH": paths}, check=False
-        ).returncode
-        if code != 0:
+        code = _ended(command, os.environ | {"PYTHONPATH": paths})
+        if code == INTERRUPTED:
+            raise KeyboardInterrupt
+        if code != OK:
             ended = f"was ended by signal {-code}" if code < 0 else "failed"
-            print(f"build_fmu.py: the simulation of {fmu} {ended}", file=sys.stderr)
-            status = FAILED
+            print(f"{command_name()}: the simulation of {fmu} {ended}", file=sys.stderr)
+            status = max(status, code if code == MISTAKE else FAILED)
     return status
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def _ended(command: Sequence[str], environment: Mapping[str, str]) -> int:
+    """Run a command to its end, return its status; what Ctrl-C means to it, it decides itself."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # it inherits that until it is ready
+    try:
+        process = subprocess.Popen(command, env=environment)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    try:
+        return process.wait()
+    except KeyboardInterrupt:
+        _end(process)
+        raise
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """Wait for a process that should end by itself; insist if it does not."""
+    for number in (signal.SIGINT, signal.SIGTERM):
+        try:
+            process.wait(PATIENCE)
+            return
+        except subprocess.TimeoutExpired:
+            os.kill(process.pid, number)
+    process.wait()

@@ -1,20 +1,18 @@
 """The modelDescription.xml of FMI 2.0 for co-simulation."""
 
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from . import __version__
+from .date import date
 from .units import QUANTITIES, UNITS
 from .variables import Variable
 
 START_TIME, STOP_TIME, STEP_SIZE = 0.0, 1.0, 1e-3  # s, of the default experiment
 TOLERANCE = "solver.tolerance"
-EPOCH = datetime(1980, 1, 1, tzinfo=UTC)  # the one of the archive
 GENERATION_TOOL = f"prbm-impact {__version__}"
 
 
@@ -26,16 +24,6 @@ class Heading:
     description: str
     guid: str
     log_categories: Mapping[str, str]
-
-
-def date() -> str:
-    """Return the date of generation: that of SOURCE_DATE_EPOCH, else the archive's own, 1980.
-
-    It may not be the time of the build, because the same input is to give the same bytes.
-    """
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    moment = datetime.fromtimestamp(int(epoch), UTC) if epoch.isdecimal() else EPOCH
-    return moment.strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def model_description(heading: Heading, variables: tuple[Variable, ...]) -> bytes:
@@ -74,8 +62,22 @@ def model_description(heading: Heading, variables: tuple[Variable, ...]) -> byte
         listed.append(_scalar_variable(variable, index))
     root.append(_structure(variables, index))
     ElementTree.indent(root)
+    for element in root.iter():
+        for name, value in element.items():
+            element.set(name, plain(value))
     text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text + b"\n"
+
+
+def plain(text: str) -> str:
+    r"""Return a text with blanks for the characters that XML and HTML cannot hold.
+
+    Examples
+    --------
+    >>> plain("a bell\a rings")
+    'a bell  rings'
+    """
+    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def number(value: float | int | bool | None) -> str:

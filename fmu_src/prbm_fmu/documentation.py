@@ -1,12 +1,12 @@
 """The page that an FMU carries: what it is, its equations, its variables, its limits."""
 
+import html
 import math
 from collections.abc import Iterable
-from html import escape
 
 from prbm import FlexureType, Mechanism
 
-from .description import GENERATION_TOOL, STOP_TIME
+from .description import GENERATION_TOOL, STOP_TIME, plain
 from .variables import Variable
 
 STYLE = """
@@ -50,6 +50,11 @@ SOURCES = (
     "W. J. Stronge, Rigid body collisions with friction, Proc. R. Soc. A 431 (1990) 169 "
     "(restitution with friction).",
 )
+
+
+def escape(text: str) -> str:
+    """Return a text as HTML has it, line by line."""
+    return "\n".join(html.escape(plain(line)) for line in text.splitlines())
 
 
 def page(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
@@ -117,11 +122,15 @@ def _use(mechanism: Mechanism) -> str:
         "environment variable <code>TMPDIR</code> (Linux) or <code>TMP</code> (Windows) if "
         "your user name has other letters.</p>\n"
         "<p>What is wrong with a value, a parameter set or a step is logged as a sentence, and "
-        "every <code>doStep</code> answers <code>fmi2Discard</code> until it is put right; what "
-        "was wrong when the simulation started needs a <code>reset</code>. "
-        "FMPy then ends the simulation early; the reason is also on the standard error "
-        "stream. The wrapper passes log messages on only if the importer asks for them "
-        "(FMPy: <code>debug_logging=True</code>), impacts included.</p>"
+        "every <code>doStep</code> answers <code>fmi2Discard</code> until a good value has put "
+        "it right. What no value can put right needs a <code>reset</code>, and its sentence says "
+        "so: setting an output or a value reference that is not in the model description, or a "
+        "failure on the way. Getting a variable with the function of another type, or a value "
+        "reference that is not in the model description, is refused too: the answer is NaN, 0 or "
+        "false and a sentence, and the simulation goes on. FMPy ends the simulation early at "
+        "<code>fmi2Discard</code>; the reasons are also on the standard error stream. The "
+        "wrapper passes log messages on only if the importer asks for them (FMPy: "
+        "<code>debug_logging=True</code>), impacts included.</p>"
     )
 
 
@@ -231,6 +240,12 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
             "it was to <code>position + displacement + velocity h</code>, and that velocity "
             "enters the impact law. Several impacts within one communication step are all "
             "computed and counted; the latched outputs show the last one."
+        )
+        items.append(
+            "A wall that retreats lets go of what rests on it: <code>contact</code> becomes false "
+            "and the gap opens. What presses the body closes the gap again; it bounces on the "
+            "moving wall, each impact counted, until one below <code>rest_speed</code> captures "
+            "it, and then goes with the wall. A wall that advances strikes what rests on it."
         )
     items.append(
         "Inputs are constant within a communication step; outputs at a communication point do "

@@ -1,6 +1,5 @@
 """Pictures of a mechanism, from its description alone."""
 
-import io
 import math
 from collections.abc import Mapping
 
@@ -12,6 +11,8 @@ from numpy.typing import NDArray
 
 from prbm import Body, Flexure, Mechanism, Stop
 from prbm.mechanism import GROUND, Point, affine, body_of
+from prbm_tools.figures import png
+from prbm_tools.scene import own_style
 
 from .variables import Number, extent
 
@@ -24,6 +25,7 @@ BEND = 0.35  # of the length, as the handle of the curve at each clamp
 Pose = tuple[complex, complex, complex]  # centre as drawn, displacement, turn exp(i angle)
 
 
+@own_style()
 def icon(mechanism: Mechanism, sample: Mapping[str, Number]) -> bytes:
     """Return the icon as PNG: the straight shape in grey, the shape at release in colour.
 
@@ -42,9 +44,7 @@ def icon(mechanism: Mechanism, sample: Mapping[str, Number]) -> bytes:
     draw(axes, mechanism, straight, faint=True)
     draw(axes, mechanism, sample)
     axes.margins(0.04)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()
+    return png(figure)
 
 
 def draw(

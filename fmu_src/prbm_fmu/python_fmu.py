@@ -1,6 +1,5 @@
 """Python FMUs: the engine's own source, wrapped by pythonfmu, as FMI 2.0 co-simulation."""
 
-import ast
 import hashlib
 import json
 import uuid
@@ -9,11 +8,11 @@ from dataclasses import replace
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 
-from prbm import Mechanism, Simulation
+from prbm import Mechanism, MechanismError, Simulation
 
-from . import documentation, picture
+from . import documentation
 from .archive import zipped
-from .description import Heading, model_description
+from .description import Heading, model_description, plain
 from .slaves.resolved import FILE, resolved
 from .slaves.slave import MechanismSlave
 from .variables import Number, Variable, variables, with_starts
@@ -32,6 +31,7 @@ its names that it does not own; without the reference that is added here, they w
 while they are used, and the process would end sooner or later.
 """
 
+import builtins
 import ctypes
 import sys
 
@@ -49,7 +49,7 @@ except ImportError as error:
         "'python -m pip install numpy scipy' (%s)" % (sys.executable, error)
     )
 
-ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(builtins.globals()))
 
 import {engine} as engine
 from {wrapper}.slave import MechanismSlave
@@ -108,12 +108,14 @@ def build(
     PrbmError
         If the mechanism cannot start with these values, or one of them makes no sense.
     """
+    from . import picture  # which takes matplotlib: half a second, spared until it is needed
+
     changes = dict(changes or {})
     progress("checking that it starts")
     listed = interface(mechanism, changes)
     progress(f"collecting {len(listed)} variables and the engine")
     sources = dict(_sources(mechanism, listed))
-    token = f"{mechanism.name}_{_digest(sources)[:SHORT]}"
+    token = f"{mechanism.name}_{_digest(sources | {'': SCRIPT.encode()})[:SHORT]}"
     progress("drawing the icon and writing the documentation")
     contents = {f"resources/{path}": text for path, text in _named(mechanism, token, sources)}
     contents |= dict(_binaries(mechanism.name))
@@ -160,14 +162,19 @@ def _named(
         folder, _, name = path.rpartition("/")
         yield (f"{folders[folder]}/{name}" if folder else name), content
     script = SCRIPT.format(name=mechanism.name, title=_plain(mechanism.title), **folders)
-    ast.parse(script)
+    try:
+        compile(script, token, "exec")
+    except SyntaxError:
+        raise MechanismError(
+            f"mechanism name {mechanism.name!r}: Python cannot give it to a class; choose another"
+        ) from None
     yield f"{token}.py", script.encode()
     yield "slavemodule.txt", token.encode()
 
 
 def _plain(title: str) -> str:
     """Return a title that cannot leave the docstring it is put into."""
-    return title.replace("\\", "/").replace('"', "'").replace("\n", " ").rstrip(".")
+    return plain(title).replace("\\", "/").replace('"', "'").rstrip(".")
 
 
 def _binaries(name: str) -> Iterator[tuple[str, bytes]]:

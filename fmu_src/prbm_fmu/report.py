@@ -1,10 +1,10 @@
 """Simulate an FMU with FMPy, tell what happened and plot it: ``python -m prbm_fmu.report``."""
 
-import io
+import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,19 +13,19 @@ from urllib.parse import unquote
 
 import fmpy  # type: ignore[import-untyped]
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 import prbm
-from prbm import Mechanism, assemble, equilibrium
+from prbm import Mechanism, assemble, free_displacement
+from prbm_tools.figures import png, response
+from prbm_tools.motion import marks
+from prbm_tools.simulate import Progress, reporter, rest_time
 
 from .archive import write
+from .cli import FAILED, INTERRUPTED, MISTAKE, OK
 from .slaves.resolved import read
 
 FREQUENCY = "mode.frequency"
-ENERGIES = ("kinetic", "elastic", "gravitational", "dissipated", "work")
-BLUE, RED, GREEN, ORANGE, GREY = "#1f4e79", "#c0392b", "#2e8b57", "#d98200", "#7f7f7f"
 
 
 @dataclass(frozen=True)
@@ -59,15 +59,6 @@ class Run:
     def finished(self) -> bool:
         """Whether the simulation came to its end."""
         return bool(np.isclose(self.record["time"][-1], self.stop_time))
-
-
-@dataclass(frozen=True)
-class Impacts:
-    """The impacts at a stop that a record shows: the last one of each communication step."""
-
-    time: NDArray[np.float64]
-    impulse: NDArray[np.float64]
-    approach_speed: NDArray[np.float64]
 
 
 @contextmanager
@@ -104,54 +95,53 @@ def plain(path: Path) -> bool:
     return unquote(uri) == uri and "%" not in uri
 
 
-def simulate(fmu: Path) -> Run:
-    """Run the default experiment of an FMU with FMPy."""
-    with unpacked(fmu) as folder:
+def simulate(fmu: Path, progress: Progress) -> Run:
+    """Run the default experiment of an FMU with FMPy.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the user wants no more of it; the FMU has finished its step then, undisturbed.
+    """
+    with unpacked(fmu) as folder, interruptible() as wanted:
         description = fmpy.read_model_description(str(folder))
         outputs = [v.name for v in description.modelVariables if v.causality == "output"]
         model = read(folder / "resources", prbm)
+        stop_time = float(description.defaultExperiment.stopTime)
+
+        def step_finished(t: float, _: object) -> bool:
+            progress(t / stop_time)
+            return wanted()
+
         begin = time.perf_counter()
         record = fmpy.simulate_fmu(
-            str(folder), model_description=description, output=[*outputs, FREQUENCY]
+            str(folder),
+            model_description=description,
+            output=[*outputs, FREQUENCY],
+            step_finished=step_finished,
         )
         seconds = time.perf_counter() - begin
-    stop_time = float(description.defaultExperiment.stopTime)
+        if not wanted():
+            raise KeyboardInterrupt
     return Run(
         description.modelName, model.mechanism, dict(model.given), record, stop_time, seconds
     )
 
 
-def rest_position(run: Run, body: str) -> complex:
-    """Return where a body rests under gravity, free of stops: displacement from straight [m]."""
-    parameters = {p.name for p in run.mechanism.parameters}
-    values = {name: x for name, x in run.values.items() if name in parameters}
-    system = assemble(run.mechanism, values)
-    shape = equilibrium(system)
-    frame = system.bodies[body]
-    return complex(frame.A @ np.exp(1j * shape.q)) + frame.c - frame.drawn
+@contextmanager
+def interruptible() -> Iterator[Callable[[], bool]]:
+    """Have Ctrl-C noted, and the second one obeyed; give what tells whether to go on."""
+    interrupted: list[int] = []
 
+    def note(number: int, _: object) -> None:
+        interrupted.append(number)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
-def impacts(record: NDArray[Any], stop: str) -> Impacts:
-    """Return the impacts at a stop that a record shows."""
-    new = np.flatnonzero(np.diff(record[f"{stop}.impact_count"])) + 1
-    return Impacts(
-        *(record[f"{stop}.{what}"][new] for what in ("impact_time", "impulse", "approach_speed"))
-    )
-
-
-def came_to_rest(time: NDArray[np.float64], contact: NDArray[np.bool_]) -> float | None:
-    """Return the first time from which a stop holds to the end, None if it does not [s].
-
-    Examples
-    --------
-    >>> contact = np.array([False, True, False, True, True])
-    >>> float(came_to_rest(np.arange(5.0), contact))
-    3.0
-    """
-    if not contact[-1]:
-        return None
-    open_at = np.flatnonzero(~contact)
-    return float(time[open_at[-1] + 1 if len(open_at) else 0])
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: not interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def millimetres(x: float) -> str:
@@ -168,23 +158,17 @@ def millimetres(x: float) -> str:
 def headline(run: Run) -> list[str]:
     """Return what happened, line by line."""
     record, body = run.record, run.mechanism.release.body
-    rest = rest_position(run, body)
-    lines = [
-        f"simulated            {record['time'][-1]:g} s in {run.seconds:.2f} s",
-        f"fundamental          {record[FREQUENCY][0]:.4g} Hz",
-        f"free rest position   {body}.x = {millimetres(rest.real)}, {body}.y = "
-        f"{millimetres(rest.imag)} (under gravity, without stops)",
-    ]
-    for stop in (s.name for s in run.mechanism.stops):
+    lines = [f"simulated            {record['time'][-1]:g} s in {run.seconds:.2f} s", *_free(run)]
+    seen = marks(record, run.mechanism)
+    for i, stop in enumerate(s.name for s in run.mechanism.stops):
         count = int(record[f"{stop}.impact_count"][-1])
-        seen = impacts(record, stop)
-        first = (
-            f", the first at t = {seen.time[0]:.5f} s with {seen.approach_speed[0]:.3f} m/s"
-            if count
-            else ""
-        )
-        lines.append(f"impacts at {stop:9} {count}{first}")
-        since = came_to_rest(record["time"], record[f"{stop}.contact"])
+        first = next((mark for mark in seen if mark.stop == i), None)
+        told = ""
+        if first is not None:
+            which = "the first" if first.count == 1 else f"number {first.count}"
+            told = f", {which} at t = {first.time:.5f} s with {first.speed:.3f} m/s"
+        lines.append(f"impacts at {stop:9} {count}{told}")
+        since = rest_time(record, stop)
         if since is not None:
             lines.append(
                 f"came to rest         at t = {since:.3f} s on {stop}, {body}.x = "
@@ -198,92 +182,44 @@ def headline(run: Run) -> list[str]:
     return lines
 
 
-def figure(run: Run) -> Figure:
-    """Return the motion with its impacts, the force of the stops, and the energies."""
-    result = Figure(figsize=(8.0, 8.4), dpi=120, layout="constrained")
-    motion, force, energy = result.subplots(3, 1, sharex=True)
-    motion.set_title(run.mechanism.title, fontsize=11, loc="left")
-    _plot_motion(motion, run)
-    _plot_force(force, run)
-    _plot_energies(energy, run)
-    for axes in (motion, force, energy):
-        axes.grid(color="#e6e6e6", linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.spines[["top"]].set_visible(False)
-        axes.margins(x=0.0)
-    energy.set_xlabel("time [s]")
-    return result
-
-
-def _plot_motion(axes: Axes, run: Run) -> None:
-    record, body = run.record, run.mechanism.release.body
-    t, x = record["time"], 1e3 * record[f"{body}.x"]
-    axes.plot(t, x, color=BLUE, label=f"{body}.x")
-    for stop in run.mechanism.stops:
-        seen = impacts(record, stop.name)
-        axes.plot(
-            seen.time, np.interp(seen.time, t, x), "v", color=RED, markersize=5,
-            label=f"impacts at {stop.name} ({record[f'{stop.name}.impact_count'][-1]})",
-        )  # fmt: skip
-        since = came_to_rest(t, record[f"{stop.name}.contact"])
-        if since is not None:
-            axes.axvspan(since, t[-1], color="#f0f0f0", label=f"rests on {stop.name}")
-    axes.set_ylabel("displacement [mm]")
-    axes.legend(loc="lower right", fontsize=9)
-
-
-def _plot_force(axes: Axes, run: Run) -> None:
-    """Plot contact forces, and impulses, which are no forces, on an axis of their own."""
-    if not run.mechanism.stops:
-        axes.set_visible(False)
-        return
-    impulse_axes = axes.twinx()
-    for stop in (s.name for s in run.mechanism.stops):
-        axes.plot(run.record["time"], run.record[f"{stop}.force"], color=GREEN, label=stop)
-        seen = impacts(run.record, stop)
-        impulse_axes.vlines(seen.time, 0.0, 1e3 * seen.impulse, color=RED, linewidth=1.2)
-        impulse_axes.plot(seen.time, 1e3 * seen.impulse, "o", color=RED, markersize=3.5)
-    if len(run.mechanism.stops) > 1:
-        axes.legend(loc="upper right", fontsize=9)
-    axes.set_ylabel("force while it holds [N]", color=GREEN)
-    impulse_axes.set_ylabel("impulse of an impact [mN·s]", color=RED)
-    impulse_axes.spines[["top"]].set_visible(False)
-    axes.set_ylim(bottom=0.0)
-    impulse_axes.set_ylim(bottom=0.0)
-
-
-def _plot_energies(axes: Axes, run: Run) -> None:
-    record = run.record
-    for name, color in zip(ENERGIES, (BLUE, ORANGE, GREEN, RED, GREY), strict=True):
-        energy = 1e3 * record[f"energy.{name}"]
-        if np.any(energy):
-            axes.plot(record["time"], energy, color=color, label=name, linewidth=1.3)
-    total = sum(record[f"energy.{name}"] for name in ENERGIES[:-1]) - record["energy.work"]
-    axes.plot(record["time"], 1e3 * total, "--", color="black", linewidth=1.0, label="sum - work")
-    axes.set_ylabel("energy [mJ]")
-    axes.legend(loc="center right", fontsize=9)
-
-
-def png(run: Run) -> bytes:
-    """Return the figure as PNG."""
-    buffer = io.BytesIO()
-    figure(run).savefig(buffer, format="png", metadata={"Software": None})
-    return buffer.getvalue()
+def _free(run: Run) -> list[str]:
+    """Tell about the equilibrium without stops, if it is one that lasts."""
+    frequency = run.record[FREQUENCY][0]
+    if frequency == 0.0:
+        return [
+            "fundamental          none: without stops, the equilibrium under gravity is unstable"
+        ]
+    parameters = {p.name for p in run.mechanism.parameters}
+    values = {name: x for name, x in run.values.items() if name in parameters}
+    rest = free_displacement(assemble(run.mechanism, values))
+    release = run.mechanism.release
+    along = "" if release.direction == 0.0 else f" along {release.direction:g} degrees"
+    return [
+        f"fundamental          {frequency:.4g} Hz",
+        f"free rest position   {release.body} {millimetres(rest)} from straight{along}, under "
+        "gravity, without stops",
+    ]
 
 
 def main(arguments: Sequence[str]) -> int:
     """Simulate the FMU given first, plot into the file given second."""
     fmu, picture = Path(arguments[0]), Path(arguments[1])
     try:
-        run = simulate(fmu)
+        run = simulate(fmu, reporter())
+    except KeyboardInterrupt:
+        return INTERRUPTED
     except Exception as error:
         print(f"{fmu}: {error}", file=sys.stderr)
-        return 1
+        return FAILED
     for line in headline(run):
         print(f"  {line}")
-    write(picture, png(run))
+    try:
+        write(picture, png(response(run.record, run.mechanism)))
+    except OSError as error:
+        print(f"cannot write the figure {picture}: {error.strerror}", file=sys.stderr)
+        return MISTAKE
     print(f"  figure               {picture}", flush=True)
-    return 0 if run.finished else 1
+    return OK if run.finished else FAILED
 
 
 if __name__ == "__main__":

@@ -141,7 +141,8 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
     Raises
     ------
     MechanismError
-        If two names share a value reference.
+        If two names share a value reference or one is none of FMI, or if a parameter has a unit
+        that is not known or a nominal value that is none.
     """
     nominal = scales(mechanism, sample)
     result = tuple(_variables(mechanism, sample, nominal))
@@ -150,6 +151,11 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
         raise MechanismError(f"no description for the outputs {', '.join(sorted(missing))}")
     seen: dict[int, str] = {}
     for variable in result:
+        if not variable.name.isascii():
+            raise MechanismError(
+                f"{variable.name}: names of FMI are of the letters a to z, digits and _, without "
+                "accents; rename the part"
+            )
         other = seen.setdefault(variable.reference, variable.name)
         if other != variable.name:
             raise MechanismError(
@@ -187,6 +193,16 @@ def _variables(
     mechanism: Mechanism, sample: Mapping[str, Number], nominal: Scales
 ) -> Iterator[Variable]:
     for parameter in mechanism.parameters:
+        if (parameter.unit or "1") not in QUANTITIES:
+            raise MechanismError(
+                f"{parameter.name} has the unit {parameter.unit!r}, which no FMU of ours knows; "
+                f"give it in one of {', '.join(QUANTITIES)}"
+            )
+        nominal_value = parameter.nominal
+        if nominal_value is not None and not 0.0 < nominal_value < math.inf:
+            raise MechanismError(
+                f"{parameter.name}: nominal = {nominal_value} must be positive and finite"
+            )
         yield _parameter(parameter)
     known = {p.name for p in mechanism.parameters}
     for name in sample:

@@ -24,9 +24,18 @@ from prbm.errors import PrbmError
 from prbm.mechanism import unknown
 
 from .mechanism_file import load, shipped
-from .motion import FPS, film, motion, needed
+from .motion import FPS, film, fmpy_command, motion, needed
 from .scene import COLOURS, DPI, SIZE, Scene, pictures
-from .simulate import Columns, Progress, Result, ResultError, names, read_csv, simulate
+from .simulate import (
+    Columns,
+    Progress,
+    Result,
+    ResultError,
+    names,
+    read_csv,
+    reporter,
+    simulate,
+)
 
 
 class AnimationError(PrbmError, RuntimeError):
@@ -306,7 +315,7 @@ def main(arguments: list[str] | None = None) -> int:
             fps=options.fps,
             start=options.start,
             stop=options.stop,
-            progress=_percent if sys.stderr.isatty() else None,
+            progress=reporter(),
         )
     except PrbmError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")
@@ -352,8 +361,14 @@ def _owner(columns: Columns) -> Mechanism:
     """Return the one shipped mechanism that has just the angles that a result holds."""
     recorded = {name for name in names(columns) if name.endswith(".angle")}
     every = [load(path) for path in shipped().values()]
-    owners = [m for m in every if set(needed(m)) & _angle_names(m) == recorded]
+    owners = [m for m in every if _angle_names(m) == recorded]
     if len(owners) != 1:
+        fewer = [m for m in every if recorded and _angle_names(m) > recorded]
+        if fewer:
+            raise ResultError(
+                "the result lacks the angles of the links; simulate again with\n"
+                + "\nor ".join(fmpy_command(m) for m in fewer)
+            )
         raise ResultError(
             "cannot tell from its columns which mechanism this is the result of: say so with "
             f"--model ({', '.join(shipped())}) or --mechanism FILE.toml"
@@ -363,11 +378,6 @@ def _owner(columns: Columns) -> Mechanism:
 
 def _angle_names(mechanism: Mechanism) -> set[str]:
     return {name for name in needed(mechanism) if name.endswith(".angle")}
-
-
-def _percent(fraction: float) -> None:
-    end = "\n" if fraction >= 1.0 else ""
-    print(f"\r{fraction:4.0%}", end=end, file=sys.stderr, flush=True)
 
 
 if __name__ == "__main__":

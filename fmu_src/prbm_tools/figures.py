@@ -1,6 +1,8 @@
-"""Figures of results, for reports: they belong to no window."""
+"""Figures of results, for reports: they belong to no window and follow no matplotlibrc."""
 
+import io
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +13,7 @@ from prbm import Mechanism
 from prbm.assembly import Real, unit
 
 from .motion import Mark, marks
-from .scene import GRID, IMPACT, PAST, REST, length_unit, time_unit
+from .scene import GRID, IMPACT, PAST, REST, length_unit, own_style, time_unit
 from .simulate import Columns, Result, ResultError, column, names
 
 ENERGIES = {  # one colour each, also for those who see colours differently
@@ -48,6 +50,7 @@ class _Plot:
         return result
 
 
+@own_style()
 def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Figure:
     """Plot a result over time: motion, speeds of the impacts, energies.
 
@@ -105,6 +108,27 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
     every[-1].set_xlim(plot.time[0], plot.time[-1])
     figure.align_ylabels(list(every))
     return figure
+
+
+@own_style()
+def png(figure: Figure) -> bytes:
+    """Return a figure as a PNG file, the same bytes for the same figure."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def save(figure: Figure, path: str | Path) -> Path:
+    """Write a figure to a PNG file; return its path.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
+    """
+    path = Path(path)
+    path.write_bytes(png(figure))
+    return path
 
 
 def _shade_rest(axes: Axes, plot: _Plot) -> None:

@@ -22,6 +22,8 @@ PREFERRED_LENGTH = 10.0  # s of film, if the factor of slow motion is not given
 FPS = 25.0  # frames per second
 FASTEST = 50.0  # frames per second; viewers of GIF files slow down what is faster
 MOST_FRAMES = 5000
+MOVES = 5e-3  # of the largest turn: less than that, which is a pixel or two, is no motion
+STAYS = 0.15  # of the motion, how long its end is shown
 OPEN = 1e-6  # of the size: loops that stand open by more are those of another mechanism
 
 
@@ -129,6 +131,15 @@ def needed(mechanism: Mechanism) -> list[str]:
     ]
 
 
+def fmpy_command(mechanism: Mechanism) -> str:
+    """Return the command with which FMPy records what an animation of a mechanism needs."""
+    variables = " ".join(f'"{name}"' for name in needed(mechanism))
+    return (
+        f"fmpy simulate {mechanism.name}.fmu --output-file result.csv "
+        f"--output-variables {variables}"
+    )
+
+
 def _angles(system: System) -> dict[str, int]:
     """Return the coordinates by the names of their angles."""
     links = {f"link[{i}].angle": j for i, j in enumerate(system.links, start=1)}
@@ -173,8 +184,9 @@ def motion(
     missing = [name for name in angles if name not in names(columns)]
     if missing:
         raise ResultError(
-            f"the result lacks {', '.join(missing)}; record what an animation needs, with FMPy as "
-            "in simulate_fmu(..., output=prbm_tools.motion.needed(mechanism))"
+            f"the result lacks {', '.join(missing)}; record what an animation needs, in Python "
+            "with simulate_fmu(..., output=prbm_tools.motion.needed(mechanism)), on the command "
+            f"line with\n{fmpy_command(mechanism)}"
         )
     q = np.empty((len(time), system.n))
     for name, j in angles.items():
@@ -319,7 +331,8 @@ def film(
     fps : float
         Frames per second.
     start, stop : float or None
-        Part of the motion that is shown [s]; None: from its start, to its end.
+        Part of the motion that is shown [s]; None: from its start, to its end or until shortly
+        after nothing moves any longer.
 
     Raises
     ------
@@ -328,7 +341,7 @@ def film(
     """
     first, last = float(motion.time[0]), float(motion.time[-1])
     a = first if start is None else start
-    b = last if stop is None else stop
+    b = _ending(motion, a) if stop is None else stop
     if not (first <= a < b <= last):
         raise ParameterError(
             f"start = {a:g} s, stop = {b:g} s: choose a span within {first:g} s to {last:g} s"
@@ -355,6 +368,18 @@ def film(
     for k, mark in hits.items():
         times[k] = mark.time
     return Film(times, slow, fps, hits)
+
+
+def _ending(motion: Motion, start: float) -> float:
+    """Return when a film that begins at a time may end: shortly after the last that moves [s]."""
+    time, last = motion.time, float(motion.time[-1])
+    places = np.hstack([motion.q, motion.walls / motion.system.length])
+    least = MOVES * float(np.ptp(motion.q, axis=0).max())
+    moving = np.flatnonzero(np.abs(places - places[-1]).max(axis=1) > least)
+    if not len(moving):
+        return last
+    end = float(time[moving[-1]])
+    return min(last, end + STAYS * (end - start)) if end > start else last
 
 
 def round_factor(x: float) -> float:

@@ -3,8 +3,10 @@
 import itertools
 import math
 from collections.abc import Iterable, Iterator
+from functools import partial
 from typing import Any
 
+import matplotlib.style
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -24,6 +26,7 @@ LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
 STRAIGHT, GRID = "#b4bcc6", "#eeeeee"
 PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
 COLOURS = (LINK, FLEXURE, BODY, WALL, STRAIGHT, GRID, FUTURE, IMPACT, REST, "#ffffff", "#000000")
+own_style = partial(matplotlib.style.context, "default")  # whatever matplotlibrc says
 SMOOTH = 40  # points along a flexure's curve
 CHAIN = 9  # pivots; a flexure of more is a smooth curve already
 THINNEST_BODY = 0.04  # of the size of the mechanism: a body without height is drawn this thick
@@ -156,6 +159,7 @@ class Scene:
         What moves, by the names of flexures, bodies and stops, in the unit of the axes.
     """
 
+    @own_style()
     def __init__(self, motion: Motion, film: Film, figure: Figure | None = None) -> None:
         self.motion, self.film = motion, film
         self.system = motion.system
@@ -424,7 +428,8 @@ def pictures(scene: Scene, frames: Iterable[int] | None = None) -> Iterator[NDAr
     assert isinstance(canvas, FigureCanvasAgg)
     for artist in scene.moving:
         artist.set_animated(True)
-    canvas.draw()  # type: ignore[no-untyped-call]
+    with own_style():  # here axes make their ticks
+        canvas.draw()  # type: ignore[no-untyped-call]
     background = canvas.copy_from_bbox(scene.figure.bbox)  # type: ignore[no-untyped-call]
     for k in range(len(scene.film.times)) if frames is None else frames:
         canvas.restore_region(background)  # type: ignore[no-untyped-call]

@@ -2,10 +2,12 @@
 
 import csv
 import math
+import sys
+import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,6 +129,35 @@ def simulate(
     return Result(mechanism, start, structured(rows), tuple(simulation.record))
 
 
+FIRST_WORD, EVERY = 1.0, 2.0  # s; what is done sooner needs no report, and lines are few
+
+
+def reporter(stream: TextIO | None = None) -> Progress:
+    """Return what tells on a stream, standard error by default, how much of a work is done.
+
+    It says nothing in the first second; then it rewrites its line on a terminal, and adds a line
+    every other second elsewhere.
+    """
+    out = sys.stderr if stream is None else stream
+    terminal = out.isatty()
+    begin = time.monotonic()
+    last = -math.inf  # when it said something [s]
+
+    def report(fraction: float) -> None:
+        nonlocal last
+        now = time.monotonic() - begin
+        done = fraction >= 1.0
+        if done and terminal and last > 0.0:
+            print("\r100%", file=out, flush=True)
+            last = -math.inf
+        elif not done and now >= FIRST_WORD and now - last >= (0.1 if terminal else EVERY):
+            text, end = (f"\r{fraction:4.0%}", "") if terminal else (f"{fraction:4.0%} done", "\n")
+            print(text, end=end, file=out, flush=True)
+            last = now
+
+    return report
+
+
 def communication_points(stop_time: float, step: float) -> list[float]:
     """Return 0, step, 2 step, ... up to the stop time [s].
 
@@ -178,7 +209,7 @@ def read_csv(path: str | Path) -> Columns:
     """
     path = Path(path)
     try:
-        with path.open(newline="", encoding="utf-8") as file:
+        with path.open(newline="", encoding="utf-8-sig") as file:
             lines = [line for line in csv.reader(file) if line]
     except OSError as error:
         raise ResultError(f"{path}: cannot be read ({error.strerror})") from None

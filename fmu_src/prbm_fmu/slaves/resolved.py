@@ -16,7 +16,7 @@ PARTS = {
     "forces": "Force",
     "geometry": "Parameter",
 }
-EMPTY = {"Real": float("nan"), "Integer": 0, "Boolean": False}
+EMPTY: dict[str, Any] = {"Real": float("nan"), "Integer": 0, "Boolean": False, "String": ""}
 
 
 @dataclass(frozen=True)
@@ -29,6 +29,8 @@ class Model:
         The mechanism, of the engine's own class.
     names : dict of int to str
         Variables by value reference.
+    types : dict of str to str
+        Their types in FMI.
     given : dict of str to float
         Start values of the parameters and inputs.
     parameters : dict of str to Parameter
@@ -39,6 +41,7 @@ class Model:
 
     mechanism: Any
     names: Mapping[int, str]
+    types: Mapping[str, str]
     given: Mapping[str, float]
     parameters: Mapping[str, Any]
     computed: Mapping[str, float | int | bool]
@@ -68,6 +71,7 @@ def read(folder: str | Path, engine: Any) -> Model:
     return Model(
         mechanism,
         {v["reference"]: v["name"] for v in table},
+        {v["name"]: v["type"] for v in table},
         {v["name"]: v["start"] for v in table if v["start"] is not None},
         {p.name: p for p in mechanism.parameters},
         {v["name"]: EMPTY[v["type"]] for v in table if v["start"] is None},

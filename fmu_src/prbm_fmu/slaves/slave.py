@@ -7,7 +7,9 @@ What the wrapper (0.7.0) does and what follows from it:
   raised once an instance exists: :func:`_never_raises`.
 * Only ``doStep`` has a milder status: False becomes ``fmi2Discard``.  ``fmi2Error`` is out of
   reach.  So whatever is wrong is logged when it is found and makes every ``doStep`` answer
-  False until it is put right.
+  False until it is put right, or for good: then the sentence says so.
+* A get cannot be refused either, and a value of another type than asked for leaves an exception
+  behind that strikes the host later.  So a wrong get is logged and answered with NaN, 0, False.
 * FMPy ends a simulation at ``fmi2Discard`` without a word, and the wrapper logs nothing unless
   the importer asked for logging.  So the reason goes to the standard error stream too.
 * When the process ends, its library frees a part of itself twice.  So it is asked to let go of
@@ -17,6 +19,7 @@ What the wrapper (0.7.0) does and what follows from it:
 """
 
 import atexit
+import copy
 import ctypes
 import functools
 import json
@@ -31,9 +34,11 @@ from typing import Any, ClassVar
 from pythonfmu import Fmi2Slave  # type: ignore[import-untyped]
 from pythonfmu.enums import Fmi2Status  # type: ignore[import-untyped]
 
-from .resolved import Model, read
+from .resolved import EMPTY, Model, read
 
 EVENTS = "logEvents"
+START, EXPERIMENT = "the start", "setupExperiment"  # what may be refused besides a variable
+RESET = "reset the instance to start again"
 TIME_SLACK = 1e-6  # of a communication step: round-off that importers gather in their time
 SAVED = (
     "given",
@@ -69,12 +74,16 @@ def _never_raises(fallback: Any) -> Callable[[Callable[..., Any]], Callable[...,
 def _unexpected(error: BaseException) -> str:
     """Return a sentence about an exception that nobody foresaw."""
     if isinstance(error, KeyboardInterrupt):
-        return "the simulation was interrupted; reset the instance to start again"
+        return f"the simulation was interrupted; {RESET}"
     place = traceback.extract_tb(error.__traceback__)[-1]
     return (
         f"unexpected {type(error).__name__} in {place.name} (line {place.lineno} of "
-        f"{place.filename}): {error}; please report it"
+        f"{place.filename}): {error}; please report it, and {RESET}"
     )
+
+
+def _unknown(vr: int) -> str:
+    return f"value reference {vr} is not in modelDescription.xml"
 
 
 _libraries: set[str] = set()
@@ -145,15 +154,15 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
     ) -> None:
         """Note where time starts and how exact the importer wants it."""
         self._forget()
-        self.refused.pop("setupExperiment", None)
+        self.refused.pop(EXPERIMENT, None)
         if not math.isfinite(start_time):
-            self._refuse("setupExperiment", f"startTime = {start_time} s must be a finite number")
+            self._refuse(EXPERIMENT, f"startTime = {start_time} s must be a finite number; {RESET}")
             return
         if tolerance is not None:
             try:
                 tolerance = self.m.parameters["solver.tolerance"].check(tolerance)
             except self.engine.ParameterError as error:
-                self._refuse("setupExperiment", f"the importer's relative tolerance: {error}")
+                self._refuse(EXPERIMENT, f"the importer's relative tolerance: {error}; {RESET}")
                 return
         self.start_time = self.clock = start_time
         self.tolerance = tolerance
@@ -165,10 +174,11 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
     @_never_raises(None)
     def exit_initialization_mode(self) -> None:
         """Start the motion; what stands against it was logged and is refused by doStep."""
-        self._start()
-        if self.refused:
-            self.failure = "; ".join(self.refused.values())
-        self.running, self.table = True, None
+        self.table = None
+        try:
+            self._start()
+        finally:
+            self.running = True
 
     def _start(self) -> None:
         """Make the simulation from the present values, once."""
@@ -182,24 +192,26 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
                 tolerance=self.tolerance,
             )
         except self.engine.PrbmError as error:
-            self.failure = str(error)
-            self.log(self.failure, Fmi2Status.error)
+            self._refuse(START, str(error))
 
     def _forget(self) -> None:
         """Drop the simulation: it is to start from other values."""
-        self.simulation, self.failure, self.table = None, None, None
+        self.simulation, self.table = None, None
+        self.refused.pop(START, None)
 
     # -- steps --
 
     @_never_raises(False)
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Continue to the next communication point, or say why not."""
+        if self.running:
+            self._start()  # what was wrong until now may have been put right
         problem = self._problem(current_time, step_size) or self._apply()
         if problem is None:
             try:
                 self.simulation.advance(current_time + step_size)
             except self.engine.PrbmError as error:
-                problem = self.failure = str(error)
+                problem = self.failure = f"{error}; {RESET}, or restore a saved state"
         if problem is not None:
             self._discard(problem)
             return False
@@ -209,10 +221,10 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
 
     def _problem(self, current_time: float, step_size: float) -> str | None:
         """Return what stands against a step."""
-        if not self.running:
-            return "doStep came before exitInitializationMode: initialize the instance first"
         if self.failure:
             return self.failure
+        if not self.running:
+            return "doStep came before exitInitializationMode: initialize the instance first"
         if self.refused:
             return "; ".join(self.refused.values())
         if not (math.isfinite(current_time) and math.isfinite(step_size)):
@@ -243,31 +255,49 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set parameters and inputs; what is refused is logged and keeps doStep from going on."""
         for vr, value in zip(vrs, values, strict=True):
-            name = self.m.names.get(vr, f"value reference {vr}")
+            name = self._settable(vr, "Real")
+            if name is None:
+                continue
             try:
                 self._set(name, value)
             except self.engine.ParameterError as error:
                 self._refuse(name, str(error))
 
+    def _settable(self, vr: int, kind: str) -> str | None:
+        """Return the name of a parameter or input of a type, or refuse what is none."""
+        name = self.m.names.get(vr)
+        if name is None:
+            self._refuse(str(vr), f"{_unknown(vr)}: it cannot be set; {RESET}")
+        elif name not in self.given:
+            self._refuse(name, f"{name} is no parameter or input: it cannot be set; {RESET}")
+        elif self.m.types[name] != kind:
+            actual = self.m.types[name]
+            self._refuse(name, f"{name} is of type {actual}: set it with fmi2Set{actual}")
+        else:
+            return name
+        return None
+
     def _set(self, name: str, value: float) -> None:
-        if name not in self.given:
-            raise self.engine.ParameterError(f"{name} is no parameter or input: it cannot be set")
         parameter = self.m.parameters.get(name)
         if parameter is not None:
             parameter.check(value)
         elif not math.isfinite(value):
             raise self.engine.ParameterError(f"{name} = {value} must be a finite number")
-        changed = self.given[name] != value
-        if changed and self.running and parameter is not None and not parameter.tunable:
+        before = self.given[name]
+        started = self.running and self.simulation is not None
+        if started and value != before and parameter is not None and not parameter.tunable:
+            unit = parameter.unit and f" {parameter.unit}"
             raise self.engine.ParameterError(
-                f"{name} = {value:.10g} refused: it is fixed once the simulation has started; "
-                "set it before, or reset the instance"
+                f"{name} = {value:.10g}{unit} refused: it is fixed once the simulation has "
+                f"started; set it back to {before:.10g}{unit}, or reset the instance and set it "
+                "before"
             )
-        self.refused.pop(name, None)
-        if not changed:
+        if self.refused.pop(name, None):
+            self.table = None
+        if value == before:
             return
         self.given[name] = value
-        if self.running:
+        if started:
             self.waiting[name] = value
             if self.table is not None:
                 self.table[name] = value
@@ -277,58 +307,67 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
     @_never_raises(None)
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
         """Refuse: no Integer can be set."""
-        self._refuse_all(vrs)
+        self._refuse_all(vrs, "Integer")
 
     @_never_raises(None)
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
         """Refuse: no Boolean can be set."""
-        self._refuse_all(vrs)
+        self._refuse_all(vrs, "Boolean")
 
     @_never_raises(None)
     def set_string(self, vrs: list[int], values: list[str]) -> None:
         """Refuse: there is no String."""
-        self._refuse_all(vrs)
+        self._refuse_all(vrs, "String")
 
-    def _refuse_all(self, vrs: list[int]) -> None:
+    def _refuse_all(self, vrs: list[int], kind: str) -> None:
         for vr in vrs:
-            name = self.m.names.get(vr, f"value reference {vr}")
-            self._refuse(name, f"{name} is no parameter or input: it cannot be set")
+            self._settable(vr, kind)
 
     def get_real(self, vrs: list[int]) -> list[float]:
         """Return values of Real variables, NaN where there is none."""
-        return self._get(vrs, math.nan)
+        return self._get(vrs, "Real")
 
     def get_integer(self, vrs: list[int]) -> list[int]:
-        """Return values of Integer variables."""
-        return self._get(vrs, 0)
+        """Return values of Integer variables, 0 where there is none."""
+        return self._get(vrs, "Integer")
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
-        """Return values of Boolean variables."""
-        return self._get(vrs, False)
+        """Return values of Boolean variables, False where there is none."""
+        return self._get(vrs, "Boolean")
 
     def get_string(self, vrs: list[int]) -> list[str]:
-        """Return nothing of interest: there is no String."""
-        return [""] * len(vrs)
+        """Return empty strings: there is no String."""
+        return self._get(vrs, "String")
 
-    def _get(self, vrs: list[int], nothing: Any) -> list[Any]:
+    def _get(self, vrs: list[int], kind: str) -> list[Any]:
+        """Return values of a type, and of what is not of that type none."""
         try:
             table = self.table or self._values()
-            names = self.m.names
-            return [table[names[vr]] for vr in vrs]
-        except KeyError as error:
-            self._refuse("get", f"value reference {error} is not in modelDescription.xml")
+            names, types = self.m.names, self.m.types
+            result = []
+            for vr in vrs:
+                name = names.get(vr)
+                if name is None:
+                    self._complain(f"{_unknown(vr)}: it has no value")
+                elif types[name] != kind:
+                    actual = types[name]
+                    self._complain(f"{name} is of type {actual}: get it with fmi2Get{actual}")
+                else:
+                    result.append(table[name])
+                    continue
+                result.append(EMPTY[kind])
+            return result
         except BaseException as error:
             self.failure = _unexpected(error)
             self.log(self.failure, Fmi2Status.error)
-        return [nothing] * len(vrs)
+        return [EMPTY[kind]] * len(vrs)
 
     def _values(self) -> Mapping[str, float | int | bool]:
         """Return all values by name, those of the present time computed once.
 
         Where there is no simulation to compute them from, they are NaN, 0 and False.
         """
-        if not self.running:
-            self._start()
+        self._start()
         self.table = {**self.m.computed, **self.given}
         if self.simulation is not None and not self.failure and (self.running or not self.refused):
             self.table.update(self.simulation.outputs())
@@ -364,19 +403,33 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
     @_never_raises(None)
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         if state.get("model") != type(self).__name__ + "." + type(self).__module__:
-            self.failure = "the state to restore was not saved by this version of this FMU"
-            self.log(self.failure, Fmi2Status.error)
+            self._lost("was not saved by this version of this FMU")
             return
-        for key in SAVED:
-            value = state[key]
+        try:
+            saved = {key: state[key] for key in SAVED}
+            simulation = self._restored(state["snapshot"])
+        except (self.engine.PrbmError, LookupError, TypeError, ValueError) as error:
+            self._lost(f"is damaged ({type(error).__name__}: {error})")
+            return
+        for key, value in saved.items():
             setattr(self, key, dict(value) if isinstance(value, dict) else value)
-        self.table = None
-        if state["snapshot"] is None:
-            self.simulation = None
-            return
+        self.simulation, self.table = simulation, None
+
+    def _restored(self, snapshot: Mapping[str, Any] | None) -> Any:
+        """Return a simulation in a saved state; the present one stays as it is."""
+        if snapshot is None:
+            return None
         if self.simulation is None:
-            self.simulation = self.engine.Simulation(self.m.mechanism, self.m.given)
-        self.simulation.restore(state["snapshot"])
+            simulation = self.engine.Simulation(self.m.mechanism, self.m.given)
+        else:
+            simulation = copy.copy(self.simulation)
+        simulation.restore(snapshot)
+        return simulation
+
+    def _lost(self, why: str) -> None:
+        """Go no further: the importer believes that it has restored a state."""
+        self.failure = f"the state to restore {why}; restore another one, or {RESET}"
+        self.log(self.failure, Fmi2Status.error)
 
     @staticmethod
     def _fmu_state_to_bytes(state: dict[str, Any]) -> bytes:
@@ -406,12 +459,20 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
     def _refuse(self, name: str, sentence: str) -> None:
         self.refused[name] = sentence
         self.log(sentence, Fmi2Status.error)
-        if not self.running:
-            self.table = None
+        self.table = None
+
+    def _complain(self, sentence: str) -> None:
+        """Tell once what is wrong but harms nothing in here."""
+        if sentence not in self.told:
+            self.log(sentence, Fmi2Status.error)
+            self._print(sentence)
 
     def _discard(self, sentence: str) -> None:
         """Tell why a step is refused: to the importer, and once to the standard error stream."""
         self.log(sentence, Fmi2Status.discard)
+        self._print(sentence)
+
+    def _print(self, sentence: str) -> None:
         if sentence not in self.told and sys.stderr is not None:
-            self.told.add(sentence)
             print(f"{self.instance_name}: {sentence}", file=sys.stderr, flush=True)
+        self.told.add(sentence)
