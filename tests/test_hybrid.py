@@ -379,6 +379,26 @@ def test_a_saved_state_continues_to_the_bit(model, time, end):
     assert sim.outputs() == expected
 
 
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+def test_a_state_saved_between_a_change_and_its_step_is_complete(model):
+    """What has been set acts from the next step on, after the restore as before it."""
+    sim = simulation(model, {"release.displacement": -0.002})
+    sim.advance(0.3)
+    before = sim.outputs()
+    changes = {"force.x": 0.05, "stop.offset": 0.002, "base.acceleration.y": 1.0}
+    sim.set(changes | {"stop.velocity": -1e-4, "damping.zeta": 0.01})
+    saved = json.loads(json.dumps(sim.snapshot()))
+    other = simulation(model)
+    other.restore(saved)
+    assert sim.outputs() == other.outputs() == before
+    assert other.values == sim.values
+    assert other.given == sim.given
+    for one in (sim, other):
+        one.advance(0.31)
+    assert sim.outputs() == other.outputs()
+    assert sim.outputs()["base.force.y"] != before["base.force.y"]
+
+
 def test_a_state_of_another_mechanism_is_refused():
     with pytest.raises(ParameterError, match="another mechanism"):
         simulation("PRBDM").restore(simulation("PRBDM2R").snapshot())

@@ -150,7 +150,8 @@ class Simulation:
         self.mechanism = mechanism
         defaults = mechanism.values()
         self.values = mechanism.values({k: x for k, x in changes.items() if k in defaults})
-        self.system = assemble(mechanism, self.values)
+        # the arrays that act, and those that a change has prepared for the next restart
+        self.system = self.prepared = assemble(mechanism, self.values)
         self.calculated = calculated(mechanism, self.values)
         self.given = dict.fromkeys(input_names(self.system), 0.0)
         for name in changes.keys() - defaults.keys():
@@ -251,11 +252,8 @@ class Simulation:
         if values == self.values and given == self.given:
             return
         if values != self.values:
-            self.values = values
-            self.system = assemble(self.mechanism, values)
-        self.given = given
-        self.changed = True
-        self._output_cache = None
+            self.prepared = assemble(self.mechanism, values)
+        self.values, self.given, self.changed = values, given, True
 
     def _wall_target(self, i: int, h: float) -> float:
         """Return where the wall is to be a time h from now [m]."""
@@ -277,7 +275,11 @@ class Simulation:
 
     def _set_equations(self, inputs: Inputs) -> None:
         self.inputs = inputs
-        self.equations = Equations(self.system, inputs, self.discrete, self.omega)
+        self.equations = self._equations(self.discrete)
+
+    def _equations(self, discrete: Discrete) -> Equations:
+        """Return the equations that hold in a discrete state."""
+        return Equations(self.system, self.inputs, discrete, self.omega)
 
     # -- time --
 
@@ -345,6 +347,7 @@ class Simulation:
         self.front = self.state()
         self.front_time = self.time
         self.arc, self.k1, self.changed = None, None, False
+        self.system = self.prepared
         self._set_equations(self._inputs(self.inputs.walls))
         struck = self._unsettled_by_walls()
         if struck is not None:
@@ -853,7 +856,7 @@ class Simulation:
             tuple(self._sign(float(x)) if i in stops else IDLE for i, x in enumerate(slides)),
             tuple(self._sign(float(x)) for x in rubs),
         )
-        return Equations(self.system, self.inputs, discrete, self.omega)
+        return self._equations(discrete)
 
     def _sign(self, speed: float) -> int:
         """Return the sign of a sliding velocity, IDLE if it is none but rounding."""
@@ -911,13 +914,11 @@ class Simulation:
             return moving
         M, _ = inertia(self.system.H, self.equations.J, e)
         loops = constraints.jacobian(self.system.loops, e)
-        others = Equations(self.system, self.inputs, self._with_slide(kind, i, IDLE), self.omega)
+        others = self._equations(self._with_slide(kind, i, IDLE))
         held = constraints.jacobian(others.B, e)
         if _mobility(M, held, row) <= DEPENDENT * _mobility(M, loops, row):
             return IDLE
-        equations = Equations(
-            self.system, self.inputs, self._with_slide(kind, i, STICKS), self.omega
-        )
+        equations = self._equations(self._with_slide(kind, i, STICKS))
         _, lam, _ = equations.accelerations(q, v)
         if kind == "rub":
             friction = float(lam[equations.first_rub + equations.rubbing.index(i)])
@@ -930,7 +931,7 @@ class Simulation:
             return STICKS
         gives = -1 if friction > 0.0 else 1
         for sign in (gives, -gives):
-            trial = Equations(self.system, self.inputs, self._with_slide(kind, i, sign), self.omega)
+            trial = self._equations(self._with_slide(kind, i, sign))
             a, _, _ = trial.accelerations(q, v)
             if sign * float((row @ a - constraints.convective(B, e, v)).item()) > 0.0:
                 return sign
@@ -1002,6 +1003,12 @@ class Simulation:
         return {
             "values": dict(self.values),
             "given": dict(self.given),
+            "acting": {
+                "values": dict(self.system.values),
+                "forces": [[f.real, f.imag] for f in self.inputs.forces],
+                "moments": list(self.inputs.moments),
+                "base": [self.inputs.base.real, self.inputs.base.imag],
+            },
             "tolerance": self.tolerance,
             "step": self.step,
             "time": self.time,
@@ -1041,17 +1048,26 @@ class Simulation:
         ):
             raise ParameterError("the saved state belongs to another mechanism")
         s = snapshot
-        if s["values"] != self.values:
-            self.values = dict(s["values"])
-            self.system = assemble(self.mechanism, self.values)
-            self.calculated = calculated(self.mechanism, self.values)
-        self.given = dict(s["given"])
+        acting = s["acting"]
+        if acting["values"] != self.system.values:
+            self.system = assemble(self.mechanism, acting["values"])
+            self.calculated = calculated(self.mechanism, acting["values"])
+        self.values, self.given, self.prepared = dict(s["values"]), dict(s["given"]), self.system
+        if self.values != acting["values"]:
+            self.prepared = assemble(self.mechanism, self.values)
         self.tolerance, self.step, self.time = s["tolerance"], s["step"], s["time"]
         self.frequency = s["frequency"]
         self.omega = 2 * math.pi * self.frequency
         d = s["discrete"]
         self.discrete = Discrete(tuple(d["holds"]), tuple(d["slides"]), tuple(d["rubs"]))
-        self._set_equations(self._inputs(tuple(Wall(**wall) for wall in s["walls"])))
+        self._set_equations(
+            Inputs(
+                tuple(complex(*f) for f in acting["forces"]),
+                tuple(acting["moments"]),
+                complex(*acting["base"]),
+                tuple(Wall(**wall) for wall in s["walls"]),
+            )
+        )
         self.latched = [Latched(**latched) for latched in s["latched"]]
         self._window = (s["window"][0], s["window"][1])
         self.h, self.last_error, self.changed = s["h"], s["last_error"], s["changed"]
