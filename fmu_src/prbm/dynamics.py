@@ -18,7 +18,7 @@ from . import constraints, forces
 from .assembly import Complex, Real, System
 from .errors import ParameterError
 from .kinetics import inertia, kinetic_energy, mass_accelerations
-from .mechanism import finite, unknown, value
+from .mechanism import Mechanism, finite, unknown, value
 
 STICKS = 0  # and +1, -1: slides along, against the direction
 IDLE = 2  # no friction acts: open, frictionless, or the stop carries everything
@@ -42,10 +42,10 @@ class Discrete:
     slides: tuple[int, ...]
     rubs: tuple[int, ...]
 
-    def with_hold(self, stop: int, holds: bool) -> "Discrete":
-        """Return the state in which a stop holds or not."""
+    def without_hold(self, stop: int) -> "Discrete":
+        """Return the state in which a stop has let go."""
         changed = list(self.holds)
-        changed[stop] = holds
+        changed[stop] = False
         return replace(self, holds=tuple(changed))
 
 
@@ -87,9 +87,8 @@ class Inputs:
     walls: tuple[Wall, ...]
 
 
-def input_names(system: System) -> tuple[str, ...]:
+def input_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the inputs in the order of the interface."""
-    mechanism = system.mechanism
     names = [f"{f.name}.{axis}" for f in mechanism.forces for axis in ("x", "y", "moment")]
     names += [f"{s.name}.{what}" for s in mechanism.stops for what in ("displacement", "velocity")]
     return (*names, "base.acceleration.x", "base.acceleration.y")

@@ -31,7 +31,7 @@ from .mechanism import Mechanism, unknown, value
 from .modal import fundamental_at, modes, simulated_restitution
 from .runge_kutta import BOGACKI_SHAMPINE as PAIR
 from .runge_kutta import interpolate, powers, stages
-from .statics import Equilibrium, equilibrium, release_velocity
+from .statics import equilibrium, release_velocity
 
 TIME_RESOLUTION = 1e-13  # s; events are located to 1e-12 s, some of which the projection needs
 TOUCHING = 1e-10  # of the size: gaps that close together with one that is being resolved
@@ -153,7 +153,7 @@ class Simulation:
         # the arrays that act, and those that a change has prepared for the next restart
         self.system = self.prepared = assemble(mechanism, self.values)
         self.calculated = calculated(mechanism, self.values)
-        self.given = dict.fromkeys(input_names(self.system), 0.0)
+        self.given = dict.fromkeys(input_names(mechanism), 0.0)
         for name in changes.keys() - defaults.keys():
             if name not in self.given:
                 raise ParameterError(unknown(name, {**defaults, **self.given}))
@@ -172,10 +172,11 @@ class Simulation:
         # one radian against the stiffest spring [J]
         self._energy_scale = float(np.abs(self.system.K).max())
 
-        shape = self.release_shape()
-        velocity = release_velocity(
-            self.system, shape.q, value(mechanism.release, "velocity", self.values)
+        displacement, speed = (
+            value(mechanism.release, name, self.values) for name in ("displacement", "velocity")
         )
+        shape = equilibrium(self.system, displacement)
+        velocity = release_velocity(self.system, shape.q, speed)
         walls = tuple(Wall(self._wall_target(i, 0.0)) for i in range(len(mechanism.stops)))
         self.discrete = Discrete(
             (False,) * len(walls), (IDLE,) * len(walls), (IDLE,) * len(mechanism.frictions)
@@ -195,11 +196,6 @@ class Simulation:
         self._output_cache: tuple[float, dict[str, Any]] | None = None
 
     # -- start --
-
-    def release_shape(self) -> Equilibrium:
-        """Return the static shape from which the motion starts."""
-        release = self.mechanism.release
-        return equilibrium(self.system, value(release, "displacement", self.values))
 
     def _check_walls(self) -> None:
         """Refuse a penetrated wall, and begin with the impact if one is hit at once."""
@@ -369,7 +365,7 @@ class Simulation:
         struck = None
         for i in list(self.equations.held):
             if abs(rates[i]) > self._still():
-                self._set_discrete(self.discrete.with_hold(i, False))
+                self._set_discrete(self.discrete.without_hold(i))
                 struck = i if rates[i] < 0.0 else struck
         return struck
 
@@ -631,7 +627,7 @@ class Simulation:
         if event.kind == "impact":
             self._impact(event.index)
         elif event.kind == "release":
-            self._set_discrete(self.discrete.with_hold(event.index, False))
+            self._set_discrete(self.discrete.without_hold(event.index))
             self._settle()
         elif event.kind.startswith("slip "):
             self._settle(yields=(event.kind.removeprefix("slip "), event.index))
@@ -705,9 +701,8 @@ class Simulation:
         if speed < self._field(i, "rest_speed"):
             return True
         equations = self._equations_holding(holding, q, after)
-        _, lam, M = equations.accelerations(q, after)
-        e = np.exp(1j * q)
-        loops = constraints.jacobian(self.system.loops, e)
+        _, lam, _ = equations.accelerations(q, after)
+        e, M, loops = self._mass_and_loops(q)
         G = constraints.jacobian(self.system.gaps[i : i + 1], e)
         pressing = float(equations.stop_forces(lam)[i]) * _mobility(M, loops, G)
         return 2.0 * speed < pressing * SHORTEST_FLIGHT * self._period()
@@ -722,9 +717,7 @@ class Simulation:
         that of friction points, is finite and has no impulse.
         """
         system, k = self.system, len(struck)
-        e = np.exp(1j * q)
-        M, _ = inertia(system.H, self.equations.J, e)
-        loops = constraints.jacobian(system.loops, e)
+        e, M, loops = self._mass_and_loops(q)
         u = self.equations.gap_rates(e, v)
         mu = np.array([self._field(i, "friction") for i in struck])
         if not mu.any():
@@ -809,8 +802,7 @@ class Simulation:
         that keeps the others from closing.
         """
         every = sorted(set(candidates))
-        e = np.exp(1j * q)
-        M, _ = inertia(self.system.H, self.equations.J, e)
+        e, M, loops = self._mass_and_loops(q)
         G = constraints.jacobian(self.system.gaps, e)
         bend = constraints.convective(self.system.gaps, e, v)
         closes = -STILL * self._omega_scale() ** 2 * self.system.length
@@ -819,7 +811,7 @@ class Simulation:
             found: list[tuple[float, list[int]]] = []
             for members in combinations(every, size):
                 holding = list(members)
-                if not self._independent(holding, M, e):
+                if not _independent(G[holding], M, loops):
                     continue
                 equations = self._equations_holding(holding, q, v)
                 a, lam, _ = equations.accelerations(q, v)
@@ -833,17 +825,11 @@ class Simulation:
                 pressed_only = pressed_only or holding
         return pressed_only
 
-    def _independent(self, stops: list[int], M: Real, e: Complex) -> bool:
-        """Tell whether each of the stops keeps a mobility of its own beside the others."""
-        if len(stops) < 2:
-            return True
-        loops = constraints.jacobian(self.system.loops, e)
-        for n, i in enumerate(stops):
-            held = np.vstack([loops, constraints.jacobian(self.system.gaps[stops[:n]], e)])
-            row = constraints.jacobian(self.system.gaps[i : i + 1], e)
-            if _mobility(M, held, row) <= ALIGNED * _mobility(M, loops, row):
-                return False
-        return True
+    def _mass_and_loops(self, q: Real) -> tuple[Complex, Real, Real]:
+        """Return e, the mass matrix and the Jacobian of the loops at a position."""
+        e = np.exp(1j * q)
+        M, _ = inertia(self.system.H, self.equations.J, e)
+        return e, M, constraints.jacobian(self.system.loops, e)
 
     def _equations_holding(self, stops: list[int], q: Real, v: Real) -> Equations:
         """Return the equations in which these stops hold, and what slides rubs."""
@@ -906,14 +892,12 @@ class Simulation:
         sticks as far as Coulomb's law allows, and beyond slides in the direction in which
         sliding accelerates it.
         """
-        e = np.exp(1j * q)
+        e, M, loops = self._mass_and_loops(q)
         B = self._slide_row(kind, i)[None, :]
         row = constraints.jacobian(B, e)
         moving = self._sign(float((row @ v).item()))
         if moving != IDLE:
             return moving
-        M, _ = inertia(self.system.H, self.equations.J, e)
-        loops = constraints.jacobian(self.system.loops, e)
         others = self._equations(self._with_slide(kind, i, IDLE))
         held = constraints.jacobian(others.B, e)
         if _mobility(M, held, row) <= DEPENDENT * _mobility(M, loops, row):
@@ -1096,6 +1080,16 @@ def _falls(f: Callable[[float], float], a: float, b: float) -> float:
 def _mobility(M: Real, held: Real, row: Real) -> float:
     """Return the inverse mass along a row (1, n) while others are held [1/kg]."""
     return float((row @ contact.response(M, held, row)).item())
+
+
+def _independent(rows: Real, M: Real, loops: Real) -> bool:
+    """Tell whether each of the rows keeps a mobility of its own beside those before it."""
+    for k in range(1, len(rows)):
+        row = rows[k : k + 1]
+        left = _mobility(M, np.vstack([loops, rows[:k]]), row)
+        if left <= ALIGNED * _mobility(M, loops, row):
+            return False
+    return True
 
 
 def fundamental_frequency(system: System) -> float:

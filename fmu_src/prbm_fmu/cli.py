@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from prbm import Mechanism, PrbmError, assemble
+from prbm import Mechanism, PrbmError
 from prbm.dynamics import input_names
 from prbm_tools.mechanism_file import load, shipped
 
@@ -205,7 +205,7 @@ def _build(options: argparse.Namespace) -> list[Path]:
 
 def _check_names(chosen: Sequence[Mechanism], changes: Mapping[str, float]) -> None:
     """Refuse start values that some of the mechanisms know and others do not."""
-    known = {m.name: {*m.values(), *input_names(assemble(m, m.values()))} for m in chosen}
+    known = {m.name: {*m.values(), *input_names(m)} for m in chosen}
     for name in changes:
         having = [model for model in known if name in known[model]]
         lacking = [model for model in known if name not in known[model]]
