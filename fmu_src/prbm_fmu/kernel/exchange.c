@@ -1,0 +1,953 @@
+/* Model exchange: somebody else integrates the independent angles and rates.
+ *
+ * The loops tie the n coordinates together; r of them are solved from the other n - r, so that a
+ * solver that knows nothing of constraints stays on them (prbm/exchange.py says how they are
+ * chosen).  A stop that holds is a constraint of the accelerations; what a solver's errors let it
+ * drift is taken back in an event.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "hybrid.h"
+
+#define DRIFT 1e-8        /* of the size, and with the frequency of the velocity: worth an event */
+#define UNDRIFTED 1e-12   /* of these: left alone in an event */
+#define FLOOR 1e-12       /* of the size: how far below zero a gap closes, more than a rounding */
+#define FORESIGHT 0.01    /* of the period: an opening rate keeps the indicator off zero by so much */
+#define DEFINITE 1e-7     /* of the largest pivot: a smaller one says that the choice is singular */
+
+/* --- independent and dependent coordinates --------------------------------------------------------- */
+
+PRBM int exchange_states(const Simulation *simulation) {
+    return 2 * simulation->mechanism->independent_count + 2;
+}
+
+PRBM int exchange_indicators(const Simulation *simulation) {
+    const Mechanism *m = simulation->mechanism;
+    return STOP_INDICATORS * m->stop_count + m->friction_count;
+}
+
+/* The coordinates that the loops determine, in rising order. */
+static void dependents(const Mechanism *m, int *result) {
+    int k = 0, count = 0;
+    for (int j = 0; j < m->coordinate_count; j++) {
+        if (k < m->independent_count && m->independent[k] == j) {
+            k++;
+        } else {
+            result[count++] = j;
+        }
+    }
+}
+
+/* The slot of the angle of a coordinate. */
+static int angle_slot(const Mechanism *m, int j) {
+    if (m->link_of[j] >= 0) {
+        return m->slots.links + PER_LINK * m->link_of[j];
+    }
+    return m->slots.bodies + PER_BODY * (m->body_of[j] - 1) + 2;
+}
+
+PRBM int exchange_slot(const Simulation *simulation, int k) {
+    const Mechanism *m = simulation->mechanism;
+    int count = m->independent_count;
+    if (k >= 2 * count) {
+        return m->slots.energies + 3 + (k - 2 * count);
+    }
+    int j = m->independent[k % count];
+    return angle_slot(m, j) + (k < count ? 0 : m->link_of[j] >= 0 ? 1 : 3);
+}
+
+static const char *coordinate_name(const Mechanism *m, int j, char *text, size_t size) {
+    if (m->link_of[j] >= 0) {
+        (void)snprintf(text, size, "link[%d].angle", m->link_of[j] + 1);
+    } else {
+        (void)snprintf(text, size, "%s.angle", m->bodies[m->body_of[j] - 1].name);
+    }
+    return text;
+}
+
+static bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem) {
+    char name[80] = "";
+    return fail(problem,
+                "the states of model exchange do not determine the other angles (%s and %d more) "
+                "at t = %.9g s: the shape is too far from the one at the start, or the solver has "
+                "left it; shorten its steps, or use co-simulation, which has no such limit",
+                coordinate_name(sim->mechanism, dependent[0], name, sizeof name), sim->system.r - 1,
+                sim->now->time);
+}
+
+/* The loops' Jacobian in the dependent coordinates, factored. */
+static bool factor_dependents(const Simulation *sim, const double *rows, const int *dependent,
+                              double *a, int *pivot) {
+    int r = sim->system.r, n = sim->system.n;
+    double least = HUGE_VAL, most = 0.0;
+    for (int i = 0; i < r; i++) {
+        for (int k = 0; k < r; k++) {
+            a[i * r + k] = rows[i * n + dependent[k]];
+        }
+    }
+    most = largest(r * n, rows);
+    if (!lu_factor(r, a, pivot)) {
+        return false;
+    }
+    for (int i = 0; i < r; i++) {
+        least = lesser(least, fabs(a[i * r + i]));
+    }
+    return least > DEFINITE * most;
+}
+
+/* Solve the loops for the dependent angles and rates, from the angles of the last step. */
+static bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = &sim->system;
+    int n = system->n, r = system->r;
+    int *dependent = take_integers(&sim->scratch, r), *pivot = take_integers(&sim->scratch, r);
+    double *rows = take_matrix(&sim->scratch, r, n), *a = take_matrix(&sim->scratch, r, r);
+    double *s = take(&sim->scratch, (size_t)r), best = HUGE_VAL;
+    bool closed = false, regular = true;
+    dependents(sim->mechanism, dependent);
+    for (int step = 0; step < ITERATIONS && regular && !closed; step++) {
+        directions(n, q, sim->e);
+        scalars(r, n, system->loops, system->loops_c, sim->e, s);
+        double error = largest(r, s), length = system->length;
+        closed = error <= CLOSED * length || (BARELY_CLOSED * length >= best && best <= error);
+        best = lesser(best, error);
+        jacobian(r, n, system->loops, sim->e, rows);
+        regular = factor_dependents(sim, rows, dependent, a, pivot);
+        if (regular && !closed) {
+            lu_solve(r, a, pivot, s);
+            for (int k = 0; k < r; k++) {
+                q[dependent[k]] -= s[k];
+            }
+        }
+    }
+    if (closed && regular) {
+        for (int k = 0; k < r; k++) {
+            v[dependent[k]] = 0.0;
+        }
+        for (int i = 0; i < r; i++) {
+            s[i] = -dot(n, rows + i * n, v);
+        }
+        lu_solve(r, a, pivot, s);
+        for (int k = 0; k < r; k++) {
+            v[dependent[k]] = s[k];
+        }
+    }
+    sim->scratch.used = mark;
+    return (closed && regular) || (r > 0 ? singular_choice(sim, dependent, problem)
+                                         : fail(problem, "the states are not finite numbers"));
+}
+
+/* The independent part of y = (q, v, dissipated energy, work). */
+static void states_of(const Simulation *sim, const double *y, double *x) {
+    const Mechanism *m = sim->mechanism;
+    int n = m->coordinate_count, count = m->independent_count;
+    for (int k = 0; k < count; k++) {
+        x[k] = y[m->independent[k]];
+        x[count + k] = y[n + m->independent[k]];
+    }
+    x[2 * count] = y[2 * n];
+    x[2 * count + 1] = y[2 * n + 1];
+}
+
+/* --- time, states, inputs ------------------------------------------------------------------------------- */
+
+/* In model exchange the displacement of a wall is used as it is. */
+static void place_walls(Simulation *sim) {
+    const Mechanism *m = sim->mechanism;
+    for (int i = 0; i < m->stop_count; i++) {
+        Wall wall = {wall_target(sim, i, 0.0), sim->given[3 * m->force_count + 2 * i + 1],
+                     sim->now->time};
+        sim->walls[i] = wall;
+    }
+}
+
+/* Bring the equations and the state y, in sim->front, up to date with time, states and inputs. */
+PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
+    const Mechanism *m = sim->mechanism;
+    int n = sim->system.n, count = m->independent_count;
+    if (!sim->stale) {
+        return true;
+    }
+    size_t np = (size_t)m->parameter_count * sizeof(double);
+    if (memcmp(sim->values, sim->acting_values, np) != 0 && !take_values(sim, problem)) {
+        return false;
+    }
+    copy(m->input_count, sim->given, sim->acting_given);
+    place_walls(sim);
+    sim->now->front_time = sim->now->time;
+    set_inputs(sim);
+    copy(n, sim->arc_y, sim->front); /* angles of the last step: the shape to look near */
+    for (int k = 0; k < count; k++) {
+        sim->front[m->independent[k]] = sim->states[k];
+        sim->front[n + m->independent[k]] = sim->states[count + k];
+    }
+    sim->front[2 * n] = sim->states[2 * count];
+    sim->front[2 * n + 1] = sim->states[2 * count + 1];
+    if (!complete(sim, sim->front, sim->front + n, problem)) {
+        return false;
+    }
+    sim->stale = sim->evaluated = false;
+    sim->output_level = 0;
+    return true;
+}
+
+/* Accelerations and multipliers at the present state, in sim->equations; its rates. */
+static bool evaluate_motion(Simulation *sim, Problem *problem) {
+    if (sim->now->exchange == 0.0) {
+        sim->at = sim->y;
+        sim->evaluated = false;
+        if (!update_outputs(sim, PLACES, problem)) {
+            return false;
+        }
+    } else {
+        sim->at = sim->front;
+        if (!exchange_refresh(sim, problem)) {
+            return false;
+        }
+    }
+    if (!sim->evaluated) {
+        sim->evaluated = rate(&sim->equations, sim->now->time, sim->at, sim->rates, problem);
+    }
+    return sim->evaluated;
+}
+
+PRBM void exchange_set_time(Simulation *simulation, double time) {
+    if (time != simulation->now->time) {
+        simulation->now->time = time;
+        simulation->stale = true;
+        simulation->output_level = 0;
+    }
+}
+
+PRBM void exchange_set(Simulation *simulation, const double *x) {
+    copy(exchange_states(simulation), x, simulation->states);
+    simulation->stale = true;
+    simulation->output_level = 0;
+}
+
+PRBM void exchange_get(const Simulation *simulation, double *x) {
+    copy(exchange_states(simulation), simulation->states, x);
+}
+
+PRBM void exchange_nominals(const Simulation *simulation, double *x) {
+    int count = simulation->mechanism->independent_count;
+    for (int k = 0; k < count; k++) {
+        x[k] = 1.0;
+        x[count + k] = omega_scale(simulation);
+    }
+    x[2 * count] = x[2 * count + 1] = simulation->energy_scale;
+}
+
+PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *problem) {
+    if (!evaluate_motion(simulation, problem)) {
+        return false;
+    }
+    states_of(simulation, simulation->rates, dx);
+    return true;
+}
+
+/* --- event indicators -------------------------------------------------------------------------------------- */
+
+static double force_scale(const Simulation *sim) {
+    return sim->energy_scale / sim->system.length;
+}
+
+static double speed_scale(const Simulation *sim) {
+    return omega_scale(sim) * sim->system.length;
+}
+
+/* Positive while an open gap stays open.  What opens keeps it off zero, so that it is positive
+ * right after an impact, whose gap is zero up to a rounding. */
+static double impact_indicator(const Simulation *sim, int i) {
+    const Equations *q = &sim->equations;
+    if (sim->holds[i] != 0.0) {
+        return 1.0;
+    }
+    double speed = gap_rate(q, i, q->e, sim->at + sim->system.n);
+    double ahead = FORESIGHT * period(sim) * greater(speed, 0.0);
+    return (gap(q, i, sim->now->time, q->e) + sim->floors[i] + ahead) / sim->system.length;
+}
+
+static double slip_speed(const Simulation *sim, const Complex *row, int sign) {
+    const Equations *q = &sim->equations;
+    return sign * row_rate(sim->system.n, row, q->e, sim->at + sim->system.n) + still(sim);
+}
+
+static void friction_indicators(const Simulation *sim, double *z) {
+    const Equations *q = &sim->equations;
+    const System *system = &sim->system;
+    double *rubs = z + STOP_INDICATORS * system->s;
+    for (int k = 0; k < q->stuck_count; k++) {
+        z[STOP_INDICATORS * q->stuck[k] + 2] = margin_stick(sim, k) / force_scale(sim);
+    }
+    for (int k = 0; k < q->sliding_count; k++) {
+        int i = q->sliding[k];
+        double speed = slip_speed(sim, system->slides + i * system->n, q->discrete.slides[i]);
+        z[STOP_INDICATORS * i + 2] = speed / speed_scale(sim);
+    }
+    for (int k = 0; k < q->rubbing_count; k++) {
+        rubs[q->rubbing[k]] = margin_rub(sim, k) / force_scale(sim);
+    }
+    for (int k = 0; k < q->rub_slide_count; k++) {
+        int i = q->rub_slides[k];
+        double speed = slip_speed(sim, system->rubs + i * system->n, q->discrete.rubs[i]);
+        rubs[i] = speed / speed_scale(sim);
+    }
+}
+
+PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *problem) {
+    Simulation *sim = simulation;
+    if (!evaluate_motion(sim, problem)) {
+        return false;
+    }
+    for (int i = 0; i < exchange_indicators(sim); i++) {
+        z[i] = 1.0;
+    }
+    for (int i = 0; i < sim->system.s; i++) {
+        z[STOP_INDICATORS * i] = impact_indicator(sim, i);
+    }
+    for (int k = 0; k < sim->equations.held_count; k++) {
+        z[STOP_INDICATORS * sim->equations.held[k] + 1] =
+            margin_release(sim, k) / force_scale(sim);
+    }
+    friction_indicators(sim, z);
+    return true;
+}
+
+/* --- events --------------------------------------------------------------------------------------------------- */
+
+/* How far a held stop is off its wall and its wall's velocity, in units of what is worth noting. */
+static double drift_of(const Simulation *sim, int i) {
+    const Equations *q = &sim->equations;
+    double off = fabs(gap(q, i, sim->now->time, q->e)) / sim->system.length;
+    double speed = fabs(gap_rate(q, i, q->e, sim->front + sim->system.n)) / speed_scale(sim);
+    return greater(off, speed);
+}
+
+PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *problem) {
+    Simulation *sim = simulation;
+    *event = false;
+    if (!evaluate_motion(sim, problem)) {
+        return false;
+    }
+    copy(state_size(sim), sim->front, sim->arc_y);
+    for (int k = 0; k < sim->equations.held_count; k++) {
+        *event = *event || drift_of(sim, sim->equations.held[k]) > DRIFT;
+    }
+    return true;
+}
+
+/* What has been changed at the front is there to be evaluated again. */
+static void changed_front(Simulation *sim) {
+    sim->evaluated = false;
+    sim->output_level = 0;
+}
+
+/* Bring held stops back onto their walls, or let them go where the wall has changed its velocity. */
+static bool follow_walls(Simulation *sim, Problem *problem) {
+    bool turned = false, drifted = false;
+    for (int k = 0; k < sim->equations.held_count; k++) {
+        int i = sim->equations.held[k];
+        turned = turned || fabs(sim->walls[i].rate - sim->held_rates[i]) > still(sim);
+        drifted = drifted || drift_of(sim, i) > UNDRIFTED;
+    }
+    if (turned) {
+        int struck = unsettled_by_walls(sim);
+        changed_front(sim);
+        if (struck >= 0) {
+            return impact(sim, struck, problem);
+        }
+        return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
+               settle(sim, NULL, 0, NO_EVENT, 0, problem);
+    }
+    if (drifted) {
+        changed_front(sim);
+        return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem);
+    }
+    return true;
+}
+
+/* The next event that is due at the front: releases and slips first, then impacts. */
+static Event due_here(const Simulation *sim, bool *struck) {
+    const Equations *q = &sim->equations;
+    const System *system = &sim->system;
+    double near = 1e-10 * system->length, bound = still(sim);
+    Event event = {NO_EVENT, 0, sim->now->time};
+    for (int k = 0; k < q->held_count; k++) {
+        if (margin_release(sim, k) <= 0.0) {
+            event.kind = RELEASE;
+            event.index = q->held[k];
+            return event;
+        }
+    }
+    for (int k = 0; k < q->stuck_count; k++) {
+        if (margin_stick(sim, k) <= 0.0) {
+            event.kind = SLIP_SLIDE;
+            event.index = q->stuck[k];
+            return event;
+        }
+    }
+    for (int k = 0; k < q->rubbing_count; k++) {
+        if (margin_rub(sim, k) <= 0.0) {
+            event.kind = SLIP_RUB;
+            event.index = q->rubbing[k];
+            return event;
+        }
+    }
+    for (int k = 0; k < q->sliding_count; k++) {
+        int i = q->sliding[k];
+        if (slip_speed(sim, system->slides + i * system->n, q->discrete.slides[i]) <= 0.0) {
+            event.kind = SLIDE;
+            event.index = i;
+            return event;
+        }
+    }
+    for (int k = 0; k < q->rub_slide_count; k++) {
+        int i = q->rub_slides[k];
+        if (slip_speed(sim, system->rubs + i * system->n, q->discrete.rubs[i]) <= 0.0) {
+            event.kind = RUB;
+            event.index = i;
+            return event;
+        }
+    }
+    for (int i = 0; i < system->s; i++) {
+        double distance = gap(q, i, sim->now->time, q->e);
+        double speed = gap_rate(q, i, q->e, sim->front + system->n);
+        bool closes = sim->holds[i] == 0.0 && !struck[i] &&
+                      ((distance <= near && speed < -bound) ||
+                       (distance + sim->floors[i] <= 0.0 && speed < 0.0));
+        if (closes) {
+            struck[i] = true;
+            event.kind = IMPACT;
+            event.index = i;
+            return event;
+        }
+    }
+    return event;
+}
+
+/* After an event: where gaps close from here on, and how fast the walls that hold move. */
+static void arm(Simulation *sim) {
+    const Equations *q = &sim->equations;
+    for (int i = 0; i < sim->system.s; i++) {
+        sim->floors[i] = FLOOR * sim->system.length;
+        if (sim->holds[i] == 0.0) {
+            sim->floors[i] += greater(0.0, -gap(q, i, sim->now->time, q->e));
+        }
+        sim->held_rates[i] = sim->walls[i].rate;
+    }
+}
+
+static bool let_all_happen(Simulation *sim, Problem *problem) {
+    enum { MOST_AT_ONCE = 16 };
+    bool struck[64] = {false};
+    if (!evaluate_motion(sim, problem) || !follow_walls(sim, problem)) {
+        return false;
+    }
+    for (int i = 0; i < MOST_AT_ONCE; i++) {
+        if (!evaluate_motion(sim, problem)) {
+            return false;
+        }
+        Event event = due_here(sim, struck);
+        if (event.kind == NO_EVENT) {
+            break;
+        }
+        changed_front(sim);
+        if (!happen(sim, &event, problem)) {
+            return false;
+        }
+    }
+    return evaluate_motion(sim, problem);
+}
+
+PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem) {
+    Simulation *sim = simulation;
+    size_t mark = sim->scratch.used;
+    int nx = exchange_states(sim);
+    double *before = take(&sim->scratch, (size_t)nx);
+    *changed = false;
+    copy(nx, sim->states, before);
+    keep_backup(sim);
+    bool right = let_all_happen(sim, problem);
+    if (right) {
+        arm(sim);
+        copy(state_size(sim), sim->front, sim->arc_y);
+        states_of(sim, sim->front, sim->states);
+        *changed = memcmp(before, sim->states, (size_t)nx * sizeof *before) != 0;
+    }
+    sim->scratch.used = mark;
+    right = attempt(sim, right, problem);
+    sim->stale = !right;
+    return right;
+}
+
+PRBM void exchange_begin(Simulation *sim) {
+    Problem ignored;
+    copy(state_size(sim), sim->front, sim->arc_y);
+    states_of(sim, sim->front, sim->states);
+    sim->stale = true;
+    if (evaluate_motion(sim, &ignored)) {
+        arm(sim);
+    }
+    sim->stale = true;
+}
+
+/* --- directional derivatives ------------------------------------------------------------------------------------ */
+
+/* A change of everything with the states and inputs: dq, dv, da, -dlam, of the rows B of what is
+ * active. */
+typedef struct {
+    Simulation *sim;
+    const Equations *q;
+    const Complex *e;
+    const double *y, *v, *a, *du;
+    double *dq, *dv, *dx; /* (n,), (n,), (n + r,) = (da, -dlam) */
+} Tangent;
+
+static double multiplier(const Tangent *t, int k) {
+    return -t->q->x[t->q->system->n + k];
+}
+
+static double multiplier_change(const Tangent *t, int k) {
+    return -t->dx[t->q->system->n + k];
+}
+
+/* Change of a scalar -Im(B e) v along dq and dv. */
+static double rate_change(const Tangent *t, const Complex *row) {
+    double sum = 0.0;
+    for (int j = 0; j < t->q->system->n; j++) {
+        Complex arm_j = product(row[j], t->e[j]);
+        sum -= arm_j.re * t->dq[j] * t->v[j] + arm_j.im * t->dv[j];
+    }
+    return sum;
+}
+
+/* dq and dv from the changes of the independent ones: J dq = 0, J dv = Re(B e) v dq. */
+static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) {
+    Simulation *sim = t->sim;
+    const Mechanism *m = sim->mechanism;
+    const System *system = &sim->system;
+    int n = system->n, r = system->r, count = m->independent_count;
+    int *dependent = take_integers(&sim->scratch, r), *pivot = take_integers(&sim->scratch, r);
+    double *rows = take_matrix(&sim->scratch, r, n), *a = take_matrix(&sim->scratch, r, r);
+    double *s = take(&sim->scratch, (size_t)r);
+    dependents(m, dependent);
+    jacobian(r, n, system->loops, t->e, rows);
+    if (!factor_dependents(sim, rows, dependent, a, pivot)) {
+        return singular_choice(sim, dependent, problem);
+    }
+    zeros(n, t->dq);
+    zeros(n, t->dv);
+    for (int k = 0; k < count; k++) {
+        t->dq[m->independent[k]] = dx[k];
+        t->dv[m->independent[k]] = dx[count + k];
+    }
+    for (int i = 0; i < r; i++) {
+        s[i] = -dot(n, rows + i * n, t->dq);
+    }
+    lu_solve(r, a, pivot, s);
+    for (int k = 0; k < r; k++) {
+        t->dq[dependent[k]] = s[k];
+    }
+    for (int i = 0; i < r; i++) {
+        s[i] = -rate_change(t, system->loops + i * n);
+    }
+    lu_solve(r, a, pivot, s);
+    for (int k = 0; k < r; k++) {
+        t->dv[dependent[k]] = s[k];
+    }
+    return true;
+}
+
+/* Im and Re of diag(e)^H H diag(e), without J. */
+static Complex turned_moment(const Tangent *t, int i, int j) {
+    const System *system = t->q->system;
+    return product(product(conjugate(t->e[i]), system->H[i * system->n + j]), t->e[j]);
+}
+
+/* dM x, from dM_ij = -Im(Hq_ij) (dq_j - dq_i). */
+static double mass_change(const Tangent *t, int i, const double *x) {
+    double sum = 0.0;
+    for (int j = 0; j < t->q->system->n; j++) {
+        sum -= turned_moment(t, i, j).im * (t->dq[j] - t->dq[i]) * x[j];
+    }
+    return sum;
+}
+
+static double momentum_of(const Tangent *t, int i, const double *x) {
+    double sum = t->q->system->J[i] * x[i];
+    for (int j = 0; j < t->q->system->n; j++) {
+        sum += turned_moment(t, i, j).re * x[j];
+    }
+    return sum;
+}
+
+/* Change of the row of loads of the inputs. */
+static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
+    const System *system = t->q->system;
+    const Mechanism *m = system->mechanism;
+    const double *base = t->du + m->input_count - 2;
+    int n = system->n;
+    size_t mark = t->sim->scratch.used;
+    Complex *one = take_complex(&t->sim->scratch, n, 1);
+    field_row(n, system->S, complex_of(-base[0], -base[1]), dw);
+    zeros(n, dmoment);
+    for (int i = 0; i < m->force_count; i++) {
+        const BodyFrame *frame = &system->bodies[m->forces[i].body - 1];
+        const double *given = t->du + 3 * i;
+        force_row(n, frame->A, complex_of(given[0], given[1]), one);
+        for (int j = 0; j < n; j++) {
+            dw[j] = plus(dw[j], one[j]);
+        }
+        dmoment[frame->j] += given[2];
+    }
+    t->sim->scratch.used = mark;
+}
+
+/* Loads and quadratic velocities: change of Q - C v^2. */
+static void load_change(const Tangent *t, const Complex *dw, const double *dmoment) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    int n = system->n;
+    for (int i = 0; i < n; i++) {
+        Complex turned = product(q->w[i], t->e[i]);
+        double sum = product(dw[i], t->e[i]).re - turned.im * t->dq[i] + dmoment[i];
+        for (int j = 0; j < n; j++) {
+            Complex moment = turned_moment(t, i, j);
+            sum += moment.re * (t->dq[j] - t->dq[i]) * (t->v[j] * t->v[j]) +
+                   moment.im * 2.0 * t->v[j] * t->dv[j];
+            sum -= system->K[i * n + j] * (t->dq[j] + q->beta * t->dv[j]);
+        }
+        if (q->mass_damping != 0.0) {
+            sum -= q->mass_damping * (mass_change(t, i, t->v) + momentum_of(t, i, t->dv));
+        }
+        t->dx[i] = sum - mass_change(t, i, t->a);
+    }
+}
+
+static double lift_change(const Tangent *t, int i) {
+    const System *system = t->q->system;
+    return row_rate(system->n, system->lifts + i * system->n, t->e, t->dq);
+}
+
+/* Change of the limit of friction of a friction point. */
+static double limit_change(const Tangent *t, int i) {
+    const double *law = t->q->rub_law + 3 * i;
+    return rub_limit(t->q, i, t->e) > 0.0 ? law[0] * law[2] * lift_change(t, i) : 0.0;
+}
+
+static void rub_change(const Tangent *t) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    int n = system->n;
+    for (int k = 0; k < q->rub_slide_count; k++) {
+        int i = q->rub_slides[k];
+        double force = rub_force(q, i), change = -q->discrete.rubs[i] * limit_change(t, i);
+        for (int j = 0; j < n; j++) {
+            Complex arm_j = product(system->rubs[i * n + j], t->e[j]);
+            t->dx[j] -= change * arm_j.im + force * arm_j.re * t->dq[j];
+        }
+    }
+}
+
+/* Rows and columns: change of the right side by dR^T lam and -dR a, and of Re(B e) v^2. */
+static void row_change(const Tangent *t) {
+    const Equations *q = t->q;
+    int n = q->system->n;
+    for (int k = 0; k < q->r; k++) {
+        double lam = multiplier(t, k), sum = 0.0;
+        for (int j = 0; j < n; j++) {
+            Complex arm_j = product(q->B[k * n + j], t->e[j]);
+            t->dx[j] -= lam * arm_j.re * t->dq[j];
+            sum += arm_j.re * t->dq[j] * t->a[j] - arm_j.im * t->dq[j] * (t->v[j] * t->v[j]) +
+                   arm_j.re * 2.0 * t->v[j] * t->dv[j];
+        }
+        t->dx[n + k] = sum;
+    }
+    for (int k = 0; k < q->sliding_count; k++) {
+        int i = q->sliding[k];
+        double share = -q->stop_friction[i] * q->discrete.slides[i];
+        double lam = multiplier(t, q->first_hold + held_at(q, i));
+        for (int j = 0; j < n; j++) {
+            Complex arm_j = product(q->system->slides[i * n + j], t->e[j]);
+            t->dx[j] -= lam * share * arm_j.re * t->dq[j];
+        }
+    }
+}
+
+/* --- their outputs --- */
+
+static void body_changes(const Tangent *t, double *out) {
+    const System *system = t->q->system;
+    for (int i = 0; i < system->b; i++) {
+        const BodyFrame *frame = &system->bodies[i];
+        double *d = out + PER_BODY * i;
+        for (int j = 0; j < system->n; j++) {
+            Complex arm_j = product(frame->A[j], t->e[j]);
+            d[0] -= arm_j.im * t->dq[j];
+            d[1] += arm_j.re * t->dq[j];
+            d[3] -= arm_j.re * t->dq[j] * t->v[j] + arm_j.im * t->dv[j];
+            d[4] += -arm_j.im * t->dq[j] * t->v[j] + arm_j.re * t->dv[j];
+        }
+        d[2] = t->dq[frame->j];
+        d[5] = t->dv[frame->j];
+    }
+}
+
+static double gap_change(const Tangent *t, int i) {
+    const System *system = t->q->system;
+    double displacement = t->du[3 * system->mechanism->force_count + 2 * i];
+    return row_rate(system->n, system->gaps + i * system->n, t->e, t->dq) + displacement;
+}
+
+static double gap_rate_change(const Tangent *t, int i) {
+    const System *system = t->q->system;
+    double velocity = t->du[3 * system->mechanism->force_count + 2 * i + 1];
+    return rate_change(t, system->gaps + i * system->n) + velocity;
+}
+
+static void stop_changes(const Tangent *t, double *out) {
+    for (int i = 0; i < t->q->system->s; i++) {
+        out[PER_STOP * i] = gap_change(t, i);
+        out[PER_STOP * i + 1] = gap_rate_change(t, i);
+    }
+    for (int k = 0; k < t->q->held_count; k++) {
+        out[PER_STOP * t->q->held[k] + 2] = multiplier_change(t, t->q->first_hold + k);
+    }
+}
+
+static void base_changes(const Tangent *t, double *out) {
+    const System *system = t->q->system;
+    const Mechanism *m = system->mechanism;
+    int n = system->n;
+    const double *base = t->du + m->input_count - 2, *given = t->q->inputs.forces;
+    Complex field = minus(system->gravity, t->q->inputs.base), force = {0.0, 0.0};
+    double moment = 0.0;
+    for (int i = 0; i < system->p; i++) {
+        Complex z = minus(system->c[i], system->anchor), dz = {0.0, 0.0};
+        Complex bend = {0.0, 0.0}, dbend = {0.0, 0.0};
+        for (int j = 0; j < n; j++) {
+            Complex arm_j = product(system->A[i * n + j], t->e[j]);
+            double v2 = t->v[j] * t->v[j];
+            double along_it = -t->a[j] * t->dq[j] - 2.0 * t->v[j] * t->dv[j];
+            double across = t->dx[j] - t->dq[j] * v2;
+            z = plus(z, arm_j);
+            dz = plus(dz, complex_of(-arm_j.im * t->dq[j], arm_j.re * t->dq[j]));
+            bend = plus(bend, product(arm_j, complex_of(-v2, t->a[j])));
+            dbend = plus(dbend, product(arm_j, complex_of(along_it, across)));
+        }
+        Complex load = scaled(system->m[i], minus(field, bend));
+        Complex change = scaled(-system->m[i], plus(complex_of(base[0], base[1]), dbend));
+        force = plus(force, change);
+        moment += product(conjugate(dz), load).im + product(conjugate(z), change).im;
+    }
+    for (int j = 0; j < n; j++) {
+        moment -= system->J[j] * t->dx[j];
+    }
+    for (int i = 0; i < m->force_count; i++) {
+        const BodyFrame *frame = &system->bodies[m->forces[i].body - 1];
+        const double *df = t->du + 3 * i, *f = given + 3 * i;
+        Complex centre = minus(frame->c, system->anchor), moved = {0.0, 0.0};
+        for (int j = 0; j < n; j++) {
+            Complex arm_j = product(frame->A[j], t->e[j]);
+            centre = plus(centre, arm_j);
+            moved = plus(moved, complex_of(-arm_j.im * t->dq[j], arm_j.re * t->dq[j]));
+        }
+        force = plus(force, complex_of(df[0], df[1]));
+        moment += product(conjugate(moved), complex_of(f[0], f[1])).im +
+                  product(conjugate(centre), complex_of(df[0], df[1])).im + df[2];
+    }
+    out[0] = force.re;
+    out[1] = force.im;
+    out[2] = moment;
+}
+
+/* Change of the kinetic energy, v^T (M dv + dM v / 2). */
+static double kinetic_change(const Tangent *t) {
+    double sum = 0.0;
+    for (int i = 0; i < t->q->system->n; i++) {
+        sum += t->v[i] * (momentum_of(t, i, t->dv) + 0.5 * mass_change(t, i, t->v));
+    }
+    return sum;
+}
+
+static void energy_changes(const Tangent *t, const double *dx, double *out) {
+    const System *system = t->q->system;
+    int n = system->n, count = system->mechanism->independent_count;
+    Complex fall = {0.0, 0.0};
+    out[0] = kinetic_change(t);
+    for (int i = 0; i < n; i++) {
+        Complex arm_j = product(system->S[i], t->e[i]);
+        fall = plus(fall, complex_of(-arm_j.im * t->dq[i], arm_j.re * t->dq[i]));
+        for (int j = 0; j < n; j++) {
+            out[1] += (t->y[i] - system->q0[i]) * system->K[i * n + j] * t->dq[j];
+        }
+    }
+    out[2] = -product(conjugate(system->gravity), fall).re;
+    out[3] = dx[2 * count];
+    out[4] = dx[2 * count + 1];
+}
+
+static double dissipation_change(const Tangent *t) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    int n = system->n;
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            sum += 2.0 * q->beta * t->v[i] * system->K[i * n + j] * t->dv[j];
+        }
+    }
+    sum += 2.0 * q->mass_damping * kinetic_change(t);
+    for (int k = 0; k < q->rub_slide_count; k++) {
+        int i = q->rub_slides[k];
+        const Complex *row = system->rubs + i * n;
+        double change = -q->discrete.rubs[i] * limit_change(t, i);
+        sum -= change * row_rate(n, row, t->e, t->v) + rub_force(q, i) * rate_change(t, row);
+    }
+    for (int k = 0; k < q->sliding_count; k++) {
+        int i = q->sliding[k], h = q->first_hold + held_at(q, i);
+        const Complex *row = system->slides + i * n;
+        sum += q->stop_friction[i] * q->discrete.slides[i] *
+               (multiplier_change(t, h) * row_rate(n, row, t->e, t->v) +
+                multiplier(t, h) * rate_change(t, row));
+    }
+    return sum;
+}
+
+static double power_change(const Tangent *t, const Complex *dw, const double *dmoment) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    double sum = 0.0;
+    for (int j = 0; j < system->n; j++) {
+        Complex load = product(q->w_input[j], t->e[j]);
+        double change = product(dw[j], t->e[j]).re - load.im * t->dq[j] + dmoment[j];
+        sum += change * t->v[j] + (load.re + q->moment[j]) * t->dv[j];
+    }
+    for (int k = 0; k < q->held_count; k++) {
+        int i = q->held[k], h = q->first_hold + k;
+        double velocity = t->du[3 * system->mechanism->force_count + 2 * i + 1];
+        sum -= multiplier_change(t, h) * q->inputs.walls[i].rate + multiplier(t, h) * velocity;
+    }
+    return sum;
+}
+
+static double sign_times(double x, double change) {
+    return x < 0.0 ? -change : change;
+}
+
+static void indicator_changes(const Tangent *t, double *out) {
+    const Simulation *sim = t->sim;
+    const Equations *q = t->q;
+    const System *system = q->system;
+    int n = system->n;
+    double *rubs = out + STOP_INDICATORS * system->s;
+    for (int i = 0; i < system->s; i++) {
+        if (sim->holds[i] == 0.0) {
+            bool opens = gap_rate(q, i, t->e, t->v) > 0.0;
+            double ahead = opens ? FORESIGHT * period(sim) * gap_rate_change(t, i) : 0.0;
+            out[STOP_INDICATORS * i] = (gap_change(t, i) + ahead) / system->length;
+        }
+    }
+    for (int k = 0; k < q->held_count; k++) {
+        out[STOP_INDICATORS * q->held[k] + 1] =
+            multiplier_change(t, q->first_hold + k) / force_scale(sim);
+    }
+    for (int k = 0; k < q->stuck_count; k++) {
+        int i = q->stuck[k], h = q->first_hold + held_at(q, i), s = q->first_stick + k;
+        double limit = (1.0 + SLACK) * (q->stop_friction[i] * multiplier_change(t, h));
+        double friction = sign_times(multiplier(t, s), multiplier_change(t, s));
+        out[STOP_INDICATORS * i + 2] = (limit - friction) / force_scale(sim);
+    }
+    for (int k = 0; k < q->sliding_count; k++) {
+        int i = q->sliding[k];
+        double change = rate_change(t, system->slides + i * n);
+        out[STOP_INDICATORS * i + 2] = q->discrete.slides[i] * change / speed_scale(sim);
+    }
+    for (int k = 0; k < q->rubbing_count; k++) {
+        int i = q->rubbing[k], s = q->first_rub + k;
+        double friction = sign_times(multiplier(t, s), multiplier_change(t, s));
+        rubs[i] = ((1.0 + SLACK) * limit_change(t, i) - friction) / force_scale(sim);
+    }
+    for (int k = 0; k < q->rub_slide_count; k++) {
+        int i = q->rub_slides[k];
+        double change = rate_change(t, system->rubs + i * n);
+        rubs[i] = q->discrete.rubs[i] * change / speed_scale(sim);
+    }
+}
+
+static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
+                        const double *dmoment, double *out) {
+    const Mechanism *m = t->sim->mechanism;
+    const System *system = t->q->system;
+    const Slots *slots = &m->slots;
+    zeros(slots->count, out);
+    copy(m->input_count, t->du, out + slots->inputs);
+    body_changes(t, out + slots->bodies);
+    stop_changes(t, out + slots->stops);
+    base_changes(t, out + slots->base);
+    energy_changes(t, dx, out + slots->energies);
+    for (int k = 0; k < m->link_count; k++) {
+        out[slots->links + PER_LINK * k] = t->dq[system->links[k]];
+        out[slots->links + PER_LINK * k + 1] = t->dv[system->links[k]];
+    }
+    for (int k = 0; k < m->independent_count; k++) {
+        out[slots->derivatives + k] = t->dx[m->independent[k]];
+    }
+    double *powers = out + slots->derivatives + m->independent_count;
+    powers[0] = dissipation_change(t);
+    powers[1] = power_change(t, dw, dmoment);
+    indicator_changes(t, out + slots->indicators);
+}
+
+PRBM bool exchange_directional(Simulation *simulation, const double *dx, const double *du,
+                               double *dvalues, Problem *problem) {
+    Simulation *sim = simulation;
+    size_t mark = sim->scratch.used;
+    int n = sim->system.n;
+    if (!evaluate_motion(sim, problem)) {
+        return false;
+    }
+    const Equations *q = &sim->equations;
+    Tangent t = {sim, q, q->e, sim->at, sim->at + n, q->x, du, NULL, NULL, NULL};
+    t.dq = take(&sim->scratch, (size_t)n);
+    t.dv = take(&sim->scratch, (size_t)n);
+    t.dx = take(&sim->scratch, (size_t)(n + q->r));
+    double *dmoment = take(&sim->scratch, (size_t)n);
+    Complex *dw = take_complex(&sim->scratch, n, 1);
+    bool right = tangent_coordinates(&t, dx, problem);
+    if (right) {
+        load_row_change(&t, dw, dmoment);
+        load_change(&t, dw, dmoment);
+        rub_change(&t);
+        row_change(&t);
+        solve_again(&q->factors, t.dx);
+        all_changes(&t, dx, dw, dmoment, dvalues);
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* --- values ------------------------------------------------------------------------------------------------------ */
+
+/* A derivative or an indicator by its slot; in co-simulation they are evaluated where it is. */
+PRBM bool exchange_value(Simulation *sim, int slot, double *x, Problem *problem) {
+    const Mechanism *m = sim->mechanism;
+    const Slots *slots = &m->slots;
+    size_t mark = sim->scratch.used;
+    int n = sim->system.n, count = m->independent_count;
+    double *z = take(&sim->scratch, (size_t)exchange_indicators(sim));
+    bool right;
+    if (slot >= slots->indicators) {
+        right = exchange_event_indicators(sim, z, problem);
+        *x = right ? z[slot - slots->indicators] : 0.0;
+    } else {
+        right = evaluate_motion(sim, problem);
+        int k = slot - slots->derivatives;
+        *x = sim->rates[k < count ? n + m->independent[k] : 2 * n + k - count];
+    }
+    sim->scratch.used = mark;
+    return right;
+}

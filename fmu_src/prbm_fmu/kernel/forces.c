@@ -1,0 +1,54 @@
+/* Generalised forces: the twin of prbm/forces.py. */
+#include "kernel.h"
+
+PRBM void springs(int n, const double *K, const double *deflection, double *torque) {
+    for (int i = 0; i < n; i++) {
+        double sum = 0.0;
+        for (int j = 0; j < n; j++) {
+            sum += K[i * n + j] * deflection[j];
+        }
+        torque[i] = -sum;
+    }
+}
+
+PRBM double elastic_energy(int n, const double *K, const double *deflection) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            sum += deflection[i] * K[i * n + j] * deflection[j];
+        }
+    }
+    return 0.5 * sum;
+}
+
+PRBM void field_row(int n, const Complex *S, Complex acceleration, Complex *w) {
+    force_row(n, S, acceleration, w);
+}
+
+PRBM void force_row(int n, const Complex *A, Complex force, Complex *w) {
+    Complex turned = complex_of(force.im, force.re); /* i conj(F) */
+    for (int j = 0; j < n; j++) {
+        w[j] = product(turned, A[j]);
+    }
+}
+
+PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q) {
+    for (int j = 0; j < n; j++) {
+        Q[j] = product(w[j], e[j]).re;
+    }
+}
+
+PRBM double gravitational_energy(const System *system, const Complex *e) {
+    Complex fall = {0.0, 0.0};
+    for (int j = 0; j < system->n; j++) {
+        Complex straight;
+        directions(1, &system->q0[j], &straight);
+        fall = plus(fall, product(system->S[j], minus(e[j], straight)));
+    }
+    return -product(conjugate(system->gravity), fall).re;
+}
+
+PRBM double normal_force(double lift, double preload, double stiffness) {
+    double force = preload + stiffness * lift;
+    return force > 0.0 ? force : 0.0;
+}

@@ -1,0 +1,490 @@
+/* The engine in C: the twin of the Python package prbm.
+ *
+ * Each file here is the twin of the Python module of the same name: the same functions with the
+ * same arguments in the same order.  Plain C99; after a simulation is opened nothing is allocated;
+ * no global state; of libm only sqrt, fabs, floor, frexp and ldexp, all of which are exact or
+ * correctly rounded, so that the same input gives the same bytes on every platform.
+ *
+ * Matrices are stored row by row.  A function that can fail returns false and leaves a sentence
+ * in a Problem.  SI units and radians everywhere; docs/conventions.md has the signs and symbols.
+ */
+#ifndef PRBM_KERNEL_H
+#define PRBM_KERNEL_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* All functions are local to the one file that the library is compiled from.  A test that looks
+ * at them one by one defines PRBM as nothing. */
+#ifndef PRBM
+#if defined(__GNUC__)
+#define PRBM static __attribute__((unused))
+#else
+#define PRBM static
+#endif
+#endif
+
+/* --- errors and memory ------------------------------------------------------------------------ */
+
+enum { PROBLEM_LENGTH = 640 };
+
+typedef struct {
+    char text[PROBLEM_LENGTH];
+} Problem;
+
+/* Write a sentence; returns false, so that "return fail(problem, ...)" reads well. */
+#if defined(__GNUC__)
+PRBM bool fail(Problem *problem, const char *format, ...) __attribute__((format(printf, 2, 3)));
+#else
+PRBM bool fail(Problem *problem, const char *format, ...);
+#endif
+
+/* A block that is laid out once: first with base NULL to count, then to place. */
+typedef struct {
+    char *base;
+    size_t used;
+} Memory;
+
+PRBM void *place(Memory *memory, size_t count, size_t size);
+
+/* Working memory for one call: taken in order, given back by setting used to what it was.
+ * Asking for more than there is yields the spare block, which is as large as any single request
+ * may be, and sets exceeded: results are then worthless, but nothing is overwritten. */
+typedef struct {
+    double *base, *spare;
+    size_t used, size, most;
+    bool exceeded;
+} Scratch;
+
+PRBM double *take(Scratch *scratch, size_t count);
+
+typedef struct {
+    double re, im;
+} Complex;
+
+PRBM double *take_matrix(Scratch *scratch, int rows, int columns);
+PRBM Complex *take_complex(Scratch *scratch, int rows, int columns);
+PRBM int *take_integers(Scratch *scratch, int count);
+
+/* --- numbers.c: elementary functions, the same bits on every platform --------------------------- */
+
+PRBM void directions(int n, const double *q, Complex *e);   /* e = exp(i q), as np.exp(1j * q) */
+PRBM double natural_log(double x);                          /* x > 0 */
+PRBM double exponential(double x);
+PRBM double power(double x, double y);                      /* x^y for x > 0 */
+PRBM double phase(Complex z);                               /* as cmath.phase, in (-pi, pi] */
+PRBM bool finite_number(double x);
+PRBM double largest(int n, const double *x);                /* max |x_i|, 0 for none */
+PRBM double greater(double a, double b); /* b unless a > b */
+PRBM double lesser(double a, double b);  /* b unless a < b */
+
+/* --- matrix.c: linear algebra ------------------------------------------------------------------- */
+
+PRBM double dot(int n, const double *a, const double *b);
+PRBM void copy(int n, const double *from, double *to);
+PRBM void zeros(int n, double *x);
+/* LU with partial pivoting, in place; false if a pivot is zero or not a number. */
+PRBM bool lu_factor(int n, double *a, int *pivot);
+PRBM void lu_solve(int n, const double *a, const int *pivot, double *b);
+/* Cholesky L L^T of a symmetric matrix within its envelope: row i begins at column first[i].
+ * Reads and overwrites the lower triangle; the diagonal is left inverted; false if a pivot is not
+ * positive. */
+PRBM bool cholesky(int n, const int *first, double *a);
+PRBM void forward(int n, const int *first, const double *a, double *b);  /* b := L^-1 b */
+PRBM void backward(int n, const int *first, const double *a, double *b); /* b := L^-T b */
+/* The x of least norm among those that minimise |a x - b|, as np.linalg.lstsq: singular values
+ * below rcond times the largest count as zero.  a is (m, n). */
+PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
+                        Scratch *scratch);
+/* The rank of a (m, n): number of singular values above the tolerance. */
+PRBM int rank(int m, int n, const double *a, double tolerance, Scratch *scratch);
+/* Eigenvalues w in rising order and, unless NULL, orthonormal eigenvectors as columns of z, of a
+ * symmetric matrix, which is destroyed (cyclic Jacobi). */
+PRBM void symmetric_eigen(int n, double *a, double *w, double *z);
+/* An orthonormal basis z (n, n - r) of what the rows (r, n), of full rank, send to zero. */
+PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch);
+
+/* --- mechanism.c: the tables ---------------------------------------------------------------------- */
+
+enum { GROUND = 0 }; /* bodies are counted from 1 */
+
+/* constant + sum(factor * parameter) */
+typedef struct {
+    double constant;
+    int count;
+    const int *parameter;
+    const double *factor;
+} Expression;
+
+typedef struct {
+    const char *name, *unit;
+    double start, minimum, maximum;
+    bool tunable;
+} Parameter;
+
+typedef struct {
+    Expression x, y;
+} Point;
+
+typedef struct {
+    const char *name;
+    Expression mass, inertia;
+    Point centre;
+} Body;
+
+typedef struct {
+    const char *name;
+    bool lumped, rate_with_gamma;
+    int pivots; /* of a cantilever */
+    Expression thickness, width, youngs_modulus, density;
+    const Expression *gamma, *K_theta; /* (pivots,) */
+} FlexureType;
+
+typedef struct {
+    const char *name;
+    int type;
+    int start, end; /* bodies, GROUND or 1 ... */
+    Point start_point, end_point;
+    bool clamped_start, clamped_end;
+} Flexure;
+
+typedef struct {
+    const char *name;
+    int body; /* 1 ... */
+    Point point;
+    double direction; /* deg */
+    Expression position, offset, restitution, friction, rest_speed;
+} Stop;
+
+typedef struct {
+    const char *name;
+    int body;
+    double direction;
+    Expression coefficient, normal_force, normal_stiffness;
+} Friction;
+
+typedef struct {
+    const char *name;
+    int body;
+} Force;
+
+typedef struct {
+    int body;
+    double direction;
+    Expression displacement, velocity;
+} Release;
+
+/* A field of a part that is an expression, with the bounds of the parameter it stands for. */
+typedef struct {
+    const char *name, *unit;
+    Expression expression;
+    double minimum, maximum;
+} Bound;
+
+enum { REAL, INTEGER, BOOLEAN, CLOCK }; /* a clock has the slot of the impact_count of its stop */
+
+typedef struct {
+    uint32_t reference;
+    int type; /* REAL, INTEGER, BOOLEAN, CLOCK */
+    int slot; /* in the vector of all values, see Slots */
+    const char *name;
+} Variable;
+
+/* The vector of all values: where each group begins. */
+typedef struct {
+    int parameters, inputs, bodies, stops, base, energies, latched, links, frequency, calculated,
+        derivatives, indicators, time, count;
+} Slots;
+
+enum {
+    PER_BODY = 6,    /* x, y, angle, vx, vy, omega */
+    PER_STOP = 3,    /* gap, gap_rate, force */
+    PER_BASE = 3,    /* force.x, force.y, moment */
+    PER_ENERGY = 5,  /* kinetic, elastic, gravitational, dissipated, work */
+    PER_LATCHED = 8, /* contact, impact_count, impact_time, approach_speed, rebound_speed, impulse,
+                        energy_lost, modal_restitution */
+    PER_LINK = 2,    /* angle, omega */
+    STOP_INDICATORS = 3, /* impact, release, slip; then one slip for each friction point */
+};
+
+typedef struct {
+    const char *token, *name;
+    int parameter_count, body_count, type_count, flexure_count, stop_count, friction_count,
+        force_count, ground_count, bound_count, variable_count, independent_count, input_count;
+    const Parameter *parameters;
+    const Body *bodies; /* (body_count,): body k is bodies[k - 1] */
+    const FlexureType *types;
+    const Flexure *flexures;
+    const Stop *stops;
+    const Friction *frictions;
+    const Force *forces;
+    const Point *ground;
+    const Bound *bounds;
+    const Variable *variables; /* in rising order of their references */
+    const char *const *input_names;
+    const double *input_starts; /* (input_count,) */
+    const int *link_of, *body_of; /* of each coordinate: which link it is, or -1; which body */
+    const int *independent; /* coordinates whose angles and rates are states in model exchange */
+    Release release;
+    int gravity[2], tolerance, damping_zeta, damping_beta; /* parameters */
+    int coordinate_count, loop_count, link_count, mass_count; /* of the assembled system */
+    Slots slots;
+} Mechanism;
+
+/* Read tables that anybody may have tampered with; NULL and a sentence if they are not sound.
+ * The result is one block and keeps nothing of the bytes. */
+PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem *problem);
+PRBM void mechanism_close(Mechanism *mechanism);
+PRBM double evaluate(Expression quantity, const double *values); /* twin: mechanism.Affine */
+PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
+/* Check all values and the fields that are expressions (Mechanism.values of the twin). */
+PRBM bool check_values(const Mechanism *mechanism, const double *values, Problem *problem);
+PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t reference);
+
+/* --- flexure.c ------------------------------------------------------------------------------------ */
+
+/* A flexure cut into rigid segments: n + 2 lengths and rods, n + 1 rates and lumps. */
+typedef struct {
+    int n;
+    double *lengths, *rates, *rods, *lumps;
+} Segments;
+
+PRBM bool stub(int pivots, const double *gamma, double *gamma0, Problem *problem);
+PRBM void reverse(int count, double *x);
+PRBM bool segments(const FlexureType *model, const double *gamma, const double *K_theta,
+                   bool clamped_start, bool clamped_end, double L, double EI, double mass,
+                   Segments *result, Problem *problem);
+
+/* --- assembly.c ----------------------------------------------------------------------------------- */
+
+typedef struct {
+    int j; /* coordinate */
+    Complex c, drawn;
+    Complex *A; /* (n,) */
+} BodyFrame;
+
+/* A point of the mechanism, z = c + A e; as the origin of a body: with its coordinate and where it
+ * is drawn. */
+typedef struct {
+    Complex c, drawn;
+    Complex *A; /* (n,) */
+    int j;
+    bool moves;
+} Place;
+
+/* A torsion spring between two coordinates, -1: the ground. */
+typedef struct {
+    double rate; /* N m/rad */
+    int a, b;
+} Spring;
+
+/* The constant arrays of a mechanism, as in the twin; n coordinates, r loop rows, p mass points,
+ * s stops, f friction points, b bodies. */
+typedef struct {
+    const Mechanism *mechanism;
+    const double *values;
+    int n, r, p, s, f, b;
+    double *q0, *J, *K;       /* (n,), (n,), (n, n) */
+    Complex *H, *A, *c;       /* (n, n), (p, n), (p,) */
+    double *m;                /* (p,) */
+    Complex *S;               /* (n,) first mass moments */
+    Complex *loops;           /* (r, n) */
+    double *loops_c;          /* (r,) */
+    Complex *gaps, *slides;   /* (s, n) */
+    double *gaps_c;           /* (s,) */
+    Complex *rubs, *lifts;    /* (f, n) */
+    double *lifts_c;          /* (f,) */
+    Complex *release;         /* (n,) */
+    double release_c;
+    BodyFrame *bodies;        /* (b,) */
+    Place *origins;           /* (b + 1,): the ground's first */
+    int *links;               /* coordinates of the links */
+    int spring_count;
+    Spring *spring;           /* what K is made of */
+    int *first;               /* (n,): first column of each row of M that is not zero throughout */
+    double *calculated;       /* gamma0 of the flexure types of several pivots */
+    Complex anchor, gravity;
+    double length;
+} System;
+
+PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory);
+PRBM bool assemble(System *system, const double *values, Scratch *scratch, Problem *problem);
+PRBM Complex unit(double degrees);
+PRBM Complex complex_of(double re, double im);
+PRBM Complex plus(Complex a, Complex b);
+PRBM Complex minus(Complex a, Complex b);
+PRBM Complex product(Complex a, Complex b);
+PRBM Complex conjugate(Complex a);
+PRBM Complex scaled(double x, Complex a);
+PRBM double modulus(Complex a);
+
+/* --- kinetics.c ----------------------------------------------------------------------------------- */
+
+PRBM void inertia(int n, const Complex *H, const double *J, const Complex *e, double *M, double *C);
+PRBM double kinetic_energy(int n, const double *M, const double *v);
+
+/* --- constraints.c --------------------------------------------------------------------------------- */
+
+PRBM void scalars(int r, int n, const Complex *B, const double *c, const Complex *e, double *s);
+PRBM void jacobian(int r, int n, const Complex *B, const Complex *e, double *rows);
+PRBM void convective(int r, int n, const Complex *B, const Complex *e, const double *v, double *x);
+PRBM void saddle(int n, int r, const double *M, const double *columns, const double *rows,
+                 double *kkt);
+/* Solve a saddle-point system by LU; right (n + r,) becomes the solution. */
+PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem *problem);
+/* J, H, length from the system; q (n,) moves onto the constraints, e = exp(i q) of the result. */
+PRBM bool project_positions(const System *system, int r, const Complex *B, const double *c,
+                            double *q, Complex *e, Scratch *scratch, Problem *problem);
+PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
+                             const double *rates, double *v, Scratch *scratch, Problem *problem);
+
+/* M = L L^T in its envelope, Y = L^-1 columns^T, and the Schur complement S of a saddle-point
+ * matrix [[M, columns^T], [rows, 0]]: what to solve with, again and again. */
+typedef struct {
+    int n, r;
+    const int *first;
+    double *L;              /* (n, n) */
+    double *Y, *Y_columns;  /* (r, n): L^-1 rows^T, L^-1 columns^T (the same if there are none) */
+    double *S;              /* (r, r) */
+    int *pivots;            /* (r,) */
+} Factors;
+
+/* columns NULL: the rows.  M is overwritten by L. */
+PRBM bool factor(Factors *factors, int r, const double *columns, const double *rows);
+/* x (n + r,): in, the right side; out, the solution (a, -lam). */
+PRBM void solve_again(const Factors *factors, double *x);
+
+/* --- forces.c --------------------------------------------------------------------------------------- */
+
+PRBM void springs(int n, const double *K, const double *deflection, double *torque);
+PRBM double elastic_energy(int n, const double *K, const double *deflection);
+PRBM void field_row(int n, const Complex *S, Complex acceleration, Complex *w);
+PRBM void force_row(int n, const Complex *A, Complex force, Complex *w);
+PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q);
+PRBM double gravitational_energy(const System *system, const Complex *e);
+PRBM double normal_force(double lift, double preload, double stiffness);
+
+/* --- dynamics.c -------------------------------------------------------------------------------------- */
+
+enum { SLIDES_BACK = -1, STICKS = 0, SLIDES = 1, IDLE = 2 };
+
+/* What holds (1 or 0), slides along its wall and rubs. */
+typedef struct {
+    int *holds, *slides, *rubs; /* (s,), (s,), (f,) */
+} Discrete;
+
+/* A wall in uniform motion: its position along the direction of the stop. */
+typedef struct {
+    double position, rate, since;
+} Wall;
+
+typedef struct {
+    const double *forces;  /* (3 b,): x, y, moment of each force */
+    Complex base;          /* acceleration */
+    const Wall *walls;     /* (s,) */
+} Inputs;
+
+/* Accelerations, multipliers and powers of a system in one discrete state. */
+typedef struct {
+    const System *system;
+    Inputs inputs;
+    Discrete discrete;
+    double omega, beta, mass_damping;
+    int r, first_hold, first_stick, first_rub;
+    int held_count, stuck_count, rubbing_count, sliding_count, rub_slide_count;
+    int *held, *stuck, *rubbing, *sliding, *rub_slides; /* stops, stops, frictions, stops, ... */
+    double *stop_friction;  /* (s,) */
+    double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
+    Complex *B;             /* (r, n) active rows */
+    double *c;              /* (r,) */
+    Complex *w, *w_input;   /* (n,) */
+    double *moment;         /* (n,) */
+    bool driven, walls_push;
+    /* at the state that was evaluated last */
+    Complex *e;                         /* (n,) */
+    double *M, *rows, *columns;         /* (n, n) in its envelope, (r, n), (r, n) */
+    double *x, *squares;                /* (n + r,) = (a, -lam); (n,) */
+    double *least, *most;               /* (held,) extremes of the forces since the trace began */
+    Factors factors;
+} Equations;
+
+PRBM void equations_place(Equations *equations, const System *system, Memory *memory);
+/* Set up the rows and loads of a discrete state. */
+PRBM void set_equations(Equations *equations, const Inputs *inputs, const Discrete *discrete,
+                        double omega);
+/* Accelerations a (n,) and multipliers lam (r,): loops, held stops (> 0 pushes), what sticks. */
+PRBM bool accelerations(Equations *equations, const double *q, const double *v, double *a,
+                        double *lam, Problem *problem);
+PRBM bool rate(Equations *equations, double t, const double *y, double *dy, Problem *problem);
+PRBM void begin_trace(Equations *equations);
+PRBM double energy_here(const Equations *equations, const double *v); /* kinetic, of what was
+                                                                         evaluated last */
+PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
+PRBM bool project(Equations *equations, double t, double *y, Scratch *scratch, Problem *problem);
+PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *scratch,
+                            Problem *problem);
+PRBM double wall_at(const Wall *wall, double t);
+PRBM double gap(const Equations *equations, int i, double t, const Complex *e);
+PRBM double gap_rate(const Equations *equations, int i, const Complex *e, const double *v);
+PRBM double row_value(int n, const Complex *row, const Complex *e);                   /* Re(B e) */
+PRBM double row_rate(int n, const Complex *row, const Complex *e, const double *v);   /* -Im(B e) v */
+PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
+                        const double *a, Complex *force, double *moment);
+
+/* --- runge_kutta.c ------------------------------------------------------------------------------------ */
+
+enum { STAGES = 8, ORDER = 5, DENSE = 4 };
+
+PRBM bool stages(Equations *equations, int n, double t, const double *y, double h, double *k,
+                 double *y1, Problem *problem);
+PRBM void error_of(int n, const double *k, double h, double *error);
+PRBM void weights(double theta, double *b);
+PRBM void interpolate(int n, const double *y, const double *k, double h, double theta,
+                      double *result);
+
+/* --- contact.c -------------------------------------------------------------------------------------- */
+
+/* Changes of velocity X (n, k) by unit impulses along the rows (k, n), while held (r, n) keep. */
+PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
+                   double *X, Scratch *scratch, Problem *problem);
+PRBM void newton(int k, const double *W, const double *u, const double *restitution, double *P,
+                 Scratch *scratch);
+PRBM void stronge(const double *W, const double *u, double friction, double restitution,
+                  double *P_n, double *P_t);
+PRBM bool several(int k, const double *W, const double *u, const double *friction,
+                  const double *restitution, double *P, Scratch *scratch, Problem *problem);
+
+/* --- statics.c -------------------------------------------------------------------------------------- */
+
+typedef struct {
+    double *q, *lam; /* (n,), (r,) */
+    double force;
+} Equilibrium;
+
+/* B (r + 1, n), c (r + 1,): the loops and, below them, the row of the released body. */
+PRBM void stack_release(const System *system, Complex *B, double *c);
+PRBM void tangent_stiffness(int n, int r, const double *K, const Complex *w, const Complex *B,
+                            const double *lam, const Complex *e, double *K_t);
+/* held: whether the released body is held at the displacement. */
+PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
+                      Scratch *scratch, Problem *problem);
+PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
+                           Scratch *scratch, Problem *problem);
+
+/* --- modal.c ---------------------------------------------------------------------------------------- */
+
+/* Frequencies [Hz] (k,) and mass-normalised modes (n, k), k = n - r. */
+PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
+                Scratch *scratch, Problem *problem);
+PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
+                                Problem *problem);
+/* The fundamental mode phi (n,) at a shape and M (n, n) there. */
+PRBM bool fundamental_at(const System *system, const double *q, double *phi, double *M,
+                         Scratch *scratch, Problem *problem);
+PRBM double simulated_restitution(int n, const double *phi, const double *M, const double *before,
+                                  const double *after);
+
+/* --- hybrid.c: see simulation.h ----------------------------------------------------------------------- */
+
+#endif

@@ -1,0 +1,23 @@
+/* Mass matrix, quadratic velocities, kinetic energy: the twin of prbm/kinetics.py. */
+#include "kernel.h"
+
+PRBM void inertia(int n, const Complex *H, const double *J, const Complex *e, double *M,
+                  double *C) {
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            Complex turned = product(product(conjugate(e[i]), H[i * n + j]), e[j]);
+            M[i * n + j] = turned.re + (i == j ? J[i] : 0.0);
+            C[i * n + j] = -turned.im;
+        }
+    }
+}
+
+PRBM double kinetic_energy(int n, const double *M, const double *v) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            sum += v[i] * M[i * n + j] * v[j];
+        }
+    }
+    return 0.5 * sum;
+}

@@ -1,0 +1,355 @@
+/* Linear algebra for small dense matrices.
+ *
+ * Sources: G. H. Golub, C. F. Van Loan, Matrix Computations, Johns Hopkins, 2013: LU 3.4, Cholesky
+ * 4.2, Householder 5.1, Jacobi's eigenvalues 8.5, one-sided Jacobi 8.6.
+ */
+#include <float.h>
+#include <math.h>
+
+#include "kernel.h"
+
+enum { ROTATION_SWEEPS = 60 }; /* Jacobi's converge quadratically: about six are usual */
+
+PRBM double dot(int n, const double *a, const double *b) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        sum += a[i] * b[i];
+    }
+    return sum;
+}
+
+PRBM void zeros(int n, double *x) {
+    for (int i = 0; i < n; i++) {
+        x[i] = 0.0;
+    }
+}
+
+PRBM void copy(int n, const double *from, double *to) {
+    for (int i = 0; i < n; i++) {
+        to[i] = from[i];
+    }
+}
+
+/* --- LU ------------------------------------------------------------------------------------------- */
+
+static int largest_below(int n, const double *a, int k) {
+    int best = k;
+    for (int i = k + 1; i < n; i++) {
+        if (fabs(a[i * n + k]) > fabs(a[best * n + k])) {
+            best = i;
+        }
+    }
+    return best;
+}
+
+static void exchange(int n, double *a, double *b) {
+    for (int i = 0; i < n; i++) {
+        double keep = a[i];
+        a[i] = b[i];
+        b[i] = keep;
+    }
+}
+
+/* The diagonal of U is left inverted, for lu_solve. */
+PRBM bool lu_factor(int n, double *a, int *pivot) {
+    for (int k = 0; k < n; k++) {
+        double *row = a + k * n;
+        pivot[k] = largest_below(n, a, k);
+        if (pivot[k] != k) {
+            exchange(n, row, a + pivot[k] * n);
+        }
+        if (!(fabs(row[k]) > 0.0)) {
+            return false;
+        }
+        row[k] = 1.0 / row[k];
+        for (int i = k + 1; i < n; i++) {
+            double *other = a + i * n;
+            double factor = other[k] *= row[k];
+            for (int j = k + 1; j < n; j++) {
+                other[j] -= factor * row[j];
+            }
+        }
+    }
+    return true;
+}
+
+PRBM void lu_solve(int n, const double *a, const int *pivot, double *b) {
+    for (int k = 0; k < n; k++) {
+        double keep = b[k];
+        b[k] = b[pivot[k]];
+        b[pivot[k]] = keep;
+    }
+    for (int i = 1; i < n; i++) {
+        b[i] -= dot(i, a + i * n, b);
+    }
+    for (int i = n - 1; i >= 0; i--) {
+        b[i] = (b[i] - dot(n - 1 - i, a + i * n + i + 1, b + i + 1)) * a[i * n + i];
+    }
+}
+
+/* --- Cholesky ------------------------------------------------------------------------------------- */
+
+/* L_ij = (a_ij - sum_k L_ik L_jk)/L_jj */
+static void cholesky_row(int n, const int *first, double *a, int i) {
+    double *row = a + i * n;
+    for (int j = first[i]; j < i; j++) {
+        const double *other = a + j * n;
+        int k = first[i] > first[j] ? first[i] : first[j];
+        row[j] = (row[j] - dot(j - k, row + k, other + k)) * other[j];
+    }
+}
+
+PRBM bool cholesky(int n, const int *first, double *a) {
+    for (int i = 0; i < n; i++) {
+        double *row = a + i * n;
+        cholesky_row(n, first, a, i);
+        double square = row[i] - dot(i - first[i], row + first[i], row + first[i]);
+        if (!(square > 0.0)) {
+            return false;
+        }
+        row[i] = 1.0 / sqrt(square);
+    }
+    return true;
+}
+
+PRBM void forward(int n, const int *first, const double *a, double *b) {
+    for (int i = 0; i < n; i++) {
+        const double *row = a + i * n;
+        b[i] = (b[i] - dot(i - first[i], row + first[i], b + first[i])) * row[i];
+    }
+}
+
+PRBM void backward(int n, const int *first, const double *a, double *b) {
+    for (int i = n - 1; i >= 0; i--) {
+        const double *row = a + i * n;
+        b[i] *= row[i];
+        for (int j = first[i]; j < i; j++) {
+            b[j] -= row[j] * b[i];
+        }
+    }
+}
+
+/* --- singular values ------------------------------------------------------------------------------ */
+
+/* The rotation p := c p - s q, q := s p + c q that makes [[p.p, p.q], [p.q, q.q]] diagonal: of the
+ * two that do, the one by the smaller angle. */
+static void small_rotation(double pp, double pq, double qq, double *c, double *s) {
+    double slope = (qq - pp) / (2.0 * pq);
+    double t = (slope >= 0.0 ? 1.0 : -1.0) / (fabs(slope) + sqrt(1.0 + slope * slope));
+    *c = 1.0 / sqrt(1.0 + t * t);
+    *s = t * *c;
+}
+
+static void rotate(int n, double c, double s, double *p, double *q, int stride) {
+    for (int i = 0; i < n * stride; i += stride) {
+        double keep = p[i];
+        p[i] = c * keep - s * q[i];
+        q[i] = s * keep + c * q[i];
+    }
+}
+
+/* One-sided Jacobi: turn the rows of g (k, n) until they are at right angles to each other, and
+ * those of v (k, k), unless NULL, with them.  The norms of the rows are the singular values.
+ * Rows below a rounding of the largest are at right angles as they are. */
+static void orthogonalise(int k, int n, double *g, double *v) {
+    double noise = DBL_EPSILON * largest(k * n, g);
+    bool turned = true;
+    for (int sweep = 0; turned && sweep < ROTATION_SWEEPS; ++sweep) {
+        turned = false;
+        for (int i = 0; i < k; i++) {
+            for (int j = i + 1; j < k; j++) {
+                double *p = g + i * n, *q = g + j * n;
+                double pp = dot(n, p, p), pq = dot(n, p, q), qq = dot(n, q, q);
+                bool small = pp <= noise * noise || qq <= noise * noise;
+                if (small || !(fabs(pq) > n * DBL_EPSILON * sqrt(pp) * sqrt(qq))) {
+                    continue;
+                }
+                double c, s;
+                small_rotation(pp, pq, qq, &c, &s);
+                rotate(n, c, s, p, q, 1);
+                if (v != NULL) {
+                    rotate(k, c, s, v + i * k, v + j * k, 1);
+                }
+                turned = true;
+            }
+        }
+    }
+}
+
+static void identity(int n, double *a) {
+    for (int i = 0; i < n * n; i++) {
+        a[i] = i % (n + 1) == 0 ? 1.0 : 0.0;
+    }
+}
+
+/* g = a or its transpose, with no more rows than columns. */
+static void wide(int m, int n, const double *a, double *g) {
+    for (int i = 0; i < m; i++) {
+        for (int j = 0; j < n; j++) {
+            g[m <= n ? i * n + j : j * m + i] = a[i * n + j];
+        }
+    }
+}
+
+static double norm(int n, const double *x) {
+    return sqrt(dot(n, x, x));
+}
+
+/* Singular values, and rows with the pairs of singular vectors: g_i = s_i u_i (k, n) and v_i
+ * (k, k) or NULL, for a = sum s_i u_i v_i^T or its transpose, k = min(m, n). */
+static void singular_values(int m, int n, const double *a, double *s, double *g, double *v) {
+    int k = m < n ? m : n, length = m < n ? n : m;
+    wide(m, n, a, g);
+    if (v != NULL) {
+        identity(k, v);
+    }
+    orthogonalise(k, length, g, v);
+    for (int i = 0; i < k; i++) {
+        s[i] = norm(length, g + i * length);
+    }
+}
+
+/* x = sum (left_i . b) right_i/s_i^2, one of the two of length s_i, over the s_i that count */
+PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
+                        Scratch *scratch) {
+    size_t used = scratch->used;
+    int k = m < n ? m : n;
+    double *s = take(scratch, (size_t)k), *v = take_matrix(scratch, k, k);
+    double *g = take_matrix(scratch, m, n);
+    singular_values(m, n, a, s, g, v);
+    const double *left = m <= n ? v : g, *right = m <= n ? g : v;
+    double least = rcond * largest(k, s);
+    zeros(n, x);
+    for (int i = 0; i < k; i++) {
+        if (s[i] > least) {
+            double share = dot(m, left + i * m, b) / s[i] / s[i];
+            for (int j = 0; j < n; j++) {
+                x[j] += share * right[i * n + j];
+            }
+        }
+    }
+    scratch->used = used;
+}
+
+PRBM int rank(int m, int n, const double *a, double tolerance, Scratch *scratch) {
+    size_t used = scratch->used;
+    int k = m < n ? m : n, count = 0;
+    double *s = take(scratch, (size_t)k), *g = take_matrix(scratch, m, n);
+    singular_values(m, n, a, s, g, NULL);
+    for (int i = 0; i < k; i++) {
+        count += s[i] > tolerance;
+    }
+    scratch->used = used;
+    return count;
+}
+
+/* --- eigenvalues ---------------------------------------------------------------------------------- */
+
+/* Rotate rows and columns p and q of a so that a_pq = 0. */
+static void jacobi_rotation(int n, double *a, double *z, int p, int q) {
+    double c, s;
+    small_rotation(a[p * n + p], a[p * n + q], a[q * n + q], &c, &s);
+    rotate(n, c, s, a + p * n, a + q * n, 1);
+    rotate(n, c, s, a + p, a + q, n);
+    a[p * n + q] = a[q * n + p] = 0.0;
+    if (z != NULL) {
+        rotate(n, c, s, z + p, z + q, n);
+    }
+}
+
+static void jacobi_sweeps(int n, double *a, double *z) {
+    double negligible = 0.5 * DBL_EPSILON * DBL_EPSILON * largest(n * n, a);
+    bool turned = true;
+    for (int sweep = 0; turned && sweep < ROTATION_SWEEPS; ++sweep) {
+        turned = false;
+        for (int p = 0; p < n; p++) {
+            for (int q = p + 1; q < n; q++) {
+                double size = sqrt(fabs(a[p * n + p])) * sqrt(fabs(a[q * n + q]));
+                if (fabs(a[p * n + q]) > 0.25 * DBL_EPSILON * size + negligible) {
+                    jacobi_rotation(n, a, z, p, q);
+                    turned = true;
+                }
+            }
+        }
+    }
+}
+
+/* Exchange eigenvalues, and columns of z, into rising order. */
+static void sort_eigen(int n, double *w, double *z) {
+    for (int i = 0; i < n; i++) {
+        int least = i;
+        for (int j = i + 1; j < n; j++) {
+            least = w[j] < w[least] ? j : least;
+        }
+        double keep = w[i];
+        w[i] = w[least];
+        w[least] = keep;
+        for (int k = 0; z != NULL && k < n; k++) {
+            keep = z[k * n + i];
+            z[k * n + i] = z[k * n + least];
+            z[k * n + least] = keep;
+        }
+    }
+}
+
+PRBM void symmetric_eigen(int n, double *a, double *w, double *z) {
+    if (z != NULL) {
+        identity(n, z);
+    }
+    jacobi_sweeps(n, a, z);
+    for (int i = 0; i < n; i++) {
+        w[i] = a[i * n + i];
+    }
+    sort_eigen(n, w, z);
+}
+
+/* --- null space ----------------------------------------------------------------------------------- */
+
+/* The u of Householder's reflection 1 - u u^T that sends x to a multiple of the first unit
+ * vector, in place of x. */
+static void householder(int n, double *x) {
+    double length = norm(n, x);
+    if (!(length > 0.0)) {
+        return;
+    }
+    for (int i = 0; i < n; i++) {
+        x[i] /= length;
+    }
+    x[0] += x[0] >= 0.0 ? 1.0 : -1.0;
+    double scale = 1.0 / sqrt(fabs(x[0])); /* |x|^2 = 2 |x_0| */
+    for (int i = 0; i < n; i++) {
+        x[i] *= scale;
+    }
+}
+
+static void reflect(int n, const double *u, double *x) {
+    double share = dot(n, u, x);
+    for (int i = 0; i < n; i++) {
+        x[i] -= share * u[i];
+    }
+}
+
+/* The last columns of the orthogonal factor of rows^T. */
+PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch) {
+    size_t used = scratch->used;
+    double *u = take_matrix(scratch, r, n), *column = take(scratch, (size_t)n);
+    copy(r * n, rows, u);
+    for (int i = 0; i < r; i++) {
+        householder(n - i, u + i * n + i);
+        for (int k = i + 1; k < r; k++) {
+            reflect(n - i, u + i * n + i, u + k * n + i);
+        }
+    }
+    for (int j = r; j < n; j++) {
+        for (int i = 0; i < n; i++) {
+            column[i] = i == j ? 1.0 : 0.0;
+        }
+        for (int i = r - 1; i >= 0; i--) {
+            reflect(n - i, u + i * n + i, column + i);
+        }
+        for (int i = 0; i < n; i++) {
+            z[i * (n - r) + j - r] = column[i];
+        }
+    }
+    scratch->used = used;
+}

@@ -1,0 +1,55 @@
+/* Memory: one block that is laid out once, and scratch that is taken and given back. */
+#include <stdarg.h>
+#include <stdio.h>
+
+#include "kernel.h"
+
+enum { ALIGNMENT = 16 };
+
+PRBM bool fail(Problem *problem, const char *format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    (void)vsnprintf(problem->text, sizeof problem->text, format, arguments);
+    va_end(arguments);
+    return false;
+}
+
+/* The next part of a block, aligned for anything; NULL while counting.  A block whose size does
+ * not fit into a size_t counts as SIZE_MAX bytes, which no allocation grants. */
+PRBM void *place(Memory *memory, size_t count, size_t size) {
+    size_t start = memory->used;
+    size_t room = SIZE_MAX - start;
+    if (room < ALIGNMENT || (size > 0 && count > (room - ALIGNMENT) / size)) {
+        memory->used = SIZE_MAX;
+        return NULL;
+    }
+    memory->used += (count * size + ALIGNMENT - 1) / ALIGNMENT * ALIGNMENT;
+    return memory->base == NULL ? NULL : memory->base + start;
+}
+
+/* What is taken too much is counted too, so that most is what would have been enough. */
+PRBM double *take(Scratch *scratch, size_t count) {
+    double *taken = scratch->base + scratch->used;
+    bool enough = scratch->used <= scratch->size && count <= scratch->size - scratch->used;
+    if (!enough) {
+        taken = scratch->spare;
+        scratch->exceeded = true;
+    }
+    scratch->used += count;
+    if (scratch->used > scratch->most) {
+        scratch->most = scratch->used;
+    }
+    return taken;
+}
+
+PRBM double *take_matrix(Scratch *scratch, int rows, int columns) {
+    return take(scratch, (size_t)rows * (size_t)columns);
+}
+
+PRBM Complex *take_complex(Scratch *scratch, int rows, int columns) {
+    return (Complex *)(void *)take_matrix(scratch, 2 * rows, columns);
+}
+
+PRBM int *take_integers(Scratch *scratch, int count) {
+    return (int *)(void *)take(scratch, (size_t)count);
+}

@@ -1,0 +1,212 @@
+/* Small vibrations about a static shape, and what an impact leaves in the fundamental mode: the
+ * twin of prbm/modal.py. */
+#include <math.h>
+
+#include "kernel.h"
+
+#define FULL_TURN 6.283185307179586 /* rad */
+
+/* c = a^T b a for a (n, k), b (n, n) */
+static void congruent(int n, int k, const double *a, const double *b, double *c, Scratch *scratch) {
+    size_t used = scratch->used;
+    double *ba = take(scratch, (size_t)n);
+    for (int j = 0; j < k; j++) {
+        for (int i = 0; i < n; i++) {
+            ba[i] = 0.0;
+            for (int l = 0; l < n; l++) {
+                ba[i] += b[i * n + l] * a[l * k + j];
+            }
+        }
+        for (int i = 0; i < k; i++) {
+            c[i * k + j] = 0.0;
+            for (int l = 0; l < n; l++) {
+                c[i * k + j] += a[l * k + i] * ba[l];
+            }
+        }
+    }
+    scratch->used = used;
+}
+
+/* A := L^-1 A L^-T for symmetric A; column is (n,) of its own use. */
+static void divide_twice(int n, const int *first, const double *L, double *A, double *column) {
+    for (int i = 0; i < n; i++) {
+        forward(n, first, L, A + i * n); /* row i: L^-1 A e_i */
+    }
+    for (int j = 0; j < n; j++) {
+        for (int i = 0; i < n; i++) {
+            column[i] = A[i * n + j];
+        }
+        forward(n, first, L, column);
+        for (int i = 0; i < n; i++) {
+            A[i * n + j] = column[i];
+        }
+    }
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < i; j++) {
+            A[i * n + j] = A[j * n + i] = 0.5 * (A[i * n + j] + A[j * n + i]);
+        }
+    }
+}
+
+/* K y = w M y with y^T M y = 1: w in rising order, y the columns of Y; K and M are destroyed. */
+static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y, Scratch *scratch,
+                              Problem *problem) {
+    size_t used = scratch->used;
+    int *first = take_integers(scratch, n);
+    double *column = take(scratch, (size_t)n);
+    for (int i = 0; i < n; i++) {
+        first[i] = 0;
+    }
+    if (!cholesky(n, first, M)) {
+        scratch->used = used;
+        return fail(problem, "the modes have no frequency here: a part that can move has no mass");
+    }
+    divide_twice(n, first, M, K, column);
+    symmetric_eigen(n, K, w, Y);
+    for (int j = 0; j < n; j++) {
+        for (int i = 0; i < n; i++) {
+            column[i] = Y[i * n + j];
+        }
+        backward(n, first, M, column);
+        for (int i = 0; i < n; i++) {
+            Y[i * n + j] = column[i];
+        }
+    }
+    scratch->used = used;
+    return true;
+}
+
+/* Z (n, k): a basis of the motions that the loops leave. */
+static void tangent_space(const System *system, const Complex *e, double *Z, Scratch *scratch) {
+    size_t used = scratch->used;
+    double *rows = take_matrix(scratch, system->r, system->n);
+    jacobian(system->r, system->n, system->loops, e, rows);
+    null_space(system->r, system->n, rows, Z, scratch);
+    scratch->used = used;
+}
+
+/* K_t phi = omega^2 M phi on the tangent space of the loops, under the constraints B, which may
+ * be more, with the multipliers lam (r,).  frequency (k,), phi (n, k), M (n, n). */
+static bool modes_about(const System *system, const double *q, int r, const Complex *B,
+                        const double *lam, double *frequency, double *phi, double *M,
+                        Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, k = n - system->r;
+    Complex *e = take_complex(scratch, 1, n), *w = take_complex(scratch, 1, n);
+    double *K_t = take_matrix(scratch, n, n), *Z = take_matrix(scratch, n, k);
+    double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
+    double *reduced = take_matrix(scratch, k, k);
+    directions(n, q, e);
+    inertia(n, system->H, system->J, e, M, K_t); /* the velocity matrix is not needed */
+    field_row(n, system->S, system->gravity, w);
+    tangent_stiffness(n, r, system->K, w, B, lam, e, K_t);
+    tangent_space(system, e, Z, scratch);
+    congruent(n, k, Z, K_t, K_z, scratch);
+    congruent(n, k, Z, M, M_z, scratch);
+    bool found = generalised_eigen(k, K_z, M_z, frequency, reduced, scratch, problem);
+    for (int j = 0; found && j < k; j++) {
+        double omega2 = frequency[j];
+        frequency[j] = (omega2 < 0.0 ? -1.0 : 1.0) * sqrt(fabs(omega2)) / FULL_TURN;
+        for (int i = 0; i < n; i++) {
+            phi[i * k + j] = 0.0;
+            for (int l = 0; l < k; l++) {
+                phi[i * k + j] += Z[i * k + l] * reduced[l * k + j];
+            }
+        }
+    }
+    scratch->used = used;
+    return found;
+}
+
+/* The holding force of the shape stays as a dead load. */
+PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
+                Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r;
+    Complex *B = take_complex(scratch, r + 1, n);
+    double *lam = take(scratch, (size_t)r + 1), *M = take_matrix(scratch, n, n);
+    stack_release(system, B, lam);
+    copy(r, shape->lam, lam);
+    lam[r] = shape->force;
+    r += shape->force != 0.0;
+    bool found = modes_about(system, shape->q, r, B, lam, frequency, phi, M, scratch, problem);
+    scratch->used = used;
+    return found;
+}
+
+/* Zero if the equilibrium under gravity is unstable. */
+PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
+                                Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r, k = n - r;
+    Equilibrium shape = {take(scratch, (size_t)n), take(scratch, (size_t)r), 0.0};
+    double *frequencies = take(scratch, (size_t)k), *phi = take_matrix(scratch, n, k);
+    bool found = equilibrium(system, false, 0.0, &shape, scratch, problem) &&
+                 modes(system, &shape, frequencies, phi, scratch, problem);
+    if (found) {
+        *frequency = greater(0.0, frequencies[0]);
+    }
+    scratch->used = used;
+    return found;
+}
+
+/* Multipliers of the shape held at rest by a force on the released body: -lam of
+ * [M, rows^T; rows, 0] (a, -lam) = (Q, 0), the accelerations left over being the least ones. */
+static bool resting_multipliers(const System *system, const double *q, const Complex *B,
+                                double *lam, double *M, Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r + 1, size = n + r;
+    Complex *e = take_complex(scratch, 1, n), *w = take_complex(scratch, 1, n);
+    double *rows = take_matrix(scratch, r, n), *kkt = take_matrix(scratch, size, size);
+    double *right = take(scratch, (size_t)size), *C = take_matrix(scratch, n, n);
+    double *turned = take(scratch, (size_t)n), *load = take(scratch, (size_t)n);
+    directions(n, q, e);
+    inertia(n, system->H, system->J, e, M, C);
+    jacobian(r, n, B, e, rows);
+    field_row(n, system->S, system->gravity, w);
+    generalised(n, w, e, load);
+    for (int j = 0; j < n; j++) {
+        turned[j] = q[j] - system->q0[j];
+    }
+    springs(n, system->K, turned, right);
+    for (int j = 0; j < n; j++) {
+        right[j] += load[j];
+    }
+    zeros(r, right + n);
+    saddle(n, r, M, rows, rows, kkt);
+    bool found = solve(size, kkt, right, scratch, problem);
+    for (int i = 0; i < r; i++) {
+        lam[i] = -right[n + i];
+    }
+    scratch->used = used;
+    return found;
+}
+
+PRBM bool fundamental_at(const System *system, const double *q, double *phi, double *M,
+                         Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r + 1, k = n - system->r;
+    Complex *B = take_complex(scratch, r, n);
+    double *lam = take(scratch, (size_t)r), *frequency = take(scratch, (size_t)k);
+    double *all = take_matrix(scratch, n, k);
+    stack_release(system, B, lam);
+    bool found = resting_multipliers(system, q, B, lam, M, scratch, problem) &&
+                 modes_about(system, q, r, B, lam, frequency, all, M, scratch, problem);
+    for (int i = 0; found && i < n; i++) {
+        phi[i] = all[i * k];
+    }
+    scratch->used = used;
+    return found;
+}
+
+PRBM double simulated_restitution(int n, const double *phi, const double *M, const double *before,
+                                  const double *after) {
+    double arriving = 0.0, leaving = 0.0, size = 0.0;
+    for (int i = 0; i < n; i++) {
+        double momentum = dot(n, M + i * n, phi);
+        arriving += momentum * before[i];
+        leaving += momentum * after[i];
+        size += fabs(momentum) * fabs(before[i]);
+    }
+    return fabs(arriving) <= 1e-12 * size ? 0.0 : -leaving / arriving;
+}

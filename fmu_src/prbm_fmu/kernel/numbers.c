@@ -1,0 +1,269 @@
+/* Elementary functions from sums, products and quotients alone, whose rounding IEEE 754 fixes:
+ * the same bits on every platform, where the functions of the C libraries differ in the last one.
+ *
+ * The polynomials of sine and cosine are minimax ones on [-pi/4, pi/4], by Remez' exchange in
+ * multiple precision; the others are Taylor's.  Reduction in parts: W. J. Cody, W. Waite,
+ * Software Manual for the Elementary Functions, Prentice-Hall, 1980.
+ */
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "kernel.h"
+
+/* --- exp(i q) ----------------------------------------------------------------------------------- */
+
+#define LARGEST_ANGLE UINT64_C(0x40f86a0000000000) /* the bits of 1e5 rad */
+#define QUARTERS_PER_RADIAN 0.6366197723675814 /* 2/pi */
+/* pi/2 in three parts; the first two have 36 bits, so that up to 2^17 times them is exact. */
+#define QUARTER_HIGH 1.5707963267923333
+#define QUARTER_MIDDLE 2.5633441515839558e-12
+#define QUARTER_LOW 1.0562999066987428e-23
+/* Adding it rounds to an integer, which the last bits of the sum then are. */
+#define ROUNDER 6755399441055744.0 /* 1.5 2^52 */
+
+/* Two angles at a time where the compiler has vectors, else one: the same operations on each. */
+#if defined(__GNUC__)
+typedef double Lanes __attribute__((vector_size(16)));
+typedef uint64_t LaneBits __attribute__((vector_size(16)));
+#else
+typedef double Lanes;
+typedef uint64_t LaneBits;
+#endif
+enum { LANES = sizeof(Lanes) / sizeof(double) };
+
+static LaneBits bits_of(Lanes x) {
+    LaneBits bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+static Lanes from_bits(LaneBits bits) {
+    Lanes x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+/* The angle, or something that is not a number (all bits set) unless it is below the limit. */
+static Lanes valid_angle(Lanes q) {
+    LaneBits magnitude = bits_of(q) & (UINT64_MAX >> 1);
+    LaneBits invalid = ((magnitude - LARGEST_ANGLE) >> 63) - UINT64_C(1);
+    return from_bits(bits_of(q) | invalid);
+}
+
+/* The angle y + rest = q - k pi/2 in [-pi/4, pi/4], and k in the last bits of quarters. */
+static void reduce_angle(Lanes q, Lanes *y, Lanes *rest, LaneBits *quarters) {
+    Lanes shifted = q * QUARTERS_PER_RADIAN + ROUNDER;
+    Lanes k = shifted - ROUNDER;
+    Lanes high = q - k * QUARTER_HIGH; /* exact */
+    Lanes middle = k * QUARTER_MIDDLE; /* exact */
+    *y = high - middle;
+    *rest = ((high - *y) - middle) - k * QUARTER_LOW;
+    *quarters = bits_of(shifted);
+}
+
+/* sin(y + rest) = y + y^3 S(y^2) + rest cos y.  The sum by pairs is done sooner than Horner's. */
+static Lanes sine(Lanes y, Lanes rest) {
+    Lanes z = y * y, zz = z * z;
+    Lanes low = 0.008333333333322116 * z - 0.1666666666666663;
+    Lanes middle = 2.755731362087903e-06 * z - 0.0001984126982958813;
+    Lanes high = 1.5896225261958841e-10 * z - 2.505074768089428e-08;
+    Lanes S = low + zz * (middle + zz * high);
+    return y + (y * z * S + rest * (1.0 - 0.5 * z));
+}
+
+/* cos(y + rest) = 1 - y^2/2 + y^4 C(y^2) - y rest, where 1 - y^2/2 is rounded and mended */
+static Lanes cosine(Lanes y, Lanes rest) {
+    Lanes z = y * y, zz = z * z;
+    Lanes half = 0.5 * z;
+    Lanes most = 1.0 - half;
+    Lanes low = 0.041666666666666595 - 0.0013888888888873054 * z;
+    Lanes middle = 2.480158728885014e-05 - 2.755731417883291e-07 * z;
+    Lanes high = 2.087570077737947e-09 - 1.1358533099463368e-11 * z;
+    Lanes C = low + zz * (middle + zz * high);
+    return most + (((1.0 - most) - half) + (zz * C - y * rest));
+}
+
+/* Choose between sine and cosine, and their signs, by the quarter, without a branch. */
+static void turn_quarters(LaneBits quarters, LaneBits s, LaneBits c, Lanes *re, Lanes *im) {
+    LaneBits swap = UINT64_C(0) - (quarters & UINT64_C(1)); /* all ones or none */
+    LaneBits exchange = (s ^ c) & swap;
+    LaneBits s_sign = (quarters & UINT64_C(2)) << 62;
+    LaneBits c_sign = ((quarters + UINT64_C(1)) & UINT64_C(2)) << 62;
+    *re = from_bits(c ^ exchange ^ c_sign);
+    *im = from_bits(s ^ exchange ^ s_sign);
+}
+
+static void lane_directions(const double *q, Complex *e) {
+    Lanes given, y, rest, re, im;
+    LaneBits quarters;
+    memcpy(&given, q, sizeof given);
+    reduce_angle(valid_angle(given), &y, &rest, &quarters);
+    turn_quarters(quarters, bits_of(sine(y, rest)), bits_of(cosine(y, rest)), &re, &im);
+    double parts[2][LANES];
+    memcpy(parts[0], &re, sizeof re);
+    memcpy(parts[1], &im, sizeof im);
+    for (int i = 0; i < LANES; i++) {
+        e[i].re = parts[0][i];
+        e[i].im = parts[1][i];
+    }
+}
+
+/* The last ones are done together with some before them, which are done twice. */
+PRBM void directions(int n, const double *q, Complex *e) {
+    int i = 0;
+    for (; i + LANES <= n; i += LANES) {
+        lane_directions(q + i, e + i);
+    }
+    if (i < n && n >= LANES) {
+        lane_directions(q + n - LANES, e + n - LANES);
+    } else if (i < n) {
+        double padded[LANES] = {0.0};
+        Complex found[LANES];
+        padded[0] = q[0];
+        lane_directions(padded, found);
+        e[0] = found[0];
+    }
+}
+
+/* --- logarithm, exponential ---------------------------------------------------------------------- */
+
+#define LN2_HIGH 0.6931471805592082 /* 40 bits */
+#define LN2_LOW 7.371002565167799e-13
+#define BINARY_DIGITS_PER_E 1.4426950408889634 /* 1/ln 2 */
+#define SQUARE_ROOT_OF_HALF 0.7071067811865476
+#define LARGEST_EXPONENT 710.0   /* beyond, exp is infinite */
+#define SMALLEST_EXPONENT -746.0 /* beyond, exp is zero */
+
+/* The value of c_0 + c_1 z + c_2 z^2 + ... */
+static double series(int count, const double *c, double z) {
+    double sum = c[count - 1];
+    for (int k = count - 2; k >= 0; k--) {
+        sum = sum * z + c[k];
+    }
+    return sum;
+}
+
+/* Q(z) = 2/3 + 2 z/5 + 2 z^2/7 ..., |z| < 0.0295 */
+static double atanh_series(double z) {
+    static const double c[] = {2.0 / 3,  2.0 / 5,  2.0 / 7,  2.0 / 9,  2.0 / 11,
+                               2.0 / 13, 2.0 / 15, 2.0 / 17, 2.0 / 19, 2.0 / 21};
+    return series(10, c, z);
+}
+
+/* With x = 2^k (1 + f) and s = f/(2 + f), ln(1 + f) = 2 atanh s = f - s (f - s^2 Q(s^2)). */
+PRBM double natural_log(double x) {
+    if (!(x > 0.0) || x > DBL_MAX) {
+        return x == 0.0 ? -HUGE_VAL : x < 0.0 ? (double)NAN : x;
+    }
+    int k;
+    double f = frexp(x, &k);
+    if (f < SQUARE_ROOT_OF_HALF) {
+        f *= 2.0;
+        k -= 1;
+    }
+    f -= 1.0;
+    double s = f / (2.0 + f), z = s * s;
+    double correction = s * (f - z * atanh_series(z));
+    return k * LN2_HIGH + (f - (correction - k * LN2_LOW));
+}
+
+/* 1/2! + r/3! + r^2/4! + ..., |r| < 0.35 */
+static double exponential_series(double r) {
+    static const double c[] = {1.0 / 2,        1.0 / 6,         1.0 / 24,        1.0 / 120,
+                               1.0 / 720,      1.0 / 5040,      1.0 / 40320,     1.0 / 362880,
+                               1.0 / 3628800,  1.0 / 39916800,  1.0 / 479001600, 1.0 / 6227020800.0,
+                               1.0 / 87178291200.0};
+    return series(13, c, r);
+}
+
+/* With x = k ln 2 + r, exp x = 2^k (1 + r + r^2 (1/2 + ...)). */
+PRBM double exponential(double x) {
+    if (!(x < LARGEST_EXPONENT)) {
+        return x >= LARGEST_EXPONENT ? HUGE_VAL : x;
+    }
+    if (x < SMALLEST_EXPONENT) {
+        return 0.0;
+    }
+    double k = floor(x * BINARY_DIGITS_PER_E + 0.5);
+    double high = x - k * LN2_HIGH; /* exact */
+    double r = high - k * LN2_LOW;
+    double rest = (high - r) - k * LN2_LOW;
+    return ldexp(1.0 + (r + (rest + r * r * exponential_series(r))), (int)k);
+}
+
+/* The relative error grows with |y ln x|, of which a rounding is lost. */
+PRBM double power(double x, double y) {
+    return y == 0.0 ? 1.0 : exponential(y * natural_log(x));
+}
+
+/* --- phase ---------------------------------------------------------------------------------------- */
+
+#define HALF_TURN_HIGH 3.141592653589793
+#define HALF_TURN_LOW 1.2246467991473532e-16
+#define QUARTER_TURN_HIGH 1.5707963267948966
+#define QUARTER_TURN_LOW 6.123233995736766e-17
+
+/* atan u - u = -u^3/3 + u^5/5 ..., |u| <= 1/8 */
+static double atan_series(double u) {
+    static const double c[] = {-1.0 / 3, 1.0 / 5,  -1.0 / 7, 1.0 / 9,  -1.0 / 11,
+                               1.0 / 13, -1.0 / 15, 1.0 / 17, -1.0 / 19};
+    double z = u * u;
+    return u * z * series(9, c, z);
+}
+
+/* The angle of (x, y), 0 <= y <= x, x > 0: atan y/x = atan t + atan (y - t x)/(x + t y), with t the
+ * nearest quarter, whose angles are tabulated in two parts. */
+static double first_octant(double x, double y) {
+    static const double high[] = {0.0, 0.24497866312686414, 0.4636476090008061,
+                                  0.6435011087932844, 0.7853981633974483};
+    static const double low[] = {0.0, 1.0698755618734451e-17, 2.2698777452961687e-17,
+                                 1.5834785051444286e-17, 3.061616997868383e-17};
+    int nearest = (int)floor(4.0 * (y / x) + 0.5);
+    double t = 0.25 * nearest;
+    double u = (y - t * x) / (x + t * y);
+    return high[nearest] + (u + (atan_series(u) + low[nearest]));
+}
+
+PRBM double phase(Complex z) {
+    double x = fabs(z.re), y = fabs(z.im);
+    if (!(x < HUGE_VAL && y < HUGE_VAL)) {
+        return (double)NAN;
+    }
+    double angle;
+    if (y <= x) {
+        angle = x > 0.0 ? first_octant(x, y) : 0.0;
+    } else {
+        angle = QUARTER_TURN_HIGH - (first_octant(y, x) - QUARTER_TURN_LOW);
+    }
+    if (z.re < 0.0) {
+        angle = HALF_TURN_HIGH - (angle - HALF_TURN_LOW);
+    }
+    return z.im < 0.0 ? -angle : angle;
+}
+
+/* --- checks --------------------------------------------------------------------------------------- */
+
+PRBM bool finite_number(double x) {
+    return x - x == 0.0;
+}
+
+PRBM double greater(double a, double b) {
+    return a > b ? a : b;
+}
+
+PRBM double lesser(double a, double b) {
+    return a < b ? a : b;
+}
+
+/* Once something is not a number, so is the result. */
+PRBM double largest(int n, const double *x) {
+    double top = 0.0;
+    for (int i = 0; i < n; i++) {
+        double magnitude = fabs(x[i]);
+        if (magnitude > top || magnitude != magnitude) {
+            top = magnitude;
+        }
+    }
+    return top;
+}

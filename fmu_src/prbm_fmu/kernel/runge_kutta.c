@@ -1,0 +1,94 @@
+/* The pair 5(4) of Bogacki and Shampine with a quartic: the data of prbm/runge_kutta.py. */
+#include "kernel.h"
+
+static const double STAGE[STAGES][STAGES] = {
+    {0.0},
+    {1.0 / 6},
+    {2.0 / 27, 4.0 / 27},
+    {183.0 / 1372, -162.0 / 343, 1053.0 / 1372},
+    {68.0 / 297, -4.0 / 11, 42.0 / 143, 1960.0 / 3861},
+    {597.0 / 22528, 81.0 / 352, 63099.0 / 585728, 58653.0 / 366080, 4617.0 / 20480},
+    {174197.0 / 959244, -30942.0 / 79937, 8152137.0 / 19744439, 666106.0 / 1039181,
+     -29421.0 / 29068, 482048.0 / 414219},
+    {587.0 / 8064, 0.0, 4440339.0 / 15491840, 24353.0 / 124800, 387.0 / 44800, 2152.0 / 5985,
+     7267.0 / 94080},
+};
+
+static const double NODE[STAGES] = {0.0,      1.0 / 6,  2.0 / 9, 3.0 / 7,
+                                    2.0 / 3,  3.0 / 4,  1.0,     1.0};
+
+static const double ERROR_WEIGHT[STAGES] = {
+    -3817.0 / 1959552,          0.0,
+    140181.0 / 15491840,        -4224731.0 / 272937600,
+    8557.0 / 403200,            -57928.0 / 4363065,
+    -23930231.0 / 4366535040.0, 3293.0 / 556956,
+};
+
+static const double DENSE_WEIGHT[STAGES][DENSE] = {
+    {1.0, -6409.0 / 2016, 1051.0 / 288, -11269.0 / 8064},
+    {0.0, 0.0, 0.0, 0.0},
+    {0.0, 12398103.0 / 3872960, -2907981.0 / 553280, 7254279.0 / 3098368},
+    {0.0, 302869.0 / 280800, -386561.0 / 280800, 110789.0 / 224640},
+    {0.0, -1161.0 / 11200, 387.0 / 1600, -1161.0 / 8960},
+    {0.0, -28192.0 / 17955, 11744.0 / 2565, -9512.0 / 3591},
+    {0.0, -7267.0 / 7840, 7267.0 / 3360, -7267.0 / 6272},
+    {0.0, 3.0 / 2, -4.0, 5.0 / 2},
+};
+
+/* The stages k (STAGES, n), of which the first is given, and the new state y1. */
+PRBM bool stages(Equations *equations, int n, double t, const double *y, double h, double *k,
+                 double *y1, Problem *problem) {
+    for (int i = 1; i < STAGES; i++) {
+        for (int j = 0; j < n; j++) {
+            y1[j] = 0.0;
+        }
+        for (int m = 0; m < i; m++) {
+            double a = STAGE[i][m] * h;
+            for (int j = 0; a != 0.0 && j < n; j++) {
+                y1[j] += a * k[m * n + j];
+            }
+        }
+        for (int j = 0; j < n; j++) {
+            y1[j] += y[j];
+        }
+        if (!rate(equations, t + NODE[i] * h, y1, k + i * n, problem)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+PRBM void error_of(int n, const double *k, double h, double *error) {
+    for (int j = 0; j < n; j++) {
+        double sum = 0.0;
+        for (int i = 0; i < STAGES; i++) {
+            sum += ERROR_WEIGHT[i] * k[i * n + j];
+        }
+        error[j] = h * sum;
+    }
+}
+
+/* The weights of the stages at a fraction of a step. */
+PRBM void weights(double theta, double *b) {
+    for (int i = 0; i < STAGES; i++) {
+        const double *d = DENSE_WEIGHT[i];
+        b[i] = theta * (d[0] + theta * (d[1] + theta * (d[2] + theta * d[3])));
+    }
+}
+
+PRBM void interpolate(int n, const double *y, const double *k, double h, double theta,
+                      double *result) {
+    double b[STAGES];
+    weights(theta, b);
+    for (int j = 0; j < n; j++) {
+        result[j] = 0.0;
+    }
+    for (int i = 0; i < STAGES; i++) {
+        for (int j = 0; b[i] != 0.0 && j < n; j++) {
+            result[j] += b[i] * k[i * n + j];
+        }
+    }
+    for (int j = 0; j < n; j++) {
+        result[j] = y[j] + h * result[j];
+    }
+}

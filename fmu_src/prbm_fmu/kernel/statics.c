@@ -1,0 +1,213 @@
+/* Static equilibrium under gravity and a holding force: the twin of prbm/statics.py.
+ *
+ * At rest the torques balance: -K (q - q0) + Re(w e) + J^T lam + r^T F = 0.
+ */
+#include <math.h>
+
+#include "kernel.h"
+
+#define LARGEST_TURN 0.5 /* rad per Newton step and per step of the load: further is another shape */
+#define SMALLEST_FRACTION (1.0 / 512) /* of the load, before the continuation gives up */
+#define BALANCED 1e-12 /* of the largest torsion rate times one radian */
+
+enum { NEWTON_STEPS = 30 };
+
+PRBM void stack_release(const System *system, Complex *B, double *c) {
+    int n = system->n, r = system->r;
+    for (int i = 0; i < r * n; i++) {
+        B[i] = system->loops[i];
+    }
+    for (int j = 0; j < n; j++) {
+        B[r * n + j] = system->release[j];
+    }
+    copy(r, system->loops_c, c);
+    c[r] = system->release_c;
+}
+
+PRBM void tangent_stiffness(int n, int r, const double *K, const Complex *w, const Complex *B,
+                            const double *lam, const Complex *e, double *K_t) {
+    copy(n * n, K, K_t);
+    for (int j = 0; j < n; j++) {
+        Complex row = {0.0, 0.0};
+        for (int i = 0; i < r; i++) {
+            row = plus(row, scaled(lam[i], B[i * n + j]));
+        }
+        K_t[j * n + j] += product(w[j], e[j]).im + product(row, e[j]).re;
+    }
+}
+
+/* What must hold at a fraction of the load: s = Re(B e) + c = 0, and the dead loads of row w. */
+typedef struct {
+    const System *system;
+    int r;
+    Complex *B; /* (r, n) */
+    double *c;  /* (r,) */
+    Complex *w; /* (n,) */
+} Balance;
+
+/* Torques and openings at (q, lam), and the rows of the constraints. */
+static void unbalanced(const Balance *balance, const double *state, const Complex *e,
+                       double *torque, double *open_by, double *rows, Scratch *scratch) {
+    const System *system = balance->system;
+    size_t used = scratch->used;
+    int n = system->n, r = balance->r;
+    double *turned = take(scratch, (size_t)n), *load = take(scratch, (size_t)n);
+    for (int j = 0; j < n; j++) {
+        turned[j] = state[j] - system->q0[j];
+    }
+    springs(n, system->K, turned, torque);
+    generalised(n, balance->w, e, load);
+    jacobian(r, n, balance->B, e, rows);
+    for (int j = 0; j < n; j++) {
+        torque[j] += load[j];
+        for (int i = 0; i < r; i++) {
+            torque[j] += state[n + i] * rows[i * n + j];
+        }
+    }
+    scalars(r, n, balance->B, balance->c, e, open_by);
+    scratch->used = used;
+}
+
+/* One Newton step, of no more than the largest turn; false if there is none. */
+static bool newton_step(const Balance *balance, const Complex *e, double *torque, double *open_by,
+                        const double *rows, double *state, Scratch *scratch) {
+    size_t used = scratch->used;
+    int n = balance->system->n, r = balance->r, size = n + r;
+    double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
+    double *change = take(scratch, (size_t)size);
+    Problem ignored;
+    tangent_stiffness(n, r, balance->system->K, balance->w, balance->B, state + n, e, K_t);
+    saddle(n, r, K_t, rows, rows, kkt);
+    copy(n, torque, change);
+    for (int i = 0; i < r; i++) {
+        change[n + i] = -open_by[i];
+    }
+    bool solved = solve(size, kkt, change, scratch, &ignored);
+    double turn = solved ? largest(n, change) : HUGE_VAL;
+    double share = lesser(1.0, LARGEST_TURN / greater(turn, 1e-300));
+    for (int i = 0; solved && i < size; i++) {
+        state[i] += (i < n ? share : -share) * change[i];
+    }
+    scratch->used = used;
+    return finite_number(turn);
+}
+
+/* Solve the balance from a state (q, lam), which is overwritten; false if it does not converge. */
+static bool balance_out(const Balance *balance, double *state, Scratch *scratch) {
+    const System *system = balance->system;
+    size_t used = scratch->used;
+    int n = system->n, r = balance->r;
+    Complex *e = take_complex(scratch, 1, n);
+    double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
+    double *rows = take_matrix(scratch, r, n), scale = BALANCED * largest(n * n, system->K);
+    bool going = true, balanced = false;
+    for (int step = 0; step < NEWTON_STEPS && going && !balanced; step++) {
+        directions(n, state, e);
+        unbalanced(balance, state, e, torque, open_by, rows, scratch);
+        bool closed = largest(r, open_by) <= 1e-13 * system->length;
+        balanced = closed && largest(n, torque) <= scale;
+        going = balanced || newton_step(balance, e, torque, open_by, rows, state, scratch);
+    }
+    scratch->used = used;
+    return balanced;
+}
+
+/* The balance at a fraction of gravity and, if held, of the displacement. */
+static bool loaded(const System *system, bool held, double displacement, double fraction,
+                   double *state, Scratch *scratch) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r;
+    Balance balance = {system, r + held, take_complex(scratch, r + 1, n),
+                       take(scratch, (size_t)r + 1), take_complex(scratch, 1, n)};
+    stack_release(system, balance.B, balance.c);
+    balance.c[r] -= fraction * displacement;
+    field_row(n, system->S, scaled(fraction, system->gravity), balance.w);
+    bool balanced = balance_out(&balance, state, scratch);
+    scratch->used = used;
+    return balanced;
+}
+
+/* The largest change of a link between two states [rad]. */
+static double jump(const System *system, const double *from, const double *to) {
+    double top = 0.0;
+    for (int i = 0; i < system->mechanism->link_count; i++) {
+        int j = system->links[i];
+        double turn = to[j] - from[j];
+        top = greater(top, largest(1, &turn));
+    }
+    return top;
+}
+
+static bool unreachable(bool held, double displacement, double done, Problem *problem) {
+    if (!held) {
+        return fail(problem,
+                    "no static equilibrium under gravity was found: the flexures are too weak for "
+                    "this load; reduce gravity or the masses, or stiffen the flexures");
+    }
+    return fail(problem,
+                "release.displacement = %g m cannot be reached: no equilibrium was found beyond "
+                "%.4g m (gravity raised in proportion); release closer to the straight shape, or "
+                "reduce gravity across the motion",
+                displacement, done * displacement);
+}
+
+/* Raise the load and the displacement together from the straight, unloaded shape: state is
+ * (q, lam, force), and the shape found the one that slow loading reaches. */
+static bool load_slowly(const System *system, bool held, double displacement, double *state,
+                        Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int size = system->n + system->r + held;
+    double *trial = take(scratch, (size_t)size), done = 0.0, fraction = 1.0;
+    while (done < 1.0 && fraction >= SMALLEST_FRACTION) {
+        double target = lesser(1.0, done + fraction);
+        copy(size, state, trial);
+        /* a jump of a link leads to another branch, where slow loading does not take it */
+        if (loaded(system, held, displacement, target, trial, scratch) &&
+            jump(system, state, trial) <= LARGEST_TURN) {
+            copy(size, trial, state);
+            done = target;
+            fraction = lesser(1.0, 2 * fraction);
+        } else {
+            fraction /= 2;
+        }
+    }
+    scratch->used = used;
+    return done >= 1.0 || unreachable(held, displacement, done, problem);
+}
+
+PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
+                      Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r;
+    double *state = take(scratch, (size_t)n + (size_t)r + 1);
+    zeros(n + r + 1, state);
+    copy(n, system->q0, state);
+    bool found = load_slowly(system, held, displacement, state, scratch, problem);
+    copy(n, state, shape->q);
+    copy(r, state + n, shape->lam);
+    shape->force = state[n + r];
+    scratch->used = used;
+    return found;
+}
+
+PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
+                           Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r + 1;
+    zeros(n, v);
+    if (speed == 0.0) {
+        return true;
+    }
+    Complex *e = take_complex(scratch, 1, n), *B = take_complex(scratch, r, n);
+    double *M = take_matrix(scratch, n, n), *C = take_matrix(scratch, n, n);
+    double *rows = take_matrix(scratch, r, n), *rates = take(scratch, (size_t)r);
+    directions(n, q, e);
+    inertia(n, system->H, system->J, e, M, C);
+    stack_release(system, B, rates);
+    jacobian(r, n, B, e, rows);
+    zeros(r, rates);
+    rates[r - 1] = -speed;
+    bool found = project_velocities(n, r, M, rows, rates, v, scratch, problem);
+    scratch->used = used;
+    return found;
+}
