@@ -292,6 +292,7 @@ class _Assembler:
             for j, vector in pivot.A.items():
                 gap = gap.plus(j, -vector)
             self.loops.append(Place(gap.c - pivot.c, gap.A))
+            place = pivot  # the stub moves with its body: links and body share no mass
         self.rod(pieces.rods[-1], place, far_index, last)
         corners.append(self.on(far, z_end))
         self.lines.append((flexure.name, "flexure", corners))

@@ -70,7 +70,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     Complex *origins = place(memory, (b + 1) * n, sizeof(Complex));
     result.links = place(memory, n, sizeof(int));
     result.spring = place(memory, p, sizeof(Spring));
-    result.first = place(memory, n, sizeof(int));
+    result.blocks = place(memory, n, sizeof(Block));
     result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
     if (memory->base) {
         for (size_t i = 0; i < b; i++) {
@@ -136,7 +136,7 @@ static void add_rod(System *system, double mass, const Place *start, int j, Comp
 
 static void add_spring(System *system, double rate, int a, int b) {
     int n = system->n;
-    Spring spring = {rate, a, b};
+    Spring spring = {rate, a == FIXED ? n : a, b == FIXED ? n : b};
     system->spring[system->spring_count++] = spring;
     if (a != FIXED) {
         system->K[a * n + a] += rate;
@@ -255,6 +255,7 @@ static bool walk_flexure(System *system, const Flexure *flexure, Walk *walk, Scr
     } else {
         on_body(system, far, minus(z_end, last), &spare);
         close_loop(system, walk, &spot, &spare);
+        copy_place(n, &spot, &spare); /* the stub moves with its body: links share no mass with it */
     }
     add_rod(system, pieces.rods[pieces.n + 1], &spot, far_index, last, &spare);
     return true;
@@ -365,6 +366,28 @@ static void add_frictions(System *system, const Complex *e0) {
     }
 }
 
+/* The first coordinate after a start with which none before it shares mass. */
+static int end_of_block(const System *system, int start) {
+    int n = system->n, end = start + 1;
+    for (int j = start; j < end; j++) {
+        for (int i = end; i < n; i++) {
+            Complex shared = system->H[i * n + j];
+            end = shared.re != 0.0 || shared.im != 0.0 ? i + 1 : end;
+        }
+    }
+    return end;
+}
+
+static void find_blocks(System *system) {
+    system->block_count = 0;
+    for (int start = 0; start < system->n;) {
+        int end = end_of_block(system, start);
+        Block block = {start, end - start};
+        system->blocks[system->block_count++] = block;
+        start = end;
+    }
+}
+
 static void add_moments(System *system) {
     int n = system->n;
     for (int i = 0; i < n; i++) {
@@ -381,13 +404,8 @@ static void add_moments(System *system) {
             sum = plus(sum, scaled(system->m[k], system->A[k * n + i]));
         }
         system->S[i] = sum;
-        system->first[i] = i;
-        for (int j = i - 1; j >= 0; j--) {
-            if (system->H[i * n + j].re != 0.0 || system->H[i * n + j].im != 0.0) {
-                system->first[i] = j;
-            }
-        }
     }
+    find_blocks(system);
 }
 
 static double size_of(const System *system) {

@@ -7,6 +7,7 @@
 #define CLOSED 1e-14        /* of the size of the mechanism: a few roundings of its coordinates */
 #define BARELY_CLOSED 1e-12 /* of that size: accepted if the iteration can do no better */
 
+enum { SMALL = 4 }; /* sizes up to which code is compiled for each */
 enum { ITERATIONS = 20 }; /* Gauss-Newton converges quadratically: twenty are hopeless */
 
 static const char SINGULAR[] =
@@ -61,46 +62,173 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
     return regular || fail(problem, "%s", SINGULAR);
 }
 
-PRBM bool factor(Factors *factors, int r, const double *columns, const double *rows) {
+/* --- the same again and again ------------------------------------------------------------------------ */
+
+/* The Cholesky factor L of the lower triangle of M; false if M is not positive definite. */
+SIZED bool block_cholesky(int size, int n, const double *M, double *L) {
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        double square = M[i * n + i];
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            if (j < i) {
+                double sum = M[i * n + j];
+                UNROLLED
+                for (int k = 0; k < size; k++) {
+                    sum = k < j ? sum - L[i * n + k] * L[j * n + k] : sum;
+                }
+                L[i * n + j] = sum * L[j * n + j];
+                square -= L[i * n + j] * L[i * n + j];
+            }
+        }
+        if (!(square > 0.0)) {
+            return false;
+        }
+        L[i * n + i] = 1.0 / sqrt(square);
+    }
+    return true;
+}
+
+/* b := L^-1 b and b := L^-T b within a block; L has the stride n and its diagonal inverted. */
+SIZED void block_forward(int size, int n, const double *L, double *b) {
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        double sum = b[i];
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            sum = j < i ? sum - L[i * n + j] * b[j] : sum;
+        }
+        b[i] = sum * L[i * n + i];
+    }
+}
+
+SIZED void block_backward(int size, int n, const double *L, double *b) {
+    UNROLLED
+    for (int k = 0; k < size; k++) {
+        int i = size - 1 - k;
+        double sum = b[i];
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            sum = j > i ? sum - L[j * n + i] * b[j] : sum;
+        }
+        b[i] = sum * L[i * n + i];
+    }
+}
+
+/* The same for a block of any size. */
+static void long_forward(int size, int n, const double *L, double *b) {
+    for (int i = 0; i < size; i++) {
+        b[i] = (b[i] - dot(i, L + i * n, b)) * L[i * n + i];
+    }
+}
+
+static void long_backward(int size, int n, const double *L, double *b) {
+    for (int i = size - 1; i >= 0; i--) {
+        b[i] *= L[i * n + i];
+        add_scaled(i, -b[i], L + i * n, b);
+    }
+}
+
+static void forward_all(const Factors *factors, double *b) {
     int n = factors->n;
-    factors->r = r;
-    if (!cholesky(n, factors->first, factors->L)) {
-        return false;
+    for (int k = 0; k < factors->block_count; k++) {
+        int o = factors->blocks[k].start;
+        const double *L = factors->L + o * n + o;
+        switch (factors->blocks[k].size) {
+        case 1: block_forward(1, n, L, b + o); break;
+        case 2: block_forward(2, n, L, b + o); break;
+        case 3: block_forward(3, n, L, b + o); break;
+        case 4: block_forward(4, n, L, b + o); break;
+        default: long_forward(factors->blocks[k].size, n, L, b + o);
+        }
     }
-    memcpy(factors->Y, rows, (size_t)(r * n) * sizeof *rows);
-    for (int k = 0; k < r; k++) {
-        forward(n, factors->first, factors->L, factors->Y + k * n);
+}
+
+static void backward_all(const Factors *factors, double *b) {
+    int n = factors->n;
+    for (int k = 0; k < factors->block_count; k++) {
+        int o = factors->blocks[k].start;
+        const double *L = factors->L + o * n + o;
+        switch (factors->blocks[k].size) {
+        case 1: block_backward(1, n, L, b + o); break;
+        case 2: block_backward(2, n, L, b + o); break;
+        case 3: block_backward(3, n, L, b + o); break;
+        case 4: block_backward(4, n, L, b + o); break;
+        default: long_backward(factors->blocks[k].size, n, L, b + o);
+        }
     }
-    const double *Y = factors->Y, *Y_columns = factors->Y_columns;
-    memcpy(factors->Y_columns, columns ? columns : Y, (size_t)(r * n) * sizeof *rows);
-    for (int k = 0; columns && k < r; k++) {
-        forward(n, factors->first, factors->L, factors->Y_columns + k * n);
+}
+
+/* S = Y Y_columns^T.  It is symmetric, unless a stop slides, whose column is not its row. */
+SIZED bool schur_of_size(int r, Factors *factors) {
+    int n = factors->n;
+    const double *Y = factors->Y;
+    double *S = factors->S;
+    for (int i = 0; i < r; i++) {
+        for (int k = 0; k <= i; k++) {
+            S[i * r + k] = dot(n, Y + i * n, Y + k * n);
+        }
+    }
+    return block_cholesky(r, r, S, S);
+}
+
+PRBM bool factor_schur(Factors *factors) {
+    int n = factors->n, r = factors->r;
+    factors->symmetric = factors->Y_columns == factors->Y && r <= SMALL;
+    if (factors->symmetric) {
+        switch (r) {
+        case 0: return true;
+        case 1: return schur_of_size(1, factors);
+        case 2: return schur_of_size(2, factors);
+        case 3: return schur_of_size(3, factors);
+        default: return schur_of_size(4, factors);
+        }
     }
     for (int i = 0; i < r; i++) {
         for (int k = 0; k < r; k++) {
-            factors->S[i * r + k] = dot(n, Y + i * n, Y_columns + k * n);
+            factors->S[i * r + k] = dot(n, factors->Y + i * n, factors->Y_columns + k * n);
         }
     }
-    return r == 0 || lu_factor(r, factors->S, factors->pivots);
+    return lu_factor(r, factors->S, factors->pivots);
 }
 
-PRBM void solve_again(const Factors *factors, double *x) {
+SIZED void multipliers_of_size(int r, const double *S, double *lam) {
+    block_forward(r, r, S, lam);
+    block_backward(r, r, S, lam);
+}
+
+static void multipliers(const Factors *factors, double *lam) {
+    if (!factors->symmetric) {
+        lu_solve(factors->r, factors->S, factors->pivots, lam);
+        return;
+    }
+    switch (factors->r) {
+    case 0: break;
+    case 1: multipliers_of_size(1, factors->S, lam); break;
+    case 2: multipliers_of_size(2, factors->S, lam); break;
+    case 3: multipliers_of_size(3, factors->S, lam); break;
+    default: multipliers_of_size(4, factors->S, lam);
+    }
+}
+
+/* Multipliers from x = L^-1 f and what the rows ask for, then x := a. */
+static void finish(const Factors *factors, double *x) {
     int n = factors->n, r = factors->r;
     double *lam = x + n;
-    forward(n, factors->first, factors->L, x);
     for (int k = 0; k < r; k++) {
         lam[k] -= dot(n, factors->Y + k * n, x);
     }
-    if (r > 0) {
-        lu_solve(r, factors->S, factors->pivots, lam);
-    }
+    multipliers(factors, lam);
     for (int k = 0; k < r; k++) {
-        for (int i = 0; i < n; i++) {
-            x[i] += factors->Y_columns[k * n + i] * lam[k];
-        }
+        add_scaled(n, lam[k], factors->Y_columns + k * n, x);
         lam[k] = -lam[k];
     }
-    backward(n, factors->first, factors->L, x);
+    backward_all(factors, x);
+}
+
+PRBM void solve_again(const Factors *factors, double *x) {
+    forward_all(factors, x);
+    finish(factors, x);
 }
 
 PRBM bool project_positions(const System *system, int r, const Complex *B, const double *c,

@@ -28,15 +28,15 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.M = place(memory, n * n, sizeof(double));
     q.rows = place(memory, r * n, sizeof(double));
     q.columns = place(memory, r * n, sizeof(double));
-    q.x = place(memory, n + r, sizeof(double));
+    q.x = place(memory, n + r + 1, sizeof(double));
+    q.turns = place(memory, n + 1, sizeof(double));
     q.squares = place(memory, n, sizeof(double));
     q.least = place(memory, s, sizeof(double));
     q.most = place(memory, s, sizeof(double));
     q.factors.n = (int)n;
-    q.factors.first = system->first;
+    q.factors.blocks = system->blocks;
     q.factors.L = place(memory, n * n, sizeof(double));
     q.factors.Y = place(memory, r * n, sizeof(double));
-    q.factors.Y_columns = place(memory, r * n, sizeof(double));
     q.factors.S = place(memory, r * r, sizeof(double));
     q.factors.pivots = place(memory, r, sizeof(int));
     *equations = q;
@@ -156,83 +156,125 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs, const Discre
 
 /* --- motion ---------------------------------------------------------------------------------------------- */
 
-/* M in its envelope, and Im(diag(e)^H H diag(e)) v^2 into x: the mass matrix is symmetric, the
- * quadratic velocities antisymmetric. */
-static void inertia_and_convection(Equations *q) {
-    const System *system = q->system;
-    int n = system->n;
-    const double *squares = q->squares;
-    double *x = q->x;
-    for (int i = 0; i < n; i++) {
-        const Complex *H = system->H + i * n, *e = q->e;
-        double *M = q->M + i * n, c = e[i].re, s = e[i].im, sum = 0.0;
-        for (int j = system->first[i]; j < i; j++) {
-            double re = c * e[j].re + s * e[j].im, im = c * e[j].im - s * e[j].re;
-            double turned = H[j].re * im + H[j].im * re;
-            M[j] = H[j].re * re - H[j].im * im;
-            sum += turned * squares[j];
-            x[j] -= turned * squares[i];
+/* x -= c M v within a block. */
+static void damp_mass(Equations *q, int start, int size, const double *v) {
+    int n = q->system->n;
+    const double *M = q->M + start * n + start;
+    double *x = q->x + start, c = q->mass_damping;
+    for (int i = 0; i < size; i++) {
+        x[i] -= c * M[i * n + i] * v[start + i];
+        for (int j = 0; j < i; j++) {
+            x[i] -= c * M[i * n + j] * v[start + j];
+            x[j] -= c * M[i * n + j] * v[start + i];
         }
-        x[i] += sum;
-        M[i] = H[i].re + system->J[i];
     }
+}
+
+/* One block of M, and what its inertia adds to the loads x: Im(diag(e)^H H diag(e)) v^2, as the
+ * mass matrix is symmetric and the quadratic velocities are antisymmetric. */
+SIZED void block_inertia(Equations *q, int start, int size) {
+    int n = q->system->n;
+    const Complex *H = q->system->H + start * n + start, *e = q->e + start;
+    const double *J = q->system->J + start, *squares = q->squares + start;
+    double *M = q->M + start * n + start, *x = q->x + start;
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            if (j < i) {
+                double re = e[i].re * e[j].re + e[i].im * e[j].im;
+                double im = e[i].re * e[j].im - e[i].im * e[j].re;
+                double turned = H[i * n + j].re * im + H[i * n + j].im * re;
+                M[i * n + j] = H[i * n + j].re * re - H[i * n + j].im * im;
+                x[i] += turned * squares[j];
+                x[j] -= turned * squares[i];
+            }
+        }
+        M[i * n + i] = H[i * n + i].re + J[i];
+    }
+}
+
+SIZED bool block_motion(Equations *q, int start, int size, const double *v) {
+    int n = q->system->n, corner = start * n + start;
+    double *L = q->factors.L + corner;
+    block_inertia(q, start, size);
+    if (q->mass_damping != 0.0) {
+        damp_mass(q, start, size, v);
+    }
+    if (!block_cholesky(size, n, q->M + corner, L)) {
+        return false;
+    }
+    block_forward(size, n, L, q->x + start);
+    for (int k = 0; k < q->r; k++) {
+        double *Y = q->factors.Y + k * n + start;
+        const double *row = q->rows + k * n + start;
+        UNROLLED
+        for (int i = 0; i < size; i++) {
+            Y[i] = row[i];
+        }
+        block_forward(size, n, L, Y);
+    }
+    return true;
+}
+
+static bool blocks_motion(Equations *q, const double *v) {
+    bool regular = true;
+    for (int k = 0; k < q->factors.block_count; k++) {
+        int start = q->factors.blocks[k].start, size = q->factors.blocks[k].size;
+        switch (size) {
+        case 1: regular = block_motion(q, start, 1, v) && regular; break;
+        case 2: regular = block_motion(q, start, 2, v) && regular; break;
+        case 3: regular = block_motion(q, start, 3, v) && regular; break;
+        case 4: regular = block_motion(q, start, 4, v) && regular; break;
+        default: regular = block_motion(q, start, size, v) && regular;
+        }
+    }
+    return regular;
 }
 
 /* What springs and their damping take up: x -= K (q - q0 + beta v), spring by spring. */
 static void add_springs(Equations *q, const double *angle, const double *v) {
     const System *system = q->system;
+    int n = system->n;
+    double *turns = q->turns, *x = q->x, ground = x[n]; /* x has room for the ground's share */
+    for (int j = 0; j < n; j++) {
+        turns[j] = angle[j] - system->q0[j] + q->beta * v[j];
+    }
+    turns[n] = 0.0;
     for (int k = 0; k < system->spring_count; k++) {
         const Spring *spring = &system->spring[k];
-        double turn = 0.0;
-        if (spring->b >= 0) {
-            turn += angle[spring->b] - system->q0[spring->b] + q->beta * v[spring->b];
-        }
-        if (spring->a >= 0) {
-            turn -= angle[spring->a] - system->q0[spring->a] + q->beta * v[spring->a];
-            q->x[spring->a] += spring->rate * turn;
-        }
-        if (spring->b >= 0) {
-            q->x[spring->b] -= spring->rate * turn;
-        }
+        double torque = spring->rate * (turns[spring->b] - turns[spring->a]);
+        x[spring->a] += torque;
+        x[spring->b] -= torque;
     }
+    x[n] = ground;
 }
 
 /* beta v^T K v */
 static double spring_loss(const Equations *q, const double *v) {
+    int n = q->system->n;
     double sum = 0.0;
     for (int k = 0; k < q->system->spring_count; k++) {
         const Spring *spring = &q->system->spring[k];
-        double turning = (spring->b >= 0 ? v[spring->b] : 0.0) -
-                         (spring->a >= 0 ? v[spring->a] : 0.0);
-        sum += spring->rate * (turning * turning);
+        double turn = (spring->b < n ? v[spring->b] : 0.0) - (spring->a < n ? v[spring->a] : 0.0);
+        sum += spring->rate * (turn * turn);
     }
     return q->beta * sum;
 }
 
-/* y := M v from the envelope. */
-static void momentum(const Equations *q, const double *v, double *y) {
-    int n = q->system->n;
-    for (int i = 0; i < n; i++) {
-        const double *M = q->M + i * n;
-        double sum = M[i] * v[i];
-        for (int j = q->system->first[i]; j < i; j++) {
-            sum += M[j] * v[j];
-            y[j] += M[j] * v[i];
-        }
-        y[i] = sum;
-    }
-}
-
-PRBM double energy_here(const Equations *q, const double *v) {
-    int n = q->system->n;
+PRBM double energy_here(const Equations *equations, const double *v) {
+    const System *system = equations->system;
     double sum = 0.0;
-    for (int i = 0; i < n; i++) {
-        const double *M = q->M + i * n;
-        double row = 0.5 * M[i] * v[i];
-        for (int j = q->system->first[i]; j < i; j++) {
-            row += M[j] * v[j];
+    for (int k = 0; k < system->block_count; k++) {
+        int start = system->blocks[k].start, end = start + system->blocks[k].size;
+        for (int i = start; i < end; i++) {
+            const double *M = equations->M + i * system->n;
+            double row = 0.5 * M[i] * v[i];
+            for (int j = start; j < i; j++) {
+                row += M[j] * v[j];
+            }
+            sum += row * v[i];
         }
-        sum += row * v[i];
     }
     return sum;
 }
@@ -261,23 +303,27 @@ static void add_rubs(Equations *q) {
     }
 }
 
-/* A stop that slides pushes along its gap and, by Coulomb's law, along its wall. */
-static const double *sliding_columns(Equations *q) {
+/* A stop that slides pushes along its gap and, by Coulomb's law, along its wall: its column differs
+ * from its row. */
+static void set_columns(Equations *q) {
     const System *system = q->system;
     int n = system->n;
+    q->factors.Y_columns = q->factors.Y;
     if (q->sliding_count == 0) {
-        return NULL;
+        return;
     }
-    memcpy(q->columns, q->rows, (size_t)(q->r * n) * sizeof *q->rows);
+    q->factors.Y_columns = q->columns;
+    copy(q->r * n, q->factors.Y, q->columns);
     for (int k = 0; k < q->sliding_count; k++) {
-        int i = q->sliding[k];
+        int i = q->sliding[k], h = q->first_hold + held_at(q, i);
         double share = -q->stop_friction[i] * q->discrete.slides[i];
-        double *column = q->columns + (q->first_hold + held_at(q, i)) * n;
+        double *column = q->columns + h * n;
         for (int j = 0; j < n; j++) {
-            column[j] -= share * product(system->slides[i * n + j], q->e[j]).im;
+            column[j] = q->rows[h * n + j] -
+                        share * product(system->slides[i * n + j], q->e[j]).im;
         }
+        forward_all(&q->factors, column);
     }
-    return q->columns;
 }
 
 /* The rows, and their convective terms Re(B e) v^2 behind the loads in x. */
@@ -304,7 +350,6 @@ static bool solve_motion(Equations *q, const double *angle, const double *v) {
         q->squares[j] = v[j] * v[j];
         q->x[j] = q->w[j].re * q->e[j].re - q->w[j].im * q->e[j].im;
     }
-    inertia_and_convection(q);
     add_springs(q, angle, v);
     rows_and_convection(q);
     if (q->driven) {
@@ -312,23 +357,17 @@ static bool solve_motion(Equations *q, const double *angle, const double *v) {
             q->x[j] += q->moment[j];
         }
     }
-    if (q->mass_damping != 0.0) {
-        double *load = q->squares; /* their turn is over */
-        momentum(q, v, load);
-        for (int j = 0; j < n; j++) {
-            q->x[j] -= q->mass_damping * load[j];
-        }
-    }
     add_rubs(q);
-    for (int i = 0; i < n; i++) {
-        for (int j = system->first[i]; j <= i; j++) {
-            q->factors.L[i * n + j] = q->M[i * n + j];
-        }
-    }
-    if (!factor(&q->factors, q->r, sliding_columns(q), q->rows)) {
+    q->factors.r = q->r;
+    q->factors.block_count = system->block_count;
+    if (!blocks_motion(q, v)) {
         return false;
     }
-    solve_again(&q->factors, q->x);
+    set_columns(q);
+    if (!factor_schur(&q->factors)) {
+        return false;
+    }
+    finish(&q->factors, q->x);
     return true;
 }
 
@@ -465,6 +504,10 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
     if (q->sliding_count > 0) {
         return project(q, t, y, scratch, problem);
     }
+    size_t mark = scratch->used;
+    double *kept = take(scratch, (size_t)n);
+    copy(n, y, kept);
+    scratch->used = mark;
     directions(n, y, q->e);
     memset(x, 0, (size_t)(n + q->r) * sizeof *x);
     for (int k = 0; k < active; k++) {
@@ -480,6 +523,7 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
         worst = open_by <= worst ? worst : open_by; /* a NaN stays */
     }
     if (!(worst <= CLOSED * q->system->length)) {
+        copy(n, kept, y); /* as if nothing had been tried */
         return project(q, t, y, scratch, problem);
     }
     memset(x, 0, (size_t)n * sizeof *x);

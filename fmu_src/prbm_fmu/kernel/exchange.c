@@ -92,7 +92,7 @@ static bool factor_dependents(const Simulation *sim, const double *rows, const i
         return false;
     }
     for (int i = 0; i < r; i++) {
-        least = lesser(least, fabs(a[i * r + i]));
+        least = lesser(least, 1.0 / fabs(a[i * r + i])); /* its diagonal is inverted */
     }
     return least > DEFINITE * most;
 }

@@ -829,10 +829,7 @@ static void look(Simulation *sim) {
         double *y = sim->look_y + k * 2 * n;
         zeros(2 * n, y);
         for (int i = 0; i < STAGES; i++) {
-            double b = sim->grid[k][i];
-            for (int j = 0; b != 0.0 && j < 2 * n; j++) {
-                y[j] += b * sim->arc_k[i * ny + j];
-            }
+            add_scaled(2 * n, sim->grid[k][i], sim->arc_k + i * ny, y);
         }
         for (int j = 0; j < 2 * n; j++) {
             y[j] = sim->arc_y[j] + now->arc_h * y[j];

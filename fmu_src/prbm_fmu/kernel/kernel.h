@@ -25,6 +25,20 @@
 #endif
 #endif
 
+/* Loops over a part of the mechanism are written once and compiled for each small size. */
+#if defined(__GNUC__)
+#define SIZED static inline __attribute__((always_inline))
+#else
+#define SIZED static
+#endif
+#if defined(__clang__)
+#define UNROLLED _Pragma("clang loop unroll(full)")
+#elif defined(__GNUC__)
+#define UNROLLED _Pragma("GCC unroll 8")
+#else
+#define UNROLLED
+#endif
+
 /* --- errors and memory ------------------------------------------------------------------------ */
 
 enum { PROBLEM_LENGTH = 640 };
@@ -84,15 +98,15 @@ PRBM double lesser(double a, double b);  /* b unless a < b */
 PRBM double dot(int n, const double *a, const double *b);
 PRBM void copy(int n, const double *from, double *to);
 PRBM void zeros(int n, double *x);
+PRBM void add_scaled(int n, double a, const double *x, double *y); /* y += a x */
 /* LU with partial pivoting, in place; false if a pivot is zero or not a number. */
 PRBM bool lu_factor(int n, double *a, int *pivot);
 PRBM void lu_solve(int n, const double *a, const int *pivot, double *b);
-/* Cholesky L L^T of a symmetric matrix within its envelope: row i begins at column first[i].
- * Reads and overwrites the lower triangle; the diagonal is left inverted; false if a pivot is not
- * positive. */
-PRBM bool cholesky(int n, const int *first, double *a);
-PRBM void forward(int n, const int *first, const double *a, double *b);  /* b := L^-1 b */
-PRBM void backward(int n, const int *first, const double *a, double *b); /* b := L^-T b */
+/* Cholesky L L^T of a symmetric matrix, of which the lower triangle is read and overwritten; the
+ * diagonal is left inverted; false if a pivot is not positive. */
+PRBM bool cholesky(int n, double *a);
+PRBM void forward(int n, const double *a, double *b);  /* b := L^-1 b */
+PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */
 /* The x of least norm among those that minimise |a x - b|, as np.linalg.lstsq: singular values
  * below rcond times the largest count as zero.  a is (m, n). */
 PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
@@ -273,11 +287,17 @@ typedef struct {
     bool moves;
 } Place;
 
-/* A torsion spring between two coordinates, -1: the ground. */
+/* A torsion spring between two coordinates, n: the ground. */
 typedef struct {
     double rate; /* N m/rad */
     int a, b;
 } Spring;
+
+/* The mass matrix consists of dense blocks along its diagonal: the links of a flexure that closes a
+ * loop, say, have no mass in common with the others. */
+typedef struct {
+    int start, size;
+} Block;
 
 /* The constant arrays of a mechanism, as in the twin; n coordinates, r loop rows, p mass points,
  * s stops, f friction points, b bodies. */
@@ -302,7 +322,8 @@ typedef struct {
     int *links;               /* coordinates of the links */
     int spring_count;
     Spring *spring;           /* what K is made of */
-    int *first;               /* (n,): first column of each row of M that is not zero throughout */
+    int block_count;
+    Block *blocks;            /* of M */
     double *calculated;       /* gamma0 of the flexure types of several pivots */
     Complex anchor, gravity;
     double length;
@@ -339,19 +360,20 @@ PRBM bool project_positions(const System *system, int r, const Complex *B, const
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, Scratch *scratch, Problem *problem);
 
-/* M = L L^T in its envelope, Y = L^-1 columns^T, and the Schur complement S of a saddle-point
- * matrix [[M, columns^T], [rows, 0]]: what to solve with, again and again. */
+/* M = L L^T block by block, Y = L^-1 rows^T, and the Schur complement S of a saddle-point matrix
+ * [[M, columns^T], [rows, 0]]: what to solve with, again and again. */
 typedef struct {
-    int n, r;
-    const int *first;
-    double *L;              /* (n, n) */
-    double *Y, *Y_columns;  /* (r, n): L^-1 rows^T, L^-1 columns^T (the same if there are none) */
+    int n, r, block_count;
+    const Block *blocks;
+    double *L;              /* (n, n); its diagonal inverted */
+    double *Y, *Y_columns;  /* (r, n): L^-1 rows^T, L^-1 columns^T; the same where they are */
     double *S;              /* (r, r) */
     int *pivots;            /* (r,) */
+    bool symmetric;         /* S is, and small: S is its Cholesky factor, else its LU factors */
 } Factors;
 
-/* columns NULL: the rows.  M is overwritten by L. */
-PRBM bool factor(Factors *factors, int r, const double *columns, const double *rows);
+/* S from L, Y and Y_columns, factored. */
+PRBM bool factor_schur(Factors *factors);
 /* x (n + r,): in, the right side; out, the solution (a, -lam). */
 PRBM void solve_again(const Factors *factors, double *x);
 
@@ -403,8 +425,9 @@ typedef struct {
     bool driven, walls_push;
     /* at the state that was evaluated last */
     Complex *e;                         /* (n,) */
-    double *M, *rows, *columns;         /* (n, n) in its envelope, (r, n), (r, n) */
+    double *M, *rows, *columns;         /* (n, n) lower blocks, (r, n), (r, n) */
     double *x, *squares;                /* (n + r,) = (a, -lam); (n,) */
+    double *turns;                      /* (n + 1,): deflections, of the ground last */
     double *least, *most;               /* (held,) extremes of the forces since the trace began */
     Factors factors;
 } Equations;

@@ -30,6 +30,15 @@ PRBM void copy(int n, const double *from, double *to) {
     }
 }
 
+/* y += a x */
+PRBM void add_scaled(int n, double a, const double *x, double *y) {
+    if (a != 0.0) {
+        for (int i = 0; i < n; i++) {
+            y[i] += a * x[i];
+        }
+    }
+}
+
 /* --- LU ------------------------------------------------------------------------------------------- */
 
 static int largest_below(int n, const double *a, int k) {
@@ -89,21 +98,14 @@ PRBM void lu_solve(int n, const double *a, const int *pivot, double *b) {
 
 /* --- Cholesky ------------------------------------------------------------------------------------- */
 
-/* L_ij = (a_ij - sum_k L_ik L_jk)/L_jj */
-static void cholesky_row(int n, const int *first, double *a, int i) {
-    double *row = a + i * n;
-    for (int j = first[i]; j < i; j++) {
-        const double *other = a + j * n;
-        int k = first[i] > first[j] ? first[i] : first[j];
-        row[j] = (row[j] - dot(j - k, row + k, other + k)) * other[j];
-    }
-}
-
-PRBM bool cholesky(int n, const int *first, double *a) {
+/* L_ij = (a_ij - sum_k L_ik L_jk)/L_jj, L_ii^2 = a_ii - sum_k L_ik^2 */
+PRBM bool cholesky(int n, double *a) {
     for (int i = 0; i < n; i++) {
         double *row = a + i * n;
-        cholesky_row(n, first, a, i);
-        double square = row[i] - dot(i - first[i], row + first[i], row + first[i]);
+        for (int j = 0; j < i; j++) {
+            row[j] = (row[j] - dot(j, row, a + j * n)) * a[j * n + j];
+        }
+        double square = row[i] - dot(i, row, row);
         if (!(square > 0.0)) {
             return false;
         }
@@ -112,20 +114,16 @@ PRBM bool cholesky(int n, const int *first, double *a) {
     return true;
 }
 
-PRBM void forward(int n, const int *first, const double *a, double *b) {
+PRBM void forward(int n, const double *a, double *b) {
     for (int i = 0; i < n; i++) {
-        const double *row = a + i * n;
-        b[i] = (b[i] - dot(i - first[i], row + first[i], b + first[i])) * row[i];
+        b[i] = (b[i] - dot(i, a + i * n, b)) * a[i * n + i];
     }
 }
 
-PRBM void backward(int n, const int *first, const double *a, double *b) {
+PRBM void backward(int n, const double *a, double *b) {
     for (int i = n - 1; i >= 0; i--) {
-        const double *row = a + i * n;
-        b[i] *= row[i];
-        for (int j = first[i]; j < i; j++) {
-            b[j] -= row[j] * b[i];
-        }
+        b[i] *= a[i * n + i];
+        add_scaled(i, -b[i], a + i * n, b);
     }
 }
 

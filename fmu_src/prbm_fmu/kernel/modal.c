@@ -28,15 +28,15 @@ static void congruent(int n, int k, const double *a, const double *b, double *c,
 }
 
 /* A := L^-1 A L^-T for symmetric A; column is (n,) of its own use. */
-static void divide_twice(int n, const int *first, const double *L, double *A, double *column) {
+static void divide_twice(int n, const double *L, double *A, double *column) {
     for (int i = 0; i < n; i++) {
-        forward(n, first, L, A + i * n); /* row i: L^-1 A e_i */
+        forward(n, L, A + i * n); /* row i: L^-1 A e_i */
     }
     for (int j = 0; j < n; j++) {
         for (int i = 0; i < n; i++) {
             column[i] = A[i * n + j];
         }
-        forward(n, first, L, column);
+        forward(n, L, column);
         for (int i = 0; i < n; i++) {
             A[i * n + j] = column[i];
         }
@@ -52,22 +52,18 @@ static void divide_twice(int n, const int *first, const double *L, double *A, do
 static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y, Scratch *scratch,
                               Problem *problem) {
     size_t used = scratch->used;
-    int *first = take_integers(scratch, n);
     double *column = take(scratch, (size_t)n);
-    for (int i = 0; i < n; i++) {
-        first[i] = 0;
-    }
-    if (!cholesky(n, first, M)) {
+    if (!cholesky(n, M)) {
         scratch->used = used;
         return fail(problem, "the modes have no frequency here: a part that can move has no mass");
     }
-    divide_twice(n, first, M, K, column);
+    divide_twice(n, M, K, column);
     symmetric_eigen(n, K, w, Y);
     for (int j = 0; j < n; j++) {
         for (int i = 0; i < n; i++) {
             column[i] = Y[i * n + j];
         }
-        backward(n, first, M, column);
+        backward(n, M, column);
         for (int i = 0; i < n; i++) {
             Y[i * n + j] = column[i];
         }

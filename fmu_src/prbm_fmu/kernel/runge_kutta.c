@@ -35,22 +35,34 @@ static const double DENSE_WEIGHT[STAGES][DENSE] = {
     {0.0, 3.0 / 2, -4.0, 5.0 / 2},
 };
 
+/* result = y + sum(a_i k_i) for n even, as it is with two rates for each angle and two energies;
+ * two components at a time, which the compilers turn into vectors. */
+static void combine(int n, int count, const double *a, const double *k, const double *y,
+                    double *result) {
+    for (int j = 0; j < n; j += 2) {
+        double first = 0.0, second = 0.0;
+        for (int i = 0; i < count; i++) {
+            first += a[i] * k[i * n + j];
+            second += a[i] * k[i * n + j + 1];
+        }
+        result[j] = y[j] + first;
+        result[j + 1] = y[j + 1] + second;
+    }
+}
+
+static void times_step(int count, const double *a, double h, double *scaled_ones) {
+    for (int i = 0; i < count; i++) {
+        scaled_ones[i] = a[i] * h;
+    }
+}
+
 /* The stages k (STAGES, n), of which the first is given, and the new state y1. */
 PRBM bool stages(Equations *equations, int n, double t, const double *y, double h, double *k,
                  double *y1, Problem *problem) {
+    double a[STAGES];
     for (int i = 1; i < STAGES; i++) {
-        for (int j = 0; j < n; j++) {
-            y1[j] = 0.0;
-        }
-        for (int m = 0; m < i; m++) {
-            double a = STAGE[i][m] * h;
-            for (int j = 0; a != 0.0 && j < n; j++) {
-                y1[j] += a * k[m * n + j];
-            }
-        }
-        for (int j = 0; j < n; j++) {
-            y1[j] += y[j];
-        }
+        times_step(i, STAGE[i], h, a);
+        combine(n, i, a, k, y, y1);
         if (!rate(equations, t + NODE[i] * h, y1, k + i * n, problem)) {
             return false;
         }
@@ -59,13 +71,10 @@ PRBM bool stages(Equations *equations, int n, double t, const double *y, double 
 }
 
 PRBM void error_of(int n, const double *k, double h, double *error) {
-    for (int j = 0; j < n; j++) {
-        double sum = 0.0;
-        for (int i = 0; i < STAGES; i++) {
-            sum += ERROR_WEIGHT[i] * k[i * n + j];
-        }
-        error[j] = h * sum;
-    }
+    double a[STAGES];
+    times_step(STAGES, ERROR_WEIGHT, h, a);
+    zeros(n, error);
+    combine(n, STAGES, a, k, error, error);
 }
 
 /* The weights of the stages at a fraction of a step. */
@@ -80,15 +89,6 @@ PRBM void interpolate(int n, const double *y, const double *k, double h, double 
                       double *result) {
     double b[STAGES];
     weights(theta, b);
-    for (int j = 0; j < n; j++) {
-        result[j] = 0.0;
-    }
-    for (int i = 0; i < STAGES; i++) {
-        for (int j = 0; b[i] != 0.0 && j < n; j++) {
-            result[j] += b[i] * k[i * n + j];
-        }
-    }
-    for (int j = 0; j < n; j++) {
-        result[j] = y[j] + h * result[j];
-    }
+    times_step(STAGES, b, h, b);
+    combine(n, STAGES, b, k, y, result);
 }
