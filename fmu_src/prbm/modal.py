@@ -89,7 +89,7 @@ def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:
     """Return the modal restitution of an impact, -phi^T M v+ / phi^T M v- [-].
 
-    Zero if nothing of the fundamental mode arrives.
+    Zero if nothing of the fundamental mode arrives but rounding.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> floa
     """
     momentum = M @ phi
     arriving = float(momentum @ before)
-    if abs(arriving) <= 1e-12 * float(np.abs(momentum) @ np.abs(before)):
+    if abs(arriving) <= 1e-12 * float(np.abs(momentum) @ (np.abs(before) + np.abs(after))):
         return 0.0
     return -float(momentum @ after) / arriving
 

@@ -209,7 +209,7 @@ static bool walk_flexure(System *system, const Flexure *flexure, Walk *walk, Scr
     int n = system->n, root = flexure->start, far = flexure->end;
     Complex z_start = at_point(system, flexure->start_point);
     Complex z_end = at_point(system, flexure->end_point);
-    Segments pieces;
+    Segments pieces = {0, NULL, NULL, NULL, NULL};
     if (!cut_flexure(system, flexure, z_start, z_end, &pieces, scratch, problem)) {
         return false;
     }

@@ -7,7 +7,6 @@
 #define CLOSED 1e-14        /* of the size of the mechanism: a few roundings of its coordinates */
 #define BARELY_CLOSED 1e-12 /* of that size: accepted if the iteration can do no better */
 
-enum { SMALL = 4 }; /* sizes up to which code is compiled for each */
 enum { ITERATIONS = 20 }; /* Gauss-Newton converges quadratically: twenty are hopeless */
 
 static const char SINGULAR[] =
@@ -69,12 +68,14 @@ SIZED bool block_cholesky(int size, int n, const double *M, double *L) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         double square = M[i * n + i];
+        const int columns = size <= SMALL ? size : i;
         UNROLLED
-        for (int j = 0; j < size; j++) {
+        for (int j = 0; j < columns; j++) {
             if (j < i) {
                 double sum = M[i * n + j];
+                const int before = size <= SMALL ? size : j;
                 UNROLLED
-                for (int k = 0; k < size; k++) {
+                for (int k = 0; k < before; k++) {
                     sum = k < j ? sum - L[i * n + k] * L[j * n + k] : sum;
                 }
                 L[i * n + j] = sum * L[j * n + j];
@@ -94,8 +95,9 @@ SIZED void block_forward(int size, int n, const double *L, double *b) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         double sum = b[i];
+        const int columns = size <= SMALL ? size : i;
         UNROLLED
-        for (int j = 0; j < size; j++) {
+        for (int j = 0; j < columns; j++) {
             sum = j < i ? sum - L[i * n + j] * b[j] : sum;
         }
         b[i] = sum * L[i * n + i];
@@ -107,25 +109,12 @@ SIZED void block_backward(int size, int n, const double *L, double *b) {
     for (int k = 0; k < size; k++) {
         int i = size - 1 - k;
         double sum = b[i];
+        const int from = size <= SMALL ? 0 : i + 1;
         UNROLLED
-        for (int j = 0; j < size; j++) {
+        for (int j = from; j < size; j++) {
             sum = j > i ? sum - L[j * n + i] * b[j] : sum;
         }
         b[i] = sum * L[i * n + i];
-    }
-}
-
-/* The same for a block of any size. */
-static void long_forward(int size, int n, const double *L, double *b) {
-    for (int i = 0; i < size; i++) {
-        b[i] = (b[i] - dot(i, L + i * n, b)) * L[i * n + i];
-    }
-}
-
-static void long_backward(int size, int n, const double *L, double *b) {
-    for (int i = size - 1; i >= 0; i--) {
-        b[i] *= L[i * n + i];
-        add_scaled(i, -b[i], L + i * n, b);
     }
 }
 
@@ -139,7 +128,7 @@ static void forward_all(const Factors *factors, double *b) {
         case 2: block_forward(2, n, L, b + o); break;
         case 3: block_forward(3, n, L, b + o); break;
         case 4: block_forward(4, n, L, b + o); break;
-        default: long_forward(factors->blocks[k].size, n, L, b + o);
+        default: block_forward(factors->blocks[k].size, n, L, b + o);
         }
     }
 }
@@ -154,7 +143,7 @@ static void backward_all(const Factors *factors, double *b) {
         case 2: block_backward(2, n, L, b + o); break;
         case 3: block_backward(3, n, L, b + o); break;
         case 4: block_backward(4, n, L, b + o); break;
-        default: long_backward(factors->blocks[k].size, n, L, b + o);
+        default: block_backward(factors->blocks[k].size, n, L, b + o);
         }
     }
 }

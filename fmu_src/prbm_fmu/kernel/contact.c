@@ -7,7 +7,7 @@
 #include "kernel.h"
 
 #define FEASIBLE 1e-10 /* of the largest approach: what the complementarity may be violated by */
-#define WEDGED 1e-10   /* of the inverse normal mass: a smaller rate of the approach is a rounding */
+#define WEDGED 1e-10   /* of the inverse normal mass: a smaller rate of approach is a rounding */
 #define ROUNDING 1e-12 /* of the rates before: what is left of a rate that has vanished */
 #define SETTLED 1e-14  /* change of the impulses at which the sweeps end, relative */
 enum {
@@ -36,7 +36,7 @@ PRBM bool response(int n, int r, int k, const double *M, const double *held, con
     return solved;
 }
 
-/* --- without friction ----------------------------------------------------------------------------- */
+/* --- without friction ------------------------------------------------------------------------- */
 
 /* The next of the sets of so many out of k, in lexical order; false after the last. */
 static bool next_set(int k, int size, int *members) {
@@ -146,7 +146,7 @@ PRBM void newton(int k, const double *W, const double *u, const double *restitut
     scratch->used = used;
 }
 
-/* --- one hit with friction ------------------------------------------------------------------------ */
+/* --- one hit with friction -------------------------------------------------------------------- */
 
 static double sign_of(double x) {
     return x < 0.0 ? -1.0 : 1.0;
@@ -248,7 +248,7 @@ PRBM void stronge(const double *W, const double *u, double friction, double rest
     *P_t = hit.p_t;
 }
 
-/* --- several hits with friction ------------------------------------------------------------------- */
+/* --- several hits with friction --------------------------------------------------------------- */
 
 static double between(double low, double x, double high) {
     return lesser(high, greater(low, x));

@@ -179,8 +179,9 @@ SIZED void block_inertia(Equations *q, int start, int size) {
     double *M = q->M + start * n + start, *x = q->x + start;
     UNROLLED
     for (int i = 0; i < size; i++) {
+        const int columns = size <= SMALL ? size : i;
         UNROLLED
-        for (int j = 0; j < size; j++) {
+        for (int j = 0; j < columns; j++) {
             if (j < i) {
                 double re = e[i].re * e[j].re + e[i].im * e[j].im;
                 double im = e[i].re * e[j].im - e[i].im * e[j].re;

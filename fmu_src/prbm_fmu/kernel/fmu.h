@@ -148,12 +148,12 @@ typedef struct {
     double time;
 } Outcome;
 
-/* --- resources.c ---------------------------------------------------------------------------------- */
+/* --- resources.c ------------------------------------------------------------------------------ */
 
 /* Read the tables; what is returned is freed by the caller. */
 PRBM Mechanism *tables_read(const char *resources, Problem *problem);
 
-/* --- fmu.c: messages --------------------------------------------------------------------------------- */
+/* --- fmu.c: messages -------------------------------------------------------------------------- */
 
 #if defined(__GNUC__)
 PRBM void report(const Journal *journal, int status, const char *format, ...)
@@ -167,7 +167,7 @@ PRBM int refuse(const Instance *instance, int status, const char *format, ...);
 PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t count,
                            const char *const *names);
 
-/* --- fmu.c: life ---------------------------------------------------------------------------------------- */
+/* --- fmu.c: life ------------------------------------------------------------------------------ */
 
 PRBM Instance *instance_open(const Request *request);
 PRBM void instance_close(Instance *instance);
@@ -181,20 +181,20 @@ PRBM int exit_initialization(Instance *instance);
 PRBM int end_run(Instance *instance);
 PRBM int reset(Instance *instance);
 
-/* --- fmu.c: values ---------------------------------------------------------------------------------------- */
+/* --- fmu.c: values ---------------------------------------------------------------------------- */
 
 PRBM int read_value(Instance *instance, uint32_t reference, int type, double *x);
 PRBM int write_value(Instance *instance, uint32_t reference, int type, double x);
 PRBM int read_clock(Instance *instance, uint32_t reference, bool *active);
 
-/* --- fmu.c: steps and events ---------------------------------------------------------------------------------- */
+/* --- fmu.c: steps and events ------------------------------------------------------------------ */
 
 PRBM int make_step(Instance *instance, double time, double size, Outcome *outcome);
 PRBM int enter_event_mode(Instance *instance);
 PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed);
 PRBM int leave_event_mode(Instance *instance, const Rule *rule, Mode next);
 
-/* --- fmu.c: model exchange ---------------------------------------------------------------------------------------- */
+/* --- fmu.c: model exchange -------------------------------------------------------------------- */
 
 PRBM int set_time(Instance *instance, double time);
 PRBM int set_states(Instance *instance, const double *x, size_t count);
@@ -207,7 +207,7 @@ PRBM int directional_derivative(Instance *instance, const uint32_t *unknowns, si
                                 const uint32_t *knowns, size_t known_count, const double *seed,
                                 double *sensitivity);
 
-/* --- fmu.c: saved states ---------------------------------------------------------------------------------------- */
+/* --- fmu.c: saved states ---------------------------------------------------------------------- */
 
 PRBM int save_state(const Instance *instance, void **state);
 PRBM int restore_state(Instance *instance, const void *state);

@@ -19,7 +19,7 @@
 #define SHRINK 0.2
 #define GROW 5.0
 #define MEMORY 0.04           /* exponent of the previous error */
-#define RETRY_EXPONENT (1.0 / ORDER)
+#define RETRY_EXPONENT 0.2    /* 1 / order */
 #define STEP_EXPONENT (RETRY_EXPONENT - 0.75 * MEMORY)
 #define STRICTNESS 0.6        /* of the tolerance: what the dense output adds has room too */
 #define LEAST_ERROR 1e-4      /* of the tolerance: what a better step is remembered as */
@@ -28,7 +28,8 @@
 #define LARGEST_WEIGHT 1.1    /* more than the sum of |b_i(theta)| of the dense output, 1.03 */
 #define TWO_PI 6.283185307179586
 
-enum { CHATTER = 1000, MOST_HOLDING = 12 };
+#define CHATTER 1000
+enum { MOST_HOLDING = 12 };
 
 static const char *const EVENT_NAMES[] = {"none",     "impact", "release", "slip slide",
                                           "slip rub", "slide",  "rub"};
@@ -146,7 +147,7 @@ PRBM Simulation *simulation_open(const Mechanism *mechanism) {
     sim->bytes = bytes;
     place_all(sim, &memory);
     for (int i = 0; i <= WATCHED; i++) {
-        weights((double)i / WATCHED, sim->grid[i]);
+        weights(i / 8.0, sim->grid[i]);
     }
     simulation_reset(sim);
     return sim;
@@ -839,7 +840,7 @@ static void look(Simulation *sim) {
 }
 
 static double look_time(const Simulation *sim, int k) {
-    return sim->now->arc_start + sim->now->arc_h * ((double)k / WATCHED);
+    return sim->now->arc_start + sim->now->arc_h * (k / 8.0);
 }
 
 /* Move the time of a closing gap to where the projected state closes it. */
@@ -1652,7 +1653,7 @@ static bool captured(Simulation *sim, int i, const Hits *hits, const double *q, 
     return right;
 }
 
-static void tell(const Simulation *sim, int i) {
+static void report_impact(const Simulation *sim, int i) {
     const Latched *last = &sim->latched[i];
     Impact told = {sim->mechanism->stops[i].name, last->time,       last->approach_speed,
                    last->rebound_speed,           last->impulse,    last->energy_lost,
@@ -1697,7 +1698,7 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
             latched->impulse = hits->normal[i];
             latched->energy_lost = lost[i];
             latched->modal_restitution = modal;
-            tell(sim, i);
+            report_impact(sim, i);
         }
     }
     copy(n, hits->after, sim->front + n);
@@ -1764,7 +1765,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
 
 static bool due(const Simulation *sim, double time) {
     const Scalars *now = sim->now;
-    return now->has_arc != 0.0 && now->event_kind != NO_EVENT && now->event_time <= time;
+    return now->has_arc != 0.0 && to_int(now->event_kind) != NO_EVENT && now->event_time <= time;
 }
 
 static bool let_happen(Simulation *sim, Problem *problem) {
@@ -2020,12 +2021,13 @@ static bool sound_state(const Simulation *sim) {
     int most = m->stop_count > m->friction_count ? m->stop_count : m->friction_count;
     bool sound = whole_number(now->started, 0, 1) && whole_number(now->exchange, 0, 1) &&
                  whole_number(now->has_k1, 0, 1) && whole_number(now->has_arc, 0, 1) &&
-                 whole_number(now->underway, 0, 1) && whole_number(now->event_kind, 0, RUB) &&
+                 whole_number(now->underway, 0, 1) && whole_number(now->event_kind, 0, (int)RUB) &&
                  whole_number(now->event_index, 0, most) && finite_number(now->time) &&
                  finite_number(now->front_time) && finite_number(now->h) && now->h >= 0.0 &&
                  now->window_count >= 0.0 && now->window_count <= CHATTER;
-    if (sound && now->has_arc != 0.0 && now->event_kind != NO_EVENT) {
-        bool rubs = now->event_kind == SLIP_RUB || now->event_kind == RUB;
+    if (sound && now->has_arc != 0.0 && to_int(now->event_kind) != NO_EVENT) {
+        int kind = to_int(now->event_kind);
+        bool rubs = kind == SLIP_RUB || kind == RUB;
         sound = now->event_index < (rubs ? m->friction_count : m->stop_count);
     }
     if (sound && now->started != 0.0) {

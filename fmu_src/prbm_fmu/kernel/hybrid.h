@@ -4,7 +4,7 @@
 
 #include "simulation.h"
 
-enum { WATCHED = 8 }; /* parts of a step at which the guards are looked at */
+enum { WATCHED = 8 }; /* parts of a step at which the guards are looked at, at eighths of it */
 
 enum { NO_EVENT, IMPACT, RELEASE, SLIP_SLIDE, SLIP_RUB, SLIDE, RUB };
 
@@ -55,7 +55,7 @@ struct Simulation {
     Discrete discrete, other;
     double omega, energy_scale;
     double *forces; /* (3 b,) acting inputs */
-    double grid[WATCHED + 1][STAGES];
+    double grid[WATCHED + 1][STAGES]; /* weights of the stages at the looks */
     double *look_y, *look_gap, *look_rate, *y1, *error;
     Complex *look_e, *e;
     double *outputs, *y, *rates, *a, *lam;

@@ -31,13 +31,12 @@
 #else
 #define SIZED static
 #endif
-#if defined(__clang__)
-#define UNROLLED _Pragma("clang loop unroll(full)")
-#elif defined(__GNUC__)
+#if defined(__GNUC__) && !defined(__clang__) /* which needs to be told */
 #define UNROLLED _Pragma("GCC unroll 8")
 #else
 #define UNROLLED
 #endif
+enum { SMALL = 4 }; /* the largest such size; loops to a constant are the ones that unroll */
 
 /* --- errors and memory ------------------------------------------------------------------------ */
 

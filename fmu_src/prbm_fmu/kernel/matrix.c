@@ -39,7 +39,7 @@ PRBM void add_scaled(int n, double a, const double *x, double *y) {
     }
 }
 
-/* --- LU ------------------------------------------------------------------------------------------- */
+/* --- LU --------------------------------------------------------------------------------------- */
 
 static int largest_below(int n, const double *a, int k) {
     int best = k;
@@ -96,7 +96,7 @@ PRBM void lu_solve(int n, const double *a, const int *pivot, double *b) {
     }
 }
 
-/* --- Cholesky ------------------------------------------------------------------------------------- */
+/* --- Cholesky --------------------------------------------------------------------------------- */
 
 /* L_ij = (a_ij - sum_k L_ik L_jk)/L_jj, L_ii^2 = a_ii - sum_k L_ik^2 */
 PRBM bool cholesky(int n, double *a) {
@@ -127,7 +127,7 @@ PRBM void backward(int n, const double *a, double *b) {
     }
 }
 
-/* --- singular values ------------------------------------------------------------------------------ */
+/* --- singular values -------------------------------------------------------------------------- */
 
 /* The rotation p := c p - s q, q := s p + c q that makes [[p.p, p.q], [p.q, q.q]] diagonal: of the
  * two that do, the one by the smaller angle. */
@@ -241,7 +241,7 @@ PRBM int rank(int m, int n, const double *a, double tolerance, Scratch *scratch)
     return count;
 }
 
-/* --- eigenvalues ---------------------------------------------------------------------------------- */
+/* --- eigenvalues ------------------------------------------------------------------------------ */
 
 /* Rotate rows and columns p and q of a so that a_pq = 0. */
 static void jacobi_rotation(int n, double *a, double *z, int p, int q) {
@@ -301,7 +301,7 @@ PRBM void symmetric_eigen(int n, double *a, double *w, double *z) {
     sort_eigen(n, w, z);
 }
 
-/* --- null space ----------------------------------------------------------------------------------- */
+/* --- null space ------------------------------------------------------------------------------- */
 
 /* The u of Householder's reflection 1 - u u^T that sends x to a multiple of the first unit
  * vector, in place of x. */

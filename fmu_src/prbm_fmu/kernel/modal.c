@@ -202,7 +202,7 @@ PRBM double simulated_restitution(int n, const double *phi, const double *M, con
         double momentum = dot(n, M + i * n, phi);
         arriving += momentum * before[i];
         leaving += momentum * after[i];
-        size += fabs(momentum) * fabs(before[i]);
+        size += fabs(momentum) * (fabs(before[i]) + fabs(after[i]));
     }
     return fabs(arriving) <= 1e-12 * size ? 0.0 : -leaving / arriving;
 }

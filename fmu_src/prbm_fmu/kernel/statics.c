@@ -6,7 +6,7 @@
 
 #include "kernel.h"
 
-#define LARGEST_TURN 0.5 /* rad per Newton step and per step of the load: further is another shape */
+#define LARGEST_TURN 0.5 /* rad per Newton step and step of the load: further is another shape */
 #define SMALLEST_FRACTION (1.0 / 512) /* of the load, before the continuation gives up */
 #define BALANCED 1e-12 /* of the largest torsion rate times one radian */
 

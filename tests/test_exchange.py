@@ -1,0 +1,199 @@
+"""Model exchange: states, derivatives, indicators and events of the kernel."""
+
+import numpy as np
+import pytest
+
+from kernel_simulation import KernelMistake, KernelSimulation
+from prbm import assemble
+from prbm.constraints import jacobian
+from prbm.dynamics import input_names
+from prbm.exchange import conditioning, independent
+from prbm.statics import equilibrium
+from support import mechanism
+
+MODELS = ("PRBDM", "PRBDM2R")
+INPUTS = {
+    "force.x": 0.1, "force.y": -0.2, "force.moment": 1e-3, "stop.displacement": 1e-3,
+    "stop.velocity": 0.02, "base.acceleration.x": 0.3, "base.acceleration.y": -0.4,
+}  # fmt: skip
+FRICTION = {
+    "stop.friction": 0.3, "friction.coefficient": 0.4, "friction.normal_force": 0.5,
+    "friction.normal_stiffness": 30.0, "damping.zeta": 0.05,
+}  # fmt: skip
+SCALARS = 20  # numbers before the values in the array of the state
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_dependent_coordinates_are_determined_at_every_shape(model):
+    """Their columns of the loops' Jacobian keep a tenth of its size from straight to release."""
+    guide = mechanism(model)
+    system = assemble(guide, guide.values())
+    chosen = independent(guide)
+    dependent = tuple(j for j in range(system.n) if j not in chosen)
+    assert len(chosen) == system.n - len(system.loops)
+    for x in np.linspace(-0.018, 0.018, 7):
+        q = equilibrium(system, x).q
+        assert conditioning(jacobian(system.loops, np.exp(1j * q)), dependent) > 0.1
+
+
+def discrete_states():
+    """Yield what may hold (0, 1), slide at the stop and rub (-1, 0, 1, 2)."""
+    for rubs in (2, 0, 1, -1):
+        yield 0, 2, rubs
+        for slides in (2, 0, 1, -1):
+            yield 1, slides, rubs
+
+
+def put(kernel, guide, time, x, values):
+    kernel.set(values)
+    kernel.exchange_set(time, x)
+
+
+@pytest.mark.parametrize("discrete", [*discrete_states()], ids=str)
+@pytest.mark.parametrize("model", MODELS)
+def test_directional_derivatives_are_those_of_differences(model, discrete):
+    """Along random changes of all states and inputs, at random states.
+
+    Differences of fourth order leave 1e-8; what a change of the shape makes of a nearly singular
+    pair of constraints (held and stuck) leaves more.
+    """
+    if model == "PRBDM" and discrete[0] and (discrete[1] == 0 or discrete[2] == 0):
+        pytest.skip("one degree of freedom cannot be held and stuck at once")
+    guide, rng = mechanism(model), np.random.default_rng(abs(hash(discrete)) % 1000)
+    kernel = KernelSimulation(guide, FRICTION, exchange=True)
+    count = (len(kernel.exchange_get()) - 2) // 2
+    x = kernel.exchange_get()
+    x[:count] += 0.02 * rng.standard_normal(count)
+    x[count : 2 * count] = 3.0 * rng.standard_normal(count)
+    put(kernel, guide, 0.0, x, INPUTS)
+    state = kernel.state
+    at = SCALARS + 2 * (len(guide.parameters) + len(INPUTS)) + 3 * len(guide.stops)
+    state[at : at + 3] = discrete
+    kernel.restore(state)
+    put(kernel, guide, 0.0, x, INPUTS)
+    names, given = list(kernel.slots), np.array([INPUTS[n] for n in input_names(guide)])
+
+    def values(step):
+        moved = dict(zip(input_names(guide), given + step * du, strict=True))
+        put(kernel, guide, 0.0, x + step * dx, moved)
+        return np.array([*kernel.outputs().values()])
+
+    for _ in range(3):
+        dx, du = rng.standard_normal(len(x)), rng.standard_normal(len(given)) * abs(given)
+        dx[count : 2 * count] *= 30.0
+        sizes = np.abs(values(0.0))
+        put(kernel, guide, 0.0, x, dict(zip(input_names(guide), given, strict=True)))
+        found = kernel.directional(dx, du)
+        error = np.full(len(found), np.inf)
+        for h in (2e-4, 6e-5, 2e-5):  # the best compromise of truncation and rounding
+            slope = (8 * (values(h) - values(-h)) - (values(2 * h) - values(-2 * h))) / (12 * h)
+            scale = np.abs(slope) + 1e-4 * (1.0 + sizes)
+            error = np.minimum(error, np.abs(found - slope) / scale)
+        worst = int(error.argmax())
+        assert error[worst] <= 1e-6, (names[worst], found[worst], error[worst])
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_derivatives_are_those_of_the_motion(model):
+    """What co-simulation moves by in a short time, without any event."""
+    exchange = KernelSimulation(mechanism(model), {"release.velocity": 0.2}, exchange=True)
+    moving = KernelSimulation(mechanism(model), {"release.velocity": 0.2}, tolerance=1e-12)
+    names = [n.removeprefix("der(").removesuffix(")") for n in exchange.slots if "der(link" in n]
+    start, h, slopes = [moving.get(name) for name in names], 1e-6, []
+    for time in (h, 2 * h):
+        moving.advance(time)
+        slopes.append([(moving.get(n) - b) / time for n, b in zip(names, start, strict=True)])
+    assert names
+    for name, first, second in zip(names, *slopes, strict=True):
+        assert exchange.get(f"der({name})") == pytest.approx(2 * first - second, rel=1e-3, abs=1.0)
+
+
+def integrate(kernel, end, h=2e-5):
+    """Integrate with classical steps, bisect to indicators that fall to zero; yield events."""
+    t, x = 0.0, kernel.exchange_get()
+
+    def f(t, x):
+        kernel.exchange_set(t, x)
+        return kernel.derivatives()
+
+    def step(t, x, h):
+        k1 = f(t, x)
+        k2 = f(t + h / 2, x + h / 2 * k1)
+        k3 = f(t + h / 2, x + h / 2 * k2)
+        k4 = f(t + h, x + h * k3)
+        return x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+
+    def crossed(t, x):
+        kernel.exchange_set(t, x)
+        return (kernel.indicators() <= 0.0).any()
+
+    while t < end:
+        x1, size = step(t, x, h), h
+        if crossed(t + h, x1):
+            low, high = 0.0, h
+            while high - low > 1e-13:
+                middle = (low + high) / 2
+                low, high = (
+                    (low, middle) if crossed(t + middle, step(t, x, middle)) else (middle, high)
+                )
+            x1, size = step(t, x, high), high
+        t += size
+        kernel.exchange_set(t, x1)
+        x = x1
+        if kernel.completed_step() or crossed(t, x1):
+            kernel.exchange_set(t, x1)
+            kernel.event()
+            x = kernel.exchange_get()
+            yield t, kernel.indicators()
+
+
+def test_indicators_are_positive_after_every_event_and_impacts_are_those_of_co_simulation():
+    guide, values = mechanism("PRBDM"), {"stop.restitution": 0.4}
+    kernel, times = KernelSimulation(guide, values, exchange=True), []
+    for t, z in integrate(kernel, 0.2):
+        assert (z > 0.0).all()
+        if kernel.get("stop.impact_count") > len(times):
+            times.append(t)
+    alone = KernelSimulation(guide, values)
+    alone.advance(0.2)
+    assert len(times) == alone.get("stop.impact_count") > 4
+    assert times[-1] == pytest.approx(alone.get("stop.impact_time"), abs=1e-7)
+    assert kernel.get("stop.contact") == alone.get("stop.contact") == 1.0
+    assert kernel.get("stop.force") == pytest.approx(alone.get("stop.force"), rel=1e-9)
+
+
+def test_a_shape_that_the_states_do_not_determine_is_told_with_a_remedy():
+    kernel = KernelSimulation(mechanism("PRBDM"), exchange=True)
+    x = kernel.exchange_get()
+    x[0] = 0.0  # the links along the shuttle: a parallelogram laid flat
+    kernel.exchange_set(0.0, x)
+    with pytest.raises(KernelMistake, match=r"do not determine the other angles .* use co-sim"):
+        kernel.derivatives()
+    kernel.exchange_set(0.0, np.full(len(x), np.nan))
+    with pytest.raises(KernelMistake):
+        kernel.derivatives()
+
+
+def test_a_wall_that_strikes_what_rests_on_it_or_leaves_it():
+    """In model exchange as in co-simulation: a change of velocity is an event."""
+    kernel = KernelSimulation(
+        mechanism("PRBDM"), {"release.displacement": 0.0, "gravity.x": 9.81}, exchange=True
+    )
+    kernel.event()
+    assert kernel.get("stop.contact") == 1.0
+    kernel.set({"stop.velocity": -0.1})
+    assert kernel.completed_step()
+    kernel.event()
+    assert kernel.get("stop.impact_count") == 1.0
+    assert kernel.get("stop.approach_speed") == pytest.approx(0.1)
+    assert (kernel.indicators() > 0.0).all()
+    kernel.exchange_set(1e-3, kernel.exchange_get())
+    other = KernelSimulation(
+        mechanism("PRBDM"), {"release.displacement": 0.0, "gravity.x": 9.81}, exchange=True
+    )
+    other.set({"stop.velocity": 0.1})
+    assert other.completed_step()
+    other.event()
+    assert other.get("stop.contact") == 0.0
+    assert other.get("stop.impact_count") == 0.0
+    assert (other.indicators() > 0.0).all()

@@ -1,0 +1,175 @@
+"""The kernel's motion is the engine's, event by event, in every kind of motion that there is."""
+
+import numpy as np
+import pytest
+
+from kernel_simulation import KernelMistake, KernelSimulation, library
+from prbm import PrbmError, Simulation
+from prbm_fmu.python_fmu import interface
+from support import PMMA, mechanism
+from test_stops import two_stops
+
+MODELS = ("PRBDM", "PRBDM2R")
+END, STEP = 0.3, 2.5e-3
+
+RUB = {
+    "friction.coefficient": 0.3,
+    "friction.normal_force": 0.2,
+    "friction.normal_stiffness": -50.0,
+}
+ROUGH = {"stop.friction": 0.4, "stop.offset": 4e-3}
+SCENARIOS = {
+    "default": ({}, {}),
+    "off the centre": ({"stop.offset": 6e-3, "stop.position": -4e-3}, {}),
+    "rubbing": (RUB | {"release.displacement": -0.012}, {}),
+    "sticking at once": ({"friction.coefficient": 5.0, "friction.normal_force": 3.0}, {}),
+    "pushed out of sticking": (
+        {"friction.coefficient": 2.0, "friction.normal_force": 0.5},
+        {8: {"force.x": 2.5}, 40: {"force.x": -2.0}},
+    ),
+    "rough stop": (ROUGH | {"stop.restitution": 0.8}, {}),
+    "rough stop, rubbing": (ROUGH | RUB, {}),
+    "no restitution": ({"stop.restitution": 0.0}, {}),
+    "damped": ({"damping.zeta": 0.1, "damping.beta": 1e-4}, {}),
+    "thrown at the wall": ({"release.velocity": 1.0, "stop.position": 5e-3}, {}),
+    "released at the wall": ({"release.displacement": 0.0, "gravity.x": 5.0}, {}),
+    "driven": (
+        {"force.moment": 1e-3},
+        {4: {"base.acceleration.x": 3.0, "base.acceleration.y": -2.0}, 30: {"force.y": 0.3}},
+    ),
+    "tuned": ({}, {20: {"stop.restitution": 0.2}, 50: {"stop.position": -2e-3, "damping.zeta": 0.02}}),
+    "a wall that comes and goes": (
+        {"stop.restitution": 0.3},
+        {90: {"stop.velocity": -0.05}, 91: {"stop.displacement": -1.25e-4}}
+        | {100: {"stop.velocity": 0.0, "stop.displacement": 0.0}},
+    ),
+    "pulled off": ({"stop.restitution": 0.2}, {80: {"force.x": -1.5}, 100: {"force.x": 0.0}}),
+}  # fmt: skip
+ENDS = {"thrown at the wall": 0.05}  # from there on the 2R turns 1e-12 into 1e-2
+
+
+def compared(guide, values, schedule, end=END):
+    """Run both side by side, compare everything at every step, return the last outputs.
+
+    Differences grow from rounding by what the motion amplifies (a few hundred for the damped 2R);
+    at rest, the fast modes keep a noise of the size of the tolerance times their frequency.
+    """
+    engine, kernel = Simulation(guide, values), KernelSimulation(guide, values)
+    nominal = {v.name: v.nominal or 1.0 for v in interface(guide, {})}
+    counts = [f"{stop.name}.{what}" for stop in guide.stops for what in ("impact_count", "contact")]
+    for k in range(round(end / STEP)):
+        change = schedule.get(k, {})
+        engine.set(change)
+        kernel.set(change)
+        engine.advance((k + 1) * STEP)
+        kernel.advance((k + 1) * STEP)
+        expected, found = engine.outputs(), kernel.outputs()
+        assert expected.keys() <= found.keys()
+        for name in counts:
+            assert found[name] == expected[name], (name, k)
+        for name, value in expected.items():
+            scale = max(nominal[name], abs(value))
+            assert abs(found[name] - value) <= 1e-5 * scale, (name, k, found[name], value)
+    return found
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("model", MODELS)
+def test_the_kernel_moves_as_the_engine_does(model, name):
+    values, schedule = SCENARIOS[name]
+    compared(mechanism(model), values, schedule, end=ENDS.get(name, END))
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("friction", [0.0, 0.2])
+def test_two_stops_in_the_kernel_are_those_of_the_engine(model, friction):
+    fields = {"friction": friction, "restitution": 0.5}
+    guide = two_stops(model, high=fields | {"position": -3e-3}, low=fields)
+    compared(guide, {"release.displacement": -0.01}, {})
+
+
+def test_the_guide_of_the_thesis_appendix_in_the_kernel():
+    compared(mechanism("PRBDM"), PMMA, {}, end=0.5)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_the_default_run_hits_when_the_engine_says(model):
+    """Every impact to 1e-7 s; and both end in rest."""
+    engine, kernel = Simulation(mechanism(model)), KernelSimulation(mechanism(model))
+    engine.record = []
+    engine.advance(END)
+    for impact in engine.record:
+        kernel.advance(impact.time + 1e-6)
+        assert kernel.get("stop.impact_time") == pytest.approx(impact.time, abs=1e-7)
+        assert kernel.get("stop.impact_count") == impact.latched.impact_count
+    kernel.advance(END)
+    assert kernel.get("stop.impact_count") == len(engine.record) == 14
+    assert kernel.get("stop.contact") == 1.0
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_restored_state_goes_on_to_the_bit(model):
+    kernel = KernelSimulation(mechanism(model), {"stop.friction": 0.1})
+    for time in (0.0, 0.03, 0.0412, 0.15, 0.26):
+        kernel.advance(time)
+        state = kernel.state
+        kernel.advance(time + 0.05)
+        expected = kernel.state
+        kernel.restore(state)
+        assert kernel.state.tobytes() == state.tobytes()
+        kernel.advance(time + 0.05)
+        assert kernel.state.tobytes() == expected.tobytes()
+        kernel.restore(state)
+
+
+def test_a_damaged_state_is_refused_and_changes_nothing():
+    kernel = KernelSimulation(mechanism("PRBDM2R"))
+    kernel.advance(0.05)
+    state, rng = kernel.state, np.random.default_rng(0)
+    refused = 0
+    for _ in range(300):
+        damaged = state.copy()
+        damaged[rng.integers(len(state))] = rng.choice([np.nan, np.inf, -1.0, 1e300, 0.5])
+        try:
+            kernel.restore(damaged)
+            kernel.advance(max(kernel.get("time"), 0.05) + 1e-3)
+        except KernelMistake:
+            refused += 1
+        kernel.restore(state)
+        assert kernel.state.tobytes() == state.tobytes()
+    assert refused > 30
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_an_instance_takes_less_than_256_kib(model):
+    kernel = KernelSimulation(mechanism(model))
+    assert library().simulation_bytes(kernel.inner) < 256 * 1024
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"stop.position": -0.02},
+        {"release.displacement": -0.1},
+        {"flexure.gamma1": 0.9},
+        {"flexure.thickness": -1.0},
+    ],
+)
+def test_what_the_engine_refuses_the_kernel_refuses_in_the_same_words(values):
+    with pytest.raises(PrbmError) as told:
+        Simulation(mechanism("PRBDM2R"), values)
+    with pytest.raises(KernelMistake) as said:
+        KernelSimulation(mechanism("PRBDM2R"), values)
+    assert str(said.value) == str(told.value)
+
+
+def test_chatter_without_an_end_is_stopped():
+    values = {
+        "stop.rest_speed": 0.0, "stop.restitution": 1.0, "release.displacement": -1e-8,
+        "gravity.x": 0.0, "damping.beta": 0.0, "force.x": 17000.0,
+    }  # fmt: skip
+    kernel = KernelSimulation(mechanism("PRBDM"), values)
+    before = kernel.state
+    with pytest.raises(KernelMistake, match="chatters"):
+        kernel.advance(0.01)
+    assert kernel.state.tobytes() == before.tobytes()
