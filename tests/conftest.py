@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from prbm import Mechanism
-from prbm_fmu import python_fmu
+from prbm_fmu import native_fmu, python_fmu
 from prbm_fmu.archive import write
 from prbm_tools.mechanism_file import load, shipped
 
@@ -26,4 +26,18 @@ def fmus(
     for name, mechanism in mechanisms.items():
         paths[name] = folder / f"{name}.fmu"
         write(paths[name], python_fmu.build(mechanism))
+    return paths
+
+
+@pytest.fixture(scope="session")
+def native(
+    mechanisms: dict[str, Mechanism], tmp_path_factory: pytest.TempPathFactory
+) -> dict[tuple[str, int], Path]:
+    """Return the native FMUs of the shipped mechanisms for this machine, by name and FMI."""
+    folder = tmp_path_factory.mktemp("native")
+    paths = {}
+    for name, mechanism in mechanisms.items():
+        for fmi in (2, 3):
+            paths[name, fmi] = folder / f"fmi{fmi}" / f"{name}.fmu"
+            write(paths[name, fmi], native_fmu.build(mechanism, fmi=fmi))
     return paths

@@ -1,6 +1,7 @@
 """The command that builds FMUs: the same bytes, whole files, one sentence for a mistake."""
 
 import io
+import itertools
 import os
 import re
 import signal
@@ -8,6 +9,7 @@ import subprocess
 import sys
 import time
 import zipfile
+from importlib import metadata
 from pathlib import Path
 
 import matplotlib
@@ -17,8 +19,9 @@ from fmpy.validation import validate_fmu
 
 from prbm import MechanismError
 from prbm_fmu import __main__ as command
-from prbm_fmu import archive, cli, picture, python_fmu, report
+from prbm_fmu import archive, cli, compiler, picture, python_fmu, report
 from prbm_fmu.description import Heading, model_description
+from prbm_fmu.sources import kernel
 from prbm_tools.mechanism_file import load
 
 ROOT = Path(__file__).parents[1]
@@ -39,28 +42,131 @@ def _typed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["build_fmu.py"])
 
 
+@pytest.mark.native
 def test_from_an_empty_folder_it_builds_simulates_tells_and_plots(tmp_path):
     """Free rest 10.42 and 10.78 mm, 4.957 and 4.889 Hz: the table of the design document."""
     done = build(tmp_path, "--simulate")
     assert done.returncode == 0, done.stderr
-    for model, rest, frequency in (("PRBDM", "10.42", "4.957"), ("PRBDM2R", "10.78", "4.889")):
-        fmu = tmp_path / "dist" / "python" / f"{model}.fmu"
+    frequencies = {"PRBDM": ("10.42", "4.957"), "PRBDM2R": ("10.78", "4.889")}
+    for folder, model in itertools.product(("python", "fmi2", "fmi3"), frequencies):
+        rest, frequency = frequencies[model]
+        fmu = tmp_path / "dist" / folder / f"{model}.fmu"
         assert validate_fmu(str(fmu)) == []
         assert fmu.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
-        told = done.stdout.partition(f"{model}: simulating")[2].partition("figure ")[0]
+        told = done.stdout.partition(f"{folder}/{model}: simulating")[2].partition("figure ")[0]
         assert re.search(rf"free rest position +shuttle {rest} mm from straight", told)
         assert re.search(rf"fundamental +{frequency} Hz", told)
-        assert re.search(r"impacts at stop +\d+, the first at t = 0\.04", told)
+        assert re.search(r"impacts at stop +14, the first at t = 0\.04", told)
         assert re.search(r"came to rest +at t = 0\.24", told)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["dist"]
+    assert {p.name for p in (tmp_path / "dist").iterdir()} == {"python", "fmi2", "fmi3"}
 
 
+@pytest.mark.native
 def test_the_same_input_gives_the_same_bytes_in_every_process(tmp_path):
     for seed in ("1", "2"):
         done = build(tmp_path, "--model", "PRBDM2R", "--out", seed, PYTHONHASHSEED=seed)
         assert done.returncode == 0, done.stderr
-    first, second = (tmp_path / seed / "python" / "PRBDM2R.fmu" for seed in ("1", "2"))
-    assert first.read_bytes() == second.read_bytes()
+    for folder in ("python", "fmi2", "fmi3"):
+        first, second = (tmp_path / seed / folder / "PRBDM2R.fmu" for seed in ("1", "2"))
+        assert first.read_bytes() == second.read_bytes()
+
+
+NATIVE = {
+    "--flavour native": {"fmi2", "fmi3"},
+    "--flavour native --fmi 2": {"fmi2"},
+    "--fmi 3": {"fmi3"},
+    "--fmi 2": {"python", "fmi2"},
+    "--flavour python": {"python"},
+    "--clock": {"fmi3-clock"},
+    "--flavour native --fmi 3 --clock": {"fmi3-clock"},
+    "--platform host": {"python", "fmi2", "fmi3"},
+}
+
+
+@pytest.mark.native
+@pytest.mark.parametrize("options", NATIVE)
+def test_what_is_asked_for_is_built_and_nothing_else(options, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main([*options.split(), "--model", "PRBDM"]) == cli.OK
+    assert {p.name for p in (tmp_path / "dist").iterdir()} == NATIVE[options]
+
+
+@pytest.mark.native
+def test_the_variant_with_a_clock_is_simulated_in_event_mode(tmp_path):
+    done = build(tmp_path, "--model", "PRBDM", "--clock", "--simulate")
+    assert done.returncode == 0, done.stderr
+    assert re.search(r"impacts at stop +14, the first at t = 0\.04107 s", done.stdout)
+    assert re.search(r"came to rest +at t = 0\.243", done.stdout)
+
+
+@pytest.fixture
+def _no_compiler(monkeypatch) -> None:
+    """Hide all compilers."""
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
+
+
+@pytest.mark.usefixtures("_no_compiler")
+def test_without_a_compiler_the_python_fmus_are_built_and_the_others_missed(
+    tmp_path, monkeypatch, capsys
+):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["--model", "PRBDM"]) == cli.FAILED
+    told = capsys.readouterr()
+    assert [p.name for p in (tmp_path / "dist").rglob("*.fmu")] == ["PRBDM.fmu"]
+    assert told.err.startswith("build_fmu.py: only the Python FMUs were built: native FMUs need")
+    assert "pip install ziglang" in told.err
+    assert told.err.count("\n") == 1
+
+
+@pytest.mark.usefixtures("_no_compiler")
+@pytest.mark.parametrize("asked", ["--flavour native", "--fmi 2", "--clock", "--platform host"])
+def test_who_asks_for_native_fmus_gets_them_or_an_error(asked, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(asked.split()) == cli.MISTAKE
+    assert "pip install ziglang" in capsys.readouterr().err
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_what_does_not_run_here_is_not_simulated_here(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    here = compiler.this_platform().name
+    other = next(name for name in compiler.PLATFORMS if name != here)
+    assert cli.main(["--platform", other, "--simulate"]) == cli.MISTAKE
+    assert f"{other} does not run on this machine" in capsys.readouterr().err
+    assert [*tmp_path.iterdir()] == []
+
+
+@pytest.mark.native
+def test_what_is_installed_has_the_kernel_too(tmp_path):
+    """From a wheel, without the clone: in a process that sees nothing but what is installed."""
+    try:
+        installed = metadata.distribution("prbm-impact").files or []
+    except metadata.PackageNotFoundError:
+        installed = []
+    packed = {f.name: f.locate() for f in installed if f.parent.name == "kernel"}
+    if not packed:
+        pytest.skip("no wheel of this package is installed")
+    if {name: Path(path).read_bytes() for name, path in packed.items()} != kernel():
+        pytest.skip("another version is installed")
+    command = [sys.executable, "-I", "-m", "prbm_fmu", "--flavour", "native", "--model", "PRBDM"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    for folder in ("fmi2", "fmi3"):
+        assert validate_fmu(str(tmp_path / "dist" / folder / "PRBDM.fmu")) == []
+
+
+def test_platforms_go_by_the_names_of_both_standards():
+    def named(*texts: str) -> tuple[str, ...]:
+        arguments = [part for text in texts for part in ("--platform", text)]
+        return cli.asked_platforms(cli.parser().parse_args(arguments))
+
+    assert named() == ("host",)
+    assert named("win64,x86_64-windows", "aarch64-darwin", "darwin64") == (
+        "x86_64-windows", "aarch64-darwin", "x86_64-darwin"
+    )  # fmt: skip
 
 
 def test_another_content_has_another_guid_and_other_module_names(mechanisms, tmp_path):
@@ -103,7 +209,7 @@ def test_nothing_is_written_if_one_of_the_models_fails(tmp_path, monkeypatch, ca
     options = ["--set", "gravity.x=0", "--set", "gravity.y=-100"]
     assert cli.main(options) == cli.MISTAKE
     told = capsys.readouterr()
-    assert "PRBDM: packing" in told.out
+    assert "python/PRBDM: packing" in told.out
     assert "PRBDM2R: release.displacement = -0.018 m cannot be reached" in told.err
     assert [*tmp_path.iterdir()] == []
 
@@ -140,11 +246,13 @@ MISTAKES = {
     "--mechanism nowhere.toml": "nowhere.toml: cannot be read",
     "--model PRBDM --mechanism x.toml": "not allowed with",
     "--out file/deeper": "file is a file",
-    "--flavour native": "not built yet",
     "--flavour python --fmi 3": "Python FMUs are FMI 2.0",
-    "--fmi 3": "not built yet",
-    "--clock": "not built yet",
-    "--platform all": "not built yet",
+    "--flavour python --clock": "only native FMUs of FMI 3.0 have clocks",
+    "--fmi 2 --clock": "only native FMUs of FMI 3.0 have clocks",
+    "--flavour python --platform all": "Python FMUs run on Linux and Windows",
+    "--platform amiga": "there is no such platform; choose host, all or some of x86_64-linux",
+    "--platform x86_64-linux,": "there is no such platform",
+    "--fmi 1": "invalid choice",
     "--flavour wood": "invalid choice",
     "--nonsense": "unrecognized arguments: --nonsense",
 }
@@ -174,8 +282,9 @@ def test_a_mechanism_of_ones_own_is_built_under_its_own_name(tmp_path):
     (tmp_path / "mine.toml").write_text(text.replace('name = "PRBDM"', 'name = "Mine"'))
     done = build(tmp_path, "--mechanism", "mine.toml", "--set", "stop.position=1e-3")
     assert done.returncode == 0, done.stderr
-    fmu = tmp_path / "dist" / "python" / "Mine.fmu"
-    assert validate_fmu(str(fmu)) == []
+    for folder in ("python", "fmi2", "fmi3"):
+        fmu = tmp_path / "dist" / folder / "Mine.fmu"
+        assert validate_fmu(str(fmu)) == []
 
 
 def test_a_path_that_pythonfmu_cannot_read_is_no_obstacle_to_our_own_simulation(tmp_path):
@@ -185,6 +294,7 @@ def test_a_path_that_pythonfmu_cannot_read_is_no_obstacle_to_our_own_simulation(
     done = build(awkward, "--model", "PRBDM", "--simulate", TMPDIR=str(awkward))
     assert done.returncode == 0, done.stderr
     assert (awkward / "dist" / "python" / "PRBDM.png").exists()
+    assert (awkward / "dist" / "fmi3" / "PRBDM.png").exists()
 
 
 @pytest.mark.parametrize("epoch", FROM_1970)
@@ -236,7 +346,7 @@ def test_a_figure_that_cannot_be_written_is_a_sentence(fmus, tmp_path, capsys):
     assert report.main([str(fmus["PRBDM"]), str(tmp_path)]) == cli.MISTAKE
     told = capsys.readouterr()
     assert "impacts at stop" in told.out
-    assert told.err.startswith(f"cannot write the figure {tmp_path}: ")
+    assert f"cannot write the figure {tmp_path}: " in told.err
 
 
 @pytest.mark.parametrize(

@@ -95,7 +95,7 @@ def test_the_names_are_the_interface_that_was_agreed(fmus, model):
 def test_units_are_the_products_that_their_names_say():
     """N.m = N m, kg/m3 = kg m^-3, ...: the exponents follow from the atoms."""
     atoms = {name: UNITS[name].base for name in ("m", "s", "rad", "kg", "N")} | {"1": {}}
-    derived = {"Pa": "N/m2", "J": "N.m", "Hz": "1/s"}
+    derived = {"Pa": "N/m2", "J": "N.m", "W": "N.m/s", "Hz": "1/s"}
     for name, unit in UNITS.items():
         above, _, below = derived.get(name, name).partition("/")
         exponents: dict[str, int] = {}
@@ -111,7 +111,7 @@ def test_display_units_are_scaled_as_their_prefixes_say():
     prefixes = {"m": 1e-3, "u": 1e-6, "k": 1e3, "G": 1e9}
     for name, unit in UNITS.items():
         for display, factor in unit.display.items():
-            if display in ("deg", "deg/s", "g", "g.mm2", "g/cm3"):
+            if display in ("deg", "deg/s", "deg/s2", "g", "g.mm2", "g/cm3"):
                 continue  # not a prefix before the unit's own name
             by_parts = [
                 prefixes[part[0]] if part != plain else 1.0

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
@@ -14,12 +15,12 @@ from prbm import Mechanism, PrbmError
 from prbm.dynamics import input_names
 from prbm_tools.mechanism_file import load, shipped
 
-from . import __version__, python_fmu
+from . import __version__, native_fmu, python_fmu
 from .__main__ import command_name
 from .archive import write
+from .compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
 
 OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
-PYTHON_FOLDER = "python"
 PATIENCE = 2.0  # s for the process of a simulation to end after Ctrl-C
 REPORT = f"""
 import os, signal, sys
@@ -31,6 +32,21 @@ sys.exit(main(sys.argv[1:]))
 
 class UserMistake(Exception):
     """What the user asked for cannot be done; the message says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Flavour:
+    """A kind of FMU: the folder it goes to, its version of FMI, whether it has an output clock."""
+
+    folder: str
+    fmi: int = 2
+    native: bool = True
+    clock: bool = False
+
+
+PYTHON = Flavour("python", native=False)
+NATIVE = {"2": Flavour("fmi2", 2), "3": Flavour("fmi3", 3)}
+CLOCKED = Flavour("fmi3-clock", 3, clock=True)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -45,7 +61,8 @@ def parser() -> argparse.ArgumentParser:
     p = _Parser(
         prog=command_name(),
         description="Build FMUs of compliant mechanisms with impacts.",
-        epilog="Without options, all shipped mechanisms are built into dist/.",
+        epilog="Without options, all shipped mechanisms are built into dist/: as Python FMUs, and "
+        "as native FMUs of FMI 2.0 and 3.0 for this machine.",
     )
     which = p.add_mutually_exclusive_group()
     which.add_argument(
@@ -57,13 +74,19 @@ def parser() -> argparse.ArgumentParser:
     )
     p.add_argument(
         "--flavour", choices=("python", "native"),
-        help="python: readable source, needs NumPy and SciPy where it runs; native: compiled",
+        help="python: readable source, needs NumPy and SciPy where it runs; native: compiled, "
+        "needs nothing (default: both)",
     )  # fmt: skip
-    p.add_argument("--fmi", choices=("2", "3"), help="version of FMI (Python FMUs: 2)")
+    p.add_argument("--fmi", choices=("2", "3"), help="version of FMI (default: both)")
     p.add_argument(
-        "--platform", default="host", metavar="NAME", help="host, all, or a platform by name"
-    )
-    p.add_argument("--clock", action="store_true", help="the variant with an output clock (FMI 3)")
+        "--platform", action="append", metavar="NAME",
+        help=f"where native FMUs run: {HOST}, {ALL}, or some of {', '.join(PLATFORMS)}; may be "
+        f"repeated (default: {HOST}; all others take the Python package ziglang)",
+    )  # fmt: skip
+    p.add_argument(
+        "--clock", action="store_true",
+        help="build the variant of FMI 3.0 whose stops have an output clock, and nothing else",
+    )  # fmt: skip
     p.add_argument("--out", type=Path, default=Path("dist"), metavar="DIR", help="default: dist")
     p.add_argument(
         "--set", action="append", default=[], dest="changes", metavar="NAME=VALUE",
@@ -85,9 +108,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.list:
             _list()
             return OK
-        _refuse_what_is_not_built(options)
-        built = _build(options)
-        return _simulate(built) if options.simulate else OK
+        order = _order(options)
+        built, missing = _build(order)
+        status = _simulate(built) if options.simulate else OK
+        if missing:
+            print(f"{command_name()}: {missing}", file=sys.stderr)
+            status = max(status, FAILED)
+        return status
     except (UserMistake, PrbmError) as error:
         print(f"{command_name()}: {error}", file=sys.stderr)
         return MISTAKE
@@ -103,21 +130,97 @@ def _list() -> None:
         print(f"{name:{width}}  {load(path).title}")
 
 
-def _refuse_what_is_not_built(options: argparse.Namespace) -> None:
-    if options.flavour == "python" and options.fmi == "3":
-        raise UserMistake("Python FMUs are FMI 2.0; leave out --fmi 3")
-    asked = {
-        "--flavour native": options.flavour == "native",
-        "--fmi 3": options.fmi == "3",
-        "--clock": options.clock,
-        f"--platform {options.platform}": options.platform != "host",
-    }
-    for option, wanted in asked.items():
-        if wanted:
+def asked_flavours(options: argparse.Namespace) -> tuple[Flavour, ...]:
+    """Return the kinds of FMU that were asked for.
+
+    Raises
+    ------
+    UserMistake
+        If there is no such kind.
+    """
+    python, native = options.flavour != "native", options.flavour != "python"
+    if options.clock:
+        if not native or options.fmi == "2":
             raise UserMistake(
-                f"{option}: native FMUs are not built yet; leave it out for the Python FMUs, "
-                "which run on Linux and Windows (x86-64)"
+                "--clock: only native FMUs of FMI 3.0 have clocks; leave out --flavour python and "
+                "--fmi 2"
             )
+        return (CLOCKED,)
+    if not native:
+        if options.fmi == "3":
+            raise UserMistake("Python FMUs are FMI 2.0; leave out --fmi 3 or --flavour python")
+        if options.platform:
+            raise UserMistake(
+                f"--platform {options.platform[0]}: Python FMUs run on Linux and Windows (x86-64) "
+                "as they are; leave it out, or leave out --flavour python"
+            )
+    kinds = [flavour for fmi, flavour in NATIVE.items() if native and options.fmi in (None, fmi)]
+    return (*([PYTHON] if python and options.fmi != "3" else []), *kinds)
+
+
+def asked_platforms(options: argparse.Namespace) -> tuple[str, ...]:
+    """Return the platforms that were asked for, by our names.
+
+    Raises
+    ------
+    UserMistake
+        If there is no such platform, or none that can simulate what is to be simulated here.
+    """
+    names = [name.strip() for text in options.platform or [HOST] for name in text.split(",")]
+    aliases = {p.folder2: p.name for p in PLATFORMS.values()}
+    chosen = tuple(dict.fromkeys(aliases.get(name, name) for name in names))
+    for name in chosen:
+        if name not in (HOST, ALL, *PLATFORMS):
+            raise UserMistake(
+                f"--platform {name}: there is no such platform; choose {HOST}, {ALL} or some of "
+                f"{', '.join(PLATFORMS)}"
+            )
+    here = this_platform()
+    if options.simulate and here and not {HOST, ALL, here.name} & {*chosen}:
+        raise UserMistake(
+            f"--simulate: what is built for {', '.join(chosen)} does not run on this machine; add "
+            f"--platform {HOST}, or leave out --simulate"
+        )
+    return chosen
+
+
+@dataclass(frozen=True)
+class Order:
+    """What to build, checked as far as that takes no time.
+
+    ``native`` tells whether native FMUs were asked for, and not just built with all others.
+    """
+
+    mechanisms: tuple[Mechanism, ...]
+    changes: Mapping[str, float]
+    flavours: tuple[Flavour, ...]
+    platforms: tuple[str, ...]
+    native: bool
+    out: Path
+
+    def path(self, flavour: Flavour, name: str) -> Path:
+        """Return where an FMU goes."""
+        return self.out / flavour.folder / f"{name}.fmu"
+
+
+def _order(options: argparse.Namespace) -> Order:
+    order = Order(
+        tuple(mechanisms(options)),
+        start_values(options.changes),
+        asked_flavours(options),
+        asked_platforms(options),
+        bool(options.flavour or options.fmi or options.platform or options.clock),
+        options.out,
+    )
+    _check_names(order.mechanisms, order.changes)
+    for flavour in order.flavours:
+        _check_writable(order.out / flavour.folder)
+        for mechanism in order.mechanisms:
+            path = order.path(flavour, mechanism.name)
+            _check_no_folder(path)
+            if options.simulate:
+                _check_no_folder(path.with_suffix(".png"))
+    return order
 
 
 def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
@@ -172,35 +275,45 @@ def start_values(texts: Sequence[str]) -> dict[str, float]:
     return changes
 
 
-def _build(options: argparse.Namespace) -> list[Path]:
-    """Build everything, then write everything; return the files."""
-    changes = start_values(options.changes)
-    chosen = mechanisms(options)
-    _check_names(chosen, changes)
-    folder = options.out / PYTHON_FOLDER
-    paths = {m.name: folder / f"{m.name}.fmu" for m in chosen}
-    _check_writable(folder)
-    for path in paths.values():
-        _check_no_folder(path)
-        if options.simulate:
-            _check_no_folder(path.with_suffix(".png"))
-    built = {}
-    for mechanism in chosen:
-        name = mechanism.name
-        try:
-            built[name] = python_fmu.build(mechanism, changes, _progress(name))
-        except PrbmError as error:
-            raise UserMistake(f"{name}: {error}") from None
-    for name, content in built.items():
-        path = paths[name]
+def _build(order: Order) -> tuple[list[Path], str]:
+    """Build everything, then write everything; return the files, and what is missing and why.
+
+    Whoever asks for native FMUs gets them or an error.  Whoever asks for nothing in particular and
+    has no compiler gets the Python FMUs, and is told.
+    """
+    built: dict[Path, bytes] = {}
+    missing = ""
+    try:
+        for flavour in order.flavours:
+            for mechanism in order.mechanisms:
+                path = order.path(flavour, mechanism.name)
+                built[path] = _fmu(order, flavour, mechanism)
+    except CompilerError as error:
+        if order.native:
+            raise
+        missing = f"only the Python FMUs were built: {error}"
+    for path, content in built.items():
         try:
             write(path, content)
         except OSError as error:
             raise UserMistake(
                 f"cannot write {path}: {error.strerror}; choose a folder with --out"
             ) from None
-        print(f"{name}: {path} ({len(content) / 1000:.0f} kB)", flush=True)
-    return [*paths.values()]
+        print(f"{path.stem}: {path} ({len(content) / 1000:.0f} kB)", flush=True)
+    return [*built], missing
+
+
+def _fmu(order: Order, flavour: Flavour, mechanism: Mechanism) -> bytes:
+    told = _progress(f"{flavour.folder}/{mechanism.name}")
+    changes, platforms = order.changes, order.platforms
+    try:
+        if not flavour.native:
+            return python_fmu.build(mechanism, changes, told)
+        return native_fmu.build(mechanism, changes, flavour.fmi, platforms, flavour.clock, told)
+    except CompilerError:
+        raise  # which has nothing to do with the mechanism
+    except PrbmError as error:
+        raise UserMistake(f"{mechanism.name}: {error}") from None
 
 
 def _check_names(chosen: Sequence[Mechanism], changes: Mapping[str, float]) -> None:
@@ -250,7 +363,7 @@ def _simulate(fmus: Sequence[Path]) -> int:
     status = OK
     for fmu in fmus:
         command = [sys.executable, "-c", REPORT, str(fmu), str(fmu.with_suffix(".png"))]
-        print(f"{fmu.stem}: simulating ...", flush=True)
+        print(f"{fmu.parent.name}/{fmu.stem}: simulating ...", flush=True)
         code = _ended(command, os.environ | {"PYTHONPATH": paths})
         if code == INTERRUPTED:
             raise KeyboardInterrupt

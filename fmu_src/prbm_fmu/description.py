@@ -1,7 +1,7 @@
-"""The modelDescription.xml of FMI 2.0 for co-simulation."""
+"""The modelDescription.xml of the Python FMUs, and what every model description shares."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -25,42 +25,35 @@ class Heading:
     guid: str
     log_categories: Mapping[str, str]
 
-
-def model_description(heading: Heading, variables: tuple[Variable, ...]) -> bytes:
-    """Return the XML."""
-    root = Element(
-        "fmiModelDescription",
-        {
-            "fmiVersion": "2.0",
-            "modelName": heading.name,
-            "guid": heading.guid,
-            "description": heading.description,
+    def attributes(self) -> dict[str, str]:
+        """Return the attributes of the model description that every version of FMI has."""
+        return {
+            "description": self.description,
             "version": __version__,
             "license": "MIT",
             "generationTool": GENERATION_TOOL,
             "generationDateAndTime": date(),
             "variableNamingConvention": "structured",
-        },
-    )
+        }
+
+
+def model_description(heading: Heading, variables: tuple[Variable, ...]) -> bytes:
+    """Return the XML of a Python FMU: FMI 2.0, co-simulation."""
+    version = {"fmiVersion": "2.0", "modelName": heading.name, "guid": heading.guid}
+    root = Element("fmiModelDescription", version | heading.attributes())
     _co_simulation(root, heading.name)
-    _units(root, variables)
-    _types(root, variables)
-    categories = SubElement(root, "LogCategories")
-    for name, description in heading.log_categories.items():
-        SubElement(categories, "Category", {"name": name, "description": description})
-    starts = {v.name: v.start for v in variables}
-    experiment = {
-        "startTime": number(START_TIME),
-        "stopTime": number(STOP_TIME),
-        "tolerance": number(starts[TOLERANCE]),
-        "stepSize": number(STEP_SIZE),
-    }
-    SubElement(root, "DefaultExperiment", experiment)
+    add_units(root, variables)
+    add_types(root, variables)
+    add_log_categories(root, heading)
+    add_experiment(root, variables)
     index = {v.name: str(i) for i, v in enumerate(variables, start=1)}
-    listed = SubElement(root, "ModelVariables")
-    for variable in variables:
-        listed.append(_scalar_variable(variable, index))
+    add_variables(root, variables, index)
     root.append(_structure(variables, index))
+    return serialized(root)
+
+
+def serialized(root: Element) -> bytes:
+    """Return XML as it is in a file."""
     ElementTree.indent(root)
     for element in root.iter():
         for name, value in element.items():
@@ -99,7 +92,27 @@ def _co_simulation(root: Element, identifier: str) -> None:
     SubElement(root, "CoSimulation", attributes)
 
 
-def _units(root: Element, variables: Iterable[Variable]) -> None:
+def add_log_categories(root: Element, heading: Heading) -> None:
+    """Add the categories of log messages."""
+    categories = SubElement(root, "LogCategories")
+    for name, description in heading.log_categories.items():
+        SubElement(categories, "Category", {"name": name, "description": description})
+
+
+def add_experiment(root: Element, variables: Iterable[Variable]) -> None:
+    """Add the default experiment."""
+    starts = {v.name: v.start for v in variables}
+    experiment = {
+        "startTime": number(START_TIME),
+        "stopTime": number(STOP_TIME),
+        "tolerance": number(starts[TOLERANCE]),
+        "stepSize": number(STEP_SIZE),
+    }
+    SubElement(root, "DefaultExperiment", experiment)
+
+
+def add_units(root: Element, variables: Iterable[Variable]) -> None:
+    """Add the definitions of the units in use."""
     used = {v.unit for v in variables if v.unit}
     definitions = SubElement(root, "UnitDefinitions")
     for name, unit in UNITS.items():
@@ -110,29 +123,47 @@ def _units(root: Element, variables: Iterable[Variable]) -> None:
                 SubElement(element, "DisplayUnit", {"name": display, "factor": number(factor)})
 
 
-def _types(root: Element, variables: Iterable[Variable]) -> None:
-    used = {v.unit for v in variables if v.unit}
+def add_types(root: Element, variables: Iterable[Variable]) -> None:
+    """Add the definitions of the quantities in use, as FMI 2.0 has them."""
     definitions = SubElement(root, "TypeDefinitions")
+    for quantity, attributes in used_types(variables):
+        simple = SubElement(definitions, "SimpleType", {"name": quantity})
+        SubElement(simple, "Real", attributes)
+
+
+def used_types(variables: Iterable[Variable]) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield the name and the attributes of each quantity in use."""
+    used = {v.unit for v in variables if v.unit}
     for unit, quantity in QUANTITIES.items():
         if unit in used:
-            simple = SubElement(definitions, "SimpleType", {"name": quantity.name})
             attributes = {"quantity": quantity.name, "unit": unit}
             if quantity.display:
                 attributes["displayUnit"] = quantity.display
-            SubElement(simple, "Real", attributes)
+            yield quantity.name, attributes
 
 
-def _scalar_variable(v: Variable, index: Mapping[str, str]) -> Element:
-    attributes = {
-        "name": v.name,
-        "valueReference": str(v.reference),
-        "description": v.description,
-        "causality": v.causality,
-        "variability": v.variability,
-    }
-    if v.initial:
-        attributes["initial"] = v.initial
-    element = Element("ScalarVariable", attributes)
+def add_variables(root: Element, variables: Iterable[Variable], index: Mapping[str, str]) -> None:
+    """Add the variables as FMI 2.0 has them, given their indices by name."""
+    listed = SubElement(root, "ModelVariables")
+    for v in variables:
+        attributes = {
+            "name": v.name,
+            "valueReference": str(v.reference),
+            "description": v.description,
+            "causality": v.causality,
+            "variability": v.variability,
+        }
+        if v.initial:
+            attributes["initial"] = v.initial
+        scalar = SubElement(listed, "ScalarVariable", attributes)
+        SubElement(scalar, v.type, value_attributes(v, index))
+
+
+def value_attributes(v: Variable, index: Mapping[str, str]) -> dict[str, str]:
+    """Return the attributes that tell what values a variable has.
+
+    ``index`` maps the name of a variable to what refers to it.
+    """
     value: dict[str, str] = {}
     if v.type == "Real":
         value |= {"declaredType": v.quantity.name, "unit": v.unit}
@@ -149,8 +180,9 @@ def _scalar_variable(v: Variable, index: Mapping[str, str]) -> Element:
         value["start"] = number(v.start)
     if v.derivative_of:
         value["derivative"] = index[v.derivative_of]
-    SubElement(element, v.type, value)
-    return element
+    if v.reinit:
+        value["reinit"] = "true"
+    return value
 
 
 def _structure(variables: tuple[Variable, ...], index: Mapping[str, str]) -> Element:
@@ -162,17 +194,27 @@ def _structure(variables: tuple[Variable, ...], index: Mapping[str, str]) -> Ele
     structure = Element("ModelStructure")
     outputs = SubElement(structure, "Outputs")
     initial = SubElement(structure, "InitialUnknowns")
-    given = [v for v in variables if v.initial == "exact"]
-    inputs = [v for v in variables if v.causality == "input"]
     for v in variables:
         if v.causality == "output":
             SubElement(outputs, "Unknown", {"index": index[v.name], "dependencies": ""})
-            known = given + inputs
-        elif v.causality == "calculatedParameter":
-            prefix = v.name.rpartition(".")[0]
-            known = [p for p in given if p.name.startswith(f"{prefix}.gamma")]
-        else:
+        elif v.causality != "calculatedParameter":
             continue
-        dependencies = " ".join(index[k.name] for k in known)
+        known = initial_dependencies(v, variables)
+        dependencies = " ".join(index[name] for name in known)
         SubElement(initial, "Unknown", {"index": index[v.name], "dependencies": dependencies})
     return structure
+
+
+def initial_dependencies(unknown: Variable, variables: Iterable[Variable]) -> list[str]:
+    """Return what a value depends on when it is initialized.
+
+    The stub of a flexure depends on its gammas; all else on everything that is given.
+    """
+    prefix = ""
+    if unknown.causality == "calculatedParameter":
+        prefix = unknown.name.rpartition(".")[0] + ".gamma"
+    return [
+        v.name
+        for v in variables
+        if (v.initial == "exact" or v.causality == "input") and v.name.startswith(prefix)
+    ]

@@ -2,12 +2,12 @@
 
 import html
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from prbm import FlexureType, Mechanism
 
 from .description import GENERATION_TOOL, STOP_TIME, plain
-from .variables import Variable
+from .variables import NativeInterface, Variable
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto;
@@ -25,6 +25,7 @@ td:first-child { white-space: nowrap; } caption { text-align: left; font-weight:
 """
 
 KINDS = {
+    ("independent", "continuous"): "Independent variable",
     ("parameter", "fixed"): "Parameters, fixed when the simulation starts",
     ("parameter", "tunable"): "Parameters that may change while the simulation runs",
     ("calculatedParameter", "fixed"): "Calculated parameters",
@@ -58,17 +59,40 @@ def escape(text: str) -> str:
 
 
 def page(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
-    """Return the HTML page of a mechanism."""
-    name = escape(mechanism.name)
-    sections = (
-        _what(mechanism),
+    """Return the HTML page of the Python FMU of a mechanism."""
+    return _page(
+        mechanism,
+        _what(mechanism, "FMI 2.0 co-simulation"),
         _use(mechanism),
         _equations(mechanism),
         _variables(variables),
-        _limits(mechanism, variables),
+        _limits(mechanism, variables, INPUTS_OF_STEPS),
         _list("Sources", (escape(source) for source in SOURCES), ordered=True),
         _licenses(),
     )
+
+
+def native_page(
+    mechanism: Mechanism, interface: NativeInterface, version: int, platforms: Sequence[str]
+) -> str:
+    """Return the HTML page of a native FMU, for a version of FMI and the platforms inside."""
+    variables = interface.variables
+    return _page(
+        mechanism,
+        _what(mechanism, f"FMI {version}.0 model exchange and co-simulation"),
+        _native_use(mechanism, interface, version, platforms),
+        _equations(mechanism),
+        _exchange(interface, version),
+        _events(mechanism, interface, version),
+        _variables(variables),
+        _limits(mechanism, variables, INPUTS_OF_BOTH),
+        _list("Sources", (escape(source) for source in SOURCES), ordered=True),
+        _native_licenses(platforms),
+    )
+
+
+def _page(mechanism: Mechanism, *sections: str) -> str:
+    name = escape(mechanism.name)
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
@@ -84,7 +108,7 @@ def _list(title: str, items: Iterable[str], *, ordered: bool = False) -> str:
     return f"<h2>{title}</h2>\n<{tag}>\n{lines}\n</{tag}>"
 
 
-def _what(mechanism: Mechanism) -> str:
+def _what(mechanism: Mechanism, flavour: str) -> str:
     drawing = escape(mechanism.drawing.strip("\n"))
     figure = f"<figure><pre>{drawing}</pre></figure>" if drawing else ""
     return (
@@ -94,24 +118,28 @@ def _what(mechanism: Mechanism) -> str:
         "<p>Flexures are replaced by rigid links and torsion springs (a pseudo-rigid-body "
         "model), so that impacts follow the laws of rigid bodies: they are located to "
         "10<sup>-12</sup> s inside a communication step, and bouncing that dies out ends in "
-        "resting contact, which releases when the contact force reaches zero. FMI 2.0 "
-        f"co-simulation, made by {GENERATION_TOOL}.</p>"
+        "resting contact, which releases when the contact force reaches zero. "
+        f"{flavour}, made by {GENERATION_TOOL}.</p>"
     )
 
 
-def _use(mechanism: Mechanism) -> str:
+def _example(mechanism: Mechanism, options: str = "") -> str:
+    """Return what simulates an FMU with FMPy."""
     stops = [stop.name for stop in mechanism.stops]
     start = f'    start_values={{"{stops[0]}.restitution": 0.4}},\n' if stops else ""
     body = mechanism.release.body
     output = f'"{body}.x"' + "".join(f', "{stop}.impact_count"' for stop in stops)
+    code = (
+        "from fmpy import plot_result, simulate_fmu\n\n"
+        f'result = simulate_fmu(\n    "{mechanism.name}.fmu",\n    stop_time={STOP_TIME:g},\n'
+        f"{start}    output=[{output}],\n{options})\nplot_result(result)"
+    )
+    return f"<pre><code>{escape(code)}</code></pre>\n"
+
+
+def _use(mechanism: Mechanism) -> str:
     return (
-        "<h2>Use</h2>\n<pre><code>"
-        + escape(
-            "from fmpy import plot_result, simulate_fmu\n\n"
-            f'result = simulate_fmu(\n    "{mechanism.name}.fmu",\n    stop_time={STOP_TIME:g},\n'
-            f"{start}    output=[{output}],\n)\nplot_result(result)"
-        )
-        + "</code></pre>\n"
+        f"<h2>Use</h2>\n{_example(mechanism)}"
         "<p>Where it runs it needs <strong>Python 3.11 or later with NumPy and SciPy</strong>: "
         "inside a Python process (FMPy, PyFMI) nothing else; a tool that is not written in "
         "Python must find the Python library when it loads the FMU (on Linux for instance "
@@ -203,7 +231,18 @@ def _range(v: Variable) -> str:
     return f"&ge; {low}" if low else f"&le; {high}" if high else ""
 
 
-def _limits(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
+INPUTS_OF_STEPS = (
+    "Inputs are constant within a communication step; outputs at a communication point do "
+    "not depend on the inputs that are set there."
+)
+INPUTS_OF_BOTH = (
+    "In co-simulation inputs are constant within a communication step. In model exchange "
+    "<code>displacement</code> of a wall is used as it is, and its <code>velocity</code> "
+    "should be its rate."
+)
+
+
+def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) -> str:
     models = {kind.model for kind in mechanism.flexure_types}
     items = [
         "An impact of rigid bodies has an impulse, but no duration and no peak of force. A real "
@@ -247,10 +286,7 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
             "moving wall, each impact counted, until one below <code>rest_speed</code> captures "
             "it, and then goes with the wall. A wall that advances strikes what rests on it."
         )
-    items.append(
-        "Inputs are constant within a communication step; outputs at a communication point do "
-        "not depend on the inputs that are set there."
-    )
+    items.append(inputs)
     return _list("Limits", items)
 
 
@@ -263,4 +299,114 @@ def _licenses() -> str:
         "<h2>Licences</h2>\n<p>The model and its engine: MIT, see "
         '<a href="licenses/prbm-impact.txt">licenses/prbm-impact.txt</a>. The wrapper library '
         'pythonfmu: MIT, see <a href="licenses/pythonfmu.txt">licenses/pythonfmu.txt</a>.</p>'
+    )
+
+
+# --- native FMUs --------------------------------------------------------------------------------
+
+
+def _native_use(
+    mechanism: Mechanism, interface: NativeInterface, version: int, platforms: Sequence[str]
+) -> str:
+    event_mode = "    use_event_mode=True,\n    early_return_allowed=True,\n"
+    options = event_mode if interface.clocks else ""
+    parts = [
+        f"<h2>Use</h2>\n{_example(mechanism, options)}",
+        "<p>It needs <strong>nothing where it runs</strong>: no Python, no library but that of "
+        f"the C language. Inside are libraries for {', '.join(platforms)}, and the C source with "
+        "the mechanism as a constant array, for other platforms and for targets without a file "
+        f"system (<code>fmpy compile {mechanism.name}.fmu</code>). The same library serves every "
+        "mechanism; <code>resources/mechanism.bin</code> is the mechanism, which it reads when an "
+        "instance is made and checks against the token of this FMU. The folder <code>extra</code> "
+        "holds the outputs of the default experiment as the Python engine computes them, to "
+        "compare with.</p>",
+        "<p>For model exchange give FMPy <code>fmi_type=&quot;ModelExchange&quot;</code>. The "
+        "solver of the importer should make steps that are short beside the time between two "
+        "bounces, or it may step over a touch that is over before the step ends (CVode in FMPy "
+        "takes at most a fiftieth of the whole time).</p>",
+        "<p>What is wrong with a value, a call or a step is refused with a sentence in the log, "
+        "and changes nothing. The state of an instance can be saved, written to bytes and "
+        "restored, to the last bit. Every instance is on its own; use each in one thread at a "
+        "time.</p>",
+    ]
+    if version == 3 and not interface.clocks:
+        parts.append(
+            "<p>Event mode is up to the importer: with <code>use_event_mode=True</code> and "
+            "<code>early_return_allowed=True</code> FMPy records each impact twice, before and "
+            "after it.</p>"
+        )
+    return "\n".join(parts)
+
+
+def _exchange(interface: NativeInterface, version: int) -> str:
+    rows = "".join(
+        f"<tr><td><code>{escape(state)}</code></td><td><code>{escape(derivative)}</code></td></tr>"
+        for state, derivative in zip(interface.states, interface.derivatives, strict=True)
+    )
+    discard = f"fmi{version}Discard"
+    return (
+        "<h2>Model exchange</h2>\n"
+        "<p>The loops tie the angles q of the mechanism together, Phi(q) = 0. The states are the "
+        "angles and rates of independent coordinates q_i, as many as there are ways to move; the "
+        "dependent ones q_d are solved from the loops at every call, so that a solver that knows "
+        "nothing of constraints stays on them:</p>\n<pre>"
+        "Phi(q_i, q_d) = 0,      v_d = -(dPhi/dq_d)^-1 (dPhi/dq_i) v_i"
+        "</pre>\n"
+        '<div class="table"><table><caption>Continuous states, in order</caption><thead><tr>'
+        "<th>state</th><th>derivative</th></tr></thead><tbody>"
+        f"{rows}</tbody></table></div>\n"
+        "<p>Which coordinates are independent was chosen at the export, so that dPhi/dq_d is as "
+        "far from singular as it can be between the straight shape and the release. Far outside "
+        "these shapes the choice can turn singular: then derivatives cannot be computed and the "
+        f"call answers <code>{discard}</code> with a sentence. Co-simulation has no such place, "
+        "because it works with all coordinates and projects them onto the loops.</p>\n"
+        "<p>Directional derivatives of outputs and derivatives along states and inputs are exact. "
+        "A stop that holds is a constraint on the accelerations; what an importer's solver lets it "
+        "drift is taken back when it has completed a step, and every state may be set anew at an "
+        "event.</p>"
+    )
+
+
+def _events(mechanism: Mechanism, interface: NativeInterface, version: int) -> str:
+    if not (mechanism.stops or mechanism.frictions):
+        return "<h2>Events</h2>\n<p>This mechanism has none.</p>"
+    parts = [
+        "<h2>Events</h2>\n<p>A stop closes (an impact, or its capture into rest), a stop that "
+        "holds lets go, and what is subject to friction sticks or begins to slide. Each has an "
+        "event indicator, which changes its sign there; indicators are scaled to the order of 1 "
+        "and never 0 after an event.</p>",
+        "<p>At an event, values are those <em>before</em> it until it has been handled: in model "
+        "exchange when the discrete states are updated in event mode. In co-simulation without "
+        "event mode impacts happen inside a step; the latched outputs tell of the last one, and "
+        "their counter of all.</p>",
+    ]
+    if version == 3:
+        parts.append(
+            "<p>In co-simulation with event mode a step ends early at the event, at its exact "
+            "time, if the importer allows it; the velocities change in "
+            "<code>fmi3UpdateDiscreteStates</code>. If it does not allow it, impacts happen "
+            "inside the step.</p>"
+        )
+    if interface.clocks:
+        names = ", ".join(f"<code>{escape(name)}</code>" for name in interface.clocks)
+        parts.append(
+            f"<p>The output clock {names} ticks in event mode at each impact. An importer that "
+            "uses this FMU must support event mode; the FMU without the clock leaves that to "
+            "it.</p>"
+        )
+    return "\n".join(parts)
+
+
+def _native_licenses(platforms: Sequence[str]) -> str:
+    windows = (
+        ' The libraries for Windows contain start-up code of MinGW-w64: see <a href="licenses/'
+        'mingw-w64.txt">licenses/mingw-w64.txt</a>.'
+        if any(name.endswith("-windows") for name in platforms)
+        else ""
+    )
+    return (
+        "<h2>Licences</h2>\n<p>The model and its engine: MIT, see "
+        '<a href="licenses/prbm-impact.txt">licenses/prbm-impact.txt</a>. The headers of FMI, '
+        'from which it was compiled: BSD with 2 clauses, see <a href="licenses/fmi-headers.txt">'
+        f"licenses/fmi-headers.txt</a>.{windows}</p>"
     )

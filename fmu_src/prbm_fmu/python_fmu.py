@@ -8,14 +8,15 @@ from dataclasses import replace
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 
-from prbm import Mechanism, MechanismError, Simulation
+from prbm import Mechanism, MechanismError
 
 from . import documentation
 from .archive import zipped
 from .description import Heading, model_description, plain
 from .slaves.resolved import FILE, resolved
 from .slaves.slave import MechanismSlave
-from .variables import Number, Variable, variables, with_starts
+from .start import interface, start_sample
+from .variables import Variable
 
 NAMESPACE = uuid.UUID("6f1c6c1e-0c53-5d0e-9d6e-3b1f0b4f7a52")
 SHORT = 10  # hexadecimal digits that tell one content from another within a process
@@ -60,31 +61,6 @@ class {name}(MechanismSlave):
 
     engine = engine
 '''
-
-
-def start_sample(mechanism: Mechanism, changes: Mapping[str, float]) -> dict[str, Number]:
-    """Return all outputs at the start, which also shows that the mechanism can start.
-
-    Raises
-    ------
-    PrbmError
-        If it cannot, with these start values.
-    """
-    return dict(Simulation(mechanism, changes).outputs())
-
-
-def interface(mechanism: Mechanism, changes: Mapping[str, float]) -> tuple[Variable, ...]:
-    """Return the variables of the FMU of a mechanism with other start values.
-
-    Raises
-    ------
-    PrbmError
-        If the mechanism cannot start, or a start value names no parameter or input.
-    """
-    plain = variables(mechanism, start_sample(mechanism, {}))
-    changed = with_starts(plain, changes)
-    start_sample(mechanism, changes)
-    return changed
 
 
 def build(

@@ -24,6 +24,7 @@ from prbm_tools.simulate import Progress, reporter, rest_time
 from .archive import write
 from .cli import FAILED, INTERRUPTED, MISTAKE, OK
 from .slaves.resolved import read
+from .variables import CLOCK
 
 FREQUENCY = "mode.frequency"
 
@@ -105,7 +106,9 @@ def simulate(fmu: Path, progress: Progress) -> Run:
     """
     with unpacked(fmu) as folder, interruptible() as wanted:
         description = fmpy.read_model_description(str(folder))
-        outputs = [v.name for v in description.modelVariables if v.causality == "output"]
+        listed = description.modelVariables
+        outputs = [v.name for v in listed if v.causality == "output" and v.type != CLOCK]
+        clocks = any(v.type == CLOCK for v in listed)  # which demand event mode
         model = read(folder / "resources", prbm)
         stop_time = float(description.defaultExperiment.stopTime)
 
@@ -118,6 +121,8 @@ def simulate(fmu: Path, progress: Progress) -> Run:
             str(folder),
             model_description=description,
             output=[*outputs, FREQUENCY],
+            use_event_mode=clocks,
+            early_return_allowed=clocks,
             step_finished=step_finished,
         )
         seconds = time.perf_counter() - begin

@@ -23,6 +23,7 @@ UNITS = {
     "m/s2": Unit({"m": 1, "s": -2}),
     "rad": Unit({"rad": 1}, {"deg": 180 / math.pi}),
     "rad/s": Unit({"rad": 1, "s": -1}, {"deg/s": 180 / math.pi}),
+    "rad/s2": Unit({"rad": 1, "s": -2}, {"deg/s2": 180 / math.pi}),
     "s": Unit({"s": 1}, {"ms": 1e3, "us": 1e6}),
     "Hz": Unit({"s": -1}, {"kHz": 1e-3}),
     "kg": Unit({"kg": 1}, {"g": 1e3}),
@@ -34,6 +35,7 @@ UNITS = {
     "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {"mN.m": 1e3}),
     "N.s": Unit({"kg": 1, "m": 1, "s": -1}, {"mN.s": 1e3}),
     "J": Unit({"kg": 1, "m": 2, "s": -2}, {"mJ": 1e3}),
+    "W": Unit({"kg": 1, "m": 2, "s": -3}, {"mW": 1e3}),
 }
 
 
@@ -55,6 +57,7 @@ QUANTITIES = {
         Quantity("Acceleration", "m/s2"),
         Quantity("Angle", "rad", "deg"),
         Quantity("AngularVelocity", "rad/s", "deg/s"),
+        Quantity("AngularAcceleration", "rad/s2", "deg/s2"),
         Quantity("Time", "s", "ms"),
         Quantity("Frequency", "Hz"),
         Quantity("Mass", "kg", "g"),
@@ -66,5 +69,6 @@ QUANTITIES = {
         Quantity("Torque", "N.m", "mN.m"),
         Quantity("Impulse", "N.s", "mN.s"),
         Quantity("Energy", "J", "mJ"),
+        Quantity("Power", "W", "mW"),
     )
 }

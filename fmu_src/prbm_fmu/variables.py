@@ -7,10 +7,10 @@ removed or moved, in every version and flavour, and nobody has to keep a registe
 
 import math
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from prbm import Mechanism, MechanismError, Parameter, ParameterError
+from prbm import Mechanism, MechanismError, Parameter, ParameterError, assemble
 from prbm.mechanism import affine, unknown
 
 from .units import QUANTITIES, Quantity
@@ -18,6 +18,19 @@ from .units import QUANTITIES, Quantity
 Number = float | int | bool
 
 BASE = "base"
+CLOCK = "Clock"
+
+# what is computed, in the order in which the C kernel keeps it
+BODY_OUTPUTS = ("x", "y", "angle", "vx", "vy", "omega")
+STOP_OUTPUTS = ("gap", "gap_rate", "force")
+BASE_OUTPUTS = (f"{BASE}.force.x", f"{BASE}.force.y", f"{BASE}.moment")
+STORED = ("energy.dissipated", "energy.work")  # energies that are states
+ENERGIES = ("energy.kinetic", "energy.elastic", "energy.gravitational", *STORED)
+LATCHED = (
+    "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
+    "energy_lost", "modal_restitution",
+)  # fmt: skip
+INDICATORS = ("impact", "release", "slip")  # event indicators of a stop
 
 
 @dataclass(frozen=True)
@@ -34,8 +47,8 @@ class Variable:
         As in FMI 2.0; ``initial`` is empty for inputs.
     unit : str
         SI unit of a Real; empty for other types.
-    type : {"Real", "Integer", "Boolean"}
-        Type in FMI 2.0.
+    type : {"Real", "Integer", "Boolean", "Clock"}
+        Type in FMI 2.0, or a clock of FMI 3.0.
     start : number or None
         Start value where there is one.
     minimum, maximum : float
@@ -46,6 +59,8 @@ class Variable:
         Name of the variable whose time derivative this one is.
     display : str or None
         Display unit where it differs from the one of the quantity.
+    reinit : bool
+        Whether an event may change this state in model exchange.
     """
 
     name: str
@@ -61,6 +76,7 @@ class Variable:
     nominal: float | None = None
     derivative_of: str | None = None
     display: str | None = None
+    reinit: bool = False
 
     @property
     def reference(self) -> int:
@@ -97,12 +113,14 @@ def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
         "rad": x / span,
         "rad/s": x / span * omega,
         "m/s2": x * omega**2,
+        "rad/s2": x / span * omega**2,
         "s": 1 / omega,
         "Hz": omega / (2 * math.pi),
         "N": mass * x * omega**2,
         "N.m": mass * x * omega**2 * span,
         "N.s": mass * x * omega,
         "J": mass * (x * omega) ** 2,
+        "W": mass * (x * omega) ** 2 * omega,
     }
     return Scales({unit: _power_of_ten(value) for unit, value in magnitudes.items()})
 
@@ -149,8 +167,20 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
     missing = sample.keys() - {v.name for v in result}
     if missing:
         raise MechanismError(f"no description for the outputs {', '.join(sorted(missing))}")
+    check_names(result)
+    return result
+
+
+def check_names(variables: Sequence[Variable]) -> None:
+    """Refuse names that FMI does not have, and two with the same value reference.
+
+    Raises
+    ------
+    MechanismError
+        If there is one.
+    """
     seen: dict[int, str] = {}
-    for variable in result:
+    for variable in variables:
         if not variable.name.isascii():
             raise MechanismError(
                 f"{variable.name}: names of FMI are of the letters a to z, digits and _, without "
@@ -162,7 +192,6 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
                 f"{variable.name} and {other} happen to have the same value reference "
                 f"{variable.reference}: rename one of them"
             )
-    return result
 
 
 def with_starts(
@@ -392,3 +421,155 @@ def _link(link: str, nominal: Scales) -> Iterator[Variable]:
         angle, name=f"{link}.omega", description=f"Angular velocity of link {number}",
         unit="rad/s", nominal=nominal("rad/s"), derivative_of=angle.name,
     )  # fmt: skip
+
+
+# --- native FMUs --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class NativeInterface:
+    """The variables of a native FMU, and which of them model exchange works with.
+
+    Parameters
+    ----------
+    variables : tuple of Variable
+        All variables, in the order of the interface.
+    states, derivatives, indicators : tuple of str
+        Names of the continuous states, their derivatives and the event indicators, in order.
+    clocks : tuple of str
+        Names of the output clocks.
+    independent : tuple of int
+        The coordinates whose angles and rates are states.
+    """
+
+    variables: tuple[Variable, ...]
+    states: tuple[str, ...]
+    derivatives: tuple[str, ...]
+    indicators: tuple[str, ...]
+    clocks: tuple[str, ...]
+    independent: tuple[int, ...]
+
+
+def native_interface(
+    mechanism: Mechanism,
+    plain: Sequence[Variable],
+    sample: Mapping[str, Number],
+    independent: Sequence[int],
+    *,
+    time: bool = False,
+    clock: bool = False,
+) -> NativeInterface:
+    """Return the interface of a native FMU.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    plain : sequence of Variable
+        The variables that every flavour has.
+    sample : mapping
+        All outputs at the start.
+    independent : sequence of int
+        The coordinates whose angles and rates are states.
+    time : bool
+        Whether time is a variable, as FMI 3.0 demands.
+    clock : bool
+        Whether each stop has an output clock that ticks at its impacts (FMI 3.0).
+
+    Raises
+    ------
+    MechanismError
+        If two names share a value reference.
+    """
+    nominal = scales(mechanism, sample)
+    names = coordinate_names(mechanism)
+    angles = tuple(f"{names[j]}.angle" for j in independent)
+    rates = tuple(f"{names[j]}.omega" for j in independent)
+    states = (*angles, *rates, *STORED)
+    accelerations = state_derivatives(names, independent)
+    indicators = tuple(_indicators(mechanism))
+    clocks = tuple(f"{stop.name}.impact" for stop in mechanism.stops) if clock else ()
+    listed = (
+        *([TIME] if time else []),
+        *(replace(v, reinit=True) if v.name in states else v for v in plain),
+        *(_derivative(name, nominal) for name in accelerations),
+        *indicators,
+        *map(_clock, clocks),
+    )
+    check_names(listed)
+    return NativeInterface(
+        listed,
+        states,
+        (*rates, *accelerations),
+        tuple(v.name for v in indicators),
+        clocks,
+        tuple(independent),
+    )
+
+
+def coordinate_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return what the variables of each coordinate are named after: ``link[k]``, or a body."""
+    system = assemble(mechanism, mechanism.values())
+    names = {j: f"link[{number}]" for number, j in enumerate(system.links, start=1)}
+    names |= {frame.j: name for name, frame in system.bodies.items()}
+    return tuple(names[j] for j in range(system.n))
+
+
+def state_derivatives(coordinates: Sequence[str], independent: Sequence[int]) -> tuple[str, ...]:
+    """Return the names of those derivatives of states that are no other variable."""
+    return (
+        *(f"der({coordinates[j]}.omega)" for j in independent),
+        *(f"der({name})" for name in STORED),
+    )
+
+
+def counter_of(clock: str) -> str:
+    """Return the name of the variable that counts what a clock ticks for.
+
+    Examples
+    --------
+    >>> counter_of("stop.impact")
+    'stop.impact_count'
+    """
+    return f"{clock}_count"
+
+
+TIME = Variable("time", "Time", "independent", "continuous", "", "s")
+DERIVATIVES = {
+    "energy.dissipated": "Power lost to damping and friction, impacts apart",
+    "energy.work": "Power of the inputs and of the moving walls, impacts apart",
+}
+
+
+def _derivative(name: str, nominal: Scales) -> Variable:
+    state = name.removeprefix("der(").removesuffix(")")
+    unit = "W" if state in DERIVATIVES else "rad/s2"
+    owner = state.removesuffix(".omega")
+    description = DERIVATIVES.get(state, f"Angular acceleration of {owner}")
+    return Variable(
+        name, description, "local", "continuous", "calculated", unit,
+        nominal=nominal(unit), derivative_of=state,
+    )  # fmt: skip
+
+
+INDICATED = {
+    "impact": "Event indicator of an impact at {name}",
+    "release": "Event indicator of the release of what rests on {name}",
+    "slip": "Event indicator of the beginning and the end of sliding at {name}",
+}
+
+
+def _indicators(mechanism: Mechanism) -> Iterator[Variable]:
+    kinds = [(stop.name, kind) for stop in mechanism.stops for kind in INDICATORS]
+    kinds += [(friction.name, "slip") for friction in mechanism.frictions]
+    for name, kind in kinds:
+        yield Variable(
+            f"{name}.{kind}_indicator",
+            INDICATED[kind].format(name=name),
+            "local", "continuous", "calculated", "1",
+        )  # fmt: skip
+
+
+def _clock(name: str) -> Variable:
+    stop = name.removesuffix(".impact")
+    return Variable(name, f"Ticks at each impact at {stop}", "output", "discrete", "", type=CLOCK)

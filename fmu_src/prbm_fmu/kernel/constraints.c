@@ -63,11 +63,12 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
 
 /* --- the same again and again ------------------------------------------------------------------------ */
 
-/* The Cholesky factor L of the lower triangle of M; false if M is not positive definite. */
-SIZED bool block_cholesky(int size, int n, const double *M, double *L) {
+/* M = L D L^T of the lower triangle of M, L with ones on its diagonal, where 1/D is kept; false if M
+ * is not positive definite. */
+SIZED bool block_factor(int size, int n, const double *restrict M, double *restrict L) {
     UNROLLED
     for (int i = 0; i < size; i++) {
-        double square = M[i * n + i];
+        double pivot = M[i * n + i];
         const int columns = size <= SMALL ? size : i;
         UNROLLED
         for (int j = 0; j < columns; j++) {
@@ -78,35 +79,42 @@ SIZED bool block_cholesky(int size, int n, const double *M, double *L) {
                 for (int k = 0; k < before; k++) {
                     sum = k < j ? sum - L[i * n + k] * L[j * n + k] : sum;
                 }
-                L[i * n + j] = sum * L[j * n + j];
-                square -= L[i * n + j] * L[i * n + j];
+                L[i * n + j] = sum; /* L_ij D_j so far */
             }
         }
-        if (!(square > 0.0)) {
+        UNROLLED
+        for (int j = 0; j < columns; j++) {
+            if (j < i) {
+                double share = L[i * n + j] * L[j * n + j];
+                pivot -= share * L[i * n + j];
+                L[i * n + j] = share;
+            }
+        }
+        if (!(pivot > 0.0)) {
             return false;
         }
-        L[i * n + i] = 1.0 / sqrt(square);
+        L[i * n + i] = 1.0 / pivot;
     }
     return true;
 }
 
-/* b := L^-1 b and b := L^-T b within a block; L has the stride n and its diagonal inverted. */
-SIZED void block_forward(int size, int n, const double *L, double *b) {
+/* b := L^-1 b and b := L^-T b within a block; L has the stride n. */
+SIZED void block_forward(int size, int n, const double *restrict L, double *restrict b) {
     UNROLLED
-    for (int i = 0; i < size; i++) {
+    for (int i = 1; i < size; i++) {
         double sum = b[i];
         const int columns = size <= SMALL ? size : i;
         UNROLLED
         for (int j = 0; j < columns; j++) {
             sum = j < i ? sum - L[i * n + j] * b[j] : sum;
         }
-        b[i] = sum * L[i * n + i];
+        b[i] = sum;
     }
 }
 
-SIZED void block_backward(int size, int n, const double *L, double *b) {
+SIZED void block_backward(int size, int n, const double *restrict L, double *restrict b) {
     UNROLLED
-    for (int k = 0; k < size; k++) {
+    for (int k = 1; k < size; k++) {
         int i = size - 1 - k;
         double sum = b[i];
         const int from = size <= SMALL ? 0 : i + 1;
@@ -114,7 +122,15 @@ SIZED void block_backward(int size, int n, const double *L, double *b) {
         for (int j = from; j < size; j++) {
             sum = j > i ? sum - L[j * n + i] * b[j] : sum;
         }
-        b[i] = sum * L[i * n + i];
+        b[i] = sum;
+    }
+}
+
+/* y := D^-1 z */
+SIZED void block_scale(int size, int n, const double *restrict L, const double *z, double *y) {
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        y[i] = z[i] * L[i * n + i];
     }
 }
 
@@ -148,17 +164,16 @@ static void backward_all(const Factors *factors, double *b) {
     }
 }
 
-/* S = Y Y_columns^T.  It is symmetric, unless a stop slides, whose column is not its row. */
+/* S = Z Y_columns^T.  It is symmetric, unless a stop slides, whose column is not its row. */
 SIZED bool schur_of_size(int r, Factors *factors) {
     int n = factors->n;
-    const double *Y = factors->Y;
     double *S = factors->S;
     for (int i = 0; i < r; i++) {
         for (int k = 0; k <= i; k++) {
-            S[i * r + k] = dot(n, Y + i * n, Y + k * n);
+            S[i * r + k] = dot(n, factors->Z + i * n, factors->Y + k * n);
         }
     }
-    return block_cholesky(r, r, S, S);
+    return block_factor(r, r, S, S + r * r); /* behind it */
 }
 
 PRBM bool factor_schur(Factors *factors) {
@@ -175,15 +190,17 @@ PRBM bool factor_schur(Factors *factors) {
     }
     for (int i = 0; i < r; i++) {
         for (int k = 0; k < r; k++) {
-            factors->S[i * r + k] = dot(n, factors->Y + i * n, factors->Y_columns + k * n);
+            factors->S[i * r + k] = dot(n, factors->Z + i * n, factors->Y_columns + k * n);
         }
     }
     return lu_factor(r, factors->S, factors->pivots);
 }
 
 SIZED void multipliers_of_size(int r, const double *S, double *lam) {
-    block_forward(r, r, S, lam);
-    block_backward(r, r, S, lam);
+    const double *L = S + r * r;
+    block_forward(r, r, L, lam);
+    block_scale(r, r, L, lam, lam);
+    block_backward(r, r, L, lam);
 }
 
 static void multipliers(const Factors *factors, double *lam) {
@@ -208,6 +225,7 @@ static void finish(const Factors *factors, double *x) {
         lam[k] -= dot(n, factors->Y + k * n, x);
     }
     multipliers(factors, lam);
+    block_scale(n, n, factors->L, x, x);
     for (int k = 0; k < r; k++) {
         add_scaled(n, lam[k], factors->Y_columns + k * n, x);
         lam[k] = -lam[k];

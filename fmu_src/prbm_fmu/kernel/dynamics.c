@@ -36,8 +36,9 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.factors.n = (int)n;
     q.factors.blocks = system->blocks;
     q.factors.L = place(memory, n * n, sizeof(double));
+    q.factors.Z = place(memory, r * n, sizeof(double));
     q.factors.Y = place(memory, r * n, sizeof(double));
-    q.factors.S = place(memory, r * r, sizeof(double));
+    q.factors.S = place(memory, 2 * r * r, sizeof(double));
     q.factors.pivots = place(memory, r, sizeof(int));
     *equations = q;
 }
@@ -172,11 +173,9 @@ static void damp_mass(Equations *q, int start, int size, const double *v) {
 
 /* One block of M, and what its inertia adds to the loads x: Im(diag(e)^H H diag(e)) v^2, as the
  * mass matrix is symmetric and the quadratic velocities are antisymmetric. */
-SIZED void block_inertia(Equations *q, int start, int size) {
-    int n = q->system->n;
-    const Complex *H = q->system->H + start * n + start, *e = q->e + start;
-    const double *J = q->system->J + start, *squares = q->squares + start;
-    double *M = q->M + start * n + start, *x = q->x + start;
+SIZED void block_inertia(int size, int n, const Complex *restrict H, const double *restrict J,
+                         const Complex *restrict e, const double *restrict squares,
+                         double *restrict M, double *restrict x) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         const int columns = size <= SMALL ? size : i;
@@ -198,22 +197,24 @@ SIZED void block_inertia(Equations *q, int start, int size) {
 SIZED bool block_motion(Equations *q, int start, int size, const double *v) {
     int n = q->system->n, corner = start * n + start;
     double *L = q->factors.L + corner;
-    block_inertia(q, start, size);
+    block_inertia(size, n, q->system->H + corner, q->system->J + start, q->e + start,
+                  q->squares + start, q->M + corner, q->x + start);
     if (q->mass_damping != 0.0) {
         damp_mass(q, start, size, v);
     }
-    if (!block_cholesky(size, n, q->M + corner, L)) {
+    if (!block_factor(size, n, q->M + corner, L)) {
         return false;
     }
     block_forward(size, n, L, q->x + start);
     for (int k = 0; k < q->r; k++) {
-        double *Y = q->factors.Y + k * n + start;
+        double *Z = q->factors.Z + k * n + start;
         const double *row = q->rows + k * n + start;
         UNROLLED
         for (int i = 0; i < size; i++) {
-            Y[i] = row[i];
+            Z[i] = row[i];
         }
-        block_forward(size, n, L, Y);
+        block_forward(size, n, L, Z);
+        block_scale(size, n, L, Z, q->factors.Y + k * n + start);
     }
     return true;
 }
@@ -324,6 +325,7 @@ static void set_columns(Equations *q) {
                         share * product(system->slides[i * n + j], q->e[j]).im;
         }
         forward_all(&q->factors, column);
+        block_scale(n, n, q->factors.L, column, column);
     }
 }
 

@@ -359,19 +359,19 @@ PRBM bool project_positions(const System *system, int r, const Complex *B, const
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, Scratch *scratch, Problem *problem);
 
-/* M = L L^T block by block, Y = L^-1 rows^T, and the Schur complement S of a saddle-point matrix
- * [[M, columns^T], [rows, 0]]: what to solve with, again and again. */
+/* M = L D L^T block by block, Z = L^-1 rows^T, Y = D^-1 Z, and the Schur complement S of a
+ * saddle-point matrix [[M, columns^T], [rows, 0]]: what to solve with, again and again. */
 typedef struct {
     int n, r, block_count;
     const Block *blocks;
-    double *L;              /* (n, n); its diagonal inverted */
-    double *Y, *Y_columns;  /* (r, n): L^-1 rows^T, L^-1 columns^T; the same where they are */
-    double *S;              /* (r, r) */
-    int *pivots;            /* (r,) */
-    bool symmetric;         /* S is, and small: S is its Cholesky factor, else its LU factors */
+    double *L;                  /* (n, n); 1/D on its diagonal */
+    double *Z, *Y, *Y_columns;  /* (r, n); of the columns as of the rows, or the same array */
+    double *S;                  /* (r, r), and room for its factor */
+    int *pivots;                /* (r,) */
+    bool symmetric;             /* S is, and small: its factor is L D L^T, else LU */
 } Factors;
 
-/* S from L, Y and Y_columns, factored. */
+/* S from Z and Y_columns, factored. */
 PRBM bool factor_schur(Factors *factors);
 /* x (n + r,): in, the right side; out, the solution (a, -lam). */
 PRBM void solve_again(const Factors *factors, double *x);

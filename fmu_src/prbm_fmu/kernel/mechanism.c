@@ -493,6 +493,9 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     count_coordinates(reader, m);
     name_coordinates(reader, m);
     read_independents(reader, m);
+    if (reader->wrong) {
+        return; /* with counts of parts that may not be there */
+    }
     lay_out_slots(m);
     read_variables(reader, m);
     if (!reader->wrong && reader->left > 0) {

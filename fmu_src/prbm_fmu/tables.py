@@ -1,0 +1,216 @@
+"""The tables of a mechanism, as the C kernel reads them from ``resources/mechanism.bin``.
+
+Little-endian; a text is its length, its bytes in UTF-8 and a zero byte; an expression is its
+constant and pairs of a parameter's index and a factor; bodies are counted from 1, 0 is the ground.
+What a simulation computes has a place, its slot, in one vector of all values: :func:`slots`.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from prbm import Flexure, FlexureType, Mechanism, assemble
+from prbm.dynamics import input_names
+from prbm.mechanism import FIELDS, GROUND, Affine, Part, Point, Quantity, affine, body_of
+
+from .variables import (
+    BASE_OUTPUTS,
+    BODY_OUTPUTS,
+    CLOCK,
+    ENERGIES,
+    INDICATORS,
+    LATCHED,
+    STOP_OUTPUTS,
+    Variable,
+    coordinate_names,
+    counter_of,
+    state_derivatives,
+)
+
+FILE = "mechanism.bin"
+MAGIC, VERSION = b"PRBM", 1
+HEAD = 16  # bytes before those that the check sum is of
+TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
+FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
+
+
+def tables(
+    mechanism: Mechanism,
+    variables: Iterable[Variable],
+    token: str,
+    independent: Sequence[int],
+) -> bytes:
+    """Return the tables of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    variables : iterable of Variable
+        The variables of the FMU, whose start values replace the mechanism's own.
+    token : str
+        The guid or instantiation token of the model description.
+    independent : sequence of int
+        The coordinates whose angles and rates are states in model exchange.
+    """
+    listed = tuple(variables)
+    body = b"".join(_Writer(mechanism, listed, independent).parts(token))
+    size = struct.pack("<I", HEAD + len(body))
+    return MAGIC + _u32(VERSION) + size + _u32(zlib.crc32(body)) + body
+
+
+def slots(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, int]:
+    """Return the slot of every value by its name, in the order of the vector of all values."""
+    return {name: slot for slot, name in enumerate(_names(mechanism, independent))}
+
+
+def _names(mechanism: Mechanism, independent: Sequence[int]) -> Iterator[str]:
+    stops = [stop.name for stop in mechanism.stops]
+    yield from (p.name for p in mechanism.parameters)
+    yield from input_names(mechanism)
+    yield from (f"{body.name}.{what}" for body in mechanism.bodies for what in BODY_OUTPUTS)
+    yield from (f"{stop}.{what}" for stop in stops for what in STOP_OUTPUTS)
+    yield from BASE_OUTPUTS
+    yield from ENERGIES
+    yield from (f"{stop}.{what}" for stop in stops for what in LATCHED)
+    links = len(assemble(mechanism, mechanism.values()).links)
+    for number in range(1, links + 1):
+        yield from (f"link[{number}].angle", f"link[{number}].omega")
+    yield "mode.frequency"
+    for kind in mechanism.flexure_types:
+        if len(mechanism.model(kind).gamma) > 1:
+            yield f"{kind.name}.gamma0"
+    yield from state_derivatives(coordinate_names(mechanism), independent)
+    yield from (f"{stop}.{what}_indicator" for stop in stops for what in INDICATORS)
+    yield from (f"{friction.name}.slip_indicator" for friction in mechanism.frictions)
+    yield "time"
+
+
+def _u32(*numbers: int) -> bytes:
+    return struct.pack(f"<{len(numbers)}I", *numbers)
+
+
+def _f64(*numbers: float) -> bytes:
+    return struct.pack(f"<{len(numbers)}d", *numbers)
+
+
+def _text(text: str) -> bytes:
+    content = text.replace("\0", " ").encode()
+    return _u32(len(content)) + content + b"\0"
+
+
+class _Writer:
+    """Writes the parts of a mechanism one after the other."""
+
+    def __init__(
+        self, mechanism: Mechanism, variables: Sequence[Variable], independent: Sequence[int]
+    ) -> None:
+        self.mechanism = mechanism
+        self.variables = sorted(variables, key=lambda v: v.reference)
+        self.independent = independent
+        self.starts = {v.name: v.start for v in variables}
+        self.parameters = {p.name: i for i, p in enumerate(mechanism.parameters)}
+        self.inputs = input_names(mechanism)
+        self.body = {b.name: i for i, b in enumerate(mechanism.bodies, start=1)} | {GROUND: 0}
+        self.type = {kind.name: i for i, kind in enumerate(mechanism.flexure_types)}
+        self.bounds = [*self._bounds()]
+
+    def parts(self, token: str) -> Iterator[bytes]:
+        """Yield everything after the head."""
+        m = self.mechanism
+        yield _text(token) + _text(m.name)
+        yield _u32(*self._counts())
+        for p in m.parameters:
+            yield _text(p.name) + _text(p.unit)
+            yield _f64(self._start(p.name, p.value), p.minimum, p.maximum) + _u32(p.tunable)
+        yield _u32(*(self.parameters[name] for name in FIXED_NAMES))
+        for name in self.inputs:
+            yield _text(name) + _f64(self._start(name, 0.0))
+        for body in m.bodies:
+            yield _text(body.name) + self._fields(body) + self._point(body.centre)
+        for kind in m.flexure_types:
+            yield self._type(kind)
+        for flexure in m.flexures:
+            yield self._flexure(flexure)
+        for stop in m.stops:
+            yield _text(stop.name) + _u32(self.body[stop.body]) + self._point(stop.point)
+            yield _f64(stop.direction) + self._fields(stop)
+        for friction in m.frictions:
+            yield _text(friction.name) + _u32(self.body[friction.body])
+            yield _f64(friction.direction) + self._fields(friction)
+        for force in m.forces:
+            yield _text(force.name) + _u32(self.body[force.body])
+        yield _u32(self.body[m.release.body]) + _f64(m.release.direction)
+        yield self._fields(m.release)
+        yield from map(self._point, m.ground.values())
+        yield from self.bounds
+        yield _u32(*self.independent)
+        yield from self._variables()
+
+    def _counts(self) -> tuple[int, ...]:
+        m = self.mechanism
+        parts: tuple[Mapping[str, object] | Sequence[object], ...] = (
+            self.parameters, m.bodies, m.flexure_types, m.flexures, m.stops, m.frictions, m.forces,
+            m.ground, self.bounds, self.variables, self.independent, self.inputs,
+        )  # fmt: skip
+        return tuple(map(len, parts))
+
+    def _start(self, name: str, default: float) -> float:
+        start = self.starts.get(name)
+        return default if start is None else float(start)
+
+    def _variables(self) -> Iterator[bytes]:
+        slot = slots(self.mechanism, self.independent)
+        for v in self.variables:
+            place = slot[counter_of(v.name) if v.type == CLOCK else v.name]
+            yield _u32(v.reference, TYPES[v.type], place) + _text(v.name)
+
+    # -- values --
+
+    def _expression(self, expression: Affine) -> bytes:
+        terms = (
+            _u32(self.parameters[name]) + _f64(factor) for name, factor in expression.terms.items()
+        )
+        return _f64(expression.constant) + _u32(len(expression.terms)) + b"".join(terms)
+
+    def _field(self, name: str, quantity: Quantity) -> bytes:
+        """Return what a field of a part is: a parameter, or an expression in parameters."""
+        parameter = Affine(0.0, {name: 1.0})
+        return self._expression(affine(quantity) if isinstance(quantity, str) else parameter)
+
+    def _fields(self, part: Part) -> bytes:
+        names = FIELDS[type(part)]
+        return b"".join(self._field(f"{part.name}.{n}", getattr(part, n)) for n in names)
+
+    def _point(self, point: Point) -> bytes:
+        return b"".join(self._expression(affine(coordinate)) for coordinate in point)
+
+    # -- parts --
+
+    def _type(self, kind: FlexureType) -> bytes:
+        model = self.mechanism.model(kind)
+        coefficients = (
+            self._field(f"{kind.name}.{c.name}", kind.coefficients.get(c.name, c.value))
+            for c in model.coefficients
+        )
+        numbers = _u32(model.lumped, model.rate_with_gamma, len(model.gamma))
+        return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
+
+    def _flexure(self, flexure: Flexure) -> bytes:
+        ends = b"".join(
+            _u32(self.body[body_of(end)]) + self._point(self.mechanism.point(end, flexure.name))
+            for end in (flexure.start, flexure.end)
+        )
+        clamped = _u32(*(end == "clamp" for end in flexure.ends))
+        return _text(flexure.name) + _u32(self.type[flexure.type]) + ends + clamped
+
+    def _bounds(self) -> Iterator[bytes]:
+        """Yield the bounds of the fields that are expressions."""
+        m = self.mechanism
+        parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.frictions, *m.stops, m.release)
+        for part in parts:
+            for name, (unit, _, minimum, maximum, *_) in FIELDS[type(part)].items():
+                quantity = getattr(part, name)
+                if isinstance(quantity, str):
+                    head = _text(f"{part.name}.{name}") + _text(unit)
+                    yield head + self._field(name, quantity) + _f64(minimum, maximum)

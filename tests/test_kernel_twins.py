@@ -1,0 +1,1084 @@
+"""The C kernel says what prbm says, function by function, on random states and parameters.
+
+Each test names the functions that it holds against each other; none is left out silently, neither
+of the header nor of the package (the last tests).  The tolerance is 1e-12 of the largest entry
+unless a comment says which rounding it has to allow for.
+"""
+
+import ctypes
+import functools
+import importlib
+import inspect
+import math
+import re
+
+import numpy as np
+import pytest
+
+from kernel_library import (
+    KernelError,
+    KernelSystem,
+    array,
+    constants,
+    kernel,
+    placed,
+    prototypes,
+    structures,
+)
+from prbm import (
+    Body,
+    Flexure,
+    FlexureType,
+    Force,
+    Friction,
+    Mechanism,
+    Parameter,
+    Release,
+    Stop,
+    assembly,
+    constraints,
+    contact,
+    dynamics,
+    flexure,
+    forces,
+    hybrid,
+    kinetics,
+    modal,
+    runge_kutta,
+    statics,
+)
+from prbm.errors import EquilibriumError, ParameterError, SimulationError
+from prbm.mechanism import Affine
+from support import mechanism
+
+TWINS = {}
+
+
+def twin(**pairs):
+    """Say which functions of the kernel a test compares with which of the package."""
+
+    def decorated(test):
+        @functools.wraps(test)
+        def checked(*arguments, **keywords):
+            kernel().called.clear()
+            test(*arguments, **keywords)
+            assert pairs.keys() <= kernel().called, "not called at all"
+
+        assert not pairs.keys() & TWINS.keys()
+        TWINS.update(pairs)
+        return checked
+
+    return decorated
+
+
+def assert_same(found, expected, rel=1e-12, scale=0.0):
+    """Hold arrays or numbers against each other, relative to the largest entry."""
+    found, expected = np.asarray(found), np.asarray(expected)
+    assert found.shape == expected.shape
+    size = max(float(np.abs(expected).max(initial=0.0)), scale)
+    assert float(np.abs(found - expected).max(initial=0.0)) <= rel * size
+
+
+def sentence(error, function, *arguments):
+    """Return what an error says."""
+    with pytest.raises(error) as caught:
+        function(*arguments)
+    return str(caught.value)
+
+
+def outcome(function, *arguments):
+    """Return what a function returns, or what it says when it refuses."""
+    try:
+        return function(*arguments)
+    except (KernelError, ParameterError) as error:
+        return str(error)
+
+
+def spread(condition):
+    """Return what a solution of such a system has in common: some roundings times its condition."""
+    return max(1e-12, 50 * 2.2e-16 * condition)
+
+
+# --- mechanisms, parameters, states --------------------------------------------------------------
+
+
+def length(name, x):
+    return Parameter(name, x, "m", "A length", 1e-9, 1e3)
+
+
+def rich(model="3R"):
+    """Return a mechanism with some of everything: two bodies, pins, 1R beside others, two stops."""
+    return Mechanism(
+        name="Rich",
+        title="A stage on two leaves, with a pendulum on a third",
+        ground={"left": (0.0, 0.0), "right": ("0.08", 0.003)},
+        bodies=(
+            Body(
+                "stage", 0.05, "3e-5 + 1e-5*L", ("0.04", "L + 0.01"),
+                {"left": (0.0, "L"), "right": ("0.08", "L"), "top": (0.03, "L + 0.02")},
+            ),
+            Body("tip", 0.004, 2e-7, ("0.03", "1.6*L + 0.02"), {"end": (0.03, "1.5*L + 0.02")}),
+        ),
+        flexure_types=(
+            FlexureType("leaf", model, "L/400", 8e-3, 1.8e11, 7800.0),
+            FlexureType("thin", "1R", 1e-4, 8e-3, 1.8e11, 7800.0),
+        ),
+        flexures=(
+            Flexure("one", "leaf", "ground.left", "stage.left"),
+            Flexure("two", "thin", "stage.right", "ground.right", ("clamp", "pin")),
+            Flexure("three", "leaf", "stage.top", "tip.end", ("clamp", "pin")),
+        ),
+        stops=(
+            Stop("high", "stage", (0.08, "L"), 10.0, 2e-3, "L/8", 0.7, 0.2),
+            Stop("low", "tip", (0.03, "1.6*L"), 180.0, 3e-3, 0.0, 0.4, 0.0),
+        ),
+        frictions=(Friction("rub", "stage", 20.0, 0.3, 0.4, 50.0), Friction("dry", "tip", 90.0)),
+        forces=(Force("pull", "tip"), Force("push", "stage")),
+        release=Release("stage", 15.0, -4e-3),
+        geometry=(length("L", 0.04),),
+        gravity=(1.0, -9.81),
+        damping_beta=8e-6,
+    )  # fmt: skip
+
+
+NAMES = ("PRBDM", "PRBDM2R", "Rich")
+
+
+def described(name):
+    return rich() if name == "Rich" else mechanism(name)
+
+
+@functools.cache
+def both(name):
+    """Return a mechanism and it in the kernel."""
+    guide = described(name)
+    system = assembly.assemble(guide, guide.values())
+    return guide, KernelSystem(guide, system.n - len(system.loops))
+
+
+def varied(guide, rng):
+    """Return parameters that differ from the defaults by up to a few per cent."""
+    values = guide.values()
+    for p in guide.parameters:
+        if p.name == "solver.tolerance":
+            continue
+        x = values[p.name] * (1.0 + 0.04 * rng.uniform(-1, 1))
+        x += (p.name.endswith("friction") or p.name.endswith("zeta")) * 0.1 * rng.uniform()
+        values[p.name] = min(max(x, p.minimum), p.maximum)
+    # the sum of the gammas must not exceed one
+    return guide.values({k: v for k, v in values.items() if ".gamma" not in k or v < 0.9})
+
+
+def systems(name, count=5, seed=0):
+    """Yield the assembled system, the kernel's, and a generator of random numbers."""
+    rng = np.random.default_rng(seed)
+    guide, ours = both(name)
+    for k in range(count):
+        values = varied(guide, rng) if k else guide.values()
+        ours.assemble(values)
+        yield assembly.assemble(guide, values), ours, rng
+
+
+def random_state(system, rng, turn=0.3):
+    return system.q0 + turn * rng.normal(size=system.n), 3.0 * rng.normal(size=system.n)
+
+
+def bent(system, rng):
+    """Return angles near a bent shape: straight flexures do not reach further anywhere."""
+    x = float(rng.choice([-1.0, 1.0]) * rng.uniform(1e-3, 4e-3))
+    return statics.equilibrium(system, x).q + 1e-3 * rng.normal(size=system.n)
+
+
+def near_loops(system, rng):
+    """Return angles at which the loops are closed."""
+    q, J = bent(system, rng), np.diag(system.J)
+    B, c = system.loops, system.loops_c
+    return constraints.project_positions(system.H, J, B, c, q, system.length)[0]
+
+
+each_mechanism = pytest.mark.parametrize("name", NAMES)
+
+
+# --- mechanism.c, flexure.c ----------------------------------------------------------------------
+
+
+@twin(evaluate=Affine.__call__)
+def test_expressions_have_the_same_values():
+    rng = np.random.default_rng(0)
+    for count in range(4):
+        x, factors = rng.normal(size=8), rng.normal(size=count)
+        places = rng.permutation(8)[:count].astype(np.int32)
+        expression = structures()["Expression"](0.5, count, places.ctypes.data, factors.ctypes.data)
+        terms = {str(i): f for i, f in zip(places, factors, strict=True)}
+        expected = Affine(0.5, terms)({str(i): value for i, value in enumerate(x)})
+        assert_same(kernel().evaluate(expression, x), expected)
+
+
+@twin(check_parameter=Parameter.check)
+def test_what_a_parameter_may_not_be_is_told_in_the_same_words():
+    for name in NAMES:
+        guide, ours = both(name)
+        kind = structures()["Parameter"]
+        for i, p in enumerate(guide.parameters):
+            parameter = ours.mechanism.parameters + i * ctypes.sizeof(kind)
+            assert kernel().check_parameter(parameter, p.value)
+            bad = [p.minimum - abs(p.minimum) - 1.0, 2.0 * p.maximum + 1.0, math.nan, -math.inf]
+            for x in bad:
+                said = sentence(KernelError, kernel().check_parameter, parameter, x)
+                assert said == sentence(ParameterError, p.check, x)
+
+
+@twin(check_values=Mechanism.values)
+def test_values_are_checked_with_the_expressions_that_depend_on_them():
+    guide, ours = both("Rich")
+    names = [p.name for p in guide.parameters]
+    for name, x in (("L", 0.05), ("L", 1e9), ("L", 600.0), ("L", 1e-8), ("high.friction", -0.1)):
+        values = np.array(list(guide.values().values()))
+        values[names.index(name)] = x
+        expected = outcome(guide.values, {name: x})
+        found = outcome(kernel().check_values, ours.address, values)
+        assert (found is True) or found == expected
+        assert (found is True) == isinstance(expected, dict)
+
+
+@twin(stub=flexure.stub)
+def test_stubs_are_the_same_and_so_is_what_is_too_long():
+    rng = np.random.default_rng(0)
+    for count in (1, 2, 3):
+        for _ in range(50):
+            gamma, found = rng.uniform(0.0, 2.0 / count, count), np.zeros(1)
+            expected = outcome(flexure.stub, gamma.tolist())
+            said = outcome(kernel().stub, count, gamma, found)
+            if isinstance(expected, str):
+                assert said == expected
+            else:
+                assert_same(found[0], expected, scale=1.0)
+
+
+@twin(segments=flexure.segments)
+@pytest.mark.parametrize("ends", [("clamp", "clamp"), ("clamp", "pin"), ("pin", "clamp")])
+@pytest.mark.parametrize("name", flexure.MODELS)
+def test_flexures_are_cut_into_the_same_segments(name, ends):
+    rng, model = np.random.default_rng(0), flexure.MODELS[name]
+    pivots = len(model.gamma)
+    kind = structures()["FlexureType"](
+        lumped=model.lumped, rate_with_gamma=model.rate_with_gamma, pivots=pivots
+    )
+    for _ in range(20):
+        gamma, K_theta = rng.uniform(0.05, 1.0 / pivots, pivots), rng.uniform(1, 4, pivots)
+        L, EI, mass = np.exp(rng.normal(size=3))
+        room = np.full((4, 2 * pivots + 2), np.nan)
+        found = structures()["Segments"](0, *(row.ctypes.data for row in room))
+        clamped = [end == "clamp" for end in ends]
+        kernel().segments(kind, gamma, K_theta, *clamped, L, EI, mass, found)
+        expected = flexure.segments(model, gamma.tolist(), K_theta.tolist(), ends, L, EI, mass)
+        assert found.n == len(expected.lengths) - 2
+        for row, part in zip(room, ("lengths", "rates", "rods", "lumps"), strict=True):
+            wanted = getattr(expected, part)
+            assert_same(row[: len(wanted)], wanted)
+    long = np.full(pivots, 1.2)
+    said = sentence(
+        KernelError, kernel().segments, kind, long, long, True, True, 1.0, 1.0, 1.0, found
+    )
+    assert said == sentence(
+        ParameterError, flexure.segments, model, long, long, ends, 1.0, 1.0, 1.0
+    )
+
+
+# --- assembly.c ----------------------------------------------------------------------------------
+
+
+@twin(unit=assembly.unit)
+def test_unit_vectors_are_exact_along_the_axes():
+    for degrees in (*range(-720, 721, 90), *np.random.default_rng(0).uniform(-720, 720, 200)):
+        found, expected = kernel().unit(float(degrees)), assembly.unit(float(degrees))
+        if degrees % 90 == 0:
+            assert found == expected
+        assert_same(found, expected)
+
+
+REALS = ("q0", "J", "K", "loops_c", "gaps_c", "lifts_c", "release_c", "length", "m")
+COMPLEXES = ("H", "A", "c", "S", "loops", "gaps", "slides", "rubs", "lifts", "release")
+
+
+@twin(assemble=assembly.assemble)
+@each_mechanism
+def test_the_arrays_of_a_mechanism_are_the_same(name):
+    for system, ours, _ in systems(name, 12):
+        for field in (*REALS, *COMPLEXES, "anchor", "gravity"):
+            size = system.length if field.endswith(("_c", "c", "anchor")) else 0.0
+            assert_same(getattr(ours, field), getattr(system, field), scale=size)
+        assert ours.links.tolist() == list(system.links)
+        for i, frame in enumerate(system.bodies.values()):
+            j, c, drawn, A = ours.body(i)
+            assert j == frame.j
+            assert_same([c, drawn], [frame.c, frame.drawn], scale=system.length)
+            assert_same(A, frame.A)
+        known = assembly.calculated(system.mechanism, system.values)
+        assert_same(array(ours.calculated, len(known)), list(known.values()), scale=1.0)
+        outside = np.ones_like(system.K)
+        for start, size in ours.blocks():
+            outside[start : start + size, start : start + size] = 0.0
+        assert not (outside * np.abs(system.H)).any()
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"L": 1e-12},
+        {"leaf.density": 0.0, "thin.density": 0.0},
+        {"leaf.gamma1": 0.9, "leaf.gamma2": 0.9},
+    ],
+)
+def test_what_cannot_be_assembled_is_told_in_the_same_words(change):
+    """No length, no mass, links too long: of the ends, the tables do not keep the names."""
+    guide, ours = both("Rich")
+    values = guide.values() | change
+    said = sentence(ParameterError, assembly.assemble, guide, values)
+    assert sentence(KernelError, ours.assemble, values) == re.sub(" from .* to [^ ]*", "", said)
+
+
+# --- kinetics.c, constraints.c, forces.c ---------------------------------------------------------
+
+
+@twin(inertia=kinetics.inertia, kinetic_energy=kinetics.kinetic_energy)
+@each_mechanism
+def test_inertia_is_the_same(name):
+    for system, ours, rng in systems(name):
+        q, v = random_state(system, rng, 2.0)
+        e, n = np.exp(1j * q), system.n
+        M, C = np.full((n, n), np.nan), np.full((n, n), np.nan)
+        kernel().inertia(n, ours.H, ours.J, e, M, C)
+        expected = kinetics.inertia(system.H, np.diag(system.J), e)
+        assert_same(M, expected[0])
+        assert_same(C, expected[1], scale=np.abs(M).max())
+        assert_same(kernel().kinetic_energy(n, M, v), kinetics.kinetic_energy(M, v))
+
+
+def all_rows(system):
+    """Return all loops, gaps and the release of a system."""
+    B = np.vstack([system.loops, system.gaps, system.release])
+    return B, np.concatenate([system.loops_c, system.gaps_c, [system.release_c]])
+
+
+@twin(scalars=constraints.values, jacobian=constraints.jacobian, convective=constraints.convective)
+@each_mechanism
+def test_scalars_and_their_derivatives_are_the_same(name):
+    for system, _, rng in systems(name):
+        q, v = random_state(system, rng, 2.0)
+        e, (B, c) = np.exp(1j * q), all_rows(system)
+        r, n = B.shape
+        s, rows, x = np.zeros(r), np.zeros((r, n)), np.zeros(r)
+        kernel().scalars(r, n, B, c, e, s)
+        kernel().jacobian(r, n, B, e, rows)
+        kernel().convective(r, n, B, e, v, x)
+        assert_same(s, constraints.values(B, c, e))
+        assert_same(rows, constraints.jacobian(B, e))
+        assert_same(x, constraints.convective(B, e, v))
+
+
+def random_saddle(rng, n, r):
+    """Return a mass matrix and rows of full rank."""
+    A = rng.normal(size=(n, n + 2))
+    return A @ A.T, rng.normal(size=(r, n))
+
+
+@twin(saddle=constraints.saddle, solve=constraints.solve)
+def test_saddle_point_systems_are_stacked_and_solved_alike():
+    rng = np.random.default_rng(0)
+    for n, r in ((1, 0), (3, 2), (7, 2), (7, 5), (9, 4)):
+        for _ in range(10):
+            M, rows = random_saddle(rng, n, r)
+            columns, right = rows + 0.2 * rng.normal(size=rows.shape), rng.normal(size=n + r)
+            kkt = np.full((n + r, n + r), np.nan)
+            kernel().saddle(n, r, M, columns, rows, kkt)
+            expected = constraints.saddle(M, columns, rows)
+            np.testing.assert_array_equal(kkt, expected)
+            x = right.copy()
+            kernel().solve(n + r, kkt, x)
+            rel = spread(np.linalg.cond(expected))
+            assert_same(x, constraints.solve(expected, right), rel)
+
+
+def test_singular_equations_are_told_in_the_same_words():
+    kkt = np.zeros((3, 3))
+    said = sentence(KernelError, kernel().solve, 3, kkt, np.ones(3))
+    assert said == sentence(SimulationError, constraints.solve, np.zeros((3, 3)), np.ones(3))
+
+
+def factors_of(M, rows, columns, sizes):
+    """Return the kernel's Factors of a matrix of such blocks, and the arrays behind them."""
+    r, n = rows.shape
+    L = np.linalg.cholesky(M)
+    root = np.diag(L).copy()
+    L /= root
+    Z, Z_columns = (np.linalg.solve(L, part.T).T.copy() for part in (rows, columns))
+    np.fill_diagonal(L, 1.0 / root**2)
+    Y, Y_columns = Z / root**2, Z_columns / root**2
+    blocks = np.array([np.cumsum([0, *sizes[:-1]]), sizes], np.int32).T.copy()
+    arrays = [blocks, L, Z, Y, Y_columns, np.full((2 * r, r), np.nan), np.zeros(r, np.int32)]
+    addresses = (part.ctypes.data for part in arrays)
+    return structures()["Factors"](n, r, len(sizes), *addresses), arrays
+
+
+@twin(factor_schur=constraints.factor_and_solve, solve_again=constraints.solve_again)
+@pytest.mark.parametrize("sizes", [(1,), (3,), (4, 3), (2, 1, 4), (5, 6)])
+def test_what_is_factored_solves_again_and_again(sizes):
+    """With columns of their own, as for sliding friction, or with the rows."""
+    rng, n = np.random.default_rng(0), sum(sizes)
+    block = np.repeat(range(len(sizes)), sizes)
+    for r in range(n):
+        for own in (False, True):
+            M, rows = random_saddle(rng, n, r)
+            M[block[:, None] != block] = 0.0
+            columns = rows + 0.2 * own * rng.normal(size=rows.shape)
+            factors, _arrays = factors_of(M, rows, columns, sizes)
+            assert kernel().factor_schur(factors)
+            kkt = constraints.saddle(M, columns, rows)
+            rel = spread(np.linalg.cond(kkt) * np.linalg.cond(M))
+            right = rng.normal(size=(2, n + r))
+            expected, known = constraints.factor_and_solve(kkt.copy(), right[0])
+            x, again = right.copy()
+            kernel().solve_again(factors, x)
+            kernel().solve_again(factors, again)
+            assert_same(x, expected, rel)
+            assert_same(again, constraints.solve_again(known, right[1]), rel)
+
+
+def scaled_condition(kkt):
+    """Return the condition of a saddle-point matrix with each row and column scaled."""
+    scale = 1.0 / np.sqrt(np.abs(kkt).max(axis=0))
+    return np.linalg.cond(scale[:, None] * kkt * scale)
+
+
+def assert_same_turn(found, expected, start, system, M, rows):
+    """Hold angles that were moved onto the same constraints against each other.
+
+    The constraints are closed to 1e-14 of the size; solving for the way there has its roundings.
+    """
+    X = np.linalg.solve(M, rows.T)
+    leverage = np.abs(X @ np.linalg.inv(rows @ X)).sum(axis=1).max(initial=0.0)
+    rel = spread(scaled_condition(constraints.saddle(M, rows, rows)))
+    way = float(np.abs(expected - start).max())
+    open_by = 2 * constraints.CLOSED * system.length
+    assert np.abs(found - expected).max() <= 1e-12 + open_by * leverage + rel * way
+
+
+@twin(
+    project_positions=constraints.project_positions,
+    project_velocities=constraints.project_velocities,
+)
+@each_mechanism
+def test_projections_lead_to_the_same_state(name):
+    for system, ours, rng in systems(name):
+        q, v = bent(system, rng), rng.normal(size=system.n)
+        n, B, c = system.n, system.loops, system.loops_c
+        r = len(B)
+        J, rates = np.diag(system.J), 0.1 * rng.normal(size=r)
+        expected, e = constraints.project_positions(system.H, J, B, c, q, system.length)
+        found, e_found = q.copy(), np.zeros(n, complex)
+        kernel().project_positions(ours.structure, r, B, c, found, e_found)
+        M, rows = kinetics.inertia(system.H, J, e)[0], constraints.jacobian(B, e)
+        assert_same_turn(found, expected, q, system, M, rows)
+        assert_same(e_found, np.exp(1j * found))
+        moved = v.copy()
+        kernel().project_velocities(n, r, M, rows, rates, moved)
+        rel = spread(np.linalg.cond(constraints.saddle(M, rows, rows)))
+        assert_same(moved, constraints.project_velocities(M, rows, rates, v), rel)
+
+
+def test_what_cannot_be_closed_is_told_in_the_same_words():
+    for system, ours, _ in systems("PRBDM", 1):
+        c = system.loops_c + 1.0
+        said = sentence(
+            KernelError, kernel().project_positions, ours.structure, len(c), system.loops, c,
+            system.q0.copy(), np.zeros(system.n, complex),
+        )  # fmt: skip
+        expected = sentence(
+            SimulationError, constraints.project_positions, system.H, np.diag(system.J),
+            system.loops, c, system.q0, system.length,
+        )  # fmt: skip
+        assert said.split("(")[0] == expected.split("(")[0]
+
+
+@twin(
+    springs=forces.springs, elastic_energy=forces.elastic_energy, field_row=forces.field_row,
+    force_row=forces.force_row, generalised=forces.generalised,
+    gravitational_energy=forces.gravitational_energy, normal_force=forces.normal_force,
+)  # fmt: skip
+@each_mechanism
+def test_forces_and_energies_are_the_same(name):
+    for system, ours, rng in systems(name):
+        q, _ = random_state(system, rng)
+        n, e = system.n, np.exp(1j * q)
+        turn, torque = q - system.q0, np.zeros(n)
+        kernel().springs(n, ours.K, turn, torque)
+        assert_same(torque, forces.springs(system.K, turn))
+        found = kernel().elastic_energy(n, ours.K, turn)
+        assert_same(found, forces.elastic_energy(system.K, turn))
+        F, a = (complex(*rng.normal(size=2)) for _ in range(2))
+        A = next(iter(system.bodies.values())).A
+        w, Q = np.zeros(n, complex), np.zeros(n)
+        kernel().field_row(n, ours.S, a, w)
+        assert_same(w, forces.field_row(system.S, a))
+        kernel().force_row(n, A, F, w)
+        assert_same(w, forces.force_row(A, F))
+        kernel().generalised(n, w, e, Q)
+        assert_same(Q, forces.generalised(w, e))
+        found = kernel().gravitational_energy(ours.structure, e)
+        size = float(np.abs(system.S).sum() * abs(system.gravity))  # of what is subtracted
+        assert_same(found, forces.gravitational_energy(system, e), scale=size)
+        for lift in (-1.0, 1.0):
+            found = kernel().normal_force(lift, 2.0, 3.0)
+            assert found == forces.normal_force(lift, 2.0, 3.0)
+
+
+# --- contact.c -----------------------------------------------------------------------------------
+
+
+def mobility(rng, size, rank):
+    A = rng.normal(size=(size, rank)) * 10 ** rng.uniform(-2, 2)
+    return A @ A.T
+
+
+@twin(response=contact.response)
+def test_responses_are_the_same():
+    rng = np.random.default_rng(0)
+    for n, r, k in ((1, 0, 1), (3, 2, 2), (7, 2, 3), (9, 4, 1)):
+        M, held = random_saddle(rng, n, r)
+        rows, X = rng.normal(size=(k, n)), np.full((n, k), np.nan)
+        kernel().response(n, r, k, M, held, rows, X)
+        rel = spread(np.linalg.cond(constraints.saddle(M, held, held)))
+        assert_same(X, contact.response(M, held, rows), rel)
+
+
+@twin(newton=contact.newton)
+@pytest.mark.parametrize("k", [1, 2, 3, 4, 6])
+def test_frictionless_impacts_of_several_stops_are_the_same(k):
+    """Of any rank, down to one; closing, resting, and those that get no impulse."""
+    rng = np.random.default_rng(k)
+    for _ in range(200):
+        rank = int(rng.integers(1, k + 1))
+        W = mobility(rng, k, rank)
+        u = np.minimum(W @ rng.normal(size=k), 0.0)
+        u[rng.uniform(size=k) < 0.2] = 0.0
+        if not u.any():
+            continue
+        eps, P = rng.uniform(0, 1, k), np.full(k, np.nan)
+        kernel().newton(k, W, u, eps, P)
+        expected = contact.newton(W, u, eps)
+        hit = expected > 0.0
+        s = np.linalg.svd(W[np.ix_(hit, hit)], compute_uv=False)
+        s = s[s > 1e-13 * s.max(initial=0.0)]
+        assert_same(P, expected, spread(s[0] / s[-1]) if len(s) else 0.0)
+
+
+def test_many_stops_have_impulses_that_satisfy_the_law():
+    """More stops than sets of them can be searched: complementarity to a part in 1e6."""
+    rng = np.random.default_rng(0)
+    k = 24
+    W = mobility(rng, k, 40)
+    u, eps, P = -rng.uniform(0, 1, k), rng.uniform(0, 1, k), np.zeros(k)
+    kernel().newton(k, W, u, eps, P)
+    slack = W @ P + (1 + eps) * u
+    assert (P >= 0).all()
+    assert slack.min() >= -1e-6
+    assert np.abs(P * np.diag(W) * slack).max() <= 1e-6
+
+
+@twin(stronge=contact.stronge)
+def test_hits_with_friction_are_the_same():
+    """Full rank and one degree of freedom, sliding, sticking and jammed, mu and eps at bounds."""
+    rng = np.random.default_rng(0)
+    for _ in range(5000):
+        W = mobility(rng, 2, int(rng.integers(1, 3)))
+        u = np.array([-rng.uniform(0, 1), rng.normal()]) * np.sqrt(np.diag(W))
+        if rng.uniform() < 0.2:
+            u[1] = 0.0
+        mu = float(rng.choice([0.0, rng.uniform(0, 2)], p=[0.1, 0.9]))
+        eps = float(rng.choice([0.0, 1.0, rng.uniform()], p=[0.1, 0.1, 0.8]))
+        P_n, P_t = np.zeros(1), np.zeros(1)
+        kernel().stronge(W, u, mu, eps, P_n, P_t)
+        expected = contact.stronge(W, u, mu, eps)
+        assert_same([P_n[0], P_t[0]], expected)
+
+
+@twin(several=contact.several)
+@pytest.mark.parametrize("k", [2, 3])
+def test_several_hits_with_friction_are_the_same(k):
+    """To what the sweeps stop at, 1e-14 a sweep, times the number of sweeps."""
+    rng = np.random.default_rng(k)
+    for _ in range(100):
+        W = mobility(rng, 2 * k, 2 * k + 2)
+        u = np.concatenate([-rng.uniform(0.1, 1, k), rng.normal(size=k)]) * np.sqrt(np.diag(W))
+        mu, eps = rng.uniform(0.05, 0.6, k), rng.uniform(0, 1, k)
+        P = np.full(2 * k, np.nan)
+        kernel().several(k, W, u, mu, eps, P)
+        assert_same(P, contact.several(W, u, mu, eps), 1e-10)
+
+
+def test_hits_that_satisfy_no_law_are_told_in_the_same_words():
+    W = np.array([[1.0, -1.9], [-1.9, 1.0]])
+    W = np.block([[np.eye(2), W], [W, np.eye(2)]])  # no mobility: not semidefinite
+    u, mu, eps, P = np.array([-1.0, -1.0, 1.0, 1.0]), np.full(2, 2.0), np.zeros(2), np.zeros(4)
+    said = sentence(KernelError, kernel().several, 2, W, u, mu, eps, P)
+    assert said == sentence(SimulationError, contact.several, W, u, mu, eps)
+
+
+# --- statics.c, modal.c --------------------------------------------------------------------------
+
+
+def equilibrium_of(system):
+    """Return room for a shape, and what it is made of."""
+    q, lam = np.full(system.n, np.nan), np.full(len(system.loops), np.nan)
+    return structures()["Equilibrium"](q.ctypes.data, lam.ctypes.data, math.nan), q, lam
+
+
+def shape_of(expected):
+    """Return a shape of the package as one of the kernel, and the arrays behind it."""
+    q, lam = expected.q.copy(), expected.lam.copy()
+    return structures()["Equilibrium"](q.ctypes.data, lam.ctypes.data, expected.force), (q, lam)
+
+
+@twin(tangent_stiffness=statics.tangent_stiffness)
+@each_mechanism
+def test_tangent_stiffness_is_the_same(name):
+    for system, ours, rng in systems(name):
+        q, _ = random_state(system, rng)
+        e, n, B = np.exp(1j * q), system.n, system.loops
+        w, lam = rng.normal(size=(n, 2)).view(complex)[:, 0], rng.normal(size=len(B))
+        K_t = np.full((n, n), np.nan)
+        kernel().tangent_stiffness(n, len(B), ours.K, w, B, lam, e, K_t)
+        assert_same(K_t, statics.tangent_stiffness(system.K, w, B, lam, e))
+
+
+def stacked_release(system):
+    return np.vstack([system.loops, system.release]), np.append(system.loops_c, system.release_c)
+
+
+@twin(equilibrium=statics.equilibrium)
+@each_mechanism
+@pytest.mark.parametrize("displacement", [None, 0.0, -4e-3, 3e-3, -0.012])
+def test_equilibria_are_the_same(name, displacement):
+    """Free and held, at once and by continuation."""
+    for system, ours, _ in systems(name):
+        expected = statics.equilibrium(system, displacement)
+        found, q, lam = equilibrium_of(system)
+        held = displacement is not None
+        kernel().equilibrium(ours.structure, held, displacement or 0.0, found)
+        size = np.abs(system.K).max() / system.length  # the forces that balance are of this size
+        assert_same(q, expected.q)
+        assert_same(lam, expected.lam, scale=size)
+        assert_same(found.force, expected.force, scale=size)
+
+
+@pytest.mark.parametrize("displacement", [0.2, -0.06])
+def test_what_cannot_be_reached_is_told_in_the_same_words(displacement):
+    for system, ours, _ in systems("PRBDM2R", 2):
+        found, *_arrays = equilibrium_of(system)
+        said = sentence(
+            KernelError, kernel().equilibrium, ours.structure, True, displacement, found
+        )
+        assert said == sentence(EquilibriumError, statics.equilibrium, system, displacement)
+
+
+def test_what_gravity_buckles_is_told_in_the_same_words():
+    guide, ours = both("PRBDM2R")
+    values = guide.values({"gravity.x": 1e6})
+    ours.assemble(values)
+    found, *_arrays = equilibrium_of(system := assembly.assemble(guide, values))
+    said = sentence(KernelError, kernel().equilibrium, ours.structure, False, 0.0, found)
+    assert said == sentence(EquilibriumError, statics.equilibrium, system)
+
+
+@twin(release_velocity=statics.release_velocity)
+@each_mechanism
+@pytest.mark.parametrize("speed", [0.0, 0.7, -2.0])
+def test_release_velocities_are_the_same(name, speed):
+    for system, ours, rng in systems(name):
+        q, _ = random_state(system, rng, 0.1)
+        v = np.full(system.n, np.nan)
+        kernel().release_velocity(ours.structure, q, speed, v)
+        assert_same(v, statics.release_velocity(system, q, speed), 1e-11)
+
+
+def assert_same_modes(frequency, phi, expected, rounding):
+    """Hold modes against each other up to their signs.
+
+    The smallest omega^2 is known to a rounding of the largest, and a mode to that over the
+    distance of its omega^2 from the next one, in LAPACK too.
+    """
+    omega2 = np.sign(expected.frequency) * expected.frequency**2
+    size = np.abs(omega2).max()
+    assert_same(np.sign(frequency) * frequency**2, omega2, rounding)
+    for i, (one, other) in enumerate(zip(phi.T, expected.shape.T, strict=True)):
+        others = np.delete(omega2, i)
+        distance = np.abs(others - omega2[i]).min() if len(others) else size
+        sign = np.sign(one @ expected.M @ other)
+        assert_same(sign * one, other, rounding * max(1.0, size / distance))
+
+
+@twin(modes=modal.modes)
+@each_mechanism
+@pytest.mark.parametrize("displacement", [None, -3e-3])
+def test_modes_are_the_same(name, displacement):
+    for system, ours, _ in systems(name):
+        expected = statics.equilibrium(system, displacement)
+        shape, _arrays = shape_of(expected)
+        k = system.n - len(system.loops)
+        frequency, phi = np.full(k, np.nan), np.full((system.n, k), np.nan)
+        kernel().modes(ours.structure, shape, frequency, phi)
+        theirs = modal.modes(system, expected)
+        assert_same_modes(frequency, phi, theirs, spread(np.linalg.cond(theirs.M)))
+
+
+@twin(fundamental_frequency=hybrid.fundamental_frequency)
+@each_mechanism
+def test_fundamental_frequencies_are_the_same(name):
+    for system, ours, _ in systems(name):
+        found = np.zeros(1)
+        kernel().fundamental_frequency(ours.structure, found)
+        assert_same(found[0], hybrid.fundamental_frequency(system), 1e-10)
+
+
+def test_an_unstable_equilibrium_has_no_frequency_in_either():
+    guide, ours = both("PRBDM2R")
+    values = guide.values({"gravity.x": 0.0, "gravity.y": -200.0})
+    ours.assemble(values)
+    found = np.ones(1)
+    kernel().fundamental_frequency(ours.structure, found)
+    assert found[0] == hybrid.fundamental_frequency(assembly.assemble(guide, values)) == 0.0
+
+
+@twin(fundamental_at=modal.fundamental_at)
+@each_mechanism
+def test_fundamental_modes_away_from_equilibrium_are_the_same(name):
+    for system, ours, rng in systems(name):
+        q, n = near_loops(system, rng), system.n
+        phi, M = np.full(n, np.nan), np.full((n, n), np.nan)
+        kernel().fundamental_at(ours.structure, q, phi, M)
+        expected, M_expected = modal.fundamental_at(system, q)
+        assert_same(M, M_expected)
+        assert_same(np.sign(phi @ M @ expected) * phi, expected, 1e-9)
+
+
+@twin(simulated_restitution=modal.simulated_restitution)
+def test_simulated_restitutions_are_the_same():
+    rng = np.random.default_rng(0)
+    for n in (1, 3, 7):
+        M, _ = random_saddle(rng, n, 0)
+        phi, before, after = rng.normal(size=(3, n))
+        found = kernel().simulated_restitution(n, phi, M, before, after)
+        assert_same(found, modal.simulated_restitution(phi, M, before, after))
+        assert kernel().simulated_restitution(n, phi, M, 0 * before, after) == 0.0
+
+
+# --- dynamics.c, runge_kutta.c -------------------------------------------------------------------
+
+
+class KernelEquations:
+    """The kernel's equations of a system in one discrete state, and the arrays behind them."""
+
+    def __init__(self, ours, inputs, discrete, omega):
+        self.ours, self.structure = ours, structures()["Equations"]()
+        self.block = placed(
+            lambda memory: kernel().equations_place(self.structure, ours.structure, memory)
+        )
+        given = [(f.real, f.imag, m) for f, m in zip(inputs.forces, inputs.moments, strict=True)]
+        walls = [(wall.position, wall.rate, wall.since) for wall in inputs.walls]
+        self.arrays = [np.array(part, float) for part in (given, walls)]
+        self.states = [
+            np.array(part, np.int32) for part in (discrete.holds, discrete.slides, discrete.rubs)
+        ]
+        base = structures()["Complex"](inputs.base.real, inputs.base.imag)
+        self.inputs = structures()["Inputs"](
+            self.arrays[0].ctypes.data, base, self.arrays[1].ctypes.data
+        )
+        known = structures()["Discrete"](*(state.ctypes.data for state in self.states))
+        kernel().set_equations(self.structure, self.inputs, known, omega)
+
+
+def discrete_states(system, rng):
+    """Yield states of all kinds that leave the mechanism some motion."""
+    kinds = (dynamics.STICKS, -1, 1, dynamics.IDLE)
+    stops, points = len(system.gaps), len(system.rubs)
+    for held in (False, True):
+        for slides in kinds:
+            for rubs in kinds:
+                holds = [held and i == 0 for i in range(stops)]
+                marks = [slides if hold else dynamics.IDLE for hold in holds]
+                rubbing = [rubs if i == 0 else dynamics.IDLE for i in range(points)]
+                rows = len(system.loops) + held * (1 + (slides == dynamics.STICKS))
+                rows += bool(points) and rubs == dynamics.STICKS
+                if rows < system.n and (held or slides == dynamics.IDLE):
+                    yield dynamics.Discrete(tuple(holds), tuple(marks), tuple(rubbing))
+
+
+def random_inputs(system, e, rng, driven):
+    """Return forces, moments, an acceleration of the base and moving walls, or nothing.
+
+    The walls are within a hundredth of a millimetre of where they are touched.
+    """
+    F = driven * rng.normal(size=(len(system.mechanism.forces), 3))
+    touched = -constraints.values(system.gaps, system.gaps_c, e)
+    return dynamics.Inputs(
+        tuple(complex(x, y) for x, y, _ in F),
+        tuple(F[:, 2] * 0.01),
+        driven * complex(*rng.normal(size=2)),
+        tuple(
+            dynamics.Wall(x + 1e-5 * rng.normal(), driven * 0.01 * rng.normal(), rng.normal())
+            for x in touched
+        ),
+    )
+
+
+def repeats(rows):
+    """Tell whether rows nearly repeat each other, so that no simulation constrains them all."""
+    s = np.linalg.svd(rows / np.linalg.norm(rows, axis=1)[:, None], compute_uv=False)
+    return len(s) > 0 and s[-1] < 0.05 * s[0]
+
+
+def equations(name, count=2):
+    """Yield the equations of both, a state near the constraints and a generator."""
+    for system, ours, rng in systems(name, count):
+        for driven in (0.0, 1.0):
+            for discrete in discrete_states(system, rng):
+                q = near_loops(system, rng)
+                inputs = random_inputs(system, np.exp(1j * q), rng, driven)
+                theirs = dynamics.Equations(system, inputs, discrete, 80.0)
+                if repeats(constraints.jacobian(theirs.B, np.exp(1j * q))):
+                    continue
+                mine = KernelEquations(ours, inputs, discrete, 80.0)
+                _, v = random_state(system, rng)
+                q = q + 1e-5 * rng.normal(size=system.n)
+                yield theirs, mine, np.concatenate([q, v, rng.normal(size=2)]), rng
+
+
+def condition(theirs):
+    """Return the condition of the equations that were solved last."""
+    return scaled_condition(theirs.kkt)
+
+
+@twin(
+    set_equations=dynamics.Equations.__init__,
+    accelerations=dynamics.Equations.accelerations,
+    rate=dynamics.Equations.rate,
+)
+@each_mechanism
+def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
+    for theirs, mine, y, _ in equations(name):
+        n, r = theirs.n, len(theirs.B)
+        a, lam, dy = np.full(n, np.nan), np.full(r, np.nan), np.full(2 * n + 2, np.nan)
+        kernel().accelerations(mine.structure, y[:n], y[n : 2 * n], a, lam)
+        a_expected, lam_expected, M = theirs.accelerations(y[:n], y[n : 2 * n])
+        rel = spread(condition(theirs))
+        assert mine.structure.r == r
+        assert_same(a, a_expected, rel)
+        assert_same(lam, lam_expected, rel)
+        kernel().rate(mine.structure, 0.3, y, dy)
+        expected = theirs.rate(0.3, y)
+        assert_same(dy[: 2 * n], expected[: 2 * n], rel)
+        power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # what the powers add up to
+        assert_same(dy[2 * n :], expected[2 * n :], rel, scale=power)
+        energy = kernel().energy_here(mine.structure, y[n : 2 * n])
+        assert_same(energy, kinetics.kinetic_energy(M, y[n : 2 * n]))
+
+
+@twin(
+    gap=dynamics.Equations.gaps, gap_rate=dynamics.Equations.gap_rates,
+    rub_limit=dynamics.Equations.rub_limit, wall_at=dynamics.Wall.at,
+)  # fmt: skip
+@each_mechanism
+def test_gaps_and_limits_of_friction_are_the_same(name):
+    for theirs, mine, y, rng in equations(name, 3):
+        n, t, size = theirs.n, rng.uniform(), theirs.system.length
+        e, v = np.exp(1j * y[:n]), y[n : 2 * n]
+        stops, points = len(theirs.system.gaps), len(theirs.system.rubs)
+        gaps = [kernel().gap(mine.structure, i, t, e) for i in range(stops)]
+        assert_same(gaps, theirs.gaps(t, e), scale=size)
+        rates = [kernel().gap_rate(mine.structure, i, e, v) for i in range(stops)]
+        assert_same(rates, theirs.gap_rates(e, v), scale=size * np.abs(v).max())
+        limits = [kernel().rub_limit(mine.structure, i, e) for i in range(points)]
+        assert_same(limits, [theirs.rub_limit(i, e) for i in range(points)])
+        wall = theirs.inputs.walls[0]
+        one = structures()["Wall"](wall.position, wall.rate, wall.since)
+        assert_same(kernel().wall_at(one, t), wall.at(t))
+
+
+@twin(project=dynamics.Equations.project, project_from_here=dynamics.Equations.project_from_here)
+@each_mechanism
+def test_states_are_projected_alike(name):
+    """From near, with the factors at hand, and from further."""
+    for theirs, mine, y, rng in equations(name):
+        n, t = theirs.n, theirs.inputs.walls[0].since + 1e-4  # of the wall that may hold
+        projected, found = theirs.project(t, y), y.copy()
+        kernel().project(mine.structure, t, found)
+        theirs.accelerations(projected[:n], projected[n : 2 * n])
+        rel, r = spread(condition(theirs)), theirs.first_stick
+        M, rows = theirs.kkt[:n, :n].copy(), theirs.kkt[n : n + r, :n].copy()
+        assert_same_turn(found[:n], projected[:n], y[:n], theirs.system, M, rows)
+        assert_same(found[n:], projected[n:], rel, scale=np.abs(y[n:]).max())
+        for distance in (1e-9, 1e-5):  # one correction is enough, or not
+            start = projected.copy()
+            start[: 2 * n] += distance * rng.normal(size=2 * n)
+            a, lam = np.zeros(n), np.zeros(len(theirs.B))
+            theirs.accelerations(projected[:n], projected[n : 2 * n])
+            expected, near = theirs.project_from_here(t, start), start.copy()
+            kernel().accelerations(mine.structure, projected[:n], projected[n : 2 * n], a, lam)
+            kernel().project_from_here(mine.structure, t, near)
+            assert_same_turn(near[:n], expected[:n], start[:n], theirs.system, M, rows)
+            assert_same(near[n:], expected[n:], rel, scale=np.abs(y[n:]).max())
+
+
+@twin(base_reaction=dynamics.Equations.base_reaction)
+@each_mechanism
+def test_reactions_on_the_base_are_the_same(name):
+    for theirs, mine, y, rng in equations(name):
+        n = theirs.n
+        q, v, a = y[:n], y[n : 2 * n], 100.0 * rng.normal(size=n)
+        force, moment = np.zeros(1, complex), np.zeros(1)
+        kernel().base_reaction(mine.structure, np.exp(1j * q), v, a, force, moment)
+        expected = theirs.base_reaction(q, v, a)
+        assert_same(force[0], expected[0])
+        assert_same(moment[0], expected[1], scale=abs(expected[0]) * theirs.system.length)
+
+
+PAIR = runge_kutta.BOGACKI_SHAMPINE
+
+
+@twin(stages=runge_kutta.stages, weights=runge_kutta.powers, interpolate=runge_kutta.interpolate)
+@each_mechanism
+def test_steps_of_the_integration_are_the_same(name):
+    """Stages, new state, error and dense output of one step of the motion."""
+    count = constants()["STAGES"]
+    for theirs, mine, y, _ in equations(name, 1):
+        h, size = 1e-5, len(y)
+        k, y1, error = np.full((count, size), np.nan), np.full(size, np.nan), np.full(size, np.nan)
+        k[0] = theirs.rate(0.0, y)
+        expected, y1_expected = runge_kutta.stages(PAIR, theirs.rate, 0.0, y, h, k[0])
+        rel = 10 * spread(condition(theirs))
+        kernel().stages(mine.structure, size, 0.0, y, h, k, y1)
+        assert_same(k, expected, rel)
+        assert_same(y1, y1_expected, rel)
+        kernel().error_of(size, expected, h, error)
+        assert_same(error, h * (PAIR.error @ expected), scale=h * np.abs(expected).max())
+        for theta in (0.0, 0.3, 1.0):
+            b, middle = np.full(count, np.nan), np.full(size, np.nan)
+            kernel().weights(theta, b)
+            assert_same(b, runge_kutta.powers(PAIR, np.array([theta]))[0], scale=1.0)
+            kernel().interpolate(size, y, expected, h, theta, middle)
+            assert_same(middle, runge_kutta.interpolate(PAIR, y, expected, h, theta))
+
+
+# --- what has no twin ----------------------------------------------------------------------------
+
+
+def test_complex_arithmetic_is_that_of_python():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        z, w = (complex(*rng.normal(size=2)) for _ in range(2))
+        x = rng.normal()
+        assert kernel().complex_of(z.real, z.imag) == z
+        assert kernel().plus(z, w) == z + w
+        assert kernel().minus(z, w) == z - w
+        assert_same(kernel().product(z, w), z * w)
+        assert kernel().conjugate(z) == z.conjugate()
+        assert kernel().scaled(x, z) == x * z
+        assert_same(kernel().modulus(z), abs(z))
+
+
+def test_rows_of_scalars_have_values_and_rates():
+    rng = np.random.default_rng(0)
+    B, e = rng.normal(size=(2, 14)).view(complex)
+    v = rng.normal(size=7)
+    assert_same(kernel().row_value(7, B, e), (B @ e).real, scale=1.0)
+    assert_same(kernel().row_rate(7, B, e, v), -((B * e).imag @ v), scale=1.0)
+
+
+def test_the_release_is_stacked_below_the_loops():
+    for system, ours, _ in systems("Rich", 1):
+        B, c = stacked_release(system)
+        found, found_c = np.zeros(B.shape, complex), np.zeros(len(c))
+        kernel().stack_release(ours.structure, found, found_c)
+        assert_same(found, B)
+        assert_same(found_c, c)
+
+
+def test_a_list_is_reversed():
+    for count in range(5):
+        x = np.arange(5.0)
+        kernel().reverse(count, x)
+        assert x.tolist() == [*range(count - 1, -1, -1), *range(count, 5)]
+
+
+OWN = {
+    "memory.c": {"fail", "place", "take", "take_matrix", "take_complex", "take_integers"},
+    "numbers.c": {
+        "directions", "natural_log", "exponential", "power", "phase", "finite_number", "largest",
+        "greater", "lesser",
+    },
+    "matrix.c": {
+        "dot", "copy", "zeros", "add_scaled", "lu_factor", "lu_solve", "cholesky",
+        "forward", "backward", "least_squares", "rank", "symmetric_eigen", "null_space",
+    },
+    "mechanism.c": {"mechanism_open", "mechanism_close", "find_variable"},
+    "flexure.c": {"reverse"},
+    "assembly.c": {
+        "system_place", "complex_of", "plus", "minus", "product", "conjugate", "scaled", "modulus",
+    },
+    "dynamics.c": {"equations_place", "begin_trace", "energy_here", "row_value", "row_rate"},
+    "runge_kutta.c": {"error_of"},
+    "statics.c": {"stack_release"},
+}  # fmt: skip
+"""What the kernel has beside the package: NumPy's work, memory, parts of what is one expression."""
+
+ELSEWHERE = {
+    "assembly": {
+        "along", "rows", "calculated", "check_masses", "check_loops", "coefficients", "plus", "row",
+    },
+    "constraints": set(),
+    "contact": set(),
+    "dynamics": {
+        "check_input", "input_names", "mass_accelerations", "offsets", "stop_forces", "torques",
+        "without_hold",
+    },
+    "flexure": set(),
+    "forces": set(),
+    "kinetics": {"mass_accelerations"},
+    "modal": {"modal_restitution"},
+    "runge_kutta": {"rk4"},
+    "statics": {"free_displacement"},
+}  # fmt: skip
+"""What the package has beside the kernel's header: parts of ``assemble``, ``rate`` and of the
+inputs, which are compared as a whole, and what only Python users ask for."""
+
+
+def public(module):
+    """Return the functions and methods of a module of the package that others may call."""
+    found = {}
+    for name, thing in vars(importlib.import_module(f"prbm.{module}")).items():
+        if inspect.isfunction(thing) and thing.__module__ == f"prbm.{module}":
+            found[name] = thing
+        own = inspect.isclass(thing) and thing.__module__ == f"prbm.{module}"
+        if own and not name.startswith("_"):
+            found |= {k: f for k, f in vars(thing).items() if inspect.isfunction(f)}
+    return {k: f for k, f in found.items() if not k.startswith("_")}
+
+
+def test_no_function_of_the_header_is_left_out():
+    """Each is compared with its twin, or is known to have none; then none has its name either."""
+    own = set().union(*OWN.values())
+    assert not own & TWINS.keys()
+    assert own | TWINS.keys() == prototypes().keys()
+    for file, names in OWN.items():
+        assert names == {p.name for p in prototypes().values() if p.file == file} - TWINS.keys()
+        if file not in ("memory.c", "numbers.c", "matrix.c", "mechanism.c"):
+            assert not names & (public(file[:-2]).keys() - ELSEWHERE[file[:-2]])
+
+
+def test_no_function_of_the_package_is_left_out():
+    """Each that the simulation calls is the twin of one in the kernel."""
+    compared = set(TWINS.values())
+    for module, others in ELSEWHERE.items():
+        missing = {name for name, f in public(module).items() if f not in compared}
+        assert missing == others & public(module).keys()

@@ -1,0 +1,273 @@
+"""What native FMUs say about themselves: valid by the standards, and the same in every flavour."""
+
+import csv
+import io
+import re
+import zipfile
+from pathlib import Path
+from types import SimpleNamespace
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+from lxml import etree
+
+from prbm import MechanismError, Simulation, SimulationError
+from prbm_fmu import native_fmu, reference, report
+from prbm_fmu.archive import write
+from prbm_fmu.native_fmu import described
+from prbm_fmu.sources import TABLES, UNIT, amalgamation, kernel
+from prbm_fmu.structure import dependencies
+from prbm_tools.mechanism_file import load, shipped
+
+SCHEMAS = Path(fmpy.__file__).parent / "schema"
+FLAVOURS = [("PRBDM", 2), ("PRBDM", 3), ("PRBDM2R", 2), ("PRBDM2R", 3)]
+
+pytestmark = [pytest.mark.fmu, pytest.mark.native]
+
+
+@pytest.fixture(scope="module")
+def clocked(mechanisms, tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("clocked") / "PRBDM.fmu"
+    write(path, native_fmu.build(mechanisms["PRBDM"], fmi=3, clock=True))
+    return path
+
+
+@pytest.fixture(params=[*FLAVOURS, "clock"], ids=str)
+def fmu(request, native, clocked) -> SimpleNamespace:
+    """Return each native FMU in turn."""
+    name, fmi = ("PRBDM", 3) if request.param == "clock" else request.param
+    path = clocked if request.param == "clock" else native[name, fmi]
+    return SimpleNamespace(name=name, fmi=fmi, path=path, clock=request.param == "clock")
+
+
+def member(fmu: Path, name: str) -> bytes:
+    with zipfile.ZipFile(fmu) as archive:
+        return archive.read(name)
+
+
+def test_fmpy_finds_nothing_to_complain_about(fmu):
+    assert validate_fmu(str(fmu.path)) == []
+
+
+def test_all_xml_passes_the_schemas_of_the_standards(fmu):
+    files = {
+        "modelDescription.xml": f"fmi{fmu.fmi}/fmi{fmu.fmi}ModelDescription.xsd",
+        "terminalsAndIcons/terminalsAndIcons.xml": "fmi3/fmi3TerminalsAndIcons.xsd",
+    }
+    if fmu.fmi == 3:
+        files["sources/buildDescription.xml"] = "fmi3/fmi3BuildDescription.xsd"
+    for name, schema in files.items():
+        checker = etree.XMLSchema(file=str(SCHEMAS / schema))
+        assert checker.validate(etree.fromstring(member(fmu.path, name))), checker.error_log
+
+
+def test_the_manifest_of_the_reference_results_has_what_the_layered_standard_demands(fmu):
+    checker = etree.XMLSchema(file=str(SCHEMAS / "fmi3" / "fmi3LayeredStandardManifest.xsd"))
+    folder = "extra/org.fmi-standard.fmi-ls-ref"
+    root = etree.fromstring(member(fmu.path, f"{folder}/fmi-ls-manifest.xml"))
+    assert root.tag == "fmiReferences"
+    related = root[0].attrib
+    assert related["role"] == "result"
+    assert member(fmu.path, f"{folder}/{related['source']}")
+    root.tag = "{http://fmi-standard.org/fmi-ls-manifest}fmiLayeredStandardManifest"
+    root.remove(root[0])
+    root.text = None
+    assert checker.validate(root), checker.error_log
+
+
+def test_the_reference_results_are_those_of_the_python_engine(native):
+    text = member(native["PRBDM", 2], "extra/org.fmi-standard.fmi-ls-ref/PRBDM_out.csv").decode()
+    rows = list(csv.DictReader(io.StringIO(text)))
+    assert [float(row["time"]) for row in rows] == pytest.approx(np.arange(1001) * 1e-3)
+    simulation = Simulation(load(shipped()["PRBDM"]))
+    simulation.advance(0.1)
+    for name, x in simulation.outputs().items():
+        if name in rows[0]:
+            # printed with nine digits; communication points before change round-off alone
+            assert float(rows[100][name]) == pytest.approx(float(x), rel=1e-7, abs=1e-9)
+
+
+def test_an_experiment_that_does_not_come_to_its_end_has_no_reference_results(monkeypatch):
+    def fails(*_: object) -> None:
+        raise SimulationError("too many impacts")
+
+    monkeypatch.setattr(reference, "simulate", fails)
+    told: list[str] = []
+    built = native_fmu.build(load(shipped()["PRBDM"]), fmi=3, progress=told.append)
+    with zipfile.ZipFile(io.BytesIO(built)) as archive:
+        assert not [name for name in archive.namelist() if name.startswith("extra/")]
+    assert "no reference results: the default experiment does not come to its end" in told
+
+
+def test_all_flavours_have_the_same_variables(fmus, native, clocked):
+    """A native FMU has all variables of the Python FMU and adds what its standard demands."""
+
+    def listed(path) -> dict[str, tuple]:
+        kinds = {"Float64": "Real", "Int32": "Integer"}
+        return {
+            v.name: (
+                v.valueReference, kinds.get(v.type, v.type), v.causality, v.variability,
+                v.initial, v.unit, v.displayUnit, v.min, v.max, v.nominal, v.start, v.description,
+                v.derivative and v.derivative.name,
+            )
+            for v in read_model_description(str(path)).modelVariables
+        }  # fmt: skip
+
+    for model in fmus:
+        plain, two, three = map(listed, (fmus[model], native[model, 2], native[model, 3]))
+        assert plain.items() <= two.items() <= three.items()
+        assert three.keys() - two.keys() == {"time"}
+        assert all(re.search(r"^der\(|_indicator$", name) for name in two.keys() - plain.keys())
+    three, clock = listed(native["PRBDM", 3]), listed(clocked)
+    assert three.items() <= clock.items()
+    assert clock.keys() - three.keys() == {"stop.impact"}
+
+
+def test_states_their_derivatives_and_indicators_belong_together(fmu, mechanisms):
+    """As many as there are ways to move, twice, and two energies; all may jump at an event."""
+    description = read_model_description(str(fmu.path))
+    loops = 2 * (len(mechanisms[fmu.name].flexures) - 1)
+    links = len([v for v in description.modelVariables if re.match(r"link.*angle$", v.name)])
+    freedom = links + 1 - loops
+    states = [u.variable.derivative for u in description.derivatives]
+    assert len(states) == len({s.name for s in states}) == 2 * freedom + 2
+    assert all(state.nominal for state in states)
+    root = etree.fromstring(member(fmu.path, "modelDescription.xml"))
+    again = [v if v.get("name") else v.getparent() for v in root.xpath("//*[@reinit='true']")]
+    assert {v.get("name") for v in again} == {s.name for s in states}
+    indicators = [v.name for v in description.modelVariables if v.name.endswith("_indicator")]
+    if fmu.fmi == 2:
+        assert root.get("numberOfEventIndicators") == str(len(indicators))
+    else:
+        assert [u.variable.name for u in description.eventIndicators] == indicators
+    assert len(indicators) == 4  # three of the stop, one of the friction
+
+
+def test_capabilities_are_declared(fmu):
+    root = etree.fromstring(member(fmu.path, "modelDescription.xml"))
+    exchange, simulation = root.find("ModelExchange"), root.find("CoSimulation")
+    state = "State" if fmu.fmi == 3 else "state"
+    for kind in (exchange, simulation):
+        assert kind.get("modelIdentifier") == fmu.name
+        assert kind.get(f"canGetAndSetFMU{state}") == kind.get(f"canSerializeFMU{state}") == "true"
+        assert kind.get("needsExecutionTool", "false") == "false"
+    plural = "s" if fmu.fmi == 3 else ""
+    assert exchange.get(f"providesDirectionalDerivative{plural}") == "true"
+    assert simulation.get(f"providesDirectionalDerivative{plural}", "false") == "false"
+    assert simulation.get("canHandleVariableCommunicationStepSize") == "true"
+    if fmu.fmi == 3:
+        assert simulation.get("hasEventMode") == "true"
+    names = {c.get("name") for c in root.find("LogCategories")}
+    assert {"logEvents", "logStatusError", "logAll"} <= names
+
+
+def test_terminals_name_variables_that_exist(fmu):
+    known = {v.name for v in read_model_description(str(fmu.path)).modelVariables}
+    root = etree.fromstring(member(fmu.path, "terminalsAndIcons/terminalsAndIcons.xml"))
+    named = [m.get("variableName") for m in root.iter("TerminalMemberVariable")]
+    assert {"stop.gap", "stop.displacement", "force.x", "base.force.x"} <= {*named} <= known
+    assert member(fmu.path, "terminalsAndIcons/icon.png").startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+def test_dependencies_cover_every_output_and_derivative(model, mechanisms):
+    native = described(mechanisms[model], {}, 3, clock=True)
+    found = dependencies(mechanisms[model], native)
+    outputs = {v.name for v in native.variables if v.causality == "output"}
+    assert {*outputs, *native.derivatives, *native.indicators} <= found.keys()
+    inputs = {v.name for v in native.variables if v.causality == "input"}
+    for name, known in found.items():
+        assert {*known} <= {*native.states, *inputs}, name
+    for i, rate in enumerate(native.states[len(native.independent) : 2 * len(native.independent)]):
+        assert found[rate] == (rate,)
+        assert native.derivatives[i] == rate
+    assert found["stop.impact_count"] == ()
+    assert "force.x" in found["base.force.x"]
+    assert "force.x" not in found["shuttle.vx"]
+
+
+def test_the_source_is_one_file_of_one_version(mechanisms):
+    for fmi, other in ((2, 3), (3, 2)):
+        text = amalgamation("X", "*/ title", fmi)
+        included = set(re.findall(r'#\s*include\s+"([^"]+)"', text))
+        assert included <= {TABLES, "fmi2Functions.h", "fmi3Functions.h", "fmi2FunctionTypes.h"} | {
+            f"fmi{fmi}{what}.h" for what in ("PlatformTypes", "TypesPlatform", "FunctionTypes")
+        }
+        assert f"fmi{fmi}GetVersion" in text
+        assert f"fmi{other}GetVersion" not in text
+        assert text.count("/* ") == text.count("*/") or "*/ title" not in text
+    assert UNIT in kernel()
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_two_builds_of_one_tree_are_the_same_bytes(native, mechanisms, fmi):
+    again = native_fmu.build(load(shipped()["PRBDM2R"]), fmi=fmi)
+    assert native["PRBDM2R", fmi].read_bytes() == again
+
+
+def test_the_token_is_that_of_the_content(native, mechanisms):
+    """Other start values, another version of FMI or another kernel: another token."""
+    tokens = {
+        read_model_description(str(path)).guid
+        or read_model_description(str(path)).instantiationToken
+        for path in native.values()
+    }
+    changed = native_fmu.build(mechanisms["PRBDM"], {"stop.restitution": 0.5}, fmi=2)
+    tokens.add(read_model_description(io.BytesIO(changed)).guid)
+    assert len(tokens) == 5
+    for fmu in native.values():
+        description = read_model_description(str(fmu))
+        token = (description.guid or description.instantiationToken).encode()
+        assert token + b"\0" in member(fmu, "resources/mechanism.bin")
+
+
+def test_start_values_that_were_changed_are_in_the_description(mechanisms):
+    changed = native_fmu.build(mechanisms["PRBDM"], {"stop.restitution": 0.1 + 0.2}, fmi=3)
+    listed = {v.name: v for v in read_model_description(io.BytesIO(changed)).modelVariables}
+    assert float(listed["stop.restitution"].start) == 0.1 + 0.2
+
+
+def test_licences_of_all_that_is_inside_are_there(fmu):
+    folder = "documentation/licenses/"
+    with zipfile.ZipFile(fmu.path) as archive:
+        names = {n.removeprefix(folder) for n in archive.namelist() if n.startswith(folder)}
+        entry = archive.read(f"{folder}license.txt").decode()
+    assert {"license.txt", "prbm-impact.txt", "fmi-headers.txt"} == names
+    assert all(name in entry for name in names - {"license.txt"})
+
+
+def test_the_page_names_every_variable_and_state(fmu):
+    page = member(fmu.path, "documentation/index.html").decode()
+    for v in read_model_description(str(fmu.path)).modelVariables:
+        assert f"<code>{v.name}</code>" in page, v.name
+    assert "Python" not in page.split("<h2>Use</h2>")[1].split("</p>")[1].split("no Python")[0]
+    assert ("fmi3UpdateDiscreteStates" in page) == (fmu.fmi == 3)
+
+
+def test_the_report_is_told_the_mechanism(fmu, mechanisms):
+    run = report.simulate(fmu.path, lambda fraction: None)
+    assert run.mechanism == mechanisms[fmu.name]
+    assert run.finished
+    told = "\n".join(report.headline(run))
+    assert re.search(r"impacts at stop +14, the first at t = 0\.04", told)
+    assert re.search(r"came to rest +at t = 0\.24", told)
+
+
+def test_a_clock_without_a_stop_is_refused(tmp_path):
+    text = shipped()["PRBDM"].read_text()
+    text = re.sub(r"\[\[stops\]\].*?\n\n", "", text, flags=re.DOTALL)
+    path = tmp_path / "mine.toml"
+    path.write_text(text)
+    free = load(path)
+    assert free.stops == ()
+    with pytest.raises(MechanismError, match="PRBDM has no stop"):
+        native_fmu.build(free, fmi=3, clock=True)
+    assert validate_fmu(_written(tmp_path, native_fmu.build(free, fmi=3))) == []
+
+
+def _written(folder: Path, content: bytes) -> str:
+    write(folder / "free.fmu", content)
+    return str(folder / "free.fmu")

@@ -1,0 +1,263 @@
+"""The tables that the C kernel reads: a reader of its own gives back what was written."""
+
+import struct
+import zlib
+from dataclasses import dataclass, field
+
+import pytest
+
+from prbm import Mechanism, Simulation
+from prbm.dynamics import input_names
+from prbm.exchange import independent
+from prbm.mechanism import FIELDS, affine, value
+from prbm_fmu.native_fmu import described
+from prbm_fmu.tables import HEAD, slots, tables
+from prbm_fmu.variables import CLOCK
+from prbm_tools.mechanism_file import load, shipped
+
+TOKEN = "{0}"
+TYPES = {0: "Real", 1: "Integer", 2: "Boolean", 3: CLOCK}
+EXPRESSIONS = """
+name = "Lever"
+title = "A lever whose numbers are expressions"
+gravity = [0.0, -9.81]
+
+[[geometry]]
+name = "size"
+value = 0.05
+unit = "m"
+description = "Length of the flexure"
+
+[[flexure_types]]
+name = "hinge"
+model = "3R"
+thickness = "size / 50"
+width = 8e-3
+youngs_modulus = 2e11
+density = 7800.0
+coefficients = {gamma1 = "7 * size", K_theta2 = 3.0}
+
+[ground]
+foot = [0.0, "-size"]
+other = ["2 * size", "-size"]
+
+[[bodies]]
+name = "tip"
+mass = "2 * size - 0.01"
+inertia = 1e-4
+centre = ["size + 0.01", 0.0]
+
+[bodies.points]
+root = ["size", "size - size"]
+
+[[flexures]]
+name = "leaf"
+type = "hinge"
+start = "tip.root"
+end = "ground.foot"
+
+[[flexures]]
+name = "strut"
+type = "hinge"
+start = "ground.other"
+end = "tip.root"
+ends = ["clamp", "pin"]
+
+[[stops]]
+name = "wall"
+body = "tip"
+point = ["size", 0.01]
+direction = -90.0
+position = "size / 10"
+
+[release]
+body = "tip"
+direction = 270.0
+displacement = -0.0001
+"""
+
+
+@dataclass
+class Reader:
+    """Reads one item after the other."""
+
+    data: bytes
+    at: int = HEAD
+    parameters: list = field(default_factory=list)
+
+    def take(self, form: str):
+        result = struct.unpack_from(f"<{form}", self.data, self.at)
+        self.at += struct.calcsize(f"<{form}")
+        return result[0] if len(result) == 1 else result
+
+    def text(self) -> str:
+        length = self.take("I")
+        content = self.data[self.at : self.at + length]
+        assert self.data[self.at + length] == 0
+        self.at += length + 1
+        return content.decode()
+
+    def expression(self):
+        """Return a function of the parameters' values by name."""
+        constant, count = self.take("dI")
+        terms = [self.take("Id") for _ in range(count)]
+        names = [(self.parameters[i], factor) for i, factor in terms]
+        return lambda values: constant + sum(c * values[name] for name, c in names)
+
+    def point(self):
+        x, y = self.expression(), self.expression()
+        return lambda values: (x(values), y(values))
+
+
+@pytest.fixture(scope="module", params=["PRBDM", "PRBDM2R", "Lever"])
+def mechanism(request, tmp_path_factory) -> Mechanism:
+    if request.param == "Lever":
+        path = tmp_path_factory.mktemp("lever") / "lever.toml"
+        path.write_text(EXPRESSIONS)
+        return load(path)
+    return load(shipped()[request.param])
+
+
+@pytest.fixture(scope="module")
+def written(mechanism) -> bytes:
+    native = described(mechanism, {}, 3, clock=True)
+    return tables(mechanism, native.variables, TOKEN, native.independent)
+
+
+def test_the_head_tells_version_size_and_check_sum(written):
+    magic, version, size, check = struct.unpack_from("<4sIII", written)
+    assert (magic, version, size) == (b"PRBM", 1, len(written))
+    assert check == zlib.crc32(written[16:])
+
+
+def same(mechanism: Mechanism, quantity, expected) -> None:
+    """Hold an expression against what it stands for, for defaults and for other values."""
+    values = mechanism.values()
+    for factor in (1.0, 1.25):
+        scaled = {name: factor * x for name, x in values.items()}
+        assert quantity(scaled) == pytest.approx(expected(scaled), rel=1e-15)
+
+
+def test_everything_is_read_back_as_it_is_in_the_mechanism(mechanism, written):
+    """Every field of every part, in the order of the format, to the last byte."""
+    m, r = mechanism, Reader(written)
+    native = described(mechanism, {}, 3, clock=True)
+
+    def fields(part) -> None:
+        for name in FIELDS[type(part)]:
+            same(m, r.expression(), lambda v, name=name: value(part, name, v))
+
+    def point(drawn) -> None:
+        x, y = (affine(coordinate) for coordinate in drawn)
+        same(m, r.point(), lambda v: (x(v), y(v)))
+
+    assert (r.text(), r.text()) == (TOKEN, m.name)
+    bounds = [
+        (part, name)
+        for part in m._parts()
+        for name in FIELDS[type(part)]
+        if isinstance(getattr(part, name), str)
+    ]
+    counts = [r.take("I") for _ in range(12)]
+    parts = (m.bodies, m.flexure_types, m.flexures, m.stops, m.frictions, m.forces, m.ground)
+    assert counts[0] == len(m.parameters)
+    assert counts[1:8] == [*map(len, parts)]
+    assert counts[8:] == [
+        len(bounds), len(native.variables), len(native.independent), len(input_names(m))
+    ]  # fmt: skip
+    for p in m.parameters:
+        r.parameters.append(p.name)
+        assert (r.text(), r.text()) == (p.name, p.unit)
+        assert r.take("dddI") == (p.value, p.minimum, p.maximum, p.tunable)
+    assert [r.parameters[r.take("I")] for _ in range(5)] == [
+        "gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta"
+    ]  # fmt: skip
+    for name in input_names(m):
+        assert (r.text(), r.take("d")) == (name, 0.0)
+    bodies = ["ground", *(b.name for b in m.bodies)]
+    for body in m.bodies:
+        assert r.text() == body.name
+        fields(body)
+        point(body.centre)
+    for kind in m.flexure_types:
+        model = m.model(kind)
+        assert r.text() == kind.name
+        assert r.take("III") == (model.lumped, model.rate_with_gamma, len(model.gamma))
+        fields(kind)
+        for c in (*model.gamma, *model.K_theta):
+            given = kind.coefficients.get(c.name, 0.0)
+            expression = affine(given) if isinstance(given, str) else None
+            name = f"{kind.name}.{c.name}"
+            same(m, r.expression(), expression or (lambda v, name=name: v[name]))
+    for flexure in m.flexures:
+        assert (r.text(), r.take("I")) == (
+            flexure.name, [k.name for k in m.flexure_types].index(flexure.type)
+        )  # fmt: skip
+        for end in (flexure.start, flexure.end):
+            assert bodies[r.take("I")] == end.rpartition(".")[0]
+            point(m.point(end, flexure.name))
+        assert r.take("II") == tuple(end == "clamp" for end in flexure.ends)
+    for stop in m.stops:
+        assert (r.text(), bodies[r.take("I")]) == (stop.name, stop.body)
+        point(stop.point)
+        assert r.take("d") == stop.direction
+        fields(stop)
+    for friction in m.frictions:
+        assert (r.text(), bodies[r.take("I")]) == (friction.name, friction.body)
+        assert r.take("d") == friction.direction
+        fields(friction)
+    for force in m.forces:
+        assert (r.text(), bodies[r.take("I")]) == (force.name, force.body)
+    assert bodies[r.take("I")] == m.release.body
+    assert r.take("d") == m.release.direction
+    fields(m.release)
+    for place in m.ground.values():
+        point(place)
+    for part, name in bounds:
+        unit, _, minimum, maximum, *_ = FIELDS[type(part)][name]
+        assert (r.text(), r.text()) == (f"{part.name}.{name}", unit)
+        same(m, r.expression(), affine(getattr(part, name)))
+        assert r.take("dd") == (minimum, maximum)
+    assert tuple(r.take("I") for _ in native.independent) == native.independent
+    place = slots(m, native.independent)
+    by_name = {v.name: v for v in native.variables}
+    before = -1
+    for _ in native.variables:
+        reference, kind, slot = r.take("III")
+        v = by_name.pop(r.text())
+        assert before < reference == v.reference
+        assert TYPES[kind] == v.type
+        assert slot == place[f"{v.name}_count" if v.type == CLOCK else v.name]
+        before = reference
+    assert not by_name
+    assert r.at == len(written)
+
+
+def test_start_values_are_those_of_the_variables(mechanism):
+    """An input's too: its name and then its start stand at the end of the inputs."""
+    changes = {"solver.tolerance": 1e-5, "base.acceleration.y": 2.5}
+    native = described(mechanism, changes, 2)
+    written = tables(mechanism, native.variables, TOKEN, native.independent)
+    for name, start in changes.items():
+        at = written.index(name.encode() + b"\0") + len(name) + 1
+        at += 5 if name == "solver.tolerance" else 0  # its unit, an empty text
+        assert struct.unpack_from("<d", written, at) == (start,)
+
+
+def test_every_output_of_the_engine_has_a_slot_of_its_own(mechanism):
+    chosen = independent(mechanism)
+    place = slots(mechanism, chosen)
+    assert sorted(place.values()) == [*range(len(place))]
+    simulation = Simulation(mechanism)
+    assert {*simulation.outputs(), *simulation.values, *simulation.given} <= place.keys()
+
+
+def test_names_of_any_alphabet_are_counted_in_bytes(tmp_path):
+    path = tmp_path / "mine.toml"
+    text = shipped()["PRBDM"].read_text()
+    path.write_text(text.replace('"left_flexure"', '"linke_Fläche"'), "utf-8")
+    mechanism = load(path)
+    native = described(mechanism, {}, 2)
+    written = tables(mechanism, native.variables, TOKEN, native.independent)
+    name = "linke_Fläche".encode()
+    assert struct.pack("<I", len(name)) + name + b"\0" in written
