@@ -300,6 +300,8 @@ def test_time_only_runs_on():
         sim.advance(0.005)
     with pytest.raises(SimulationError):
         sim.advance(math.nan)
+    with pytest.raises(SimulationError, match="times are in seconds"):
+        sim.advance(1e300)
 
 
 def test_fixed_parameters_stay_and_a_refused_change_changes_nothing():

@@ -53,6 +53,7 @@ STRICTNESS = 0.6  # of the tolerance: what the dense output adds to the error ha
 LEAST_ERROR = 1e-4  # of the tolerance: what a step better than that is remembered as
 LARGEST_STEP = 0.05  # of the fundamental period
 SMALLEST_STEP = 1e-13  # s
+MOST_STEPS = 1e9  # of the longest, to one time: more is a mistake of units
 
 
 @dataclass(frozen=True)
@@ -298,6 +299,11 @@ class Simulation:
         if not math.isfinite(time) or time < self.time:
             raise SimulationError(
                 f"cannot go from t = {self.time:.12g} s to t = {time:.12g} s: time only runs on"
+            )
+        if time - self.time > MOST_STEPS * self._largest_step():
+            raise SimulationError(
+                f"cannot go from t = {self.time:.12g} s to t = {time:.12g} s at once: that is more "
+                f"than {MOST_STEPS:g} steps; times are in seconds"
             )
         if time == self.time:
             return

@@ -511,8 +511,7 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
     double *kept = take(scratch, (size_t)n);
     copy(n, y, kept);
     scratch->used = mark;
-    directions(n, y, q->e);
-    memset(x, 0, (size_t)(n + q->r) * sizeof *x);
+    memset(x, 0, (size_t)(n + q->r) * sizeof *x); /* e is that of y: evaluated last */
     for (int k = 0; k < active; k++) {
         x[n + k] = -(row_value(n, q->B + k * n, q->e) + offset(q, k, t));
     }

@@ -25,6 +25,7 @@
 #define LEAST_ERROR 1e-4      /* of the tolerance: what a better step is remembered as */
 #define LARGEST_STEP 0.05     /* of the fundamental period */
 #define SMALLEST_STEP 1e-13   /* s */
+#define MOST_STEPS 1e9        /* of the longest, to one time: more is a mistake of units */
 #define LARGEST_WEIGHT 1.1    /* more than the sum of |b_i(theta)| of the dense output, 1.03 */
 #define TWO_PI 6.283185307179586
 
@@ -1782,6 +1783,22 @@ static bool continues(const Simulation *sim, double time) {
            !values_changed(sim) && !given_changed(sim);
 }
 
+/* Whether a time is one to go to: not before the present one, and not after the end of days. */
+static bool check_time(const Simulation *sim, double time, Problem *problem) {
+    double now = sim->now->time;
+    if (!finite_number(time) || time < now) {
+        return fail(problem, "cannot go from t = %.12g s to t = %.12g s: time only runs on", now,
+                    time);
+    }
+    if (time - now > MOST_STEPS * largest_step(sim)) {
+        return fail(problem,
+                    "cannot go from t = %.12g s to t = %.12g s at once: that is more than %g "
+                    "steps; times are in seconds",
+                    now, time, MOST_STEPS);
+    }
+    return true;
+}
+
 static bool advance(Simulation *sim, double time, bool each, bool events, bool *event,
                     Problem *problem) {
     Scalars *now = sim->now;
@@ -1827,9 +1844,8 @@ PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each
                                   Problem *problem) {
     Simulation *sim = simulation;
     *event = false;
-    if (!finite_number(time) || time < sim->now->time) {
-        return fail(problem, "cannot go from t = %.12g s to t = %.12g s: time only runs on",
-                    sim->now->time, time);
+    if (!check_time(sim, time, problem)) {
+        return false;
     }
     if (time == sim->now->time) {
         *event = due(sim, time);
@@ -1843,9 +1859,8 @@ PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each
 PRBM bool simulation_advance(Simulation *simulation, double time, Problem *problem) {
     Simulation *sim = simulation;
     bool event;
-    if (!finite_number(time) || time < sim->now->time) {
-        return fail(problem, "cannot go from t = %.12g s to t = %.12g s: time only runs on",
-                    sim->now->time, time);
+    if (!check_time(sim, time, problem)) {
+        return false;
     }
     if (time == sim->now->time) {
         return true;
@@ -2014,25 +2029,39 @@ static bool whole_number(double x, double low, double high) {
     return x >= low && x <= high && x == floor(x);
 }
 
+/* What an importer's solver has set may be anything; all else is finite. */
+static bool all_finite(const Simulation *sim) {
+    const double *states = sim->states;
+    for (const double *x = sim->state; x < sim->state + sim->state_count; x++) {
+        bool foreign = x >= states && x < states + exchange_states(sim);
+        if (!foreign && !finite_number(*x)) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool sound_event(const Simulation *sim) {
+    const Scalars *now = sim->now;
+    int kind = to_int(now->event_kind);
+    bool rubs = kind == SLIP_RUB || kind == RUB;
+    int count = rubs ? sim->mechanism->friction_count : sim->mechanism->stop_count;
+    return kind == NO_EVENT || now->event_index < count;
+}
+
 /* Whether the numbers that decide what is done, and where, are ones that the engine writes. */
 static bool sound_state(const Simulation *sim) {
     const Scalars *now = sim->now;
     const Mechanism *m = sim->mechanism;
-    int most = m->stop_count > m->friction_count ? m->stop_count : m->friction_count;
-    bool sound = whole_number(now->started, 0, 1) && whole_number(now->exchange, 0, 1) &&
-                 whole_number(now->has_k1, 0, 1) && whole_number(now->has_arc, 0, 1) &&
-                 whole_number(now->underway, 0, 1) && whole_number(now->event_kind, 0, (int)RUB) &&
-                 whole_number(now->event_index, 0, most) && finite_number(now->time) &&
-                 finite_number(now->front_time) && finite_number(now->h) && now->h >= 0.0 &&
-                 now->window_count >= 0.0 && now->window_count <= CHATTER;
-    if (sound && now->has_arc != 0.0 && to_int(now->event_kind) != NO_EVENT) {
-        int kind = to_int(now->event_kind);
-        bool rubs = kind == SLIP_RUB || kind == RUB;
-        sound = now->event_index < (rubs ? m->friction_count : m->stop_count);
-    }
+    bool sound = all_finite(sim) && whole_number(now->started, 0, 1) &&
+                 whole_number(now->exchange, 0, 1) && whole_number(now->has_k1, 0, 1) &&
+                 whole_number(now->has_arc, 0, 1) && whole_number(now->underway, 0, 1) &&
+                 whole_number(now->event_kind, 0, (int)RUB) && now->h >= 0.0 &&
+                 whole_number(now->event_index, 0, MOST_STOPS) && now->window_count >= 0.0 &&
+                 now->window_count <= CHATTER && sound_event(sim);
     if (sound && now->started != 0.0) {
         sound = now->tolerance >= 1e-13 && now->tolerance <= 1e-2 && now->frequency >= 0.0 &&
-                finite_number(now->frequency) && (now->has_arc == 0.0 || now->arc_h > 0.0);
+                now->last_error > 0.0 && (now->has_arc == 0.0 || now->arc_h > 0.0);
     }
     for (int i = 0; sound && i < m->stop_count; i++) {
         sound = whole_number(sim->holds[i], 0, 1) && whole_number(sim->slides[i], -1, IDLE) &&
@@ -2040,12 +2069,6 @@ static bool sound_state(const Simulation *sim) {
     }
     for (int i = 0; sound && i < m->friction_count; i++) {
         sound = whole_number(sim->rubs[i], -1, IDLE);
-    }
-    for (int i = 0; sound && i < m->input_count; i++) {
-        sound = finite_number(sim->given[i]) && finite_number(sim->acting_given[i]);
-    }
-    for (int i = 0; sound && now->started != 0.0 && i < state_size(sim); i++) {
-        sound = finite_number(sim->front[i]);
     }
     return sound;
 }
