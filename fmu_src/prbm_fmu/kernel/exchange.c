@@ -258,6 +258,25 @@ static double speed_scale(const Simulation *sim) {
     return omega_scale(sim) * sim->system.length;
 }
 
+/* How much the velocity of a wall may change under what rests on it before that is an event: the
+ * wall's acceleration is not known, and a slower strike than rest_speed ends in rest. */
+static double turn_allowed(const Simulation *sim, int i) {
+    double rest_speed = evaluate(sim->mechanism->stops[i].rest_speed, sim->acting_values);
+    return greater(0.5 * rest_speed, 10.0 * still(sim));
+}
+
+static double wall_turn(const Simulation *sim, int i) {
+    return sim->walls[i].rate - sim->held_rates[i];
+}
+
+/* Positive while a stop that holds is pressed and its wall keeps its velocity. */
+static double release_indicator(const Simulation *sim, int k) {
+    int i = sim->equations.held[k];
+    double pressed = margin_release(sim, k) / force_scale(sim);
+    double steady = (turn_allowed(sim, i) - fabs(wall_turn(sim, i))) / speed_scale(sim);
+    return lesser(pressed, steady);
+}
+
 /* Positive while an open gap stays open.  What opens keeps it off zero, so that it is positive
  * right after an impact, whose gap is zero up to a rounding. */
 static double impact_indicator(const Simulation *sim, int i) {
@@ -270,9 +289,10 @@ static double impact_indicator(const Simulation *sim, int i) {
     return (gap(q, i, sim->now->time, q->e) + sim->floors[i] + ahead) / sim->system.length;
 }
 
+/* Falls through zero as what slides has come to rest, up to what counts as rest. */
 static double slip_speed(const Simulation *sim, const Complex *row, int sign) {
     const Equations *q = &sim->equations;
-    return sign * row_rate(sim->system.n, row, q->e, sim->at + sim->system.n) + still(sim);
+    return sign * row_rate(sim->system.n, row, q->e, sim->at + sim->system.n) + 0.5 * still(sim);
 }
 
 static void friction_indicators(const Simulation *sim, double *z) {
@@ -309,8 +329,7 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
         z[STOP_INDICATORS * i] = impact_indicator(sim, i);
     }
     for (int k = 0; k < sim->equations.held_count; k++) {
-        z[STOP_INDICATORS * sim->equations.held[k] + 1] =
-            margin_release(sim, k) / force_scale(sim);
+        z[STOP_INDICATORS * sim->equations.held[k] + 1] = release_indicator(sim, k);
     }
     friction_indicators(sim, z);
     return true;
@@ -318,12 +337,29 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
 
 /* --- events --------------------------------------------------------------------------------------------------- */
 
-/* How far a held stop is off its wall and its wall's velocity, in units of what is worth noting. */
-static double drift_of(const Simulation *sim, int i) {
+/* How far a stop that holds is off its wall and off the velocity at which it was held, in units of
+ * size and speed.  While the wall changes its velocity the place is the wall's matter. */
+static double drift_of_held(const Simulation *sim, int i) {
     const Equations *q = &sim->equations;
+    double turn = wall_turn(sim, i);
     double off = fabs(gap(q, i, sim->now->time, q->e)) / sim->system.length;
-    double speed = fabs(gap_rate(q, i, q->e, sim->front + sim->system.n)) / speed_scale(sim);
-    return greater(off, speed);
+    double speed = fabs(gap_rate(q, i, q->e, sim->front + sim->system.n) - turn);
+    return greater(fabs(turn) > still(sim) ? 0.0 : off, speed / speed_scale(sim));
+}
+
+/* The largest drift of what holds and what sticks. */
+static double drift(const Simulation *sim) {
+    const Equations *q = &sim->equations;
+    int n = sim->system.n;
+    double most = 0.0;
+    for (int k = 0; k < q->held_count; k++) {
+        most = greater(most, drift_of_held(sim, q->held[k]));
+    }
+    for (int k = q->first_stick; k < q->r; k++) {
+        double speed = fabs(row_rate(n, q->B + k * n, q->e, sim->front + n));
+        most = greater(most, speed / speed_scale(sim));
+    }
+    return most;
 }
 
 PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *problem) {
@@ -333,9 +369,7 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
         return false;
     }
     copy(state_size(sim), sim->front, sim->arc_y);
-    for (int k = 0; k < sim->equations.held_count; k++) {
-        *event = *event || drift_of(sim, sim->equations.held[k]) > DRIFT;
-    }
+    *event = drift(sim) > DRIFT;
     return true;
 }
 
@@ -345,13 +379,12 @@ static void changed_front(Simulation *sim) {
     sim->output_level = 0;
 }
 
-/* Bring held stops back onto their walls, or let them go where the wall has changed its velocity. */
+/* Bring held stops back onto their walls, or let them go where the wall has changed its velocity;
+ * bring what sticks back to rest. */
 static bool follow_walls(Simulation *sim, Problem *problem) {
-    bool turned = false, drifted = false;
+    bool turned = false, drifted = drift(sim) > UNDRIFTED;
     for (int k = 0; k < sim->equations.held_count; k++) {
-        int i = sim->equations.held[k];
-        turned = turned || fabs(sim->walls[i].rate - sim->held_rates[i]) > still(sim);
-        drifted = drifted || drift_of(sim, i) > UNDRIFTED;
+        turned = turned || fabs(wall_turn(sim, sim->equations.held[k])) > still(sim);
     }
     if (turned) {
         int struck = unsettled_by_walls(sim);
@@ -367,6 +400,21 @@ static bool follow_walls(Simulation *sim, Problem *problem) {
         return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem);
     }
     return true;
+}
+
+/* What has stopped sliding is at rest: a solver overshoots by its own resolution of time, which
+ * must not look like sliding back. */
+static void stop_sliding(Simulation *sim, const Event *event) {
+    const System *system = &sim->system;
+    const Complex *rows = event->kind == RUB ? system->rubs : system->slides;
+    int n = system->n;
+    double speed = row_rate(n, rows + event->index * n, sim->equations.e, sim->front + n);
+    if (fabs(speed) <= DRIFT * speed_scale(sim)) {
+        Problem ignored; /* held and stuck at once may be one constraint too many: then it stays */
+        with_slide(sim, event->kind, event->index, STICKS);
+        set_discrete(sim, &sim->other);
+        (void)project(&sim->equations, sim->now->time, sim->front, &sim->scratch, &ignored);
+    }
 }
 
 /* The next event that is due at the front: releases and slips first, then impacts. */
@@ -455,6 +503,9 @@ static bool let_all_happen(Simulation *sim, Problem *problem) {
             break;
         }
         changed_front(sim);
+        if (event.kind == SLIDE || event.kind == RUB) {
+            stop_sliding(sim, &event);
+        }
         if (!happen(sim, &event, problem)) {
             return false;
         }
@@ -852,8 +903,12 @@ static void indicator_changes(const Tangent *t, double *out) {
         }
     }
     for (int k = 0; k < q->held_count; k++) {
-        out[STOP_INDICATORS * q->held[k] + 1] =
-            multiplier_change(t, q->first_hold + k) / force_scale(sim);
+        int i = q->held[k];
+        double velocity = t->du[3 * system->mechanism->force_count + 2 * i + 1];
+        bool pressed = margin_release(sim, k) / force_scale(sim) <= release_indicator(sim, k);
+        out[STOP_INDICATORS * i + 1] =
+            pressed ? multiplier_change(t, q->first_hold + k) / force_scale(sim)
+                    : -sign_times(wall_turn(sim, i), velocity) / speed_scale(sim);
     }
     for (int k = 0; k < q->stuck_count; k++) {
         int i = q->stuck[k], h = q->first_hold + held_at(q, i), s = q->first_stick + k;

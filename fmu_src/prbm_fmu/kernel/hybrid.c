@@ -25,6 +25,7 @@
 #define LEAST_ERROR 1e-4      /* of the tolerance: what a better step is remembered as */
 #define LARGEST_STEP 0.05     /* of the fundamental period */
 #define SMALLEST_STEP 1e-13   /* s */
+#define ROUNDED 1e-12         /* of a time: what importers lose when they add up steps */
 #define MOST_STEPS 1e9        /* of the longest, to one time: more is a mistake of units */
 #define LARGEST_WEIGHT 1.1    /* more than the sum of |b_i(theta)| of the dense output, 1.03 */
 #define TWO_PI 6.283185307179586
@@ -1777,10 +1778,19 @@ static bool let_happen(Simulation *sim, Problem *problem) {
     return happen(sim, &event, problem);
 }
 
-/* Whether this continues a communication step that was left in its middle. */
+/* Whether this continues a communication step that was left in its middle, to the same end but for
+ * the rounding of an importer that adds what is left of the step to the time. */
 static bool continues(const Simulation *sim, double time) {
-    return sim->now->underway != 0.0 && sim->now->underway_until == time &&
+    double rounding = ROUNDED * (fabs(time) + fabs(sim->now->time));
+    return sim->now->underway != 0.0 && fabs(sim->now->underway_until - time) <= rounding &&
            !values_changed(sim) && !given_changed(sim);
+}
+
+/* Stop before the end of a communication step; the walls go on as planned until then. */
+static void leave_underway(Scalars *now, double time, double end) {
+    now->time = time;
+    now->underway = 1.0;
+    now->underway_until = end;
 }
 
 /* Whether a time is one to go to: not before the present one, and not after the end of days. */
@@ -1816,7 +1826,7 @@ static bool advance(Simulation *sim, double time, bool each, bool events, bool *
         if (due(sim, time)) {
             if (events) {
                 *event = true;
-                now->time = now->event_time;
+                leave_underway(now, now->event_time, time);
                 return true;
             }
             if (!let_happen(sim, problem)) {
@@ -1827,9 +1837,7 @@ static bool advance(Simulation *sim, double time, bool each, bool events, bool *
             break;
         }
         if (each && stepped) {
-            now->time = now->front_time;
-            now->underway = 1.0;
-            now->underway_until = time;
+            leave_underway(now, now->front_time, time);
             return true;
         }
         if (!take_step(sim, problem)) {
