@@ -37,7 +37,10 @@ SCENARIOS = {
         {"force.moment": 1e-3},
         {4: {"base.acceleration.x": 3.0, "base.acceleration.y": -2.0}, 30: {"force.y": 0.3}},
     ),
-    "tuned": ({}, {20: {"stop.restitution": 0.2}, 50: {"stop.position": -2e-3, "damping.zeta": 0.02}}),
+    "tuned": (
+        {},
+        {20: {"stop.restitution": 0.2}, 50: {"stop.position": -2e-3, "damping.zeta": 0.02}},
+    ),
     "a wall that comes and goes": (
         {"stop.restitution": 0.3},
         {90: {"stop.velocity": -0.05}, 91: {"stop.displacement": -1.25e-4}}

@@ -379,14 +379,46 @@ static void changed_front(Simulation *sim) {
     sim->output_level = 0;
 }
 
-/* Bring held stops back onto their walls, or let them go where the wall has changed its velocity;
- * bring what sticks back to rest. */
-static bool follow_walls(Simulation *sim, Problem *problem) {
-    bool turned = false, drifted = drift(sim) > UNDRIFTED;
-    for (int k = 0; k < sim->equations.held_count; k++) {
-        turned = turned || fabs(wall_turn(sim, sim->equations.held[k])) > still(sim);
+/* Give what holds the present velocities of its walls.  The impulses, which may pull here where a
+ * hop too small to follow would be the truth, are booked as at an impact. */
+static bool follow(Simulation *sim, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const Equations *q = &sim->equations;
+    int n = sim->system.n, r = q->r, size = n + r;
+    double *y = sim->front, *v = y + n, *rows = take_matrix(&sim->scratch, r, n);
+    double *M = take_matrix(&sim->scratch, n, n), *C = take_matrix(&sim->scratch, n, n);
+    double *kkt = take_matrix(&sim->scratch, size, size), *x = take(&sim->scratch, (size_t)size);
+    jacobian(r, n, q->B, q->e, rows);
+    inertia(n, sim->system.H, sim->system.J, q->e, M, C);
+    saddle(n, r, M, rows, rows, kkt);
+    zeros(n, x);
+    for (int k = 0; k < r; k++) {
+        x[n + k] = -(dot(n, rows + k * n, v) + prescribed(q, k));
     }
-    if (turned) {
+    bool right = solve(size, kkt, x, &sim->scratch, problem);
+    for (int k = 0; right && k < q->held_count; k++) {
+        int i = q->held[k], row = q->first_hold + k;
+        double P = -x[n + row], wall = sim->walls[i].rate;
+        double before = dot(n, rows + row * n, v) + wall;
+        y[2 * n] -= P * before / 2; /* and nothing after */
+        y[2 * n + 1] -= P * wall;
+    }
+    add_scaled(right ? n : 0, 1.0, x, v);
+    sim->scratch.used = mark;
+    return right && project(&sim->equations, sim->now->time, y, &sim->scratch, problem);
+}
+
+/* Bring held stops back onto their walls, let them go or strike where a wall has changed its
+ * velocity at once; bring what sticks back to rest. */
+static bool follow_walls(Simulation *sim, Problem *problem) {
+    bool turned = false, jumped = false, drifted = drift(sim) > UNDRIFTED;
+    for (int k = 0; k < sim->equations.held_count; k++) {
+        int i = sim->equations.held[k];
+        double turn = fabs(wall_turn(sim, i));
+        turned = turned || turn > still(sim);
+        jumped = jumped || turn > 2.0 * turn_allowed(sim, i);
+    }
+    if (jumped) {
         int struck = unsettled_by_walls(sim);
         changed_front(sim);
         if (struck >= 0) {
@@ -395,9 +427,9 @@ static bool follow_walls(Simulation *sim, Problem *problem) {
         return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
                settle(sim, NULL, 0, NO_EVENT, 0, problem);
     }
-    if (drifted) {
+    if (turned || drifted) {
         changed_front(sim);
-        return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem);
+        return follow(sim, problem);
     }
     return true;
 }
