@@ -224,11 +224,13 @@ def test_what_rests_on_a_wall_follows_its_smooth_motion():
     kernel = KernelSimulation(mechanism("PRBDM"), values, exchange=True)
     kernel.event()
     start = energy_balance(kernel.outputs())
-    speeds = [z.min() for _, z in integrate(kernel, 0.15, h=1e-4, inputs=wall)]
-    assert min(speeds) > 0.0
+    kept = []
+    for _, z in integrate(kernel, 0.15, h=1e-4, inputs=wall):
+        assert z.min() > 0.0
+        kept.append(energy_balance(kernel.outputs()) - start)
     assert kernel.get("stop.contact") == 1.0
     assert kernel.get("stop.impact_count") == 0.0
     assert kernel.get("shuttle.x") == pytest.approx(wall(0.15)["stop.displacement"], abs=1e-6)
-    kept = energy_balance(kernel.outputs()) - start
-    assert abs(kept) < 1e-3 * abs(kernel.get("energy.work"))
-    assert 0.0 < kernel.get("energy.dissipated") < 0.05 * abs(kernel.get("energy.work"))
+    work = abs(kernel.get("energy.work"))
+    assert np.abs(kept).max() < 1e-4 * work
+    assert 0.0 < kernel.get("energy.dissipated") < 0.05 * work
