@@ -3,6 +3,9 @@
 import csv
 import io
 import re
+import shutil
+import subprocess
+import sys
 import zipfile
 from pathlib import Path
 from types import SimpleNamespace
@@ -10,7 +13,7 @@ from types import SimpleNamespace
 import fmpy
 import numpy as np
 import pytest
-from fmpy import read_model_description
+from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
 
@@ -103,24 +106,30 @@ def test_an_experiment_that_does_not_come_to_its_end_has_no_reference_results(mo
 
 
 def test_all_flavours_have_the_same_variables(fmus, native, clocked):
-    """A native FMU has all variables of the Python FMU and adds what its standard demands."""
+    """A native FMU has all variables of the Python FMU and adds what its standard demands.
+
+    That is, among others, for its states the nominal values that their solver takes.
+    """
 
     def listed(path) -> dict[str, tuple]:
         kinds = {"Float64": "Real", "Int32": "Integer"}
         return {
             v.name: (
                 v.valueReference, kinds.get(v.type, v.type), v.causality, v.variability,
-                v.initial, v.unit, v.displayUnit, v.min, v.max, v.nominal, v.start, v.description,
-                v.derivative and v.derivative.name,
+                v.initial, v.unit, v.displayUnit, v.min, v.max, v.start, v.description,
+                v.derivative and v.derivative.name, None if v.name in states else v.nominal,
             )
             for v in read_model_description(str(path)).modelVariables
         }  # fmt: skip
 
     for model in fmus:
+        derivatives = read_model_description(str(native[model, 2])).derivatives
+        states = {unknown.variable.derivative.name for unknown in derivatives}
         plain, two, three = map(listed, (fmus[model], native[model, 2], native[model, 3]))
         assert plain.items() <= two.items() <= three.items()
         assert three.keys() - two.keys() == {"time"}
         assert all(re.search(r"^der\(|_indicator$", name) for name in two.keys() - plain.keys())
+    states = set()
     three, clock = listed(native["PRBDM", 3]), listed(clocked)
     assert three.items() <= clock.items()
     assert clock.keys() - three.keys() == {"stop.impact"}
@@ -134,7 +143,7 @@ def test_states_their_derivatives_and_indicators_belong_together(fmu, mechanisms
     freedom = links + 1 - loops
     states = [u.variable.derivative for u in description.derivatives]
     assert len(states) == len({s.name for s in states}) == 2 * freedom + 2
-    assert all(state.nominal for state in states)
+    assert {float(s.nominal) for s in states if s.name.endswith(".angle")} == {1.0}
     root = etree.fromstring(member(fmu.path, "modelDescription.xml"))
     again = [v if v.get("name") else v.getparent() for v in root.xpath("//*[@reinit='true']")]
     assert {v.get("name") for v in again} == {s.name for s in states}
@@ -144,6 +153,22 @@ def test_states_their_derivatives_and_indicators_belong_together(fmu, mechanisms
     else:
         assert [u.variable.name for u in description.eventIndicators] == indicators
     assert len(indicators) == 4  # three of the stop, one of the friction
+
+
+def test_parameters_are_knowns_in_fmi_3_and_are_none_in_fmi_2(fmu):
+    """By the definitions of ``dependencies`` in the two standards."""
+    description = read_model_description(str(fmu.path))
+    parameters = {v.name for v in description.modelVariables if v.causality == "parameter"}
+    of_parameters = set()
+    for unknown in (*description.outputs, *description.derivatives):
+        known = {v.name for v in unknown.dependencies} & parameters
+        assert known in (set(), parameters)
+        of_parameters |= {unknown.variable.name} if known else set()
+    if fmu.fmi == 2:
+        assert not of_parameters
+    else:
+        assert {"shuttle.x", "stop.force", "der(energy.work)"} <= of_parameters
+        assert not {"stop.impact_count", "energy.work"} & of_parameters
 
 
 def test_capabilities_are_declared(fmu):
@@ -200,6 +225,39 @@ def test_the_source_is_one_file_of_one_version(mechanisms):
         assert f"fmi{other}GetVersion" not in text
         assert text.count("/* ") == text.count("*/") or "*/ title" not in text
     assert UNIT in kernel()
+
+
+STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="calls cc and nm as they are on Linux")
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_source_makes_a_library_that_needs_no_resources(native, tmp_path, fmi):
+    """As a receiver compiles it who takes headers and flags of his own."""
+    with zipfile.ZipFile(native["PRBDM", fmi]) as archive:
+        archive.extractall(tmp_path)
+    sources = tmp_path / "sources"
+    if fmi == 3:
+        listed = etree.parse(sources / "buildDescription.xml").getroot()
+    else:
+        listed = etree.parse(tmp_path / "modelDescription.xml").find("CoSimulation")
+    names = [file.get("name") for file in listed.iter("File", "SourceFile")]
+    definitions = [f"-D{d.get('name')}" for d in listed.iter("PreprocessorDefinition")]
+    command = ["cc", *STRICT, f"-I{Path(fmpy.__file__).parent / 'c-code'}", *names]
+    (library,) = (tmp_path / "binaries").rglob("*.so")
+    subprocess.run(
+        [*command, *definitions, "-O1", "-fPIC", "-shared", "-o", library, "-lm"],
+        cwd=sources, check=True,
+    )  # fmt: skip
+    shutil.rmtree(tmp_path / "resources")
+    result = simulate_fmu(str(tmp_path), output=["stop.impact_count"])
+    assert result["stop.impact_count"][-1] == 14
+    if fmi == 3:  # the headers of FMI 2.0 that FMPy brings know no prefix
+        subprocess.run([*command, "-c", "-o", "static.o"], cwd=sources, check=True)
+        found = subprocess.check_output(["nm", "-g", "--defined-only", "static.o"], cwd=sources)
+        shown = {line.split()[-1] for line in found.decode().splitlines()}
+        assert shown
+        assert all(name.startswith("PRBDM_fmi3") for name in shown)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

@@ -435,11 +435,16 @@ class Simulation:
         radian means for them.
         """
         n = self.system.n
+        angle, rate, energy = self.magnitudes()
         scale = np.abs(y)
-        scale[:n] = 1.0
-        np.maximum(scale[n : 2 * n], self._omega_scale(), out=scale[n : 2 * n])
-        np.maximum(scale[2 * n :], self._energy_scale, out=scale[2 * n :])
+        scale[:n] = angle
+        np.maximum(scale[n : 2 * n], rate, out=scale[n : 2 * n])
+        np.maximum(scale[2 * n :], energy, out=scale[2 * n :])
         return scale
+
+    def magnitudes(self) -> tuple[float, float, float]:
+        """Return an angle [rad], and the rate [rad/s] and energy [J] that it means."""
+        return 1.0, self._omega_scale(), self._energy_scale
 
     def _omega_scale(self) -> float:
         """Return the angular frequency against which rates are measured [rad/s]."""

@@ -149,19 +149,25 @@ def _fmi3(heading: Heading, mechanism: Mechanism, interface: NativeInterface) ->
         SubElement(listed, TYPES_3[v.type], _attributes(v, reference))
     structure = SubElement(root, "ModelStructure")
     known = dependencies(mechanism, interface)
+    parameters = tuple(v.name for v in interface.variables if v.causality == "parameter")
 
     def add(element: str, name: str, names: Iterable[str]) -> None:
         SubElement(structure, element, _unknown("valueReference", name, names, reference))
 
+    def add_moving(element: str, name: str) -> None:
+        """Add what follows from states and inputs, and so from the parameters: knowns here too."""
+        computed = {*known[name]} - {name}
+        add(element, name, (*parameters, *known[name]) if computed else known[name])
+
     for v in interface.variables:
         if v.causality == "output":
-            add("Output", v.name, known[v.name])
+            add_moving("Output", v.name)
     for name in interface.derivatives:
-        add("ContinuousStateDerivative", name, known[name])
+        add_moving("ContinuousStateDerivative", name)
     for v in initial_unknowns(interface):
         add("InitialUnknown", v.name, initial_dependencies(v, interface.variables))
     for name in interface.indicators:
-        add("EventIndicator", name, known[name])
+        add_moving("EventIndicator", name)
     return serialized(root)
 
 

@@ -18,7 +18,7 @@ from .reference import reference
 from .slaves.resolved import FILE as MODEL
 from .slaves.resolved import resolved
 from .sources import TABLES, amalgamation, build_description, kernel, tables_header
-from .start import interface, start_sample
+from .start import interface, magnitudes, start_sample
 from .tables import FILE, tables
 from .variables import CLOCK, NativeInterface, native_interface
 
@@ -119,6 +119,7 @@ def described(
         mechanism,
         interface(mechanism, changes),
         start_sample(mechanism, {}),
+        magnitudes(mechanism, changes),
         independent(mechanism),
         time=fmi == 3,
         clock=clock,

@@ -11,6 +11,7 @@ UNIT = "prbm_fmu.c"  # the one file that is compiled: it includes all others
 TABLES = "mechanism_tables.h"
 WRAPPERS = {2: "fmi2.c", 3: "fmi3.c"}
 INCLUDE = re.compile(r'#\s*include\s+"([^"]+)"\s*')
+OVERRIDE = "FMI{}_OVERRIDE_FUNCTION_PREFIX"
 BYTES_A_LINE = 20
 
 HEAD = """\
@@ -19,8 +20,12 @@ HEAD = """\
  * The C kernel of {tool} as one file.  Everything is static but the functions of
  * FMI {version}.0, whose headers the importer brings.  {tables} holds the mechanism, so
  * that no file has to be read where it runs.  Compile it without -ffast-math and, for results
- * that are the same on every platform, with -ffp-contract=off.
+ * that are the same on every platform, with -ffp-contract=off.  With the headers of the standard
+ * its functions get the prefix {name}_, unless {override} is defined.
  */
+#ifndef {prefix}
+#define {prefix} {name}_
+#endif
 #ifndef PRBM_FMI
 #define PRBM_FMI {version}
 #endif
@@ -50,6 +55,8 @@ def amalgamation(name: str, title: str, version: int) -> str:
         tool=GENERATION_TOOL,
         version=version,
         tables=TABLES,
+        prefix=f"FMI{version}_FUNCTION_PREFIX",
+        override=OVERRIDE.format(version),
     )
     return head + "\n".join(_lines(UNIT, texts, left_out)) + "\n"
 
@@ -83,9 +90,12 @@ def tables_header(tables: bytes) -> str:
 
 
 def build_description(identifier: str, source: str) -> bytes:
-    """Return the buildDescription.xml of FMI 3.0, which FMI 2.0 may have too."""
+    """Return the buildDescription.xml of FMI 3.0: how a shared library is made."""
     root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     sources = SubElement(configuration, "SourceFileSet", {"language": "C99"})
     SubElement(sources, "SourceFile", {"name": source})
+    override = {"name": OVERRIDE.format(3), "optional": "true"}
+    text = "Functions without the prefix of the model, as a shared library has them"
+    SubElement(sources, "PreprocessorDefinition", override | {"description": text})
     return serialized(root)

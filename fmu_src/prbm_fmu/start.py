@@ -18,6 +18,11 @@ def start_sample(mechanism: Mechanism, changes: Mapping[str, float]) -> dict[str
     return dict(Simulation(mechanism, changes).outputs())
 
 
+def magnitudes(mechanism: Mechanism, changes: Mapping[str, float]) -> tuple[float, float, float]:
+    """Return what angles [rad], rates [rad/s] and energies [J] are measured against."""
+    return Simulation(mechanism, changes).magnitudes()
+
+
 def interface(mechanism: Mechanism, changes: Mapping[str, float]) -> tuple[Variable, ...]:
     """Return the variables that every FMU of a mechanism has, with other start values.
 

@@ -146,6 +146,10 @@ def _power_of_ten(value: float) -> float:
     return float(f"1e{round(math.log10(value))}")
 
 
+def _next_power_of_ten(value: float) -> float:
+    return float(f"1e{math.ceil(math.log10(value))}")
+
+
 def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Variable, ...]:
     """Return all variables of a mechanism, in the order of the interface.
 
@@ -415,6 +419,7 @@ def _link(link: str, nominal: Scales) -> Iterator[Variable]:
             f"Angle of link {number} of the flexures, counter-clockwise from +x", nominal,
         ),
         causality="local",
+        nominal=1.0,  # it is absolute
     )  # fmt: skip
     yield angle
     yield replace(
@@ -454,6 +459,7 @@ def native_interface(
     mechanism: Mechanism,
     plain: Sequence[Variable],
     sample: Mapping[str, Number],
+    magnitudes: tuple[float, float, float],
     independent: Sequence[int],
     *,
     time: bool = False,
@@ -469,6 +475,9 @@ def native_interface(
         The variables that every flavour has.
     sample : mapping
         All outputs at the start.
+    magnitudes : tuple of float
+        Of those states that are angles, rates and energies; their nominal values are the next
+        powers of ten, as the C kernel gives them.
     independent : sequence of int
         The coordinates whose angles and rates are states.
     time : bool
@@ -486,12 +495,20 @@ def native_interface(
     angles = tuple(f"{names[j]}.angle" for j in independent)
     rates = tuple(f"{names[j]}.omega" for j in independent)
     states = (*angles, *rates, *STORED)
+    nominals = {
+        name: _next_power_of_ten(size)
+        for kind, size in zip((angles, rates, STORED), magnitudes, strict=True)
+        for name in kind
+    }
     accelerations = state_derivatives(names, independent)
     indicators = tuple(_indicators(mechanism))
     clocks = tuple(f"{stop.name}.impact" for stop in mechanism.stops) if clock else ()
     listed = (
         *([TIME] if time else []),
-        *(replace(v, reinit=True) if v.name in states else v for v in plain),
+        *(
+            replace(v, reinit=True, nominal=nominals[v.name]) if v.name in nominals else v
+            for v in plain
+        ),
         *(_derivative(name, nominal) for name in accelerations),
         *indicators,
         *map(_clock, clocks),

@@ -231,13 +231,30 @@ PRBM void exchange_get(const Simulation *simulation, double *x) {
     copy(exchange_states(simulation), simulation->states, x);
 }
 
+/* The next power of ten that is not below: what modelDescription.xml has for a nominal.  A solver's
+ * absolute tolerance goes with it; one below the scale of the motion would have it count roundings. */
+static double next_power_of_ten(double value) {
+    double power = 1.0; /* exact to 1e22 */
+    if (value <= 1.0) {
+        while (value * power * 10.0 <= 1.0) {
+            power *= 10.0;
+        }
+        return 1.0 / power;
+    }
+    while (power < value) {
+        power *= 10.0;
+    }
+    return power;
+}
+
 PRBM void exchange_nominals(const Simulation *simulation, double *x) {
     int count = simulation->mechanism->independent_count;
+    double rate = next_power_of_ten(omega_scale(simulation));
     for (int k = 0; k < count; k++) {
         x[k] = 1.0;
-        x[count + k] = omega_scale(simulation);
+        x[count + k] = rate;
     }
-    x[2 * count] = x[2 * count + 1] = simulation->energy_scale;
+    x[2 * count] = x[2 * count + 1] = next_power_of_ten(simulation->energy_scale);
 }
 
 PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *problem) {
@@ -379,9 +396,16 @@ static void changed_front(Simulation *sim) {
     sim->output_level = 0;
 }
 
-/* Give what holds the present velocities of its walls.  The impulses, which may pull here where a
- * hop too small to follow would be the truth, are booked as at an impact. */
-static bool follow(Simulation *sim, Problem *problem) {
+/* Whether an impulse on a held stop pulls more than it was pressed since the last event: then its
+ * wall has retreated faster than the body could follow. */
+static bool left_behind(const Simulation *sim, int k, double P) {
+    double since = sim->now->time - sim->held_times[sim->equations.held[k]];
+    return -P > greater(margin_release(sim, k), 0.0) * since;
+}
+
+/* Give what holds the present velocities of its walls, if what was pressed meanwhile bears the
+ * change.  The impulses, which may pull a little, are booked as at an impact. */
+static bool follow(Simulation *sim, bool *followed, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
     int n = sim->system.n, r = q->r, size = n + r;
@@ -396,16 +420,32 @@ static bool follow(Simulation *sim, Problem *problem) {
         x[n + k] = -(dot(n, rows + k * n, v) + prescribed(q, k));
     }
     bool right = solve(size, kkt, x, &sim->scratch, problem);
+    *followed = right;
     for (int k = 0; right && k < q->held_count; k++) {
+        bool turned = fabs(wall_turn(sim, q->held[k])) > still(sim);
+        *followed = *followed && !(turned && left_behind(sim, k, -x[n + q->first_hold + k]));
+    }
+    for (int k = 0; *followed && k < q->held_count; k++) {
         int i = q->held[k], row = q->first_hold + k;
         double P = -x[n + row], wall = sim->walls[i].rate;
         double before = dot(n, rows + row * n, v) + wall;
         y[2 * n] -= P * before / 2; /* and nothing after */
         y[2 * n + 1] -= P * wall;
     }
-    add_scaled(right ? n : 0, 1.0, x, v);
+    add_scaled(*followed ? n : 0, 1.0, x, v);
     sim->scratch.used = mark;
-    return right && project(&sim->equations, sim->now->time, y, &sim->scratch, problem);
+    return right && (!*followed ||
+                     project(&sim->equations, sim->now->time, y, &sim->scratch, problem));
+}
+
+/* Let go of what rests on walls that have changed their velocity, or have them strike. */
+static bool break_away(Simulation *sim, Problem *problem) {
+    int struck = unsettled_by_walls(sim);
+    if (struck >= 0) {
+        return impact(sim, struck, problem);
+    }
+    return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
+           settle(sim, NULL, 0, NO_EVENT, 0, problem);
 }
 
 /* Bring held stops back onto their walls, let them go or strike where a wall has changed its
@@ -418,20 +458,14 @@ static bool follow_walls(Simulation *sim, Problem *problem) {
         turned = turned || turn > still(sim);
         jumped = jumped || turn > 2.0 * turn_allowed(sim, i);
     }
-    if (jumped) {
-        int struck = unsettled_by_walls(sim);
-        changed_front(sim);
-        if (struck >= 0) {
-            return impact(sim, struck, problem);
-        }
-        return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
-               settle(sim, NULL, 0, NO_EVENT, 0, problem);
+    bool followed = false;
+    if (!jumped && (turned || drifted) && !follow(sim, &followed, problem)) {
+        return false;
     }
     if (turned || drifted) {
         changed_front(sim);
-        return follow(sim, problem);
     }
-    return true;
+    return followed || !turned || break_away(sim, problem);
 }
 
 /* What has stopped sliding is at rest: a solver overshoots by its own resolution of time, which
@@ -517,6 +551,7 @@ static void arm(Simulation *sim) {
             sim->floors[i] += greater(0.0, -gap(q, i, sim->now->time, q->e));
         }
         sim->held_rates[i] = sim->walls[i].rate;
+        sim->held_times[i] = sim->now->time;
     }
 }
 

@@ -48,7 +48,7 @@ static void place_state(Simulation *sim, Memory *memory) {
     size_t np = (size_t)m->parameter_count, nu = (size_t)m->input_count;
     size_t nx = 2 * (size_t)m->independent_count + 2;
     size_t counts[] = {sizeof(Scalars) / d, np, nu, np, nu, 3 * s, s, s, (size_t)m->friction_count,
-                       sizeof(Latched) / d * s, ny, ny, ny, STAGES * ny, nx, s, s};
+                       sizeof(Latched) / d * s, ny, ny, ny, STAGES * ny, nx, s, s, s};
     enum { GROUPS = sizeof counts / sizeof counts[0] };
     double *parts[GROUPS];
     size_t count = 0;
@@ -81,6 +81,7 @@ static void place_state(Simulation *sim, Memory *memory) {
         sim->states = parts[14];
         sim->floors = parts[15];
         sim->held_rates = parts[16];
+        sim->held_times = parts[17];
     }
 }
 

@@ -50,7 +50,8 @@ struct Simulation {
     double *front, *k1;                   /* (ny,): the end of the last step, its rates */
     double *arc_y, *arc_k;                /* (ny,), (STAGES, ny): the last step */
     double *states;                       /* model exchange: as they were set */
-    double *floors, *held_rates;          /* (s,): below which a gap closes; of held walls */
+    double *floors;                       /* (s,): below which a gap closes */
+    double *held_rates, *held_times;      /* (s,): of the walls at the last event, and its time */
     /* not state: what can be computed again */
     Discrete discrete, other;
     double omega, energy_scale;
