@@ -1,0 +1,281 @@
+/* Fuzzes what reads a mechanism's tables, and the simulation of what is accepted.
+ *
+ * A target of libFuzzer (clang -fsanitize=fuzzer,...), or with -DSTANDALONE a program that mutates
+ * the files it is given by itself:
+ *
+ *     tables SECONDS SEED FILE...
+ *
+ * Mutated tables get their size and checksum put right most of the time: what is behind them is
+ * of more interest than they are.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#include "simulation.h"
+
+enum {
+    HEAD = 16,
+    SIZE_AT = 8,
+    CHECKSUM_AT = 12,
+    MOST_SIMULATED = 24 /* coordinates: larger ones take too long */
+};
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most);
+size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed);
+
+static unsigned long opened, moved; /* how deep the inputs got */
+
+/* --- what is done with an input --- */
+
+static void must(bool fact, const char *what) {
+    if (!fact) {
+        fprintf(stderr, "tables: %s\n", what);
+        abort();
+    }
+}
+
+static void read_all(Simulation *simulation) {
+    const Mechanism *mechanism = simulation_mechanism(simulation);
+    Problem problem;
+    double x;
+    for (int i = 0; i < mechanism->variable_count; i++) {
+        (void)simulation_get(simulation, mechanism->variables[i].slot, &x, &problem);
+    }
+}
+
+/* A small part of a period, so that no input takes long. */
+static double short_time(Simulation *simulation) {
+    const Mechanism *mechanism = simulation_mechanism(simulation);
+    Problem problem;
+    double frequency = 0.0;
+    bool known = simulation_get(simulation, mechanism->slots.frequency, &frequency, &problem);
+    return known && frequency > 1.0 ? 1e-3 / frequency : 1e-3;
+}
+
+static void advance(Simulation *simulation) {
+    Problem problem;
+    double time = short_time(simulation);
+    bool event;
+    read_all(simulation);
+    if (simulation_advance(simulation, time, &problem) &&
+        simulation_advance_some(simulation, 2 * time, false, &event, &problem) && event) {
+        (void)simulation_happen(simulation, &problem);
+    }
+    read_all(simulation);
+}
+
+static void exchange(Simulation *simulation) {
+    Problem problem;
+    int n = exchange_states(simulation), m = exchange_indicators(simulation);
+    double *x = malloc(((size_t)n + 1) * sizeof *x), *dx = malloc(((size_t)n + 1) * sizeof *dx);
+    double *z = malloc(((size_t)m + 1) * sizeof *z);
+    bool event, changed;
+    must(x && dx && z, "no memory");
+    exchange_get(simulation, x);
+    exchange_set(simulation, x);
+    exchange_set_time(simulation, 1e-6);
+    exchange_nominals(simulation, dx);
+    (void)exchange_derivatives(simulation, dx, &problem);
+    (void)exchange_event_indicators(simulation, z, &problem);
+    (void)exchange_completed_step(simulation, &event, &problem);
+    (void)exchange_event(simulation, &changed, &problem);
+    read_all(simulation);
+    free(x);
+    free(dx);
+    free(z);
+}
+
+static void start(const Mechanism *mechanism, bool for_exchange) {
+    Problem problem = {{0}};
+    Simulation *simulation = simulation_open(mechanism);
+    if (!simulation) {
+        return;
+    }
+    if (simulation_start(simulation, 0.0, 0.0, for_exchange, &problem)) {
+        moved++;
+        for_exchange ? exchange(simulation) : advance(simulation);
+    } else {
+        must(problem.text[0], "refused to start without a reason");
+    }
+    simulation_close(simulation);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
+    Problem problem = {{0}};
+    uint8_t *bytes = malloc(size ? size : 1); /* no longer, so that no byte after it is read */
+    must(bytes, "no memory");
+    memcpy(bytes, data, size);
+    Mechanism *mechanism = mechanism_open(bytes, size, &problem);
+    free(bytes);
+    if (!mechanism) {
+        must(problem.text[0] && memchr(problem.text, 0, sizeof problem.text),
+             "refused without a reason");
+        return 0;
+    }
+    opened++;
+    if (mechanism->coordinate_count <= MOST_SIMULATED) {
+        start(mechanism, false);
+        start(mechanism, true);
+    }
+    mechanism_close(mechanism);
+    return 0;
+}
+
+/* --- mutations --- */
+
+static void put_u32(uint8_t *at, uint32_t x) {
+    for (int i = 0; i < 4; i++) {
+        at[i] = (uint8_t)(x >> 8 * i);
+    }
+}
+
+/* CRC-32 as of zlib, bit by bit. */
+static uint32_t crc(const uint8_t *bytes, size_t size) {
+    uint32_t c = 0xFFFFFFFFu;
+    for (size_t i = 0; i < size; i++) {
+        c ^= bytes[i];
+        for (int k = 0; k < 8; k++) {
+            c = c >> 1 ^ (c & 1 ? 0xEDB88320u : 0);
+        }
+    }
+    return ~c;
+}
+
+static void put_right(uint8_t *data, size_t size) {
+    if (size >= HEAD) {
+        memcpy(data, "PRBM\1\0\0", SIZE_AT);
+        put_u32(data + SIZE_AT, (uint32_t)size);
+        put_u32(data + CHECKSUM_AT, crc(data + HEAD, size - HEAD));
+    }
+}
+
+static uint64_t generator;
+
+static uint32_t arbitrary(uint32_t below) {
+    generator = generator * 6364136223846793005u + 1442695040888963407u;
+    return (uint32_t)(generator >> 33) % below;
+}
+
+static void overwrite(uint8_t *data, size_t size) {
+    static const uint32_t counts[] = {0, 1, 2, 3, 7, 64, 255, 1000, 65536, 0x7FFFFFFF, 0xFFFFFFFF};
+    static const double numbers[] = {0.0,   -0.0,  1.0,  -1.0, 1e-3,     1e3,       1e-9, 1e9,
+                                     1e300, 5e-324, 90.0, 45.0, INFINITY, -INFINITY, NAN};
+    size_t place = arbitrary((uint32_t)size);
+    if (arbitrary(3) == 0) {
+        data[place] = (uint8_t)(data[place] ^ 1u << arbitrary(8));
+    } else if (arbitrary(2) == 0 && place + 4 <= size) {
+        put_u32(data + place, counts[arbitrary(sizeof counts / sizeof *counts)]);
+    } else if (place + 8 <= size) {
+        double x = numbers[arbitrary(sizeof numbers / sizeof *numbers)];
+        memcpy(data + place, &x, sizeof x);
+    }
+}
+
+/* Numbers that are somewhat larger or smaller keep tables valid and lead to other motions. */
+static void scale(uint8_t *data, size_t size) {
+    for (int tries = 0; tries < 64; tries++) {
+        size_t place = arbitrary((uint32_t)size);
+        double x;
+        if (place + 8 > size) {
+            continue;
+        }
+        memcpy(&x, data + place, sizeof x);
+        if (fabs(x) > 1e-12 && fabs(x) < 1e15) {
+            static const double factors[] = {0.5, 0.9, 1.1, 2.0, -1.0, 10.0, 0.1};
+            x *= factors[arbitrary(sizeof factors / sizeof *factors)];
+            memcpy(data + place, &x, sizeof x);
+            return;
+        }
+    }
+}
+
+static size_t cut_or_copy(uint8_t *data, size_t size, size_t most) {
+    size_t from = arbitrary((uint32_t)size), length = 1 + arbitrary(40);
+    if (from + length > size) {
+        length = size - from;
+    }
+    if (arbitrary(2) == 0) {
+        memmove(data + from, data + from + length, size - from - length);
+        return size - length;
+    }
+    if (size + length > most) {
+        return size;
+    }
+    memmove(data + from + length, data + from, size - from);
+    return size + length;
+}
+
+static size_t mutated(uint8_t *data, size_t size, size_t most) {
+    for (uint32_t count = 1 + arbitrary(4); count > 0 && size > HEAD; count--) {
+        switch (arbitrary(5)) {
+        case 0:
+            size = cut_or_copy(data, size, most);
+            break;
+        case 1:
+            overwrite(data, size);
+            break;
+        default:
+            scale(data, size);
+        }
+    }
+    return size;
+}
+
+size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed) {
+    generator = seed * 0x9E3779B97F4A7C15u + 1;
+    size = arbitrary(2) && size > HEAD ? mutated(data, size, most)
+                                       : LLVMFuzzerMutate(data, size, most);
+    if (arbitrary(10)) {
+        put_right(data, size);
+    }
+    return size;
+}
+
+#if defined(STANDALONE)
+
+enum { ROOM_FOR_TABLES = 1 << 18, MOST_FILES = 16 };
+
+size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most) {
+    (void)most;
+    if (size) {
+        overwrite(data, size);
+    }
+    return size;
+}
+
+int main(int count, char **words) {
+    static uint8_t files[MOST_FILES][ROOM_FOR_TABLES], data[ROOM_FOR_TABLES];
+    size_t sizes[MOST_FILES];
+    int given = 0;
+    unsigned seed = count > 2 ? (unsigned)strtoul(words[2], NULL, 10) : 0;
+    unsigned long tried = 0;
+    time_t end = time(NULL) + (count > 1 ? atol(words[1]) : 0);
+    for (int i = 3; i < count && given < MOST_FILES; i++, given++) {
+        FILE *file = fopen(words[i], "rb");
+        must(file != NULL, "a file cannot be read");
+        sizes[given] = fread(files[given], 1, ROOM_FOR_TABLES, file);
+        fclose(file);
+        (void)LLVMFuzzerTestOneInput(files[given], sizes[given]);
+    }
+    must(given && moved == 2 * (unsigned long)given, "the files themselves must be accepted");
+    for (; time(NULL) < end; tried++) {
+        size_t which = tried % (size_t)given, size = sizes[which];
+        memcpy(data, files[which], size);
+        size = LLVMFuzzerCustomMutator(data, size, ROOM_FOR_TABLES, seed + (unsigned)tried);
+        if (getenv("KEEP")) { /* what a crash leaves to look at */
+            FILE *file = fopen(getenv("KEEP"), "wb");
+            must(file != NULL, "the input cannot be kept");
+            fwrite(data, 1, size, file);
+            fclose(file);
+        }
+        (void)LLVMFuzzerTestOneInput(data, size);
+    }
+    printf("%lu tables, %lu accepted, %lu started\n", tried, opened, moved);
+    return 0;
+}
+
+#endif
