@@ -1,0 +1,844 @@
+"""A native FMU does what the engine does, through every interface that it has."""
+
+import threading
+from ctypes import c_double
+from itertools import pairwise
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+
+from native_host import OK, WAYS, Instance, Integrator, clocked, unpacked
+from prbm import Simulation
+from prbm_fmu import native_fmu
+from prbm_fmu.archive import write
+from prbm_fmu.native_fmu import described
+from support import mechanism, simulation
+
+MODELS = ("PRBDM", "PRBDM2R")
+END, SEEN = 0.3, 0.01  # s; the default run bounces until 0.243 s, then it rests
+IMPACTS = 14
+ways = pytest.mark.parametrize(("fmi", "kind"), WAYS)
+models = pytest.mark.parametrize("model", MODELS)
+
+pytestmark = [pytest.mark.fmu, pytest.mark.native]
+
+
+def points(step: float, end: float = END) -> np.ndarray:
+    return step * np.arange(round(end / step) + 1)
+
+
+def uneven(end: float) -> np.ndarray:
+    """Communication points with steps over three decades that include every SEEN."""
+    rng = np.random.default_rng(0)
+    inner = np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
+    return np.unique(np.concatenate([[0.0], inner[inner < end], points(SEEN, end)]))
+
+
+GRIDS = {
+    "0.1 ms": points(1e-4), "1 ms": points(1e-3), "50 ms": points(0.05), "uneven": uneven(END),
+}  # fmt: skip
+
+
+def slopes(sim: Simulation, listed: dict, now: dict) -> dict[str, float]:
+    """Return the derivatives that are declared, by differences ahead of the present state."""
+    h, before, later = 1e-6, sim.snapshot(), []
+    for step in (h, 2 * h):
+        sim.advance(now["time"] + step)
+        later.append(sim.outputs())
+    sim.restore(before)
+    ders = [name for name in listed if name.startswith("der(")]
+    result = {}
+    for name in ders:
+        state = name.removeprefix("der(").removesuffix(")")
+        one, two = (outputs[state] - now[state] for outputs in later)
+        result[name] = (4 * one - two) / (2 * h)
+    return result
+
+
+@pytest.fixture(scope="module")
+def engine_runs():
+    """Return what the engine says at every SEEN, all that is declared, by model."""
+    runs = {}
+    for model in MODELS:
+        listed = {v.name: v for v in described(mechanism(model), {}, 3).variables}
+        sim = simulation(model)
+        given = {n: v.start for n, v in listed.items() if v.start is not None}
+        rows = []
+        for t in points(SEEN):
+            sim.advance(t)
+            rows.append(given | sim.outputs() | {"time": t})
+            rows[-1] |= slopes(sim, listed, rows[-1])
+        runs[model] = SimpleNamespace(listed=listed, rows=rows, record=sim.record)
+    return runs
+
+
+def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: float = 1e-7) -> None:
+    """Every variable that is declared agrees to a share of its nominal value.
+
+    Event indicators are positive between events.  Derivatives (up to 2e5 rad/s2) are compared with
+    differences of the engine, which interpolates: its fast modes keep a noise of 1e-4 rad/s in
+    the worst case, which changes within 1e-3 s or less.
+    """
+    found = instance.values()
+    compared = set()
+    for name, value in found.items():
+        compared.add(name)
+        if name.endswith("_indicator"):
+            assert value > 0.0, name
+            continue
+        scale = max(listed[name].nominal or 1.0, abs(expected[name]))
+        bound = 1e-2 if name.startswith("der(") else tolerance
+        assert abs(value - expected[name]) <= bound * scale, (name, value, expected[name])
+    assert compared == instance.references.keys()
+    assert compared == set(listed) - ({"time"} if instance.version == 2 else set())
+
+
+def worst(found: np.ndarray, expected: np.ndarray, name: str) -> float:
+    return float(np.abs(found[name] - expected[name]).max())
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+@pytest.mark.parametrize("fmi", [2, 3])
+@models
+def test_co_simulation_is_the_engine_whatever_the_communication_step(
+    native, engine_runs, model, fmi, grid
+):
+    """To 1e-7 of each nominal: rounding, times what the motion amplifies it by."""
+    run = engine_runs[model]
+    with Instance(native[model, fmi]).initialize() as instance:
+        assert_equal(instance, run.rows[0], run.listed)
+        compared = 0
+        for begin, end in pairwise(GRIDS[grid]):
+            assert instance.step(begin, end - begin) == OK
+            k = round(end / SEEN)
+            if abs(end - k * SEEN) < 1e-12:
+                assert_equal(instance, run.rows[k], run.listed)
+                compared += 1
+    assert compared == (6 if grid == "50 ms" else 30)
+    assert run.rows[-1]["stop.contact"]
+    assert run.rows[-1]["stop.impact_count"] == IMPACTS
+
+
+@models
+def test_the_communication_step_leaves_no_trace(native, model):
+    """Nor does the version: the bytes at a time are the same however it was reached.
+
+    Steps of so many 2^-16 s, so that their sums are exact.
+    """
+    rng, found = np.random.default_rng(0), set()
+    inner = np.unique(rng.integers(1, 2**14, 100))
+    for counts in (range(0, 2**14 + 1, 2**4), (0, 2**14), (0, *inner, 2**14)):
+        grid = np.array([*counts]) / 2**16
+        for fmi, kind in ((2, "cs"), (3, "cs"), (3, "events")):
+            with Instance(native[model, fmi], kind).initialize() as instance:
+                for end in grid[1:]:
+                    instance.advance(end)
+                values = {n: v for n, v in instance.values().items() if n != "time"}
+                found.add(np.array([*values.values()], dtype=float).tobytes())
+    assert values["stop.impact_count"] == IMPACTS
+    assert len(found) == 1
+
+
+@pytest.mark.parametrize("kind", ["cs", "events", "late"])
+@models
+def test_event_mode_shows_the_same_trajectory(native, engine_runs, model, kind):
+    run = engine_runs[model]
+    with Instance(native[model, 3], kind).initialize() as instance:
+        for row in run.rows[1:]:
+            instance.advance(row["time"])
+            assert_equal(instance, row, run.listed)
+
+
+@models
+def test_a_native_fmu_is_the_python_fmu(fmus, native, model):
+    """The default run in FMPy: to 1e-7 m and 1e-7 s in the times of all impacts."""
+    python = simulate_fmu(str(fmus[model]))
+    for fmi in (2, 3):
+        ours = simulate_fmu(str(native[model, fmi]))
+        assert python.dtype.names == ours.dtype.names
+        assert (python["time"] == ours["time"]).all()
+        assert len(ours) == 1001
+        for name in ("shuttle.x", "shuttle.y", "stop.impact_time"):
+            assert worst(ours, python, name) <= 1e-7, name  # m, s
+        assert (ours["stop.impact_count"] == python["stop.impact_count"]).all()
+        assert ours["stop.impact_count"][-1] == IMPACTS
+        assert ours["stop.contact"][-1]
+
+
+# -- model exchange --
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@models
+def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
+    """At a relative tolerance of 1e-9: positions to 1e-6 of the release, the same 14 impacts.
+
+    The last bounces are slow (1 mm/s): an error of 1e-9 m in place is one of 1e-6 s in time.
+    """
+    options = {"stop_time": END, "output_interval": 1e-3, "record_events": False}
+    expected = simulate_fmu(str(native[model, fmi]), stop_time=END, output_interval=1e-3)
+    found = simulate_fmu(
+        str(native[model, fmi]), fmi_type="ModelExchange", relative_tolerance=1e-9, **options
+    )
+    assert found["time"] == pytest.approx(expected["time"], abs=1e-12)
+    assert worst(found, expected, "shuttle.x") < 1e-6 * 0.018  # m
+    assert worst(found, expected, "shuttle.y") < 1e-6 * 0.018
+    assert worst(found, expected, "shuttle.angle") < 1e-6  # rad
+    assert worst(found, expected, "shuttle.vx") < 5e-6  # m/s: of 0.5; late impacts are a bit off
+    assert worst(found, expected, "stop.impact_time") < 5e-6  # s
+    assert (found["stop.impact_count"] == expected["stop.impact_count"]).all()
+    assert found["stop.impact_count"][-1] == IMPACTS
+    assert found["stop.contact"][-1] == expected["stop.contact"][-1] == True  # noqa: E712
+    assert found["stop.force"][-1] == pytest.approx(expected["stop.force"][-1], rel=1e-6)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@models
+def test_model_exchange_at_fmpys_default_settings_tells_the_same_story(native, model, fmi):
+    """FMPy takes the default experiment's tolerance, 1e-8: within 1e-7 m, of a release by 18 mm."""
+    path = str(native[model, fmi])
+    expected = simulate_fmu(path)
+    found = simulate_fmu(path, fmi_type="ModelExchange", record_events=False)
+    x = np.interp(found["time"], expected["time"], expected["shuttle.x"])
+    same = np.isin(np.round(found["time"], 9), np.round(expected["time"], 9))
+    assert same.sum() > 100
+    assert np.abs(found["shuttle.x"] - x)[same].max() < 1e-7  # m
+    assert found["stop.impact_count"][-1] == expected["stop.impact_count"][-1] == IMPACTS
+    assert found["stop.contact"][-1]
+    assert found["stop.force"][-1] == pytest.approx(expected["stop.force"][-1], rel=1e-5)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_model_exchange_with_cvode_shows_each_impact_before_and_after(native, engine_runs, fmi):
+    """Two rows at one time; the times as exact as the positions are."""
+    found = simulate_fmu(
+        str(native["PRBDM2R", fmi]), fmi_type="ModelExchange", relative_tolerance=1e-9,
+        stop_time=END, output=["stop.gap_rate", "stop.impact_count", "stop.impact_time"],
+    )  # fmt: skip
+    hits = np.flatnonzero(np.diff(found["stop.impact_count"]))
+    record = engine_runs["PRBDM2R"].record
+    assert len(hits) == len(record) == IMPACTS
+    for k, impact in zip(hits, record, strict=True):
+        assert found["time"][k] == found["time"][k + 1] == found["stop.impact_time"][k + 1]
+        assert found["time"][k] == pytest.approx(impact.time, abs=1e-6)
+        assert found["stop.gap_rate"][k] < 0.0 < found["stop.gap_rate"][k + 1]
+
+
+@pytest.mark.parametrize(("model", "h"), [("PRBDM", 2e-5), ("PRBDM2R", 4e-6)])
+def test_model_exchange_with_eulers_steps_converges_to_co_simulation(native, model, h):
+    """First order until the first impact; there it sees the impact up to a step too late."""
+    outputs = {"output": ["shuttle.x", "stop.impact_count", "stop.impact_time"]}
+    expected = simulate_fmu(str(native[model, 2]), stop_time=0.05, output_interval=1e-3, **outputs)
+    errors = []
+    for step in (h, h / 2):
+        found = simulate_fmu(
+            str(native[model, 2]), fmi_type="ModelExchange", solver="Euler", step_size=step,
+            output_interval=step, stop_time=0.05, record_events=False, **outputs,
+        )  # fmt: skip
+        stride = round(1e-3 / step)
+        x = found["shuttle.x"][::stride]
+        errors.append(np.abs(x[:41] - expected["shuttle.x"][:41]).max())
+        assert np.abs(x - expected["shuttle.x"]).max() < 5e-5  # m, of 18 mm
+        assert found["stop.impact_count"][-1] == expected["stop.impact_count"][-1] == 1
+        late = found["stop.impact_time"][-1] - expected["stop.impact_time"][-1]
+        assert abs(late) < 2 * step
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)  # first order
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@models
+def test_model_exchange_with_an_integrator_of_our_own_is_the_engine(
+    native, engine_runs, model, fmi
+):
+    """Classical steps of 40 us: every declared variable to 1e-6 of its nominal, and on from there.
+
+    Near the straight shape the 2R's fast modes feel the truncation of such steps, which falls
+    with their fourth power: at 0.06 s, after the first impact, 8e-7 m and then 6e-8 m.
+    """
+    run, errors = engine_runs[model], []
+    for h in (4e-5, 2e-5):
+        with Instance(native[model, fmi], "me", substep=h).initialize() as instance:
+            for row in run.rows[1:4]:
+                instance.advance(row["time"])
+                assert_equal(instance, row, run.listed, 1e-6)
+            instance.advance(run.rows[6]["time"])
+            (x,) = instance.get("shuttle.x")
+            errors.append(abs(x - run.rows[6]["shuttle.x"]))
+    assert errors[1] < max(errors[0] / 10, 1e-9)  # m: what the engine's tolerance leaves
+
+
+# -- events --
+
+
+@models
+def test_event_mode_records_each_impact_before_and_after_at_its_time(native, engine_runs, model):
+    """As FMPy records it: two rows at one time, and the time is the engine's to 1e-9 s."""
+    found = simulate_fmu(
+        str(native[model, 3]), use_event_mode=True, early_return_allowed=True, stop_time=END,
+        output_interval=1e-3,
+        output=["stop.gap_rate", "stop.gap", "stop.impact_count", "stop.impact_time",
+                "stop.approach_speed", "stop.rebound_speed", "stop.contact"],
+    )  # fmt: skip
+    record = engine_runs[model].record
+    twice = np.flatnonzero(np.diff(found["time"]) == 0.0)
+    hits = [k for k in twice if found["stop.impact_count"][k + 1] > found["stop.impact_count"][k]]
+    assert len(hits) == len(record) == IMPACTS
+    for n, (k, impact) in enumerate(zip(hits, record, strict=True)):
+        before, after = found[k], found[k + 1]
+        assert before["time"] == after["time"] == after["stop.impact_time"]
+        assert after["time"] == pytest.approx(impact.time, abs=1e-9)
+        assert before["stop.gap_rate"] < 0.0 < after["stop.gap_rate"]
+        assert (before["stop.impact_count"], after["stop.impact_count"]) == (n, n + 1)
+        assert before["stop.impact_time"] == (found["time"][hits[n - 1]] if n else 0.0)
+        assert abs(before["stop.gap"]) < 1e-12  # m: where the root was found
+        assert after["stop.approach_speed"] == pytest.approx(-before["stop.gap_rate"], rel=1e-9)
+        assert after["stop.rebound_speed"] == pytest.approx(after["stop.gap_rate"], rel=1e-9)
+    captured = [k for k in twice if found["stop.contact"][k + 1] and not found["stop.contact"][k]]
+    assert captured
+    assert captured[-1] > hits[-1]  # coming to rest is an event as well, but no impact
+
+
+def test_without_early_return_the_step_ends_where_it_should_and_tells_of_its_events(native):
+    with Instance(native["PRBDM", 3], "late").initialize() as instance:
+        seen = []
+        for k in range(30):
+            event, _, early, time = instance.fmu.doStep(k * 0.01, 0.01)
+            assert (early, time) == (False, pytest.approx((k + 1) * 0.01, abs=1e-15))
+            seen.append(event)
+            if event:
+                instance.fmu.enterEventMode()
+                instance.update()
+        count, contact = instance.values()["stop.impact_count"], instance.values()["stop.contact"]
+    assert not any(seen[:4])
+    assert seen[4]
+    assert not any(seen[25:])
+    assert (count, contact) == (IMPACTS, True)
+
+
+@models
+def test_an_event_that_waits_shows_the_values_before_it_until_the_update(native, model):
+    """Also through gets in Event Mode, and through evaluateDiscreteStates."""
+    with Instance(native[model, 3], "events").initialize() as instance:
+        event, _, early, time = instance.fmu.doStep(0.0, 0.1)
+        assert (event, early) == (True, True)
+        assert time < 0.1
+        waiting = instance.bytes()
+        instance.fmu.enterEventMode()
+        assert instance.call("EvaluateDiscreteStates") == OK
+        assert instance.bytes() == waiting
+        instance.update()
+        values = instance.values()
+        assert values["time"] == values["stop.impact_time"] == time
+        assert values["stop.impact_count"] == 1
+
+
+def test_rest_ends_when_the_wall_retreats_and_that_is_an_event(native):
+    """In event mode the release is seen; in co-simulation it happens within the step."""
+    found = {}
+    for kind in ("cs", "events", "late"):
+        with Instance(native["PRBDM", 3], kind).initialize() as instance:
+            instance.advance(END)
+            rested, held = instance.values(), []
+            assert rested["stop.contact"]
+            for k in range(40):
+                instance.change({"stop.displacement": 2e-5 * k, "stop.velocity": 0.02})
+                instance.advance(END + (k + 1) * 1e-3)
+                held.append(instance.values()["stop.contact"])
+            found[kind] = instance.values()
+        assert not held[0]
+        assert held[-1]
+        assert found[kind]["shuttle.vx"] == pytest.approx(0.02, rel=1e-9)  # it goes with the wall
+    assert found["cs"]["stop.impact_count"] > IMPACTS
+    for kind in ("events", "late"):  # the wall goes on through an event as it was told
+        assert found[kind] == pytest.approx(found["cs"], rel=1e-9, abs=1e-12)
+
+
+# -- intermediate update --
+
+
+def watched(native, required, **options):
+    """Return an instance whose steps are watched, and what its callback saw."""
+    seen = []
+
+    def update(_, time, may_set, may_get, finished, may_return, early, early_time):
+        references = [instance.references[name] for name in required]
+        seen.append((time, may_set, may_get, finished, may_return,
+                     instance.fmu.getFloat64(references)))  # fmt: skip
+        if len(seen) == instance.patience:
+            early[0] = True
+            early_time[0] = time
+
+    _, description = unpacked(native["PRBDM", 3])
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    instance = Instance(
+        native["PRBDM", 3], options.pop("kind", "cs"), intermediateUpdate=update,
+        requiredIntermediateVariables=[references[name] for name in required], **options,
+    )  # fmt: skip
+    instance.patience = 0
+    return instance, seen
+
+
+def test_intermediate_updates_show_the_motion_within_a_step(native):
+    """At increasing times, with the values of these times, and the result is the same."""
+    instance, seen = watched(native, ["shuttle.x", "time"])
+    with instance.initialize():
+        instance.fmu.doStep(0.0, END)
+        last = instance.values()
+    times = np.array([time for time, *_ in seen])
+    assert len(times) > 50
+    assert (np.diff(times) >= 0.0).all()  # twice the same where an event happens
+    assert times[-1] == END
+    with Instance(native["PRBDM", 3]).initialize() as plain:
+        for time, may_set, may_get, finished, may_return, (x, t) in seen:
+            assert (may_set, may_get, finished, may_return) == (False, True, True, False)
+            assert t == time
+            if time > plain.time:
+                plain.advance(time)
+            assert x == pytest.approx(plain.values()["shuttle.x"], abs=1e-12)  # round-off
+        assert plain.values() == pytest.approx(last, rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["cs", "events"])
+def test_an_importer_may_end_a_step_in_an_intermediate_update(native, kind):
+    instance, seen = watched(native, ["shuttle.x"], kind=kind, earlyReturnAllowed=True)
+    with instance.initialize():
+        instance.patience = 5
+        _, _, early, time = instance.fmu.doStep(0.0, 0.03)
+        assert early
+        assert time == seen[-1][0] < 0.03
+        assert len(seen) == 5
+        assert instance.values()["time"] == time
+        event, _, early, time = instance.fmu.doStep(time, 0.03 - time)
+        assert (event, early, time) == (False, False, 0.03)
+        found = instance.values()
+    with Instance(native["PRBDM", 3]).initialize() as plain:
+        plain.advance(0.03)
+        assert found == pytest.approx(plain.values(), rel=1e-9, abs=1e-12)
+
+
+def test_an_early_return_that_was_not_allowed_is_not_given(native):
+    instance, seen = watched(native, ["shuttle.x"])
+    with instance.initialize():
+        instance.patience = 2
+        assert instance.fmu.doStep(0.0, 0.03)[2:] == (False, 0.03)
+        assert len(seen) > 2
+
+
+def test_in_an_intermediate_update_only_what_was_asked_for_may_be_read(native):
+    statuses = []
+
+    def update(*_):
+        if not statuses:
+            statuses.append(instance.call("Reset"))
+            statuses.append(instance.set({"force.x": 1.0}))
+            statuses.append(instance.call("DoStep", 0.0, 1.0, True, None, None, None, None))
+            statuses.append(instance.call("FreeInstance") or 3)
+            try:
+                instance.get("shuttle.y")
+            except Exception:
+                statuses.append(3)
+
+    instance = Instance(native["PRBDM", 3], intermediateUpdate=update)
+    with instance.initialize():
+        instance.advance(0.01)
+        assert statuses == [3] * 5
+        assert instance.said("shuttle.y was not among the requiredIntermediateVariables")
+        assert instance.said("fmi3Reset cannot be called in Intermediate Update Mode")
+        assert instance.said("return from the callback first")
+        instance.advance(0.02)
+
+
+# -- directional derivatives --
+
+
+@pytest.mark.parametrize("time", [0.02, END])
+@pytest.mark.parametrize("fmi", [2, 3])
+@models
+def test_directional_derivatives_are_those_of_differences(native, model, fmi, time):
+    """Of all outputs and derivatives, along all states and inputs at once; flying and at rest."""
+    rng = np.random.default_rng(fmi)
+    with Instance(native[model, fmi], "me", substep=2e-5 if time < END else 1e-4) as instance:
+        instance.initialize(values={"damping.zeta": 0.05, "friction.coefficient": 0.1,
+                                    "friction.normal_force": 0.2})  # fmt: skip
+        instance.advance(time)
+        d = instance.description
+        states = [u.variable.derivative.name for u in d.derivatives]
+        inputs = [v.name for v in d.modelVariables if v.causality == "input"]
+        unknowns = [u.variable.name for u in (*d.outputs, *d.derivatives)
+                    if u.variable.variability == "continuous"]  # fmt: skip
+        integrator = Integrator(instance)
+        x, u = integrator.x(), np.array(instance.get(*inputs))
+        dx, du = rng.standard_normal(len(x)), rng.standard_normal(len(u))
+        dx[2 * ((len(x) - 2) // 2) :] = 0.0  # what was dissipated has no effect
+
+        def at(step: float) -> np.ndarray:
+            integrator.put(time, x + step * dx)
+            assert instance.set(dict(zip(inputs, u + step * du, strict=True))) == OK
+            return np.array(instance.get(*unknowns))
+
+        references = [
+            [instance.references[n] for n in names] for names in (unknowns, states + inputs)
+        ]
+        nominals = [float(instance.variables[name].nominal or 1.0) for name in unknowns]
+        sizes, errors = np.maximum(np.abs(at(0.0)), nominals), np.full(len(unknowns), np.inf)
+        found = np.array(instance.fmu.getDirectionalDerivative(*references, [*dx, *du]))
+        for h in (1e-4, 3e-5, 1e-5):
+            slope = (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h)
+            errors = np.minimum(errors, np.abs(found - slope) / (np.abs(slope) + 1e-4 * sizes))
+        assert errors.max() < 1e-6, dict(zip(unknowns, errors, strict=True))
+        assert instance.values()["stop.contact"] == (time == END)
+        single = sum(
+            w * np.array(instance.fmu.getDirectionalDerivative(references[0], [r], [1.0]))
+            for w, r in zip([*dx, *du], references[1], strict=True)
+        )
+        at(0.0)
+        assert single == pytest.approx(found, rel=1e-3, abs=1e-3 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@models
+def test_what_depends_on_an_input_or_a_state_says_so(native, model, fmi):
+    """Move each alone: nothing changes but what has it among its dependencies."""
+    rng = np.random.default_rng(0)
+    with Instance(native[model, fmi], "me").initialize() as instance:
+        instance.advance(0.02)
+        d = instance.description
+        unknowns = {
+            u.variable.name: {k.name for k in u.dependencies}
+            for u in (*d.outputs, *d.derivatives)
+            if u.dependencies is not None
+        }
+        inputs = [v.name for v in d.modelVariables if v.causality == "input"]
+        states = [u.variable.derivative.name for u in d.derivatives]
+        assert len(unknowns) == len(d.outputs) + len(d.derivatives)
+        before, moved = instance.values(), 0
+        for name in inputs + states:
+            assert instance.set({name: before[name] + 1e-3 * rng.uniform(0.5, 1.0)}) == OK
+            after = instance.values()
+            changed = {n for n in unknowns if after[n] != before[n]}
+            assert all(name in unknowns[n] for n in changed), name
+            moved += bool(changed)
+            assert instance.set({name: before[name]}) == OK
+            assert instance.values() == before
+    assert moved >= len(states) + 4
+
+
+# -- inputs, parameters, start --
+
+CHANGES = {
+    3: {"force.x": 0.3, "base.acceleration.y": 2.0},
+    5: {"stop.displacement": 1e-3, "stop.velocity": 0.0},
+    8: {"stop.restitution": 0.9, "damping.zeta": 0.05},
+    12: {"stop.displacement": -1e-3, "force.moment": 1e-3},
+}
+"""By the step before which they are set."""
+STARTS = {"release.displacement": -0.01, "stop.position": 2e-3, "force.x": 0.05}
+
+
+@pytest.fixture(scope="module")
+def driven_rows():
+    """Return what the engine says to the changes, from another start time, by model."""
+    result = {}
+    for model in MODELS:
+        listed = {v.name: v for v in described(mechanism(model), {}, 3).variables}
+        sim = Simulation(mechanism(model), STARTS, start_time=2.0, tolerance=1e-9)
+        given = {n: v.start for n, v in listed.items() if v.start is not None} | STARTS
+        rows = []
+        for k in range(20):
+            sim.set(CHANGES.get(k, {}))
+            sim.advance(2.0 + (k + 1) * 0.01)
+            given |= CHANGES.get(k, {})
+            rows.append(given | sim.outputs() | {"time": 2.0 + (k + 1) * 0.01})
+            rows[-1] |= slopes(sim, listed, rows[-1])
+        assert rows[-1]["stop.impact_count"] > 0
+        result[model] = listed, rows
+    return result
+
+
+@pytest.mark.parametrize(("fmi", "kind"), [*(way for way in WAYS if way[1] != "me"), (3, "late")])
+@models
+def test_inputs_walls_and_tunable_parameters_reach_the_equations(
+    native, driven_rows, model, fmi, kind
+):
+    """From another start time than 0, at the tolerance that the importer asks for."""
+    listed, rows = driven_rows[model]
+    with Instance(native[model, fmi], kind) as instance:
+        instance.initialize(start=2.0, tolerance=1e-9, values=STARTS)
+        for k, row in enumerate(rows):
+            instance.change(CHANGES.get(k, {}))
+            instance.advance(row["time"])
+            assert_equal(instance, row, listed)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@models
+def test_inputs_and_tunable_parameters_reach_model_exchange(native, model, fmi):
+    """The same but for the wall, whose motion co-simulation interpolates."""
+    sim = Simulation(mechanism(model), STARTS, start_time=2.0, tolerance=1e-9)
+    with Instance(native[model, fmi], "me", substep=2e-5) as instance:
+        instance.initialize(start=2.0, values=STARTS)
+        for k in range(7):
+            change = {3: CHANGES[3], 4: CHANGES[8], 5: {"force.moment": 1e-3}}.get(k, {})
+            instance.change(change)
+            sim.set(change)
+            instance.advance(2.0 + (k + 1) * 0.01)
+            sim.advance(2.0 + (k + 1) * 0.01)
+            found, expected = instance.values(), sim.outputs()
+            for name in ("shuttle.x", "shuttle.y", "shuttle.angle"):
+                # the truncation of the steps, through an impact
+                assert found[name] == pytest.approx(expected[name], abs=1e-7), name
+            assert found["stop.impact_count"] == expected["stop.impact_count"]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_wall_that_moves_is_met_in_model_exchange_where_its_inputs_say(native, fmi):
+    """Displacement and velocity as inputs that fit each other, at every step."""
+    speed = -0.03
+    with Instance(native["PRBDM", fmi], "me") as instance:
+        instance.initialize()
+        time, h = 0.0, 2e-5
+        integrator = Integrator(instance)
+        while not (z := integrator.z())[0] <= 0.0:
+            assert instance.set({"stop.displacement": speed * time, "stop.velocity": speed}) == OK
+            integrator.step(time, integrator.x(), h)
+            time += h
+            assert instance.set({"stop.displacement": speed * time}) == OK
+            assert time < 0.1
+        assert len(z) == 4
+        met = instance.values()
+        assert met["stop.gap"] == pytest.approx(0.0, abs=2 * h)
+        assert met["shuttle.x"] == pytest.approx(speed * time, abs=2 * h)
+        instance.fmu.enterEventMode()
+        instance.update()
+        after = instance.values()
+        assert after["stop.impact_count"] == 1
+        assert after["stop.gap_rate"] == pytest.approx(-0.6 * met["stop.gap_rate"], rel=1e-9)
+
+
+@pytest.mark.parametrize(("fmi", "kind"), [way for way in WAYS if way[1] != "me"])
+def test_the_importers_tolerance_wins_over_the_parameter(native, fmi, kind):
+    def last(tolerance: float | None, parameter: float) -> float:
+        with Instance(native["PRBDM2R", fmi], kind) as instance:
+            instance.initialize(tolerance=tolerance, values={"solver.tolerance": parameter})
+            instance.advance(0.1)
+            return instance.values()["shuttle.x"]
+
+    assert last(1e-5, 1e-8) == last(1e-5, 1e-5) == last(None, 1e-5) != last(None, 1e-8)
+
+
+@ways
+@models
+def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi, kind):
+    with Instance(native[model, fmi], kind).enter() as instance:
+        softer = instance.values()
+        assert instance.set({"flexure.youngs_modulus": 4e11, "release.displacement": -5e-3}) == OK
+        stiffer = instance.values()
+        instance.begin()
+        assert instance.values() == stiffer
+    assert softer["shuttle.x"] == pytest.approx(-18e-3, abs=1e-12)  # tolerance of the statics
+    assert stiffer["shuttle.x"] == pytest.approx(-5e-3, abs=1e-12)
+    assert stiffer["mode.frequency"] > softer["mode.frequency"] > 0.0
+
+
+@ways
+@models
+def test_time_that_starts_elsewhere_shifts_the_motion_and_nothing_else(native, model, fmi, kind):
+    """To what the rounding of the time leaves, 1e-14 s."""
+    shift, rows = -7.0, []
+    for start in (0.0, shift):
+        with Instance(native[model, fmi], kind).initialize(start=start) as instance:
+            instance.advance(start + 0.03)
+            rows.append(instance.values())
+    moved = {"time", "stop.impact_time"}
+    assert {n: v for n, v in rows[1].items() if n not in moved} == pytest.approx(
+        {n: v for n, v in rows[0].items() if n not in moved}, rel=1e-6, abs=1e-9
+    )
+    if fmi == 3:
+        assert rows[1]["time"] == pytest.approx(shift + 0.03)
+
+
+@ways
+@models
+def test_values_are_within_their_declared_bounds_through_a_run(native, model, fmi, kind):
+    with Instance(native[model, fmi], kind, substep=1e-4).initialize() as instance:
+        for k in range(30):
+            instance.advance((k + 1) * 4e-3)
+            for name, value in instance.values().items():
+                v = instance.variables[name]
+                assert v.min is None or value >= float(v.min), name
+                assert v.max is None or value <= float(v.max), name
+
+
+# -- the output clock --
+
+
+@models
+def test_the_clock_ticks_at_impacts_and_only_there(engine_runs, model):
+    """Once for each, in an instant of its own with the values after it; not for the capture."""
+    ticked, events = [], 0
+    with Instance(clocked(model), "events").initialize() as instance:
+        while instance.time < END:
+            event, _, _, instance.time = instance.fmu.doStep(instance.time, END - instance.time)
+            if not event:
+                continue
+            events += 1
+            instance.fmu.enterEventMode()
+            count = instance.values()["stop.impact_count"]
+            clock = [v.valueReference for v in instance.description.modelVariables
+                     if v.type == "Clock"]  # fmt: skip
+            assert instance.fmu.getClock(clock) == [False]
+            ticks = instance.update()
+            grown = instance.values()["stop.impact_count"] - count
+            assert (sum(ticks), grown) in ((0, 0), (1, 1))
+            ticked += [instance.time] * grown
+    expected = [impact.time for impact in engine_runs[model].record]
+    assert ticked == pytest.approx(expected, abs=1e-9)
+    assert events > len(expected)
+
+
+@models
+def test_the_clock_changes_nothing_of_the_motion(engine_runs, model):
+    """Also in FMPy, and in model exchange."""
+    run = engine_runs[model]
+    found = simulate_fmu(
+        str(clocked(model)), use_event_mode=True, early_return_allowed=True, stop_time=END,
+        output_interval=SEEN, output=["shuttle.x", "stop.impact_count"],
+    )  # fmt: skip
+    expected = {round(row["time"], 9): row["shuttle.x"] for row in run.rows}
+    rows = [(round(float(row["time"]), 9), row["shuttle.x"]) for row in found]
+    compared = [(x, expected[t]) for t, x in rows if t in expected]
+    assert len(compared) == len(run.rows)
+    assert [x for x, _ in compared] == pytest.approx([x for _, x in compared], abs=1e-9)
+    assert found["stop.impact_count"][-1] == IMPACTS
+    exchanged = simulate_fmu(
+        str(clocked(model)), fmi_type="ModelExchange", relative_tolerance=1e-9, stop_time=END,
+        output_interval=1e-3, record_events=False, output=["shuttle.x", "stop.impact_count"],
+    )  # fmt: skip
+    assert exchanged["shuttle.x"][::10] == pytest.approx([*expected.values()], abs=1e-8)
+    assert exchanged["stop.impact_count"][-1] == IMPACTS
+
+
+@models
+def test_the_clock_ticks_in_a_late_event_mode_too(model):
+    """Events inside a step are over at its end; one tick tells of all of them."""
+    with Instance(clocked(model), "late").initialize() as instance:
+        total = 0
+        for k in range(6):
+            before = instance.values()["stop.impact_count"]
+            event, *_ = instance.fmu.doStep(k * 0.05, 0.05)
+            grown = instance.values()["stop.impact_count"] - before
+            if event:
+                instance.fmu.enterEventMode()
+                clock = [v.valueReference for v in instance.description.modelVariables
+                         if v.type == "Clock"]  # fmt: skip
+                assert instance.fmu.getClock(clock) == [grown > 0]
+                instance.update()
+            assert event or not grown
+            total += grown
+    assert total == IMPACTS
+
+
+# -- many of them --
+
+SHORT = points(2e-3, 0.06)[1:]
+
+
+def alone(fmu, kind: str) -> list[bytes]:
+    with Instance(fmu, kind).initialize() as instance:
+        return instance.run(SHORT)
+
+
+def test_instances_of_all_fmus_in_one_process_do_not_disturb_each_other(native):
+    everything = [(model, fmi, kind) for model in MODELS for fmi, kind in WAYS]
+    expected = {key: alone(native[key[:2]], key[2]) for key in everything}
+    instances = [(key, Instance(native[key[:2]], key[2]).initialize()) for key in everything * 2]
+    for k, time in enumerate(SHORT):
+        for key, instance in instances:
+            instance.advance(time)
+            assert instance.bytes() == expected[key][k]
+    for _, instance in instances:
+        instance.free()
+
+
+@ways
+def test_instances_in_threads_do_not_disturb_each_other(native, fmi, kind):
+    expected = alone(native["PRBDM2R", fmi], kind)
+    found: list[list[bytes]] = []
+
+    def work() -> None:
+        found.append(alone(native["PRBDM2R", fmi], kind))
+
+    threads = [threading.Thread(target=work) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(found) == 8
+    assert all(rows == expected for rows in found)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_hundreds_of_instances_at_once_and_one_after_the_other(native, fmi):
+    """Loaded and unloaded each time; then two hundred that live together."""
+    for k in range(100):
+        kind = "cs" if k % 2 else "me"
+        with Instance(native["PRBDM", fmi], kind).initialize() as instance:
+            instance.advance(1e-3)
+            assert instance.values()["shuttle.vx"] > 0.0
+    crowd = [Instance(native["PRBDM", fmi], name=f"it {k}").initialize() for k in range(200)]
+    for instance in crowd:
+        instance.advance(0.05)
+    assert len({instance.bytes() for instance in crowd}) == 1
+    for instance in crowd:
+        instance.free()
+
+
+def test_two_builds_of_one_model_in_one_process_keep_their_own_content(native, tmp_path):
+    other = tmp_path / "PRBDM.fmu"
+    write(other, native_fmu.build(mechanism("PRBDM"), {"stop.restitution": 0.1}, fmi=3))
+    with Instance(native["PRBDM", 3]).initialize() as a, Instance(other).initialize() as b:
+        for k in range(50):
+            a.advance((k + 1) * 1e-3)
+            b.advance((k + 1) * 1e-3)
+        rows = {0.6: a.values(), 0.1: b.values()}
+    for restitution, values in rows.items():
+        assert values["stop.restitution"] == restitution
+        assert values["stop.impact_count"] == 1
+        assert values["stop.rebound_speed"] == pytest.approx(
+            restitution * values["stop.approach_speed"], rel=1e-12
+        )  # round-off
+
+
+# -- what the standards fix --
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@models
+def test_states_derivatives_and_indicators_are_the_variables_that_the_xml_names(native, model, fmi):
+    with Instance(native[model, fmi], "me").initialize() as instance:
+        states = [u.variable.derivative for u in instance.description.derivatives]
+        nominals = (c_double * len(states))()
+        instance.fmu.getNominalsOfContinuousStates(nominals, len(states))
+        assert [*nominals] == [float(state.nominal) for state in states]
+        integrator = Integrator(instance)
+        assert integrator.x() == pytest.approx(instance.get(*(s.name for s in states)), rel=0.0)
+        names = [v.name for v in instance.description.modelVariables
+                 if v.name.endswith("_indicator")]  # fmt: skip
+        assert [*integrator.z()] == instance.get(*names)
+        found = integrator.slope(0.0, integrator.x())
+        assert [*found] == instance.get(
+            *(u.variable.name for u in instance.description.derivatives)
+        )
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_time_is_a_variable_in_fmi_3_only(native, fmi):
+    with Instance(native["PRBDM", fmi]) as instance:
+        assert ("time" in instance.variables) == (fmi == 3)
+        if fmi == 3:
+            assert instance.enter(start=1.5).get("time") == [1.5]
+            assert instance.begin().get("time") == [1.5]
+            instance.advance(1.6)
+            assert instance.get("time") == [1.6]
