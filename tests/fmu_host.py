@@ -18,6 +18,8 @@ from fmpy.logging import addLoggerProxy
 
 OK, DISCARD = 0, 2
 
+_kept: list[fmi2CallbackFunctions] = []  # FMPy's proxy calls the logger that it got last, for ever
+
 
 class Instance:
     """An instance of an FMU, freed and removed at the end of a ``with`` block."""
@@ -38,6 +40,7 @@ class Instance:
         callbacks.allocateMemory = Allocate(calloc)
         callbacks.freeMemory = Free(free)
         addLoggerProxy(byref(callbacks))
+        _kept.append(callbacks)
         try:
             self.fmu.instantiate(callbacks=callbacks, loggingOn=True)
         except BaseException:
