@@ -40,6 +40,7 @@ HEADERS = (
 )  # fmt: skip
 _made: dict[Path, bytes] = {}  # what this process has got already
 LAST_LINES = 6  # of what a compiler complains about
+TEMPORARY = ("TMPDIR", "TMP", "TEMP")  # where compilers leave their files if they are interrupted
 MAGIC = b"prbm library\n"
 INSTALL = (
     "install one (on Debian or Ubuntu 'apt install gcc', on macOS 'xcode-select --install'), or "
@@ -274,7 +275,7 @@ def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -
         folder = Path(name)
         for file, content in files.items():
             (folder / file).write_bytes(content)
-        environment = os.environ | {"LC_ALL": "C"}
+        environment = os.environ | {"LC_ALL": "C"} | dict.fromkeys(TEMPORARY, name)
         if compiler.name == "ziglang":
             environment |= _zig_folders(folder)
         try:

@@ -584,6 +584,25 @@ static int write_state(Instance *instance, const Variable *variable, double x) {
     return FMU_OK;
 }
 
+/* Whether a variable is not a fixed parameter, which may have any value within its bounds only
+ * before the start; if it is, it is told. */
+static bool not_fixed(const Instance *instance, int slot, double x, double present) {
+    Problem problem;
+    if (!is_parameter(instance->mechanism, slot) || !simulation_started(instance->simulation)) {
+        return true;
+    }
+    const Parameter *parameter = &instance->mechanism->parameters[slot];
+    if (parameter->tunable || !check_parameter(parameter, x, &problem)) {
+        return true;
+    }
+    const char *unit = parameter->unit, *space = *unit ? " " : "";
+    refuse(instance, FMU_ERROR, "%s = %.10g%s%s refused: it is fixed once the simulation has "
+                                "started; set it back to %.10g%s%s, or reset the instance and set "
+                                "it before",
+           parameter->name, x, space, unit, present, space, unit);
+    return false;
+}
+
 PRBM int write_value(Instance *instance, uint32_t reference, int type, double x) {
     const Variable *variable = writable(instance, reference, type);
     Problem problem;
@@ -594,7 +613,7 @@ PRBM int write_value(Instance *instance, uint32_t reference, int type, double x)
     if (!settable(instance->mechanism, slot)) {
         return write_state(instance, variable, x);
     }
-    double present;
+    double present = 0.0;
     bool known = simulation_get(instance->simulation, slot, &present, &problem);
     if (known && present == x) { /* also a fixed parameter that is put back */
         instance->refused[slot] = 0;
@@ -608,6 +627,9 @@ PRBM int write_value(Instance *instance, uint32_t reference, int type, double x)
     }
     if (instance->mode == MODE_INITIALIZATION) {
         simulation_unstart(instance->simulation);
+    }
+    if (!not_fixed(instance, slot, x, present)) {
+        return refuse_set(instance, slot);
     }
     if (!simulation_set(instance->simulation, slot, x, &problem)) {
         refuse(instance, FMU_ERROR, "%s", problem.text);
