@@ -234,3 +234,18 @@ def test_what_rests_on_a_wall_follows_its_smooth_motion():
     work = abs(kernel.get("energy.work"))
     assert np.abs(kept).max() < 1e-4 * work
     assert 0.0 < kernel.get("energy.dissipated") < 0.05 * work
+
+
+def test_bounces_without_end_end_in_rest_although_gaps_close_late():
+    """Without rest_speed; only bounces lower than 1e-10 of the size may be missing."""
+    values = {"stop.rest_speed": 0.0, "release.displacement": -1e-3}
+    kernel = KernelSimulation(mechanism("PRBDM"), values, exchange=True)
+    for _, z in integrate(kernel, 0.08, h=1e-4):
+        assert z.min() > 0.0
+    other = KernelSimulation(mechanism("PRBDM"), values)
+    other.advance(0.08)
+    assert kernel.get("stop.contact") == other.get("stop.contact") == 1.0
+    assert kernel.get("stop.impact_time") == pytest.approx(other.get("stop.impact_time"), abs=1e-5)
+    missing = other.get("stop.impact_count") - kernel.get("stop.impact_count")
+    assert 0 <= missing <= 10
+    assert kernel.get("stop.force") == pytest.approx(other.get("stop.force"), rel=1e-6)

@@ -406,6 +406,12 @@ def test_a_state_of_another_mechanism_is_refused():
         simulation("PRBDM").restore(simulation("PRBDM2R").snapshot())
 
 
+def test_a_time_that_steps_cannot_move_is_told():
+    sim = simulation("PRBDM", start_time=1e18)
+    with pytest.raises(SimulationError, match="nearer to zero"):
+        sim.advance(1e18 + 1e3)
+
+
 def test_a_start_time_shifts_everything():
     late = simulation("PRBDM", start_time=5.0)
     early = simulation("PRBDM")

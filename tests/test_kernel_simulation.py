@@ -1,5 +1,8 @@
 """The kernel's motion is the engine's, event by event, in every kind of motion that there is."""
 
+import ctypes
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -176,3 +179,50 @@ def test_chatter_without_an_end_is_stopped():
     with pytest.raises(KernelMistake, match="chatters"):
         kernel.advance(0.01)
     assert kernel.state.tobytes() == before.tobytes()
+
+
+def test_a_time_that_has_no_digits_left_for_a_step_is_refused():
+    """Instead of steps that lead nowhere, for ever."""
+    kernel = KernelSimulation(mechanism("PRBDM"), start_time=1e18)
+    with pytest.raises(KernelMistake, match="lost in the rounding of the time"):
+        kernel.advance(1e18 + 256.0)
+    late = KernelSimulation(mechanism("PRBDM"), start_time=1e6)
+    late.advance(1e6 + END)
+    assert late.get("stop.impact_count") == 14.0
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_communication_step_in_pieces_is_the_same_step(model):
+    """A moving wall goes on as planned, whether or not the step is left at each internal one."""
+    values = {"stop.velocity": -0.05, "stop.friction": 0.1}
+    whole, pieces = (KernelSimulation(mechanism(model), values) for _ in range(2))
+    event, left = ctypes.c_bool(), 0
+    for k in range(1, 21):
+        time = 5e-3 * k
+        change = {"stop.displacement": -0.05 * (time - 5e-3)}
+        for kernel in (whole, pieces):
+            kernel.set(change)
+        whole.advance(time)
+        while pieces.get("time") < time or event.value:
+            if event.value:
+                pieces.call("simulation_happen")
+            at = ctypes.byref(event)
+            pieces.call("simulation_advance_some", time, True, at)
+            left += 1
+        assert pieces.outputs() == whole.outputs()
+    assert left > 20
+    assert whole.get("stop.impact_count") > 0
+
+
+def test_more_stops_than_can_be_searched_are_resolved():
+    """Twenty along a wall, hit at once: they carry the weight together."""
+    (stop,) = mechanism("PRBDM2R").stops
+    stops = tuple(replace(stop, name=f"s{i}", offset=1e-3 * (i - 9.5)) for i in range(20))
+    guide = replace(mechanism("PRBDM2R"), name="Many", stops=stops)
+    kernel = KernelSimulation(guide, {"release.displacement": -2e-3})
+    kernel.advance(0.2)
+    one = KernelSimulation(mechanism("PRBDM2R"), {"release.displacement": -2e-3})
+    one.advance(0.2)
+    assert min(kernel.get(f"{s.name}.gap") for s in stops) > -1e-9
+    carried = sum(kernel.get(f"{s.name}.force") for s in stops)
+    assert carried == pytest.approx(one.get("stop.force"), rel=0.02)

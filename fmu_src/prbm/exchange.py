@@ -69,7 +69,7 @@ def conditioning(jacobian: Real, dependent: tuple[int, ...]) -> float:
 
     Examples
     --------
-    >>> conditioning(np.array([[2.0, 0.0, 1.0], [0.0, 1.0, 1.0]]), (0, 1))
+    >>> conditioning(np.array([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), (0, 1))
     0.5
     """
     size = np.linalg.svd(jacobian[:, dependent], compute_uv=False)

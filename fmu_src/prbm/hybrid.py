@@ -400,6 +400,11 @@ class Simulation:
                     "is too violent for the model; check the inputs and parameters, or add "
                     "damping.beta"
                 )
+            if t + h == t:
+                raise SimulationError(
+                    f"at t = {t:.9g} s a step of {h:.3g} s is lost in the rounding of the time: "
+                    "start the simulation nearer to zero"
+                )
             self.equations.trace.clear()
             k, y1 = stages(PAIR, f, t, y, h, self.k1)
             error = self._error(h * (PAIR.error @ k), y, y1)

@@ -83,7 +83,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     *system = result;
 }
 
-/* --- values and places ------------------------------------------------------------------------------ */
+/* --- values and places ------------------------------------------------------------------------ */
 
 static Complex at_point(const System *system, Point point) {
     return complex_of(evaluate(point.x, system->values), evaluate(point.y, system->values));
@@ -157,7 +157,7 @@ static Place new_place(int n, Scratch *scratch) {
     return result;
 }
 
-/* --- walking ------------------------------------------------------------------------------------------- */
+/* --- walking ---------------------------------------------------------------------------------- */
 
 typedef struct {
     int coordinates, links, loops; /* so far */
@@ -311,7 +311,7 @@ static void add_body(System *system, int body, Scratch *scratch) {
     scratch->used = mark;
 }
 
-/* --- arrays ---------------------------------------------------------------------------------------------- */
+/* --- arrays ----------------------------------------------------------------------------------- */
 
 /* B, c of the displacement of a place along u from the straight shape. */
 static double along(int n, Complex u, const Complex *A, const Complex *e0, Complex *B) {
@@ -436,7 +436,7 @@ static Complex first_clamp(const System *system) {
     return complex_of(0.0, 0.0);
 }
 
-/* --- checks ------------------------------------------------------------------------------------------------ */
+/* --- checks ----------------------------------------------------------------------------------- */
 
 static bool check_masses(const System *system, const Complex *e0, Scratch *scratch,
                          Problem *problem) {
@@ -508,7 +508,7 @@ static bool stubs(System *system, Scratch *scratch, Problem *problem) {
     return true;
 }
 
-/* --- the whole ------------------------------------------------------------------------------------------------ */
+/* --- the whole -------------------------------------------------------------------------------- */
 
 static void clear(System *system) {
     size_t n = (size_t)system->n, b = (size_t)system->b;

@@ -61,11 +61,11 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
     return regular || fail(problem, "%s", SINGULAR);
 }
 
-/* --- the same again and again ------------------------------------------------------------------------ */
+/* --- the same again and again ----------------------------------------------------------------- */
 
 /* M = L D L^T of the lower triangle of M, L with ones on its diagonal, where 1/D is kept; false if M
  * is not positive definite. */
-SIZED bool block_factor(int size, int n, const double *restrict M, double *restrict L) {
+SIZED bool block_factor(int size, int n, const double *ALONE M, double *ALONE L) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         double pivot = M[i * n + i];
@@ -99,7 +99,7 @@ SIZED bool block_factor(int size, int n, const double *restrict M, double *restr
 }
 
 /* b := L^-1 b and b := L^-T b within a block; L has the stride n. */
-SIZED void block_forward(int size, int n, const double *restrict L, double *restrict b) {
+SIZED void block_forward(int size, int n, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
         double sum = b[i];
@@ -112,7 +112,7 @@ SIZED void block_forward(int size, int n, const double *restrict L, double *rest
     }
 }
 
-SIZED void block_backward(int size, int n, const double *restrict L, double *restrict b) {
+SIZED void block_backward(int size, int n, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int k = 1; k < size; k++) {
         int i = size - 1 - k;
@@ -127,7 +127,7 @@ SIZED void block_backward(int size, int n, const double *restrict L, double *res
 }
 
 /* y := D^-1 z */
-SIZED void block_scale(int size, int n, const double *restrict L, const double *z, double *y) {
+SIZED void block_scale(int size, int n, const double *ALONE L, const double *z, double *y) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         y[i] = z[i] * L[i * n + i];

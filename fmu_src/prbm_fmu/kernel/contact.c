@@ -12,7 +12,7 @@
 #define SETTLED 1e-14  /* change of the impulses at which the sweeps end, relative */
 enum {
     SWEEPS = 2000, /* of Gauss-Seidel over several contacts with friction */
-    SEARCHED = 20, /* stops of which every set is tried; of more, there are too many sets */
+    SEARCHED = 12, /* stops of which every set is tried; of more, there are too many sets */
 };
 static const double RELAXATIONS[] = {1.0, 0.3, 0.05}; /* of the sweeps, tried in this order */
 

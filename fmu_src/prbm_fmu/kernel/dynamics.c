@@ -43,7 +43,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     *equations = q;
 }
 
-/* --- what holds, sticks and slides ------------------------------------------------------------------ */
+/* --- what holds, sticks and slides ------------------------------------------------------------ */
 
 static void add_row(Equations *q, const Complex *row, double c) {
     int n = q->system->n;
@@ -155,7 +155,7 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs, const Discre
     set_loads(q);
 }
 
-/* --- motion ---------------------------------------------------------------------------------------------- */
+/* --- motion ----------------------------------------------------------------------------------- */
 
 /* x -= c M v within a block. */
 static void damp_mass(Equations *q, int start, int size, const double *v) {
@@ -173,9 +173,9 @@ static void damp_mass(Equations *q, int start, int size, const double *v) {
 
 /* One block of M, and what its inertia adds to the loads x: Im(diag(e)^H H diag(e)) v^2, as the
  * mass matrix is symmetric and the quadratic velocities are antisymmetric. */
-SIZED void block_inertia(int size, int n, const Complex *restrict H, const double *restrict J,
-                         const Complex *restrict e, const double *restrict squares,
-                         double *restrict M, double *restrict x) {
+SIZED void block_inertia(int size, int n, const Complex *ALONE H, const double *ALONE J,
+                         const Complex *ALONE e, const double *ALONE squares,
+                         double *ALONE M, double *ALONE x) {
     UNROLLED
     for (int i = 0; i < size; i++) {
         const int columns = size <= SMALL ? size : i;
@@ -458,7 +458,7 @@ PRBM bool rate(Equations *equations, double t, const double *y, double *dy, Prob
     return true;
 }
 
-/* --- constraints ---------------------------------------------------------------------------------------- */
+/* --- constraints ------------------------------------------------------------------------------ */
 
 PRBM double wall_at(const Wall *wall, double t) {
     return wall->position + wall->rate * (t - wall->since);
@@ -539,7 +539,7 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
     return true;
 }
 
-/* --- stops ------------------------------------------------------------------------------------------------ */
+/* --- stops ------------------------------------------------------------------------------------ */
 
 PRBM double row_value(int n, const Complex *row, const Complex *e) {
     double sum = 0.0;
@@ -569,7 +569,7 @@ PRBM double gap_rate(const Equations *equations, int i, const Complex *e, const 
            equations->inputs.walls[i].rate;
 }
 
-/* --- reactions ---------------------------------------------------------------------------------------------- */
+/* --- reactions -------------------------------------------------------------------------------- */
 
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
                         const double *a, Complex *force, double *moment) {

@@ -17,7 +17,7 @@
 #define FORESIGHT 0.01    /* of the period: an opening rate keeps the indicator off zero by so much */
 #define DEFINITE 1e-7     /* of the largest pivot: a smaller one says that the choice is singular */
 
-/* --- independent and dependent coordinates --------------------------------------------------------- */
+/* --- independent and dependent coordinates ---------------------------------------------------- */
 
 PRBM int exchange_states(const Simulation *simulation) {
     return 2 * simulation->mechanism->independent_count + 2;
@@ -151,7 +151,7 @@ static void states_of(const Simulation *sim, const double *y, double *x) {
     x[2 * count + 1] = y[2 * n + 1];
 }
 
-/* --- time, states, inputs ------------------------------------------------------------------------------- */
+/* --- time, states, inputs --------------------------------------------------------------------- */
 
 /* In model exchange the displacement of a wall is used as it is. */
 static void place_walls(Simulation *sim) {
@@ -171,7 +171,8 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
         return true;
     }
     size_t np = (size_t)m->parameter_count * sizeof(double);
-    if (memcmp(sim->values, sim->acting_values, np) != 0 && !take_values(sim, problem)) {
+    bool known = sim->assembled && memcmp(sim->values, sim->acting_values, np) == 0;
+    if (!known && !take_values(sim, problem)) {
         return false;
     }
     copy(m->input_count, sim->given, sim->acting_given);
@@ -265,7 +266,7 @@ PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *prob
     return true;
 }
 
-/* --- event indicators -------------------------------------------------------------------------------------- */
+/* --- event indicators ------------------------------------------------------------------------- */
 
 static double force_scale(const Simulation *sim) {
     return sim->energy_scale / sim->system.length;
@@ -352,7 +353,7 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
     return true;
 }
 
-/* --- events --------------------------------------------------------------------------------------------------- */
+/* --- events ----------------------------------------------------------------------------------- */
 
 /* How far a stop that holds is off its wall and off the velocity at which it was held, in units of
  * size and speed.  While the wall changes its velocity the place is the wall's matter. */
@@ -487,7 +488,7 @@ static void stop_sliding(Simulation *sim, const Event *event) {
 static Event due_here(const Simulation *sim, bool *struck) {
     const Equations *q = &sim->equations;
     const System *system = &sim->system;
-    double near = 1e-10 * system->length, bound = still(sim);
+    double near = TOUCHING * system->length, bound = still(sim);
     Event event = {NO_EVENT, 0, sim->now->time};
     for (int k = 0; k < q->held_count; k++) {
         if (margin_release(sim, k) <= 0.0) {
@@ -557,7 +558,7 @@ static void arm(Simulation *sim) {
 
 static bool let_all_happen(Simulation *sim, Problem *problem) {
     enum { MOST_AT_ONCE = 16 };
-    bool struck[64] = {false};
+    bool struck[MOST_STOPS] = {false};
     if (!evaluate_motion(sim, problem) || !follow_walls(sim, problem)) {
         return false;
     }
@@ -612,7 +613,7 @@ PRBM void exchange_begin(Simulation *sim) {
     sim->stale = true;
 }
 
-/* --- directional derivatives ------------------------------------------------------------------------------------ */
+/* --- directional derivatives ------------------------------------------------------------------ */
 
 /* A change of everything with the states and inputs: dq, dv, da, -dlam, of the rows B of what is
  * active. */
@@ -1052,7 +1053,7 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
     return right;
 }
 
-/* --- values ------------------------------------------------------------------------------------------------------ */
+/* --- values ----------------------------------------------------------------------------------- */
 
 /* A derivative or an indicator by its slot; in co-simulation they are evaluated where it is. */
 PRBM bool exchange_value(Simulation *sim, int slot, double *x, Problem *problem) {

@@ -9,6 +9,7 @@
 #define TOUCHING 1e-10        /* of the size: gaps that close together with one being resolved */
 #define RELEASE_GAP 1e-9      /* m; a wall may be touched at release by no more than this */
 #define SHORTEST_FLIGHT 5e-7  /* of the period: the arc of a shorter bounce is lost in rounding */
+#define LOWEST_BOUNCE 1e-10   /* of the size, in model exchange: gaps close a little late there */
 #define DEPENDENT 1e-4        /* share of a row's mobility that the stops leave */
 #define ALIGNED 1e-9          /* the same for stops among each other */
 #define STILL 1e-9            /* of the velocity scale: what rounding leaves of none */
@@ -28,15 +29,16 @@
 #define ROUNDED 1e-12         /* of a time: what importers lose when they add up steps */
 #define MOST_STEPS 1e9        /* of the longest, to one time: more is a mistake of units */
 #define LARGEST_WEIGHT 1.1    /* more than the sum of |b_i(theta)| of the dense output, 1.03 */
+#define MOST_IMPACTS 2147483647.0 /* that an Integer of FMI can count */
 #define TWO_PI 6.283185307179586
 
 #define CHATTER 1000
-enum { MOST_HOLDING = 12 };
+enum { MOST_HOLDING = 12 }; /* stops at rest of which every set is tried; others hold nothing */
 
 static const char *const EVENT_NAMES[] = {"none",     "impact", "release", "slip slide",
                                           "slip rub", "slide",  "rub"};
 
-/* --- memory -------------------------------------------------------------------------------------------- */
+/* --- memory ----------------------------------------------------------------------------------- */
 
 PRBM int state_size(const Simulation *sim) {
     return 2 * sim->mechanism->coordinate_count + 2;
@@ -200,7 +202,7 @@ PRBM double simulation_time(const Simulation *simulation) {
     return simulation->now->time;
 }
 
-/* --- scales ------------------------------------------------------------------------------------------------ */
+/* --- scales ----------------------------------------------------------------------------------- */
 
 PRBM double omega_scale(const Simulation *sim) {
     if (sim->omega > 0.0) {
@@ -230,7 +232,7 @@ static void set_scales(Simulation *sim) {
     sim->energy_scale = largest(n * n, sim->system.K); /* one radian, the stiffest spring [J] */
 }
 
-/* --- discrete state ------------------------------------------------------------------------------------------ */
+/* --- discrete state --------------------------------------------------------------------------- */
 
 static int to_int(double x) {
     return (int)x;
@@ -292,8 +294,9 @@ PRBM bool take_values(Simulation *sim, Problem *problem) {
     const Mechanism *m = sim->mechanism;
     copy(m->parameter_count, sim->values, sim->acting_values);
     copy(m->input_count, sim->given, sim->acting_given);
-    return check_values(m, sim->acting_values, problem) &&
-           assemble(&sim->system, sim->acting_values, &sim->scratch, problem);
+    sim->assembled = check_values(m, sim->acting_values, problem) &&
+                     assemble(&sim->system, sim->acting_values, &sim->scratch, problem);
+    return sim->assembled;
 }
 
 static bool values_changed(const Simulation *sim) {
@@ -306,7 +309,7 @@ static bool given_changed(const Simulation *sim) {
     return memcmp(sim->given, sim->acting_given, nu) != 0;
 }
 
-/* --- inputs and parameters ------------------------------------------------------------------------------------- */
+/* --- inputs and parameters -------------------------------------------------------------------- */
 
 PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *problem) {
     Simulation *sim = simulation;
@@ -344,7 +347,7 @@ PRBM double wall_target(const Simulation *sim, int i, double h) {
     return evaluate(m->stops[i].position, sim->values) + given[0] + given[1] * h;
 }
 
-/* --- start ------------------------------------------------------------------------------------------------------- */
+/* --- start ------------------------------------------------------------------------------------ */
 
 static bool check_tolerance(double x, Problem *problem) {
     if (!(x >= 1e-13 && x <= 1e-2)) {
@@ -408,7 +411,7 @@ static void start_discrete(Simulation *sim) {
 }
 
 static bool set_off(Simulation *sim, Problem *problem) {
-    int every[64];
+    int every[MOST_STOPS];
     for (int i = 0; i < sim->system.s; i++) {
         every[i] = i;
     }
@@ -432,7 +435,8 @@ static bool attempt(Simulation *sim, bool right, Problem *problem) {
         sim->scratch.used = 0;
         sim->output_level = 0;
         if (simulation_started(sim)) {
-            assemble(&sim->system, sim->acting_values, &sim->scratch, &another);
+            sim->assembled =
+                assemble(&sim->system, sim->acting_values, &sim->scratch, &another);
             set_scales(sim);
             set_inputs(sim);
         }
@@ -471,7 +475,7 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
     return attempt(sim, right, problem);
 }
 
-/* --- time ------------------------------------------------------------------------------------------------------- */
+/* --- time ------------------------------------------------------------------------------------- */
 
 /* Turn the inputs of the walls into uniform motions up to a time; whether one changes. */
 static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
@@ -493,8 +497,8 @@ static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
 /* Let go of what rested on a wall that has changed its velocity: one that retreats leaves the body
  * behind, one that advances strikes; such a stop is returned, or -1. */
 PRBM int unsettled_by_walls(Simulation *sim) {
-    int n = sim->system.n, struck = -1, held[64], count = sim->equations.held_count;
-    double rates[64], bound = still(sim);
+    int n = sim->system.n, struck = -1, held[MOST_STOPS], count = sim->equations.held_count;
+    double rates[MOST_STOPS], bound = still(sim);
     directions(n, sim->front, sim->e);
     for (int k = 0; k < count; k++) {
         held[k] = sim->equations.held[k];
@@ -545,7 +549,7 @@ static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
            settle(sim, NULL, 0, NO_EVENT, 0, problem);
 }
 
-/* --- steps -------------------------------------------------------------------------------------------------------- */
+/* --- steps ------------------------------------------------------------------------------------ */
 
 /* The magnitude against which the error of a component of the state is measured. */
 static double scale_of(const Simulation *sim, int i, double size) {
@@ -600,6 +604,12 @@ static bool find_step(Simulation *sim, double *step, Problem *problem) {
                         "the step size fell below %g s at t = %.9g s: the motion is too violent "
                         "for the model; check the inputs and parameters, or add damping.beta",
                         SMALLEST_STEP, now->front_time);
+        }
+        if (now->front_time + h == now->front_time) {
+            return fail(problem,
+                        "at t = %.9g s a step of %.3g s is lost in the rounding of the time: start "
+                        "the simulation nearer to zero",
+                        now->front_time, h);
         }
         begin_trace(&sim->equations);
         error = HUGE_VAL;
@@ -671,7 +681,7 @@ static bool take_step(Simulation *sim, Problem *problem) {
     return project(&sim->equations, event.time, sim->front, &sim->scratch, problem);
 }
 
-/* --- locating events ------------------------------------------------------------------------------------------------- */
+/* --- locating events -------------------------------------------------------------------------- */
 
 /* A quantity whose fall to zero is an event. */
 typedef struct {
@@ -1015,7 +1025,7 @@ static bool first_event(Simulation *sim, Event *event, Problem *problem) {
     return true;
 }
 
-/* --- events ------------------------------------------------------------------------------------------------------------ */
+/* --- events ----------------------------------------------------------------------------------- */
 
 /* Stop a chatter that does not end. */
 PRBM bool count_event(Simulation *sim, double time, int kind, Problem *problem) {
@@ -1238,7 +1248,7 @@ static bool find_holding(Simulation *sim, int count, const int *candidates, cons
     return right;
 }
 
-/* --- friction --------------------------------------------------------------------------------------------------- */
+/* --- friction --------------------------------------------------------------------------------- */
 
 static void with_slide(Simulation *sim, int kind, int i, int state) {
     read_discrete(sim);
@@ -1364,7 +1374,7 @@ static bool same_discrete(const Simulation *sim, const double *before) {
 static bool settle_friction(Simulation *sim, const Holding *holding, int yields, int yields_index,
                             Problem *problem) {
     int s = sim->system.s, f = sim->system.f, rubbing = 0;
-    double before[2 * 64];
+    double before[2 * MOST_STOPS];
     for (int k = 0; k < holding->count; k++) {
         rubbing += sim->equations.stop_friction[holding->stops[k]] > 0.0;
     }
@@ -1399,7 +1409,7 @@ static bool settle_friction(Simulation *sim, const Holding *holding, int yields,
  * friction and cannot stick. */
 PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yields,
                  int yields_index, Problem *problem) {
-    int n = sim->system.n, s = sim->system.s, candidates[2 * 64], count = 0;
+    int n = sim->system.n, s = sim->system.s, candidates[2 * MOST_STOPS], count = 0;
     double near = TOUCHING * sim->system.length + RELEASE_GAP, bound = still(sim);
     const double *v = sim->front + n;
     for (int i = 0; i < s; i++) {
@@ -1438,15 +1448,15 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yie
            project(&sim->equations, sim->now->front_time, sim->front, &sim->scratch, problem);
 }
 
-/* --- impacts ------------------------------------------------------------------------------------------------------ */
+/* --- impacts ---------------------------------------------------------------------------------- */
 
 /* An impact that is being resolved: the stops struck and held, velocities after, impulses. */
 typedef struct {
-    int struck_count, held_count, struck[64], held[64];
-    double restitution[64];
+    int struck_count, held_count, struck[MOST_STOPS], held[MOST_STOPS];
+    double restitution[MOST_STOPS];
     double *after;                          /* (n,) */
-    double normal[64], tangential[64];      /* by stop */
-    bool with_normal[64];                   /* whether the stop took part */
+    double normal[MOST_STOPS], tangential[MOST_STOPS];      /* by stop */
+    bool with_normal[MOST_STOPS];                   /* whether the stop took part */
 } Hits;
 
 static void hits_without_friction(Simulation *sim, const Here *here, const double *v,
@@ -1578,8 +1588,8 @@ static bool hits_with_friction(Simulation *sim, const Here *here, const double *
 static bool impulse(Simulation *sim, const double *q, const double *v, Hits *hits,
                     Problem *problem) {
     size_t mark = sim->scratch.used;
-    int s = sim->system.s, n = sim->system.n, kept_count = hits->held_count, kept[64];
-    double mu[64], u[64];
+    int s = sim->system.s, kept_count = hits->held_count, kept[MOST_STOPS];
+    double mu[MOST_STOPS], u[MOST_STOPS];
     bool rough = false, pulling = true, right = true;
     Here here = mass_and_loops(sim, q);
     for (int i = 0; i < s; i++) {
@@ -1602,18 +1612,18 @@ static bool impulse(Simulation *sim, const double *q, const double *v, Hits *hit
             sim->scratch.used = here_mark;
         }
     }
-    (void)n;
     sim->scratch.used = mark;
     return right;
 }
 
 /* Whether a stop that is struck slowly comes to rest: if, after an impact without restitution, it
- * is pressed, and it closes below rest_speed or comes from a bounce shorter than SHORTEST_FLIGHT.
- * A speed that is none but rounding is neither counted nor returned. */
+ * is pressed, and it closes below rest_speed or comes from a bounce shorter than SHORTEST_FLIGHT or
+ * lower than LOWEST_BOUNCE, which would gain by closing late what it loses by the hit.  A speed that
+ * is none but rounding is neither counted nor returned. */
 static bool captured(Simulation *sim, int i, const Hits *hits, const double *q, const double *v,
                      double speed, bool *result, Problem *problem) {
     size_t mark = sim->scratch.used;
-    int n = sim->system.n, candidates[64];
+    int n = sim->system.n, candidates[MOST_STOPS];
     *result = speed <= still(sim);
     if (*result) {
         return true;
@@ -1649,7 +1659,9 @@ static bool captured(Simulation *sim, int i, const Hits *hits, const double *q, 
                     mobility(sim, here.M, sim->system.r, here.loops, G, &free, problem);
             double pressing =
                 right ? lam[sim->trial.first_hold + held_at(&sim->trial, i)] * free : 0.0;
-            *result = right && 2.0 * speed < pressing * SHORTEST_FLIGHT * period(sim);
+            double lowest = sim->now->exchange * LOWEST_BOUNCE * sim->system.length;
+            *result = right && (2.0 * speed < pressing * SHORTEST_FLIGHT * period(sim) ||
+                                speed * speed < 2.0 * pressing * lowest);
         }
     }
     sim->scratch.used = mark;
@@ -1674,7 +1686,7 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
     const System *system = &sim->system;
     int n = system->n, s = system->s;
     bool any = false, right = true;
-    double lost[64], before[64], after[64], all_lost = 0.0, work = 0.0, modal = 0.0;
+    double lost[MOST_STOPS], before[MOST_STOPS], after[MOST_STOPS], all_lost = 0.0, work = 0.0, modal = 0.0;
     directions(n, q, sim->e);
     for (int i = 0; i < s; i++) {
         before[i] = gap_rate(&sim->equations, i, sim->e, v);
@@ -1694,7 +1706,7 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
     for (int i = 0; right && i < s; i++) {
         if (counted[i]) {
             Latched *latched = &sim->latched[i];
-            latched->count += 1.0;
+            latched->count = lesser(latched->count + 1.0, MOST_IMPACTS);
             latched->time = sim->now->front_time;
             latched->approach_speed = -before[i];
             latched->rebound_speed = after[i];
@@ -1714,9 +1726,9 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
 /* Resolve the impact of a stop and of all that touch with it. */
 PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     size_t mark = sim->scratch.used;
-    int n = sim->system.n, s = sim->system.s, resting[64], resting_count = 0;
-    double near = TOUCHING * sim->system.length, bound = still(sim), rates[64];
-    bool counted[64];
+    int n = sim->system.n, s = sim->system.s, resting[MOST_STOPS], resting_count = 0;
+    double near = TOUCHING * sim->system.length, bound = still(sim), rates[MOST_STOPS];
+    bool counted[MOST_STOPS];
     double *q = take(&sim->scratch, (size_t)n), *v = take(&sim->scratch, (size_t)n);
     Hits hits;
     hits.after = take(&sim->scratch, (size_t)n);
@@ -1764,7 +1776,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     return right && settle(sim, resting, resting_count, NO_EVENT, 0, problem);
 }
 
-/* --- going on ----------------------------------------------------------------------------------------------------- */
+/* --- going on --------------------------------------------------------------------------------- */
 
 static bool due(const Simulation *sim, double time) {
     const Scalars *now = sim->now;
@@ -1787,10 +1799,11 @@ static bool continues(const Simulation *sim, double time) {
            !values_changed(sim) && !given_changed(sim);
 }
 
-/* Stop before the end of a communication step; the walls go on as planned until then. */
+/* Stop before the end of a communication step, if it is one; the walls go on as planned until
+ * then. */
 static void leave_underway(Scalars *now, double time, double end) {
     now->time = time;
-    now->underway = 1.0;
+    now->underway = time < end;
     now->underway_until = end;
 }
 
@@ -1815,7 +1828,7 @@ static bool advance(Simulation *sim, double time, bool each, bool events, bool *
     Scalars *now = sim->now;
     *event = false;
     if (!continues(sim, time)) {
-        Wall planned[64];
+        Wall planned[MOST_STOPS];
         bool walls = plan_walls(sim, time, planned);
         if ((walls || values_changed(sim) || given_changed(sim)) &&
             !restart(sim, planned, problem)) {
@@ -1889,7 +1902,7 @@ PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     return attempt(sim, let_happen(sim, problem), problem);
 }
 
-/* --- outputs -------------------------------------------------------------------------------------------------------- */
+/* --- outputs ---------------------------------------------------------------------------------- */
 
 static void output_places(Simulation *sim) {
     const System *system = &sim->system;
@@ -2024,7 +2037,7 @@ PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *p
     return true;
 }
 
-/* --- saving and restoring ---------------------------------------------------------------------------------------------- */
+/* --- saving and restoring --------------------------------------------------------------------- */
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     return simulation->state_count;
@@ -2070,11 +2083,12 @@ static bool sound_state(const Simulation *sim) {
                  now->window_count <= CHATTER && sound_event(sim);
     if (sound && now->started != 0.0) {
         sound = now->tolerance >= 1e-13 && now->tolerance <= 1e-2 && now->frequency >= 0.0 &&
-                now->last_error > 0.0 && (now->has_arc == 0.0 || now->arc_h > 0.0);
+                now->last_error > 0.0 && (now->has_arc == 0.0 || now->arc_h > 0.0) &&
+                (now->exchange != 0.0 || now->front_time >= now->time);
     }
     for (int i = 0; sound && i < m->stop_count; i++) {
         sound = whole_number(sim->holds[i], 0, 1) && whole_number(sim->slides[i], -1, IDLE) &&
-                whole_number(sim->latched[i].count, 0, 2147483647);
+                whole_number(sim->latched[i].count, 0, MOST_IMPACTS);
     }
     for (int i = 0; sound && i < m->friction_count; i++) {
         sound = whole_number(sim->rubs[i], -1, IDLE);
@@ -2091,6 +2105,7 @@ PRBM bool simulation_restore(Simulation *simulation, const double *state, Proble
     if (right && simulation_started(sim)) {
         right = check_values(sim->mechanism, sim->acting_values, &ignored) &&
                 assemble(&sim->system, sim->acting_values, &sim->scratch, &ignored);
+        sim->assembled = right;
         if (right) {
             set_scales(sim);
             set_inputs(sim);

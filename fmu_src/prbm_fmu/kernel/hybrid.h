@@ -62,6 +62,7 @@ struct Simulation {
     double *outputs, *y, *rates, *a, *lam;
     const double *at;  /* the state at which indicators and derivatives are evaluated */
     int output_level;  /* how much of the outputs is up to date */
+    bool assembled;    /* whether the system is that of the acting values */
     bool stale;        /* model exchange: states, time or inputs have changed */
     bool evaluated;    /* model exchange: the equations and rates are those of the front */
 };

@@ -25,6 +25,13 @@
 #endif
 #endif
 
+/* Of a pointer: the only one to its array within the function. */
+#if defined(_MSC_VER)
+#define ALONE __restrict
+#else
+#define ALONE restrict
+#endif
+
 /* Loops over a part of the mechanism are written once and compiled for each small size. */
 #if defined(__GNUC__)
 #define SIZED static inline __attribute__((always_inline))

@@ -31,7 +31,7 @@ PRBM void copy(int n, const double *from, double *to) {
 }
 
 /* y += a x */
-PRBM void add_scaled(int n, double a, const double *restrict x, double *restrict y) {
+PRBM void add_scaled(int n, double a, const double *ALONE x, double *ALONE y) {
     if (a != 0.0) {
         for (int i = 0; i < n; i++) {
             y[i] += a * x[i];

@@ -9,7 +9,8 @@ enum {
     TABLES_VERSION = 1,
     CHECKED_FROM = 16,         /* bytes before what the checksum covers */
     MOST_COORDINATES = 512,    /* a mass matrix of 2 MB; no mechanism of this kind has as many */
-    MOST_STOPS = 64,
+    MOST_STOPS = 64,           /* and friction points */
+    MOST_POINTS = 4096,        /* of the ground: every pair of them has a distance */
     MOST_PIVOTS = 256,
     ROOM = 8,                  /* bytes of memory for each byte of the tables, more than needed */
 };
@@ -22,10 +23,11 @@ typedef struct {
     size_t room;
 } Reader;
 
-/* --- numbers and texts ---------------------------------------------------------------------------- */
+/* --- numbers and texts ------------------------------------------------------------------------ */
 
 static void *kept(Reader *reader, size_t count, size_t size) {
-    if (reader->wrong || count > reader->room || reader->memory.used + count * size + 32 > reader->room) {
+    size_t left = reader->room - reader->memory.used; /* place rounds up to less than 32 bytes */
+    if (reader->wrong || left < 32 || count > (left - 32) / size) {
         reader->wrong = reader->wrong ? reader->wrong : "counts that its size does not bear";
         return NULL;
     }
@@ -114,7 +116,7 @@ static int read_count(Reader *reader, size_t bytes) {
     return (int)count;
 }
 
-/* --- parts ------------------------------------------------------------------------------------------ */
+/* --- parts ------------------------------------------------------------------------------------ */
 
 static Expression read_expression(Reader *reader, Mechanism *m) {
     Expression result = {read_finite(reader), 0, NULL, NULL};
@@ -290,7 +292,7 @@ static void read_bounds(Reader *reader, Mechanism *m) {
     m->bounds = bounds;
 }
 
-/* --- sizes and order ---------------------------------------------------------------------------------- */
+/* --- sizes and order -------------------------------------------------------------------------- */
 
 /* The links that stand for a flexure: mirrored halves share the middle one. */
 static int links_of(const Mechanism *m, const Flexure *flexure) {
@@ -326,11 +328,12 @@ static void count_coordinates(Reader *reader, Mechanism *m) {
         links += links_of(m, &m->flexures[i]);
     }
     long long n = links + m->body_count, r = 2LL * (m->flexure_count - m->body_count);
-    if (!reader->wrong && (m->body_count < 1 || !all_held(reader, m))) {
-        reader->wrong = reader->wrong ? reader->wrong : "a body that nothing holds";
-    } else if (!reader->wrong && (n > MOST_COORDINATES || r >= n || m->stop_count > MOST_STOPS ||
-                                  m->friction_count > MOST_STOPS)) {
+    if (!reader->wrong &&
+        (n > MOST_COORDINATES || r >= n || m->stop_count > MOST_STOPS ||
+         m->friction_count > MOST_STOPS || m->ground_count > MOST_POINTS)) {
         reader->wrong = "more parts than can be computed with, or loops that leave no motion";
+    } else if (!reader->wrong && (m->body_count < 1 || !all_held(reader, m))) {
+        reader->wrong = reader->wrong ? reader->wrong : "a body that nothing holds";
     }
     if (!reader->wrong) {
         m->link_count = (int)links;
@@ -432,7 +435,7 @@ static void read_variables(Reader *reader, Mechanism *m) {
     m->variables = variables;
 }
 
-/* --- the whole -------------------------------------------------------------------------------------------- */
+/* --- the whole -------------------------------------------------------------------------------- */
 
 static uint32_t checksum(const unsigned char *bytes, size_t size) {
     uint32_t remainder = 0xFFFFFFFFu;
@@ -476,7 +479,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     m->variable_count = read_count(reader, 16);
     m->independent_count = read_count(reader, 4);
     m->input_count = read_count(reader, 12);
-    if (!reader->wrong && m->input_count != 3 * m->force_count + 2 * m->stop_count + 2) {
+    if (!reader->wrong && m->input_count != 3LL * m->force_count + 2LL * m->stop_count + 2) {
         reader->wrong = "another number of inputs than the mechanism has";
     }
     read_parameters(reader, m);
@@ -534,7 +537,7 @@ PRBM void mechanism_close(Mechanism *mechanism) {
     free(mechanism);
 }
 
-/* --- values --------------------------------------------------------------------------------------------- */
+/* --- values ----------------------------------------------------------------------------------- */
 
 PRBM double evaluate(Expression quantity, const double *values) {
     double result = 0.0;

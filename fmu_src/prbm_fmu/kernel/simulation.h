@@ -37,8 +37,6 @@ PRBM bool simulation_restore(Simulation *simulation, const double *state, Proble
 PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *problem);
 /* Any value by its slot, at the present time; before the start: parameters, inputs only. */
 PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *problem);
-/* Back to not started, with the values kept. */
-PRBM void simulation_unstart(Simulation *simulation);
 /* Back to not started, values kept: so that fixed parameters may be set again. */
 PRBM void simulation_unstart(Simulation *simulation);
 PRBM bool simulation_started(const Simulation *simulation);
