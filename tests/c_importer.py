@@ -1,5 +1,6 @@
 """The C importer of ``tests/importer``: compiled where needed, given jobs, its rows read back."""
 
+import atexit
 import dataclasses
 import os
 import shutil
@@ -8,7 +9,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -23,7 +24,7 @@ from fmpy import read_model_description
 from prbm import Mechanism, Stop
 from prbm_fmu import native_fmu
 from prbm_fmu.archive import write
-from prbm_fmu.compiler import cache_folder
+from prbm_fmu.compiler import _locked, cache_folder
 from support import mechanism
 
 SOURCES = Path(__file__).with_name("importer")
@@ -92,13 +93,33 @@ def needs(*programs: str) -> None:
 
 @cache
 def _folder() -> Path:
-    """Return a folder that lasts as long as this process."""
-    folder = tempfile.TemporaryDirectory(prefix="prbm_importer_")
-    _KEPT.append(folder)
-    return Path(folder.name)
+    """Return a folder for what is made once, shared by all processes of a run of the tests."""
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", f"of-{os.getpid()}")
+    folder = Path(tempfile.gettempdir()) / f"prbm_importer_{run}"
+    users = folder / "users"
+    users.mkdir(parents=True, exist_ok=True)
+    (users / str(os.getpid())).touch()
+    atexit.register(_leave, folder)
+    return folder
 
 
-_KEPT: list[tempfile.TemporaryDirectory[str]] = []
+def _leave(folder: Path) -> None:
+    """Remove the folder if no other process uses it any more."""
+    users = folder / "users"
+    (users / str(os.getpid())).unlink()
+    if not any(users.iterdir()):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def once(name: str, make: Callable[[Path], object]) -> Path:
+    """Return a file or folder that is made by whoever needs it first."""
+    path = _folder() / name
+    with _locked(path.with_name(f"{name}.lock")):
+        if not path.exists():
+            part = path.with_name(f"part-{name}")
+            make(part)
+            part.rename(path)
+    return path
 
 
 def zig(target: str) -> list[str]:
@@ -109,33 +130,35 @@ def zig_environment() -> dict[str, str]:
     """Return an environment in which ziglang shares what it builds with the exporter."""
     return os.environ | {
         "ZIG_GLOBAL_CACHE_DIR": str(cache_folder() / "zig"),
-        "ZIG_LOCAL_CACHE_DIR": str(_folder() / "zig"),
+        "ZIG_LOCAL_CACHE_DIR": str(_folder() / f"zig-{os.getpid()}"),
     }
 
 
 def compile_c(
-    output: Path, sources: Sequence[Path], flags: Sequence[str], target: str = ""
-) -> Path:
-    """Compile; the warnings of the project are errors."""
-    command = zig(target) if target else ["cc"]
+    output: Path,
+    sources: Sequence[Path],
+    flags: Sequence[str] = (),
+    target: str = "",
+    compiler: str = "cc",
+) -> None:
+    """Compile with the system's compiler or, for a target, ziglang's; warnings are errors."""
+    needs(*([] if target else [compiler]))
+    command = zig(target) if target else [compiler]
     done = subprocess.run(
         [*command, *FLAGS, *map(str, sources), "-o", str(output), *flags],
         capture_output=True, text=True, check=False,
         env=zig_environment() if target else None,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    return output
 
 
 @cache
 def importer(host: Host = NATIVE, flags: tuple[str, ...] = ()) -> Path:
     """Return the importer for a host; skip the test if it cannot be made or run."""
-    needs("cc" if not host.target else host.emulator[0])
-    suffix = ".exe" if host.windows else ""
-    name = f"importer-{host.name}-{abs(hash(flags))}{suffix}"
-    system = () if host.windows else POSIX
-    sources = sorted(SOURCES.glob("*.c"))
-    return compile_c(_folder() / name, sources, [*flags, *system], host.target)
+    needs(*host.emulator[:1])
+    name = f"importer-{host.name}-{len(flags)}{'.exe' if host.windows else ''}"
+    sources, system = sorted(SOURCES.glob("*.c")), () if host.windows else POSIX
+    return once(name, lambda path: compile_c(path, sources, [*flags, *system], host.target))
 
 
 @dataclass(frozen=True)
@@ -272,7 +295,7 @@ def execute(
     with tempfile.TemporaryDirectory(prefix="prbm_job_") as name:
         file = Path(name) / "job.txt"
         file.write_text(job.text(), encoding="utf-8")
-        own = {"WINEPREFIX": str(_folder() / "wine")} if host.windows else {}
+        own = {"WINEPREFIX": str(_folder() / f"wine-{os.getpid()}")} if host.windows else {}
         done = subprocess.run(
             [*host.emulator, *before, str(program), host.path(file), *map(str, words)],
             capture_output=True, check=False, timeout=timeout,
@@ -306,22 +329,18 @@ def given(model: str) -> Mechanism:
 
 @cache
 def native(model: str, fmi: int, platform: str = "host") -> Path:
-    """Return a native FMU of a mechanism, unpacked."""
-    folder = _folder() / f"{model}-{fmi}-{platform}"
-    fmu = folder.with_suffix(".fmu")
-    write(fmu, native_fmu.build(given(model), {}, fmi, (platform,)))
-    return unpack(fmu, folder)
+    """Return a native FMU of a mechanism, unpacked; the FMU itself lies beside it."""
+    name = f"{model}-{fmi}-{platform}"
+    fmu = once(
+        f"{name}.fmu",
+        lambda path: write(path, native_fmu.build(given(model), {}, fmi, (platform,))),
+    )
+    return once(name, lambda path: unpack(fmu, path))
 
 
 @cache
 def kernel_library(name: str, flags: tuple[str, ...], compiler: str = "cc") -> Path:
     """Return the FMUs' library, compiled with flags of one's own; it serves every mechanism."""
-    needs(compiler)
-    output = _folder() / f"{name}.so"
-    done = subprocess.run(
-        [compiler, *FLAGS, "-fPIC", "-shared", "-fvisibility=hidden", *flags,
-         str(KERNEL / "prbm_fmu.c"), "-o", str(output), "-lm"],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return output
+    shared = ("-fPIC", "-shared", "-fvisibility=hidden", *flags, "-lm")
+    sources = [KERNEL / "prbm_fmu.c"]
+    return once(f"{name}.so", lambda path: compile_c(path, sources, shared, "", compiler))

@@ -15,17 +15,18 @@ from pathlib import Path
 import numpy as np
 
 from c_importer import (
-    FLAGS,
     KERNEL,
     POSIX,
     SOURCES,
     TWO_STOPS,
     Job,
+    compile_c,
     execute,
     importer,
     kernel_library,
     native,
     needs,
+    once,
 )
 
 SANITIZERS = (
@@ -71,25 +72,19 @@ def has_libfuzzer() -> bool:
 @cache
 def _target(name: str) -> Path:
     """Compile a fuzz target: for libFuzzer if clang is there, else to mutate by itself."""
-    clang = has_libfuzzer()
-    output = sanitized_importer().with_name(f"fuzz-{name}")
     sources = [FUZZERS / f"{name}.c"]
     if name == "calls":
         sources += [path for path in sorted(SOURCES.glob("*.c")) if path.name != "main.c"]
     else:
         sources.append(KERNEL / "prbm_fmu.c")
-    command = [
-        "clang" if clang else "cc", *FLAGS, *SANITIZERS,
-        "-fsanitize=fuzzer" if clang else "-DSTANDALONE",
+    clang = has_libfuzzer()
+    flags = [
+        *SANITIZERS, "-fsanitize=fuzzer" if clang else "-DSTANDALONE", *POSIX,
         "-DPRBM=",  # the functions of the kernel are not static
+        "-I", str(KERNEL), "-I", str(SOURCES),
     ]  # fmt: skip
-    done = subprocess.run(
-        [*command, "-I", str(KERNEL), "-I", str(SOURCES), *map(str, sources),
-         "-o", str(output), *POSIX],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return output
+    compiler = "clang" if clang else "cc"
+    return once(f"fuzz-{name}", lambda path: compile_c(path, sources, flags, "", compiler))
 
 
 def _run(command: Sequence[object], seconds: float, **environment: str) -> Found:

@@ -6,7 +6,7 @@
  *     importer JOB cycles N POINTS        instantiate, run to a communication point, free, N times
  *     importer JOB reload N POINTS        the same, and the library unloaded and loaded each time
  *     importer JOB threads N              N instances at once, each in a thread of its own
- *     importer JOB speed N                CPU seconds of steps with five readings each, N times
+ *     importer JOB speed N READINGS       CPU seconds of steps, each with some readings, N times
  *     importer JOB calls SEED N COUNT     arbitrary calls: N sequences of COUNT, from SEED on
  *     importer JOB replay FILE COUNT      the one sequence that the bytes of a file choose
  */
@@ -73,7 +73,7 @@ static void binary_output(void) {}
 
 #endif
 
-enum { READINGS = 5, MOST_THREADS = 64 };
+enum { MOST_THREADS = 64 };
 
 /* --- runs --- */
 
@@ -246,7 +246,7 @@ static bool threads(const Library *library, const Job *job, long count) {
 
 /* --- speed --- */
 
-static bool stepping(Instance *instance, double *elapsed) {
+static bool stepping(Instance *instance, size_t readings, double *elapsed) {
     const Job *job = instance->job;
     double time = job->start, reached, value, begun = seconds();
     bool event;
@@ -255,7 +255,7 @@ static bool stepping(Instance *instance, double *elapsed) {
             return false;
         }
         time = job->points[i];
-        for (size_t k = 0; k < READINGS; k++) {
+        for (size_t k = 0; k < readings; k++) {
             if (!instance_get(instance, job->records + k % job->record_count, &value)) {
                 return false;
             }
@@ -265,7 +265,7 @@ static bool stepping(Instance *instance, double *elapsed) {
     return true;
 }
 
-static bool speed(const Library *library, const Job *job, long count) {
+static bool speed(const Library *library, const Job *job, long count, size_t readings) {
     bool good = job->record_count > 0;
     for (long i = 0; good && i < count; i++) {
         Instance instance;
@@ -274,7 +274,7 @@ static bool speed(const Library *library, const Job *job, long count) {
         if (!good) {
             break;
         }
-        good = instance_initialize(&instance) && stepping(&instance, &elapsed);
+        good = instance_initialize(&instance) && stepping(&instance, readings, &elapsed);
         instance_close(&instance);
         printf("%.9e\n", elapsed);
     }
@@ -325,7 +325,7 @@ static bool execute(const Job *job, int count, char **words) {
     } else if (strcmp(what, "threads") == 0) {
         good = threads(&library, job, number);
     } else if (strcmp(what, "speed") == 0) {
-        good = speed(&library, job, number);
+        good = speed(&library, job, number, size);
     } else if (strcmp(what, "calls") == 0 && count > 3) {
         good = calls(&library, job, (uint64_t)number, (long)size, strtoul(words[3], NULL, 10));
     } else if (strcmp(what, "replay") == 0 && count > 2) {

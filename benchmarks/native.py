@@ -1,0 +1,402 @@
+"""What native FMUs cost: times real time, work over precision, beside others, instructions.
+
+    python benchmarks/native.py
+    python benchmarks/native.py --only speed overhead --runs 9
+
+All ratios are of medians within one run on one machine.  Counted is CPU time, so that what else
+the machine does matters little.
+
+speed       the C importer of the tests steps through the default second (with its impacts) at
+            1 ms, with no, one and five readings a step: times real time, and the error of
+            shuttle.x over the run against the same at the tolerance 1e-12, for tolerances from
+            1e-4 to 1e-10
+overhead    FMPy's fmi2DoStep and five fmi2GetReal, with ours and with an FMU of the same interface
+            that computes nothing (trivial_fmu.c)
+exudyn      the 1R guide of bodies, joints and springs in Exudyn, without its wall, which Exudyn's
+            rigid bodies do not know: cost over error, both against the scalar equation
+octave      the source's algorithm (source_algorithm.m)
+profile     instructions of a right-hand side, counted by valgrind, against the floating-point
+            operations that the equations need
+"""
+
+import argparse
+import importlib.util
+import math
+import shutil
+import statistics
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
+
+from speed import octave_cost
+
+from c_importer import Done, Job, compile_c, execute, kernel_library, native, run
+from prbm import assemble
+from support import ScalarGuide, mechanism
+
+Real = NDArray[np.float64]
+
+MODELS = {"1R": "PRBDM", "2R": "PRBDM2R"}
+POINTS = 1e-3 * np.arange(1001)
+READ = ("shuttle.x", "shuttle.y", "stop.gap", "stop.force", "energy.kinetic")
+TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
+TIGHT = 1e-12
+FREE = {"stop.position": 1.0}  # m: out of reach
+EXUDYN_STEPS = (1e-3, 2.5e-4, 1e-4, 2.5e-5, 1e-5)  # s, whole parts of a millisecond
+TARGETS = (1e-5, 1e-6, 1e-7)  # m
+
+
+# -- the C importer --
+
+
+def cost(job: Job, runs: int, readings: int = len(READ)) -> float:
+    """Return the median seconds of the stepping loop."""
+    done = run(job, "speed", runs, readings)
+    return statistics.median(float(line) for line in done.output.split())
+
+
+def motion(model: str, tolerance: float, **options: Any) -> Real:
+    """Return shuttle.x at the communication points [m]."""
+    job = Job(native(model, 2), points=POINTS, records=READ[:1], tolerance=tolerance, **options)
+    found: Real = run(job).rows()["shuttle.x"]
+    return found
+
+
+def speed(runs: int) -> None:
+    """Print times real time and errors."""
+    print("\nC importer, default run of 1 s at 1 ms; times real time and ms a simulated second")
+    heads = ("steps alone", "with one reading", "with five")
+    print(" " * 14 + "".join(f"{head:>20s}" for head in heads) + f"{'error of x':>12s}")
+    for name, model in MODELS.items():
+        wanted = motion(model, TIGHT)
+        for tolerance in TOLERANCES:
+            job = Job(native(model, 2), points=POINTS, records=READ, tolerance=tolerance)
+            cells = ""
+            for readings in (0, 1, len(READ)):
+                seconds = cost(job, runs, readings)
+                cells += f"{1 / seconds:11.0f}{1e3 * seconds:9.3f}"
+            error = np.abs(motion(model, tolerance) - wanted).max()
+            print(f"{name:4s}{tolerance:10.0e}{cells}{error:12.1e}")
+
+
+# -- FMPy --
+
+
+def fmpy_cost(fmu: Path, folder: Path, runs: int) -> float:
+    """Return the median seconds of a step with five readings, through FMPy."""
+    description = fmpy.read_model_description(fmu)
+    references = {v.name: v.valueReference for v in description.modelVariables}
+    asked = [[references[name]] for name in READ]
+    instance = fmpy.instantiate_fmu(str(folder), description, fmi_type="CoSimulation")
+    durations = []
+    for _ in range(runs):
+        instance.setupExperiment(startTime=0.0)
+        instance.enterInitializationMode()
+        instance.exitInitializationMode()
+        started = time.process_time()
+        for k in range(len(POINTS) - 1):
+            instance.doStep(currentCommunicationPoint=k * 1e-3, communicationStepSize=1e-3)
+            for reference in asked:
+                instance.getReal(reference)
+        durations.append((time.process_time() - started) / (len(POINTS) - 1))
+        instance.reset()
+    instance.freeInstance()
+    return statistics.median(durations)
+
+
+def overhead(runs: int) -> None:
+    """Print what a step costs in FMPy, ours and the trivial FMU's."""
+    print("\nFMPy, one fmi2DoStep of 1 ms and five fmi2GetReal, over the default run")
+    with tempfile.TemporaryDirectory() as name:
+        for label, model in MODELS.items():
+            folder = native(model, 2)
+            idle = Path(name) / model
+            shutil.copytree(folder, idle)
+            (library,) = (idle / "binaries" / "linux64").iterdir()
+            library.unlink()
+            flags = ("-fPIC", "-shared")
+            compile_c(library, [Path(__file__).with_name("trivial_fmu.c")], flags)
+            fmu = folder.with_suffix(".fmu")
+            ours, least = (fmpy_cost(fmu, place, runs) for place in (folder, idle))
+            print(
+                f"{label:4s}{1e6 * ours:8.1f} us, trivial {1e6 * least:6.1f} us, "
+                f"ratio {ours / least:5.2f}"
+            )
+
+
+# -- Exudyn --
+
+
+def scalar_motion() -> Real:
+    """Return x of the 1R guide without a wall, by its scalar equation [m]."""
+    guide, values = _guide()
+    g, beta, inertia = guide.g, values["damping.beta"], guide.mass * guide.r**2
+
+    def rates(_: float, y: Real) -> list[float]:
+        phi, omega = y
+        force = -4 * guide.k * (phi + beta * omega)
+        return [omega, (force + guide.mass * g * guide.r * math.cos(phi)) / inertia]
+
+    start = [math.asin(values["release.displacement"] / guide.r), 0.0]
+    found = solve_ivp(rates, (0.0, POINTS[-1]), start, "DOP853", POINTS, rtol=1e-13, atol=1e-16)
+    x: Real = guide.r * np.sin(found.y[0])
+    return x
+
+
+def _guide() -> tuple[ScalarGuide, dict[str, float]]:
+    values = mechanism("PRBDM").values()
+    return ScalarGuide.of(values), dict(values)
+
+
+def exudyn_motion(exudyn: Any, step: float) -> tuple[Real, float]:
+    """Return x of the same guide in Exudyn [m] and the seconds that the solver took.
+
+    Three rigid bodies in the plane, four revolute joints, four torsion springs with dampers; the
+    implicit trapezoidal rule, Exudyn's second order.
+    """
+    from exudyn import itemInterface as item
+
+    guide, values = _guide()
+    L, W = values["flexure.length"], values["shuttle.width"]
+    r, foot, height = guide.r, (L - guide.r) / 2, L + values["shuttle.com_height"]
+    phi = math.asin(values["release.displacement"] / r)
+    start = [r * math.sin(phi), r * (math.cos(phi) - 1)]
+    lump = (guide.mass - values["shuttle.mass"]) / 2
+    system = exudyn.SystemContainer().AddSystem()
+    ground = system.AddObject(item.ObjectGround())
+    fixed = system.AddMarker(
+        item.MarkerNodeCoordinate(nodeNumber=system.AddNode(item.NodePointGround()), coordinate=0)
+    )
+
+    def body(x: float, y: float, angle: float, mass: float, inertia: float) -> tuple[int, int]:
+        node = system.AddNode(
+            item.NodeRigidBody2D(referenceCoordinates=[x, y, 0], initialCoordinates=[*start, angle])
+        )
+        number = system.AddObject(
+            item.ObjectRigidBody2D(mass=mass, inertia=inertia, nodeNumber=node)
+        )
+        weight = [mass * guide.g, 0, 0]
+        system.AddLoad(item.Force(markerNumber=marker(number, 0.0, 0.0), loadVector=weight))
+        return node, number
+
+    def marker(number: int, x: float, y: float) -> int:
+        return int(
+            system.AddMarker(item.MarkerBodyPosition(bodyNumber=number, localPosition=[x, y, 0]))
+        )
+
+    def angle_of(node: int) -> int:
+        return int(system.AddMarker(item.MarkerNodeCoordinate(nodeNumber=node, coordinate=2)))
+
+    shuttle_node, shuttle = body(
+        W / 2, height, 0.0, values["shuttle.mass"], values["shuttle.inertia"]
+    )
+    for x in (0.0, W):
+        node, link = body(x, foot + r, -phi, lump, 0.0)
+        for pair in (
+            [marker(ground, x, foot), marker(link, 0.0, -r)],
+            [marker(link, 0.0, 0.0), marker(shuttle, x - W / 2, foot + r - height)],
+        ):
+            system.AddObject(item.RevoluteJoint2D(markerNumbers=pair))
+        for other in (fixed, angle_of(shuttle_node)):
+            system.AddObject(
+                item.CoordinateSpringDamper(
+                    markerNumbers=[other, angle_of(node)],
+                    stiffness=guide.k,
+                    damping=values["damping.beta"] * guide.k,
+                )
+            )
+    sensor = system.AddSensor(
+        item.SensorNode(
+            nodeNumber=shuttle_node,
+            storeInternal=True,
+            outputVariableType=exudyn.OutputVariableType.Displacement,
+        )
+    )
+    system.Assemble()
+    settings = exudyn.SimulationSettings()
+    settings.timeIntegration.numberOfSteps = round(POINTS[-1] / step)
+    settings.timeIntegration.endTime = float(POINTS[-1])
+    settings.timeIntegration.verboseMode = 0
+    settings.timeIntegration.newton.useModifiedNewton = True
+    settings.solution.sensors.writePeriod = float(POINTS[1])
+    settings.solution.file.write = False
+    started = time.process_time()
+    system.SolveDynamic(settings, solverType=exudyn.DynamicSolverType.TrapezoidalIndex2)
+    elapsed = time.process_time() - started
+    data = system.GetSensorStoredData(sensor)
+    return np.interp(POINTS, data[:, 0], data[:, 1]), elapsed
+
+
+def interpolated(errors: Sequence[float], costs: Sequence[float], target: float) -> float:
+    """Return the cost of an error, between powers; outside, that of the nearest point."""
+    order = np.argsort(errors)
+    logs = np.log(np.array(errors)[order]), np.log(np.array(costs)[order])
+    return float(np.exp(np.interp(math.log(target), *logs)))
+
+
+def exudyn_costs(runs: int) -> None:
+    """Print cost over error of the guide without a wall, ours and Exudyn's."""
+    if importlib.util.find_spec("exudyn") is None:
+        print("\nExudyn is not installed (python -m pip install exudyn)")
+        return
+    import exudyn
+
+    wanted = scalar_motion()
+    print("\n1R guide without a wall, 1 s, x at 1 ms against the scalar equation")
+    curves: dict[str, tuple[list[float], list[float]]] = {"Exudyn": ([], []), "ours": ([], [])}
+    for step in EXUDYN_STEPS:
+        found = [exudyn_motion(exudyn, step) for _ in range(min(runs, 3))]
+        seconds = statistics.median(elapsed for _, elapsed in found)
+        _add(curves["Exudyn"], found[0][0] - wanted, seconds, f"Exudyn, step {step:g} s")
+    for tolerance in TOLERANCES:
+        job = Job(native("PRBDM", 2), points=POINTS, records=READ, tolerance=tolerance, sets=FREE)
+        x = motion("PRBDM", tolerance, sets=FREE)
+        _add(curves["ours"], x - wanted, cost(job, runs), f"ours, tolerance {tolerance:g}")
+    for target in TARGETS:
+        theirs, ours = (interpolated(*curves[name], target) for name in ("Exudyn", "ours"))
+        print(f"  at {target:g} m: {theirs / ours:.0f} times faster")
+
+
+def _add(curve: tuple[list[float], list[float]], off: Real, seconds: float, label: str) -> None:
+    error = float(np.abs(off).max())
+    curve[0].append(error)
+    curve[1].append(seconds)
+    print(f"  {label:28s}{1e3 * seconds:10.3f} ms{error:10.1e} m")
+
+
+# -- Octave --
+
+
+def octave(runs: int) -> None:
+    """Print the cost of the source's algorithm and its ratio to ours."""
+    program = shutil.which("octave-cli")
+    if program is None:
+        print("\noctave-cli is not installed, so the source's algorithm was not timed")
+        return
+    theirs = octave_cost(program, min(runs, 3))
+    print("\nThe source's algorithm in Octave, seconds per simulated second")
+    for name, model in MODELS.items():
+        ours = cost(Job(native(model, 2), points=POINTS, records=READ), runs)
+        print(f"{name:4s}{theirs[name]:8.1f}, ours at the default tolerance {ours:.2g}: "
+              f"{theirs[name] / ours:.0f} times faster")  # fmt: skip
+
+
+# -- instructions --
+
+
+def operations(model: str) -> dict[str, int]:
+    """Return the floating-point operations that a right-hand side needs, by what they are for.
+
+    With blocks of coordinates that no mass couples: sine and cosine at 20 operations each, complex
+    products at 6, of symmetric matrices one half, of constant arrays what is not zero.
+    """
+    given = mechanism(model)
+    system = assemble(given, given.values())
+    n, r = system.n, len(system.loops)
+    coupled = system.H != 0
+    blocks = _blocks(coupled)
+    pairs = int(np.count_nonzero(np.triu(coupled, 1)))
+    entries = int(np.count_nonzero(system.loops))
+    springs = int(np.count_nonzero(system.K))
+    columns = sum(
+        b * b * int(np.count_nonzero(system.loops[:, block].any(axis=1)))
+        for block in blocks
+        for b in [len(block)]
+    )
+    return {
+        "sines and cosines": 40 * n,
+        "masses": 12 * pairs + 2 * n,
+        "products of rates": 5 * pairs + n,
+        "loads, springs and dampers": 4 * n + 4 * springs,
+        "loops": 8 * entries,
+        "factors": sum(b**3 // 3 + b**2 for b in map(len, blocks)) + columns,
+        "multipliers": 2 * (r * (r + 1) // 2) * n + 2 * r**3 // 3 + 2 * r * r,
+        "solution": 4 * n * r + sum(4 * b * b for b in map(len, blocks)),
+        "dissipation": 2 * springs + 2 * n,
+    }
+
+
+def _blocks(coupled: Any) -> list[list[int]]:
+    """Return the sets of coordinates that masses couple."""
+    from scipy.sparse.csgraph import connected_components
+
+    count, label = connected_components(coupled, directed=False)
+    return [[*np.flatnonzero(label == k)] for k in range(count)]
+
+
+def inclusive(profile: Path, function: str) -> tuple[int, int]:
+    """Return how often a function was called and the instructions below it, from callgrind."""
+    names: dict[str, str] = {}
+    calls = total = 0
+    callee, pending = "", 0
+    for line in profile.read_text().splitlines():
+        if pending:
+            if callee.split(".")[0] == function:
+                calls, total = calls + pending, total + int(line.split()[-1])
+            pending = 0
+        elif line.startswith(("fn=", "cfn=")):
+            number, _, name = line.partition("=")[2].partition(" ")
+            names.setdefault(number, name)
+            if line.startswith("cfn="):
+                callee = names[number]
+        elif line.startswith("calls="):
+            pending = int(line.removeprefix("calls=").split()[0])
+    return calls, total
+
+
+def profile(runs: int) -> None:
+    """Print instructions of a right-hand side and of a whole run."""
+    del runs
+    if shutil.which("valgrind") is None:
+        print("\nvalgrind is not installed, so no instructions were counted")
+        return
+    print("\nInstructions a right-hand side, over the default run until 0.1 s")
+    library = kernel_library("profiled", ("-g",))
+    for name, model in MODELS.items():
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "profile"
+            job = Job(native(model, 2), points=POINTS[:101], records=READ, library=library)
+            counted = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={file}")
+            done: Done = execute(job, before=counted)
+            if done.status:
+                print(done.errors)
+                return
+            calls, total = inclusive(file, "solve_motion")
+            _, whole = inclusive(file, "fmi2DoStep")
+        needed = operations(model)
+        print(
+            f"{name:4s}{total / calls:8.0f} instructions, {sum(needed.values())} operations needed "
+            f"({calls} right-hand sides, {100 * total / whole:.0f} % of fmi2DoStep)"
+        )
+        print("    " + ", ".join(f"{what} {count}" for what, count in needed.items()))
+
+
+PARTS: dict[str, Callable[[int], None]] = {
+    "speed": speed, "overhead": overhead, "exudyn": exudyn_costs, "octave": octave,
+    "profile": profile,
+}  # fmt: skip
+
+
+def main() -> None:
+    """Print what was asked for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--runs", type=int, default=7, help="runs of which to take the median")
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=[*PARTS])
+    arguments = parser.parse_args()
+    for part in arguments.only:
+        PARTS[part](arguments.runs)
+
+
+if __name__ == "__main__":
+    main()
