@@ -48,6 +48,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.f = (int)f;
     result.b = (int)b;
     result.q0 = place(memory, n, sizeof(double));
+    result.e0 = place(memory, n, sizeof(Complex));
     result.J = place(memory, n, sizeof(double));
     result.K = place(memory, n * n, sizeof(double));
     result.H = place(memory, n * n, sizeof(Complex));
@@ -527,13 +528,13 @@ static void clear(System *system) {
 
 PRBM bool assemble(System *system, const double *values, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
-    size_t mark = scratch->used, n = (size_t)system->n;
+    size_t mark = scratch->used;
     system->values = values;
     system->gravity = complex_of(values[m->gravity[0]], values[m->gravity[1]]);
     clear(system);
     bool right = stubs(system, scratch, problem) && walk_all(system, scratch, problem);
     if (right) {
-        Complex *e0 = (Complex *)take(scratch, 2 * n);
+        Complex *e0 = system->e0;
         directions(system->n, system->q0, e0);
         for (int body = 1; body <= system->b; body++) {
             add_body(system, body, scratch);

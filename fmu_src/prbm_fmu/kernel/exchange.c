@@ -190,7 +190,7 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
         return false;
     }
     sim->stale = sim->evaluated = false;
-    sim->output_level = 0;
+    sim->fresh = NOTHING;
     return true;
 }
 
@@ -218,14 +218,14 @@ PRBM void exchange_set_time(Simulation *simulation, double time) {
     if (time != simulation->now->time) {
         simulation->now->time = time;
         simulation->stale = true;
-        simulation->output_level = 0;
+        simulation->fresh = NOTHING;
     }
 }
 
 PRBM void exchange_set(Simulation *simulation, const double *x) {
     copy(exchange_states(simulation), x, simulation->states);
     simulation->stale = true;
-    simulation->output_level = 0;
+    simulation->fresh = NOTHING;
 }
 
 PRBM void exchange_get(const Simulation *simulation, double *x) {
@@ -394,7 +394,7 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
 /* What has been changed at the front is there to be evaluated again. */
 static void changed_front(Simulation *sim) {
     sim->evaluated = false;
-    sim->output_level = 0;
+    sim->fresh = NOTHING;
 }
 
 /* Whether an impulse on a held stop pulls more than it was pressed since the last event: then its

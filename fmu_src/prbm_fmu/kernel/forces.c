@@ -41,9 +41,7 @@ PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q) {
 PRBM double gravitational_energy(const System *system, const Complex *e) {
     Complex fall = {0.0, 0.0};
     for (int j = 0; j < system->n; j++) {
-        Complex straight;
-        directions(1, &system->q0[j], &straight);
-        fall = plus(fall, product(system->S[j], minus(e[j], straight)));
+        fall = plus(fall, product(system->S[j], minus(e[j], system->e0[j])));
     }
     return -product(conjugate(system->gravity), fall).re;
 }

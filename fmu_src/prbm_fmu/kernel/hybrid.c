@@ -185,13 +185,13 @@ PRBM void simulation_reset(Simulation *simulation) {
     for (int i = 0; i < m->input_count; i++) {
         sim->given[i] = m->input_starts[i];
     }
-    sim->output_level = 0;
+    sim->fresh = NOTHING;
     sim->stale = false;
 }
 
 PRBM void simulation_unstart(Simulation *simulation) {
     simulation->now->started = 0.0;
-    simulation->output_level = 0;
+    simulation->fresh = NOTHING;
 }
 
 PRBM bool simulation_started(const Simulation *simulation) {
@@ -262,7 +262,7 @@ PRBM void set_inputs(Simulation *sim) {
     Inputs inputs = inputs_of(sim);
     read_discrete(sim);
     set_equations(&sim->equations, &inputs, &sim->discrete, sim->omega);
-    sim->output_level = 0;
+    sim->fresh = NOTHING;
 }
 
 PRBM void set_discrete(Simulation *sim, const Discrete *discrete) {
@@ -336,7 +336,7 @@ PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *pr
     }
     if (sim->now->exchange != 0.0) {
         sim->stale = true;
-        sim->output_level = 0;
+        sim->fresh = NOTHING;
     }
     return true;
 }
@@ -433,7 +433,7 @@ static bool attempt(Simulation *sim, bool right, Problem *problem) {
         Problem another;
         copy((int)sim->state_count, sim->backup, sim->state);
         sim->scratch.used = 0;
-        sim->output_level = 0;
+        sim->fresh = NOTHING;
         if (simulation_started(sim)) {
             sim->assembled =
                 assemble(&sim->system, sim->acting_values, &sim->scratch, &another);
@@ -1874,7 +1874,7 @@ PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each
         return true;
     }
     keep_backup(sim);
-    sim->output_level = 0;
+    sim->fresh = NOTHING;
     return attempt(sim, advance(sim, time, each, true, event, problem), problem);
 }
 
@@ -1888,7 +1888,7 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
         return true;
     }
     keep_backup(sim);
-    sim->output_level = 0;
+    sim->fresh = NOTHING;
     return attempt(sim, advance(sim, time, false, false, &event, problem), problem);
 }
 
@@ -1898,7 +1898,7 @@ PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
         return true;
     }
     keep_backup(sim);
-    sim->output_level = 0;
+    sim->fresh = NOTHING;
     return attempt(sim, let_happen(sim, problem), problem);
 }
 
@@ -1946,71 +1946,90 @@ static void output_places(Simulation *sim) {
     out[slots->time] = sim->now->time;
 }
 
-static bool output_forces(Simulation *sim, Problem *problem) {
-    const System *system = &sim->system;
+static bool output_motion(Simulation *sim, Problem *problem) {
     const Slots *slots = &sim->mechanism->slots;
-    int n = system->n;
-    double *out = sim->outputs, *v = sim->y + n, *deflection = sim->error;
+    double *out = sim->outputs, *v = sim->y + sim->system.n;
     if (!accelerations(&sim->equations, sim->y, v, sim->a, sim->lam, problem)) {
         return false;
     }
-    for (int i = 0; i < system->s; i++) {
+    for (int i = 0; i < sim->system.s; i++) {
         out[slots->stops + PER_STOP * i + 2] = 0.0;
     }
     for (int k = 0; k < sim->equations.held_count; k++) {
         out[slots->stops + PER_STOP * sim->equations.held[k] + 2] =
             sim->lam[sim->equations.first_hold + k];
     }
-    Complex force;
-    base_reaction(&sim->equations, sim->equations.e, v, sim->a, &force, out + slots->base + 2);
-    out[slots->base] = force.re;
-    out[slots->base + 1] = force.im;
-    for (int j = 0; j < n; j++) {
-        deflection[j] = sim->y[j] - system->q0[j];
-    }
     out[slots->energies] = energy_here(&sim->equations, v);
-    out[slots->energies + 1] = elastic_energy(n, system->K, deflection);
-    out[slots->energies + 2] = gravitational_energy(system, sim->equations.e);
     return true;
 }
 
-/* Bring the outputs up to date, as far as they are wanted. */
-PRBM bool update_outputs(Simulation *sim, int level, Problem *problem) {
+static void output_base(Simulation *sim) {
+    double *out = sim->outputs + sim->mechanism->slots.base;
+    Complex force;
+    directions(sim->system.n, sim->y, sim->e);
+    base_reaction(&sim->equations, sim->e, sim->y + sim->system.n, sim->a, &force, out + 2);
+    out[0] = force.re;
+    out[1] = force.im;
+}
+
+static void output_energies(Simulation *sim) {
+    const System *system = &sim->system;
+    int n = system->n;
+    double *out = sim->outputs + sim->mechanism->slots.energies, *deflection = sim->error;
+    for (int j = 0; j < n; j++) {
+        deflection[j] = sim->y[j] - system->q0[j];
+    }
+    directions(n, sim->y, sim->e);
+    out[1] = elastic_energy(n, system->K, deflection);
+    out[2] = gravitational_energy(system, sim->e);
+}
+
+static bool output_state(Simulation *sim, Problem *problem) {
+    if (sim->now->exchange != 0.0) {
+        copy(state_size(sim), sim->front, sim->y);
+    } else if (!state_at(sim, sim->y, problem)) {
+        return false;
+    }
+    output_places(sim);
+    return true;
+}
+
+/* Bring groups of outputs up to date. */
+PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem) {
     if (sim->now->exchange != 0.0 && sim->stale) {
         if (!exchange_refresh(sim, problem)) {
             return false;
         }
-        sim->output_level = NOTHING;
+        sim->fresh = NOTHING;
     }
-    if (sim->output_level < PLACES) {
-        bool right = true;
-        if (sim->now->exchange != 0.0) {
-            copy(state_size(sim), sim->front, sim->y);
-        } else {
-            right = state_at(sim, sim->y, problem);
-        }
-        if (!right) {
-            return false;
-        }
-        output_places(sim);
-        sim->output_level = PLACES;
+    int missing = groups & ~sim->fresh;
+    if (((missing & PLACES) && !output_state(sim, problem)) ||
+        ((missing & MOTION) && !output_motion(sim, problem))) {
+        return false;
     }
-    if (sim->output_level < level) {
-        if (!output_forces(sim, problem)) {
-            return false;
-        }
-        sim->output_level = EVERYTHING;
+    if (missing & BASE) {
+        output_base(sim);
     }
+    if (missing & ENERGIES) {
+        output_energies(sim);
+    }
+    sim->fresh |= groups;
     return true;
 }
 
-/* Whether a value takes the accelerations. */
-static bool takes_forces(const Simulation *sim, int slot) {
+/* The groups that a value is of or follows from. */
+static int groups_of(const Simulation *sim, int slot) {
     const Slots *slots = &sim->mechanism->slots;
-    if (slot >= slots->stops && slot < slots->base) {
-        return (slot - slots->stops) % PER_STOP == 2;
+    bool of_stop = slot >= slots->stops && slot < slots->base;
+    bool force = of_stop && (slot - slots->stops) % PER_STOP == 2;
+    if (force || slot == slots->energies) {
+        return PLACES | MOTION;
     }
-    return slot >= slots->base && slot < slots->energies + 3;
+    if (slot >= slots->base && slot < slots->energies) {
+        return PLACES | MOTION | BASE;
+    }
+    bool potential = slot == slots->energies + 1 || slot == slots->energies + 2;
+    return potential ? PLACES | ENERGIES : PLACES;
 }
 
 PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *problem) {
@@ -2030,7 +2049,7 @@ PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *p
     if (slot >= slots->derivatives && slot < slots->time) {
         return exchange_value(sim, slot, x, problem);
     }
-    if (!update_outputs(sim, takes_forces(sim, slot) ? EVERYTHING : PLACES, problem)) {
+    if (!update_outputs(sim, groups_of(sim, slot), problem)) {
         return false;
     }
     *x = sim->outputs[slot];
@@ -2112,7 +2131,7 @@ PRBM bool simulation_restore(Simulation *simulation, const double *state, Proble
         }
     }
     sim->stale = true;
-    sim->output_level = NOTHING;
+    sim->fresh = NOTHING;
     if (!right) {
         fail(problem, "the saved state is damaged: its numbers are not those of a motion");
     }

@@ -28,7 +28,7 @@ typedef struct {
     double time;
 } Event;
 
-enum { NOTHING, PLACES, EVERYTHING }; /* how much of the outputs is up to date */
+enum { NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8 }; /* groups of outputs */
 
 struct Simulation {
     const Mechanism *mechanism;
@@ -61,7 +61,7 @@ struct Simulation {
     Complex *look_e, *e;
     double *outputs, *y, *rates, *a, *lam;
     const double *at;  /* the state at which indicators and derivatives are evaluated */
-    int output_level;  /* how much of the outputs is up to date */
+    int fresh;         /* the groups of outputs that are up to date */
     bool assembled;    /* whether the system is that of the acting values */
     bool stale;        /* model exchange: states, time or inputs have changed */
     bool evaluated;    /* model exchange: the equations and rates are those of the front */
@@ -82,7 +82,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem);
 PRBM bool count_event(Simulation *sim, double time, int kind, Problem *problem);
 PRBM void without_hold(Simulation *sim, int stop);
 PRBM int unsettled_by_walls(Simulation *sim);
-PRBM bool update_outputs(Simulation *sim, int level, Problem *problem);
+PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem);
 PRBM double margin_release(const Simulation *sim, int k);
 PRBM double margin_stick(const Simulation *sim, int k);
 PRBM double margin_rub(const Simulation *sim, int k);

@@ -312,6 +312,7 @@ typedef struct {
     const double *values;
     int n, r, p, s, f, b;
     double *q0, *J, *K;       /* (n,), (n,), (n, n) */
+    Complex *e0;              /* (n,) exp(i q0) */
     Complex *H, *A, *c;       /* (n, n), (p, n), (p,) */
     double *m;                /* (p,) */
     Complex *S;               /* (n,) first mass moments */
