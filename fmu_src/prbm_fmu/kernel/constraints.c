@@ -217,20 +217,33 @@ static void multipliers(const Factors *factors, double *lam) {
     }
 }
 
-/* Multipliers from x = L^-1 f and what the rows ask for, then x := a. */
-static void finish(const Factors *factors, double *x) {
-    int n = factors->n, r = factors->r;
+/* x := a from x = D^-1 L^-1 f and the multipliers behind it, which change their sign. */
+static void add_multipliers(const Factors *factors, double *x) {
+    int n = factors->n;
     double *lam = x + n;
-    for (int k = 0; k < r; k++) {
-        lam[k] -= dot(n, factors->Y + k * n, x);
-    }
-    multipliers(factors, lam);
-    block_scale(n, n, factors->L, x, x);
-    for (int k = 0; k < r; k++) {
+    for (int k = 0; k < factors->r; k++) {
         add_scaled(n, lam[k], factors->Y_columns + k * n, x);
         lam[k] = -lam[k];
     }
     backward_all(factors, x);
+}
+
+/* Multipliers from x = L^-1 f and what the rows ask for, then x := a. */
+static void finish(const Factors *factors, double *x) {
+    int n = factors->n;
+    double *lam = x + n;
+    for (int k = 0; k < factors->r; k++) {
+        lam[k] -= dot(n, factors->Y + k * n, x);
+    }
+    multipliers(factors, lam);
+    block_scale(n, n, factors->L, x, x);
+    add_multipliers(factors, x);
+}
+
+/* The same without loads: x (n + r,) begins with zeros. */
+static void solve_rows(const Factors *factors, double *x) {
+    multipliers(factors, x + factors->n);
+    add_multipliers(factors, x);
 }
 
 PRBM void solve_again(const Factors *factors, double *x) {

@@ -253,12 +253,14 @@ static void add_springs(Equations *q, const double *angle, const double *v) {
 }
 
 /* beta v^T K v */
-static double spring_loss(const Equations *q, const double *v) {
-    int n = q->system->n;
-    double sum = 0.0;
-    for (int k = 0; k < q->system->spring_count; k++) {
-        const Spring *spring = &q->system->spring[k];
-        double turn = (spring->b < n ? v[spring->b] : 0.0) - (spring->a < n ? v[spring->a] : 0.0);
+static double spring_loss(Equations *q, const double *v) {
+    const System *system = q->system;
+    int n = system->n;
+    double *turns = q->turns, sum = 0.0;
+    copy(n, v, turns); /* and none of the ground */
+    for (int k = 0; k < system->spring_count; k++) {
+        const Spring *spring = &system->spring[k];
+        double turn = turns[spring->b] - turns[spring->a];
         sum += spring->rate * (turn * turn);
     }
     return q->beta * sum;
@@ -515,7 +517,7 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
     for (int k = 0; k < active; k++) {
         x[n + k] = -(row_value(n, q->B + k * n, q->e) + offset(q, k, t));
     }
-    solve_again(&q->factors, x);
+    solve_rows(&q->factors, x);
     for (int i = 0; i < n; i++) {
         y[i] += x[i];
     }
@@ -532,7 +534,7 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
     for (int k = 0; k < q->r; k++) {
         x[n + k] = -(row_rate(n, q->B + k * n, q->e, v) + prescribed(q, k));
     }
-    solve_again(&q->factors, x);
+    solve_rows(&q->factors, x);
     for (int i = 0; i < n; i++) {
         v[i] += x[i];
     }

@@ -37,16 +37,31 @@ static const double DENSE_WEIGHT[STAGES][DENSE] = {
 
 /* result = y + sum(a_i k_i) for n even, as it is with two rates for each angle and two energies;
  * two components at a time, which the compilers turn into vectors. */
-static void combine(int n, int count, const double *a, const double *k, const double *y,
-                    double *result) {
+SIZED void combine_of(int count, int n, const double *a, const double *k, const double *y,
+                      double *result) {
     for (int j = 0; j < n; j += 2) {
         double first = 0.0, second = 0.0;
+        UNROLLED
         for (int i = 0; i < count; i++) {
             first += a[i] * k[i * n + j];
             second += a[i] * k[i * n + j + 1];
         }
         result[j] = y[j] + first;
         result[j + 1] = y[j + 1] + second;
+    }
+}
+
+static void combine(int n, int count, const double *a, const double *k, const double *y,
+                    double *result) {
+    switch (count) {
+    case 1: combine_of(1, n, a, k, y, result); break;
+    case 2: combine_of(2, n, a, k, y, result); break;
+    case 3: combine_of(3, n, a, k, y, result); break;
+    case 4: combine_of(4, n, a, k, y, result); break;
+    case 5: combine_of(5, n, a, k, y, result); break;
+    case 6: combine_of(6, n, a, k, y, result); break;
+    case 7: combine_of(7, n, a, k, y, result); break;
+    default: combine_of(STAGES, n, a, k, y, result);
     }
 }
 
