@@ -89,13 +89,18 @@ static void set_rows(Equations *q) {
     }
 }
 
-/* The place of a held stop among those that hold. */
-static int held_at(const Equations *q, int stop) {
+/* Where an index stands in a list that has it. */
+static int place_in(const int *list, int index) {
     int k = 0;
-    while (q->held[k] != stop) {
+    while (list[k] != index) {
         k++;
     }
     return k;
+}
+
+/* The place of a held stop among those that hold. */
+static int held_at(const Equations *q, int stop) {
+    return place_in(q->held, stop);
 }
 
 static void set_laws(Equations *q) {

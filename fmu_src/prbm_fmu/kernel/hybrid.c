@@ -552,23 +552,22 @@ static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
 /* --- steps ------------------------------------------------------------------------------------ */
 
 /* The magnitude against which the error of a component of the state is measured. */
-static double scale_of(const Simulation *sim, int i, double size) {
+static double scale_of(const Simulation *sim, int i, double size, double omega) {
     int n = sim->system.n;
     if (i < n) {
         return 1.0;
     }
-    return greater(size, i < 2 * n ? omega_scale(sim) : sim->energy_scale);
+    return greater(size, i < 2 * n ? omega : sim->energy_scale);
 }
 
 /* The root mean square of an error in units of what the tolerance allows. */
 static double relative_error(const Simulation *sim, const double *difference, const double *y,
                              const double *y1) {
-    int ny = state_size(sim), n = sim->system.n;
+    int ny = state_size(sim);
     double sum = 0.0, omega = omega_scale(sim);
     for (int i = 0; i < ny; i++) {
         double size = greater(fabs(y[i]), fabs(y1[i]));
-        double scale = i < n ? 1.0 : greater(size, i < 2 * n ? omega : sim->energy_scale);
-        double ratio = difference[i] / scale;
+        double ratio = difference[i] / scale_of(sim, i, size, omega);
         sum += ratio * ratio;
     }
     return sqrt(sum / ny) / (STRICTNESS * sim->now->tolerance);
@@ -583,7 +582,7 @@ static double first_step(const Simulation *sim) {
     int ny = state_size(sim);
     double sum = 0.0;
     for (int i = 0; i < ny; i++) {
-        double ratio = sim->k1[i] / scale_of(sim, i, fabs(sim->front[i]));
+        double ratio = sim->k1[i] / scale_of(sim, i, fabs(sim->front[i]), omega_scale(sim));
         sum += ratio * ratio;
     }
     double size = greater(sqrt(sum / ny), 1e-6);
@@ -1262,18 +1261,11 @@ static void with_slide(Simulation *sim, int kind, int i, int state) {
 static void stick_force(const Simulation *sim, int kind, int i, const double *lam,
                         const Complex *e, double *friction, double *limit) {
     const Equations *q = &sim->trial;
-    int k = 0;
     if (kind == RUB) {
-        while (q->rubbing[k] != i) {
-            k++;
-        }
-        *friction = lam[q->first_rub + k];
+        *friction = lam[q->first_rub + place_in(q->rubbing, i)];
         *limit = rub_limit(q, i, e);
     } else {
-        while (q->stuck[k] != i) {
-            k++;
-        }
-        *friction = lam[q->first_stick + k];
+        *friction = lam[q->first_stick + place_in(q->stuck, i)];
         *limit = q->stop_friction[i] * lam[q->first_hold + held_at(q, i)];
     }
 }
@@ -1459,8 +1451,31 @@ typedef struct {
     bool with_normal[MOST_STOPS];                   /* whether the stop took part */
 } Hits;
 
-static void hits_without_friction(Simulation *sim, const Here *here, const double *v,
-                                  const double *u, Hits *hits, bool *right, Problem *problem) {
+/* The inverse mass in contact space, W = rows X (k, k), of rows (k, n) and their response X. */
+static void contact_mobility(int k, int n, const double *rows, const double *X, double *W) {
+    for (int a = 0; a < k; a++) {
+        for (int b = 0; b < k; b++) {
+            W[a * k + b] = 0.0;
+            for (int j = 0; j < n; j++) {
+                W[a * k + b] += rows[a * n + j] * X[j * k + b];
+            }
+        }
+    }
+}
+
+/* after = v + X P */
+static void add_impulses(int k, int n, const double *v, const double *X, const double *P,
+                         double *after) {
+    copy(n, v, after);
+    for (int j = 0; j < n; j++) {
+        for (int a = 0; a < k; a++) {
+            after[j] += X[j * k + a] * P[a];
+        }
+    }
+}
+
+static bool hits_without_friction(Simulation *sim, const Here *here, const double *v,
+                                  const double *u, Hits *hits, Problem *problem) {
     const System *system = &sim->system;
     int n = system->n, k = hits->struck_count + hits->held_count;
     double *G = take_matrix(&sim->scratch, k, n), *X = take_matrix(&sim->scratch, n, k);
@@ -1473,28 +1488,44 @@ static void hits_without_friction(Simulation *sim, const Here *here, const doubl
         rates[a] = lesser(u[i], 0.0);
         eps[a] = struck ? hits->restitution[a] : 0.0;
     }
-    *right = response(n, system->r, k, here->M, here->loops, G, X, &sim->scratch, problem);
-    if (!*right) {
-        return;
+    if (!response(n, system->r, k, here->M, here->loops, G, X, &sim->scratch, problem)) {
+        return false;
     }
-    for (int a = 0; a < k; a++) {
-        for (int b = 0; b < k; b++) {
-            W[a * k + b] = 0.0;
-            for (int j = 0; j < n; j++) {
-                W[a * k + b] += G[a * n + j] * X[j * k + b];
-            }
-        }
-    }
+    contact_mobility(k, n, G, X, W);
     newton(k, W, rates, eps, P, &sim->scratch);
-    copy(n, v, hits->after);
+    add_impulses(k, n, v, X, P, hits->after);
     for (int a = 0; a < k; a++) {
         int i = a < hits->struck_count ? hits->struck[a] : hits->held[a - hits->struck_count];
         hits->normal[i] = P[a];
         hits->with_normal[i] = true;
-        for (int j = 0; j < n; j++) {
-            hits->after[j] += X[j * k + a] * P[a];
+    }
+    return true;
+}
+
+/* What the loops and the kept stops put in, M (v+ - v-) - [G; T]^T P = rows^T reaction. */
+static void reactions_of(Simulation *sim, const Here *here, const double *v, const double *after,
+                         int k, const double *GT, const double *P, int r, const double *rows,
+                         double *reaction) {
+    size_t mark = sim->scratch.used;
+    int n = sim->system.n;
+    double *left = take(&sim->scratch, (size_t)n);
+    double *columns = take_matrix(&sim->scratch, n, r);
+    for (int j = 0; j < n; j++) {
+        left[j] = 0.0;
+        for (int i = 0; i < n; i++) {
+            left[j] += here->M[j * n + i] * (after[i] - v[i]);
+        }
+        for (int a = 0; a < k; a++) {
+            left[j] -= GT[a * n + j] * P[a];
+        }
+        for (int a = 0; a < r; a++) {
+            columns[j * r + a] = rows[a * n + j];
         }
     }
+    if (r > 0) {
+        least_squares(n, r, columns, left, 1e-12, reaction, &sim->scratch);
+    }
+    sim->scratch.used = mark;
 }
 
 /* One round with friction: kept stops are constraints; *pulling tells whether one of them pulls,
@@ -1522,44 +1553,15 @@ static bool hits_with_friction(Simulation *sim, const Here *here, const double *
     if (!response(n, r, 2 * k, here->M, rows, GT, X, &sim->scratch, problem)) {
         return false;
     }
-    for (int a = 0; a < 2 * k; a++) {
-        for (int b = 0; b < 2 * k; b++) {
-            W[a * 2 * k + b] = 0.0;
-            for (int j = 0; j < n; j++) {
-                W[a * 2 * k + b] += GT[a * n + j] * X[j * 2 * k + b];
-            }
-        }
-    }
+    contact_mobility(2 * k, n, GT, X, W);
     if (k == 1) {
         stronge(W, rates, mu[0], hits->restitution[0], &P[0], &P[1]);
     } else if (!several(k, W, rates, mu, hits->restitution, P, &sim->scratch, problem)) {
         return false;
     }
-    /* what the loops and the kept stops put in: M (v+ - v-) - [G; T]^T P = rows^T reaction */
-    double *left = take(&sim->scratch, (size_t)n), *reaction = take(&sim->scratch, (size_t)r);
-    double *columns = take_matrix(&sim->scratch, n, r);
-    copy(n, v, hits->after);
-    for (int j = 0; j < n; j++) {
-        for (int a = 0; a < 2 * k; a++) {
-            hits->after[j] += X[j * 2 * k + a] * P[a];
-        }
-    }
-    for (int j = 0; j < n; j++) {
-        left[j] = 0.0;
-        for (int i = 0; i < n; i++) {
-            left[j] += here->M[j * n + i] * (hits->after[i] - v[i]);
-        }
-        for (int a = 0; a < 2 * k; a++) {
-            left[j] -= GT[a * n + j] * P[a];
-        }
-        for (int a = 0; a < r; a++) {
-            columns[j * r + a] = rows[a * n + j];
-        }
-    }
-    zeros(r, reaction);
-    if (r > 0) {
-        least_squares(n, r, columns, left, 1e-12, reaction, &sim->scratch);
-    }
+    double *reaction = take(&sim->scratch, (size_t)r);
+    add_impulses(2 * k, n, v, X, P, hits->after);
+    reactions_of(sim, here, v, hits->after, 2 * k, GT, P, r, rows, reaction);
     int staying = 0;
     for (int a = 0; a < *kept_count; a++) {
         if (!(reaction[system->r + a] < 0.0)) {
@@ -1602,7 +1604,7 @@ static bool impulse(Simulation *sim, const double *q, const double *v, Hits *hit
         rough = rough || mu[a] != 0.0;
     }
     if (!rough) {
-        hits_without_friction(sim, &here, v, u, hits, &right, problem);
+        right = hits_without_friction(sim, &here, v, u, hits, problem);
     } else {
         memcpy(kept, hits->held, (size_t)hits->held_count * sizeof(int));
         while (right && pulling) {
