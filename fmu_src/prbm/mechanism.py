@@ -14,12 +14,12 @@ import ast
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from keyword import iskeyword
 from typing import ClassVar
 
 from .errors import MechanismError, ParameterError
-from .flexure import MODELS, FlexureModel
+from .flexure import CLAMP, ENDS, FREE, MODELS, MOST_LINKS, FlexureModel
 
 Quantity = float | str
 Point = tuple[Quantity, Quantity]
@@ -221,7 +221,7 @@ class FlexureType:
     ----------
     name : str
         Prefix of the parameters, for instance ``flexure``.
-    model : {"1R", "2R", "3R"}
+    model : {"1R", "2R", "3R", "nR"}
         Pseudo-rigid-body model.
     thickness, width : Quantity
         Section: in the plane of motion, across it [m].
@@ -231,6 +231,10 @@ class FlexureType:
         Of the material [kg/m^3].
     coefficients : mapping
         Values that replace the published coefficients of the model, by name [-].
+    n : int
+        Number of links, of the chain nR alone.
+    axial : bool
+        Whether the flexures stretch, too.
     """
 
     name: str
@@ -240,27 +244,42 @@ class FlexureType:
     youngs_modulus: Quantity
     density: Quantity
     coefficients: Mapping[str, Quantity] = field(default_factory=dict)
+    n: int = 0
+    axial: bool = False
 
 
 @dataclass(frozen=True)
 class Flexure:
-    """A straight flexure between two points, each ``body.point``, held by a clamp or a pin."""
+    """A straight flexure between two points, each ``body.point``, and how it is held there.
+
+    An end is a ``clamp`` (a spring), a ``pin`` (none), or ``free``: then the body at that end
+    is carried by the last link, as the mass at the tip of a cantilever.
+    """
 
     name: str
     type: str
     start: str
     end: str
-    ends: tuple[str, str] = ("clamp", "clamp")
+    ends: tuple[str, str] = (CLAMP, CLAMP)
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A pin that joins two points, each ``body.point``, which are drawn at the same place."""
+
+    name: str
+    start: str
+    end: str
 
 
 @dataclass(frozen=True)
 class Stop:
-    """A point of a body against a wall fixed to the ground.
+    """A point of a body against a wall fixed to the ground, or to another body.
 
     The wall is a line across ``direction`` [deg], the direction in which the body travels
     towards it; it is touched when the point has moved by ``position`` [m] from the straight
-    shape along that direction.  ``offset`` [m] shifts the point along the wall, positive to the
-    left of the direction.
+    shape along that direction, as seen from what the wall is fixed to.  ``offset`` [m] shifts
+    the point along the wall, positive to the left of the direction.
     """
 
     name: str
@@ -272,14 +291,16 @@ class Stop:
     restitution: Quantity = 0.6
     friction: Quantity = 0.0
     rest_speed: Quantity = 1e-3
+    on: str = GROUND
 
 
 @dataclass(frozen=True)
 class Friction:
-    """Coulomb friction against the motion of a body's centre of mass along a direction [deg].
+    """Coulomb friction against the motion of a body along a direction [deg].
 
-    The normal force is max(0, normal_force + normal_stiffness * s), s the displacement of the
-    centre of mass to the left of the direction (thesis 3.4.2).
+    It acts at a point as drawn, the centre of mass unless given.  The normal force is
+    max(0, normal_force + normal_stiffness * s), s the displacement of the point to the left of
+    the direction (thesis 3.4.2).
     """
 
     name: str
@@ -288,14 +309,30 @@ class Friction:
     coefficient: Quantity = 0.0
     normal_force: Quantity = 0.0
     normal_stiffness: Quantity = 0.0
+    point: Point | None = None
 
 
 @dataclass(frozen=True)
 class Force:
-    """Inputs ``name.x``, ``name.y`` [N], ``name.moment`` [N m] on a body's centre of mass."""
+    """Inputs ``name.x``, ``name.y`` [N], ``name.moment`` [N m] on a body.
+
+    The force acts at a point as drawn, the centre of mass unless given.
+    """
 
     name: str
     body: str
+    point: Point | None = None
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Outputs ``name.x``, ``name.y``, ``name.vx``, ``name.vy`` of a point ``body.point``.
+
+    The displacement from the straight shape [m] and the velocity [m/s].
+    """
+
+    name: str
+    point: str
 
 
 @dataclass(frozen=True)
@@ -313,7 +350,7 @@ class Release:
     velocity: Quantity = 0.0
 
 
-Part = Body | FlexureType | Flexure | Stop | Friction | Force | Release
+Part = Body | FlexureType | Flexure | Joint | Stop | Friction | Force | Probe | Release
 
 TINY_LENGTH = 1e-9  # m; below this a dimension of a mechanism is a mistake, not a nanostructure
 TINY_MASS = 1e-15  # kg; a cubic micrometre of silicon has 2e-15 kg
@@ -398,7 +435,7 @@ class Mechanism:
         Identifier of its FMU, one line, a paragraph.
     ground : mapping
         Fixed points by name [m].
-    bodies, flexure_types, flexures, stops, frictions, forces : tuples of parts
+    bodies, flexure_types, flexures, joints, stops, frictions, forces, probes : tuples of parts
         The parts.
     release : Release
         How the motion starts.
@@ -427,9 +464,11 @@ class Mechanism:
     flexure_types: tuple[FlexureType, ...]
     flexures: tuple[Flexure, ...]
     release: Release
+    joints: tuple[Joint, ...] = ()
     stops: tuple[Stop, ...] = ()
     frictions: tuple[Friction, ...] = ()
     forces: tuple[Force, ...] = ()
+    probes: tuple[Probe, ...] = ()
     geometry: tuple[Parameter, ...] = ()
     gravity: tuple[float, float] = (0.0, 0.0)
     damping_zeta: float = 0.0
@@ -502,7 +541,7 @@ class Mechanism:
 
     def model(self, kind: FlexureType) -> FlexureModel:
         """Return the flexure model of a type."""
-        return MODELS[kind.model]
+        return replace(MODELS[kind.model], links=kind.n)
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Return all parameter values, defaults replaced by the given changes.
@@ -534,9 +573,10 @@ class Mechanism:
 
     def _check_names(self) -> None:
         seen = set(RESERVED)
-        parts: tuple[Part, ...] = (*self.bodies, *self.flexure_types, *self.flexures)
-        parts = (*parts, *self.stops, *self.frictions, *self.forces)
-        for name in (part.name for part in parts):
+        own = [f.name for f in self.flexures if f.type != f.name]  # else both have one section
+        parts: tuple[Part, ...] = (*self.bodies, *self.flexure_types, *self.joints, *self.stops)
+        parts = (*parts, *self.frictions, *self.forces, *self.probes)
+        for name in (*(part.name for part in parts), *own):
             if name in seen:
                 raise MechanismError(
                     f"the name {name!r} is used twice or reserved: give each part its own"
@@ -550,45 +590,80 @@ class Mechanism:
     def _check_references(self) -> None:
         if not self.bodies or not self.flexures:
             raise MechanismError(f"{self.name} needs at least one body and one flexure")
-        bodies = {body.name: body.points for body in self.bodies}
-        kinds = {kind.name: kind for kind in self.flexure_types}
         for kind in self.flexure_types:
-            if kind.model not in MODELS:
-                raise MechanismError(
-                    f"{kind.name}.model = {kind.model!r} is unknown: choose one of "
-                    f"{', '.join(MODELS)}"
-                )
-            known = {c.name for c in self.model(kind).coefficients}
-            for name in kind.coefficients:
-                if name not in known:
-                    raise MechanismError(
-                        f"{kind.name}.{name} is no coefficient of the {kind.model} model, which "
-                        f"has {', '.join(sorted(known))}"
-                    )
+            self._check_type(kind)
         for flexure in self.flexures:
-            if flexure.type not in kinds:
-                raise MechanismError(f"{flexure.name}.type = {flexure.type!r} is not described")
-            for end in (flexure.start, flexure.end):
-                self.point(end, flexure.name)
-            if body_of(flexure.start) == body_of(flexure.end):
-                raise MechanismError(
-                    f"flexure {flexure.name} joins {body_of(flexure.start)} to itself"
-                )
-            if flexure.ends not in (("clamp", "clamp"), ("clamp", "pin"), ("pin", "clamp")):
-                raise MechanismError(
-                    f"{flexure.name}.ends = {flexure.ends!r}: each end is a clamp or a pin, and "
-                    "at least one is a clamp"
-                )
+            self._check_flexure(flexure)
+        for joint in self.joints:
+            self._check_connection("joint", joint)
+        bodies = [body.name for body in self.bodies]
         attached: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
         for part in attached:
             if part.body not in bodies:
                 raise MechanismError(f"{part.name}.body = {part.body!r} is not described")
+        for stop in self.stops:
+            if stop.on not in (GROUND, *bodies):
+                raise MechanismError(f"{stop.name}.on = {stop.on!r} is not described")
+            if stop.on == stop.body:
+                raise MechanismError(f"the stop {stop.name} is fixed to the body that it stops")
+        for probe in self.probes:
+            self.point(probe.point, probe.name)
         directed: tuple[Stop | Friction | Release, ...] = (*self.stops, *self.frictions)
         for one in (*directed, self.release):
             if not math.isfinite(one.direction):
                 raise MechanismError(f"{one.name}.direction = {one.direction} must be an angle")
         if self.release.body not in bodies:
             raise MechanismError(f"release.body = {self.release.body!r} is not described")
+
+    def _check_type(self, kind: FlexureType) -> None:
+        if kind.model not in MODELS:
+            raise MechanismError(
+                f"{kind.name}.model = {kind.model!r} is unknown: choose one of {', '.join(MODELS)}"
+            )
+        chain = not MODELS[kind.model].gamma
+        if chain and not 1 <= kind.n <= MOST_LINKS:
+            raise MechanismError(
+                f"{kind.name}.n = {kind.n} must be the number of links of the chain, from 1 to "
+                f"{MOST_LINKS}"
+            )
+        if kind.n and not chain:
+            raise MechanismError(
+                f"{kind.name}.n = {kind.n}: the {kind.model} model has its own number of links; "
+                'leave n out, or choose model = "nR"'
+            )
+        known = {c.name for c in self.model(kind).coefficients}
+        for name in kind.coefficients:
+            if name not in known:
+                raise MechanismError(
+                    f"{kind.name}.{name} is no coefficient of the {kind.model} model, which has "
+                    f"{', '.join(sorted(known)) or 'none'}"
+                )
+
+    def _check_flexure(self, flexure: Flexure) -> None:
+        kind = next((k for k in self.flexure_types if k.name == flexure.type), None)
+        if kind is None:
+            raise MechanismError(f"{flexure.name}.type = {flexure.type!r} is not described")
+        self._check_connection("flexure", flexure)
+        ends = flexure.ends
+        if len(ends) != 2 or any(end not in ENDS for end in ends):
+            raise MechanismError(
+                f"{flexure.name}.ends = {ends!r}: each of the two ends is one of {', '.join(ENDS)}"
+            )
+        if FREE in ends and CLAMP not in ends:
+            raise MechanismError(
+                f"{flexure.name}.ends = {ends!r}: a free end needs a clamp at the other"
+            )
+        if kind.axial and FREE in ends and len(MODELS[kind.model].gamma) == 1:
+            raise MechanismError(
+                f"{flexure.name} has one link, which its free end fixes to the body: it cannot "
+                f"stretch; choose another model than {kind.model}, or axial = false"
+            )
+
+    def _check_connection(self, what: str, part: Flexure | Joint) -> None:
+        for end in (part.start, part.end):
+            self.point(end, part.name)
+        if body_of(part.start) == body_of(part.end):
+            raise MechanismError(f"{what} {part.name} joins {body_of(part.start)} to itself")
 
     def point(self, reference: str, user: str) -> Point:
         """Return the drawn point that ``body.point`` names.
@@ -603,7 +678,7 @@ class Mechanism:
         if owner not in points or name not in points[owner]:
             every = [f"{o}.{p}" for o, named in points.items() for p in named]
             raise MechanismError(
-                f"{user} ends at {reference!r}, which is not described; points are "
+                f"{user} refers to the point {reference!r}, which is not described; points are "
                 f"{', '.join(every)}"
             )
         return points[owner][name]
@@ -615,12 +690,13 @@ class Mechanism:
             yield from ((f"{body.name}.centre", c) for c in body.centre)
             for name, point in body.points.items():
                 yield from ((f"{body.name}.{name}", c) for c in point)
-        for stop in self.stops:
-            yield from ((f"{stop.name}.point", c) for c in stop.point)
+        points: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
+        for part in points:
+            yield from ((f"{part.name}.point", c) for c in part.point or ())
         for kind in self.flexure_types:
             yield from ((f"{kind.name}.{n}", c) for n, c in kind.coefficients.items())
-        for part in self._parts():
-            yield from ((f"{part.name}.{f}", getattr(part, f)) for f in FIELDS[type(part)])
+        for one in self._parts():
+            yield from ((f"{one.name}.{f}", getattr(one, f)) for f in FIELDS[type(one)])
 
 
 def _fields(part: Part) -> Iterator[Parameter]:
