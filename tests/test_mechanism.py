@@ -99,7 +99,7 @@ LEAF = GUIDE.flexure_types[0]
         ({"release": Release("nobody")}, "'nobody' is not described"),
         ({"flexures": (dataclasses.replace(LEFT, end="shuttle.top"), RIGHT)}, "'shuttle.top'"),
         ({"flexures": (dataclasses.replace(LEFT, type="leaf"), RIGHT)}, "'leaf' is not"),
-        ({"flexures": (dataclasses.replace(LEFT, ends=("pin", "pin")), RIGHT)}, "a clamp or a pin"),
+        ({"flexures": (dataclasses.replace(LEFT, ends=("free", "pin")), RIGHT)}, "needs a clamp"),
         ({"flexures": (dataclasses.replace(LEFT, end="ground.right"), RIGHT)}, "to itself"),
         ({"flexure_types": (dataclasses.replace(LEAF, model="4R"),)}, "choose one of 1R, 2R, 3R"),
         (

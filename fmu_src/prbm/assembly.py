@@ -1,20 +1,30 @@
 r"""From a mechanism and parameter values to the constant arrays of the equations of motion.
 
-Every position is z = c + A e with e = exp(i q) and constant c, A.  Every scalar that the engine
-constrains, watches or reports (loop closures, gaps, displacements) is therefore of one form,
+A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, the
+logarithm of its length over the drawn one.  Each link and body has one *arm*,
 
-    s = Re(B e) + c,      ds/dq = Re(i B e),      d2s/dq2 = -diag(Re(B e)),
+    E = exp(s + i theta),       E' = i w E,     w = theta' - i s',
 
-so that a stack of rows B serves them all.
+(s = 0 for what does not stretch), and every position is z = c + A E with constant c, A.  Every
+scalar that the engine constrains, watches or reports (loop closures, gaps, displacements) is
+therefore of one form,
+
+    x = Re(B E) + c,      x' = -Im(B E w),      x'' = -Im(B E w') - Re(B E w^2).
+
+Arrays have a column for every coordinate.  The vector e has, for the angle of an arm, E, and for
+its stretch -i E, so that dE/dq = i e for both; the columns of A and B at stretches are zero.
+:meth:`System.spread` repeats there the column of the arm: then dx/dq = -Im(spread(B) e).
 """
 
 import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr
 
 from .errors import MechanismError, ParameterError
 from .flexure import Segments, segments, stub
@@ -22,8 +32,10 @@ from .mechanism import (
     GROUND,
     Flexure,
     FlexureType,
+    Joint,
     Mechanism,
     Point,
+    Probe,
     Stop,
     affine,
     body_of,
@@ -32,18 +44,22 @@ from .mechanism import (
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Whole = NDArray[np.int64]
+
+FIXED = -1  # in place of a coordinate: to the ground
+TOGETHER = 1e-9  # of the size: points that a joint joins are drawn no further apart
 
 
 @dataclass(frozen=True)
 class Place:
-    """A point of the mechanism, z = c + A e.
+    """A point of the mechanism, z = c + A E.
 
     Parameters
     ----------
     c : complex
         Fixed part [m].
     A : dict of int to complex
-        Vectors that turn with the coordinates [m].
+        Vectors that turn, and stretch, with the arms [m].
     """
 
     c: complex = 0j
@@ -55,6 +71,13 @@ class Place:
             return Place(self.c + vector, self.A)
         return Place(self.c, {**self.A, j: self.A.get(j, 0j) + vector})
 
+    def minus(self, other: "Place") -> "Place":
+        """Return the vector from another place to this one."""
+        A = dict(self.A)
+        for j, vector in other.A.items():
+            A[j] = A.get(j, 0j) - vector
+        return Place(self.c - other.c, A)
+
     def row(self, n: int) -> Complex:
         """Return A as a row of n columns."""
         row = np.zeros(n, complex)
@@ -65,7 +88,7 @@ class Place:
 
 @dataclass(frozen=True)
 class BodyFrame:
-    """Where a body is: its coordinate and its centre of mass, z = c + A e."""
+    """Where a point of a body is, its centre of mass, say: z = c + A E; the body's coordinate."""
 
     name: str
     j: int
@@ -76,7 +99,7 @@ class BodyFrame:
 
 @dataclass(frozen=True)
 class Outline:
-    """A line to draw: the places of its corners, z = c + A e."""
+    """A line to draw: the places of its corners, z = c + A E."""
 
     name: str
     kind: str
@@ -91,27 +114,37 @@ class System:
     Parameters
     ----------
     q0 : (n,)
-        Absolute angles of the straight shape, counter-clockwise from +x [rad].
+        Coordinates of the straight shape: absolute angles, counter-clockwise from +x [rad], and
+        stretches, which are zero there [-].
+    arm : (n,) int
+        Whose arm a coordinate turns or stretches: its own, or that of a link.
     H : (n, n) complex
-        A^H diag(m) A, Hermitian [kg m^2].
+        A^H diag(m) A with the columns of A spread, Hermitian [kg m^2].
     J : (n,)
-        Rotary inertia of each coordinate about the mass centres of its parts [kg m^2].
+        Rotary inertia of each body about the mass centres of its parts [kg m^2].
     K : (n, n)
-        Torsion springs: elastic energy (q - q0)^T K (q - q0) / 2 [N m/rad].
+        Springs: elastic energy (q - q0)^T K (q - q0) / 2 [N m/rad], [N m].
     A, c, m : (p, n) complex, (p,) complex, (p,)
-        Mass points z = c + A e [m] and their masses [kg].
+        Mass points z = c + A E [m] and their masses [kg].
     loops, loops_c : (r, n) complex, (r,)
-        Loop closures Phi = Re(loops e) + loops_c [m].
-    gaps, gaps_c : (s, n) complex, (s,)
-        Gaps of the stops, without the wall's position: gap = wall + Re(gaps e) + gaps_c [m].
-    slides : (s, n) complex
+        Loop closures Phi = Re(loops E) + loops_c [m].
+    gaps, gaps_c, gaps_z : (s, n) complex, (s,), (s,) complex
+        Gaps of the stops, without the wall's position [m]: gap = wall + Re(f (gaps E + gaps_z)) +
+        gaps_c, with f = 1 for a wall on the ground, conj(E) of the body that it is fixed to.
+    slides, slides_z : (s, n) complex, (s,) complex
         Displacement of the hit points along their walls, to the left of the direction [m].
+    on : (s,) int
+        The coordinate of the body that a wall is fixed to; :data:`FIXED`: the ground.
     rubs, lifts, lifts_c : (f, n) complex, (f, n) complex, (f,)
         Displacement along and to the left of the direction of each friction point [m].
     release, release_c : (n,) complex, float
         Displacement of the released body along the direction of the release [m].
     bodies : dict of BodyFrame
-        The bodies by name.
+        The bodies by name: their centres of mass.
+    pushed : tuple of BodyFrame
+        Where the forces act.
+    probes : tuple of BodyFrame
+        The points that are watched.
     links : tuple of int
         The coordinates of the flexures' links, in the order of their names link[1], ...
     outlines : tuple of Outline
@@ -125,6 +158,7 @@ class System:
     mechanism: Mechanism
     values: Mapping[str, float]
     q0: Real
+    arm: Whole
     H: Complex
     J: Real
     K: Real
@@ -135,13 +169,18 @@ class System:
     loops_c: Real
     gaps: Complex
     gaps_c: Real
+    gaps_z: Complex
     slides: Complex
+    slides_z: Complex
+    on: Whole
     rubs: Complex
     lifts: Complex
     lifts_c: Real
     release: Complex
     release_c: float
     bodies: Mapping[str, BodyFrame]
+    pushed: tuple[BodyFrame, ...]
+    probes: tuple[BodyFrame, ...]
     links: tuple[int, ...]
     outlines: tuple[Outline, ...]
     anchor: complex
@@ -152,11 +191,66 @@ class System:
         """Number of coordinates."""
         return len(self.q0)
 
-    @property
+    @cached_property
     def S(self) -> Complex:
         """First mass moments m^T A, (n,) complex [kg m]."""
         result: Complex = self.m @ self.A
         return result
+
+    @cached_property
+    def stretches(self) -> Whole:
+        """The coordinates that are stretches."""
+        result: Whole = np.flatnonzero(self.arm != np.arange(self.n))
+        return result
+
+    @cached_property
+    def stretched(self) -> Whole:
+        """The links that they stretch."""
+        result: Whole = self.arm[self.stretches]
+        return result
+
+    def directions(self, q: Real) -> Complex:
+        """Return e: the arms exp(s + i theta), and -i times that for stretches.
+
+        Parameters
+        ----------
+        q : (..., n)
+            Angles [rad] and stretches [-].
+
+        Examples
+        --------
+        A link that stands up, stretched by 1 %:
+
+        >>> class Bar:
+        ...     stretches, stretched = np.array([1]), np.array([0])
+        >>> e = System.directions(Bar, np.array([np.pi / 2, np.log(1.01)]))
+        >>> bool(abs(e - [1.01j, 1.01]).max() < 1e-15)
+        True
+        """
+        if not len(self.stretches):
+            turned: Complex = np.exp(1j * q)
+            return turned
+        w = 1j * q
+        w[..., self.stretched] += q[..., self.stretches]
+        e: Complex = np.exp(w)
+        e[..., self.stretches] = -1j * e[..., self.stretched]
+        return e
+
+    def turning(self, v: Real) -> Real | Complex:
+        """Return the complex rates w = theta' - i s' of the arms; zero for stretches [1/s].
+
+        They are the rates v themselves where nothing stretches.
+        """
+        if not len(self.stretches):
+            return v
+        w = v.astype(complex)
+        w[..., self.stretched] -= 1j * v[..., self.stretches]
+        w[..., self.stretches] = 0.0
+        return w
+
+    def spread(self, B: Complex) -> Complex:
+        """Return rows with the column of each arm repeated for its stretch."""
+        return B[..., self.arm] if len(self.stretches) else B
 
     @property
     def gravity(self) -> complex:
@@ -169,7 +263,7 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
 
     Every flexure becomes a chain of links.  Chains are rooted at ground or at a body already
     reached; a flexure between two bodies already reached is rooted at its start and closes a
-    loop at its end.
+    loop at its end.  So does a joint.
 
     Parameters
     ----------
@@ -181,11 +275,21 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
     Raises
     ------
     MechanismError
-        If a body is not held by any flexure, or a loop closes over nothing.
+        If a body is not held by anything, or a loop repeats what others ask for.
     ParameterError
         If a flexure has no length, or its links are longer than itself.
     """
     return _Assembler(mechanism, values).system()
+
+
+@dataclass(frozen=True)
+class Hit:
+    """The gap of a stop, Re(f (B E + z)) + c, as seen from what its wall is fixed to."""
+
+    B: Complex
+    c: float
+    z: complex
+    on: int
 
 
 class _Assembler:
@@ -195,10 +299,11 @@ class _Assembler:
         self.mechanism = mechanism
         self.values = values
         self.q0: list[float] = []
+        self.arm: list[int] = []
         self.J: list[float] = []
         self.masses: list[tuple[Place, float]] = []
         self.springs: list[tuple[float, int | None, int | None]] = []
-        self.loops: list[Place] = []
+        self.loops: list[tuple[str, Place]] = []
         self.origin: dict[str, Place] = {GROUND: Place()}
         self.drawn: dict[str, complex] = {GROUND: 0j}
         self.index: dict[str, int | None] = {GROUND: None}
@@ -213,34 +318,51 @@ class _Assembler:
     def at(self, point: Point) -> complex:
         return complex(self.number(point[0]), self.number(point[1]))
 
-    def coordinate(self, angle: float) -> int:
-        self.q0.append(angle)
+    def end(self, part: Flexure | Joint, reference: str) -> complex:
+        """Return where an end of a part is drawn."""
+        return self.at(self.mechanism.point(reference, part.name))
+
+    def coordinate(self, start: float, arm: int | None = None) -> int:
+        """Add an angle, or the stretch of an arm."""
+        j = len(self.q0)
+        self.q0.append(start)
+        self.arm.append(j if arm is None else arm)
         self.J.append(0.0)
-        return len(self.q0) - 1
+        return j
 
     def on(self, body: str, drawn: complex) -> Place:
         """Return the place of a drawn point of a body."""
         return self.origin[body].plus(self.index[body], drawn - self.drawn[body])
 
+    def frame(self, name: str, body: str, point: Point | None) -> BodyFrame:
+        """Return where a point of a body is; None: its centre of mass."""
+        if point is None:
+            point = next(b for b in self.mechanism.bodies if b.name == body).centre
+        drawn = self.at(point)
+        place, j = self.on(body, drawn), self.index[body]
+        return BodyFrame(name, FIXED if j is None else j, place.c, place.row(len(self.q0)), drawn)
+
     # -- walking --
 
     def system(self) -> System:
-        waiting = list(self.mechanism.flexures)
+        waiting: list[Flexure | Joint] = [*self.mechanism.flexures, *self.mechanism.joints]
         while waiting:
-            for flexure in waiting:
-                if body_of(flexure.start) in self.origin or body_of(flexure.end) in self.origin:
+            for part in waiting:
+                if body_of(part.start) in self.origin or body_of(part.end) in self.origin:
                     break
             else:
-                names = ", ".join(f.name for f in waiting)
+                names = ", ".join(part.name for part in waiting)
                 raise MechanismError(
-                    f"the flexures {names} have no connection to the ground: the mechanism "
-                    "falls apart"
+                    f"{names} have no connection to the ground: the mechanism falls apart"
                 )
-            waiting.remove(flexure)
-            self.flexure(flexure)
+            waiting.remove(part)
+            if isinstance(part, Joint):
+                self.joint(part)
+            else:
+                self.flexure(part)
         for body in self.mechanism.bodies:
             if body.name not in self.origin:
-                raise MechanismError(f"the body {body.name} is not held by any flexure")
+                raise MechanismError(f"the body {body.name} is not held by any flexure or joint")
             self.body(body.name)
         return self.arrays()
 
@@ -252,26 +374,48 @@ class _Assembler:
         assert j is not None
         self.J[j] += value(body, "inertia", self.values)
 
+    def joint(self, joint: Joint) -> None:
+        start, end = joint.start, joint.end
+        if body_of(start) not in self.origin:
+            start, end = end, start
+        z_start, z_end = self.end(joint, start), self.end(joint, end)
+        if abs(z_end - z_start) > TOGETHER * self.size():
+            raise MechanismError(
+                f"the joint {joint.name} joins {start} and {end}, which are drawn "
+                f"{abs(z_end - z_start):.4g} m apart: draw them at the same place"
+            )
+        place, far = self.on(body_of(start), z_start), body_of(end)
+        if far in self.origin:
+            self.close(joint.name, place, self.on(far, z_end))
+        else:
+            self.reach(far, place, z_end, self.coordinate(0.0))
+        self.lines.append((joint.name, "joint", [place]))
+
+    def reach(self, body: str, place: Place, drawn: complex, j: int | None) -> None:
+        """Note where a drawn point of a body is that turns with a coordinate."""
+        self.origin[body], self.drawn[body], self.index[body] = place, drawn, j
+
+    def close(self, name: str, place: Place, other: Place) -> None:
+        """Ask for two places to be one."""
+        self.loops.append((name, place.minus(other)))
+
     def flexure(self, flexure: Flexure) -> None:
         start, end = flexure.start, flexure.end
         pieces = self.segments(flexure)
         if body_of(start) not in self.origin:
-            start, end = end, start
-            pieces = Segments(*(tuple(reversed(part)) for part in vars(pieces).values()))
+            start, end, pieces = end, start, pieces.reversed()
         root, far = body_of(start), body_of(end)
-        z_start = self.at(self.mechanism.point(start, flexure.name))
-        z_end = self.at(self.mechanism.point(end, flexure.name))
+        z_start, z_end = self.end(flexure, start), self.end(flexure, end)
         direction = (z_end - z_start) / abs(z_end - z_start)
 
         place, owner = self.on(root, z_start), self.index[root]
         corners = [place]
-        links = [self.coordinate(cmath.phase(direction)) for _ in pieces.lengths[1:-1]]
-        self.links += links
-        if far not in self.origin:
-            far_index: int | None = self.coordinate(0.0)
-        else:
-            far_index = self.index[far]
-        owners = [owner, *links, far_index]
+        links = [
+            self.link(direction, length, axial)
+            for length, axial in zip(pieces.lengths[1:-1], pieces.axial, strict=True)
+        ]
+        known = far in self.origin
+        owners = [owner, *links, self.index[far] if known else self.coordinate(0.0)]
         for i, (length, j) in enumerate(zip(pieces.lengths[:-1], owners[:-1], strict=True)):
             # links carry their angle in q, bodies are drawn with q = 0
             vector = length * (1.0 if j in links else direction)
@@ -281,27 +425,28 @@ class _Assembler:
             self.mass(place, pieces.lumps[i])
             self.springs.append((pieces.rates[i], owners[i], owners[i + 1]))
         last = pieces.lengths[-1] * direction
-        if far not in self.origin:
-            assert far_index is not None
-            self.index[far] = far_index
-            self.drawn[far] = z_end - last
-            self.origin[far] = place
-        else:
+        if known:
             pivot = self.on(far, z_end - last)
-            gap = place
-            for j, vector in pivot.A.items():
-                gap = gap.plus(j, -vector)
-            self.loops.append(Place(gap.c - pivot.c, gap.A))
+            self.close(flexure.name, place, pivot)
             place = pivot  # the stub moves with its body: links and body share no mass
-        self.rod(pieces.rods[-1], place, far_index, last)
+        else:
+            self.reach(far, place, z_end - last, owners[-1])
+        self.rod(pieces.rods[-1], place, owners[-1], last)
         corners.append(self.on(far, z_end))
         self.lines.append((flexure.name, "flexure", corners))
 
+    def link(self, direction: complex, length: float, axial: float) -> int:
+        """Add a link, and its stretch if it has an axial stiffness [N/m]."""
+        j = self.coordinate(cmath.phase(direction))
+        self.links.append(j)
+        if axial > 0.0:
+            self.springs.append((axial * length**2, None, self.coordinate(0.0, j)))
+        return j
+
     def rod(self, mass: float, start: Place, j: int | None, vector: complex) -> None:
-        """Add a slender rod that is fixed to coordinate j (None: the ground)."""
-        self.mass(start.plus(j, vector / 2), mass)
-        if j is not None:
-            self.J[j] += mass * abs(vector) ** 2 / 12
+        """Add a uniform rod: two points with its mass, centre and moments."""
+        for fraction in (0.5 - 0.5 / math.sqrt(3), 0.5 + 0.5 / math.sqrt(3)):
+            self.mass(start.plus(j, fraction * vector), mass / 2)
 
     def mass(self, place: Place, mass: float) -> None:
         """Add a point mass, unless it is part of the ground."""
@@ -310,9 +455,7 @@ class _Assembler:
 
     def segments(self, flexure: Flexure) -> Segments:
         kind = next(k for k in self.mechanism.flexure_types if k.name == flexure.type)
-        z_start = self.at(self.mechanism.point(flexure.start, flexure.name))
-        z_end = self.at(self.mechanism.point(flexure.end, flexure.name))
-        L = abs(z_end - z_start)
+        L = abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
         if L < 1e-9:
             raise ParameterError(
                 f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
@@ -321,78 +464,70 @@ class _Assembler:
         fields = ("thickness", "width", "youngs_modulus", "density")
         h, b, E, rho = (value(kind, name, self.values) for name in fields)
         gamma, K_theta = coefficients(self.mechanism, kind, self.values)
+        EI, EA, mass = E * b * h**3 / 12, E * b * h, rho * b * h * L
         model = self.mechanism.model(kind)
-        EI, mass = E * b * h**3 / 12, rho * b * h * L
-        return segments(model, gamma, K_theta, flexure.ends, L, EI, mass)
+        return segments(model, gamma, K_theta, flexure.ends, L, EI, mass, EA if kind.axial else 0.0)
+
+    def size(self) -> float:
+        """Return the size of the mechanism as drawn [m]."""
+        points = [self.at(p) for p in self.mechanism.ground.values()]
+        points += [self.at(body.centre) for body in self.mechanism.bodies]
+        return max(abs(a - b) for a in points for b in points)
 
     # -- arrays --
 
     def arrays(self) -> System:
-        n = len(self.q0)
+        n, mechanism = len(self.q0), self.mechanism
+        arm = np.array(self.arm)
         A = np.array([place.row(n) for place, _ in self.masses])
         m = np.array([mass for _, mass in self.masses])
-        K = np.zeros((n, n))
-        for rate, a, b in self.springs:
-            s = np.zeros(n)
-            if a is not None:
-                s[a] -= 1.0
-            if b is not None:
-                s[b] += 1.0
-            K += rate * np.outer(s, s)
-        e0 = np.exp(1j * np.array(self.q0))
-        loops = np.array([r for p in self.loops for r in (p.row(n), -1j * p.row(n))])
-        loops_c = np.array([x for p in self.loops for x in (p.c.real, p.c.imag)])
+        e0 = np.exp(1j * np.array(self.q0))[arm]
+        closures = [place for _, place in self.loops]
+        loops = np.array([r for p in closures for r in (p.row(n), -1j * p.row(n))])
+        loops_c = np.array([x for p in closures for x in (p.c.real, p.c.imag)])
         loops = loops.reshape(-1, n)
-        check_loops(loops, e0)
-        check_masses((e0.conj()[:, None] * (A.conj().T @ (m[:, None] * A)) * e0).real, self.J)
+        e = np.where(arm == np.arange(n), e0, -1j * e0)
+        spread = A[:, arm]
+        H = spread.conj().T @ (m[:, None] * spread)
+        check_loops(loops[:, arm], e, [name for name, _ in self.loops])
+        check_masses((e.conj()[:, None] * H * e).real, self.J)
 
-        frames = {}
-        for body in self.mechanism.bodies:
-            drawn = self.at(body.centre)
-            place = self.on(body.name, drawn)
-            j = self.index[body.name]
-            assert j is not None
-            frames[body.name] = BodyFrame(body.name, j, place.c, place.row(n), drawn)
-            self.lines.append((body.name, "body", self.corners(body.name)))
-        hits = [(stop, self.hit(stop)) for stop in self.mechanism.stops]
-        d = [unit(s.direction) for s, _ in hits]
-        gaps, gaps_c = rows([along(-u, p, e0) for u, (_, p) in zip(d, hits, strict=True)], n)
-        slides, _ = rows([along(1j * u, p, e0) for u, (_, p) in zip(d, hits, strict=True)], n)
-        for stop, place in hits:
-            self.lines.append((stop.name, "stop", [place]))
-        rubbed = [
-            (unit(f.direction), self.on(f.body, frames[f.body].drawn))
-            for f in self.mechanism.frictions
+        frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
+        self.lines += [(body, "body", self.corners(body)) for body in frames]
+        hits = [self.hit(stop, e0) for stop in mechanism.stops]
+        rubbed = [self.displaced(f.body, f.point, f.direction, e0) for f in mechanism.frictions]
+        lifted = [
+            self.displaced(f.body, f.point, f.direction + 90.0, e0) for f in mechanism.frictions
         ]
-        rubs, _ = rows([along(u, p, e0) for u, p in rubbed], n)
-        lifts, lifts_c = rows([along(1j * u, p, e0) for u, p in rubbed], n)
-        held = self.mechanism.release.body
-        release, release_c = along(
-            unit(self.mechanism.release.direction), self.on(held, frames[held].drawn), e0
-        )
-        points = [self.at(p) for p in self.mechanism.ground.values()]
-        points += [frame.drawn for frame in frames.values()]
+        release = mechanism.release
+        along_release, release_c = self.displaced(release.body, None, release.direction, e0)
         return System(
-            mechanism=self.mechanism,
+            mechanism=mechanism,
             values=dict(self.values),
             q0=np.array(self.q0),
-            H=A.conj().T @ (m[:, None] * A),
+            arm=arm,
+            H=H,
             J=np.array(self.J),
-            K=K,
+            K=self.stiffness(),
             A=A,
             c=np.array([place.c for place, _ in self.masses]),
             m=m,
             loops=loops,
             loops_c=loops_c,
-            gaps=gaps,
-            gaps_c=gaps_c,
-            slides=slides,
-            rubs=rubs,
-            lifts=lifts,
-            lifts_c=lifts_c,
-            release=release,
+            gaps=stacked([hit.B for hit in hits], n),
+            gaps_c=np.array([hit.c for hit in hits]),
+            gaps_z=np.array([hit.z for hit in hits], complex),
+            slides=stacked([1j * hit.B for hit in hits], n),
+            slides_z=np.array([1j * hit.z for hit in hits], complex),
+            on=np.array([hit.on for hit in hits], int),
+            rubs=stacked([B for B, _ in rubbed], n),
+            lifts=stacked([B for B, _ in lifted], n),
+            lifts_c=np.array([c for _, c in lifted]),
+            release=along_release,
             release_c=release_c,
             bodies=frames,
+            pushed=tuple(self.frame(f.name, f.body, f.point) for f in mechanism.forces),
+            probes=tuple(self.probe(probe) for probe in mechanism.probes),
             links=tuple(self.links),
             outlines=tuple(
                 Outline(
@@ -404,12 +539,45 @@ class _Assembler:
                 for name, kind, places in self.lines
             ),
             anchor=self.anchor(),
-            length=max(abs(a - b) for a in points for b in points),
+            length=self.size(),
         )
 
-    def hit(self, stop: Stop) -> Place:
-        shift = value(stop, "offset", self.values) * 1j * unit(stop.direction)
-        return self.on(stop.body, self.at(stop.point) + shift)
+    def stiffness(self) -> Real:
+        n = len(self.q0)
+        K = np.zeros((n, n))
+        for rate, a, b in self.springs:
+            s = np.zeros(n)
+            if a is not None:
+                s[a] -= 1.0
+            if b is not None:
+                s[b] += 1.0
+            K += rate * np.outer(s, s)
+        return K
+
+    def displaced(
+        self, body: str, point: Point | None, direction: float, e0: Complex
+    ) -> tuple[Complex, float]:
+        """Return B, c of the displacement of a point from the straight shape [m]."""
+        frame = self.frame(body, body, point)
+        B = unit(direction).conjugate() * frame.A
+        return B, -float((B @ e0).real)
+
+    def probe(self, probe: Probe) -> BodyFrame:
+        point = self.mechanism.point(probe.point, probe.name)
+        return self.frame(probe.name, body_of(probe.point), point)
+
+    def hit(self, stop: Stop, e0: Complex) -> "Hit":
+        """Return the gap of a stop, but for its wall's position."""
+        u = unit(stop.direction)
+        drawn = self.at(stop.point) + value(stop, "offset", self.values) * 1j * u
+        place, j = self.on(stop.body, drawn), self.index[stop.on]
+        if j is None:
+            B = -u.conjugate() * place.row(len(self.q0))
+            return Hit(B, -float((B @ e0).real), 0j, FIXED)
+        apart = place.minus(self.origin[stop.on])
+        B = -u.conjugate() * apart.row(len(self.q0))
+        straight = (u.conjugate() * (drawn - self.drawn[stop.on])).real
+        return Hit(B, straight, -u.conjugate() * apart.c, j)
 
     def corners(self, name: str) -> list[Place]:
         body = next(b for b in self.mechanism.bodies if b.name == name)
@@ -466,17 +634,9 @@ def unit(degrees: float) -> complex:
     return complex(1j ** int(quarter % 4)) * (cmath.exp(1j * math.radians(rest)) if rest else 1.0)
 
 
-def along(u: complex, place: Place, e0: Complex) -> tuple[Complex, float]:
-    """Return B, c of the displacement of a place along u from the straight shape [m]."""
-    row = place.row(len(e0))
-    B = u.conjugate() * row
-    return B, -float((B @ e0).real)
-
-
-def rows(pairs: list[tuple[Complex, float]], n: int) -> tuple[Complex, Real]:
-    """Stack pairs (B, c) into arrays of n columns, also when there are none."""
-    B = np.array([b for b, _ in pairs], complex).reshape(-1, n)
-    return B, np.array([c for _, c in pairs], float)
+def stacked(rows: list[Complex], n: int) -> Complex:
+    """Stack rows of n columns, also when there are none."""
+    return np.array(rows, complex).reshape(-1, n)
 
 
 def check_masses(M: Real, J: Sequence[float]) -> None:
@@ -506,8 +666,17 @@ def check_masses(M: Real, J: Sequence[float]) -> None:
     )
 
 
-def check_loops(loops: Complex, e0: Complex) -> None:
+def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
     """Refuse loops that are not independent of each other at the straight shape.
+
+    Parameters
+    ----------
+    loops : (2 k, n) complex
+        Rows of the closures, spread [m].
+    e : (n,) complex
+        Directions of the straight shape.
+    names : sequence of str
+        Of the parts that close the k loops.
 
     Raises
     ------
@@ -516,14 +685,16 @@ def check_loops(loops: Complex, e0: Complex) -> None:
     """
     if not len(loops):
         return
-    jacobian = (1j * loops * e0).real
-    scale = np.abs(jacobian).max()
-    rank = int(np.linalg.matrix_rank(jacobian, tol=1e-9 * scale))
-    if rank < len(loops):
+    jacobian = (1j * loops * e).real
+    tolerance = 1e-9 * np.abs(jacobian).max()
+    _, R, order = qr(jacobian.T, mode="economic", pivoting=True)
+    size = np.abs(np.diag(R))
+    repeated = sorted({names[row // 2] for row in order[: len(size)][size <= tolerance]})
+    if repeated or len(loops) > len(e):
         raise MechanismError(
-            f"{len(loops) - rank} of the {len(loops)} loop closures follow from the others at "
-            "the straight shape: the mechanism is over-constrained there; take away a flexure "
-            "or move it out of line"
+            f"the loops closed by {', '.join(repeated or names)} ask at the straight shape for "
+            "what other loops already ask for: rigid links are over-constrained there; take a part "
+            "away, move it out of line, or let flexures stretch (axial = true)"
         )
-    if len(loops) >= len(e0):
+    if len(loops) >= len(e):
         raise MechanismError("the loops leave the mechanism no motion")

@@ -3,9 +3,9 @@ r"""The equations of motion in one discrete state: which stops hold, what slides
     [ M    R^T ] [  a   ]   [ Q - C v^2 ]
     [ R     0  ] [ -lam ] = [ Re(B e) v^2 ]
 
-with R the rows of the loops, of the stops that hold and of what sticks.  A stop that holds and
-slides pushes along its gap and, by Coulomb's law, along its wall: its column differs from its
-row.
+(w^2 for v^2 where links stretch: see :mod:`prbm.assembly`) with R the rows of the loops, of the
+stops that hold and of what sticks.  A stop that holds and slides pushes along its gap and, by
+Coulomb's law, along its wall: its column differs from its row.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,8 @@ from typing import TypeVar
 import numpy as np
 
 from . import constraints, forces
-from .assembly import Complex, Real, System
+from .assembly import FIXED, Complex, Real, System
+from .constraints import Rows, gap_rows, rub_rows, slide_rows
 from .errors import ParameterError
 from .kinetics import inertia, kinetic_energy, mass_accelerations
 from .mechanism import Mechanism, finite, unknown, value
@@ -134,9 +135,7 @@ class Equations:
         stuck = [i for i in held if discrete.slides[i] == STICKS]
         rubbing = [i for i, s in enumerate(discrete.rubs) if s == STICKS]
         self.held, self.stuck, self.rubbing = held, stuck, rubbing
-        self.B: Complex = np.vstack(
-            [system.loops, system.gaps[held], system.slides[stuck], system.rubs[rubbing]]
-        )
+        B = np.vstack([system.loops, system.gaps[held], system.slides[stuck], system.rubs[rubbing]])
         self.first_hold = len(system.loops)
         self.first_stick = self.first_hold + len(held)
         self.first_rub = self.first_stick + len(stuck)
@@ -153,26 +152,35 @@ class Equations:
             i for i, s in enumerate(discrete.rubs) if abs(s) == 1 and self.rub_law[i][0] > 0.0
         ]
 
-        frames = [system.bodies[f.body] for f in mechanism.forces]
-        self.w_input: Complex = forces.field_row(system.S, -inputs.base)
+        w = forces.field_row(system.S, -inputs.base)
         self.moment = np.zeros(self.n)
-        for frame, force, moment in zip(frames, inputs.forces, inputs.moments, strict=True):
-            self.w_input = self.w_input + forces.force_row(frame.A, force)
+        for frame, force, moment in zip(system.pushed, inputs.forces, inputs.moments, strict=True):
+            w = w + forces.force_row(frame.A, force)
             self.moment[frame.j] += moment
-        self.w: Complex = self.w_input + forces.field_row(system.S, system.gravity)
+        self.w_input = system.spread(w)
+        self.w = self.w_input + system.spread(forces.field_row(system.S, system.gravity))
         self.driven = bool(np.any(self.w_input) or np.any(self.moment))
         self.walls_push = any(inputs.walls[i].rate for i in held)
 
-        self.c = np.zeros(len(self.B))
-        self.c[: self.first_hold] = system.loops_c
+        loops, rubs = len(system.loops), len(rubbing)
+        c = np.zeros(len(B))
+        c[:loops] = system.loops_c
         for k, i in enumerate(held):
-            self.c[self.first_hold + k] = system.gaps_c[i] + inputs.walls[i].position
+            c[self.first_hold + k] = system.gaps_c[i] + inputs.walls[i].position
+        z = np.zeros(len(B), complex)
+        on = np.full(len(B), FIXED)
+        z[loops : len(B) - rubs] = [*system.gaps_z[held], *system.slides_z[stuck]]
+        on[loops : len(B) - rubs] = [*system.on[held], *system.on[stuck]]
+        self.rows = Rows(system, B, c, z, on)
+        self.positions = self.rows.first(self.first_stick)
+        self.gap_rows, self.slide_rows = gap_rows(system), slide_rows(system)
+        self.rub_rows = rub_rows(system)
 
         # one product with e serves loads, inertia and constraints: see accelerations
-        self.stack: Complex = np.vstack([self.w, system.H, 1j * self.B])
-        self.J_stack = np.zeros((self.n + len(self.B), self.n))
+        self.stack: Complex = np.vstack([self.w, system.H, 1j * self.rows.spread])
+        self.J_stack = np.zeros((self.n + len(B), self.n))
         self.J_stack[: self.n] = self.J
-        self.kkt = np.zeros((self.n + len(self.B),) * 2, order="F")
+        self.kkt = np.zeros((self.n + len(B),) * 2, order="F")
         # springs and their damping in one product with y = (q, v, ...): see torques
         self.K_y = np.block(
             [[system.K, self.beta * system.K], [0 * system.K, self.beta * system.K]]
@@ -222,7 +230,7 @@ class Equations:
     def _solve(self, q: Real, v: Real, torques: Real) -> tuple[Real, Real, Real]:
         """Return accelerations, multipliers and mass matrix for given torques of the springs.
 
-        All that depends on e = exp(i q) comes from one product, row by row:
+        All that depends on e comes from one product, row by row:
 
             G = [w e;  diag(e)^H H diag(e);  i B e],
 
@@ -230,13 +238,18 @@ class Equations:
         are -C (:func:`prbm.kinetics.inertia`) and the convective terms Re(B e).
         """
         n, kkt = self.n, self.kkt
-        e = np.exp(1j * q)
+        e, w = self.system.directions(q), self.system.turning(v)
         G = self.stack * e
         G[1 : n + 1] *= e.conj()[:, None]
+        carried = n + self.rows.carried
+        if len(carried):
+            G.real[1 + carried] = self.rows.jacobian(e)[self.rows.carried]
         np.add(G.real[1:], self.J_stack, out=kkt[:, :n])
         kkt[:n, n:] = kkt[n:, :n].T
         M = kkt[:n, :n]
-        right = G.imag[1:] @ (v * v)
+        right: Real = (G[1:] @ (w * w)).imag if np.iscomplexobj(w) else G.imag[1:] @ (v * v)
+        if len(carried):
+            right[carried] = self.rows.carried_convective(e, v, w)
         Q = right[:n]
         Q += G.real[0]
         Q -= torques
@@ -245,11 +258,11 @@ class Equations:
         if self.mass_damping:
             Q -= self.mass_damping * (M @ v)
         for i in self.rub_slides:
-            Q += self._rub_force(i, e) * constraints.jacobian(self.system.rubs[i], e)
+            Q += self._rub_force(i, e) * self.rub_rows.jacobian(e)[i]
         for i in self.sliding:
             share = -self.stop_friction[i] * self.discrete.slides[i]
             column = n + self.first_hold + self.held.index(i)
-            kkt[:n, column] += share * constraints.jacobian(self.system.slides[i], e)
+            kkt[:n, column] += share * self.slide_rows.jacobian(e)[i]
         x, self.factors = constraints.factor_and_solve(kkt, right)
         return x[:n], -x[n:], M
 
@@ -285,13 +298,12 @@ class Equations:
 
     def _rubbing_power(self, q: Real, v: Real, lam: Real) -> float:
         """Return the power that friction takes out [W]."""
-        e = np.exp(1j * q)
+        e = self.system.directions(q)
         power = 0.0
         for i in self.rub_slides:
-            rate = float(constraints.jacobian(self.system.rubs[i], e) @ v)
-            power -= self._rub_force(i, e) * rate
+            power -= self._rub_force(i, e) * float(self.rub_rows.rates(e, v)[i])
         for i in self.sliding:
-            rate = float(constraints.jacobian(self.system.slides[i], e) @ v)
+            rate = float(self.slide_rows.rates(e, v)[i])
             force = float(lam[self.first_hold + self.held.index(i)])
             power += self.stop_friction[i] * force * self.discrete.slides[i] * rate
         return power
@@ -300,7 +312,7 @@ class Equations:
         """Return the power of the inputs and of the moving walls that hold [W]."""
         power = 0.0
         if self.driven:
-            e = np.exp(1j * q)
+            e = self.system.directions(q)
             power += float((forces.generalised(self.w_input, e) + self.moment) @ v)
         for k, i in enumerate(self.held):
             power -= float(lam[self.first_hold + k]) * self.inputs.walls[i].rate
@@ -311,8 +323,8 @@ class Equations:
     def offsets(self, t: float) -> Real:
         """Return the constant parts of the active constraints at time t [m]."""
         if not self.walls_push:
-            return self.c
-        c = self.c.copy()
+            return self.rows.c
+        c = self.rows.c.copy()
         for k, i in enumerate(self.held):
             c[self.first_hold + k] = self.system.gaps_c[i] + self.inputs.walls[i].at(t)
         return c
@@ -324,9 +336,9 @@ class Equations:
         """
         n, r = self.n, self.first_stick
         q, e = constraints.project_positions(
-            self.system.H, self.J, self.B[:r], self.offsets(t)[:r], y[:n], self.system.length
+            self.system, self.positions, y[:n], self.offsets(t)[:r]
         )
-        rows = constraints.jacobian(self.B, e)
+        rows = self.rows.jacobian(e)
         rates = np.zeros(len(rows))
         for k, i in enumerate(self.held):
             rates[self.first_hold + k] = self.inputs.walls[i].rate
@@ -348,14 +360,14 @@ class Equations:
         system, n, r = self.system, self.n, self.first_stick
         c = self.offsets(t)
         right = np.zeros(n + len(c))
-        right[n : n + r] = -constraints.values(self.B, c, np.exp(1j * y[:n]))[:r]
+        right[n : n + r] = -self.positions.values(system.directions(y[:n]), c[:r])
         result = y.copy()
         result[:n] += constraints.solve_again(self.factors, right)[:n]
-        e = np.exp(1j * result[:n])
-        open_by = constraints.values(self.B, c, e)[:r]
+        e = system.directions(result[:n])
+        open_by = self.positions.values(e, c[:r])
         if len(open_by) and np.abs(open_by).max() > constraints.CLOSED * system.length:
             return self.project(t, y)
-        rates = constraints.jacobian(self.B, e) @ result[n : 2 * n]
+        rates = self.rows.rates(e, result[n : 2 * n])
         for k, i in enumerate(self.held):
             rates[self.first_hold + k] += self.inputs.walls[i].rate
         right[n:] = -rates
@@ -367,13 +379,13 @@ class Equations:
     def gaps(self, t: float | Real, e: Complex) -> Real:
         """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row a time t."""
         walls = np.array([wall.at(t) for wall in self.inputs.walls]).T
-        result: Real = (e @ self.system.gaps.T).real + self.system.gaps_c + walls
+        result: Real = self.gap_rows.values(e) + walls
         return result
 
     def gap_rates(self, e: Complex, v: Real) -> Real:
         """Return the rates of all gaps [m/s]; ``e`` and ``v`` may be stacks (m, n)."""
         walls = np.array([wall.rate for wall in self.inputs.walls])
-        result: Real = -((e * v) @ self.system.gaps.T).imag + walls
+        result: Real = self.gap_rows.rates(e, v) + walls
         return result
 
     def stop_forces(self, lam: Real) -> Real:
@@ -391,17 +403,15 @@ class Equations:
         its friction points put in is what gravity, the inputs and inertia leave.
         """
         system = self.system
-        e = np.exp(1j * q)
+        e = system.directions(q)
         z = system.A @ e + system.c - system.anchor
         field = system.gravity - self.inputs.base
-        load = system.m * (field - mass_accelerations(system.A, e, v, a))
+        speed, change = system.turning(v), system.turning(a)
+        load = system.m * (field - mass_accelerations(system.A, e, speed, change))
         force = complex(load.sum())
         moment = float((z.conj() * load).imag.sum() - system.J @ a)
-        for f, m, F in zip(
-            self.inputs.forces, self.inputs.moments, system.mechanism.forces, strict=True
-        ):
-            frame = system.bodies[F.body]
-            centre = complex(frame.A @ e) + frame.c - system.anchor
+        for f, m, frame in zip(self.inputs.forces, self.inputs.moments, system.pushed, strict=True):
+            place = complex(frame.A @ e) + frame.c - system.anchor
             force += f
-            moment += (centre.conjugate() * f).imag + m
+            moment += (place.conjugate() * f).imag + m
         return force, moment

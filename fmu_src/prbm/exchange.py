@@ -52,10 +52,11 @@ def independent(mechanism: Mechanism) -> tuple[int, ...]:
 
 def _jacobians(system: System, displacement: float) -> Iterator[Real]:
     """Yield the Jacobian of the loops at the straight shape and towards the release."""
-    yield constraints.jacobian(system.loops, np.exp(1j * system.q0))
+    loops = system.spread(system.loops)
+    yield constraints.jacobian(loops, system.directions(system.q0))
     for fraction in SHAPES:
         shape = equilibrium(system, fraction * displacement)
-        yield constraints.jacobian(system.loops, np.exp(1j * shape.q))
+        yield constraints.jacobian(loops, system.directions(shape.q))
 
 
 def _pivots(jacobian: Real) -> tuple[int, ...]:

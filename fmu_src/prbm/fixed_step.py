@@ -83,7 +83,7 @@ def march(
         equations.trace.clear()
         if not np.isfinite(y).all():
             raise SimulationError(f"the step of {step:g} s is too long: lost at t = {t:g} s")
-        e = np.exp(1j * y[:n])
+        e = system.directions(y[:n])
         gaps = equations.gaps(t, e)
         for i, stop in enumerate(mechanism.stops):
             if gaps[i] > 0.0:
@@ -92,8 +92,8 @@ def march(
                 armed[i] = False
                 impacts.append((t, stop.name))
                 M, _ = inertia(system.H, equations.J, e)
-                loops = constraints.jacobian(system.loops, e)
-                G = constraints.jacobian(system.gaps[i : i + 1], e)
+                loops = constraints.jacobian(system.spread(system.loops), e)
+                G = equations.gap_rows.jacobian(e)[[i]]
                 X = contact.response(M, loops, G)
                 eps = np.array([value(stop, "restitution", simulation.values)])
                 P = contact.newton(G @ X, G @ y[n : 2 * n], eps)

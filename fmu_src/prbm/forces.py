@@ -1,7 +1,7 @@
 r"""Generalised forces: springs, damping, gravity, inputs, friction.  Positive with q [N m].
 
-A force F (complex, [N]) at z = c + A e has the generalised force Re(conj(F) i A e): forces enter
-through one complex row w, Q = Re(w e) with w = i sum conj(F) A.
+A force F (complex, [N]) at z = c + A E has the generalised force Re(conj(F) i A e), A spread over
+the stretches: forces enter through one complex row w, Q = Re(w e) with w = i sum conj(F) A.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from .assembly import Complex, Real, System
 
 
 def springs(K: Real, deflection: Real) -> Real:
-    """Return the torque -K (q - q0) of the torsion springs.
+    """Return the torque -K (q - q0) of the springs.
 
     Examples
     --------
@@ -46,7 +46,7 @@ def field_row(S: Complex, acceleration: complex) -> Complex:
 
 
 def force_row(A: Complex, force: complex) -> Complex:
-    """Return the row w of a force at z = c + A e [N m].
+    """Return the row w of a force at z = c + A E [N m].
 
     Examples
     --------
@@ -66,7 +66,7 @@ def generalised(w: Complex, e: Complex) -> Real:
 
 def gravitational_energy(system: System, e: Complex) -> float:
     """Return -Re(conj(g) sum m (z - z0)), zero at the straight shape [J]."""
-    fall = system.S @ (e - np.exp(1j * system.q0))
+    fall = system.S @ (e - system.directions(system.q0))
     return -float((np.conj(system.gravity) * fall).real)
 
 

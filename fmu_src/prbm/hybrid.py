@@ -201,7 +201,7 @@ class Simulation:
     def _check_walls(self) -> None:
         """Refuse a penetrated wall, and begin with the impact if one is hit at once."""
         n = self.system.n
-        e, v = np.exp(1j * self.front[:n]), self.front[n : 2 * n]
+        e, v = self.system.directions(self.front[:n]), self.front[n : 2 * n]
         gaps = self.equations.gaps(self.front_time, e)
         rates = self.equations.gap_rates(e, v)
         for i, stop in enumerate(self.mechanism.stops):
@@ -366,7 +366,7 @@ class Simulation:
         stop is returned.
         """
         n = self.system.n
-        e, v = np.exp(1j * self.front[:n]), self.front[n : 2 * n]
+        e, v = self.system.directions(self.front[:n]), self.front[n : 2 * n]
         rates = self.equations.gap_rates(e, v)
         struck = None
         for i in list(self.equations.held):
@@ -486,7 +486,7 @@ class Simulation:
         if looking or self.equations.sliding:
             times = arc.start + arc.h * FRACTIONS
             Y = arc.y + arc.h * (GRID @ arc.k)
-            e, v = np.exp(1j * Y[:, :n]), Y[:, n : 2 * n]
+            e, v = self.system.directions(Y[:, :n]), Y[:, n : 2 * n]
             gaps = self.equations.gaps(times, e)
             rates = self.equations.gap_rates(e, v)
             for i, holds in enumerate(discrete.holds):
@@ -504,14 +504,15 @@ class Simulation:
 
     def _gap_at(self, arc: Arc, i: int) -> Callable[[float], float]:
         n = self.system.n
-        return lambda t: float(self.equations.gaps(t, np.exp(1j * arc.at(t)[:n]))[i])
+        return lambda t: float(self.equations.gaps(t, self.system.directions(arc.at(t)[:n]))[i])
 
     def _gap_rate_at(self, arc: Arc, i: int, sign: float = 1.0) -> Callable[[float], float]:
         n = self.system.n
 
         def rate(t: float) -> float:
             y = arc.at(t)
-            return sign * float(self.equations.gap_rates(np.exp(1j * y[:n]), y[n : 2 * n])[i])
+            e = self.system.directions(y[:n])
+            return sign * float(self.equations.gap_rates(e, y[n : 2 * n])[i])
 
         return rate
 
@@ -550,7 +551,7 @@ class Simulation:
         n = self.system.n
         for _ in range(3):
             y = self.equations.project(t, arc.at(t))
-            e = np.exp(1j * y[:n])
+            e = self.system.directions(y[:n])
             gap = float(self.equations.gaps(t, e)[i])
             rate = float(self.equations.gap_rates(e, y[n : 2 * n])[i])
             if rate >= 0.0 or abs(gap) <= TIME_RESOLUTION * abs(rate):
@@ -565,14 +566,15 @@ class Simulation:
         self, arc: Arc, kind: str, i: int, times: Real, e: Complex, v: Real
     ) -> list[Event]:
         """Return when a sliding velocity changes its sign."""
-        sign, row, n = self._sliding(kind, i), self._slide_row(kind, i), self.system.n
-        z = -sign * ((e * v) @ row).imag
+        sign, rows, n = self._sliding(kind, i), self._slide_rows(kind), self.system.n
+        z = sign * rows.rates(e, v)[:, i]
         for j in range(WATCHED):
             if z[j] > 0.0 >= z[j + 1]:
 
                 def speed(t: float) -> float:
                     y = arc.at(t)
-                    return -sign * float(((np.exp(1j * y[:n]) * y[n : 2 * n]) @ row).imag)
+                    e = self.system.directions(y[:n])
+                    return sign * float(rows.rates(e, y[n : 2 * n])[i])
 
                 return [Event(_falls(speed, times[j], times[j + 1]), kind, i)]
         if z[-1] < 0.0 and z[0] <= 0.0:
@@ -582,9 +584,8 @@ class Simulation:
     def _sliding(self, kind: str, i: int) -> int:
         return self.discrete.rubs[i] if kind == "rub" else self.discrete.slides[i]
 
-    def _slide_row(self, kind: str, i: int) -> Complex:
-        row: Complex = self.system.rubs[i] if kind == "rub" else self.system.slides[i]
-        return row
+    def _slide_rows(self, kind: str) -> constraints.Rows:
+        return self.equations.rub_rows if kind == "rub" else self.equations.slide_rows
 
     def _may_yield(self) -> bool:
         """Tell whether the stages of the step come near to releasing or slipping."""
@@ -603,7 +604,7 @@ class Simulation:
         def margins(t: float) -> dict[tuple[str, int], float]:
             y = arc.at(t)
             _, lam, _ = equations.accelerations(y[:n], y[n : 2 * n])
-            return self._margins(lam, np.exp(1j * y[:n]))
+            return self._margins(lam, self.system.directions(y[:n]))
 
         def margin(key: tuple[str, int]) -> Callable[[float], float]:
             return lambda t: margins(t)[key]
@@ -672,7 +673,7 @@ class Simulation:
         """Resolve the impact of a stop and of all that touch with it."""
         t, n = self.front_time, self.system.n
         q, v = self.front[:n], self.front[n : 2 * n]
-        e = np.exp(1j * q)
+        e = self.system.directions(q)
         gaps, rates = self.equations.gaps(t, e), self.equations.gap_rates(e, v)
         near = TOUCHING * self.system.length
         struck = [
@@ -719,7 +720,7 @@ class Simulation:
         equations = self._equations_holding(holding, q, after)
         _, lam, _ = equations.accelerations(q, after)
         e, M, loops = self._mass_and_loops(q)
-        G = constraints.jacobian(self.system.gaps[i : i + 1], e)
+        G = self.equations.gap_rows.jacobian(e)[[i]]
         pressing = float(equations.stop_forces(lam)[i]) * _mobility(M, loops, G)
         return 2.0 * speed < pressing * SHORTEST_FLIGHT * self._period()
 
@@ -732,22 +733,22 @@ class Simulation:
         with friction as constraints that are let go if they would pull.  Their own friction, and
         that of friction points, is finite and has no impulse.
         """
-        system, k = self.system, len(struck)
+        k = len(struck)
         e, M, loops = self._mass_and_loops(q)
+        gaps = self.equations.gap_rows.jacobian(e)
         u = self.equations.gap_rates(e, v)
         mu = np.array([self._field(i, "friction") for i in struck])
         if not mu.any():
             partners = struck + held
-            G = constraints.jacobian(system.gaps[partners], e)
+            G = gaps[partners]
             X = contact.response(M, loops, G)
             eps = np.concatenate([restitution, np.zeros(len(held))])
             P = contact.newton(G @ X, np.minimum(u[partners], 0.0), eps)
             return v + X @ P, dict(zip(partners, P.tolist(), strict=True)), {}
         kept = list(held)
         while True:
-            rows = constraints.jacobian(np.vstack([system.loops, system.gaps[kept]]), e)
-            G = constraints.jacobian(system.gaps[struck], e)
-            T = constraints.jacobian(system.slides[struck], e)
+            rows = np.vstack([loops, gaps[kept]])
+            G, T = gaps[struck], self.equations.slide_rows.jacobian(e)[struck]
             X = contact.response(M, rows, np.vstack([G, T]))
             W = np.vstack([G, T]) @ X
             rates = np.concatenate([u[struck], T @ v])
@@ -780,9 +781,9 @@ class Simulation:
         At each stop -P (u- + u+)/2 is lost, and as much along the wall; the wall does -P w.
         """
         n = self.system.n
-        e = np.exp(1j * q)
+        e = self.system.directions(q)
         u = [self.equations.gap_rates(e, rates) for rates in (v, after)]
-        slides = constraints.jacobian(self.system.slides, e)
+        slides = self.equations.slide_rows.jacobian(e)
         lost = {i: -P * float(u[0][i] + u[1][i]) / 2 for i, P in normal.items()}
         for i, P in tangential.items():
             lost[i] -= P * float(slides[i] @ (v + after)) / 2
@@ -819,8 +820,8 @@ class Simulation:
         """
         every = sorted(set(candidates))
         e, M, loops = self._mass_and_loops(q)
-        G = constraints.jacobian(self.system.gaps, e)
-        bend = constraints.convective(self.system.gaps, e, v)
+        G = self.equations.gap_rows.jacobian(e)
+        bend = self.equations.gap_rows.convective(e, v)
         closes = -STILL * self._omega_scale() ** 2 * self.system.length
         pressed_only: list[int] = []
         for size in range(len(every), 0, -1):
@@ -843,15 +844,15 @@ class Simulation:
 
     def _mass_and_loops(self, q: Real) -> tuple[Complex, Real, Real]:
         """Return e, the mass matrix and the Jacobian of the loops at a position."""
-        e = np.exp(1j * q)
+        e = self.system.directions(q)
         M, _ = inertia(self.system.H, self.equations.J, e)
-        return e, M, constraints.jacobian(self.system.loops, e)
+        return e, M, constraints.jacobian(self.system.spread(self.system.loops), e)
 
     def _equations_holding(self, stops: list[int], q: Real, v: Real) -> Equations:
         """Return the equations in which these stops hold, and what slides rubs."""
-        e = np.exp(1j * q)
+        e = self.system.directions(q)
         slides, rubs = (
-            constraints.jacobian(B, e) @ v for B in (self.system.slides, self.system.rubs)
+            rows.rates(e, v) for rows in (self.equations.slide_rows, self.equations.rub_rows)
         )
         discrete = Discrete(
             tuple(i in stops for i in range(len(slides))),
@@ -878,7 +879,7 @@ class Simulation:
         """
         n, t = self.system.n, self.front_time
         q, v = self.front[:n], self.front[n : 2 * n]
-        e = np.exp(1j * q)
+        e = self.system.directions(q)
         gaps, rates = self.equations.gaps(t, e), self.equations.gap_rates(e, v)
         near, still = TOUCHING * self.system.length + RELEASE_GAP, self._still()
         candidates = [i for i, holds in enumerate(self.discrete.holds) if holds]
@@ -909,13 +910,13 @@ class Simulation:
         sliding accelerates it.
         """
         e, M, loops = self._mass_and_loops(q)
-        B = self._slide_row(kind, i)[None, :]
-        row = constraints.jacobian(B, e)
+        rows = self._slide_rows(kind)
+        row = rows.jacobian(e)[[i]]
         moving = self._sign(float((row @ v).item()))
         if moving != IDLE:
             return moving
         others = self._equations(self._with_slide(kind, i, IDLE))
-        held = constraints.jacobian(others.B, e)
+        held = others.rows.jacobian(e)
         if _mobility(M, held, row) <= DEPENDENT * _mobility(M, loops, row):
             return IDLE
         equations = self._equations(self._with_slide(kind, i, STICKS))
@@ -933,7 +934,7 @@ class Simulation:
         for sign in (gives, -gives):
             trial = self._equations(self._with_slide(kind, i, sign))
             a, _, _ = trial.accelerations(q, v)
-            if sign * float((row @ a - constraints.convective(B, e, v)).item()) > 0.0:
+            if sign * float((row @ a).item() - rows.convective(e, v)[i]) > 0.0:
                 return sign
         return STICKS if not yields else IDLE
 
@@ -959,7 +960,7 @@ class Simulation:
         system, equations, n, t = self.system, self.equations, self.system.n, self.time
         y = self.state()
         q, v = y[:n], y[n : 2 * n]
-        e = np.exp(1j * q)
+        e = self.system.directions(q)
         a, lam, M = equations.accelerations(q, v)
         out: dict[str, float | int | bool] = {}
         for name, frame in system.bodies.items():

@@ -1,8 +1,8 @@
 r"""Mass matrix, quadratic velocities, kinetic energy and momentum.
 
-The TMT method (Newton-Euler in generalised coordinates) for absolute angles: with the positions
-z = c + A e, e = exp(i q), the projection T = dz/dq = i A diag(e) gives M = Re(T^H diag(m) T) + J,
-and H = A^H diag(m) A is constant.
+The TMT method (Newton-Euler in generalised coordinates) for absolute angles and stretches: with
+the positions z = c + A E (see :mod:`prbm.assembly`), the projection T = dz/dq = i A diag(e), where
+A is spread over the stretches, gives M = Re(T^H diag(m) T) + J, and H = A^H diag(m) A is constant.
 
 Sources
 -------
@@ -15,12 +15,13 @@ from .assembly import Complex, Real
 def inertia(H: Complex, J: Real, e: Complex) -> tuple[Real, Real]:
     r"""Mass matrix M and quadratic-velocity matrix C of M a + C v^2 = Q.
 
-    With Hq = diag(e)^H H diag(e) and e = exp(i q),
+    With Hq = diag(e)^H H diag(e),
 
         M = Re Hq + diag(J),    C = -Im Hq,
 
     so one Hermitian product yields both.  C multiplies the *squares* v^2: with absolute angles
-    there are no cross products v_i v_j.
+    there are no cross products v_i v_j.  With stretches the quadratic velocities are
+    -Im(Hq w^2), w the complex rates of the arms.
 
     Parameters
     ----------
@@ -29,7 +30,7 @@ def inertia(H: Complex, J: Real, e: Complex) -> tuple[Real, Real]:
     J : (n, n)
         Rotary inertia of each coordinate about its own mass centres, diagonal [kg m^2].
     e : (n,) complex
-        Unit directions exp(i q) of the links [-].
+        Directions [-].
 
     Returns
     -------
@@ -61,7 +62,7 @@ def kinetic_energy(M: Real, v: Real) -> float:
     return 0.5 * float(v @ M @ v)
 
 
-def mass_accelerations(A: Complex, e: Complex, v: Real, a: Real) -> Complex:
-    """Accelerations z'' = A (i e a - e v^2) of the mass points [m/s^2]."""
-    result: Complex = A @ (1j * e * a - e * v * v)
+def mass_accelerations(A: Complex, e: Complex, w: Real | Complex, dw: Real | Complex) -> Complex:
+    """Accelerations z'' = A (i e w' - e w^2) of the mass points [m/s^2]."""
+    result: Complex = A @ (1j * e * dw - e * w * w)
     return result

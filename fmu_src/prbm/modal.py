@@ -50,11 +50,11 @@ def modes(system: System, shape: Equilibrium) -> Modes:
 
 def _modes(system: System, q: Real, B: Complex, lam: Real) -> Modes:
     """Solve K_t phi = omega^2 M phi on the tangent space of the loops."""
-    e = np.exp(1j * q)
+    e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
-    w = field_row(system.S, system.gravity)
-    K_t = tangent_stiffness(system.K, w, B, lam, e)
-    rows = constraints.jacobian(system.loops, e)
+    w = field_row(system.spread(system.S), system.gravity)
+    K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm)
+    rows = constraints.jacobian(system.spread(system.loops), e)
     Z = null_space(rows) if len(rows) else np.eye(system.n)
     omega2, reduced = eigh(Z.T @ K_t @ Z, Z.T @ M @ Z)
     frequency = np.sign(omega2) * np.sqrt(np.abs(omega2)) / (2 * np.pi)
@@ -75,11 +75,11 @@ def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
     M : (n, n)
         Mass matrix [kg m^2].
     """
-    e = np.exp(1j * q)
+    e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     B = np.vstack([system.loops, system.release])
-    rows = constraints.jacobian(B, e)
-    w = field_row(system.S, system.gravity)
+    rows = constraints.jacobian(system.spread(B), e)
+    w = field_row(system.spread(system.S), system.gravity)
     right = np.concatenate([springs(system.K, q - system.q0) + (w * e).real, np.zeros(len(B))])
     lam = -constraints.solve(constraints.saddle(M, rows, rows), right)[system.n :]
     found = _modes(system, q, B, lam)
@@ -123,6 +123,6 @@ def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution
         Coefficient of restitution eps [-].
     """
     found = modes(system, shape)
-    G = constraints.jacobian(system.gaps[stop : stop + 1], np.exp(1j * shape.q))[0]
+    G = constraints.gap_rows(system).jacobian(system.directions(shape.q))[stop]
     share = (G @ found.shape) ** 2
     return (1.0 + restitution) * float(share[0] / share.sum()) - 1.0

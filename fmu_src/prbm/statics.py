@@ -1,8 +1,9 @@
 r"""Static equilibrium under gravity and a holding force, and the tangent stiffness there.
 
 At rest the torques balance: K (q - q0) - Re(w e) - J^T lam - r^T F = 0 with w the row of gravity,
-J the Jacobian of the loops, r that of the held displacement and F the holding force.  All
-second derivatives are diagonal, because every position is linear in e = exp(i q).
+J the Jacobian of the loops, r that of the held displacement and F the holding force.  Second
+derivatives couple at most an angle and the stretch of the same link, because every position is
+linear in the arms.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import constraints
-from .assembly import Complex, Real, System
+from .assembly import Complex, Real, System, Whole
 from .errors import EquilibriumError, SimulationError
 from .forces import field_row, springs
 from .kinetics import inertia
@@ -40,8 +41,13 @@ class Equilibrium:
     force: float
 
 
-def tangent_stiffness(K: Real, w: Complex, B: Complex, lam: Real, e: Complex) -> Real:
+def tangent_stiffness(
+    K: Real, w: Complex, B: Complex, lam: Real, e: Complex, arm: Whole | None = None
+) -> Real:
     r"""Stiffness about a shape, K + diag(Im(w e) + Re(lam^T B e)) [N m/rad].
+
+    With g = Im(w e) + Re(lam^T B e) and h = Im(lam^T B e) - Re(w e) of a link, its stretch has -g
+    on the diagonal and h beside the link's angle.
 
     Parameters
     ----------
@@ -52,7 +58,9 @@ def tangent_stiffness(K: Real, w: Complex, B: Complex, lam: Real, e: Complex) ->
     B, lam : (r, n) complex, (r,)
         Constraints and their multipliers [m], [N].
     e : (n,) complex
-        exp(i q).
+        Directions.
+    arm : (n,) int or None
+        Whose arm a coordinate turns or stretches; None: each its own.
 
     Examples
     --------
@@ -64,8 +72,15 @@ def tangent_stiffness(K: Real, w: Complex, B: Complex, lam: Real, e: Complex) ->
     >>> tangent_stiffness(np.zeros((1, 1)), w, none, np.zeros(0), np.array([-1j])).item()
     6.0
     """
-    geometric = (w * e).imag + ((lam @ B) * e).real
-    return K + np.diag(geometric)
+    pull = (lam @ B - 1j * w) * e
+    result: Real = K + np.diag(pull.real)
+    if arm is not None:
+        k = np.flatnonzero(arm != np.arange(len(arm)))
+        a = arm[k]
+        result[k, k] = K[k, k] - pull[a].real
+        result[k, a] += pull[a].imag
+        result[a, k] += pull[a].imag
+    return result
 
 
 def equilibrium(system: System, displacement: float | None = None) -> Equilibrium:
@@ -114,7 +129,7 @@ def free_displacement(system: System) -> float:
 
     The displacement of its centre of mass along the direction of the release, from straight.
     """
-    e = np.exp(1j * equilibrium(system).q)
+    e = system.directions(equilibrium(system).q)
     return float((system.release @ e).real) + system.release_c
 
 
@@ -123,7 +138,7 @@ def _newton(
 ) -> Real | None:
     """Solve the balance at a fraction of the load; None if it does not converge."""
     n = system.n
-    w = fraction * field_row(system.S, system.gravity)
+    w = fraction * field_row(system.spread(system.S), system.gravity)
     shift = np.zeros(len(c))
     if len(c) > len(system.loops):
         shift[-1] = fraction * displacement
@@ -131,14 +146,14 @@ def _newton(
     state = start.copy()
     for _ in range(NEWTON_STEPS):
         q, lam = state[:n], state[n:]
-        e = np.exp(1j * q)
-        rows = constraints.jacobian(B, e)
+        e = system.directions(q)
+        rows = constraints.jacobian(system.spread(B), e)
         torque = springs(system.K, q - system.q0) + (w * e).real + lam @ rows
         open_by = constraints.values(B, c, e) - shift
         closed = not len(open_by) or np.abs(open_by).max() <= 1e-13 * system.length
         if closed and np.abs(torque).max() <= scale:
             return state
-        kkt = constraints.saddle(tangent_stiffness(system.K, w, B, lam, e), rows, rows)
+        kkt = constraints.saddle(tangent_stiffness(system.K, w, B, lam, e, system.arm), rows, rows)
         try:
             change = constraints.solve(kkt, np.concatenate([torque, -open_by]))
         except SimulationError:
@@ -181,9 +196,9 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     """
     if speed == 0.0:
         return np.zeros(system.n)
-    e = np.exp(1j * q)
+    e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
-    rows = constraints.jacobian(np.vstack([system.loops, system.release]), e)
+    rows = constraints.jacobian(system.spread(np.vstack([system.loops, system.release])), e)
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     return constraints.project_velocities(M, rows, rates, np.zeros(system.n))
