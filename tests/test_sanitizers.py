@@ -75,12 +75,22 @@ def test_sanitizers_find_nothing_in_ten_thousand_instances():
 @pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "kind"), WAYS)
 def test_valgrind_finds_nothing(fmi, kind):
-    """A run into the first impact, going back, and a hundred instances (ten thousand: above)."""
+    """A run into the first impact, going back, and a hundred instances."""
     needs("valgrind")
     library = kernel_library("plain", ("-g",))
     job = Job(native("PRBDM2R", fmi), kind, POINTS[:61], library=library)
     for words in ((), ("interrupt", 30, "serialize"), ("cycles", 100, 0)):
         assert not run(job, *words, before=VALGRIND).errors
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("fmi", "kind"), [(2, "cs"), (2, "me"), (3, "cs"), (3, "me")])
+def test_valgrind_finds_nothing_in_ten_thousand_instances(fmi, kind):
+    """Each is instantiated, initialised, steps and is freed."""
+    needs("valgrind")
+    library = kernel_library("plain", ("-g",))
+    job = Job(native("PRBDM", fmi), kind, POINTS[:61], library=library)
+    assert not run(job, "cycles", 2500, 1, before=VALGRIND).errors
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
