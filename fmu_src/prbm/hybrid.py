@@ -170,8 +170,9 @@ class Simulation:
             raise ParameterError(f"step = {step} s must be positive")
         self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
-        # one radian against the stiffest spring [J]
-        self._energy_scale = float(np.abs(self.system.K).max())
+        # one radian against the stiffest torsion spring [J]
+        turns = np.setdiff1d(np.arange(self.system.n), self.system.stretches)
+        self._energy_scale = float(np.abs(self.system.K[np.ix_(turns, turns)]).max())
 
         displacement, speed = (
             value(mechanism.release, name, self.values) for name in ("displacement", "velocity")

@@ -6,6 +6,7 @@ derivatives couple at most an angle and the stretch of the same link, because ev
 linear in the arms.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,8 @@ from .kinetics import inertia
 NEWTON_STEPS = 30
 LARGEST_TURN = 0.5  # rad per Newton step and per step of the load: further is another shape
 SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
-BALANCED = 1e-12  # of the largest torsion rate times one radian
+BALANCED = 1e-12  # of the largest rate of a spring times one radian
+CONVERGED = 1e-8  # rad of the last Newton step; what is left after it is its square
 
 
 @dataclass(frozen=True)
@@ -143,7 +145,7 @@ def _newton(
     if len(c) > len(system.loops):
         shift[-1] = fraction * displacement
     scale = BALANCED * float(np.abs(system.K).max())
-    state = start.copy()
+    state, turn = start.copy(), math.inf
     for _ in range(NEWTON_STEPS):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
@@ -151,16 +153,17 @@ def _newton(
         torque = springs(system.K, q - system.q0) + (w * e).real + lam @ rows
         open_by = constraints.values(B, c, e) - shift
         closed = not len(open_by) or np.abs(open_by).max() <= 1e-13 * system.length
-        if closed and np.abs(torque).max() <= scale:
+        balanced = closed and np.abs(torque).max() <= scale
+        if balanced and turn <= CONVERGED:
             return state
         kkt = constraints.saddle(tangent_stiffness(system.K, w, B, lam, e, system.arm), rows, rows)
         try:
             change = constraints.solve(kkt, np.concatenate([torque, -open_by]))
         except SimulationError:
-            return None
+            return state if balanced else None
         change[n:] *= -1.0
         turn = float(np.abs(change[:n]).max())
-        if not np.isfinite(turn):
+        if not math.isfinite(turn):
             return None
         state = state + change * min(1.0, LARGEST_TURN / max(turn, 1e-300))
     return None
