@@ -170,9 +170,7 @@ class Simulation:
             raise ParameterError(f"step = {step} s must be positive")
         self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
-        # one radian against the stiffest torsion spring [J]
-        turns = np.setdiff1d(np.arange(self.system.n), self.system.stretches)
-        self._energy_scale = float(np.abs(self.system.K[np.ix_(turns, turns)]).max())
+        self._energy_scale = self._energy_of_a_radian()
 
         displacement, speed = (
             value(mechanism.release, name, self.values) for name in ("displacement", "velocity")
@@ -451,6 +449,15 @@ class Simulation:
     def magnitudes(self) -> tuple[float, float, float]:
         """Return an angle [rad], and the rate [rad/s] and energy [J] that it means."""
         return 1.0, self._omega_scale(), self._energy_scale
+
+    def _energy_of_a_radian(self) -> float:
+        """Return the energy of one radian against the stiffest torsion spring [J].
+
+        Where all is pinned and nothing bends: of a turn by one radian in a period.
+        """
+        turns = np.setdiff1d(np.arange(self.system.n), self.system.stretches)
+        torsion = float(np.abs(self.system.K[np.ix_(turns, turns)]).max())
+        return torsion or float(np.abs(self.system.H).max()) * self._omega_scale() ** 2
 
     def _omega_scale(self) -> float:
         """Return the angular frequency against which rates are measured [rad/s]."""
