@@ -165,6 +165,11 @@ CHANGES = {
         "gravity.1 = 'ratio': write a number in m",
     ),
     "list as a number": ('mass = "53.187 g"', "mass = [1, 2]", "(of arm) = [1, 2]: write a number"),
+    "list as a value": (
+        "value = 0.5",
+        "value = [1]",
+        "geometry.1.value (of ratio) = [1]: write a number",
+    ),
     "truth as a number": (
         'mass = "53.187 g"',
         "mass = true",

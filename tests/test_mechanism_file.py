@@ -431,10 +431,11 @@ def test_what_is_a_mechanism_satisfies_the_schema(name):
 
 
 SEEN = (
-    "text as a truth", "list as a number", "truth as a number", "number as a name",
-    "number as a title", "part of a link", "gravity with three numbers", "gravity with one number",
-    "point with one number", "point that is a number", "point without a body",
-    "array instead of table", "table instead of array", "ground as an array",
+    "text as a truth", "list as a number", "list as a value", "truth as a number",
+    "number as a name", "number as a title", "part of a link", "gravity with three numbers",
+    "gravity with one number", "point with one number", "point that is a number",
+    "point without a body", "array instead of table", "table instead of array",
+    "ground as an array",
     "value instead of an array", "unknown key", "unknown key of the file", "unknown table",
     "key of another part", "missing key", "body without mass", "missing release",
     "name with a path", "name that is empty", "name too long",

@@ -25,7 +25,6 @@ from pydantic import (
     StrictStr,
     Tag,
     ValidationInfo,
-    field_validator,
     model_validator,
 )
 from pydantic_core import CoreSchema, core_schema
@@ -71,6 +70,25 @@ class Measured:
         if self.expression or self.unit:
             choices.append({"type": "string", "pattern": r"\S" if self.expression else r"\d"})
         return {"description": f"{self.description} [{self.unit or '-'}]", "anyOf": choices}
+
+
+@dataclass(frozen=True)
+class InUnit:
+    """What a key of a parameter holds: a number, in the unit beside it; a bound may be infinite."""
+
+    bound: bool = False
+
+    def read(self, written: object, info: ValidationInfo) -> float:
+        """Return the number in the unit of the parameter."""
+        if self.bound and isinstance(written, float) and math.isinf(written):
+            return written
+        return number(written, str(info.data.get("unit", "")).removeprefix("1"))
+
+    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(self, _: CoreSchema, __: GetJsonSchemaHandler) -> Any:
+        return {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"\d"}]}
 
 
 def measured(part: type, key: str) -> Measured:
@@ -132,11 +150,17 @@ class ParameterTable(Named):
     """A parameter that points and other quantities refer to."""
 
     unit: StrictStr = Field("", description="SI unit; that of the value if it is written with one")
-    value: float = Field(description="Default, in the unit")
+    value: Annotated[float, InUnit()] = Field(description="Default, in the unit")
     description: StrictStr = Field("", description="One sentence for the reader of the FMU")
-    minimum: float | None = Field(None, description="Least value, in the unit")
-    maximum: float | None = Field(None, description="Greatest value, in the unit")
-    nominal: float | None = Field(None, description="Typical magnitude, in the unit")
+    minimum: Annotated[float, InUnit(bound=True)] | None = Field(
+        None, description="Least value, in the unit"
+    )
+    maximum: Annotated[float, InUnit(bound=True)] | None = Field(
+        None, description="Greatest value, in the unit"
+    )
+    nominal: Annotated[float, InUnit(bound=True)] | None = Field(
+        None, description="Typical magnitude, in the unit"
+    )
     tunable: StrictBool = Field(False, description="Whether it may change during a simulation")
 
     @model_validator(mode="before")
@@ -148,13 +172,6 @@ class ParameterTable(Named):
             except MechanismError:
                 pass  # told where the value is read
         return data
-
-    @field_validator("value", "minimum", "maximum", "nominal", mode="plain")
-    @classmethod
-    def _number(cls, written: object, info: ValidationInfo) -> float:
-        if isinstance(written, float) and math.isinf(written) and info.field_name != "value":
-            return written  # no bound
-        return number(written, str(info.data.get("unit", "")).removeprefix("1"))
 
 
 class MaterialTable(Named):
