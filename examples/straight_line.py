@@ -2,8 +2,8 @@
 
 A shuttle on two parallel leaves goes down by 3 x^2 / (5 L) on its way x (Euler-Bernoulli beams of
 length L).  In a folded suspension each truss goes x/2 and down by as much as the outer leaves lift
-the shuttle above it.  Left over is what the trusses turn, where there is one of them alone, and what
-differs from leaf to leaf.
+the shuttle above it.  Left over is what the truss turns, where there is one alone, and what differs
+from leaf to leaf.
 """
 
 import sys
@@ -19,6 +19,7 @@ from prbm_tools.figures import save
 from prbm_tools.mechanism_file import load, shipped
 
 STROKES = np.linspace(0.0, 0.03, 16)  # m
+ROUNDING = 1e-12  # m; a lateral error below this is none
 THICKER = 1.05  # of the thickness: one leaf that is not like the others
 
 
@@ -93,13 +94,15 @@ def plot(errors: dict[str, np.ndarray], beam: np.ndarray) -> Figure:
     axes = figure.subplots()
     axes.plot(1e3 * STROKES[1:], 1e3 * beam[1:], "k--", linewidth=1.0, label="3 x² / (5 L)")
     for (name, error), marker in zip(errors.items(), "osd^", strict=True):
-        size = np.maximum(np.abs(error), 1e-12)  # rounding is none
+        size = np.abs(error)
+        if size.max() < ROUNDING:
+            size, name = np.full(len(error), ROUNDING), f"{name} (none but rounding)"
         axes.plot(1e3 * STROKES[1:], 1e3 * size[1:], marker + "-", markersize=4, label=name)
     axes.set_yscale("log")
     axes.set_xlabel("stroke [mm]")
     axes.set_ylabel("lateral error [mm]")
     axes.grid(color="#eeeeee")
-    axes.legend(fontsize=8, frameon=False, loc="center right")
+    axes.legend(fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 0.08))
     return figure
 
 

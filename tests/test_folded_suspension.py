@@ -60,11 +60,11 @@ def test_it_hardens_by_a_percent_over_its_stroke() -> None:
 
 
 def test_fundamental_frequency_is_rayleighs_with_the_trusses_at_half_speed() -> None:
-    """M = M + 2 M_t/4 + 4 m 13/35 / 4 + 4 m (1/4 + 1/4 + 13/140), k = 24 EI/L^3.
+    """Mass M + 2 M_t/4 + 4 m 13/35 / 4 + 4 m (1/4 + 1/4 + 13/140), stiffness 24 EI/L^3.
 
-    Fixed-guided shape 3 s^2 - 2 s^3: its square has the mean 13/35, itself 1/2.  Rayleigh's quotient
-    is an upper bound, here by 1.1 % because the trusses' own inertia makes them go more than half
-    the way; the model adds -1.1 % of its stiffness.
+    Fixed-guided shape 3 s^2 - 2 s^3: its square has the mean 13/35, itself 1/2.  Rayleigh's
+    quotient is an upper bound, here by 1.1 %, because the trusses' own inertia makes them go more
+    than half the way; the model adds the -1.1 % of its stiffness.
     """
     EI_L3, m, shuttle, truss = beam()
     mass = shuttle + 2 * truss / 4 + 4 * m * 13 / 35 / 4 + 4 * m * (0.25 + 0.25 + 13 / 140)

@@ -30,9 +30,8 @@ def check_books(result: Run) -> None:
     smaller than those by up to a factor of a thousand (Bistable 1e-6, the others below 1e-7).
     """
     system = result.simulation.system
-    assert result.imbalance < (2e-6 if system.mechanism.name == "Bistable" else 2e-7) * stored(
-        result
-    )
+    share = 2e-6 if system.mechanism.name == "Bistable" else 2e-7
+    assert result.imbalance < share * stored(result)
     assert result.opened < 1e-12 * system.length
     assert all(math.isfinite(x) for row in result.outputs for x in row.values())
 
