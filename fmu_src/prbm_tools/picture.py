@@ -47,6 +47,7 @@ ARROW = 0.14  # of the size: length of the arrows of forces
 MOST_MODES = 12  # in a picture
 COLUMNS = 3  # of modes in a row
 THIN = 0.12  # of the size: a body lower than this has its name above it
+NAME_AT = 0.36  # of the length of a flexure: flexures cross in the middle
 NAME, NAME_OFFSET = "#303030", 7.0  # points between a flexure and its name
 WIDTH, LEAST_HEIGHT, LARGEST_HEIGHT, FRAME = 7.2, 2.4, 6.4, 0.9  # inches, of the picture
 
@@ -275,7 +276,8 @@ class _Drawing:
 
     def along(self, start: complex, end: complex, words: str) -> None:
         """Write along a line, left of it as one reads."""
-        place, degrees = (start + end) / 2 * self.factor, math.degrees(cmath.phase(end - start))
+        place = (start + NAME_AT * (end - start)) * self.factor
+        degrees = math.degrees(cmath.phase(end - start))
         turned = (degrees + 89.0) % 180.0 - 89.0
         away = cmath.rect(NAME_OFFSET, math.radians(turned + 90.0))
         self.axes.annotate(
