@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import constraints
+from . import constraints, contact
 from .assembly import Complex, Real, System, Whole
 from .errors import EquilibriumError, ParameterError, SimulationError
 from .forces import field_row, force_row, springs
@@ -21,7 +21,8 @@ from .mechanism import finite, unknown
 NEWTON_STEPS = 30
 LARGEST_TURN = 0.5  # rad per Newton step and per step of the load: further is another shape
 SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
-BALANCED = 1e-12  # of the largest torsion rate times one radian
+IMMOBILE = 1e-12  # share of a body's mobility that the loops leave it: below, it cannot move
+BALANCED = 1e-12  # of the largest torsion rate times one radian, or without springs of the load
 
 
 @dataclass(frozen=True)
@@ -183,7 +184,7 @@ def _newton(
     shift = np.zeros(len(c))
     if len(c) > len(system.loops):
         shift[-1] = displacement
-    scale = BALANCED * float(np.abs(system.K).max())
+    scale = BALANCED * float(np.abs(system.K).max() or np.abs(w).max())
     state = start.copy()
     for _ in range(NEWTON_STEPS):
         q, lam = state[:n], state[n:]
@@ -239,12 +240,25 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     -------
     v : (n,)
         What an impulse on the centre of mass along that direction gives [rad/s].
+
+    Raises
+    ------
+    ParameterError
+        If the body cannot move along that direction.
     """
     if speed == 0.0:
         return np.zeros(system.n)
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     rows = constraints.jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    loops, row = rows[:-1], rows[-1:]
+    left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
+    if left <= IMMOBILE * free:
+        raise ParameterError(
+            f"release.velocity = {speed:g} m/s: the body {system.mechanism.release.body} cannot "
+            "move along the direction of the release; choose another direction, or let flexures "
+            "stretch (axial = true)"
+        )
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     return constraints.project_velocities(M, rows, rates, np.zeros(system.n))
