@@ -39,6 +39,8 @@ RELEASE_GAP = 1e-9  # m; a wall may be touched at release by no more than this
 SHORTEST_FLIGHT = 5e-7  # of the period: the arc of a shorter bounce is lost in rounding
 DEPENDENT = 1e-4  # share of a row's mobility that the stops leave; below, the stop carries all
 ALIGNED = 1e-9  # the same for stops among each other; below, one of them holds for all
+AT_EASE = 1e-7  # of the highest frequency: a lower one is what rounding leaves of none
+NO_SPRING = 2 * math.pi  # rad/s; the scale of rates of a linkage without springs
 STILL = 1e-9  # of the velocity scale: a slower rate is what rounding leaves of none
 SLACK = 1e-6  # of the limit of friction: what sticks may exceed it by this before it slips
 CHATTER = 1000  # events ...
@@ -170,9 +172,12 @@ class Simulation:
             raise ParameterError(f"step = {step} s must be positive")
         self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
-        # one radian against the stiffest torsion spring [J]
-        turns = np.setdiff1d(np.arange(self.system.n), self.system.stretches)
-        self._energy_scale = float(np.abs(self.system.K[np.ix_(turns, turns)]).max())
+        # one radian against the stiffest torsion spring [J], and the largest inertia [kg m^2]
+        turns = np.ix_(*2 * (np.setdiff1d(np.arange(self.system.n), self.system.stretches),))
+        self._inertia_scale = float(np.abs(self.system.H[turns]).max())
+        self._energy_scale = (
+            float(np.abs(self.system.K[turns]).max()) or self._inertia_scale * NO_SPRING**2
+        )
 
         displacement, speed = (
             value(mechanism.release, name, self.values) for name in ("displacement", "velocity")
@@ -456,8 +461,7 @@ class Simulation:
         """Return the angular frequency against which rates are measured [rad/s]."""
         if self.omega > 0.0:
             return self.omega
-        ratio: float = np.abs(self.system.K).max() / np.abs(self.system.H).max()
-        return math.sqrt(ratio)
+        return math.sqrt(self._energy_scale / self._inertia_scale)
 
     def _error(self, difference: Real, y: Real, y1: Real) -> float:
         """Return the root mean square of an error in units of what the tolerance allows."""
@@ -650,7 +654,7 @@ class Simulation:
         elif event.kind.startswith("slip "):
             self._settle(yields=(event.kind.removeprefix("slip "), event.index))
         else:
-            self._settle()
+            self._settle(turns=(event.kind, event.index))
 
     def _count(self, event: Event) -> None:
         """Stop a chatter that does not end."""
@@ -868,7 +872,12 @@ class Simulation:
             return IDLE
         return 1 if speed > 0.0 else -1
 
-    def _settle(self, resting: Sequence[int] = (), yields: tuple[str, int] | None = None) -> None:
+    def _settle(
+        self,
+        resting: Sequence[int] = (),
+        yields: tuple[str, int] | None = None,
+        turns: tuple[str, int] | None = None,
+    ) -> None:
         """Choose what holds, sticks and slides at the front, from its state alone.
 
         Parameters
@@ -877,9 +886,12 @@ class Simulation:
             Open stops that touch without closing or opening.
         yields : (str, int) or None
             What has just used up its friction and cannot stick.
+        turns : (str, int) or None
+            What has just stopped sliding, or turns back.
         """
         n, t = self.system.n, self.front_time
         q, v = self.front[:n], self.front[n : 2 * n]
+        slow = self._speed_left(*turns, q, v) if turns else 0.0
         e = self.system.directions(q)
         gaps, rates = self.equations.gaps(t, e), self.equations.gap_rates(e, v)
         near, still = TOUCHING * self.system.length + RELEASE_GAP, self._still()
@@ -895,26 +907,37 @@ class Simulation:
         for _ in range(len(rubbing) + 1):  # what one does may change what another must do
             before = self.discrete
             for kind, i in rubbing:
-                state = self._slide_state(kind, i, q, v, yields == (kind, i))
+                stops = slow if turns == (kind, i) else 0.0
+                state = self._slide_state(kind, i, q, v, yields == (kind, i), stops)
                 self._set_discrete(self._with_slide(kind, i, state))
             if self.discrete == before:
                 break
         if holding:
             self.front = self.equations.project(t, self.front)
 
-    def _slide_state(self, kind: str, i: int, q: Real, v: Real, yields: bool) -> int:
+    def _speed_left(self, kind: str, i: int, q: Real, v: Real) -> float:
+        """Return the sliding speed that the resolution of time leaves when sliding stops [m/s]."""
+        a, _, _ = self.equations.accelerations(q, v)
+        e, rows = self.system.directions(q), self._slide_rows(kind)
+        rate = float(rows.jacobian(e)[i] @ a - rows.convective(e, v)[i])
+        return abs(rate) * (2 * TIME_RESOLUTION + 8 * math.ulp(self.front_time))
+
+    def _slide_state(
+        self, kind: str, i: int, q: Real, v: Real, yields: bool, slow: float = 0.0
+    ) -> int:
         """Return whether something slides (its sign), sticks, or is idle.
 
-        What moves slides.  What is at rest is idle where the loops and the stops that hold leave
-        it no mobility of its own: the stop carries everything and the friction nothing.  Else it
-        sticks as far as Coulomb's law allows, and beyond slides in the direction in which
-        sliding accelerates it.
+        What moves, faster than ``slow``, slides.  What is at rest is idle where the loops and the
+        stops that hold leave it no mobility of its own: the stop carries everything and the
+        friction nothing.  Else it sticks as far as Coulomb's law allows, and beyond slides in the
+        direction in which sliding accelerates it.
         """
         e, M, loops = self._mass_and_loops(q)
         rows = self._slide_rows(kind)
         row = rows.jacobian(e)[[i]]
-        moving = self._sign(float((row @ v).item()))
-        if moving != IDLE:
+        speed = float((row @ v).item())
+        moving = self._sign(speed)
+        if moving != IDLE and abs(speed) > slow:
             return moving
         others = self._equations(self._with_slide(kind, i, IDLE))
         held = others.rows.jacobian(e)
@@ -1113,9 +1136,11 @@ def _independent(rows: Real, M: Real, loops: Real) -> bool:
 def fundamental_frequency(system: System) -> float:
     """Return the fundamental frequency about the equilibrium under gravity [Hz].
 
-    Zero if that equilibrium is unstable.
+    Zero if that equilibrium is unstable, or something swings without a spring.
     """
-    return max(0.0, float(modes(system, equilibrium(system)).frequency[0]))
+    frequency = modes(system, equilibrium(system)).frequency
+    lowest = float(frequency[0])
+    return lowest if lowest > AT_EASE * float(np.abs(frequency).max()) else 0.0
 
 
 def _tolerance(x: float) -> float:
