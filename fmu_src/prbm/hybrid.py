@@ -172,11 +172,13 @@ class Simulation:
             raise ParameterError(f"step = {step} s must be positive")
         self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
-        # one radian against the stiffest torsion spring [J], and the largest inertia [kg m^2]
+        # of the largest inertia [kg m^2], and of one radian against the stiffest torsion spring or,
+        # where nothing bends, of a turn by one radian in a period [J]
         turns = np.ix_(*2 * (np.setdiff1d(np.arange(self.system.n), self.system.stretches),))
         self._inertia_scale = float(np.abs(self.system.H[turns]).max())
         self._energy_scale = (
-            float(np.abs(self.system.K[turns]).max()) or self._inertia_scale * NO_SPRING**2
+            float(np.abs(self.system.K[turns]).max())
+            or self._inertia_scale * (self.omega or NO_SPRING) ** 2
         )
 
         displacement, speed = (
