@@ -530,10 +530,10 @@ class Simulation:
         the impact that has just been resolved, whose gap is zero up to a rounding of either
         sign, is not found again.  A dip below zero between two looks shows in the rates.
         """
-        gap_at, near = self._gap_at(arc, i), TOUCHING * self.system.length
+        gap_at, near, still = self._gap_at(arc, i), TOUCHING * self.system.length, self._still()
         for j in range(WATCHED):
             a, b = float(times[j]), float(times[j + 1])
-            dips = rates[j] < 0.0 < rates[j + 1]
+            dips = rates[j] < -still and rates[j + 1] > 0.0
             if gaps[j + 1] > 0.0 and not dips:
                 continue
             if rates[j] > 0.0:
