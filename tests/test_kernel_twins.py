@@ -11,6 +11,7 @@ import importlib
 import inspect
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,8 +32,10 @@ from prbm import (
     FlexureType,
     Force,
     Friction,
+    Joint,
     Mechanism,
     Parameter,
+    Probe,
     Release,
     Stop,
     assembly,
@@ -141,11 +144,69 @@ def rich(model="3R"):
     )  # fmt: skip
 
 
-NAMES = ("PRBDM", "PRBDM2R", "Rich")
+def elastic():
+    """Return a mechanism of what stretches, hangs, leans on a body and closes two loops.
+
+    A stage on two leaves, of which one is a chain; a hammer at the free end of a third that hits a
+    wall on the stage; a lever between a bar and a joint; a pendulum on another joint.
+    """
+    return Mechanism(
+        name="Elastic",
+        title="Bodies that hit each other, on flexures that stretch",
+        ground={"left": (0.0, 0.0), "right": (0.08, 0.002), "far": (0.115, "L - 0.03")},
+        bodies=(
+            Body(
+                "stage", 0.05, 3e-5, (0.04, "L + 0.01"),
+                {
+                    "left": (0.0, "L"), "right": (0.08, "L"), "top": (0.03, "L + 0.02"),
+                    "hinge": (0.09, "L + 0.01"), "hook": (0.02, "L"),
+                },
+            ),
+            Body("hammer", 0.004, 2e-7, (0.032, "L + 0.055"), {"root": (0.03, "L + 0.05")}),
+            Body(
+                "lever", 0.003, 4e-7, (0.1, "L + 0.02"),
+                {"pin": (0.09, "L + 0.01"), "end": (0.11, "L + 0.025")},
+            ),
+            Body("pendulum", 0.002, 1e-7, (0.021, "L - 0.012"), {"pin": (0.02, "L")}),
+        ),
+        flexure_types=(
+            FlexureType("leaf", "2R", "L/100", 8e-3, 3e9, 1200.0, axial=True),
+            FlexureType("chain", "nR", "L/80", 8e-3, 3e9, 1200.0, n=4, axial=True),
+            FlexureType("bar", "1R", 5e-4, 4e-3, 2e9, 1200.0, axial=True),
+        ),
+        flexures=(
+            Flexure("one", "leaf", "stage.left", "ground.left", ("clamp", "pin")),
+            Flexure("two", "chain", "ground.right", "stage.right"),
+            Flexure("three", "leaf", "hammer.root", "stage.top", ("free", "clamp")),
+            Flexure("strut", "bar", "lever.end", "ground.far", ("pin", "pin")),
+        ),
+        joints=(
+            Joint("hinge", "stage.hinge", "lever.pin"), Joint("hook", "pendulum.pin", "stage.hook"),
+        ),
+        stops=(
+            Stop("knock", "hammer", (0.035, "L + 0.055"), 5.0, 2e-3, "L/20", 0.7, 0.2, on="stage"),
+            Stop("low", "stage", (0.08, "L"), 10.0, 2e-3, 0.0, 0.4, 0.0),
+            Stop("tap", "stage", (0.02, "L - 0.02"), 160.0, 4e-3, 0.0, 0.5, 0.3, on="pendulum"),
+        ),
+        frictions=(
+            Friction("rub", "hammer", 20.0, 0.3, 0.4, 50.0, point=(0.03, "L + 0.06")),
+            Friction("dry", "pendulum", 90.0),
+        ),
+        forces=(Force("pull", "hammer", point=("0.03", "L + 0.06")), Force("push", "stage")),
+        probes=(Probe("tip", "hammer.root"), Probe("eye", "lever.end"), Probe("still", "ground.left")),
+        release=Release("stage", 15.0, -3e-3),
+        geometry=(length("L", 0.04),),
+        gravity=(1.0, -9.81),
+        damping_beta=1e-7,
+    )  # fmt: skip
+
+
+NAMES = ("PRBDM", "PRBDM2R", "Rich", "Elastic")
+OWN_MECHANISMS = {"Rich": rich, "Elastic": elastic}
 
 
 def described(name):
-    return rich() if name == "Rich" else mechanism(name)
+    return OWN_MECHANISMS[name]() if name in OWN_MECHANISMS else mechanism(name)
 
 
 @functools.cache
@@ -255,34 +316,46 @@ def test_stubs_are_the_same_and_so_is_what_is_too_long():
                 assert_same(found[0], expected, scale=1.0)
 
 
-@twin(segments=flexure.segments)
-@pytest.mark.parametrize("ends", [("clamp", "clamp"), ("clamp", "pin"), ("pin", "clamp")])
+ENDS = [
+    (start, end)
+    for start in flexure.ENDS
+    for end in flexure.ENDS
+    if flexure.CLAMP in (start, end) or flexure.FREE not in (start, end)
+]
+
+
+@twin(segments=flexure.segments, reversed=flexure.Segments.reversed)
+@pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.parametrize("links", [1, 4])
 @pytest.mark.parametrize("name", flexure.MODELS)
-def test_flexures_are_cut_into_the_same_segments(name, ends):
-    rng, model = np.random.default_rng(0), flexure.MODELS[name]
+def test_flexures_are_cut_into_the_same_segments(name, links, ends):
+    rng = np.random.default_rng(0)
+    model = replace(flexure.MODELS[name], links=links if name == "nR" else 0)
     pivots = len(model.gamma)
     kind = structures()["FlexureType"](
-        lumped=model.lumped, rate_with_gamma=model.rate_with_gamma, pivots=pivots
-    )
+        lumped=model.lumped, rate_with_gamma=model.rate_with_gamma, pivots=pivots,
+        links=model.links, axial=True,
+    )  # fmt: skip
+    held = [flexure.ENDS.index(end) for end in ends]
+    count = kernel().links_of(kind, *held)
     for _ in range(20):
-        gamma, K_theta = rng.uniform(0.05, 1.0 / pivots, pivots), rng.uniform(1, 4, pivots)
-        L, EI, mass = np.exp(rng.normal(size=3))
-        room = np.full((4, 2 * pivots + 2), np.nan)
+        gamma, K_theta = rng.uniform(0.05, 1.0 / max(pivots, 1), pivots), rng.uniform(1, 4, pivots)
+        L, EI, mass, EA = np.exp(rng.normal(size=4))
+        room = np.full((5, count + 2), np.nan)
         found = structures()["Segments"](0, *(row.ctypes.data for row in room))
-        clamped = [end == "clamp" for end in ends]
-        kernel().segments(kind, gamma, K_theta, *clamped, L, EI, mass, found)
-        expected = flexure.segments(model, gamma.tolist(), K_theta.tolist(), ends, L, EI, mass)
-        assert found.n == len(expected.lengths) - 2
-        for row, part in zip(room, ("lengths", "rates", "rods", "lumps"), strict=True):
-            wanted = getattr(expected, part)
-            assert_same(row[: len(wanted)], wanted)
-    long = np.full(pivots, 1.2)
-    said = sentence(
-        KernelError, kernel().segments, kind, long, long, True, True, 1.0, 1.0, 1.0, found
-    )
-    assert said == sentence(
-        ParameterError, flexure.segments, model, long, long, ends, 1.0, 1.0, 1.0
-    )
+        kernel().segments(kind, gamma, K_theta, *held, L, EI, mass, EA, found)
+        expected = flexure.segments(model, gamma, K_theta, ends, L, EI, mass, EA)
+        for same in (lambda: expected, expected.reversed):
+            assert found.n == count == len(same().lengths) - 2
+            for row, wanted in zip(room, vars(same()).values(), strict=True):
+                assert_same(row[: len(wanted)], wanted)
+            kernel().reversed(found)
+        stretching = [kernel().stretches(kind, i, count) for i in range(count)]
+        assert stretching == [stiffness > 0.0 for stiffness in expected.axial]
+    long, rest = np.full(pivots, 1.2), (1.0, 1.0, 1.0, 0.0)
+    if pivots and ends != (flexure.PIN, flexure.PIN):
+        said = sentence(KernelError, kernel().segments, kind, long, long, *held, *rest, found)
+        assert said == sentence(ParameterError, flexure.segments, model, long, long, ends, *rest)
 
 
 # --- assembly.c ----------------------------------------------------------------------------------
@@ -298,22 +371,28 @@ def test_unit_vectors_are_exact_along_the_axes():
 
 
 REALS = ("q0", "J", "K", "loops_c", "gaps_c", "lifts_c", "release_c", "length", "m")
-COMPLEXES = ("H", "A", "c", "S", "loops", "gaps", "slides", "rubs", "lifts", "release")
+COMPLEXES = ("H", "A", "c", "S", "loops", "gaps", "gaps_z", "slides", "slides_z", "rubs", "lifts")
 
 
 @twin(assemble=assembly.assemble)
 @each_mechanism
 def test_the_arrays_of_a_mechanism_are_the_same(name):
     for system, ours, _ in systems(name, 12):
-        for field in (*REALS, *COMPLEXES, "anchor", "gravity"):
-            size = system.length if field.endswith(("_c", "c", "anchor")) else 0.0
+        for field in (*REALS, *COMPLEXES, "release", "anchor", "gravity"):
+            size = system.length if field.endswith(("_c", "c", "_z", "anchor")) else 0.0
             assert_same(getattr(ours, field), getattr(system, field), scale=size)
-        assert ours.links.tolist() == list(system.links)
-        for i, frame in enumerate(system.bodies.values()):
-            j, c, drawn, A = ours.body(i)
-            assert j == frame.j
-            assert_same([c, drawn], [frame.c, frame.drawn], scale=system.length)
-            assert_same(A, frame.A)
+        assert ours.links().tolist() == list(system.links)
+        for field in ("arm", "on", "stretches"):
+            found = getattr(ours, field)
+            found = found() if callable(found) else found
+            assert found.tolist() == getattr(system, field).tolist()
+        groups = {"bodies": system.bodies.values(), "pushed": system.pushed}
+        for group, frames in (groups | {"probes": system.probes}).items():
+            for i, frame in enumerate(frames):
+                j, c, drawn, A = ours.frame(group, i)
+                assert j == frame.j
+                assert_same([c, drawn], [frame.c, frame.drawn], scale=system.length)
+                assert_same(A, frame.A)
         known = assembly.calculated(system.mechanism, system.values)
         assert_same(array(ours.calculated, len(known)), list(known.values()), scale=1.0)
         outside = np.ones_like(system.K)
@@ -346,13 +425,32 @@ def test_what_cannot_be_assembled_is_told_in_the_same_words(change):
 def test_inertia_is_the_same(name):
     for system, ours, rng in systems(name):
         q, v = random_state(system, rng, 2.0)
-        e, n = np.exp(1j * q), system.n
+        e, n = system.directions(q), system.n
         M, C = np.full((n, n), np.nan), np.full((n, n), np.nan)
         kernel().inertia(n, ours.H, ours.J, e, M, C)
         expected = kinetics.inertia(system.H, np.diag(system.J), e)
         assert_same(M, expected[0])
         assert_same(C, expected[1], scale=np.abs(M).max())
         assert_same(kernel().kinetic_energy(n, M, v), kinetics.kinetic_energy(M, v))
+
+
+@twin(
+    directions=assembly.System.directions, turning=assembly.System.turning,
+    spread=assembly.System.spread,
+)  # fmt: skip
+@each_mechanism
+def test_arms_turn_and_stretch_alike(name):
+    for system, ours, rng in systems(name):
+        q, v = random_state(system, rng, 0.5)
+        e, w = np.zeros((2, system.n), complex)
+        kernel().directions(ours.structure, q, e)
+        assert_same(e, system.directions(q))
+        kernel().turning(ours.structure, v, w)
+        assert_same(w, system.turning(v))
+        B = np.vstack([system.loops, system.gaps])
+        rows = np.zeros(B.shape, complex)
+        kernel().spread(ours.structure, len(B), B, rows)
+        assert_same(rows, system.spread(B))
 
 
 def all_rows(system):
@@ -510,7 +608,7 @@ def test_what_cannot_be_closed_is_told_in_the_same_words():
 def test_forces_and_energies_are_the_same(name):
     for system, ours, rng in systems(name):
         q, _ = random_state(system, rng)
-        n, e = system.n, np.exp(1j * q)
+        n, e = system.n, system.directions(q)
         turn, torque = q - system.q0, np.zeros(n)
         kernel().springs(n, ours.K, turn, torque)
         assert_same(torque, forces.springs(system.K, turn))
@@ -645,11 +743,11 @@ def shape_of(expected):
 def test_tangent_stiffness_is_the_same(name):
     for system, ours, rng in systems(name):
         q, _ = random_state(system, rng)
-        e, n, B = np.exp(1j * q), system.n, system.loops
+        e, n, B = system.directions(q), system.n, system.loops
         w, lam = rng.normal(size=(n, 2)).view(complex)[:, 0], rng.normal(size=len(B))
-        K_t = np.full((n, n), np.nan)
-        kernel().tangent_stiffness(n, len(B), ours.K, w, B, lam, e, K_t)
-        assert_same(K_t, statics.tangent_stiffness(system.K, w, B, lam, e))
+        w, K_t = system.spread(w), np.full((n, n), np.nan)
+        kernel().tangent_stiffness(ours.structure, len(B), w, B, lam, e, K_t)
+        assert_same(K_t, statics.tangent_stiffness(system.K, w, B, lam, e, system.arm))
 
 
 def stacked_release(system):
@@ -738,7 +836,10 @@ def test_fundamental_frequencies_are_the_same(name):
     for system, ours, _ in systems(name):
         found = np.zeros(1)
         kernel().fundamental_frequency(ours.structure, found)
-        assert_same(found[0], hybrid.fundamental_frequency(system), 1e-10)
+        expected = modal.modes(system, statics.equilibrium(system)).frequency
+        assert hybrid.fundamental_frequency(system) == max(0.0, expected[0])
+        rounding = 1e-15 * (expected[-1] / expected[0]) ** 2  # of the largest omega^2
+        assert_same(found[0], expected[0], max(1e-10, rounding))
 
 
 def test_an_unstable_equilibrium_has_no_frequency_in_either():

@@ -388,9 +388,9 @@ class Simulation:
 
     def _take_step(self) -> None:
         """Take one step from the front, cut it at the first event."""
-        f, t, y = self.equations.rate, self.front_time, self.front
+        t, y = self.front_time, self.front
         if self.k1 is None:
-            self.k1 = f(t, y)
+            self.k1 = self.equations.rate(t, y)
         h = self.step or min(self.h or self._first_step(self.k1), self._largest_step())
         growth = GROW
         while True:
@@ -406,8 +406,7 @@ class Simulation:
                     "start the simulation nearer to zero"
                 )
             self.equations.trace.clear()
-            k, y1 = stages(PAIR, f, t, y, h, self.k1)
-            error = self._error(h * (PAIR.error @ k), y, y1)
+            k, y1, error = self._trial(t, y, h, self.k1)
             if self.step or error <= 1.0:
                 break
             growth = 1.0  # a step that had to be repeated is not followed by a longer one
@@ -432,6 +431,21 @@ class Simulation:
             self.front_time, self.k1 = event.time, None
             self.front = self.equations.project(event.time, arc.at(event.time))
         self.arc = arc
+
+    def _trial(self, t: float, y: Real, h: float, k1: Real) -> tuple[Real, Real, float]:
+        """Return the stages of a step, where it leads to, and its error.
+
+        A step that is far too long may lead to where nothing can be computed: its error is
+        infinite, unless the step is fixed.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            try:
+                k, y1 = stages(PAIR, self.equations.rate, t, y, h, k1)
+            except SimulationError:
+                if self.step:
+                    raise
+                return np.zeros((PAIR.error.size, len(y))), y, math.inf
+            return k, y1, self._error(h * (PAIR.error @ k), y, y1)
 
     def _scales(self, y: Real) -> Real:
         """Return the magnitudes against which errors of a state are measured.
@@ -964,12 +978,15 @@ class Simulation:
         a, lam, M = equations.accelerations(q, v)
         out: dict[str, float | int | bool] = {}
         for name, frame in system.bodies.items():
-            place = complex(frame.A @ e) + frame.c - frame.drawn
-            velocity = complex(1j * (frame.A @ (e * v)))
+            place, velocity = system.motion(frame, e, v)
             out[f"{name}.x"], out[f"{name}.y"] = place.real, place.imag
             out[f"{name}.angle"] = float(q[frame.j])
             out[f"{name}.vx"], out[f"{name}.vy"] = velocity.real, velocity.imag
             out[f"{name}.omega"] = float(v[frame.j])
+        for frame in system.probes:
+            place, velocity = system.motion(frame, e, v)
+            out[f"{frame.name}.x"], out[f"{frame.name}.y"] = place.real, place.imag
+            out[f"{frame.name}.vx"], out[f"{frame.name}.vy"] = velocity.real, velocity.imag
         gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
         pressed = equations.stop_forces(lam)
         for i, stop in enumerate(self.mechanism.stops):
@@ -992,6 +1009,10 @@ class Simulation:
         for number, j in enumerate(system.links, start=1):
             out[f"link[{number}].angle"] = float(q[j])
             out[f"link[{number}].omega"] = float(v[j])
+        for j, link in zip(system.stretches, system.stretched, strict=True):
+            number = system.links.index(link) + 1
+            out[f"link[{number}].strain"] = float(q[j])
+            out[f"link[{number}].strain_rate"] = float(v[j])
         out["mode.frequency"] = self.frequency
         out.update(self.calculated)
         return out

@@ -260,7 +260,7 @@ PRBM bool project_positions(const System *system, int r, const Complex *B, const
     double best = INFINITY;
     bool right_way = true, closed = false;
     for (int step = 0; step < ITERATIONS && right_way && !closed; step++) {
-        directions(system->n, q, e);
+        directions(system, q, e);
         scalars(r, system->n, B, c, e, s);
         double error = largest(r, s), length = system->length;
         closed = error <= CLOSED * length || (BARELY_CLOSED * length >= best && best <= error);

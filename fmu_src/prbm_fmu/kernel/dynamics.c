@@ -355,7 +355,7 @@ static void rows_and_convection(Equations *q) {
 static bool solve_motion(Equations *q, const double *angle, const double *v) {
     const System *system = q->system;
     int n = system->n;
-    directions(n, angle, q->e);
+    directions(system, angle, q->e);
     for (int j = 0; j < n; j++) {
         q->squares[j] = v[j] * v[j];
         q->x[j] = q->w[j].re * q->e[j].re - q->w[j].im * q->e[j].im;
@@ -526,7 +526,7 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
     for (int i = 0; i < n; i++) {
         y[i] += x[i];
     }
-    directions(n, y, q->e);
+    directions(q->system, y, q->e);
     for (int k = 0; k < active; k++) {
         double open_by = fabs(row_value(n, q->B + k * n, q->e) + offset(q, k, t));
         worst = open_by <= worst ? worst : open_by; /* a NaN stays */

@@ -40,12 +40,20 @@ static void dependents(const Mechanism *m, int *result) {
     }
 }
 
-/* The slot of the angle of a coordinate. */
-static int angle_slot(const Mechanism *m, int j) {
-    if (m->link_of[j] >= 0) {
-        return m->slots.links + PER_LINK * m->link_of[j];
+/* The slot of a coordinate: of its angle or strain, of its rate behind it. */
+static int slot_of(const Mechanism *m, int j, bool rate) {
+    const Coordinate *coordinate = &m->coordinates[j];
+    if (coordinate->arm != j) {
+        int k = 0;
+        while (m->stretches[k] != j) {
+            k++;
+        }
+        return m->slots.stretches + PER_STRETCH * k + rate;
     }
-    return m->slots.bodies + PER_BODY * (m->body_of[j] - 1) + 2;
+    if (coordinate->link >= 0) {
+        return m->slots.links + PER_LINK * coordinate->link + rate;
+    }
+    return m->slots.bodies + PER_BODY * (coordinate->body - 1) + (rate ? 5 : 2);
 }
 
 PRBM int exchange_slot(const Simulation *simulation, int k) {
@@ -54,15 +62,16 @@ PRBM int exchange_slot(const Simulation *simulation, int k) {
     if (k >= 2 * count) {
         return m->slots.energies + 3 + (k - 2 * count);
     }
-    int j = m->independent[k % count];
-    return angle_slot(m, j) + (k < count ? 0 : m->link_of[j] >= 0 ? 1 : 3);
+    return slot_of(m, m->independent[k % count], k >= count);
 }
 
 static const char *coordinate_name(const Mechanism *m, int j, char *text, size_t size) {
-    if (m->link_of[j] >= 0) {
-        (void)snprintf(text, size, "link[%d].angle", m->link_of[j] + 1);
+    const Coordinate *coordinate = &m->coordinates[j];
+    if (coordinate->link >= 0) {
+        const char *what = coordinate->arm == j ? "angle" : "strain";
+        (void)snprintf(text, size, "link[%d].%s", coordinate->link + 1, what);
     } else {
-        (void)snprintf(text, size, "%s.angle", m->bodies[m->body_of[j] - 1].name);
+        (void)snprintf(text, size, "%s.angle", m->bodies[coordinate->body - 1].name);
     }
     return text;
 }
@@ -108,7 +117,7 @@ static bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
     bool closed = false, regular = true;
     dependents(sim->mechanism, dependent);
     for (int step = 0; step < ITERATIONS && regular && !closed; step++) {
-        directions(n, q, sim->e);
+        directions(system, q, sim->e);
         scalars(r, n, system->loops, system->loops_c, sim->e, s);
         double error = largest(r, s), length = system->length;
         closed = error <= CLOSED * length || (BARELY_CLOSED * length >= best && best <= error);
@@ -1013,8 +1022,12 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     base_changes(t, out + slots->base);
     energy_changes(t, dx, out + slots->energies);
     for (int k = 0; k < m->link_count; k++) {
-        out[slots->links + PER_LINK * k] = t->dq[system->links[k]];
-        out[slots->links + PER_LINK * k + 1] = t->dv[system->links[k]];
+        out[slots->links + PER_LINK * k] = t->dq[m->links[k]];
+        out[slots->links + PER_LINK * k + 1] = t->dv[m->links[k]];
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        out[slots->stretches + PER_STRETCH * k] = t->dq[system->stretches[k]];
+        out[slots->stretches + PER_STRETCH * k + 1] = t->dv[system->stretches[k]];
     }
     for (int k = 0; k < m->independent_count; k++) {
         out[slots->derivatives + k] = t->dx[m->independent[k]];

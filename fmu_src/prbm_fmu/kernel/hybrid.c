@@ -94,14 +94,15 @@ static void place_discrete(Discrete *discrete, const Mechanism *m, Memory *memor
 }
 
 static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) {
-    size_t n = (size_t)m->coordinate_count, s = (size_t)m->stop_count, pivots = 0;
+    size_t n = (size_t)m->coordinate_count, s = (size_t)m->stop_count;
     size_t size = n + (size_t)m->loop_count + 2 * s + (size_t)m->friction_count + 2;
+    size_t drawn = (size_t)m->ground_count + (size_t)m->body_count, pieces = (size_t)m->longest;
     for (int i = 0; i < m->type_count; i++) {
-        size_t of_type = (size_t)m->types[i].pivots;
-        pivots = of_type > pivots ? of_type : pivots;
+        size_t pivots = (size_t)m->types[i].pivots;
+        pieces = pivots > pieces ? pivots : pieces;
     }
-    size_t single = size * size + 4 * size + 4 * (size_t)m->flexure_count + 4 * pivots + 16;
-    scratch->size = 12 * size * size + 60 * size + 16 * pivots + (size_t)m->flexure_count + 64;
+    size_t single = size * size + 4 * size + 2 * drawn + 4 * pieces + 16;
+    scratch->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64;
     scratch->base = place(memory, scratch->size, sizeof(double));
     scratch->spare = place(memory, single, sizeof(double));
     scratch->used = scratch->most = 0;
@@ -360,7 +361,7 @@ static bool check_tolerance(double x, Problem *problem) {
 static bool check_walls(Simulation *sim, Problem *problem) {
     int n = sim->system.n, struck = -1;
     const double *v = sim->front + n;
-    directions(n, sim->front, sim->e);
+    directions(&sim->system, sim->front, sim->e);
     for (int i = 0; i < sim->system.s; i++) {
         double distance = gap(&sim->equations, i, sim->now->front_time, sim->e);
         if (distance < -RELEASE_GAP) {
@@ -499,7 +500,7 @@ static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
 PRBM int unsettled_by_walls(Simulation *sim) {
     int n = sim->system.n, struck = -1, held[MOST_STOPS], count = sim->equations.held_count;
     double rates[MOST_STOPS], bound = still(sim);
-    directions(n, sim->front, sim->e);
+    directions(&sim->system, sim->front, sim->e);
     for (int k = 0; k < count; k++) {
         held[k] = sim->equations.held[k];
         rates[k] = gap_rate(&sim->equations, held[k], sim->e, sim->front + n);
@@ -735,7 +736,7 @@ static double guard_at(const Guard *guard, int what, double t) {
         }
         return margin(sim, guard->kind, guard->index);
     }
-    directions(n, y, sim->e);
+    directions(&sim->system, y, sim->e);
     if (what == GAP_FALLS) {
         return gap(&sim->equations, guard->index, t, sim->e);
     }
@@ -818,7 +819,7 @@ static bool within_reach(Simulation *sim) {
         }
         turn[j] = LARGEST_WEIGHT * now->arc_h * fastest;
     }
-    directions(n, sim->arc_y, sim->e);
+    directions(&sim->system, sim->arc_y, sim->e);
     for (int s = 0; s < sim->system.s; s++) {
         if (sim->holds[s] == 0.0) {
             const Complex *row = sim->system.gaps + s * n;
@@ -847,7 +848,7 @@ static void look(Simulation *sim) {
         for (int j = 0; j < 2 * n; j++) {
             y[j] = sim->arc_y[j] + now->arc_h * y[j];
         }
-        directions(n, y, sim->look_e + k * n);
+        directions(&sim->system, y, sim->look_e + k * n);
     }
 }
 
@@ -864,7 +865,7 @@ static bool polished(Simulation *sim, int i, double *time, Problem *problem) {
         if (!project(&sim->equations, t, sim->y1, &sim->scratch, problem)) {
             return false;
         }
-        directions(n, sim->y1, sim->e);
+        directions(&sim->system, sim->y1, sim->e);
         double distance = gap(&sim->equations, i, t, sim->e);
         double speed = gap_rate(&sim->equations, i, sim->e, sim->y1 + n);
         double change = -distance / speed;
@@ -930,7 +931,7 @@ static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
 }
 
 /* When a sliding velocity changes its sign. */
-static void turning(Simulation *sim, int kind, int i, int sign, Event *first) {
+static void turning_back(Simulation *sim, int kind, int i, int sign, Event *first) {
     int n = sim->system.n;
     double z[WATCHED + 1];
     const Complex *row = slide_row(sim, kind, i);
@@ -1011,11 +1012,11 @@ static bool first_event(Simulation *sim, Event *event, Problem *problem) {
         }
         for (int k = 0; k < q->rub_slide_count; k++) {
             int i = q->rub_slides[k];
-            turning(sim, RUB, i, q->discrete.rubs[i], event);
+            turning_back(sim, RUB, i, q->discrete.rubs[i], event);
         }
         for (int k = 0; k < q->sliding_count; k++) {
             int i = q->sliding[k];
-            turning(sim, SLIDE, i, q->discrete.slides[i], event);
+            turning_back(sim, SLIDE, i, q->discrete.slides[i], event);
         }
     }
     if (may_yield(sim)) {
@@ -1080,7 +1081,7 @@ static Here mass_and_loops(Simulation *sim, const double *q) {
                  take_matrix(&sim->scratch, system->n, system->n),
                  take_matrix(&sim->scratch, system->r, system->n)};
     double *C = take_matrix(&sim->scratch, system->n, system->n);
-    directions(system->n, q, here.e);
+    directions(system, q, here.e);
     inertia(system->n, system->H, system->J, here.e, here.M, C);
     jacobian(system->r, system->n, system->loops, here.e, here.loops);
     return here;
@@ -1131,7 +1132,7 @@ static void equations_holding(Simulation *sim, int count, const int *stops, cons
                               const double *v) {
     const System *system = &sim->system;
     int n = system->n;
-    directions(n, q, sim->e);
+    directions(&sim->system, q, sim->e);
     for (int i = 0; i < system->s; i++) {
         bool holds = false;
         for (int k = 0; k < count; k++) {
@@ -1409,7 +1410,7 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yie
             candidates[count++] = i;
         }
     }
-    directions(n, sim->front, sim->e);
+    directions(&sim->system, sim->front, sim->e);
     for (int k = 0; k < resting_count; k++) {
         int i = resting[k];
         if (sim->holds[i] == 0.0 && gap(&sim->equations, i, sim->now->front_time, sim->e) <= near &&
@@ -1689,7 +1690,7 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
     int n = system->n, s = system->s;
     bool any = false, right = true;
     double lost[MOST_STOPS], before[MOST_STOPS], after[MOST_STOPS], all_lost = 0.0, work = 0.0, modal = 0.0;
-    directions(n, q, sim->e);
+    directions(&sim->system, q, sim->e);
     for (int i = 0; i < s; i++) {
         before[i] = gap_rate(&sim->equations, i, sim->e, v);
         after[i] = gap_rate(&sim->equations, i, sim->e, hits->after);
@@ -1737,7 +1738,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     hits.struck_count = hits.held_count = 0;
     copy(n, sim->front, q);
     copy(n, sim->front + n, v);
-    directions(n, q, sim->e);
+    directions(&sim->system, q, sim->e);
     for (int i = 0; i < s; i++) {
         double distance = gap(&sim->equations, i, sim->now->front_time, sim->e);
         rates[i] = gap_rate(&sim->equations, i, sim->e, v);
@@ -1764,7 +1765,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     right = right && impulse(sim, q, v, &hits, problem) &&
             book(sim, &hits, counted, q, v, problem);
     if (right) {
-        directions(n, q, sim->e);
+        directions(&sim->system, q, sim->e);
         for (int k = 0; k < hits.struck_count + hits.held_count; k++) {
             int i = k < hits.struck_count ? hits.struck[k] : hits.held[k - hits.struck_count];
             if (gap_rate(&sim->equations, i, sim->e, hits.after) <= bound) {
@@ -1911,7 +1912,7 @@ static void output_places(Simulation *sim) {
     const Slots *slots = &sim->mechanism->slots;
     int n = system->n;
     double *out = sim->outputs, *v = sim->y + n;
-    directions(n, sim->y, sim->e);
+    directions(&sim->system, sim->y, sim->e);
     for (int i = 0; i < system->b; i++) {
         const BodyFrame *frame = &system->bodies[i];
         double *values = out + slots->bodies + PER_BODY * i;
@@ -1938,8 +1939,14 @@ static void output_places(Simulation *sim) {
         memcpy(last + 1, &sim->latched[i], sizeof(Latched));
     }
     for (int k = 0; k < sim->mechanism->link_count; k++) {
-        out[slots->links + PER_LINK * k] = sim->y[system->links[k]];
-        out[slots->links + PER_LINK * k + 1] = v[system->links[k]];
+        int j = sim->mechanism->links[k];
+        out[slots->links + PER_LINK * k] = sim->y[j];
+        out[slots->links + PER_LINK * k + 1] = v[j];
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        out[slots->stretches + PER_STRETCH * k] = sim->y[j];
+        out[slots->stretches + PER_STRETCH * k + 1] = v[j];
     }
     out[slots->energies + 3] = sim->y[2 * n];
     out[slots->energies + 4] = sim->y[2 * n + 1];
@@ -1968,7 +1975,7 @@ static bool output_motion(Simulation *sim, Problem *problem) {
 static void output_base(Simulation *sim) {
     double *out = sim->outputs + sim->mechanism->slots.base;
     Complex force;
-    directions(sim->system.n, sim->y, sim->e);
+    directions(&sim->system, sim->y, sim->e);
     base_reaction(&sim->equations, sim->e, sim->y + sim->system.n, sim->a, &force, out + 2);
     out[0] = force.re;
     out[1] = force.im;
@@ -1981,7 +1988,7 @@ static void output_energies(Simulation *sim) {
     for (int j = 0; j < n; j++) {
         deflection[j] = sim->y[j] - system->q0[j];
     }
-    directions(n, sim->y, sim->e);
+    directions(&sim->system, sim->y, sim->e);
     out[1] = elastic_energy(n, system->K, deflection);
     out[2] = gravitational_energy(system, sim->e);
 }

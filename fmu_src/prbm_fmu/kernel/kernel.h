@@ -89,7 +89,7 @@ PRBM int *take_integers(Scratch *scratch, int count);
 
 /* --- numbers.c: elementary functions, the same bits on every platform --------------------------- */
 
-PRBM void directions(int n, const double *q, Complex *e);   /* e = exp(i q), as np.exp(1j * q) */
+PRBM void unit_vectors(int n, const double *q, Complex *e); /* exp(i q), as np.exp(1j * q) */
 PRBM double natural_log(double x);                          /* x > 0 */
 PRBM double exponential(double x);
 PRBM double power(double x, double y);                      /* x^y for x > 0 */
@@ -155,23 +155,36 @@ typedef struct {
 
 typedef struct {
     const char *name;
-    bool lumped, rate_with_gamma;
-    int pivots; /* of a cantilever */
+    bool lumped, rate_with_gamma, axial;
+    int pivots; /* of a cantilever; 0: a chain */
+    int links;  /* of a chain; 0: a set of coefficients */
     Expression thickness, width, youngs_modulus, density;
     const Expression *gamma, *K_theta; /* (pivots,) */
 } FlexureType;
 
+/* Two points of different bodies, GROUND or 1 ... */
+typedef struct {
+    int start, end;
+    Point start_point, end_point;
+} Connection;
+
+enum { CLAMP, PIN, FREE };
+
 typedef struct {
     const char *name;
     int type;
-    int start, end; /* bodies, GROUND or 1 ... */
-    Point start_point, end_point;
-    bool clamped_start, clamped_end;
+    Connection between;
+    int start_end, end_end; /* CLAMP, PIN or FREE */
 } Flexure;
 
 typedef struct {
     const char *name;
-    int body; /* 1 ... */
+    Connection between;
+} Joint;
+
+typedef struct {
+    const char *name;
+    int body, on; /* 1 ...; what its wall is fixed to, GROUND or 1 ... */
     Point point;
     double direction; /* deg */
     Expression position, offset, restitution, friction, rest_speed;
@@ -180,6 +193,7 @@ typedef struct {
 typedef struct {
     const char *name;
     int body;
+    Point point;
     double direction;
     Expression coefficient, normal_force, normal_stiffness;
 } Friction;
@@ -187,7 +201,14 @@ typedef struct {
 typedef struct {
     const char *name;
     int body;
+    Point point;
 } Force;
+
+typedef struct {
+    const char *name;
+    int body; /* GROUND or 1 ... */
+    Point point;
+} Probe;
 
 typedef struct {
     int body;
@@ -213,8 +234,8 @@ typedef struct {
 
 /* The vector of all values: where each group begins. */
 typedef struct {
-    int parameters, inputs, bodies, stops, base, energies, latched, links, frequency, calculated,
-        derivatives, indicators, time, count;
+    int parameters, inputs, bodies, stops, base, energies, latched, links, stretches, probes,
+        frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
 enum {
@@ -225,30 +246,55 @@ enum {
     PER_LATCHED = 8, /* contact, impact_count, impact_time, approach_speed, rebound_speed, impulse,
                         energy_lost, modal_restitution */
     PER_LINK = 2,    /* angle, omega */
+    PER_STRETCH = 2, /* strain, strain_rate */
+    PER_PROBE = 4,   /* x, y, vx, vy */
     STOP_INDICATORS = 3, /* impact, release, slip; then one slip for each friction point */
 };
 
+/* A part that the assembly walks along, from what is held already. */
+typedef struct {
+    const char *name;
+    const Connection *between;
+    const Flexure *flexure; /* NULL: a joint */
+    bool backwards;         /* from its end to its start */
+    bool closes;            /* a loop: what it leads to is held, too */
+    int first;              /* of the coordinates that it adds */
+} Step;
+
+/* What a coordinate is: the angle of a link, its stretch, or the angle of a body. */
+typedef struct {
+    int link, body; /* 0 ... or -1; 1 ... or 0 */
+    int arm;        /* whose arm it turns or stretches: its own, or that of a link */
+} Coordinate;
+
 typedef struct {
     const char *token, *name;
-    int parameter_count, body_count, type_count, flexure_count, stop_count, friction_count,
-        force_count, ground_count, bound_count, variable_count, independent_count, input_count;
+    int parameter_count, body_count, type_count, flexure_count, joint_count, stop_count,
+        friction_count, force_count, probe_count, ground_count, bound_count, variable_count,
+        independent_count, input_count;
     const Parameter *parameters;
     const Body *bodies; /* (body_count,): body k is bodies[k - 1] */
     const FlexureType *types;
     const Flexure *flexures;
+    const Joint *joints;
     const Stop *stops;
     const Friction *frictions;
     const Force *forces;
+    const Probe *probes;
     const Point *ground;
     const Bound *bounds;
     const Variable *variables; /* in rising order of their references */
     const char *const *input_names;
     const double *input_starts; /* (input_count,) */
-    const int *link_of, *body_of; /* of each coordinate: which link it is, or -1; which body */
-    const int *independent; /* coordinates whose angles and rates are states in model exchange */
+    const Step *steps;             /* flexures and joints in the order of the assembly */
+    const Coordinate *coordinates; /* (coordinate_count,) */
+    const int *links, *stretches;  /* coordinates that are angles and stretches of links */
+    const int *independent; /* coordinates that are states, with their rates, in model exchange */
     Release release;
     int gravity[2], tolerance, damping_zeta, damping_beta; /* parameters */
-    int coordinate_count, loop_count, link_count, mass_count; /* of the assembled system */
+    /* of the assembled system */
+    int coordinate_count, loop_count, link_count, stretch_count, mass_count, spring_count;
+    int longest; /* links of a flexure at most */
     Slots slots;
 } Mechanism;
 
@@ -264,27 +310,35 @@ PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t referenc
 
 /* --- flexure.c ------------------------------------------------------------------------------------ */
 
-/* A flexure cut into rigid segments: n + 2 lengths and rods, n + 1 rates and lumps. */
+/* A flexure cut into segments: n + 2 lengths and rods, n + 1 rates and lumps, n axial. */
 typedef struct {
     int n;
-    double *lengths, *rates, *rods, *lumps;
+    double *lengths, *rates, *rods, *lumps, *axial;
 } Segments;
 
 PRBM bool stub(int pivots, const double *gamma, double *gamma0, Problem *problem);
 PRBM void reverse(int count, double *x);
+/* How many links stand for a flexure, and whether the i-th of n stretches. */
+PRBM int links_of(const FlexureType *model, int start_end, int end_end);
+PRBM bool stretches(const FlexureType *model, int i, int n);
 PRBM bool segments(const FlexureType *model, const double *gamma, const double *K_theta,
-                   bool clamped_start, bool clamped_end, double L, double EI, double mass,
+                   int start_end, int end_end, double L, double EI, double mass, double EA,
                    Segments *result, Problem *problem);
+/* The same flexure from its end to its start. */
+PRBM void reversed(Segments *pieces);
 
 /* --- assembly.c ----------------------------------------------------------------------------------- */
 
+enum { NOWHERE = -2, FIXED = -1 }; /* coordinates of a body not reached yet, of the ground */
+
+/* Where a point of a body is, z = c + A E; its coordinate, and where it is drawn. */
 typedef struct {
-    int j; /* coordinate */
+    int j;
     Complex c, drawn;
     Complex *A; /* (n,) */
 } BodyFrame;
 
-/* A point of the mechanism, z = c + A e; as the origin of a body: with its coordinate and where it
+/* A point of the mechanism, z = c + A E; as the origin of a body: with its coordinate and where it
  * is drawn. */
 typedef struct {
     Complex c, drawn;
@@ -293,9 +347,9 @@ typedef struct {
     bool moves;
 } Place;
 
-/* A torsion spring between two coordinates, n: the ground. */
+/* A spring between two coordinates, n: the ground. */
 typedef struct {
-    double rate; /* N m/rad */
+    double rate; /* N m/rad, N m */
     int a, b;
 } Spring;
 
@@ -306,13 +360,14 @@ typedef struct {
 } Block;
 
 /* The constant arrays of a mechanism, as in the twin; n coordinates, r loop rows, p mass points,
- * s stops, f friction points, b bodies. */
+ * s stops, f friction points, b bodies.  Columns of A and of the rows are zero at stretches: see
+ * spread. */
 typedef struct {
     const Mechanism *mechanism;
     const double *values;
     int n, r, p, s, f, b;
     double *q0, *J, *K;       /* (n,), (n,), (n, n) */
-    Complex *e0;              /* (n,) exp(i q0) */
+    Complex *e0;              /* (n,) directions of the straight shape */
     Complex *H, *A, *c;       /* (n, n), (p, n), (p,) */
     double *m;                /* (p,) */
     Complex *S;               /* (n,) first mass moments */
@@ -320,13 +375,18 @@ typedef struct {
     double *loops_c;          /* (r,) */
     Complex *gaps, *slides;   /* (s, n) */
     double *gaps_c;           /* (s,) */
+    Complex *gaps_z, *slides_z; /* (s,) */
+    int *on;                  /* (s,) the coordinate of what a wall is fixed to, or FIXED */
     Complex *rubs, *lifts;    /* (f, n) */
     double *lifts_c;          /* (f,) */
     Complex *release;         /* (n,) */
     double release_c;
     BodyFrame *bodies;        /* (b,) */
+    BodyFrame *pushed;        /* where forces act */
+    BodyFrame *probes;        /* points that are watched */
     Place *origins;           /* (b + 1,): the ground's first */
-    int *links;               /* coordinates of the links */
+    int stretch_count;
+    const int *stretches;     /* coordinates that are stretches */
     int spring_count;
     Spring *spring;           /* what K is made of */
     int block_count;
@@ -338,6 +398,13 @@ typedef struct {
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory);
 PRBM bool assemble(System *system, const double *values, Scratch *scratch, Problem *problem);
+PRBM int arm_of(const System *system, int j);
+/* e (n,): the arms exp(s + i theta), and -i times that for stretches. */
+PRBM void directions(const System *system, const double *q, Complex *e);
+/* w (n,): the complex rates theta' - i s' of the arms, zero for stretches. */
+PRBM void turning(const System *system, const double *v, Complex *w);
+/* Rows (r, n) with the column of each arm repeated for its stretch; rows may be B. */
+PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
 PRBM Complex unit(double degrees);
 PRBM Complex complex_of(double re, double im);
 PRBM Complex plus(Complex a, Complex b);
@@ -494,7 +561,8 @@ typedef struct {
 
 /* B (r + 1, n), c (r + 1,): the loops and, below them, the row of the released body. */
 PRBM void stack_release(const System *system, Complex *B, double *c);
-PRBM void tangent_stiffness(int n, int r, const double *K, const Complex *w, const Complex *B,
+/* w is spread, B is not. */
+PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t);
 /* held: whether the released body is held at the displacement. */
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,

@@ -110,7 +110,7 @@ static void lane_directions(const double *q, Complex *e) {
 }
 
 /* The last ones are done together with some before them, which are done twice. */
-PRBM void directions(int n, const double *q, Complex *e) {
+PRBM void unit_vectors(int n, const double *q, Complex *e) {
     int i = 0;
     for (; i + LANES <= n; i += LANES) {
         lane_directions(q + i, e + i);
