@@ -43,6 +43,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     System result = {0};
     result.mechanism = mechanism;
     result.n = (int)n;
+    result.even = even_length((int)n);
     result.r = (int)r;
     result.s = (int)s;
     result.f = (int)f;
@@ -72,6 +73,9 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.links = place(memory, n, sizeof(int));
     result.spring = place(memory, p, sizeof(Spring));
     result.blocks = place(memory, n, sizeof(Block));
+    result.coupling = place(memory, n * n, sizeof(Complex));
+    result.own = place(memory, n, sizeof(double));
+    result.straight = place(memory, (size_t)result.even, sizeof(double));
     result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
     if (memory->base) {
         for (size_t i = 0; i < b; i++) {
@@ -389,6 +393,21 @@ static void find_blocks(System *system) {
     }
 }
 
+/* What the equations of motion read again and again, as they go along it. */
+static void pack_blocks(System *system) {
+    int n = system->n;
+    Complex *next = system->coupling;
+    for (int k = 0; k < system->block_count; k++) {
+        int start = system->blocks[k].start, size = system->blocks[k].size;
+        for (int i = start; i < start + size; i++) {
+            memcpy(next, system->H + i * n + start, (size_t)size * sizeof *next);
+            next += size;
+            system->own[i] = system->H[i * n + i].re + system->J[i];
+        }
+    }
+    pad(n, system->q0, system->straight);
+}
+
 static void add_moments(System *system) {
     int n = system->n;
     for (int i = 0; i < n; i++) {
@@ -407,6 +426,7 @@ static void add_moments(System *system) {
         system->S[i] = sum;
     }
     find_blocks(system);
+    pack_blocks(system);
 }
 
 static double size_of(const System *system) {
