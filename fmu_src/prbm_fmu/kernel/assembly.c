@@ -68,6 +68,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     System result = {0};
     result.mechanism = mechanism;
     result.n = (int)n;
+    result.even = even_length((int)n);
     result.r = (int)r;
     result.s = (int)s;
     result.f = (int)f;
@@ -101,6 +102,9 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.stretches = m->stretches;
     result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
     result.blocks = place(memory, n, sizeof(Block));
+    result.coupling = place(memory, n * n, sizeof(Complex));
+    result.own = place(memory, n, sizeof(double));
+    result.straight = place(memory, (size_t)result.even, sizeof(double));
     result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
     *system = result;
 }
@@ -514,6 +518,21 @@ static void find_blocks(System *system) {
     }
 }
 
+/* What the equations of motion read again and again, as they go along it. */
+static void pack_blocks(System *system) {
+    int n = system->n;
+    Complex *next = system->coupling;
+    for (int k = 0; k < system->block_count; k++) {
+        int start = system->blocks[k].start, size = system->blocks[k].size;
+        for (int i = start; i < start + size; i++) {
+            memcpy(next, system->H + i * n + start, (size_t)size * sizeof *next);
+            next += size;
+            system->own[i] = system->H[i * n + i].re + system->J[i];
+        }
+    }
+    pad(n, system->q0, system->straight);
+}
+
 /* The moments of one mass point, of the coordinates that it moves with alone. */
 static void add_moments_of(System *system, double mass, const Complex *A) {
     int n = system->n;
@@ -540,6 +559,7 @@ static void add_moments(System *system) {
         add_moments_of(system, system->m[k], system->A + (size_t)k * n);
     }
     find_blocks(system);
+    pack_blocks(system);
 }
 
 /* The size of the mechanism as drawn. */

@@ -624,22 +624,22 @@ PRBM void exchange_begin(Simulation *sim) {
 
 /* --- directional derivatives ------------------------------------------------------------------ */
 
-/* A change of everything with the states and inputs: dq, dv, da, -dlam, of the rows B of what is
+/* A change of everything with the states and inputs: dq, dv, da, dlam, of the rows B of what is
  * active. */
 typedef struct {
     Simulation *sim;
     const Equations *q;
     const Complex *e;
     const double *y, *v, *a, *du;
-    double *dq, *dv, *dx; /* (n,), (n,), (n + r,) = (da, -dlam) */
+    double *dq, *dv, *dx, *dlam; /* (n,), (n,), (even,) = da, (r,) */
 } Tangent;
 
 static double multiplier(const Tangent *t, int k) {
-    return -t->q->x[t->q->system->n + k];
+    return t->q->lam[k];
 }
 
 static double multiplier_change(const Tangent *t, int k) {
-    return -t->dx[t->q->system->n + k];
+    return t->dlam[k];
 }
 
 /* Change of a scalar -Im(B e) v along dq and dv. */
@@ -792,7 +792,7 @@ static void row_change(const Tangent *t) {
             sum += arm_j.re * t->dq[j] * t->a[j] - arm_j.im * t->dq[j] * (t->v[j] * t->v[j]) +
                    arm_j.re * 2.0 * t->v[j] * t->dv[j];
         }
-        t->dx[n + k] = sum;
+        t->dlam[k] = sum;
     }
     for (int k = 0; k < q->sliding_count; k++) {
         int i = q->sliding[k];
@@ -1047,10 +1047,12 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
         return false;
     }
     const Equations *q = &sim->equations;
-    Tangent t = {sim, q, q->e, sim->at, sim->at + n, q->x, du, NULL, NULL, NULL};
+    Tangent t = {sim, q, q->e, sim->at, sim->at + n, q->x, du, NULL, NULL, NULL, NULL};
     t.dq = take(&sim->scratch, (size_t)n);
     t.dv = take(&sim->scratch, (size_t)n);
-    t.dx = take(&sim->scratch, (size_t)(n + q->r));
+    t.dx = take(&sim->scratch, (size_t)sim->system.even);
+    t.dlam = take(&sim->scratch, (size_t)q->r);
+    zeros(sim->system.even, t.dx);
     double *dmoment = take(&sim->scratch, (size_t)n);
     Complex *dw = take_complex(&sim->scratch, n, 1);
     bool right = tangent_coordinates(&t, dx, problem);
@@ -1059,7 +1061,7 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
         load_change(&t, dw, dmoment);
         rub_change(&t);
         row_change(&t);
-        solve_again(&q->factors, t.dx);
+        solve_again(&q->factors, t.dx, t.dlam);
         all_changes(&t, dx, dw, dmoment, dvalues);
     }
     sim->scratch.used = mark;

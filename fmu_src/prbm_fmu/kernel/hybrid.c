@@ -28,7 +28,6 @@
 #define SMALLEST_STEP 1e-13   /* s */
 #define ROUNDED 1e-12         /* of a time: what importers lose when they add up steps */
 #define MOST_STEPS 1e9        /* of the longest, to one time: more is a mistake of units */
-#define LARGEST_WEIGHT 1.1    /* more than the sum of |b_i(theta)| of the dense output, 1.03 */
 #define MOST_IMPACTS 2147483647.0 /* that an Integer of FMI can count */
 #define TWO_PI 6.283185307179586
 
@@ -460,7 +459,7 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
     sim->now->time = sim->now->front_time = sim->now->window_since = start_time;
     sim->now->tolerance = wanted;
     sim->now->exchange = exchange;
-    sim->now->last_error = LEAST_ERROR;
+    sim->now->log_of_error = natural_log(LEAST_ERROR);
     bool right = check_tolerance(wanted, problem) && take_values(sim, problem) &&
                  fundamental_frequency(&sim->system, &sim->now->frequency, &sim->scratch, problem);
     if (right) {
@@ -552,26 +551,24 @@ static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
 
 /* --- steps ------------------------------------------------------------------------------------ */
 
-/* The magnitude against which the error of a component of the state is measured. */
-static double scale_of(const Simulation *sim, int i, double size, double omega) {
-    int n = sim->system.n;
-    if (i < n) {
-        return 1.0;
-    }
-    return greater(size, i < 2 * n ? omega : sim->energy_scale);
-}
-
-/* The root mean square of an error in units of what the tolerance allows. */
-static double relative_error(const Simulation *sim, const double *difference, const double *y,
-                             const double *y1) {
-    int ny = state_size(sim);
-    double sum = 0.0, omega = omega_scale(sim);
-    for (int i = 0; i < ny; i++) {
-        double size = greater(fabs(y[i]), fabs(y1[i]));
-        double ratio = difference[i] / scale_of(sim, i, size, omega);
+/* The sum of the squares of errors x against the sizes of y and y1, which count as no less than the
+ * least. */
+static double squares_of(int n, const double *x, const double *y, const double *y1, double least) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        double ratio = x[i] / greater(least, greater(fabs(y[i]), fabs(y1[i])));
         sum += ratio * ratio;
     }
-    return sqrt(sum / ny) / (STRICTNESS * sim->now->tolerance);
+    return sum;
+}
+
+/* The root mean square of differences in units of the scales of angles, their rates, energies. */
+static double relative_size(const Simulation *sim, const double *x, const double *y,
+                            const double *y1) {
+    int n = sim->system.n;
+    double sum = dot(n, x, x) + squares_of(n, x + n, y + n, y1 + n, omega_scale(sim)) +
+                 squares_of(2, x + 2 * n, y + 2 * n, y1 + 2 * n, sim->energy_scale);
+    return sqrt(sum / state_size(sim));
 }
 
 static double largest_step(const Simulation *sim) {
@@ -580,13 +577,7 @@ static double largest_step(const Simulation *sim) {
 
 /* A first step size from the size of the rates (Hairer, II.4). */
 static double first_step(const Simulation *sim) {
-    int ny = state_size(sim);
-    double sum = 0.0;
-    for (int i = 0; i < ny; i++) {
-        double ratio = sim->k1[i] / scale_of(sim, i, fabs(sim->front[i]), omega_scale(sim));
-        sum += ratio * ratio;
-    }
-    double size = greater(sqrt(sum / ny), 1e-6);
+    double size = greater(relative_size(sim, sim->k1, sim->front, sim->front), 1e-6);
     return lesser(largest_step(sim), 0.1 * power(sim->now->tolerance, 0.2) / size);
 }
 
@@ -616,7 +607,8 @@ static bool find_step(Simulation *sim, double *step, Problem *problem) {
         if (stages(&sim->equations, ny, now->front_time, sim->arc_y, h, sim->arc_k, sim->y1,
                    problem)) {
             error_of(ny, sim->arc_k, h, sim->error);
-            error = relative_error(sim, sim->error, sim->arc_y, sim->y1);
+            error = relative_size(sim, sim->error, sim->arc_y, sim->y1) /
+                    (STRICTNESS * now->tolerance);
         }
         if (error <= 1.0) {
             break;
@@ -626,9 +618,11 @@ static bool find_step(Simulation *sim, double *step, Problem *problem) {
         h *= greater(SHRINK, factor_h);
     }
     error = greater(error, LEAST_ERROR);
-    growth = lesser(growth, SAFETY * power(error, -STEP_EXPONENT) * power(now->last_error, MEMORY));
+    double log_of_error = natural_log(error);
+    double trend = MEMORY * now->log_of_error - STEP_EXPONENT * log_of_error;
+    growth = lesser(growth, SAFETY * exponential(trend));
     now->h = h * greater(SHRINK, growth);
-    now->last_error = error;
+    now->log_of_error = log_of_error;
     *step = h;
     return true;
 }
@@ -658,7 +652,7 @@ static bool take_step(Simulation *sim, Problem *problem) {
     now->arc_end = now->arc_start + h;
     now->event_kind = NO_EVENT;
     copy(ny, sim->y1, sim->front); /* the last stage was there */
-    if (!project_from_here(&sim->equations, now->arc_end, sim->front, &sim->scratch, problem)) {
+    if (!project_near(&sim->equations, now->arc_end, sim->front, true, &sim->scratch, problem)) {
         return false;
     }
     Event event;
@@ -698,21 +692,21 @@ static const Complex *slide_row(const Simulation *sim, int kind, int i) {
 }
 
 PRBM double margin_release(const Simulation *sim, int k) {
-    return -sim->equations.x[sim->system.n + sim->equations.first_hold + k];
+    return sim->equations.lam[sim->equations.first_hold + k];
 }
 
 /* What is left before the k-th stop that sticks slips. */
 PRBM double margin_stick(const Simulation *sim, int k) {
     const Equations *q = &sim->equations;
     int i = q->stuck[k];
-    double normal = -q->x[q->system->n + q->first_hold + held_at(q, i)];
-    double friction = fabs(q->x[q->system->n + q->first_stick + k]);
+    double normal = q->lam[q->first_hold + held_at(q, i)];
+    double friction = fabs(q->lam[q->first_stick + k]);
     return (1.0 + SLACK) * (q->stop_friction[i] * normal) - friction;
 }
 
 PRBM double margin_rub(const Simulation *sim, int k) {
     const Equations *q = &sim->equations;
-    double friction = fabs(q->x[q->system->n + q->first_rub + k]);
+    double friction = fabs(q->lam[q->first_rub + k]);
     return (1.0 + SLACK) * rub_limit(q, q->rubbing[k], q->e) - friction;
 }
 
@@ -812,14 +806,7 @@ static bool within_reach(Simulation *sim) {
     const Scalars *now = sim->now;
     int n = sim->system.n, ny = state_size(sim);
     double near = TOUCHING * sim->system.length, *turn = sim->error;
-    for (int j = 0; j < n; j++) {
-        double fastest = 0.0;
-        for (int i = 0; i < STAGES; i++) {
-            fastest = greater(fastest, fabs(sim->arc_k[i * ny + j]));
-        }
-        turn[j] = LARGEST_WEIGHT * now->arc_h * fastest;
-    }
-    directions(&sim->system, sim->arc_y, sim->e);
+    furthest(n, ny, sim->arc_k, now->arc_h, turn);
     for (int s = 0; s < sim->system.s; s++) {
         if (sim->holds[s] == 0.0) {
             const Complex *row = sim->system.gaps + s * n;
@@ -827,7 +814,7 @@ static bool within_reach(Simulation *sim) {
             for (int j = 0; j < n; j++) {
                 reach += (fabs(row[j].re) + fabs(row[j].im)) * turn[j];
             }
-            if (!(gap(&sim->equations, s, now->arc_start, sim->e) > reach)) {
+            if (!(gap(&sim->equations, s, now->arc_start, sim->equations.e_at_start) > reach)) {
                 return true;
             }
         }
@@ -2111,7 +2098,7 @@ static bool sound_state(const Simulation *sim) {
                  now->window_count <= CHATTER && sound_event(sim);
     if (sound && now->started != 0.0) {
         sound = now->tolerance >= 1e-13 && now->tolerance <= 1e-2 && now->frequency >= 0.0 &&
-                now->last_error > 0.0 && (now->has_arc == 0.0 || now->arc_h > 0.0) &&
+                (now->has_arc == 0.0 || now->arc_h > 0.0) &&
                 (now->exchange != 0.0 || now->front_time >= now->time);
     }
     for (int i = 0; sound && i < m->stop_count; i++) {

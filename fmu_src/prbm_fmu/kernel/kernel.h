@@ -83,6 +83,12 @@ typedef struct {
     double re, im;
 } Complex;
 
+/* Complex numbers with their parts apart, in vectors that are padded with zeros to an even length,
+ * so that they are worked on by pairs. */
+typedef struct {
+    double *re, *im;
+} Parts;
+
 PRBM double *take_matrix(Scratch *scratch, int rows, int columns);
 PRBM Complex *take_complex(Scratch *scratch, int rows, int columns);
 PRBM int *take_integers(Scratch *scratch, int count);
@@ -361,11 +367,11 @@ typedef struct {
 
 /* The constant arrays of a mechanism, as in the twin; n coordinates, r loop rows, p mass points,
  * s stops, f friction points, b bodies.  Columns of A and of the rows are zero at stretches: see
- * spread. */
+ * spread.  Vectors over the coordinates are padded to an even length where that is said. */
 typedef struct {
     const Mechanism *mechanism;
     const double *values;
-    int n, r, p, s, f, b;
+    int n, even, r, p, s, f, b;
     double *q0, *J, *K;       /* (n,), (n,), (n, n) */
     Complex *e0;              /* (n,) directions of the straight shape */
     Complex *H, *A, *c;       /* (n, n), (p, n), (p,) */
@@ -391,6 +397,9 @@ typedef struct {
     Spring *spring;           /* what K is made of */
     int block_count;
     Block *blocks;            /* of M */
+    Complex *coupling;        /* of H, these blocks, one behind the other */
+    double *own;              /* (n,) the diagonal of M */
+    double *straight;         /* (even,) q0 */
     double *calculated;       /* gamma0 of the flexure types of several pivots */
     Complex anchor, gravity;
     double length;
@@ -434,13 +443,15 @@ PRBM bool project_positions(const System *system, int r, const Complex *B, const
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, Scratch *scratch, Problem *problem);
 
-/* M = L D L^T block by block, Z = L^-1 rows^T, Y = D^-1 Z, and the Schur complement S of a
- * saddle-point matrix [[M, columns^T], [rows, 0]]: what to solve with, again and again. */
+/* M = L D L^T block by block, Z = L^-1 rows^T and the Schur complement S of a saddle-point matrix
+ * [[M, columns^T], [rows, 0]]: what to solve with, again and again.  Vectors are padded to an even
+ * length. */
 typedef struct {
-    int n, r, block_count;
+    int even, r, block_count;
     const Block *blocks;
-    double *L;                  /* (n, n); 1/D on its diagonal */
-    double *Z, *Y, *Y_columns;  /* (r, n); of the columns as of the rows, or the same array */
+    double *L;                  /* its blocks, one behind the other, below their diagonals */
+    double *inverse;            /* (even,) 1/D */
+    double *Z, *Z_columns;      /* (r, even); of the columns as of the rows, or the same array */
     double *S;                  /* (r, r), and room for its factor */
     int *pivots;                /* (r,) */
     bool symmetric;             /* S is, and small: its factor is L D L^T, else LU */
@@ -448,8 +459,8 @@ typedef struct {
 
 /* S from Z and Y_columns, factored. */
 PRBM bool factor_schur(Factors *factors);
-/* x (n + r,): in, the right side; out, the solution (a, -lam). */
-PRBM void solve_again(const Factors *factors, double *x);
+/* x (even,) and lam (r,): in, the right side; out, the solution a and the multipliers. */
+PRBM void solve_again(const Factors *factors, double *x, double *lam);
 
 /* --- forces.c --------------------------------------------------------------------------------------- */
 
@@ -495,14 +506,23 @@ typedef struct {
     Complex *B;             /* (r, n) active rows */
     double *c;              /* (r,) */
     Complex *w, *w_input;   /* (n,) */
-    double *moment;         /* (n,) */
+    double *moment;         /* (even,) */
     bool driven, walls_push;
-    /* at the state that was evaluated last */
-    Complex *e;                         /* (n,) */
-    double *M, *rows, *columns;         /* (n, n) lower blocks, (r, n), (r, n) */
-    double *x, *squares;                /* (n + r,) = (a, -lam); (n,) */
-    double *turns;                      /* (n + 1,): deflections, of the ground last */
-    double *least, *most;               /* (held,) extremes of the forces since the trace began */
+    Parts B_conjugate;      /* (r, even) */
+    Parts w_parts;          /* (even,) */
+    /* where the present step began */
+    double *start;          /* (even,) its angles */
+    Complex *e_at_start;    /* (even,) */
+    Parts e_start;          /* (even,) the same */
+    /* at the state that was evaluated last; of the coordinates and, behind them, of the ground */
+    double *angle, *speed, *squares, *turns; /* (even + 2,) */
+    Complex *e;                              /* (n,) */
+    Parts e_parts;                           /* (even,) */
+    double *rows, *columns;                  /* (r, even) */
+    double *x, *lam;                         /* (even + 2,) accelerations; (r,) */
+    double *block;                           /* of M, below its diagonal */
+    double spring_loss;                      /* the power that the springs' damping takes */
+    double *least, *most;                    /* (held,) extremes of the forces since the trace */
     Factors factors;
 } Equations;
 
