@@ -19,7 +19,7 @@ RNG = np.random.default_rng(1)
 
 def directions(q, library=None):
     e = np.zeros(len(q), complex)
-    (library or kernel()).directions(len(q), np.asarray(q, float), e)
+    (library or kernel()).unit_vectors(len(q), np.asarray(q, float), e)
     return e
 
 

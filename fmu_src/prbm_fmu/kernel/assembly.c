@@ -115,13 +115,18 @@ PRBM int arm_of(const System *system, int j) {
     return system->mechanism->coordinates[j].arm;
 }
 
-PRBM void directions(const System *system, const double *q, Complex *e) {
-    unit_vectors(system->n, q, e);
+/* Unit vectors e become the arms and, at stretches, -i times those. */
+static void stretch(const System *system, const double *q, Complex *e) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);
         e[a] = scaled(exponential(q[j]), e[a]);
         e[j] = complex_of(e[a].im, -e[a].re);
     }
+}
+
+PRBM void directions(const System *system, const double *q, Complex *e) {
+    unit_vectors(system->n, q, e);
+    stretch(system, q, e);
 }
 
 PRBM void turning(const System *system, const double *v, Complex *w) {
@@ -133,6 +138,25 @@ PRBM void turning(const System *system, const double *v, Complex *w) {
         w[arm_of(system, j)].im = -v[j];
         w[j] = complex_of(0.0, 0.0);
     }
+}
+
+PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
+                 Complex *displacement, Complex *velocity) {
+    Complex at = minus(frame->c, frame->drawn), speed = {0.0, 0.0};
+    for (int j = 0; j < system->n; j++) {
+        Complex arm = product(frame->A[j], e[j]);
+        at = plus(at, arm);
+        speed.re -= arm.im * v[j];
+        speed.im += arm.re * v[j];
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        Complex along_arm = product(frame->A[arm_of(system, j)], e[j]);
+        speed.re -= along_arm.im * v[j];
+        speed.im += along_arm.re * v[j];
+    }
+    *displacement = at;
+    *velocity = speed;
 }
 
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows) {
@@ -681,7 +705,6 @@ static bool check_loops(const System *system, const Complex *e0, Scratch *scratc
     size_t mark = scratch->used;
     int r = system->r, n = system->n;
     double *rows = take_matrix(scratch, r, n);
-    Complex *B = take_complex(scratch, r, n);
     int *loop = take_integers(scratch, r);
     bool *repeated = (bool *)take_integers(scratch, r);
     char names[PROBLEM_LENGTH / 2];
@@ -689,8 +712,8 @@ static bool check_loops(const System *system, const Complex *e0, Scratch *scratc
         loop[i] = i / 2;
         repeated[i] = false;
     }
-    spread(system, r, system->loops, B);
-    jacobian(r, n, B, e0, rows);
+    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
+    jacobian(&loops, e0, rows);
     double scale = largest(r * n, rows);
     bool any = repeated_loops(r, n, rows, loop, 1e-9 * scale, repeated);
     name_loops(system->mechanism, repeated, names, sizeof names);

@@ -1,4 +1,4 @@
-/* Scalars s = Re(B e) + c of the position: the twin of prbm/constraints.py. */
+/* Scalars s = Re(f (B E + z)) + c of the position: the twin of prbm/constraints.py. */
 #include <math.h>
 #include <string.h>
 
@@ -13,27 +13,127 @@ static const char SINGULAR[] =
     "the equations of motion are singular here: two constraints repeat each other, or a part that "
     "can move has no mass";
 
-PRBM void scalars(int r, int n, const Complex *B, const double *c, const Complex *e, double *s) {
-    for (int i = 0; i < r; i++) {
-        s[i] = row_value(n, B + i * n, e) + c[i];
+/* --- rows ------------------------------------------------------------------------------------- */
+
+PRBM Rows plain_rows(const System *system, int count, const Complex *B, const double *c) {
+    Rows rows = {system, count, B, c, NULL, NULL};
+    return rows;
+}
+
+PRBM Rows gap_rows(const System *system) {
+    Rows rows = {system, system->s, system->gaps, system->gaps_c, system->gaps_z, system->on};
+    return rows;
+}
+
+PRBM Rows slide_rows(const System *system) {
+    Rows rows = {system, system->s, system->slides, NULL, system->slides_z, system->on};
+    return rows;
+}
+
+PRBM Rows rub_rows(const System *system) {
+    return plain_rows(system, system->f, system->rubs, NULL);
+}
+
+static int seen_from(const Rows *rows, int i) {
+    return rows->on == NULL ? FIXED : rows->on[i];
+}
+
+/* f (B E + z) of a row that is seen from a body. */
+static Complex seen_value(const Rows *rows, int i, const Complex *e) {
+    int n = rows->system->n;
+    const Complex *B = rows->B + i * n;
+    Complex sum = rows->z[i];
+    for (int j = 0; j < n; j++) {
+        sum = plus(sum, product(B[j], e[j]));
+    }
+    return product(conjugate(e[rows->on[i]]), sum);
+}
+
+PRBM double row_value(const Rows *rows, int i, const Complex *e) {
+    int n = rows->system->n;
+    const Complex *B = rows->B + i * n;
+    if (seen_from(rows, i) != FIXED) {
+        return seen_value(rows, i, e).re;
+    }
+    double sum = 0.0;
+    for (int j = 0; j < n; j++) {
+        sum += B[j].re * e[j].re - B[j].im * e[j].im;
+    }
+    return sum;
+}
+
+/* B E w */
+static Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
+    const System *system = rows->system;
+    const Complex *B = rows->B + i * system->n;
+    Complex sum = {0.0, 0.0};
+    for (int j = 0; j < system->n; j++) {
+        sum = plus(sum, scaled(v[j], product(B[j], e[j])));
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        sum = plus(sum, scaled(v[j], product(B[arm_of(system, j)], e[j])));
+    }
+    return sum;
+}
+
+PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v) {
+    int on = seen_from(rows, i);
+    Complex speed = swing(rows, i, e, v);
+    if (on == FIXED) {
+        return -speed.im;
+    }
+    return v[on] * seen_value(rows, i, e).im - product(conjugate(e[on]), speed).im;
+}
+
+PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row) {
+    const System *system = rows->system;
+    const Complex *B = rows->B + i * system->n;
+    int on = seen_from(rows, i);
+    Complex f = on == FIXED ? complex_of(1.0, 0.0) : conjugate(e[on]);
+    for (int j = 0; j < system->n; j++) {
+        row[j] = -product(f, product(B[j], e[j])).im;
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        row[j] = -product(f, product(B[arm_of(system, j)], e[j])).im;
+    }
+    if (on != FIXED) {
+        row[on] += seen_value(rows, i, e).im;
     }
 }
 
-PRBM void jacobian(int r, int n, const Complex *B, const Complex *e, double *rows) {
-    for (int i = 0; i < r * n; i++) {
-        rows[i] = -product(B[i], e[i % n]).im;
+/* Re(f (B E (w - w_b)^2 + z w_b^2)), w_b of the body that a row is seen from */
+PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v) {
+    const System *system = rows->system;
+    const Complex *B = rows->B + i * system->n;
+    int on = seen_from(rows, i);
+    double turn = on == FIXED ? 0.0 : v[on];
+    Complex sum = on == FIXED ? complex_of(0.0, 0.0) : scaled(turn * turn, rows->z[i]);
+    for (int j = 0; j < system->n; j++) {
+        sum = plus(sum, scaled((v[j] - turn) * (v[j] - turn), product(B[j], e[j])));
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k], a = arm_of(system, j);
+        Complex more = complex_of(-v[j] * v[j], -2.0 * (v[a] - turn) * v[j]);
+        sum = plus(sum, product(more, product(B[a], e[a])));
+    }
+    return on == FIXED ? sum.re : product(conjugate(e[on]), sum).re;
+}
+
+PRBM void scalars(const Rows *rows, const Complex *e, double *s) {
+    for (int i = 0; i < rows->count; i++) {
+        s[i] = row_value(rows, i, e) + rows->c[i];
     }
 }
 
-PRBM void convective(int r, int n, const Complex *B, const Complex *e, const double *v,
-                     double *x) {
-    for (int i = 0; i < r; i++) {
-        x[i] = 0.0;
-        for (int j = 0; j < n; j++) {
-            x[i] += product(B[i * n + j], e[j]).re * (v[j] * v[j]);
-        }
+PRBM void jacobian(const Rows *rows, const Complex *e, double *result) {
+    for (int i = 0; i < rows->count; i++) {
+        row_jacobian(rows, i, e, result + i * rows->system->n);
     }
 }
+
+/* --- saddle points ---------------------------------------------------------------------------- */
 
 PRBM void saddle(int n, int r, const double *M, const double *columns, const double *rows,
                  double *kkt) {
@@ -284,27 +384,29 @@ PRBM void solve_again(const Factors *factors, double *x, double *lam) {
     finish(factors, x, lam);
 }
 
-PRBM bool project_positions(const System *system, int r, const Complex *B, const double *c,
-                            double *q, Complex *e, Scratch *scratch, Problem *problem) {
-    size_t mark = scratch->used, n = (size_t)system->n, size = n + (size_t)r;
-    double *s = take(scratch, (size_t)r), *rows = take(scratch, (size_t)r * n);
+PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
+                            Complex *e, Scratch *scratch, Problem *problem) {
+    size_t mark = scratch->used, n = (size_t)system->n, r = (size_t)rows->count, size = n + r;
+    double *s = take(scratch, r), *G = take(scratch, r * n);
     double *M = take(scratch, n * n), *C = take(scratch, n * n);
     double *kkt = take(scratch, size * size), *right = take(scratch, size);
     double best = INFINITY;
     bool right_way = true, closed = false;
+    Rows now = *rows;
+    now.c = c;
     for (int step = 0; step < ITERATIONS && right_way && !closed; step++) {
         directions(system, q, e);
-        scalars(r, system->n, B, c, e, s);
-        double error = largest(r, s), length = system->length;
+        scalars(&now, e, s);
+        double error = largest(rows->count, s), length = system->length;
         closed = error <= CLOSED * length || (BARELY_CLOSED * length >= best && best <= error);
         best = error < best ? error : best;
         if (!closed) {
-            jacobian(r, system->n, B, e, rows);
+            jacobian(rows, e, G);
             inertia(system->n, system->H, system->J, e, M, C);
-            saddle(system->n, r, M, rows, rows, kkt);
-            memset(right, 0, n * sizeof *right);
-            for (int k = 0; k < r; k++) {
-                right[n + (size_t)k] = -s[k];
+            saddle(system->n, rows->count, M, G, G, kkt);
+            zeros(system->n, right);
+            for (size_t k = 0; k < r; k++) {
+                right[n + k] = -s[k];
             }
             right_way = solve((int)size, kkt, right, scratch, problem);
             for (size_t i = 0; right_way && i < n; i++) {

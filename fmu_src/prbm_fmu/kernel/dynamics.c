@@ -27,7 +27,11 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.stop_friction = place(memory, s, sizeof(double));
     q.rub_law = place(memory, 3 * f, sizeof(double));
     q.B = place(memory, r * n, sizeof(Complex));
+    q.z = place(memory, r, sizeof(Complex));
     q.c = place(memory, r, sizeof(double));
+    q.on = place(memory, r, sizeof(int));
+    q.carried = place(memory, r, sizeof(int));
+    q.own = place(memory, n, sizeof(double));
     q.w = place(memory, n, sizeof(Complex));
     q.w_input = place(memory, n, sizeof(Complex));
     q.moment = place(memory, even, sizeof(double));
@@ -61,25 +65,33 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 
 /* --- what holds, sticks and slides ------------------------------------------------------------ */
 
-static void add_row(Equations *q, const Complex *row, double c) {
-    int n = q->system->n;
-    memcpy(q->B + q->r * n, row, (size_t)n * sizeof *row);
-    q->c[q->r++] = c;
+/* Make the i-th of some rows the next active one, with the constant c. */
+static void add_row(Equations *q, const Rows *rows, int i, double c) {
+    int n = q->system->n, on = seen_from(rows, i);
+    memcpy(q->B + q->r * n, rows->B + i * n, (size_t)n * sizeof *rows->B);
+    q->c[q->r] = c;
+    q->on[q->r] = on;
+    if (on != FIXED) {
+        q->z[q->r] = rows->z[i];
+        q->carried[q->carried_count++] = q->r;
+    }
+    q->r++;
 }
 
 static void set_rows(Equations *q) {
     const System *system = q->system;
-    int n = system->n;
-    q->r = 0;
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    Rows gaps = gap_rows(system), walls = slide_rows(system), rubs = rub_rows(system);
+    q->r = q->carried_count = 0;
     for (int k = 0; k < system->r; k++) {
-        add_row(q, system->loops + k * n, system->loops_c[k]);
+        add_row(q, &loops, k, system->loops_c[k]);
     }
     q->first_hold = q->r;
     q->held_count = q->stuck_count = q->rubbing_count = q->sliding_count = 0;
     for (int i = 0; i < system->s; i++) {
         if (q->discrete.holds[i]) {
             q->held[q->held_count++] = i;
-            add_row(q, system->gaps + i * n, system->gaps_c[i] + q->inputs.walls[i].position);
+            add_row(q, &gaps, i, system->gaps_c[i] + q->inputs.walls[i].position);
         }
     }
     q->first_stick = q->r;
@@ -87,7 +99,7 @@ static void set_rows(Equations *q) {
         int i = q->held[k], slides = q->discrete.slides[i];
         if (slides == STICKS) {
             q->stuck[q->stuck_count++] = i;
-            add_row(q, system->slides + i * n, 0.0);
+            add_row(q, &walls, i, 0.0);
         } else if (slides != IDLE) {
             q->sliding[q->sliding_count++] = i;
         }
@@ -95,14 +107,16 @@ static void set_rows(Equations *q) {
     q->first_rub = q->r;
     q->rub_slide_count = 0;
     for (int i = 0; i < system->f; i++) {
-        int rubs = q->discrete.rubs[i];
-        if (rubs == STICKS) {
+        int slides = q->discrete.rubs[i];
+        if (slides == STICKS) {
             q->rubbing[q->rubbing_count++] = i;
-            add_row(q, system->rubs + i * n, 0.0);
-        } else if (rubs != IDLE && q->rub_law[3 * i] > 0.0) {
+            add_row(q, &rubs, i, 0.0);
+        } else if (slides != IDLE && q->rub_law[3 * i] > 0.0) {
             q->rub_slides[q->rub_slide_count++] = i;
         }
     }
+    Rows active = {system, q->r, q->B, q->c, q->z, q->on};
+    q->active = active;
 }
 
 static Parts parts_from(Parts parts, int start) {
@@ -111,15 +125,17 @@ static Parts parts_from(Parts parts, int start) {
     return parts;
 }
 
-/* What is behind the coordinates in padded vectors stays zero. */
+/* What is behind the coordinates in padded vectors stays zero; the rows' parts are spread. */
 static void set_padding(Equations *q) {
     int n = q->system->n, even = q->system->even;
     for (int k = 0; k < q->r; k++) {
-        pad_parts(n, q->B + k * n, parts_from(q->B_conjugate, k * even));
+        spread(q->system, 1, q->B + k * n, q->e);
+        pad_parts(n, q->e, parts_from(q->B_conjugate, k * even));
     }
     for (int i = 0; i < q->r * even; i++) {
         q->B_conjugate.im[i] = -q->B_conjugate.im[i];
     }
+    copy(n, q->system->own, q->own);
     zeros(q->r * even, q->factors.Z);
     zeros(even, q->factors.inverse);
     q->speed[n] = q->turns[n] = 0.0;
@@ -161,7 +177,7 @@ static void set_loads(Equations *q) {
     zeros(system->even, q->moment);
     field_row(n, system->S, scaled(-1.0, q->inputs.base), q->w_input);
     for (int i = 0; i < m->force_count; i++) {
-        const BodyFrame *frame = &system->bodies[m->forces[i].body - 1];
+        const BodyFrame *frame = &system->pushed[i];
         const double *given = q->inputs.forces + 3 * i;
         force_row(n, frame->A, complex_of(given[0], given[1]), q->w);
         for (int j = 0; j < n; j++) {
@@ -169,7 +185,9 @@ static void set_loads(Equations *q) {
         }
         q->moment[frame->j] += given[2];
     }
+    spread(system, 1, q->w_input, q->w_input);
     field_row(n, system->S, system->gravity, q->w);
+    spread(system, 1, q->w, q->w);
     q->driven = false;
     for (int j = 0; j < n; j++) {
         q->w[j] = plus(q->w_input[j], q->w[j]);
@@ -206,6 +224,21 @@ static void start_from(Equations *q, const double *angle) {
     pad(q->system->n, angle, q->start);
     unit_vectors(even, q->start, q->e_at_start);
     pad_parts(even, q->e_at_start, q->e_start);
+    stretch(q->system, q->start, q->e_at_start);
+}
+
+/* The arms of links that stretch, and the diagonal of M, of which |E|^2 is a factor. */
+static void stretch_links(Equations *q) {
+    const System *system = q->system;
+    if (system->stretch_count > 0) {
+        stretch(system, q->angle, q->e);
+        pad_parts(system->even, q->e, q->e_parts);
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k], a = arm_of(system, j);
+        double square = q->e[a].re * q->e[a].re + q->e[a].im * q->e[a].im;
+        q->own[a] = q->own[j] = system->own[a] * square;
+    }
 }
 
 /* The directions at the angles: from those where the step began, or afresh. */
@@ -216,6 +249,7 @@ static void find_directions(Equations *q, bool turned) {
         unit_vectors(even, q->angle, q->e);
         pad_parts(even, q->e, q->e_parts);
     }
+    stretch_links(q);
 }
 
 /* x: the loads Re(w e) + moment. */
@@ -230,6 +264,17 @@ static void find_loads(Equations *q) {
         set_lanes(x + j, lanes_at(moment + j) + (re - im));
         set_lanes(squares + j, lanes_at(v + j) * lanes_at(v + j));
     }
+    for (int k = 0; k < q->system->stretch_count; k++) { /* Re(w^2) of w = theta' - i s' */
+        int j = q->system->stretches[k];
+        squares[arm_of(q->system, j)] -= squares[j];
+        squares[j] = 0.0;
+    }
+}
+
+/* What the rates of stretches add to the accelerations of angles: with Im(w^2) = -2 theta' s', all
+ * that w^2 enters is solved for a - Im(w^2) as it is for a without stretches. */
+static double coriolis(const Equations *q, int stretch_coordinate) {
+    return -2.0 * q->speed[arm_of(q->system, stretch_coordinate)] * q->speed[stretch_coordinate];
 }
 
 /* What springs and their damping take up: x -= K (q - q0 + beta v), spring by spring, and the
@@ -274,6 +319,21 @@ SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE sq
     }
 }
 
+/* The rows that are seen from a body, and what is left of their convective terms. */
+static void carried_rows(Equations *q, double *rows) {
+    const System *system = q->system;
+    for (int c = 0; c < q->carried_count; c++) {
+        int k = q->carried[c];
+        double *row = rows + k * system->even;
+        row_jacobian(&q->active, k, q->e, row);
+        q->lam[k] = row_convective(&q->active, k, q->e, q->speed);
+        for (int l = 0; l < system->stretch_count; l++) {
+            int j = system->stretches[l];
+            q->lam[k] -= row[arm_of(system, j)] * coriolis(q, j);
+        }
+    }
+}
+
 static void rows_and_convection(Equations *q, double *rows) {
     int even = q->system->even;
     Parts B = q->B_conjugate, e = q->e_parts;
@@ -286,6 +346,7 @@ static void rows_and_convection(Equations *q, double *rows) {
             convect(1, even, parts_from(B, k * even), e, q->squares, rows + k * even, q->lam + k);
         }
     }
+    carried_rows(q, rows);
 }
 
 /* x -= c M v within a block. */
@@ -327,7 +388,7 @@ SIZED bool block_motion(Equations *q, int size, int start, const Complex *H, dou
     const int even = q->system->even, r = q->r;
     double local[SMALL * SMALL], *M = size <= SMALL ? local : q->block;
     double *x = q->x + start, *Z = q->factors.Z + start;
-    block_inertia(size, H, q->system->own + start, parts_from(q->e_parts, start),
+    block_inertia(size, H, q->own + start, parts_from(q->e_parts, start),
                   q->squares + start, M, x);
     if (q->mass_damping != 0.0) {
         damp_mass(size, q->mass_damping, M, q->speed + start, x);
@@ -369,7 +430,7 @@ PRBM double energy_here(const Equations *equations, const double *v) {
     for (int k = 0; k < system->block_count; k++) {
         int start = system->blocks[k].start, end = start + system->blocks[k].size;
         for (int i = start; i < end; i++) {
-            double row = 0.5 * system->own[i] * v[i];
+            double row = 0.5 * equations->own[i] * v[i];
             for (int j = start; j < i; j++) {
                 Complex h = system->H[i * system->n + j];
                 row += product(product(conjugate(e[i]), h), e[j]).re * v[j];
@@ -383,7 +444,8 @@ PRBM double energy_here(const Equations *equations, const double *v) {
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e) {
     const System *system = equations->system;
     const double *law = equations->rub_law + 3 * i;
-    double lift = row_value(system->n, system->lifts + i * system->n, e) + system->lifts_c[i];
+    Rows lifts = plain_rows(system, system->f, system->lifts, system->lifts_c);
+    double lift = row_value(&lifts, i, e) + lifts.c[i];
     return law[0] * normal_force(lift, law[1], law[2]);
 }
 
@@ -393,14 +455,11 @@ static double rub_force(const Equations *q, int i) {
 }
 
 static void add_rubs(Equations *q) {
-    const System *system = q->system;
-    int n = system->n;
+    Rows rubs = rub_rows(q->system);
     for (int k = 0; k < q->rub_slide_count; k++) {
         int i = q->rub_slides[k];
-        double force = rub_force(q, i);
-        for (int j = 0; j < n; j++) {
-            q->x[j] -= force * product(system->rubs[i * n + j], q->e[j]).im;
-        }
+        row_jacobian(&rubs, i, q->e, q->rows);
+        add_scaled(q->system->n, rub_force(q, i), q->rows, q->x);
     }
 }
 
@@ -409,6 +468,7 @@ static void add_rubs(Equations *q) {
 static void set_columns(Equations *q) {
     const System *system = q->system;
     int n = system->n, even = system->even;
+    Rows walls = slide_rows(system);
     q->factors.Z_columns = q->factors.Z;
     if (q->sliding_count == 0) {
         return;
@@ -419,10 +479,9 @@ static void set_columns(Equations *q) {
         int i = q->sliding[k], h = q->first_hold + held_at(q, i);
         double share = -q->stop_friction[i] * q->discrete.slides[i];
         double *column = q->columns + h * even;
-        for (int j = 0; j < n; j++) {
-            column[j] = -product(q->B[h * n + j], q->e[j]).im -
-                        share * product(system->slides[i * n + j], q->e[j]).im;
-        }
+        row_jacobian(&q->active, h, q->e, column);
+        row_jacobian(&walls, i, q->e, q->rows);
+        add_scaled(n, share, q->rows, column);
         forward_all(&q->factors, column);
     }
 }
@@ -447,6 +506,10 @@ static bool solve_motion(Equations *q, const double *angle, const double *v, boo
         return false;
     }
     finish(&q->factors, q->x, q->lam);
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        q->x[arm_of(system, j)] += coriolis(q, j);
+    }
     return true;
 }
 
@@ -462,17 +525,16 @@ PRBM bool accelerations(Equations *equations, const double *q, const double *v, 
 
 /* The power that friction takes out. */
 static double rubbing_power(const Equations *q, const double *v) {
-    const System *system = q->system;
-    int n = system->n;
+    Rows rubs = rub_rows(q->system), walls = slide_rows(q->system);
     double power = 0.0;
     for (int k = 0; k < q->rub_slide_count; k++) {
         int i = q->rub_slides[k];
-        power -= rub_force(q, i) * row_rate(n, system->rubs + i * n, q->e, v);
+        power -= rub_force(q, i) * row_rate(&rubs, i, q->e, v);
     }
     for (int k = 0; k < q->sliding_count; k++) {
         int i = q->sliding[k];
         double force = q->lam[q->first_hold + held_at(q, i)];
-        double speed = row_rate(n, system->slides + i * n, q->e, v);
+        double speed = row_rate(&walls, i, q->e, v);
         power += q->stop_friction[i] * force * q->discrete.slides[i] * speed;
     }
     return power;
@@ -567,9 +629,11 @@ PRBM bool project(Equations *equations, double t, double *y, Scratch *scratch, P
         c[k] = offset(q, k, t);
         rates[k] = prescribed(q, k);
     }
-    bool right = project_positions(q->system, q->first_stick, q->B, c, y, e, scratch, problem);
+    Rows positions = q->active;
+    positions.count = q->first_stick;
+    bool right = project_positions(q->system, &positions, y, c, e, scratch, problem);
     if (right) {
-        jacobian(q->r, (int)n, q->B, e, rows);
+        jacobian(&q->active, e, rows);
         inertia((int)n, q->system->H, q->system->J, e, M, C);
         right = project_velocities((int)n, q->r, M, rows, rates, y + n, scratch, problem);
     }
@@ -577,9 +641,12 @@ PRBM bool project(Equations *equations, double t, double *y, Scratch *scratch, P
     return right;
 }
 
-/* Re(B e) of an active row at the state that was evaluated last. */
+/* The value of an active row, but for its constant, at the state that was evaluated last. */
 static double active_value(const Equations *q, int k) {
     const int even = q->system->even;
+    if (q->system->stretch_count > 0 || q->on[k] != FIXED) {
+        return row_value(&q->active, k, q->e);
+    }
     Parts B = parts_from(q->B_conjugate, k * even), e = q->e_parts;
     Lanes sum[SUMS] = {NO_LANES};
     for (int j = 0; j < even; j += LANES) {
@@ -654,67 +721,69 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
 
 /* --- stops ------------------------------------------------------------------------------------ */
 
-PRBM double row_value(int n, const Complex *row, const Complex *e) {
-    double sum = 0.0;
-    for (int j = 0; j < n; j++) {
-        sum += row[j].re * e[j].re - row[j].im * e[j].im;
-    }
-    return sum;
-}
-
-PRBM double row_rate(int n, const Complex *row, const Complex *e, const double *v) {
-    double sum = 0.0;
-    for (int j = 0; j < n; j++) {
-        sum -= (row[j].re * e[j].im + row[j].im * e[j].re) * v[j];
-    }
-    return sum;
-}
-
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e) {
-    const System *system = equations->system;
-    return row_value(system->n, system->gaps + i * system->n, e) + system->gaps_c[i] +
-           wall_at(&equations->inputs.walls[i], t);
+    Rows rows = gap_rows(equations->system);
+    return row_value(&rows, i, e) + rows.c[i] + wall_at(&equations->inputs.walls[i], t);
 }
 
 PRBM double gap_rate(const Equations *equations, int i, const Complex *e, const double *v) {
-    const System *system = equations->system;
-    return row_rate(system->n, system->gaps + i * system->n, e, v) +
-           equations->inputs.walls[i].rate;
+    Rows rows = gap_rows(equations->system);
+    return row_rate(&rows, i, e, v) + equations->inputs.walls[i].rate;
 }
 
 /* --- reactions -------------------------------------------------------------------------------- */
 
+/* E (i w' - w^2) of the arms: a place accelerates by A times that. */
+static void arm_accelerations(const System *system, const Complex *e, const double *v,
+                              const double *a, Complex *result, Scratch *scratch) {
+    size_t mark = scratch->used;
+    int n = system->n;
+    Complex *w = take_complex(scratch, n, 1), *dw = take_complex(scratch, n, 1);
+    turning(system, v, w);
+    turning(system, a, dw);
+    for (int j = 0; j < n; j++) {
+        Complex change = minus(complex_of(-dw[j].im, dw[j].re), product(w[j], w[j]));
+        result[j] = product(e[j], change);
+    }
+    scratch->used = mark;
+}
+
+/* A E */
+static Complex along_arms(int n, const Complex *A, const Complex *e) {
+    Complex sum = {0.0, 0.0};
+    for (int j = 0; j < n; j++) {
+        sum = plus(sum, product(A[j], e[j]));
+    }
+    return sum;
+}
+
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
-                        const double *a, Complex *force, double *moment) {
+                        const double *a, Complex *force, double *moment, Scratch *scratch) {
     const System *system = equations->system;
-    const Mechanism *m = system->mechanism;
+    size_t mark = scratch->used;
     int n = system->n;
     Complex field = minus(system->gravity, equations->inputs.base);
+    Complex *bend = take_complex(scratch, n, 1);
+    arm_accelerations(system, e, v, a, bend, scratch);
     *force = complex_of(0.0, 0.0);
     *moment = 0.0;
     for (int i = 0; i < system->p; i++) {
-        Complex z = minus(system->c[i], system->anchor), bend = {0.0, 0.0};
-        for (int j = 0; j < n; j++) {
-            Complex arm = product(system->A[i * n + j], e[j]);
-            z = plus(z, arm);
-            bend.re -= arm.im * a[j] + arm.re * (v[j] * v[j]);
-            bend.im += arm.re * a[j] - arm.im * (v[j] * v[j]);
-        }
-        Complex load = scaled(system->m[i], minus(field, bend));
+        const Complex *A = system->A + i * n;
+        Complex z = plus(along_arms(n, A, e), minus(system->c[i], system->anchor));
+        Complex load = scaled(system->m[i], minus(field, along_arms(n, A, bend)));
         *force = plus(*force, load);
         *moment += product(conjugate(z), load).im;
     }
     for (int j = 0; j < n; j++) {
         *moment -= system->J[j] * a[j];
     }
-    for (int i = 0; i < m->force_count; i++) {
-        const BodyFrame *frame = &system->bodies[m->forces[i].body - 1];
+    for (int i = 0; i < system->mechanism->force_count; i++) {
+        const BodyFrame *frame = &system->pushed[i];
         const double *given = equations->inputs.forces + 3 * i;
-        Complex centre = minus(frame->c, system->anchor), f = complex_of(given[0], given[1]);
-        for (int j = 0; j < n; j++) {
-            centre = plus(centre, product(frame->A[j], e[j]));
-        }
+        Complex f = complex_of(given[0], given[1]);
+        Complex z = plus(along_arms(n, frame->A, e), minus(frame->c, system->anchor));
         *force = plus(*force, f);
-        *moment += product(conjugate(centre), f).im + given[2];
+        *moment += product(conjugate(z), f).im + given[2];
     }
+    scratch->used = mark;
 }

@@ -686,9 +686,10 @@ typedef struct {
 
 enum { GAP_FALLS, GAP_RATE_FALLS, SPEED_FALLS, MARGIN_FALLS };
 
-static const Complex *slide_row(const Simulation *sim, int kind, int i) {
+/* The rows of the friction points, or of the stops along their walls. */
+static Rows rows_of(const Simulation *sim, int kind) {
     bool rubs = kind == RUB || kind == SLIP_RUB;
-    return (rubs ? sim->system.rubs : sim->system.slides) + i * sim->system.n;
+    return rubs ? rub_rows(&sim->system) : slide_rows(&sim->system);
 }
 
 PRBM double margin_release(const Simulation *sim, int k) {
@@ -737,7 +738,8 @@ static double guard_at(const Guard *guard, int what, double t) {
     if (what == GAP_RATE_FALLS) {
         return guard->sign * gap_rate(&sim->equations, guard->index, sim->e, y + n);
     }
-    return guard->sign * row_rate(n, slide_row(sim, guard->kind, guard->index), sim->e, y + n);
+    Rows rows = rows_of(sim, guard->kind);
+    return guard->sign * row_rate(&rows, guard->index, sim->e, y + n);
 }
 
 /* Brent's search for the fall of a guard between a, where it is positive, and b, where it is not
@@ -800,21 +802,38 @@ static void note(Event *first, int kind, int index, double time) {
     }
 }
 
-/* Whether an open stop may be reached within the step: angles change by no more than the dense
- * output can make of the stages, gaps by no more than the angles at their arms. */
+/* How far the arms may move within the step: coordinates change by no more than the dense output
+ * can make of the stages, |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
+static void furthest_arms(const Simulation *sim, double *turn) {
+    const System *system = &sim->system;
+    furthest(system->n, state_size(sim), sim->arc_k, sim->now->arc_h, turn);
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k], a = arm_of(system, j);
+        double longest = modulus(sim->equations.e_at_start[a]) * exponential(turn[j]);
+        turn[a] = longest * (turn[a] + turn[j]);
+    }
+}
+
+/* Whether an open stop may be reached within the step: gaps change by no more than the arms do, and
+ * than what is seen by a wall that turns. */
 static bool within_reach(Simulation *sim) {
     const Scalars *now = sim->now;
-    int n = sim->system.n, ny = state_size(sim);
+    const Complex *e = sim->equations.e_at_start;
+    int n = sim->system.n;
     double near = TOUCHING * sim->system.length, *turn = sim->error;
-    furthest(n, ny, sim->arc_k, now->arc_h, turn);
+    Rows gaps = gap_rows(&sim->system);
+    furthest_arms(sim, turn);
     for (int s = 0; s < sim->system.s; s++) {
         if (sim->holds[s] == 0.0) {
-            const Complex *row = sim->system.gaps + s * n;
+            const Complex *row = gaps.B + s * n;
             double reach = near + fabs(sim->walls[s].rate) * now->arc_h;
             for (int j = 0; j < n; j++) {
                 reach += (fabs(row[j].re) + fabs(row[j].im)) * turn[j];
             }
-            if (!(gap(&sim->equations, s, now->arc_start, sim->equations.e_at_start) > reach)) {
+            if (gaps.on[s] != FIXED) {
+                reach += modulus(seen_value(&gaps, s, e)) * turn[gaps.on[s]];
+            }
+            if (!(gap(&sim->equations, s, now->arc_start, e) > reach)) {
                 return true;
             }
         }
@@ -921,10 +940,10 @@ static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
 static void turning_back(Simulation *sim, int kind, int i, int sign, Event *first) {
     int n = sim->system.n;
     double z[WATCHED + 1];
-    const Complex *row = slide_row(sim, kind, i);
+    Rows rows = rows_of(sim, kind);
     Guard guard = {sim, kind, i, sign};
     for (int k = 0; k <= WATCHED; k++) {
-        z[k] = sign * row_rate(n, row, sim->look_e + k * n, sim->look_y + k * 2 * n + n);
+        z[k] = sign * row_rate(&rows, i, sim->look_e + k * n, sim->look_y + k * 2 * n + n);
     }
     for (int k = 0; k < WATCHED; k++) {
         if (z[k] > 0.0 && z[k + 1] <= 0.0) {
@@ -1070,7 +1089,8 @@ static Here mass_and_loops(Simulation *sim, const double *q) {
     double *C = take_matrix(&sim->scratch, system->n, system->n);
     directions(system, q, here.e);
     inertia(system->n, system->H, system->J, here.e, here.M, C);
-    jacobian(system->r, system->n, system->loops, here.e, here.loops);
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    jacobian(&loops, here.e, here.loops);
     return here;
 }
 
@@ -1118,19 +1138,19 @@ static int sign_of_speed(const Simulation *sim, double speed) {
 static void equations_holding(Simulation *sim, int count, const int *stops, const double *q,
                               const double *v) {
     const System *system = &sim->system;
-    int n = system->n;
-    directions(&sim->system, q, sim->e);
+    Rows walls = slide_rows(system), rubs = rub_rows(system);
+    directions(system, q, sim->e);
     for (int i = 0; i < system->s; i++) {
         bool holds = false;
         for (int k = 0; k < count; k++) {
             holds = holds || stops[k] == i;
         }
-        double speed = row_rate(n, system->slides + i * n, sim->e, v);
+        double speed = row_rate(&walls, i, sim->e, v);
         sim->other.holds[i] = holds;
         sim->other.slides[i] = holds ? sign_of_speed(sim, speed) : IDLE;
     }
     for (int i = 0; i < system->f; i++) {
-        double speed = row_rate(n, system->rubs + i * n, sim->e, v);
+        double speed = row_rate(&rubs, i, sim->e, v);
         sim->other.rubs[i] = sign_of_speed(sim, speed);
     }
     try_equations(sim, &sim->other);
@@ -1199,8 +1219,11 @@ static bool find_holding(Simulation *sim, int count, const int *candidates, cons
     Here here = mass_and_loops(sim, q);
     double *G = take_matrix(&sim->scratch, system->s, n);
     double *bend = take(&sim->scratch, (size_t)system->s);
-    jacobian(system->s, n, system->gaps, here.e, G);
-    convective(system->s, n, system->gaps, here.e, v, bend);
+    Rows gaps = gap_rows(system);
+    jacobian(&gaps, here.e, G);
+    for (int i = 0; i < system->s; i++) {
+        bend[i] = row_convective(&gaps, i, here.e, v);
+    }
     holding->count = 0;
     for (int size = many; right && !found && size > 0; size--) {
         Holding best = {0, {0}, -HUGE_VAL}, tried;
@@ -1267,7 +1290,7 @@ static bool has_mobility(Simulation *sim, int kind, int i, const Here *here, con
     with_slide(sim, kind, i, IDLE);
     try_equations(sim, &sim->other);
     double *held = take_matrix(&sim->scratch, sim->trial.r, n);
-    jacobian(sim->trial.r, n, sim->trial.B, here->e, held);
+    jacobian(&sim->trial.active, here->e, held);
     bool right = mobility(sim, here->M, sim->trial.r, held, row, &left, problem) &&
                  mobility(sim, here->M, sim->system.r, here->loops, row, &own, problem);
     *result = left > DEPENDENT * own;
@@ -1293,7 +1316,8 @@ static bool state_at_rest(Simulation *sim, int kind, int i, const double *q, con
     if (fabs(friction) <= limit && !yields) {
         return true;
     }
-    convective(1, n, slide_row(sim, kind, i), here->e, v, &bend);
+    Rows rows_here = rows_of(sim, kind);
+    bend = row_convective(&rows_here, i, here->e, v);
     int gives = friction > 0.0 ? -1 : 1;
     for (int attempt_sign = 0; attempt_sign < 2; attempt_sign++) {
         int sign = attempt_sign == 0 ? gives : -gives;
@@ -1322,7 +1346,8 @@ static bool slide_state(Simulation *sim, int kind, int i, const double *q, const
     bool mobile = false, right = true;
     Here here = mass_and_loops(sim, q);
     double *row = take(&sim->scratch, (size_t)n);
-    jacobian(1, n, slide_row(sim, kind, i), here.e, row);
+    Rows rows = rows_of(sim, kind);
+    row_jacobian(&rows, i, here.e, row);
     *state = sign_of_speed(sim, dot(n, row, v));
     if (*state == IDLE) {
         right = has_mobility(sim, kind, i, &here, row, &mobile, problem);
@@ -1469,10 +1494,11 @@ static bool hits_without_friction(Simulation *sim, const Here *here, const doubl
     double *G = take_matrix(&sim->scratch, k, n), *X = take_matrix(&sim->scratch, n, k);
     double *W = take_matrix(&sim->scratch, k, k), *rates = take(&sim->scratch, (size_t)k);
     double *eps = take(&sim->scratch, (size_t)k), *P = take(&sim->scratch, (size_t)k);
+    Rows gaps = gap_rows(system);
     for (int a = 0; a < k; a++) {
         bool struck = a < hits->struck_count;
         int i = struck ? hits->struck[a] : hits->held[a - hits->struck_count];
-        jacobian(1, n, system->gaps + i * n, here->e, G + a * n);
+        row_jacobian(&gaps, i, here->e, G + a * n);
         rates[a] = lesser(u[i], 0.0);
         eps[a] = struck ? hits->restitution[a] : 0.0;
     }
@@ -1527,14 +1553,15 @@ static bool hits_with_friction(Simulation *sim, const Here *here, const double *
     double *X = take_matrix(&sim->scratch, n, 2 * k);
     double *W = take_matrix(&sim->scratch, 2 * k, 2 * k);
     double *rates = take(&sim->scratch, 2 * (size_t)k), *P = take(&sim->scratch, 2 * (size_t)k);
+    Rows gaps = gap_rows(system), walls = slide_rows(system);
     copy(system->r * n, here->loops, rows);
     for (int a = 0; a < *kept_count; a++) {
-        jacobian(1, n, system->gaps + kept[a] * n, here->e, rows + (system->r + a) * n);
+        row_jacobian(&gaps, kept[a], here->e, rows + (system->r + a) * n);
     }
     for (int a = 0; a < k; a++) {
         int i = hits->struck[a];
-        jacobian(1, n, system->gaps + i * n, here->e, GT + a * n);
-        jacobian(1, n, system->slides + i * n, here->e, GT + (k + a) * n);
+        row_jacobian(&gaps, i, here->e, GT + a * n);
+        row_jacobian(&walls, i, here->e, GT + (k + a) * n);
         rates[a] = u[i];
         rates[k + a] = dot(n, GT + (k + a) * n, v);
     }
@@ -1644,7 +1671,8 @@ static bool captured(Simulation *sim, int i, const Hits *hits, const double *q, 
             equations_holding(sim, holding.count, holding.stops, q, soft.after);
             right = accelerations(&sim->trial, q, soft.after, a, lam, problem);
             Here here = mass_and_loops(sim, q);
-            jacobian(1, n, sim->system.gaps + i * n, here.e, G);
+            Rows gaps = gap_rows(&sim->system);
+            row_jacobian(&gaps, i, here.e, G);
             right = right &&
                     mobility(sim, here.M, sim->system.r, here.loops, G, &free, problem);
             double pressing =
@@ -1674,6 +1702,7 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
                  const double *v, Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = &sim->system;
+    Rows walls = slide_rows(system);
     int n = system->n, s = system->s;
     bool any = false, right = true;
     double lost[MOST_STOPS], before[MOST_STOPS], after[MOST_STOPS], all_lost = 0.0, work = 0.0, modal = 0.0;
@@ -1681,8 +1710,7 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
     for (int i = 0; i < s; i++) {
         before[i] = gap_rate(&sim->equations, i, sim->e, v);
         after[i] = gap_rate(&sim->equations, i, sim->e, hits->after);
-        double slid = row_rate(n, system->slides + i * n, sim->e, v) +
-                      row_rate(n, system->slides + i * n, sim->e, hits->after);
+        double slid = row_rate(&walls, i, sim->e, v) + row_rate(&walls, i, sim->e, hits->after);
         lost[i] = -hits->normal[i] * (before[i] + after[i]) / 2 - hits->tangential[i] * slid / 2;
         all_lost += hits->with_normal[i] ? lost[i] : 0.0;
         work -= hits->with_normal[i] ? hits->normal[i] * sim->walls[i].rate : 0.0;
@@ -1903,19 +1931,23 @@ static void output_places(Simulation *sim) {
     for (int i = 0; i < system->b; i++) {
         const BodyFrame *frame = &system->bodies[i];
         double *values = out + slots->bodies + PER_BODY * i;
-        Complex at = minus(frame->c, frame->drawn), speed = {0.0, 0.0};
-        for (int j = 0; j < n; j++) {
-            Complex arm = product(frame->A[j], sim->e[j]);
-            at = plus(at, arm);
-            speed.re -= arm.im * v[j];
-            speed.im += arm.re * v[j];
-        }
+        Complex at, speed;
+        motion(system, frame, sim->e, v, &at, &speed);
         values[0] = at.re;
         values[1] = at.im;
         values[2] = sim->y[frame->j];
         values[3] = speed.re;
         values[4] = speed.im;
         values[5] = v[frame->j];
+    }
+    for (int i = 0; i < sim->mechanism->probe_count; i++) {
+        double *values = out + slots->probes + PER_PROBE * i;
+        Complex at, speed;
+        motion(system, &system->probes[i], sim->e, v, &at, &speed);
+        values[0] = at.re;
+        values[1] = at.im;
+        values[2] = speed.re;
+        values[3] = speed.im;
     }
     for (int i = 0; i < system->s; i++) {
         double *values = out + slots->stops + PER_STOP * i;
@@ -1963,7 +1995,8 @@ static void output_base(Simulation *sim) {
     double *out = sim->outputs + sim->mechanism->slots.base;
     Complex force;
     directions(&sim->system, sim->y, sim->e);
-    base_reaction(&sim->equations, sim->e, sim->y + sim->system.n, sim->a, &force, out + 2);
+    base_reaction(&sim->equations, sim->e, sim->y + sim->system.n, sim->a, &force, out + 2,
+                  &sim->scratch);
     out[0] = force.re;
     out[1] = force.im;
 }

@@ -123,8 +123,6 @@ PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */
  * below rcond times the largest count as zero.  a is (m, n). */
 PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
                         Scratch *scratch);
-/* The rank of a (m, n): number of singular values above the tolerance. */
-PRBM int rank(int m, int n, const double *a, double tolerance, Scratch *scratch);
 /* Eigenvalues w in rising order and, unless NULL, orthonormal eigenvectors as columns of z, of a
  * symmetric matrix, which is destroyed (cyclic Jacobi). */
 PRBM void symmetric_eigen(int n, double *a, double *w, double *z);
@@ -412,6 +410,9 @@ PRBM int arm_of(const System *system, int j);
 PRBM void directions(const System *system, const double *q, Complex *e);
 /* w (n,): the complex rates theta' - i s' of the arms, zero for stretches. */
 PRBM void turning(const System *system, const double *v, Complex *w);
+/* The displacement from the straight shape and the velocity of a point. */
+PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
+                 Complex *displacement, Complex *velocity);
 /* Rows (r, n) with the column of each arm repeated for its stretch; rows may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
 PRBM Complex unit(double degrees);
@@ -430,16 +431,33 @@ PRBM double kinetic_energy(int n, const double *M, const double *v);
 
 /* --- constraints.c --------------------------------------------------------------------------------- */
 
-PRBM void scalars(int r, int n, const Complex *B, const double *c, const Complex *e, double *s);
-PRBM void jacobian(int r, int n, const Complex *B, const Complex *e, double *rows);
-PRBM void convective(int r, int n, const Complex *B, const Complex *e, const double *v, double *x);
+/* Scalars s = Re(f (B E + z)) + c: f = 1, or conj(E) of the body that they are seen from. */
+typedef struct {
+    const System *system;
+    int count;
+    const Complex *B;       /* (count, n) */
+    const double *c;        /* (count,) */
+    const Complex *z;       /* (count,) */
+    const int *on;          /* (count,) coordinates, FIXED: f = 1, z = 0; or NULL: all of them */
+} Rows;
+
+PRBM Rows plain_rows(const System *system, int count, const Complex *B, const double *c);
+PRBM Rows gap_rows(const System *system);
+PRBM Rows slide_rows(const System *system);
+PRBM Rows rub_rows(const System *system);
+PRBM double row_value(const Rows *rows, int i, const Complex *e); /* without c */
+PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v);
+PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row);
+PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v);
+PRBM void scalars(const Rows *rows, const Complex *e, double *s);
+PRBM void jacobian(const Rows *rows, const Complex *e, double *result); /* (count, n) */
 PRBM void saddle(int n, int r, const double *M, const double *columns, const double *rows,
                  double *kkt);
 /* Solve a saddle-point system by LU; right (n + r,) becomes the solution. */
 PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem *problem);
-/* J, H, length from the system; q (n,) moves onto the constraints, e = exp(i q) of the result. */
-PRBM bool project_positions(const System *system, int r, const Complex *B, const double *c,
-                            double *q, Complex *e, Scratch *scratch, Problem *problem);
+/* q (n,) moves onto the rows, of which c (count,) are the constants now; e: its directions. */
+PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
+                            Complex *e, Scratch *scratch, Problem *problem);
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, Scratch *scratch, Problem *problem);
 
@@ -503,14 +521,18 @@ typedef struct {
     int *held, *stuck, *rubbing, *sliding, *rub_slides; /* stops, stops, frictions, stops, ... */
     double *stop_friction;  /* (s,) */
     double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
-    Complex *B;             /* (r, n) active rows */
+    Complex *B, *z;         /* (r, n), (r,) of the active rows */
     double *c;              /* (r,) */
+    int *on, *carried;      /* (r,), (carried_count,) those that are seen from a body */
+    int carried_count;
+    Rows active;
     Complex *w, *w_input;   /* (n,) */
     double *moment;         /* (even,) */
     bool driven, walls_push;
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
     /* where the present step began */
+    double *own;            /* (n,) the diagonal of M now */
     double *start;          /* (even,) its angles */
     Complex *e_at_start;    /* (even,) */
     Parts e_start;          /* (even,) the same */
@@ -544,10 +566,8 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
 PRBM double wall_at(const Wall *wall, double t);
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e);
 PRBM double gap_rate(const Equations *equations, int i, const Complex *e, const double *v);
-PRBM double row_value(int n, const Complex *row, const Complex *e);                   /* Re(B e) */
-PRBM double row_rate(int n, const Complex *row, const Complex *e, const double *v);   /* -Im(B e) v */
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
-                        const double *a, Complex *force, double *moment);
+                        const double *a, Complex *force, double *moment, Scratch *scratch);
 
 /* --- runge_kutta.c ------------------------------------------------------------------------------------ */
 

@@ -242,18 +242,6 @@ PRBM void least_squares(int m, int n, const double *a, const double *b, double r
     scratch->used = used;
 }
 
-PRBM int rank(int m, int n, const double *a, double tolerance, Scratch *scratch) {
-    size_t used = scratch->used;
-    int k = m < n ? m : n, count = 0;
-    double *s = take(scratch, (size_t)k), *g = take_matrix(scratch, m, n);
-    singular_values(m, n, a, s, g, NULL);
-    for (int i = 0; i < k; i++) {
-        count += s[i] > tolerance;
-    }
-    scratch->used = used;
-    return count;
-}
-
 /* --- eigenvalues ------------------------------------------------------------------------------ */
 
 /* Rotate rows and columns p and q of a so that a_pq = 0. */

@@ -82,9 +82,8 @@ static void gravity_row(const System *system, Complex *w) {
 static void tangent_space(const System *system, const Complex *e, double *Z, Scratch *scratch) {
     size_t used = scratch->used;
     double *rows = take_matrix(scratch, system->r, system->n);
-    Complex *B = take_complex(scratch, system->r, system->n);
-    spread(system, system->r, system->loops, B);
-    jacobian(system->r, system->n, B, e, rows);
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    jacobian(&loops, e, rows);
     null_space(system->r, system->n, rows, Z, scratch);
     scratch->used = used;
 }
@@ -161,14 +160,13 @@ static bool resting_multipliers(const System *system, const double *q, const Com
     size_t used = scratch->used;
     int n = system->n, r = system->r + 1, size = n + r;
     Complex *e = take_complex(scratch, 1, n), *w = take_complex(scratch, 1, n);
-    Complex *spread_B = take_complex(scratch, r, n);
     double *rows = take_matrix(scratch, r, n), *kkt = take_matrix(scratch, size, size);
     double *right = take(scratch, (size_t)size), *C = take_matrix(scratch, n, n);
     double *turned = take(scratch, (size_t)n), *load = take(scratch, (size_t)n);
     directions(system, q, e);
     inertia(n, system->H, system->J, e, M, C);
-    spread(system, r, B, spread_B);
-    jacobian(r, n, spread_B, e, rows);
+    Rows held = plain_rows(system, r, B, NULL);
+    jacobian(&held, e, rows);
     gravity_row(system, w);
     generalised(n, w, e, load);
     for (int j = 0; j < n; j++) {

@@ -48,10 +48,8 @@ PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const
 /* What must hold at a fraction of the load: s = Re(B e) + c = 0, and the dead loads of row w. */
 typedef struct {
     const System *system;
-    int r;
-    Complex *B, *spread; /* (r, n) */
-    double *c;           /* (r,) */
-    Complex *w;          /* (n,) spread */
+    Rows rows;
+    Complex *w; /* (n,) spread */
 } Balance;
 
 /* Torques and openings at (q, lam), and the rows of the constraints. */
@@ -59,21 +57,21 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
                        double *torque, double *open_by, double *rows, Scratch *scratch) {
     const System *system = balance->system;
     size_t used = scratch->used;
-    int n = system->n, r = balance->r;
+    int n = system->n, r = balance->rows.count;
     double *turned = take(scratch, (size_t)n), *load = take(scratch, (size_t)n);
     for (int j = 0; j < n; j++) {
         turned[j] = state[j] - system->q0[j];
     }
     springs(n, system->K, turned, torque);
     generalised(n, balance->w, e, load);
-    jacobian(r, n, balance->spread, e, rows);
+    jacobian(&balance->rows, e, rows);
     for (int j = 0; j < n; j++) {
         torque[j] += load[j];
         for (int i = 0; i < r; i++) {
             torque[j] += state[n + i] * rows[i * n + j];
         }
     }
-    scalars(r, n, balance->B, balance->c, e, open_by);
+    scalars(&balance->rows, e, open_by);
     scratch->used = used;
 }
 
@@ -81,11 +79,11 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
 static bool newton_step(const Balance *balance, const Complex *e, double *torque, double *open_by,
                         const double *rows, double *state, Scratch *scratch) {
     size_t used = scratch->used;
-    int n = balance->system->n, r = balance->r, size = n + r;
+    int n = balance->system->n, r = balance->rows.count, size = n + r;
     double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
     double *change = take(scratch, (size_t)size);
     Problem ignored;
-    tangent_stiffness(balance->system, r, balance->w, balance->B, state + n, e, K_t);
+    tangent_stiffness(balance->system, r, balance->w, balance->rows.B, state + n, e, K_t);
     saddle(n, r, K_t, rows, rows, kkt);
     copy(n, torque, change);
     for (int i = 0; i < r; i++) {
@@ -105,7 +103,7 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
 static bool balance_out(const Balance *balance, double *state, Scratch *scratch) {
     const System *system = balance->system;
     size_t used = scratch->used;
-    int n = system->n, r = balance->r;
+    int n = system->n, r = balance->rows.count;
     Complex *e = take_complex(scratch, 1, n);
     double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
     double *rows = take_matrix(scratch, r, n), scale = BALANCED * largest(n * n, system->K);
@@ -126,12 +124,11 @@ static bool loaded(const System *system, bool held, double displacement, double 
                    double *state, Scratch *scratch) {
     size_t used = scratch->used;
     int n = system->n, r = system->r;
-    Balance balance = {system, r + held, take_complex(scratch, r + 1, n),
-                       take_complex(scratch, r + 1, n), take(scratch, (size_t)r + 1),
-                       take_complex(scratch, 1, n)};
-    stack_release(system, balance.B, balance.c);
-    balance.c[r] -= fraction * displacement;
-    spread(system, r + 1, balance.B, balance.spread);
+    Complex *B = take_complex(scratch, r + 1, n);
+    double *c = take(scratch, (size_t)r + 1);
+    Balance balance = {system, plain_rows(system, r + held, B, c), take_complex(scratch, 1, n)};
+    stack_release(system, B, c);
+    c[r] -= fraction * displacement;
     field_row(n, system->S, scaled(fraction, system->gravity), balance.w);
     spread(system, 1, balance.w, balance.w);
     bool balanced = balance_out(&balance, state, scratch);
@@ -216,8 +213,8 @@ PRBM bool release_velocity(const System *system, const double *q, double speed, 
     directions(system, q, e);
     inertia(n, system->H, system->J, e, M, C);
     stack_release(system, B, rates);
-    spread(system, r, B, B);
-    jacobian(r, n, B, e, rows);
+    Rows held = plain_rows(system, r, B, NULL);
+    jacobian(&held, e, rows);
     zeros(r, rates);
     rates[r - 1] = -speed;
     bool found = project_velocities(n, r, M, rows, rates, v, scratch, problem);
