@@ -285,14 +285,6 @@ def test_small_singular_values_count_or_not_as_rcond_says():
         np.testing.assert_allclose(x, exact, rtol=1e-7, atol=1e-12 * np.abs(exact).max())
 
 
-@pytest.mark.parametrize(("m", "n"), SHAPES)
-def test_rank_is_the_number_of_singular_values_above_the_tolerance(m, n):
-    for r in range(min(m, n) + 1):
-        a = of_rank(m, n, r)
-        for tolerance in (1e-9, 0.5, 3.0):
-            assert kernel().rank(m, n, a, tolerance) == np.linalg.matrix_rank(a, tol=tolerance)
-
-
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8, 13])
 def test_eigenvalues_and_vectors_of_symmetric_matrices(n):
     """A z = w z, z orthonormal, w rising and NumPy's; for multiple and graded ones too."""

@@ -163,8 +163,8 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
 
 /* --- the same again and again ----------------------------------------------------------------- */
 
-/* M = L D L^T of the lower triangle of M, L with ones on its diagonal, and the inverse of D; false if
- * M is not positive definite. */
+/* M = L D L^T of the lower triangle of M, L with ones on its diagonal, and the inverse of D; false
+ * if M is not positive definite. */
 SIZED bool block_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     UNROLLED
     for (int i = 0; i < size; i++) {

@@ -218,7 +218,7 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs, const Discre
 
 /* --- motion ----------------------------------------------------------------------------------- */
 
-/* The angles from which those of the stages of a step are turned. */
+/* The angles from whose directions those near them are turned. */
 static void start_from(Equations *q, const double *angle) {
     int even = q->system->even;
     pad(q->system->n, angle, q->start);
@@ -241,7 +241,7 @@ static void stretch_links(Equations *q) {
     }
 }
 
-/* The directions at the angles: from those where the step began, or afresh. */
+/* The directions at the angles: from those of the start, or afresh. */
 static void find_directions(Equations *q, bool turned) {
     int even = q->system->even;
     if (!turned ||
@@ -486,7 +486,18 @@ static void set_columns(Equations *q) {
     }
 }
 
-/* Solve for x = a and lam; turned: within a step. */
+/* The factors, and x := L^-1 x, from the rows in Z. */
+static bool factor_motion(Equations *q) {
+    q->factors.r = q->r;
+    q->factors.block_count = q->system->block_count;
+    if (!blocks_motion(q)) {
+        return false;
+    }
+    set_columns(q);
+    return factor_schur(&q->factors);
+}
+
+/* Solve for x = a and lam; turned: near the start. */
 static bool solve_motion(Equations *q, const double *angle, const double *v, bool turned) {
     const System *system = q->system;
     pad(system->n, angle, q->angle);
@@ -496,13 +507,7 @@ static bool solve_motion(Equations *q, const double *angle, const double *v, boo
     add_springs(q);
     rows_and_convection(q, q->factors.Z);
     add_rubs(q);
-    q->factors.r = q->r;
-    q->factors.block_count = system->block_count;
-    if (!blocks_motion(q)) {
-        return false;
-    }
-    set_columns(q);
-    if (!factor_schur(&q->factors)) {
+    if (!factor_motion(q)) {
         return false;
     }
     finish(&q->factors, q->x, q->lam);
@@ -511,6 +516,17 @@ static bool solve_motion(Equations *q, const double *angle, const double *v, boo
         q->x[arm_of(system, j)] += coriolis(q, j);
     }
     return true;
+}
+
+/* Only the factors, at a state that is then a start. */
+static bool factor_start(Equations *q, const double *angle, const double *v) {
+    start_from(q, angle);
+    pad(q->system->n, angle, q->angle);
+    pad(q->system->n, v, q->speed);
+    find_directions(q, true);
+    find_loads(q);
+    rows_and_convection(q, q->factors.Z);
+    return factor_motion(q);
 }
 
 PRBM bool accelerations(Equations *equations, const double *q, const double *v, double *a,
@@ -568,7 +584,7 @@ PRBM void begin_trace(Equations *q) {
     }
 }
 
-/* The rates of y; turned: within a step. */
+/* The rates of y; turned: near the start. */
 static bool rates_at(Equations *q, const double *y, bool turned, double *dy, Problem *problem) {
     int n = q->system->n;
     const double *v = y + n;
@@ -684,7 +700,7 @@ static void correct(Equations *q, double *y) {
     }
 }
 
-/* One correction by the factors at hand; turned: within a step. */
+/* One correction by the factors at hand; turned: near the start. */
 static bool corrected(Equations *q, double t, double *y, bool turned) {
     int n = q->system->n;
     ask_positions(q, t); /* e is that of y: evaluated last */
@@ -712,6 +728,13 @@ static bool project_near(Equations *q, double t, double *y, bool turned, Scratch
     }
     copy(n, kept, y); /* as if nothing had been tried */
     return project(q, t, y, scratch, problem);
+}
+
+/* The directions at angles near the start. */
+static const Complex *directions_near(Equations *q, const double *angle) {
+    pad(q->system->n, angle, q->angle);
+    find_directions(q, true);
+    return q->e;
 }
 
 PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *scratch,

@@ -445,7 +445,7 @@ static bool attempt(Simulation *sim, bool right, Problem *problem) {
 }
 
 static void keep_backup(Simulation *sim) {
-    copy((int)sim->state_count, sim->state, sim->backup);
+    memcpy(sim->backup, sim->state, sim->state_count * sizeof *sim->state);
 }
 
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
@@ -513,18 +513,22 @@ PRBM int unsettled_by_walls(Simulation *sim) {
     return struck;
 }
 
-/* The state y = (q, v, dissipated energy, work) at the present time, on the constraints. */
+/* The state y = (q, v, dissipated energy, work) at the present time, on the constraints; the start
+ * of the equations is near it. */
 static bool state_at(Simulation *sim, double *y, Problem *problem) {
     const Scalars *now = sim->now;
     int ny = state_size(sim), n = sim->system.n;
     if (now->has_arc == 0.0 || now->time >= now->front_time) {
         copy(ny, sim->front, y);
+        start_from(&sim->equations, y);
         return true;
     }
     double theta = (now->time - now->arc_start) / now->arc_h;
     interpolate(ny, sim->arc_y, sim->arc_k, now->arc_h, theta, y);
-    return accelerations(&sim->equations, y, y + n, sim->a, sim->lam, problem) &&
-           project_from_here(&sim->equations, now->time, y, &sim->scratch, problem);
+    if (!factor_start(&sim->equations, y, y + n)) {
+        return fail(problem, "%s", SINGULAR);
+    }
+    return project_near(&sim->equations, now->time, y, true, &sim->scratch, problem);
 }
 
 /* Go on from the present state with the present inputs and parameters. */
@@ -1927,7 +1931,6 @@ static void output_places(Simulation *sim) {
     const Slots *slots = &sim->mechanism->slots;
     int n = system->n;
     double *out = sim->outputs, *v = sim->y + n;
-    directions(&sim->system, sim->y, sim->e);
     for (int i = 0; i < system->b; i++) {
         const BodyFrame *frame = &system->bodies[i];
         double *values = out + slots->bodies + PER_BODY * i;
@@ -1977,15 +1980,16 @@ static void output_places(Simulation *sim) {
 static bool output_motion(Simulation *sim, Problem *problem) {
     const Slots *slots = &sim->mechanism->slots;
     double *out = sim->outputs, *v = sim->y + sim->system.n;
-    if (!accelerations(&sim->equations, sim->y, v, sim->a, sim->lam, problem)) {
-        return false;
+    if (!solve_motion(&sim->equations, sim->y, v, sim->now->exchange == 0.0)) {
+        return fail(problem, "%s", SINGULAR);
     }
+    copy(sim->system.n, sim->equations.x, sim->a);
     for (int i = 0; i < sim->system.s; i++) {
         out[slots->stops + PER_STOP * i + 2] = 0.0;
     }
     for (int k = 0; k < sim->equations.held_count; k++) {
         out[slots->stops + PER_STOP * sim->equations.held[k] + 2] =
-            sim->lam[sim->equations.first_hold + k];
+            sim->equations.lam[sim->equations.first_hold + k];
     }
     out[slots->energies] = energy_here(&sim->equations, v);
     return true;
@@ -1994,7 +1998,6 @@ static bool output_motion(Simulation *sim, Problem *problem) {
 static void output_base(Simulation *sim) {
     double *out = sim->outputs + sim->mechanism->slots.base;
     Complex force;
-    directions(&sim->system, sim->y, sim->e);
     base_reaction(&sim->equations, sim->e, sim->y + sim->system.n, sim->a, &force, out + 2,
                   &sim->scratch);
     out[0] = force.re;
@@ -2008,15 +2011,19 @@ static void output_energies(Simulation *sim) {
     for (int j = 0; j < n; j++) {
         deflection[j] = sim->y[j] - system->q0[j];
     }
-    directions(&sim->system, sim->y, sim->e);
     out[1] = elastic_energy(n, system->K, deflection);
     out[2] = gravitational_energy(system, sim->e);
 }
 
+/* y and e at the present time, and what follows from them alone. */
 static bool output_state(Simulation *sim, Problem *problem) {
+    int n = sim->system.n;
     if (sim->now->exchange != 0.0) {
         copy(state_size(sim), sim->front, sim->y);
-    } else if (!state_at(sim, sim->y, problem)) {
+        directions(&sim->system, sim->y, sim->e);
+    } else if (state_at(sim, sim->y, problem)) {
+        memcpy(sim->e, directions_near(&sim->equations, sim->y), (size_t)n * sizeof *sim->e);
+    } else {
         return false;
     }
     output_places(sim);

@@ -531,8 +531,8 @@ typedef struct {
     bool driven, walls_push;
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
-    /* where the present step began */
     double *own;            /* (n,) the diagonal of M now */
+    /* where the present step began, or something else that others are near */
     double *start;          /* (even,) its angles */
     Complex *e_at_start;    /* (even,) */
     Parts e_start;          /* (even,) the same */

@@ -32,8 +32,9 @@ static const double DENSE_WEIGHT[STAGES][DENSE] = {
     {0.0, 3.0 / 2, -4.0, 5.0 / 2},
 };
 
-/* More than the largest magnitudes of the weights at any fraction. */
-static const double LARGEST_WEIGHT[STAGES] = {0.103, 0.0, 0.329, 0.196, 0.009, 0.36, 0.078, 0.068};
+/* More than the largest magnitudes of the weights of the dense output at any fraction. */
+static const double LARGEST_WEIGHT[STAGES] = {0.103, 0.0,  0.329, 0.196,
+                                              0.009, 0.36, 0.078, 0.068};
 
 /* result = y + h sum(a_i k_i) for n even, as it is with two rates for each angle and two energies. */
 SIZED void combine_of(int count, int n, int stride, double h, const double *a, const double *k,
