@@ -538,10 +538,15 @@ class Simulation:
         sign, is not found again.  A dip below zero between two looks shows in the rates.
         """
         gap_at, near = self._gap_at(arc, i), TOUCHING * self.system.length
+        still, closed = self._still(), constraints.CLOSED * self.system.length
         for j in range(WATCHED):
             a, b = float(times[j]), float(times[j + 1])
             dips = rates[j] < 0.0 < rates[j + 1]
             if gaps[j + 1] > 0.0 and not dips:
+                continue
+            if abs(rates[j]) <= still and abs(gaps[j]) <= closed:
+                if gaps[j + 1] < -near:  # it has let go too early: a little later it is pressed
+                    return _falls(lambda t: gap_at(t) + near, a, b)
                 continue
             if rates[j] > 0.0:
                 if rates[j + 1] >= 0.0:

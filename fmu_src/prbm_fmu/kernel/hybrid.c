@@ -686,6 +686,7 @@ typedef struct {
     Simulation *sim;
     int kind, index;
     double sign;
+    double depth; /* of a gap, at which it counts as fallen */
 } Guard;
 
 enum { GAP_FALLS, GAP_RATE_FALLS, SPEED_FALLS, MARGIN_FALLS };
@@ -737,7 +738,7 @@ static double guard_at(const Guard *guard, int what, double t) {
     }
     directions(&sim->system, y, sim->e);
     if (what == GAP_FALLS) {
-        return gap(&sim->equations, guard->index, t, sim->e);
+        return gap(&sim->equations, guard->index, t, sim->e) + guard->depth;
     }
     if (what == GAP_RATE_FALLS) {
         return guard->sign * gap_rate(&sim->equations, guard->index, sim->e, y + n);
@@ -896,7 +897,9 @@ static bool polished(Simulation *sim, int i, double *time, Problem *problem) {
 static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
     int n = sim->system.n;
     double near = TOUCHING * sim->system.length, *gaps = sim->look_gap, *rates = sim->look_rate;
-    Guard guard = {sim, IMPACT, i, 1.0}, opening = {sim, IMPACT, i, -1.0};
+    double bound = still(sim), closed = CLOSED * sim->system.length;
+    Guard guard = {sim, IMPACT, i, 1.0, 0.0}, opening = {sim, IMPACT, i, -1.0, 0.0};
+    Guard deeper = {sim, IMPACT, i, 1.0, near};
     for (int k = 0; k <= WATCHED; k++) {
         const Complex *e = sim->look_e + k * n;
         gaps[k] = gap(&sim->equations, i, look_time(sim, k), e);
@@ -906,6 +909,13 @@ static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
         double a = look_time(sim, k), b = look_time(sim, k + 1);
         bool dips = rates[k] < 0.0 && 0.0 < rates[k + 1];
         if (gaps[k + 1] > 0.0 && !dips) {
+            continue;
+        }
+        if (fabs(rates[k]) <= bound && fabs(gaps[k]) <= closed) {
+            if (gaps[k + 1] < -near) { /* it has let go too early: a little later it is pressed */
+                note(first, IMPACT, i, falls(&deeper, GAP_FALLS, a, b));
+                return true;
+            }
             continue;
         }
         if (rates[k] > 0.0) {
@@ -945,7 +955,7 @@ static void turning_back(Simulation *sim, int kind, int i, int sign, Event *firs
     int n = sim->system.n;
     double z[WATCHED + 1];
     Rows rows = rows_of(sim, kind);
-    Guard guard = {sim, kind, i, sign};
+    Guard guard = {sim, kind, i, sign, 0.0};
     for (int k = 0; k <= WATCHED; k++) {
         z[k] = sign * row_rate(&rows, i, sim->look_e + k * n, sim->look_y + k * 2 * n + n);
     }
@@ -977,7 +987,7 @@ static bool may_yield(const Simulation *sim) {
 
 /* When one margin is used up, from its values at the start, the middle and the end. */
 static void yields_at(Simulation *sim, int kind, int k, int index, Event *first) {
-    Guard guard = {sim, kind, k, 1.0};
+    Guard guard = {sim, kind, k, 1.0, 0.0};
     const Scalars *now = sim->now;
     double times[3] = {now->arc_start, now->arc_start + now->arc_h / 2,
                        now->arc_start + now->arc_h};
