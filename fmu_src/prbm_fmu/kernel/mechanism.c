@@ -336,12 +336,12 @@ static void read_bounds(Reader *reader, Mechanism *m) {
 
 /* --- sizes and order -------------------------------------------------------------------------- */
 
-static const FlexureType *type_of(const Mechanism *m, const Flexure *flexure) {
+static const FlexureType *kind_of(const Mechanism *m, const Flexure *flexure) {
     return &m->types[flexure->type];
 }
 
 static int link_count(const Mechanism *m, const Flexure *flexure) {
-    return links_of(type_of(m, flexure), flexure->start_end, flexure->end_end);
+    return links_of(kind_of(m, flexure), flexure->start_end, flexure->end_end);
 }
 
 static void count_coordinates(Reader *reader, Mechanism *m) {
@@ -351,7 +351,7 @@ static void count_coordinates(Reader *reader, Mechanism *m) {
         links += count;
         m->longest = count > m->longest ? count : m->longest;
         for (int k = 0; k < count; k++) {
-            stretching += stretches(type_of(m, &m->flexures[i]), k, count);
+            stretching += stretches(kind_of(m, &m->flexures[i]), k, count);
         }
     }
     long long parts = (long long)m->flexure_count + m->joint_count, b = m->body_count;
@@ -431,7 +431,7 @@ static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
     int count = step->flexure ? link_count(m, step->flexure) : 0;
     for (int k = 0; k < count; k++) {
         int i = step->backwards ? count - 1 - k : k;
-        add_link(walk, stretches(type_of(m, step->flexure), i, count));
+        add_link(walk, stretches(kind_of(m, step->flexure), i, count));
     }
     int far = step->backwards ? step->between->start : step->between->end;
     step->closes = walk->held[far];
