@@ -396,9 +396,9 @@ class Simulation:
 
     def _take_step(self) -> None:
         """Take one step from the front, cut it at the first event."""
-        f, t, y = self.equations.rate, self.front_time, self.front
+        t, y = self.front_time, self.front
         if self.k1 is None:
-            self.k1 = f(t, y)
+            self.k1 = self.equations.rate(t, y)
         h = self.step or min(self.h or self._first_step(self.k1), self._largest_step())
         growth = GROW
         while True:
@@ -414,8 +414,7 @@ class Simulation:
                     "start the simulation nearer to zero"
                 )
             self.equations.trace.clear()
-            k, y1 = stages(PAIR, f, t, y, h, self.k1)
-            error = self._error(h * (PAIR.error @ k), y, y1)
+            k, y1, error = self._trial(t, y, h, self.k1)
             if self.step or error <= 1.0:
                 break
             growth = 1.0  # a step that had to be repeated is not followed by a longer one
@@ -440,6 +439,21 @@ class Simulation:
             self.front_time, self.k1 = event.time, None
             self.front = self.equations.project(event.time, arc.at(event.time))
         self.arc = arc
+
+    def _trial(self, t: float, y: Real, h: float, k1: Real) -> tuple[Real, Real, float]:
+        """Return the stages of a step, where it leads to, and its error.
+
+        A step that is far too long may lead to where nothing can be computed: its error is
+        infinite, unless the step is fixed.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            try:
+                k, y1 = stages(PAIR, self.equations.rate, t, y, h, k1)
+            except SimulationError:
+                if self.step:
+                    raise
+                return np.zeros((PAIR.error.size, len(y))), y, math.inf
+            return k, y1, self._error(h * (PAIR.error @ k), y, y1)
 
     def _scales(self, y: Real) -> Real:
         """Return the magnitudes against which errors of a state are measured.
@@ -530,11 +544,16 @@ class Simulation:
         the impact that has just been resolved, whose gap is zero up to a rounding of either
         sign, is not found again.  A dip below zero between two looks shows in the rates.
         """
-        gap_at, near, still = self._gap_at(arc, i), TOUCHING * self.system.length, self._still()
+        gap_at, near = self._gap_at(arc, i), TOUCHING * self.system.length
+        still, closed = self._still(), constraints.CLOSED * self.system.length
         for j in range(WATCHED):
             a, b = float(times[j]), float(times[j + 1])
-            dips = rates[j] < -still and rates[j + 1] > 0.0
+            dips = rates[j] < 0.0 < rates[j + 1]
             if gaps[j + 1] > 0.0 and not dips:
+                continue
+            if abs(rates[j]) <= still and abs(gaps[j]) <= closed:
+                if gaps[j + 1] < -near:  # it has let go too early: a little later it is pressed
+                    return _falls(lambda t: gap_at(t) + near, a, b)
                 continue
             if rates[j] > 0.0:
                 if rates[j + 1] >= 0.0:
@@ -986,16 +1005,19 @@ class Simulation:
         system, equations, n, t = self.system, self.equations, self.system.n, self.time
         y = self.state()
         q, v = y[:n], y[n : 2 * n]
-        e, w = self.system.directions(q), self.system.turning(v)
+        e = system.directions(q)
         a, lam, M = equations.accelerations(q, v)
         out: dict[str, float | int | bool] = {}
         for name, frame in system.bodies.items():
-            place = complex(frame.A @ e) + frame.c - frame.drawn
-            velocity = complex(1j * (frame.A @ (e * w)))
+            place, velocity = system.motion(frame, e, v)
             out[f"{name}.x"], out[f"{name}.y"] = place.real, place.imag
             out[f"{name}.angle"] = float(q[frame.j])
             out[f"{name}.vx"], out[f"{name}.vy"] = velocity.real, velocity.imag
             out[f"{name}.omega"] = float(v[frame.j])
+        for frame in system.probes:
+            place, velocity = system.motion(frame, e, v)
+            out[f"{frame.name}.x"], out[f"{frame.name}.y"] = place.real, place.imag
+            out[f"{frame.name}.vx"], out[f"{frame.name}.vy"] = velocity.real, velocity.imag
         gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
         pressed = equations.stop_forces(lam)
         for i, stop in enumerate(self.mechanism.stops):
@@ -1018,6 +1040,10 @@ class Simulation:
         for number, j in enumerate(system.links, start=1):
             out[f"link[{number}].angle"] = float(q[j])
             out[f"link[{number}].omega"] = float(v[j])
+        for j, link in zip(system.stretches, system.stretched, strict=True):
+            number = system.links.index(link) + 1
+            out[f"link[{number}].strain"] = float(q[j])
+            out[f"link[{number}].strain_rate"] = float(v[j])
         out["mode.frequency"] = self.frequency
         out.update(self.calculated)
         return out
