@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import constraints
+from . import constraints, contact
 from .assembly import Complex, Real, System, Whole
 from .errors import EquilibriumError, ParameterError, SimulationError
 from .forces import field_row, force_row, springs
@@ -22,7 +22,8 @@ from .mechanism import finite, unknown
 NEWTON_STEPS = 30
 LARGEST_TURN = 0.5  # rad per Newton step and per step of the load: further is another shape
 SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
-BALANCED = 1e-12  # of the largest rate of a spring times one radian
+IMMOBILE = 1e-12  # share of a body's mobility that the loops leave it: below, it cannot move
+BALANCED = 1e-12  # of the largest spring rate times one radian, or without springs of the load
 CONVERGED = 1e-8  # rad of the last Newton step; what is left after it is its square
 
 
@@ -185,7 +186,7 @@ def _newton(
     shift = np.zeros(len(c))
     if len(c) > len(system.loops):
         shift[-1] = displacement
-    scale = BALANCED * float(np.abs(system.K).max())
+    scale = BALANCED * float(np.abs(system.K).max() or np.abs(w).max())
     state, turn = start.copy(), math.inf
     for _ in range(NEWTON_STEPS):
         q, lam = state[:n], state[n:]
@@ -242,12 +243,25 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     -------
     v : (n,)
         What an impulse on the centre of mass along that direction gives [rad/s].
+
+    Raises
+    ------
+    ParameterError
+        If the body cannot move along that direction.
     """
     if speed == 0.0:
         return np.zeros(system.n)
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     rows = constraints.jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    loops, row = rows[:-1], rows[-1:]
+    left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
+    if left <= IMMOBILE * free:
+        raise ParameterError(
+            f"release.velocity = {speed:g} m/s: the body {system.mechanism.release.body} cannot "
+            "move along the direction of the release; choose another direction, or let flexures "
+            "stretch (axial = true)"
+        )
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     return constraints.project_velocities(M, rows, rates, np.zeros(system.n))

@@ -11,7 +11,7 @@ enum { NO_EVENT, IMPACT, RELEASE, SLIP_SLIDE, SLIP_RUB, SLIDE, RUB };
 /* Numbers of the state; all of them doubles, so that the state is one array. */
 typedef struct {
     double started, exchange, time, tolerance, frequency;
-    double h, last_error, has_k1;
+    double h, log_of_error, has_k1; /* error: of the last step, to what the tolerance allows */
     double front_time;
     double window_since, window_count; /* of the events that are counted against chatter */
     double has_arc, arc_start, arc_h, arc_end;
