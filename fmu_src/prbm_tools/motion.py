@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from prbm import Mechanism, ParameterError, System, assemble
-from prbm.assembly import Real
-from prbm.constraints import project_positions
+from prbm.assembly import FIXED, Real
+from prbm.constraints import Rows, gap_rows, project_positions
 from prbm.mechanism import value
 
 from .simulate import Columns, Result, ResultError, column, names
@@ -97,8 +97,7 @@ class Motion:
 
 
 def _gaps(system: System, q: Real) -> Real:
-    result: Real = (np.exp(1j * q) @ system.gaps.T).real + system.gaps_c
-    return result
+    return gap_rows(system).values(system.directions(q))
 
 
 def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) -> Real:
@@ -115,10 +114,15 @@ def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) 
     wall : float
         Where its wall is [m].
     """
-    touching = [] if stop is None else [stop]
-    B = np.vstack([system.loops, system.gaps[touching]])
-    c = np.concatenate([system.loops_c, system.gaps_c[touching] + wall])
-    return project_positions(system.H, np.diag(system.J), B, c, q, system.length)[0]
+    touching, free = [] if stop is None else [stop], np.zeros(len(system.loops), complex)
+    rows = Rows(
+        system,
+        np.vstack([system.loops, system.gaps[touching]]),
+        np.concatenate([system.loops_c, system.gaps_c[touching] + wall]),
+        np.concatenate([free, system.gaps_z[touching]]),
+        np.concatenate([np.full(len(free), FIXED), system.on[touching]]),
+    )
+    return project_positions(system, rows, q, rows.c)[0]
 
 
 def needed(mechanism: Mechanism) -> list[str]:
