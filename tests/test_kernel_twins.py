@@ -241,9 +241,9 @@ def test_flexures_are_cut_into_the_same_segments(name, links, ends):
         found = structures()["Segments"](0, *(row.ctypes.data for row in room))
         kernel().segments(kind, gamma, K_theta, *held, L, EI, mass, EA, found)
         expected = flexure.segments(model, gamma, K_theta, ends, L, EI, mass, EA)
-        for same in (lambda: expected, expected.reversed):
-            assert found.n == count == len(same().lengths) - 2
-            for row, wanted in zip(room, vars(same()).values(), strict=True):
+        for same in (expected, expected.reversed()):
+            assert found.n == count == len(same.lengths) - 2
+            for row, wanted in zip(room, vars(same).values(), strict=True):
                 assert_same(row[: len(wanted)], wanted)
             kernel().reversed(found)
         stretching = [kernel().stretches(kind, i, count) for i in range(count)]
@@ -1073,7 +1073,8 @@ OWN = {
     "mechanism.c": {"mechanism_open", "mechanism_close", "find_variable"},
     "flexure.c": {"links_of", "reverse", "stretches"},
     "assembly.c": {
-        "arm_of", "system_place", "complex_of", "plus", "minus", "product", "conjugate", "scaled", "modulus",
+        "arm_of", "system_place", "complex_of", "plus", "minus", "product", "conjugate", "scaled",
+        "modulus",
     },
     "constraints.c": {"plain_rows", "row_jacobian", "row_value"},
     "dynamics.c": {"equations_place", "begin_trace", "energy_here"},
