@@ -314,8 +314,9 @@ def run(job: Job, *words: Any, **options: Any) -> Done:
 
 @cache
 def given(model: str) -> Mechanism:
-    """Return a mechanism by name: a shipped one, or the 2R guide with two stops that rub, or one
-    of bodies that hit each other on flexures that stretch.
+    """Return a mechanism by name: a shipped one, or one of the tests' own.
+
+    The 2R guide with two stops that rub, and bodies that hit each other on flexures that stretch.
     """
     if model == ANVIL:
         return anvil()

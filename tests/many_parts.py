@@ -103,7 +103,9 @@ def elastic():
             Friction("dry", "pendulum", 90.0),
         ),
         forces=(Force("pull", "hammer", point=("0.03", "L + 0.06")), Force("push", "stage")),
-        probes=(Probe("tip", "hammer.root"), Probe("eye", "lever.end"), Probe("still", "ground.left")),
+        probes=(
+            Probe("tip", "hammer.root"), Probe("eye", "lever.end"), Probe("still", "ground.left"),
+        ),
         release=Release("stage", 15.0, -3e-3),
         geometry=(length("L", 0.04),),
         gravity=(1.0, -9.81),

@@ -136,6 +136,7 @@ def test_directional_derivatives_of_stretches_and_walls_on_bodies(side, slides, 
 def test_directional_derivatives_of_a_mechanism_of_many_parts():
     guide = elastic()
     inputs = dict.fromkeys(input_names(guide), 0.1) | {"pull.moment": 1e-3, "push.moment": -1e-3}
+    inputs["tap.velocity"] = 0.04  # away from the kink of its indicator
     friction = {"rub.coefficient": 0.2, "dry.coefficient": 0.1, "dry.normal_force": 0.3}
     for discrete in ((0, 0, 0, 2, 2, 2, 1, 2), (1, 1, 1, 1, 2, -1, 0, -1)):
         assert_directional(guide, friction, inputs, discrete)

@@ -122,7 +122,12 @@ def test_bodies_that_hit_and_rest_on_each_other_do_so_in_the_kernel(name):
 
 def test_a_mechanism_of_many_parts_moves_in_the_kernel_as_in_the_engine():
     """A chain, a free end, bars, joints, walls on bodies: until a few impacts have been."""
-    compared(elastic(), {"L": 0.05, "solver.tolerance": 1e-10}, {2: {"pull.x": 0.05, "push.moment": 0.01}}, end=0.02)
+    compared(
+        elastic(),
+        {"L": 0.05, "solver.tolerance": 1e-10},
+        {2: {"pull.x": 0.05, "push.moment": 0.01}},
+        end=0.02,
+    )
 
 
 def test_the_guide_of_the_thesis_appendix_in_the_kernel():

@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import prbm_fmu.tables
 from kernel_library import (
     KernelError,
     KernelSystem,
@@ -29,6 +30,7 @@ from kernel_library import (
 )
 from many_parts import elastic, rich
 from prbm import (
+    FlexureType,
     Mechanism,
     Parameter,
     assembly,
@@ -43,7 +45,7 @@ from prbm import (
     runge_kutta,
     statics,
 )
-from prbm.errors import EquilibriumError, ParameterError, SimulationError
+from prbm.errors import EquilibriumError, MechanismError, ParameterError, SimulationError
 from prbm.mechanism import Affine
 from support import mechanism
 
@@ -241,9 +243,9 @@ def test_flexures_are_cut_into_the_same_segments(name, links, ends):
         found = structures()["Segments"](0, *(row.ctypes.data for row in room))
         kernel().segments(kind, gamma, K_theta, *held, L, EI, mass, EA, found)
         expected = flexure.segments(model, gamma, K_theta, ends, L, EI, mass, EA)
-        for same in (lambda: expected, expected.reversed):
-            assert found.n == count == len(same().lengths) - 2
-            for row, wanted in zip(room, vars(same()).values(), strict=True):
+        for same in (expected, expected.reversed()):
+            assert found.n == count == len(same.lengths) - 2
+            for row, wanted in zip(room, vars(same).values(), strict=True):
                 assert_same(row[: len(wanted)], wanted)
             kernel().reversed(found)
         stretching = [kernel().stretches(kind, i, count) for i in range(count)]
@@ -311,6 +313,36 @@ def test_what_cannot_be_assembled_is_told_in_the_same_words(change):
     values = guide.values() | change
     said = sentence(ParameterError, assembly.assemble, guide, values)
     assert sentence(KernelError, ours.assemble, values) == re.sub(" from .* to [^ ]*", "", said)
+
+
+def refused(guide, count):
+    """Return what package and kernel say of a mechanism that cannot be assembled."""
+    with pytest.MonkeyPatch.context() as patch:  # which assemble it, too
+        patch.setattr(prbm_fmu.tables, "check_size", lambda mechanism: None)
+        patch.setattr(prbm_fmu.tables, "slots", lambda mechanism, independent: {})
+        ours = KernelSystem(guide, count)
+    said = sentence(MechanismError, assembly.assemble, guide, guide.values())
+    return said, sentence(KernelError, ours.assemble, guide.values())
+
+
+def test_loops_that_ask_for_the_same_are_named_in_the_same_words():
+    """Two bars beside a leaf that is as long as they are at every shape near the straight one."""
+    guide = mechanism("PRBDM2R")
+    one, other = guide.flexures
+    bar = replace(one, type="bar", ends=("pin", "pin"))
+    more = (replace(bar, name="third"), replace(bar, name="a_fourth"))
+    types = (*guide.flexure_types, FlexureType("bar", "3R", 1e-3, 1e-3, 1e9, 1e3))
+    guide = replace(guide, flexure_types=types, flexures=(one, other, *more))
+    theirs, ours = refused(guide, 3)
+    assert ours == theirs
+    assert "closed by a_fourth, third ask" in ours
+
+
+def test_points_that_a_joint_cannot_join_are_told_in_the_same_words():
+    guide = elastic()
+    hinge, hook = guide.joints
+    theirs, ours = refused(replace(guide, joints=(replace(hinge, start="stage.top"), hook)), 15)
+    assert ours == theirs.replace("stage.top and lever.pin, which", "points that")
 
 
 # --- kinetics.c, constraints.c, forces.c ---------------------------------------------------------
@@ -1073,7 +1105,8 @@ OWN = {
     "mechanism.c": {"mechanism_open", "mechanism_close", "find_variable"},
     "flexure.c": {"links_of", "reverse", "stretches"},
     "assembly.c": {
-        "arm_of", "system_place", "complex_of", "plus", "minus", "product", "conjugate", "scaled", "modulus",
+        "arm_of", "system_place", "complex_of", "plus", "minus", "product", "conjugate", "scaled",
+        "modulus",
     },
     "constraints.c": {"plain_rows", "row_jacobian", "row_value"},
     "dynamics.c": {"equations_place", "begin_trace", "energy_here"},

@@ -15,6 +15,7 @@ from prbm import Simulation
 from prbm_fmu import native_fmu, python_fmu
 from prbm_fmu.native_description import terminals
 from prbm_fmu.slaves.resolved import mechanism_from, resolved
+from support import energy_balance
 
 END, STEP = 0.04, 1e-3
 BLOW = {"blow.y": -0.6}
@@ -90,6 +91,45 @@ def test_model_exchange_goes_as_co_simulation(fmu, expected):
     assert result["face.impact_count"][-1] == expected[-1]["face.impact_count"]
     for name in ("hammer.y", "tip.x"):
         assert result[name][-1] == pytest.approx(expected[-1][name], abs=1e-6)
+
+
+def test_velocities_are_the_rates_of_displacements_where_links_stretch():
+    """Of bodies and of points, which the strain rates move, too."""
+    simulation, h = Simulation(anvil(), {"solver.tolerance": 1e-12}), 1e-6
+    simulation.advance(0.01)
+    before = simulation.outputs()
+    simulation.advance(0.01 + h)
+    now = simulation.outputs()
+    simulation.advance(0.01 + 2 * h)
+    after = simulation.outputs()
+    for name in ("stage", "hammer", "tip"):
+        for axis in "xy":
+            slope = (after[f"{name}.{axis}"] - before[f"{name}.{axis}"]) / (2 * h)
+            assert now[f"{name}.v{axis}"] == pytest.approx(slope, rel=1e-4, abs=1e-6)
+
+
+def test_energy_is_kept_by_bodies_that_hit_rub_and_stretch(expected):
+    """What the blow puts in is moved, bent, stretched, lifted or lost; to the tolerance's 1e-6."""
+    kept = [energy_balance(row) for row in expected]
+    moved = max(abs(row["energy.work"]) for row in expected)
+    assert np.ptp(kept) <= 1e-5 * moved
+
+
+def test_a_first_step_that_is_far_too_long_is_shortened():
+    """Links that stretch answer within a thousandth of the period that the first step is of."""
+    simulation = Simulation(elastic(), {"pull.x": 100.0})
+    simulation.advance(1e-5)
+    assert simulation.outputs()["hammer.vx"] > 0.0
+
+
+def test_what_lets_go_while_it_is_pressed_again_does_not_chatter():
+    """The force of a hammer that is dragged over its anvil touches zero and comes back."""
+    simulation = Simulation(anvil(), {"face.friction": 0.05, "rub.coefficient": 0.0})
+    for k, change in ((4, {"blow.y": -0.4}), (20, {"blow.x": 0.5, "blow.moment": 1e-3})):
+        simulation.advance(k * 2.5e-3)
+        simulation.set(change)
+    simulation.advance(0.08)
+    assert simulation.outputs()["face.impact_count"] > 0
 
 
 @pytest.mark.parametrize("guide", [anvil(), elastic()], ids=lambda guide: guide.name)

@@ -26,7 +26,9 @@ VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full")
 def changes(model: str) -> dict[int, dict[str, float]]:
     """Return inputs and tunable parameters that change on the way; friction sets in."""
     guide = given(model)
-    stop, force, friction = (parts[0].name for parts in (guide.stops, guide.forces, guide.frictions))
+    stop, force, friction = (
+        parts[0].name for parts in (guide.stops, guide.forces, guide.frictions)
+    )
     return {
         20: {f"{force}.x": 0.3, "base.acceleration.y": 2.0},
         60: {f"{stop}.displacement": 1e-3},

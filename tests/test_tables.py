@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import pytest
 
+from kernel_library import KernelError, kernel
 from many_parts import anvil, elastic
 from prbm import Mechanism, MechanismError, Simulation
 from prbm.dynamics import input_names
@@ -287,6 +288,32 @@ def test_what_the_kernel_would_refuse_is_not_written(many, told):
     large = replace(guide, **{many: more})
     with pytest.raises(MechanismError, match=f"Anvil has {told}; a native FMU computes with"):
         tables(large, (), TOKEN, ())
+
+
+@pytest.mark.parametrize(
+    ("name", "places", "number", "told"),
+    [
+        ("knock", 1, 2, "a stop that is fixed to what it stops"),
+        ("knock", 1, 9, "a reference that leads nowhere"),
+        ("leaf", 3, 0, "a flexure of no kind"),
+        ("leaf", 4, 3, "a flexure of no kind"),
+        ("leaf", 2, 2, "a reference that leads nowhere"),
+        ("chain", 4, 100000, "a reference that leads nowhere"),
+        ("chain", 4, 256, "more parts than can be computed with"),
+        ("hook", 0, 1, "a part that joins nothing"),
+        ("hook", 0, 2, "a body that nothing holds"),
+        ("tip", 0, 9, "a reference that leads nowhere"),
+    ],
+)
+def test_tables_that_make_no_mechanism_are_refused(name, places, number, told):
+    """A number behind the name of a part of the mechanism of many parts is replaced."""
+    guide = elastic()
+    written = bytearray(tables(guide, (), TOKEN, independent(guide)))
+    at = written.index(struct.pack("<I", len(name)) + name.encode() + b"\0") + 5 + len(name)
+    struct.pack_into("<I", written, at + 4 * places, number)
+    struct.pack_into("<I", written, 12, zlib.crc32(written[16:]))
+    with pytest.raises(KernelError, match=told):
+        kernel().mechanism_open(bytes(written), len(written))
 
 
 def test_names_of_any_alphabet_are_counted_in_bytes(tmp_path):

@@ -117,8 +117,8 @@ def _names(mechanism: Mechanism, independent: Sequence[int]) -> Iterator[str]:
     yield from ENERGIES
     yield from (f"{stop}.{what}" for stop in stops for what in LATCHED)
     coordinates = coordinate_variables(mechanism)
-    for kind in (LINK_ANGLE, LINK_STRAIN):
-        yield from (name for pair in coordinates if kind.search(pair[0]) for name in pair)
+    for of_links in (LINK_ANGLE, LINK_STRAIN):
+        yield from (name for pair in coordinates if of_links.search(pair[0]) for name in pair)
     yield from (f"{probe.name}.{what}" for probe in mechanism.probes for what in PROBE_OUTPUTS)
     yield "mode.frequency"
     for kind in mechanism.flexure_types:
@@ -200,7 +200,8 @@ class _Writer:
         m = self.mechanism
         parts: tuple[Mapping[str, object] | Sequence[object], ...] = (
             self.parameters, m.bodies, m.flexure_types, m.flexures, m.joints, m.stops, m.frictions,
-            m.forces, m.probes, m.ground, self.bounds, self.variables, self.independent, self.inputs,
+            m.forces, m.probes, m.ground, self.bounds, self.variables, self.independent,
+            self.inputs,
         )  # fmt: skip
         return tuple(map(len, parts))
 

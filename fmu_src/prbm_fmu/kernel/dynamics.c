@@ -228,12 +228,10 @@ static void start_from(Equations *q, const double *angle) {
 }
 
 /* The arms of links that stretch, and the diagonal of M, of which |E|^2 is a factor. */
-static void stretch_links(Equations *q) {
+RARE void stretch_links(Equations *q) {
     const System *system = q->system;
-    if (system->stretch_count > 0) {
-        stretch(system, q->angle, q->e);
-        pad_parts(system->even, q->e, q->e_parts);
-    }
+    stretch(system, q->angle, q->e);
+    pad_parts(system->even, q->e, q->e_parts);
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);
         double square = q->e[a].re * q->e[a].re + q->e[a].im * q->e[a].im;
@@ -249,7 +247,18 @@ static void find_directions(Equations *q, bool turned) {
         unit_vectors(even, q->angle, q->e);
         pad_parts(even, q->e, q->e_parts);
     }
-    stretch_links(q);
+    if (q->system->stretch_count > 0) {
+        stretch_links(q);
+    }
+}
+
+/* Re(w^2) of the complex rates w = theta' - i s' of arms, for the squares of all rates. */
+RARE void stretch_squares(const System *system, double *squares) {
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        squares[arm_of(system, j)] -= squares[j];
+        squares[j] = 0.0;
+    }
 }
 
 /* x: the loads Re(w e) + moment. */
@@ -264,10 +273,8 @@ static void find_loads(Equations *q) {
         set_lanes(x + j, lanes_at(moment + j) + (re - im));
         set_lanes(squares + j, lanes_at(v + j) * lanes_at(v + j));
     }
-    for (int k = 0; k < q->system->stretch_count; k++) { /* Re(w^2) of w = theta' - i s' */
-        int j = q->system->stretches[k];
-        squares[arm_of(q->system, j)] -= squares[j];
-        squares[j] = 0.0;
+    if (q->system->stretch_count > 0) {
+        stretch_squares(q->system, squares);
     }
 }
 
@@ -320,7 +327,7 @@ SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE sq
 }
 
 /* The rows that are seen from a body, and what is left of their convective terms. */
-static void carried_rows(Equations *q, double *rows) {
+RARE void carried_rows(Equations *q, double *rows) {
     const System *system = q->system;
     for (int c = 0; c < q->carried_count; c++) {
         int k = q->carried[c];
@@ -346,7 +353,9 @@ static void rows_and_convection(Equations *q, double *rows) {
             convect(1, even, parts_from(B, k * even), e, q->squares, rows + k * even, q->lam + k);
         }
     }
-    carried_rows(q, rows);
+    if (q->carried_count > 0) {
+        carried_rows(q, rows);
+    }
 }
 
 /* x -= c M v within a block. */
@@ -497,6 +506,13 @@ static bool factor_motion(Equations *q) {
     return factor_schur(&q->factors);
 }
 
+RARE void add_coriolis(Equations *q) {
+    for (int k = 0; k < q->system->stretch_count; k++) {
+        int j = q->system->stretches[k];
+        q->x[arm_of(q->system, j)] += coriolis(q, j);
+    }
+}
+
 /* Solve for x = a and lam; turned: near the start. */
 static bool solve_motion(Equations *q, const double *angle, const double *v, bool turned) {
     const System *system = q->system;
@@ -511,9 +527,8 @@ static bool solve_motion(Equations *q, const double *angle, const double *v, boo
         return false;
     }
     finish(&q->factors, q->x, q->lam);
-    for (int k = 0; k < system->stretch_count; k++) {
-        int j = system->stretches[k];
-        q->x[arm_of(system, j)] += coriolis(q, j);
+    if (system->stretch_count > 0) {
+        add_coriolis(q);
     }
     return true;
 }

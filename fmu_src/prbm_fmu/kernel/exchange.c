@@ -456,7 +456,7 @@ static bool break_away(Simulation *sim, Problem *problem) {
         return impact(sim, struck, problem);
     }
     return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
-           settle(sim, NULL, 0, NO_EVENT, 0, problem);
+           settle(sim, NULL, 0, NULL, problem);
 }
 
 /* Bring held stops back onto their walls, let them go or strike where a wall has changed its
@@ -1108,8 +1108,9 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
     return sum;
 }
 
+/* Change of |x|; at zero, where it has two, their mean. */
 static double sign_times(double x, double change) {
-    return x < 0.0 ? -change : change;
+    return x < 0.0 ? -change : x > 0.0 ? change : 0.0;
 }
 
 static void indicator_changes(const Tangent *t, double *out) {

@@ -12,6 +12,7 @@
 #define LOWEST_BOUNCE 1e-10   /* of the size, in model exchange: gaps close a little late there */
 #define DEPENDENT 1e-4        /* share of a row's mobility that the stops leave */
 #define ALIGNED 1e-9          /* the same for stops among each other */
+#define NO_SPRING TWO_PI      /* rad/s; the scale of rates of a linkage without springs */
 #define STILL 1e-9            /* of the velocity scale: what rounding leaves of none */
 #define SLACK 1e-6            /* of the limit of friction: excess before what sticks slips */
 #define CHATTER_SPAN 5e-3     /* of a period: in which CHATTER events are too many */
@@ -208,13 +209,7 @@ PRBM double omega_scale(const Simulation *sim) {
     if (sim->omega > 0.0) {
         return sim->omega;
     }
-    double stiffest = 0.0, heaviest = 0.0;
-    int n = sim->system.n;
-    for (int i = 0; i < n * n; i++) {
-        stiffest = greater(stiffest, fabs(sim->system.K[i]));
-        heaviest = greater(heaviest, modulus(sim->system.H[i]));
-    }
-    return sqrt(stiffest / heaviest);
+    return sqrt(sim->energy_scale / sim->inertia_scale);
 }
 
 PRBM double still(const Simulation *sim) {
@@ -225,11 +220,24 @@ PRBM double period(const Simulation *sim) {
     return TWO_PI / omega_scale(sim);
 }
 
-/* The scales that follow from frequency and stiffness. */
+/* The scales that follow from frequency and stiffness: of the largest inertia, and of one radian
+ * against the stiffest torsion spring or, where nothing bends, of a turn by one radian in a period. */
 static void set_scales(Simulation *sim) {
-    int n = sim->system.n;
+    const System *system = &sim->system;
+    int n = system->n;
+    double stiffest = 0.0, heaviest = 0.0;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            if (arm_of(system, i) == i && arm_of(system, j) == j) {
+                stiffest = greater(stiffest, fabs(system->K[i * n + j]));
+                heaviest = greater(heaviest, modulus(system->H[i * n + j]));
+            }
+        }
+    }
     sim->omega = TWO_PI * sim->now->frequency;
-    sim->energy_scale = largest(n * n, sim->system.K); /* one radian, the stiffest spring [J] */
+    double turning = sim->omega > 0.0 ? sim->omega : NO_SPRING;
+    sim->inertia_scale = heaviest;
+    sim->energy_scale = stiffest > 0.0 ? stiffest : heaviest * (turning * turning);
 }
 
 /* --- discrete state --------------------------------------------------------------------------- */
@@ -420,7 +428,7 @@ static bool set_off(Simulation *sim, Problem *problem) {
     return start_shape(sim, problem) &&
            project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
            check_walls(sim, problem) &&
-           settle(sim, every, sim->system.s, NO_EVENT, 0, problem);
+           settle(sim, every, sim->system.s, NULL, problem);
 }
 
 /* Keep what was before if an attempt fails. */
@@ -550,7 +558,7 @@ static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
         return impact(sim, struck, problem);
     }
     return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
-           settle(sim, NULL, 0, NO_EVENT, 0, problem);
+           settle(sim, NULL, 0, NULL, problem);
 }
 
 /* --- steps ------------------------------------------------------------------------------------ */
@@ -1075,13 +1083,9 @@ static bool happen(Simulation *sim, const Event *event, Problem *problem) {
         return impact(sim, event->index, problem);
     case RELEASE:
         without_hold(sim, event->index);
-        return settle(sim, NULL, 0, NO_EVENT, 0, problem);
-    case SLIP_SLIDE:
-    case SLIP_RUB:
-        return settle(sim, NULL, 0, event->kind == SLIP_SLIDE ? SLIDE : RUB, event->index,
-                      problem);
+        return settle(sim, NULL, 0, NULL, problem);
     default:
-        return settle(sim, NULL, 0, NO_EVENT, 0, problem);
+        return settle(sim, NULL, 0, event, problem);
     }
 }
 
@@ -1349,12 +1353,13 @@ static bool state_at_rest(Simulation *sim, int kind, int i, const double *q, con
     return true;
 }
 
-/* Whether something slides (its sign), sticks, or is idle.  What moves slides.  What is at rest is
+/* Whether something slides (its sign), sticks, or is idle.  What moves, faster than slow, slides.
+ * What is at rest is
  * idle where the loops and the stops that hold leave it no mobility of its own: the stop carries
  * everything and the friction nothing.  Else it sticks as far as Coulomb's law allows, and beyond
  * slides in the direction in which sliding accelerates it. */
 static bool slide_state(Simulation *sim, int kind, int i, const double *q, const double *v,
-                        bool yields, int *state, Problem *problem) {
+                        bool yields, double slow, int *state, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = sim->system.n;
     bool mobile = false, right = true;
@@ -1362,7 +1367,8 @@ static bool slide_state(Simulation *sim, int kind, int i, const double *q, const
     double *row = take(&sim->scratch, (size_t)n);
     Rows rows = rows_of(sim, kind);
     row_jacobian(&rows, i, here.e, row);
-    *state = sign_of_speed(sim, dot(n, row, v));
+    double speed = dot(n, row, v);
+    *state = fabs(speed) > slow ? sign_of_speed(sim, speed) : IDLE;
     if (*state == IDLE) {
         right = has_mobility(sim, kind, i, &here, row, &mobile, problem);
         if (right && mobile) {
@@ -1373,9 +1379,19 @@ static bool slide_state(Simulation *sim, int kind, int i, const double *q, const
     return right;
 }
 
-static bool settle_one(Simulation *sim, int kind, int i, bool yields, Problem *problem) {
+/* What has just happened to what slides, if anything: it has used up its friction and cannot stick,
+ * or it has stopped sliding and has no more than a slow speed left. */
+typedef struct {
+    int kind, index;
+    bool yields;
+    double slow;
+} Turn;
+
+static bool settle_one(Simulation *sim, int kind, int i, const Turn *turn, Problem *problem) {
     int state, n = sim->system.n;
-    if (!slide_state(sim, kind, i, sim->front, sim->front + n, yields, &state, problem)) {
+    bool this_one = turn->kind == kind && turn->index == i, yields = this_one && turn->yields;
+    double slow = this_one ? turn->slow : 0.0;
+    if (!slide_state(sim, kind, i, sim->front, sim->front + n, yields, slow, &state, problem)) {
         return false;
     }
     with_slide(sim, kind, i, state);
@@ -1390,7 +1406,7 @@ static bool same_discrete(const Simulation *sim, const double *before) {
 }
 
 /* Choose what sticks and slides; what one does may change what another must do. */
-static bool settle_friction(Simulation *sim, const Holding *holding, int yields, int yields_index,
+static bool settle_friction(Simulation *sim, const Holding *holding, const Turn *turn,
                             Problem *problem) {
     int s = sim->system.s, f = sim->system.f, rubbing = 0;
     double before[2 * MOST_STOPS];
@@ -1406,13 +1422,13 @@ static bool settle_friction(Simulation *sim, const Holding *holding, int yields,
         for (int k = 0; k < holding->count; k++) {
             int i = holding->stops[k];
             if (sim->equations.stop_friction[i] > 0.0 &&
-                !settle_one(sim, SLIDE, i, yields == SLIDE && yields_index == i, problem)) {
+                !settle_one(sim, SLIDE, i, turn, problem)) {
                 return false;
             }
         }
         for (int i = 0; i < f; i++) {
             if (sim->equations.rub_law[3 * i] > 0.0 &&
-                !settle_one(sim, RUB, i, yields == RUB && yields_index == i, problem)) {
+                !settle_one(sim, RUB, i, turn, problem)) {
                 return false;
             }
         }
@@ -1423,11 +1439,51 @@ static bool settle_friction(Simulation *sim, const Holding *holding, int yields,
     return true;
 }
 
+/* The spacing of the numbers around x. */
+static double spacing(double x) {
+    int exponent;
+    (void)frexp(x, &exponent);
+    return ldexp(1.0, exponent - 53);
+}
+
+/* The sliding speed that the resolution of time leaves when sliding stops. */
+static bool speed_left(Simulation *sim, int kind, int i, double *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = sim->system.n;
+    const double *q = sim->front, *v = sim->front + n;
+    double *row = take(&sim->scratch, (size_t)n);
+    Rows rows = rows_of(sim, kind);
+    bool right = accelerations(&sim->equations, q, v, sim->a, sim->lam, problem);
+    directions(&sim->system, q, sim->e);
+    row_jacobian(&rows, i, sim->e, row);
+    double rate = dot(n, row, sim->a) - row_convective(&rows, i, sim->e, v);
+    *result = fabs(rate) * (2 * TIME_RESOLUTION + 8 * spacing(sim->now->front_time));
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* What an event, NULL for none, does to what slides. */
+static bool turn_of(Simulation *sim, const Event *event, Turn *turn, Problem *problem) {
+    Turn none = {NO_EVENT, 0, false, 0.0};
+    *turn = none;
+    if (!event) {
+        return true;
+    }
+    turn->yields = event->kind == SLIP_SLIDE || event->kind == SLIP_RUB;
+    turn->kind = event->kind == SLIDE || event->kind == SLIP_SLIDE ? SLIDE : RUB;
+    turn->index = event->index;
+    return turn->yields || speed_left(sim, turn->kind, turn->index, &turn->slow, problem);
+}
+
 /* Choose what holds, sticks and slides at the front, from its state alone.  resting: open stops
- * that touch without closing or opening; yields: SLIDE or RUB of what has just used up its
- * friction and cannot stick. */
-PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yields,
-                 int yields_index, Problem *problem) {
+ * that touch without closing or opening; event: of what slides, which has just used up its friction
+ * and cannot stick, or has stopped sliding or turns back; NULL for none. */
+PRBM bool settle(Simulation *sim, const int *resting, int resting_count, const Event *event,
+                 Problem *problem) {
+    Turn turn;
+    if (!turn_of(sim, event, &turn, problem)) {
+        return false;
+    }
     int n = sim->system.n, s = sim->system.s, candidates[2 * MOST_STOPS], count = 0;
     double near = TOUCHING * sim->system.length + RELEASE_GAP, bound = still(sim);
     const double *v = sim->front + n;
@@ -1460,7 +1516,7 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yie
         sim->discrete.holds[holding.stops[k]] = 1;
     }
     set_discrete(sim, &sim->discrete);
-    if (!settle_friction(sim, &holding, yields, yields_index, problem)) {
+    if (!settle_friction(sim, &holding, &turn, problem)) {
         return false;
     }
     return holding.count == 0 ||
@@ -1780,7 +1836,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     }
     if (hits.struck_count == 0) {
         sim->scratch.used = mark;
-        return settle(sim, &hit, fabs(rates[hit]) <= bound, NO_EVENT, 0, problem);
+        return settle(sim, &hit, fabs(rates[hit]) <= bound, NULL, problem);
     }
     bool right = true;
     for (int k = 0; right && k < hits.struck_count; k++) {
@@ -1805,7 +1861,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         set_inputs(sim);
     }
     sim->scratch.used = mark;
-    return right && settle(sim, resting, resting_count, NO_EVENT, 0, problem);
+    return right && settle(sim, resting, resting_count, NULL, problem);
 }
 
 /* --- going on --------------------------------------------------------------------------------- */

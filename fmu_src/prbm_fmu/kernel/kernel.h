@@ -38,6 +38,12 @@
 #else
 #define SIZED static
 #endif
+/* What few mechanisms need stays out of the way of what all do. */
+#if defined(__GNUC__)
+#define RARE static __attribute__((noinline))
+#else
+#define RARE static
+#endif
 #if defined(__GNUC__) && !defined(__clang__) /* which needs to be told */
 #define UNROLLED _Pragma("GCC unroll 8")
 #else

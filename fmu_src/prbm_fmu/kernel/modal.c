@@ -4,6 +4,8 @@
 
 #include "kernel.h"
 
+#define AT_EASE 1e-7 /* of the highest frequency: a lower one is what rounding leaves of none */
+
 #define FULL_TURN 6.283185307179586 /* rad */
 
 /* c = a^T b a for a (n, k), b (n, n) */
@@ -147,7 +149,8 @@ PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch
     bool found = equilibrium(system, false, 0.0, &shape, scratch, problem) &&
                  modes(system, &shape, frequencies, phi, scratch, problem);
     if (found) {
-        *frequency = greater(0.0, frequencies[0]);
+        bool bends = frequencies[0] > AT_EASE * largest(k, frequencies);
+        *frequency = bends ? frequencies[0] : 0.0;
     }
     scratch->used = used;
     return found;

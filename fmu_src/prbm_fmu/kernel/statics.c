@@ -8,7 +8,9 @@
 
 #define LARGEST_TURN 0.5 /* rad per Newton step and step of the load: further is another shape */
 #define SMALLEST_FRACTION (1.0 / 512) /* of the load, before the continuation gives up */
-#define BALANCED 1e-12 /* of the largest torsion rate times one radian */
+#define BALANCED 1e-12 /* of the largest spring rate times one radian, or else of the load */
+#define CONVERGED 1e-8 /* rad of the last Newton step; what is left after it is its square */
+#define IMMOBILE 1e-12 /* share of a body's mobility that loops leave it: below, it cannot move */
 
 enum { NEWTON_STEPS = 30 };
 
@@ -77,7 +79,7 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
 
 /* One Newton step, of no more than the largest turn; false if there is none. */
 static bool newton_step(const Balance *balance, const Complex *e, double *torque, double *open_by,
-                        const double *rows, double *state, Scratch *scratch) {
+                        const double *rows, double *state, double *turned, Scratch *scratch) {
     size_t used = scratch->used;
     int n = balance->system->n, r = balance->rows.count, size = n + r;
     double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
@@ -96,6 +98,7 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
         state[i] += (i < n ? share : -share) * change[i];
     }
     scratch->used = used;
+    *turned = turn;
     return finite_number(turn);
 }
 
@@ -107,16 +110,21 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     Complex *e = take_complex(scratch, 1, n);
     double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
     double *rows = take_matrix(scratch, r, n), scale = BALANCED * largest(n * n, system->K);
-    bool going = true, balanced = false;
-    for (int step = 0; step < NEWTON_STEPS && going && !balanced; step++) {
+    double turn = HUGE_VAL;
+    bool going = true, balanced = false, done = false;
+    for (int j = 0; j < n && scale == 0.0; j++) {
+        scale = greater(scale, BALANCED * modulus(balance->w[j]));
+    }
+    for (int step = 0; step < NEWTON_STEPS && going && !done; step++) {
         directions(system, state, e);
         unbalanced(balance, state, e, torque, open_by, rows, scratch);
         bool closed = largest(r, open_by) <= 1e-13 * system->length;
         balanced = closed && largest(n, torque) <= scale;
-        going = balanced || newton_step(balance, e, torque, open_by, rows, state, scratch);
+        done = balanced && turn <= CONVERGED;
+        going = done || newton_step(balance, e, torque, open_by, rows, state, &turn, scratch);
     }
     scratch->used = used;
-    return balanced;
+    return done || (balanced && !going);
 }
 
 /* The balance at a fraction of gravity and, if held, of the displacement. */
@@ -136,13 +144,15 @@ static bool loaded(const System *system, bool held, double displacement, double 
     return balanced;
 }
 
-/* The largest change of a link between two states [rad]. */
+/* The largest change between two states of what bends [rad]; what hangs on a pin alone may turn at
+ * once. */
 static double jump(const System *system, const double *from, const double *to) {
     double top = 0.0;
-    for (int i = 0; i < system->mechanism->link_count; i++) {
-        int j = system->mechanism->links[i];
+    for (int j = 0; j < system->n; j++) {
         double turn = to[j] - from[j];
-        top = greater(top, largest(1, &turn));
+        bool link = system->mechanism->coordinates[j].link >= 0;
+        bool bends = link || system->K[j * system->n + j] > 0.0;
+        top = bends ? greater(top, largest(1, &turn)) : top;
     }
     return top;
 }
@@ -199,6 +209,27 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     return found;
 }
 
+/* Whether the loops let the released body move: rows (r, n), its own the last. */
+static bool releasable(const System *system, const double *M, int r, const double *rows,
+                       double speed, Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n;
+    const double *row = rows + (r - 1) * n;
+    double *left = take(scratch, (size_t)n), *free = take(scratch, (size_t)n);
+    bool right = response(n, r - 1, 1, M, rows, row, left, scratch, problem) &&
+                 response(n, 0, 1, M, rows, row, free, scratch, problem);
+    double share = right ? dot(n, row, left) / dot(n, row, free) : 0.0;
+    scratch->used = used;
+    if (right && !(share > IMMOBILE)) {
+        const Mechanism *m = system->mechanism;
+        return fail(problem,
+                    "release.velocity = %g m/s: the body %s cannot move along the direction of the "
+                    "release; choose another direction, or let flexures stretch (axial = true)",
+                    speed, m->bodies[m->release.body - 1].name);
+    }
+    return right;
+}
+
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
                            Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -217,7 +248,8 @@ PRBM bool release_velocity(const System *system, const double *q, double speed, 
     jacobian(&held, e, rows);
     zeros(r, rates);
     rates[r - 1] = -speed;
-    bool found = project_velocities(n, r, M, rows, rates, v, scratch, problem);
+    bool found = releasable(system, M, r, rows, speed, scratch, problem) &&
+                 project_velocities(n, r, M, rows, rates, v, scratch, problem);
     scratch->used = used;
     return found;
 }
