@@ -961,12 +961,12 @@ class Simulation:
         system, equations, n, t = self.system, self.equations, self.system.n, self.time
         y = self.state()
         q, v = y[:n], y[n : 2 * n]
-        e = self.system.directions(q)
+        e, w = self.system.directions(q), self.system.turning(v)
         a, lam, M = equations.accelerations(q, v)
         out: dict[str, float | int | bool] = {}
         for name, frame in system.bodies.items():
             place = complex(frame.A @ e) + frame.c - frame.drawn
-            velocity = complex(1j * (frame.A @ (e * v)))
+            velocity = complex(1j * (frame.A @ (e * w)))
             out[f"{name}.x"], out[f"{name}.y"] = place.real, place.imag
             out[f"{name}.angle"] = float(q[frame.j])
             out[f"{name}.vx"], out[f"{name}.vy"] = velocity.real, velocity.imag
