@@ -394,7 +394,8 @@ class Fit:
     p : (k,)
         Parameters in the order of ``problem.names``.
     covariance : (k, k)
-        Of the parameters; infinite where the data do not determine them.
+        Of the parameters; infinite on the diagonal, else not a number, where the data do not
+        determine them.
     singular : (k,)
         Singular values of the Jacobian scaled by the sizes of the parameters [-].
     directions : (k, k)
@@ -589,6 +590,7 @@ def _covariance(s: Real, V: Real, size: Real) -> Real:
     W = V[kept] / s[kept, None]
     result: Real = (W.T @ W) * np.outer(size, size)
     lost = np.any(np.abs(V[~kept]) >= PART, axis=0)
+    result[lost] = result[:, lost] = math.nan
     result[lost, lost] = math.inf
     return result
 

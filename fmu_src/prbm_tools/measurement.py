@@ -375,7 +375,9 @@ def averaged(x: Real, y: Real, window: int) -> tuple[Real, Real]:
 
 
 def turning_points(x: Real, least: float) -> list[int]:
-    """Return the indices at which x turns back by more than ``least``, and both ends.
+    """Return the indices between which x rises or falls by more than ``least``.
+
+    The first is the extreme from which it first does, the last the end of the record.
 
     Examples
     --------
@@ -383,7 +385,7 @@ def turning_points(x: Real, least: float) -> list[int]:
     [0, 4, 6]
     """
     low = high = 0
-    turns = [0]
+    turns: list[int] = []
     rising = None
     for i, value in enumerate(x):
         low = i if value < x[low] else low

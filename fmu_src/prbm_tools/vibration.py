@@ -25,7 +25,7 @@ FEWEST_PERIODS = 3.0  # in a record, for a frequency
 PROMINENT = 0.25  # share of the signal's power that the fit must explain
 FEWEST_PEAKS = 4  # of a decrement
 LOWEST_PEAK = 5.0  # times the noise: lower peaks are biased and left out
-KINK = 8.0  # times the usual second difference: an impact
+KINK = 6.0  # times the usual second difference: an impact
 MADS = 1.4826  # standard deviations in a median absolute deviation, of Gaussian noise
 DECAYS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # over the record, from which the fit starts
 
@@ -321,8 +321,8 @@ def _decrement_zeta(decrement: Estimate | None) -> Estimate | None:
 def impacts(series: Series) -> Real:
     """Return the times of impacts: kinks of the signal, at which its velocity jumps [s].
 
-    A kink is a second difference of more than eight times the usual one (median absolute
-    deviation); it is located to a sample.
+    A kink is a second difference that differs from their median by more than six times the
+    usual (median absolute) deviation; it is located to a sample.
 
     Raises
     ------
@@ -330,7 +330,8 @@ def impacts(series: Series) -> Real:
         If there is none.
     """
     x = series.values
-    second = np.abs(x[2:] - 2.0 * x[1:-1] + x[:-2])
+    second = x[2:] - 2.0 * x[1:-1] + x[:-2]
+    second = np.abs(second - np.median(second))
     usual = MADS * float(np.median(second))
     found, _ = find_peaks(np.concatenate([[0.0], second, [0.0]]), height=KINK * usual, distance=3)
     if not len(found) or usual == 0.0:
