@@ -1,5 +1,6 @@
 """Parameters fitted to frequencies, responses and forces, and what the data do not determine."""
 
+import dataclasses
 import math
 from functools import cache
 
@@ -186,6 +187,18 @@ def test_the_valley_is_a_level_curve_and_a_figure(ambiguous):
     assert valley(ambiguous, points=2).along in BOTH
 
 
+def test_three_coefficients_and_one_frequency_leave_two_valleys():
+    """The 3R: two directions change nothing, the third is as sharp as the frequency."""
+    m = mechanism("PRBDM2R")
+    kinds = tuple(dataclasses.replace(kind, model="3R") for kind in m.flexure_types)
+    m = dataclasses.replace(m, flexure_types=kinds)
+    free = [f"flexure.K_theta{i}" for i in (1, 2, 3)]
+    found = fit(m, free, Frequency(Estimate(5.6375, 5e-5)), PMMA)
+    assert found.rms["frequency 1 at rest"] < 1e-6
+    assert [math.isinf(one.uncertainty) for one in found.valleys] == [True, True]
+    assert found.singular[0] > 1e4
+
+
 def test_a_product_cannot_be_taken_apart():
     """The stiffness has E K_theta only: the valley is (1, -1)/sqrt 2 in relative changes."""
     free = [K, "flexure.youngs_modulus"]
@@ -293,17 +306,17 @@ def test_restitution_wall_and_start_come_back_together():
 
 @pytest.mark.slow
 def test_stated_uncertainty_of_the_restitution_covers_the_truth():
-    """68.3 % of 100 draws of the noise, -+ 3 standard deviations of a count: 0.543 to 0.823."""
+    """68.3 % of 60 draws of the noise, -+ 3 standard deviations of a count: 0.503 to 0.863."""
     hits = 0
-    clean = record(0.6, 0.13, noise=0.0)
+    clean = record(0.6, 0.1, noise=0.0)
     rng = np.random.default_rng(3)
-    for _ in range(100):
+    for _ in range(60):
         x = clean.values + NOISE * rng.standard_normal(len(clean.time))
         target = Response(Series(clean.time, x), uncertainty=NOISE)
         free = [Free("stop.restitution", 0.5, 0.7, 0.6)]
         found = fit(mechanism("PRBDM"), free, target, DROPPED, starts=1)["stop.restitution"]
         hits += abs(found.value - 0.6) < found.uncertainty
-    assert 0.543 < hits / 100 < 0.823
+    assert 0.503 < hits / 60 < 0.863
 
 
 def test_a_record_without_impact_has_no_restitution():

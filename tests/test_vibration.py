@@ -68,12 +68,14 @@ def test_damping_that_the_record_does_not_hold_is_too_small_to_measure(zeta):
 def test_uncertainties_cover_the_truth():
     """68.3 % of 200 draws, -+ 3 standard deviations of a count of them: 0.585 to 0.781."""
     rng = np.random.default_rng(1)
-    hits = dict.fromkeys(("frequency", "zeta", "decrement"), 0)
+    hits = dict.fromkeys(("frequency", "zeta", "decrement", "its zeta"), 0)
     for _ in range(200):
         found = free_vibration(vibration(2e-3, rng, 3.0, 1e-3))
         delta = 2 * np.pi * 2e-3
         hits["frequency"] += abs(found.frequency.value - FREQUENCY) < found.frequency.uncertainty
         hits["zeta"] += abs(found.zeta.value - 2e-3) < found.zeta.uncertainty
+        by_peaks = found.decrement_zeta
+        hits["its zeta"] += abs(by_peaks.value - 2e-3) < by_peaks.uncertainty
         hits["decrement"] += abs(found.decrement.value - delta) < found.decrement.uncertainty
     for name, count in hits.items():
         assert 0.585 < count / 200 < 0.781, name
