@@ -17,6 +17,7 @@ from prbm_tools.measurement import (
     turning_points,
     youngs_modulus,
 )
+from prbm_tools.records import Series
 from prbm_tools.uncertainty import Estimate, EvaluationError, line, power_law
 
 E, LENGTH, WIDTH, THICKNESS = 181.5e9, 40e-3, 8e-3, 0.1e-3  # the steel flexures of the source
@@ -234,6 +235,19 @@ def test_calibration_comes_back_and_covers():
     assert sensor.gain.unit == "m/V"
     assert sensor.sensitivity.value == pytest.approx(200.0, rel=0.01)
     assert "gain" in str(sensor)
+
+
+def test_a_record_in_volts_becomes_one_in_metres():
+    x, volts = stage(np.random.default_rng(8), noise=0.0)
+    sensor = calibrate(x, volts)
+    series = Series(np.arange(60) / 750, volts, "laser", "V", "record.csv")
+    length = sensor.applied(series)
+    np.testing.assert_allclose(length.values, x, atol=1e-15)
+    assert (length.unit, length.name) == ("m", "laser")
+    with pytest.raises(
+        EvaluationError, match="laser is in m, the calibration is of a reading in V"
+    ):
+        sensor.applied(length)
 
 
 def test_a_bent_characteristic_is_said():

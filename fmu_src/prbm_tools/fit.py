@@ -201,7 +201,7 @@ class Response:
                 simulation.advance(float(t))
             outputs = simulation.outputs()
             if self.output not in outputs:
-                raise ParameterError(unknown(self.output, outputs))
+                raise EvaluationError(unknown(self.output, outputs))
             result[i] = outputs[self.output]
         return result + values.get(RECORD_ZERO, 0.0)
 
@@ -546,6 +546,14 @@ def fit(
         only, or there is no motion or shape within the bounds.
     ParameterError
         If a name is unknown.
+
+    Examples
+    --------
+    >>> from prbm_tools.mechanism_file import load, shipped
+    >>> guide = load(shipped()["PRBDM"])
+    >>> found = fit(guide, ["flexure.K_theta"], Frequency(Estimate(4.82, 0.06)))
+    >>> print(found["flexure.K_theta"])
+    2.475 ± 0.076
     """
     several = (targets,) if not isinstance(targets, Sequence) else tuple(targets)
     problem = _problem(mechanism, free, several, values or {})
@@ -608,7 +616,8 @@ def _problem(
             "the uncertainty is given for some targets only, so that they cannot be weighed: give "
             "it for all"
         )
-    defaults = mechanism.values(_of_mechanism(values)) | dict.fromkeys(OWN, 0.0)
+    defaults = mechanism.values(_of_mechanism(values))
+    defaults |= {name: values.get(name, 0.0) for name in OWN}
     wanted = [one if isinstance(one, Free) else Free(one) for one in free]
     names = tuple(one.name for one in wanted)
     for name in names:
@@ -791,7 +800,9 @@ def fitted_restitution(
     """Fit the restitution of a stop to a bouncing response.
 
     With the 1R guide, which has no other mode, it is the restitution in the fundamental mode of
-    the source, whatever the mechanism that was measured.
+    the source, whatever the mechanism that was measured.  It is one number for all impacts of the
+    record: where an impact leaves much in other modes, the next ones find it there, and the
+    number is not that of the first (:func:`prbm.modal_restitution`).
 
     Parameters
     ----------

@@ -20,12 +20,13 @@ Sources
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from prbm.assembly import Real
 
+from .records import Series
 from .uncertainty import CORRELATED, Estimate, EvaluationError, Line, line, power_law
 
 STIFFENING = 36 / 35  # of the elastica under a force that keeps its direction, times (d/l)^2
@@ -79,6 +80,21 @@ class Calibration:
         fit = self.fit
         result: Real = fit.centre_x + (reading - fit.centre_y) / fit.slope.value
         return result
+
+    def applied(self, series: Series) -> Series:
+        """Return a recorded reading as the quantity.
+
+        Raises
+        ------
+        EvaluationError
+            If the record is not in the unit of the reading.
+        """
+        if series.unit != self.reading_unit:
+            raise EvaluationError(
+                f"{series.source}: {series.name} is in {series.unit}, the calibration is of a "
+                f"reading in {self.reading_unit}: take another column"
+            )
+        return replace(series, values=self(series.values), unit=self.unit)
 
     def uncertainty(self, reading: Real) -> Real:
         """Return the standard uncertainty of the calibration at readings, as a quantity.
