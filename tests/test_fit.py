@@ -265,6 +265,8 @@ def test_bounds_hold_and_are_said():
     found = fit(mechanism("PRBDM"), [Free(K, 2.6, 3.0)], Frequency(Estimate(4.7, 1e-3)))
     assert found[K].value == pytest.approx(2.6, rel=1e-6)
     assert any("ended at its bound 2.6" in note for note in found.notes)
+    wide = fit(mechanism("PRBDM"), [K, Free("stop.restitution", -1.0, 5.0)], F5).problem
+    assert (wide.lower[1], wide.upper[1]) == (0.0, 1.0), "the mechanism's own bounds hold, too"
 
 
 # --- responses ----------------------------------------------------------------------------------
@@ -358,6 +360,8 @@ def test_what_is_known_of_the_record_is_given():
     found = fit(mechanism("PRBDM"), [K], target, {"record.zero": 0.05})
     assert found[K].value == pytest.approx(2.5, rel=1e-8)
     assert "record.zero" not in found.values
+    freed = fit(mechanism("PRBDM"), [K, "record.zero"], target, {"record.zero": 0.04})
+    assert freed["record.zero"].value == pytest.approx(0.05, rel=1e-8), "bounds are about 0.04"
 
 
 def test_a_record_without_impact_has_no_restitution():

@@ -159,6 +159,21 @@ def test_hysteresis_loses_the_area_of_the_loop():
     assert hysteresis(*bent(np.random.default_rng(4), 600, 0.5)) == ()
 
 
+def test_branches_that_differ_are_said():
+    """A loss of 10 % of the work; E lies between those of the branches, each alone."""
+    d, F = bent(np.random.default_rng(4), 4000, 1, noise=1e-5, loss=0.3)
+    both, up, down = (
+        youngs_modulus(d[part], F[part], beam())
+        for part in (slice(None), slice(2000), slice(2000, None))
+    )
+    assert up.modulus.value == pytest.approx(E, rel=1e-3)
+    assert up.modulus.value < both.modulus.value < down.modulus.value
+    assert both.loss == pytest.approx(0.1, abs=0.01)
+    assert any("10 % of the work is lost" in note for note in both.notes)
+    assert up.loss is None
+    assert not any("lost" in note for note in up.notes)
+
+
 def test_turning_points_ignore_noise():
     phase = np.linspace(0, 6 * np.pi, 900)
     x = -np.cos(phase) + 0.05 * np.random.default_rng(5).standard_normal(900)

@@ -31,6 +31,7 @@ from .uncertainty import CORRELATED, Estimate, EvaluationError, Line, line, powe
 
 STIFFENING = 36 / 35  # of the elastica under a force that keeps its direction, times (d/l)^2
 LINEAR = 0.01  # the share by which the theory of small deflections may be wrong unannounced
+LOSSY = 0.03  # of the work of a cycle: more makes the branches different springs
 LONGEST = 1.0  # of the length of a beam: a larger deflection is a mistake of units
 TURNS = 0.2  # of the range of the deflection: less is noise, not a change of direction
 LARGEST_ANGLE = 85.0  # deg between the sensor and the direction of the force
@@ -257,7 +258,18 @@ class YoungsModulus:
                 "the data bend away from the line (neighbouring residuals are correlated): the "
                 "uncertainty was widened; narrow the fit range"
             )
+        loss = self.loss
+        if loss is not None and loss > LOSSY:
+            notes.append(
+                f"{100 * loss:.0f} % of the work is lost in a cycle: E is of both branches, "
+                "and their difference is not in its uncertainty; evaluate one alone to see it"
+            )
         return tuple(notes)
+
+    @property
+    def loss(self) -> float | None:
+        """Mean loss of the cycles over their work of loading [-]; None without a cycle."""
+        return float(np.mean([loop.fraction for loop in self.loops])) if self.loops else None
 
     def __str__(self) -> str:
         beam = self.beam
@@ -494,8 +506,7 @@ class BeamTable:
     def __str__(self) -> str:
         rows = [f"{'beam':<16}{'E [GPa]':>10}{'u [GPa]':>10}{'rms [mN]':>10}{'loss [%]':>10}"]
         for one in self.beams:
-            losses = [loop.fraction for loop in one.loops]
-            loss = f"{100 * float(np.mean(losses)):.1f}" if losses else "-"
+            loss = "-" if one.loss is None else f"{100 * one.loss:.1f}"
             rows.append(
                 f"{one.beam.name:<16}{1e-9 * one.modulus.value:>10.4g}"
                 f"{1e-9 * one.modulus.uncertainty:>10.2g}{1e3 * one.fit.residual:>10.3g}{loss:>10}"
