@@ -1,1 +1,1 @@
-"""What a desk needs and an FMU does not: mechanism files, figures, animation."""
+"""What a desk needs and an FMU does not: mechanism files, figures, animation, fits."""
