@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 import prbm
 from prbm import Mechanism, assemble, free_displacement
+from prbm.assembly import unit
 from prbm_tools.figures import png, response
 from prbm_tools.motion import marks
 from prbm_tools.simulate import Progress, reporter, rest_time
@@ -162,7 +163,7 @@ def millimetres(x: float) -> str:
 
 def headline(run: Run) -> list[str]:
     """Return what happened, line by line."""
-    record, body = run.record, run.mechanism.release.body
+    record = run.record
     lines = [f"simulated            {record['time'][-1]:g} s in {run.seconds:.2f} s", *_free(run)]
     seen = marks(record, run.mechanism)
     for i, stop in enumerate(s.name for s in run.mechanism.stops):
@@ -176,8 +177,7 @@ def headline(run: Run) -> list[str]:
         since = rest_time(record, stop)
         if since is not None:
             lines.append(
-                f"came to rest         at t = {since:.3f} s on {stop}, {body}.x = "
-                f"{millimetres(record[f'{body}.x'][-1])}, pressed with "
+                f"came to rest         at t = {since:.3f} s on {stop}, {_place(run)}, pressed with "
                 f"{record[f'{stop}.force'][-1]:.4g} N"
             )
     if not run.finished:
@@ -198,12 +198,25 @@ def _free(run: Run) -> list[str]:
     values = {name: x for name, x in run.values.items() if name in parameters}
     rest = free_displacement(assemble(run.mechanism, values))
     release = run.mechanism.release
-    along = "" if release.direction == 0.0 else f" along {release.direction:g} degrees"
     return [
         f"fundamental          {frequency:.4g} Hz",
-        f"free rest position   {release.body} {millimetres(rest)} from straight{along}, under "
-        "gravity, without stops",
+        f"free rest position   {release.body} {millimetres(rest)} from straight"
+        f"{_along(release.direction)}, under gravity, without stops",
     ]
+
+
+def _along(direction: float) -> str:
+    return "" if direction == 0.0 else f" along {direction:g} degrees"
+
+
+def _place(run: Run) -> str:
+    """Tell where the released body is at the end."""
+    body, direction = run.mechanism.release.body, run.mechanism.release.direction
+    x, y = (float(run.record[f"{body}.{axis}"][-1]) for axis in "xy")
+    u = unit(direction)
+    if direction == 0.0:
+        return f"{body}.x = {millimetres(x)}"
+    return f"{body} {millimetres(x * u.real + y * u.imag)} from straight{_along(direction)}"
 
 
 def main(arguments: Sequence[str]) -> int:
