@@ -10,6 +10,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 import prbm
+from kernel_simulation import KernelSimulation
 from many_parts import anvil, elastic
 from prbm import Simulation
 from prbm_fmu import native_fmu, python_fmu
@@ -116,10 +117,13 @@ def test_energy_is_kept_by_bodies_that_hit_rub_and_stretch(expected):
 
 
 def test_a_first_step_that_is_far_too_long_is_shortened():
-    """Links that stretch answer within a thousandth of the period that the first step is of."""
-    simulation = Simulation(elastic(), {"pull.x": 100.0})
-    simulation.advance(1e-5)
-    assert simulation.outputs()["hammer.vx"] > 0.0
+    """With much damping, a step that is short beside the period leads to nothing but infinities."""
+    simulation = Simulation(elastic(), {"damping.beta": 1e-4})
+    simulation.advance(1e-7)
+    assert 0.0 < simulation.h < 1e-6
+    kernel = KernelSimulation(elastic(), {"damping.beta": 1e-4})
+    kernel.advance(1e-7)
+    assert kernel.get("tip.x") == pytest.approx(simulation.outputs()["tip.x"])
 
 
 def test_what_lets_go_while_it_is_pressed_again_does_not_chatter():

@@ -129,8 +129,8 @@ static Parts parts_from(Parts parts, int start) {
 static void set_padding(Equations *q) {
     int n = q->system->n, even = q->system->even;
     for (int k = 0; k < q->r; k++) {
-        spread(q->system, 1, q->B + k * n, q->e);
-        pad_parts(n, q->e, parts_from(q->B_conjugate, k * even));
+        spread(q->system, 1, q->B + k * n, q->w); /* which the loads are put into later */
+        pad_parts(n, q->w, parts_from(q->B_conjugate, k * even));
     }
     for (int i = 0; i < q->r * even; i++) {
         q->B_conjugate.im[i] = -q->B_conjugate.im[i];
