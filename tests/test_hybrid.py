@@ -418,3 +418,17 @@ def test_a_start_time_shifts_everything():
     late.advance(5.2)
     early.advance(0.2)
     assert late.record[2].time == pytest.approx(early.record[2].time + 5.0, abs=1e-9)
+
+
+def test_a_step_that_is_far_too_long_for_stretching_links_is_taken_again():
+    """The axial modes of a chain are a thousand times faster than what chooses the first step."""
+    from dataclasses import replace
+
+    guide = mechanism("PRBDM2R")
+    kinds = tuple(
+        replace(k, model="nR", n=2, axial=True, coefficients={}) for k in guide.flexure_types
+    )
+    sim = Simulation(replace(guide, flexure_types=kinds), tolerance=1e-7)
+    start = energy_balance(sim.outputs())
+    sim.advance(1e-4)
+    assert energy_balance(sim.outputs()) == pytest.approx(start, abs=1e-9)

@@ -407,8 +407,14 @@ class Simulation:
                     "start the simulation nearer to zero"
                 )
             self.equations.trace.clear()
-            k, y1 = stages(PAIR, f, t, y, h, self.k1)
-            error = self._error(h * (PAIR.error @ k), y, y1)
+            try:
+                with np.errstate(over="ignore", invalid="ignore"):
+                    k, y1 = stages(PAIR, f, t, y, h, self.k1)
+                    error = self._error(h * (PAIR.error @ k), y, y1)
+            except SimulationError:  # a stage so far off that its equations mean nothing
+                if self.step or SHRINK * h < SMALLEST_STEP:
+                    raise
+                error = math.inf
             if self.step or error <= 1.0:
                 break
             growth = 1.0  # a step that had to be repeated is not followed by a longer one
