@@ -21,6 +21,7 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
+from many_parts import anvil
 from prbm import Mechanism, Stop
 from prbm_fmu import native_fmu
 from prbm_fmu.archive import write
@@ -34,7 +35,7 @@ WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werr
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, "-isystem", str(HEADERS))
 POSIX = ("-D_POSIX_C_SOURCE=200809L", "-ldl", "-lm", "-lpthread")
 TYPES = {"Real": "r", "Float64": "r", "Integer": "i", "Int32": "i", "Boolean": "b"}
-TWO_STOPS = "TwoStops"
+TWO_STOPS, ANVIL = "TwoStops", "Anvil"
 
 
 @dataclass(frozen=True)
@@ -313,7 +314,12 @@ def run(job: Job, *words: Any, **options: Any) -> Done:
 
 @cache
 def given(model: str) -> Mechanism:
-    """Return a mechanism by name: a shipped one, or the 2R guide with two stops that rub."""
+    """Return a mechanism by name: a shipped one, or one of the tests' own.
+
+    The 2R guide with two stops that rub, and bodies that hit each other on flexures that stretch.
+    """
+    if model == ANVIL:
+        return anvil()
     if model != TWO_STOPS:
         return mechanism(model)
     place = ("shuttle.width", "flexure.length + shuttle.com_height")

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from c_importer import (
+    ANVIL,
     KERNEL,
     POSIX,
     SOURCES,
@@ -28,6 +29,9 @@ from c_importer import (
     needs,
     once,
 )
+from many_parts import elastic
+from prbm.exchange import independent
+from prbm_fmu.tables import tables
 
 SANITIZERS = (
     "-O0",  # which compiles in seconds what takes a minute else
@@ -41,7 +45,7 @@ ENVIRONMENT = {
     "UBSAN_OPTIONS": "print_stacktrace=1",
 }
 FUZZERS = Path(__file__).with_name("fuzz")
-MODELS = ("PRBDM", "PRBDM2R", TWO_STOPS)
+MODELS = ("PRBDM", "PRBDM2R", TWO_STOPS, ANVIL)
 CALLS = 500  # in a sequence
 SEEDS, LONGEST = 20, 4096  # sequences to begin with; bytes that choose one
 SLOW_INPUT = 20  # s; libFuzzer counts a slower input as a failure
@@ -115,6 +119,9 @@ def fuzz_tables(folder: Path, seconds: float, seed: int) -> Found:
         content = (native(model, 3) / "resources" / "mechanism.bin").read_bytes()
         seeds.append(corpus / f"{model}.bin")
         seeds[-1].write_bytes(content)
+    whole = elastic()  # which has a joint, a bar, a chain
+    seeds.append(corpus / f"{whole.name}.bin")
+    seeds[-1].write_bytes(tables(whole, (), "token", independent(whole)))
     target = _target("tables")
     if has_libfuzzer():
         longest = 2 * max(path.stat().st_size for path in seeds)

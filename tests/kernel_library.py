@@ -315,17 +315,29 @@ class KernelSystem:
             "m": ("double", p), "S": ("Complex", n),
             "loops": ("Complex", r, n), "loops_c": ("double", r),
             "gaps": ("Complex", s, n), "slides": ("Complex", s, n), "gaps_c": ("double", s),
+            "gaps_z": ("Complex", s), "slides_z": ("Complex", s), "on": ("int", s),
             "rubs": ("Complex", f, n), "lifts": ("Complex", f, n), "lifts_c": ("double", f),
-            "release": ("Complex", n), "links": ("int", self.mechanism.link_count),
+            "release": ("Complex", n), "stretches": ("int", x.stretch_count),
         }  # fmt: skip
+
+    def links(self) -> np.ndarray:
+        """Return the coordinates of the links."""
+        return array(self.mechanism.links, self.mechanism.link_count, kind="int")
+
+    def arm(self) -> np.ndarray:
+        """Return whose arm each coordinate turns or stretches."""
+        return array(self.mechanism.coordinates, self.structure.n, 3, kind="int")[:, 2]
 
     def blocks(self) -> np.ndarray:
         """Return the starts and sizes of the blocks of the mass matrix."""
         return array(self.structure.blocks, self.structure.block_count, 2, kind="int")
 
-    def body(self, i: int) -> tuple[int, complex, complex, np.ndarray]:
-        """Return the coordinate, the constant, the drawn place and the row of a body's centre."""
+    def frame(self, group: str, i: int) -> tuple[int, complex, complex, np.ndarray]:
+        """Return the coordinate, the constant, the drawn place and the row of a point of a body.
+
+        The group is one of bodies, pushed, probes.
+        """
         kind = structures()["BodyFrame"]
-        frame = kind.from_address(self.structure.bodies + i * ctypes.sizeof(kind))
+        frame = kind.from_address(getattr(self.structure, group) + i * ctypes.sizeof(kind))
         c, drawn = (complex(z.re, z.im) for z in (frame.c, frame.drawn))
         return frame.j, c, drawn, array(frame.A, self.structure.n, kind="Complex")

@@ -36,6 +36,7 @@ FUNCTIONS = {
     "mechanism_close": (None, POINTER),
     "exchange_states": (INT, POINTER),
     "exchange_indicators": (INT, POINTER),
+    "exchange_slot": (INT, POINTER, INT),
     "exchange_set_time": (None, POINTER, DOUBLE),
     "exchange_set": (None, POINTER, POINTER),
     "exchange_get": (None, POINTER, POINTER),
@@ -146,6 +147,13 @@ class KernelSimulation:
         self.call("simulation_restore", pointer(state))
 
     # -- model exchange --
+
+    @property
+    def states(self) -> list[str]:
+        """Return the names of the states of model exchange."""
+        names = {slot: name for name, slot in self.slots.items()}
+        count = self.library.exchange_states(self.inner)
+        return [names[self.library.exchange_slot(self.inner, k)] for k in range(count)]
 
     def exchange_set(self, time: float, x: np.ndarray) -> None:
         self.library.exchange_set_time(self.inner, time)

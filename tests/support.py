@@ -114,3 +114,41 @@ class ScalarGuide:
         """Return the period after a start from straight at a speed along x, without gravity."""
         amplitude = self.turning(0.5 * self.mass * speed**2, 0.0, 1.5)
         return 4 * self.time(amplitude, 0.0)
+
+
+@dataclass(frozen=True)
+class Run:
+    """A default experiment, or its beginning: the simulation, and its outputs at each step.
+
+    ``imbalance`` is the largest change of the energy balance [J], ``opened`` the largest distance
+    by which a loop stood open [m].
+    """
+
+    simulation: Simulation
+    outputs: list[dict[str, float]]
+    imbalance: float
+    opened: float
+
+    def column(self, name: str) -> np.ndarray:
+        return np.array([row[name] for row in self.outputs])
+
+
+def run(
+    model: str | Mechanism, values=None, stop_time: float = 1.0, step: float = 1e-3, **options
+) -> Run:
+    """Simulate a mechanism, its loops and energies looked at on the way."""
+    chosen = mechanism(model) if isinstance(model, str) else model
+    sim = Simulation(chosen, values, **options)
+    sim.record = []
+    outputs, opened = [sim.outputs()], 0.0
+    for k in range(1, round(stop_time / step) + 1):
+        sim.advance(k * step)
+        outputs.append(sim.outputs())
+        system = sim.system
+        if len(system.loops):
+            e = system.directions(sim.state()[: system.n])
+            phi = (system.loops @ e).real + system.loops_c
+            opened = max(opened, float(np.abs(phi).max()))
+    start = energy_balance(outputs[0])
+    imbalance = max(abs(energy_balance(row) - start) for row in outputs)
+    return Run(sim, outputs, imbalance, opened)

@@ -1,6 +1,7 @@
 """The film shows what the engine computed: to scale, at its times, whole files or none."""
 
 import math
+import re
 import shlex
 import sys
 from dataclasses import replace
@@ -21,7 +22,8 @@ from prbm import Mechanism, ParameterError
 from prbm_tools import animation
 from prbm_tools.animation import AnimationError, animate, main, show
 from prbm_tools.motion import film, marks, motion, needed
-from prbm_tools.scene import CHAIN, Scene, curve, pictures
+from prbm_tools.scene import CHAIN, Scene, pictures
+from prbm_tools.shapes import curve
 from prbm_tools.simulate import Result, ResultError, simulate
 
 matplotlib.use("Agg")
@@ -498,4 +500,4 @@ def test_a_file_of_an_unknown_mechanism_asks_whose_it_is(
     with pytest.raises(SystemExit) as end:
         main([str(tmp_path / "result.csv"), str(tmp_path / "out.gif")])
     assert end.value.code == 2
-    assert "--model (PRBDM, PRBDM2R" in capsys.readouterr().err
+    assert re.search(r"--model \(.*PRBDM, PRBDM2R", capsys.readouterr().err)

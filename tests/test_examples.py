@@ -53,6 +53,21 @@ def test_quickstart_simulates_as_long_as_it_is_told(tmp_path: Path) -> None:
     assert {"shuttle.x", "link[6].angle", "mode.frequency"} < set(result.dtype.names)
 
 
+def test_straight_line_is_that_of_beam_theory_and_far_better_when_folded(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Two leaves: 3 x^2 / (5 L), within the model error of the 3R."""
+    example("straight_line.py").main([])
+    printed = capsys.readouterr().out
+    lines = [line for line in printed.splitlines() if line.endswith(" um")]
+    leaves, uneven, half, folded, beam = (
+        float(line.split(": ")[1].removesuffix(" um")) for line in lines
+    )
+    assert leaves == pytest.approx(beam, rel=0.015)
+    assert folded < half < uneven < 0.1 * leaves
+    assert is_picture("straight_line.png")
+
+
 def test_quickstart_says_where_it_cannot_write() -> None:
     Path("PRBDM2R.fmu").mkdir()
     with pytest.raises(SystemExit, match=r"cannot write .*PRBDM2R\.fmu: Is a directory; run this"):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation
+from many_parts import anvil, elastic
 from prbm import assemble
 from prbm.constraints import jacobian
 from prbm.dynamics import input_names
@@ -50,42 +51,50 @@ def discrete_states():
                 yield "PRBDM", (1, slides, rubs)
 
 
-def put(kernel, guide, time, x, values):
+def put(kernel, time, x, values):
     kernel.set(values)
     kernel.exchange_set(time, x)
 
 
-@pytest.mark.parametrize(("model", "discrete"), [*discrete_states()], ids=str)
-def test_directional_derivatives_are_those_of_differences(model, discrete):
-    """Along random changes of all states and inputs, at random states.
+def moving(guide, parameters, inputs, discrete, rng):
+    """Return a kernel of a mechanism in some discrete state, and states of a random motion."""
+    kernel = KernelSimulation(guide, parameters, exchange=True)
+    x = kernel.exchange_get()
+    count = (len(x) - 2) // 2
+    names = [kernel.states[k] for k in range(count)]
+    stretches = np.array([name.endswith(".strain") for name in names])
+    x[:count] += np.where(stretches, 0.002, 0.02) * rng.standard_normal(count)
+    x[count : 2 * count] = np.where(stretches, 0.3, 3.0) * rng.standard_normal(count)
+    put(kernel, 0.0, x, inputs)
+    state = kernel.state
+    at = SCALARS + 2 * (len(guide.parameters) + len(inputs)) + 3 * len(guide.stops)
+    state[at : at + len(discrete)] = discrete
+    kernel.restore(state)
+    put(kernel, 0.0, x, inputs)
+    return kernel, x
+
+
+def assert_directional(guide, parameters, inputs, discrete):
+    """Hold derivatives along random changes of all states and inputs against differences.
 
     Differences of fourth order leave 1e-8; what a change of the shape makes of a nearly singular
     pair of constraints (held and stuck) leaves more.
     """
-    guide, rng = mechanism(model), np.random.default_rng(0)
-    kernel = KernelSimulation(guide, FRICTION, exchange=True)
-    count = (len(kernel.exchange_get()) - 2) // 2
-    x = kernel.exchange_get()
-    x[:count] += 0.02 * rng.standard_normal(count)
-    x[count : 2 * count] = 3.0 * rng.standard_normal(count)
-    put(kernel, guide, 0.0, x, INPUTS)
-    state = kernel.state
-    at = SCALARS + 2 * (len(guide.parameters) + len(INPUTS)) + 3 * len(guide.stops)
-    state[at : at + 3] = discrete
-    kernel.restore(state)
-    put(kernel, guide, 0.0, x, INPUTS)
-    names, given = list(kernel.slots), np.array([INPUTS[n] for n in input_names(guide)])
+    rng = np.random.default_rng(0)
+    kernel, x = moving(guide, parameters, inputs, discrete, rng)
+    count = (len(x) - 2) // 2
+    names, given = list(kernel.slots), np.array([inputs[n] for n in input_names(guide)])
 
     def values(step):
         moved = dict(zip(input_names(guide), given + step * du, strict=True))
-        put(kernel, guide, 0.0, x + step * dx, moved)
+        put(kernel, 0.0, x + step * dx, moved)
         return np.array([*kernel.outputs().values()])
 
     for _ in range(3):
         dx, du = rng.standard_normal(len(x)), rng.standard_normal(len(given)) * abs(given)
         dx[count : 2 * count] *= 30.0
         sizes = np.abs(values(0.0))
-        put(kernel, guide, 0.0, x, dict(zip(input_names(guide), given, strict=True)))
+        put(kernel, 0.0, x, dict(zip(input_names(guide), given, strict=True)))
         found = kernel.directional(dx, du)
         error = np.full(len(found), np.inf)
         for h in (2e-4, 6e-5, 2e-5):  # the best compromise of truncation and rounding
@@ -94,6 +103,43 @@ def test_directional_derivatives_are_those_of_differences(model, discrete):
             error = np.minimum(error, np.abs(found - slope) / scale)
         worst = int(error.argmax())
         assert error[worst] <= 1e-6, (names[worst], found[worst], error[worst])
+
+
+@pytest.mark.parametrize(("model", "discrete"), [*discrete_states()], ids=str)
+def test_directional_derivatives_are_those_of_differences(model, discrete):
+    assert_directional(mechanism(model), FRICTION, INPUTS, discrete)
+
+
+HAMMER = {
+    "face.friction": 0.3, "rub.coefficient": 0.4, "rub.normal_force": 0.5,
+    "rub.normal_stiffness": 30.0, "damping.zeta": 0.05,
+}  # fmt: skip
+BLOW = {
+    "blow.x": 0.1, "blow.y": -0.2, "blow.moment": 1e-3, "face.displacement": 1e-3,
+    "face.velocity": 0.02, "side.displacement": -1e-3, "side.velocity": 0.01,
+    "base.acceleration.x": 0.3, "base.acceleration.y": -0.4,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("rubs", [2, 0, 1])
+@pytest.mark.parametrize("slides", [None, 2, 0, 1, -1])
+@pytest.mark.parametrize("side", [0, 1])
+def test_directional_derivatives_of_stretches_and_walls_on_bodies(side, slides, rubs):
+    """A hammer on the stage that carries it, which holds, sticks and slides there."""
+    holds = slides is not None
+    if side and holds and slides == rubs == 0:
+        pytest.skip("as many constraints as ways to move")
+    discrete = (holds, side, slides if holds else 2, 2, rubs)
+    assert_directional(anvil(), HAMMER, BLOW, discrete)
+
+
+def test_directional_derivatives_of_a_mechanism_of_many_parts():
+    guide = elastic()
+    inputs = dict.fromkeys(input_names(guide), 0.1) | {"pull.moment": 1e-3, "push.moment": -1e-3}
+    inputs["tap.velocity"] = 0.04  # away from the kink of its indicator
+    friction = {"rub.coefficient": 0.2, "dry.coefficient": 0.1, "dry.normal_force": 0.3}
+    for discrete in ((0, 0, 0, 2, 2, 2, 1, 2), (1, 1, 1, 1, 2, -1, 0, -1)):
+        assert_directional(guide, friction, inputs, discrete)
 
 
 @pytest.mark.parametrize("model", MODELS)
@@ -166,6 +212,22 @@ def test_indicators_are_positive_after_every_event_and_impacts_are_those_of_co_s
     assert times[-1] == pytest.approx(alone.get("stop.impact_time"), abs=1e-7)
     assert kernel.get("stop.contact") == alone.get("stop.contact") == 1.0
     assert kernel.get("stop.force") == pytest.approx(alone.get("stop.force"), rel=1e-9)
+
+
+def test_bodies_come_to_rest_on_each_other_in_model_exchange_as_in_co_simulation():
+    """A hammer that is pressed onto the stage that carries it, and rubs there."""
+    guide, values = anvil(), {"blow.y": -0.6, "face.restitution": 0.3, "rub.coefficient": 0.0}
+    kernel = KernelSimulation(guide, values, exchange=True)
+    for _, z in integrate(kernel, 0.03):
+        assert (z > 0.0).all()
+    alone = KernelSimulation(guide, values)
+    alone.advance(kernel.get("time"))
+    assert kernel.get("face.impact_count") == alone.get("face.impact_count") > 2
+    assert kernel.get("face.impact_time") == pytest.approx(alone.get("face.impact_time"), abs=1e-7)
+    assert kernel.get("face.contact") == alone.get("face.contact") == 1.0
+    assert abs(kernel.get("face.gap")) < 1e-9
+    for name in ("hammer.x", "hammer.vy", "tip.vx", "stage.vx", "energy.dissipated"):
+        assert kernel.get(name) == pytest.approx(alone.get(name), rel=1e-4, abs=1e-5)
 
 
 def test_a_shape_that_the_states_do_not_determine_is_told_with_a_remedy():

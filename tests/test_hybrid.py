@@ -1,12 +1,26 @@
 """Events, rest, friction, moving walls, saving and refusing."""
 
+import dataclasses
 import json
 import math
 
 import numpy as np
 import pytest
 
-from prbm import EquilibriumError, ParameterError, Simulation, SimulationError
+from prbm import (
+    Body,
+    EquilibriumError,
+    Flexure,
+    FlexureType,
+    Friction,
+    Mechanism,
+    ParameterError,
+    Release,
+    Simulation,
+    SimulationError,
+    Stop,
+)
+from prbm.hybrid import Event
 from support import ScalarGuide, energy_balance, mechanism, simulation
 
 QUIET = {"gravity.x": 0.0, "damping.beta": 0.0}
@@ -54,6 +68,30 @@ def test_friction_sticks_where_the_spring_is_weaker_and_stays():
     assert out["energy.elastic"] + out["energy.dissipated"] == pytest.approx(
         one.potential(math.asin(1e-3 / one.r)), rel=1e-5
     )
+
+
+def test_what_stops_sliding_turns_back_though_the_clock_leaves_it_a_speed():
+    """A stiff spring pulls at 1e5 m/s^2: within 1e-13 s, to which events are located, 1e-8 m/s."""
+    cord = FlexureType("cord", "2R", 1e-4, 1e-2, 1e11, 1e3, axial=True)
+    body = Body("body", 0.02, 1e-5, (0.1, 0.0), {"end": (0.1, 0.0)})
+    mechanism = Mechanism(
+        name="Cord",
+        title="A body on a cord, with friction along it",
+        ground={"clamp": (0.0, 0.0)},
+        bodies=(body,),
+        flexure_types=(cord,),
+        flexures=(Flexure("flexure", "cord", "ground.clamp", "body.end", ("clamp", "free")),),
+        frictions=(Friction("rub", "body", coefficient=0.3, normal_force=0.02),),
+        release=Release("body", velocity=0.5),
+    )
+    sim = Simulation(mechanism)
+    assert sim.discrete.rubs == (1,)
+    n, row = sim.system.n, sim.equations.rub_rows
+    sim.front[sim.system.stretches] = 0.05
+    row_now = row.jacobian(sim.system.directions(sim.front[:n]))[0]
+    sim.front[n : 2 * n] = 1e-8 * row_now / (row_now @ row_now)
+    sim._happen(Event(0.0, "rub", 0))
+    assert sim.discrete.rubs == (-1,)
 
 
 def test_a_stuck_shuttle_budges_when_the_input_exceeds_friction():
@@ -418,6 +456,69 @@ def test_a_start_time_shifts_everything():
     late.advance(5.2)
     early.advance(0.2)
     assert late.record[2].time == pytest.approx(early.record[2].time + 5.0, abs=1e-9)
+
+
+# --- linkages ---------------------------------------------------------------------------------
+
+
+def linkage(**parts):
+    """Return a bar that swings about a pin and carries a body on another pin: no spring at all."""
+    return Mechanism(
+        name="Linkage",
+        title="A double pendulum without gravity",
+        ground={"pin": (0.0, 0.0)},
+        bodies=(Body("body", 0.05, 1e-5, (0.11, -0.004), {"pin": (0.1, 0.0)}),),
+        flexure_types=(FlexureType("bar", "2R", 1e-3, 1e-2, 1e9, 1e3),),
+        flexures=(Flexure("bar1", "bar", "ground.pin", "body.pin", ("pin", "pin")),),
+        release=Release("body", direction=90.0, velocity=1.0),
+        **parts,
+    )
+
+
+def test_a_linkage_without_springs_coasts():
+    """Kinetic energy and the angular momentum about the pin stay; a stop takes its share."""
+    sim = Simulation(linkage(stops=(Stop("stop", "body", (0.1, 0.0), 90.0, 0.02),)))
+    assert sim.frequency == 0.0
+    before = sim.outputs()["energy.kinetic"]
+    sim.record = []
+    sim.advance(0.015)
+    assert sim.outputs()["energy.kinetic"] == pytest.approx(before, rel=1e-8)
+    system, n = sim.system, sim.system.n
+
+    def momentum():
+        q, v = sim.state()[:n], sim.state()[n : 2 * n]
+        e = system.directions(q)
+        z, u = system.A @ e, 1j * (system.A @ (e * v))
+        return float((system.m * (z.conj() * u).imag).sum() + system.J @ v)
+
+    angular = momentum()
+    sim.advance(0.017)
+    assert momentum() == pytest.approx(angular, rel=1e-8)
+    sim.advance(0.1)
+    assert sim.record
+    assert energy_balance(sim.outputs()) == pytest.approx(before, rel=1e-7)
+
+
+@pytest.mark.parametrize("ends", [("clamp", "pin"), ("pin", "clamp")])
+def test_what_swings_without_a_spring_has_no_frequency(ends):
+    """Not 1e-6 Hz, which is what rounding makes of zero, and a period of weeks."""
+    parts = linkage()
+    flexure = Flexure("bar1", "bar", "ground.pin", "body.pin", ends)
+    sim = Simulation(dataclasses.replace(parts, flexures=(flexure,)))
+    assert sim.frequency == 0.0
+    with_weight = Simulation(parts, {"gravity.x": 9.81})
+    assert 1.0 < with_weight.frequency < 2.0
+
+
+def test_a_release_velocity_that_the_loops_forbid_is_refused():
+    """A straight guide of rigid links cannot move along its flexures."""
+    guide = mechanism("PRBDM")
+    upwards = dataclasses.replace(guide, release=dataclasses.replace(guide.release, direction=90.0))
+    values = {"release.displacement": 0.0, "release.velocity": 0.1, "gravity.x": 0.0}
+    with pytest.raises(
+        ParameterError, match=r"release.velocity = 0.1 m/s: the body shuttle cannot"
+    ):
+        Simulation(upwards, values)
 
 
 def test_a_step_that_is_far_too_long_for_stretching_links_is_taken_again():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation, library
+from many_parts import anvil, elastic
 from prbm import PrbmError, Simulation
 from prbm_fmu.python_fmu import interface
 from support import PMMA, mechanism
@@ -92,6 +93,41 @@ def test_two_stops_in_the_kernel_are_those_of_the_engine(model, friction):
     fields = {"friction": friction, "restitution": 0.5}
     guide = two_stops(model, high=fields | {"position": -3e-3}, low=fields)
     compared(guide, {"release.displacement": -0.01}, {})
+
+
+HAMMERED = {
+    "blow and rest": ({}, {8: {"blow.y": -0.6}}),
+    "smooth": ({"face.friction": 0.0, "rub.coefficient": 0.0}, {8: {"blow.y": -0.6}}),
+    "lifted": ({"face.restitution": 0.2}, {4: {"blow.y": -0.6}, 30: {"blow.y": 0.03}}),
+    "dragged": (
+        {"face.friction": 0.05, "rub.coefficient": 0.0},
+        {4: {"blow.y": -0.4}, 20: {"blow.x": 0.5, "blow.moment": 1e-3}, 36: {"blow.x": -0.5}},
+    ),
+    "a wall that moves on its body": (
+        {"face.restitution": 0.0},
+        {4: {"blow.y": -0.6}, 20: {"face.velocity": -0.02}, 21: {"face.displacement": -5e-5}}
+        | {24: {"face.velocity": 0.0}, 30: {"face.displacement": 0.0}},
+    ),
+    "shaken": ({"damping.zeta": 0.05}, {2: {"base.acceleration.x": 2.0, "blow.y": -0.3}}),
+}
+
+
+@pytest.mark.parametrize("name", HAMMERED)
+def test_bodies_that_hit_and_rest_on_each_other_do_so_in_the_kernel(name):
+    """On flexures that stretch: impacts on a body, rest on it, friction there."""
+    values, schedule = HAMMERED[name]
+    found = compared(anvil(), values, schedule, end=0.12)
+    assert found["face.impact_count"] + found["face.contact"] > 0.0
+
+
+def test_a_mechanism_of_many_parts_moves_in_the_kernel_as_in_the_engine():
+    """A chain, a free end, bars, joints, walls on bodies: until a few impacts have been."""
+    compared(
+        elastic(),
+        {"L": 0.05, "solver.tolerance": 1e-10},
+        {2: {"pull.x": 0.05, "push.moment": 0.01}},
+        end=0.02,
+    )
 
 
 def test_the_guide_of_the_thesis_appendix_in_the_kernel():

@@ -570,7 +570,7 @@ def test_tables_that_are_missing_or_damaged_are_told(native, copied, fmi, kind):
     not_a_number = good.replace(struct.pack("<d", 0.04), struct.pack("<d", NAN))
     assert not_a_number != good
     for bad in (b"", b"PRBM", good[:-1], good + b"x", bytes(flipped), sealed(not_a_number),
-                sealed(good[:4] + struct.pack("<I", 2) + good[8:]), b"x" * (17 << 20)):  # fmt: skip
+                sealed(good[:4] + struct.pack("<I", 1) + good[8:]), b"x" * (17 << 20)):  # fmt: skip
         (said,) = instantiated(copied(fmi, bad), kind)
         assert "tables" in said or "mechanism" in said, said
     (said,) = instantiated(copied(fmi, tables_of(native, 5 - fmi)), kind)

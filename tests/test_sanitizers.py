@@ -25,12 +25,15 @@ VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full")
 
 def changes(model: str) -> dict[int, dict[str, float]]:
     """Return inputs and tunable parameters that change on the way; friction sets in."""
-    stop = given(model).stops[0].name
+    guide = given(model)
+    stop, force, friction = (
+        parts[0].name for parts in (guide.stops, guide.forces, guide.frictions)
+    )
     return {
-        20: {"force.x": 0.3, "base.acceleration.y": 2.0},
+        20: {f"{force}.x": 0.3, "base.acceleration.y": 2.0},
         60: {f"{stop}.displacement": 1e-3},
-        80: {f"{stop}.restitution": 0.9, "damping.zeta": 0.05, "friction.coefficient": 0.3},
-        90: {"friction.normal_force": 0.2, f"{stop}.friction": 0.3},
+        80: {f"{stop}.restitution": 0.9, "damping.zeta": 0.05, f"{friction}.coefficient": 0.3},
+        90: {f"{friction}.normal_force": 0.2, f"{stop}.friction": 0.3},
     }
 
 

@@ -22,7 +22,7 @@ def test_amplitudes_and_frequencies_of_known_sines_are_found():
 
 @pytest.fixture(scope="module")
 def small_motion():
-    """Return what follows a small hit off the centre of mass beside the static equilibrium under gravity."""
+    """Return what follows a small hit, off the centre of mass, beside the static equilibrium."""
     values = {
         "release.displacement": 10.6e-3,
         "stop.position": 10.8e-3,
@@ -33,7 +33,7 @@ def small_motion():
 
 
 def test_small_motions_ring_at_the_modes_of_the_impact_shape(small_motion):
-    """Nearly linear vibration: each mode is a line, to 0.2 %; modes depend on the shape a little."""
+    """Nearly linear vibration: each mode is a line, to 0.2 %, for modes depend on the shape."""
     found = np.concatenate([
         peaks(*spectrum(small_motion.time, getattr(small_motion, name)), share=0.005)
         for name in ("along", "across", "turning")

@@ -2,11 +2,13 @@
 
 import struct
 import zlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import pytest
 
-from prbm import Mechanism, Simulation
+from kernel_library import KernelError, kernel
+from many_parts import anvil, elastic
+from prbm import Mechanism, MechanismError, Simulation
 from prbm.dynamics import input_names
 from prbm.exchange import independent
 from prbm.mechanism import FIELDS, affine, value
@@ -109,8 +111,10 @@ class Reader:
         return lambda values: (x(values), y(values))
 
 
-@pytest.fixture(scope="module", params=["PRBDM", "PRBDM2R", "Lever"])
+@pytest.fixture(scope="module", params=["PRBDM", "PRBDM2R", "Lever", "Elastic"])
 def mechanism(request, tmp_path_factory) -> Mechanism:
+    if request.param == "Elastic":
+        return elastic()
     if request.param == "Lever":
         path = tmp_path_factory.mktemp("lever") / "lever.toml"
         path.write_text(EXPRESSIONS)
@@ -126,7 +130,7 @@ def written(mechanism) -> bytes:
 
 def test_the_head_tells_version_size_and_check_sum(written):
     magic, version, size, check = struct.unpack_from("<4sIII", written)
-    assert (magic, version, size) == (b"PRBM", 1, len(written))
+    assert (magic, version, size) == (b"PRBM", 2, len(written))
     assert check == zlib.crc32(written[16:])
 
 
@@ -158,11 +162,14 @@ def test_everything_is_read_back_as_it_is_in_the_mechanism(mechanism, written):
         for name in FIELDS[type(part)]
         if isinstance(getattr(part, name), str)
     ]
-    counts = [r.take("I") for _ in range(12)]
-    parts = (m.bodies, m.flexure_types, m.flexures, m.stops, m.frictions, m.forces, m.ground)
+    counts = [r.take("I") for _ in range(14)]
+    parts = (
+        m.bodies, m.flexure_types, m.flexures, m.joints, m.stops, m.frictions, m.forces, m.probes,
+        m.ground,
+    )  # fmt: skip
     assert counts[0] == len(m.parameters)
-    assert counts[1:8] == [*map(len, parts)]
-    assert counts[8:] == [
+    assert counts[1:10] == [*map(len, parts)]
+    assert counts[10:] == [
         len(bounds), len(native.variables), len(native.independent), len(input_names(m))
     ]  # fmt: skip
     for p in m.parameters:
@@ -175,6 +182,17 @@ def test_everything_is_read_back_as_it_is_in_the_mechanism(mechanism, written):
     for name in input_names(m):
         assert (r.text(), r.take("d")) == (name, 0.0)
     bodies = ["ground", *(b.name for b in m.bodies)]
+
+    def between(part) -> None:
+        for end in (part.start, part.end):
+            assert bodies[r.take("I")] == end.rpartition(".")[0]
+            point(m.point(end, part.name))
+
+    def placed(part) -> None:
+        """Read where a part acts: at the centre of mass if nothing is said."""
+        assert (r.text(), bodies[r.take("I")]) == (part.name, part.body)
+        point(part.point or next(b for b in m.bodies if b.name == part.body).centre)
+
     for body in m.bodies:
         assert r.text() == body.name
         fields(body)
@@ -182,7 +200,8 @@ def test_everything_is_read_back_as_it_is_in_the_mechanism(mechanism, written):
     for kind in m.flexure_types:
         model = m.model(kind)
         assert r.text() == kind.name
-        assert r.take("III") == (model.lumped, model.rate_with_gamma, len(model.gamma))
+        assert r.take("III") == (model.lumped, model.rate_with_gamma, kind.axial)
+        assert r.take("II") == (len(model.gamma), kind.n)
         fields(kind)
         for c in (*model.gamma, *model.K_theta):
             given = kind.coefficients.get(c.name, 0.0)
@@ -193,21 +212,26 @@ def test_everything_is_read_back_as_it_is_in_the_mechanism(mechanism, written):
         assert (r.text(), r.take("I")) == (
             flexure.name, [k.name for k in m.flexure_types].index(flexure.type)
         )  # fmt: skip
-        for end in (flexure.start, flexure.end):
-            assert bodies[r.take("I")] == end.rpartition(".")[0]
-            point(m.point(end, flexure.name))
-        assert r.take("II") == tuple(end == "clamp" for end in flexure.ends)
+        between(flexure)
+        assert r.take("II") == tuple(("clamp", "pin", "free").index(end) for end in flexure.ends)
+    for joint in m.joints:
+        assert r.text() == joint.name
+        between(joint)
     for stop in m.stops:
         assert (r.text(), bodies[r.take("I")]) == (stop.name, stop.body)
+        assert bodies[r.take("I")] == stop.on
         point(stop.point)
         assert r.take("d") == stop.direction
         fields(stop)
     for friction in m.frictions:
-        assert (r.text(), bodies[r.take("I")]) == (friction.name, friction.body)
+        placed(friction)
         assert r.take("d") == friction.direction
         fields(friction)
     for force in m.forces:
-        assert (r.text(), bodies[r.take("I")]) == (force.name, force.body)
+        placed(force)
+    for probe in m.probes:
+        assert (r.text(), bodies[r.take("I")]) == (probe.name, probe.point.rpartition(".")[0])
+        point(m.point(probe.point, probe.name))
     assert bodies[r.take("I")] == m.release.body
     assert r.take("d") == m.release.direction
     fields(m.release)
@@ -250,6 +274,46 @@ def test_every_output_of_the_engine_has_a_slot_of_its_own(mechanism):
     assert sorted(place.values()) == [*range(len(place))]
     simulation = Simulation(mechanism)
     assert {*simulation.outputs(), *simulation.values, *simulation.given} <= place.keys()
+
+
+@pytest.mark.parametrize(
+    ("many", "told"),
+    [("probes", "1025 probes"), ("forces", "1025 forces"), ("stops", "65 stops")],
+)
+def test_what_the_kernel_would_refuse_is_not_written(many, told):
+    guide = anvil()
+    one = getattr(guide, many)[0]
+    count = int(told.split()[0])
+    more = tuple(replace(one, name=f"{one.name}{k}") for k in range(count))
+    large = replace(guide, **{many: more})
+    with pytest.raises(MechanismError, match=f"Anvil has {told}; a native FMU computes with"):
+        tables(large, (), TOKEN, ())
+
+
+@pytest.mark.parametrize(
+    ("name", "places", "number", "told"),
+    [
+        ("knock", 1, 2, "a stop that is fixed to what it stops"),
+        ("knock", 1, 9, "a reference that leads nowhere"),
+        ("leaf", 3, 0, "a flexure of no kind"),
+        ("leaf", 4, 3, "a flexure of no kind"),
+        ("leaf", 2, 2, "a reference that leads nowhere"),
+        ("chain", 4, 100000, "a reference that leads nowhere"),
+        ("chain", 4, 256, "more parts than can be computed with"),
+        ("hook", 0, 1, "a part that joins nothing"),
+        ("hook", 0, 2, "a body that nothing holds"),
+        ("tip", 0, 9, "a reference that leads nowhere"),
+    ],
+)
+def test_tables_that_make_no_mechanism_are_refused(name, places, number, told):
+    """A number behind the name of a part of the mechanism of many parts is replaced."""
+    guide = elastic()
+    written = bytearray(tables(guide, (), TOKEN, independent(guide)))
+    at = written.index(struct.pack("<I", len(name)) + name.encode() + b"\0") + 5 + len(name)
+    struct.pack_into("<I", written, at + 4 * places, number)
+    struct.pack_into("<I", written, 12, zlib.crc32(written[16:]))
+    with pytest.raises(KernelError, match=told):
+        kernel().mechanism_open(bytes(written), len(written))
 
 
 def test_names_of_any_alphabet_are_counted_in_bytes(tmp_path):

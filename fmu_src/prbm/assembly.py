@@ -248,6 +248,11 @@ class System:
         w[..., self.stretches] = 0.0
         return w
 
+    def motion(self, frame: BodyFrame, e: Complex, v: Real) -> tuple[complex, complex]:
+        """Return the displacement from the straight shape [m] and the velocity [m/s] of a point."""
+        displacement = complex(frame.A @ e) + frame.c - frame.drawn
+        return displacement, complex(1j * (frame.A @ (e * self.turning(v))))
+
     def spread(self, B: Complex) -> Complex:
         """Return rows with the column of each arm repeated for its stretch."""
         return B[..., self.arm] if len(self.stretches) else B

@@ -39,6 +39,8 @@ RELEASE_GAP = 1e-9  # m; a wall may be touched at release by no more than this
 SHORTEST_FLIGHT = 5e-7  # of the period: the arc of a shorter bounce is lost in rounding
 DEPENDENT = 1e-4  # share of a row's mobility that the stops leave; below, the stop carries all
 ALIGNED = 1e-9  # the same for stops among each other; below, one of them holds for all
+AT_EASE = 1e-7  # of the highest frequency: a lower one is what rounding leaves of none
+NO_SPRING = 2 * math.pi  # rad/s; the scale of rates of a linkage without springs
 STILL = 1e-9  # of the velocity scale: a slower rate is what rounding leaves of none
 SLACK = 1e-6  # of the limit of friction: what sticks may exceed it by this before it slips
 CHATTER = 1000  # events ...
@@ -170,9 +172,14 @@ class Simulation:
             raise ParameterError(f"step = {step} s must be positive")
         self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
-        # one radian against the stiffest torsion spring [J]
-        turns = np.setdiff1d(np.arange(self.system.n), self.system.stretches)
-        self._energy_scale = float(np.abs(self.system.K[np.ix_(turns, turns)]).max())
+        # of the largest inertia [kg m^2], and of one radian against the stiffest torsion spring or,
+        # where nothing bends, of a turn by one radian in a period [J]
+        turns = np.ix_(*2 * (np.setdiff1d(np.arange(self.system.n), self.system.stretches),))
+        self._inertia_scale = float(np.abs(self.system.H[turns]).max())
+        self._energy_scale = (
+            float(np.abs(self.system.K[turns]).max())
+            or self._inertia_scale * (self.omega or NO_SPRING) ** 2
+        )
 
         displacement, speed = (
             value(mechanism.release, name, self.values) for name in ("displacement", "velocity")
@@ -389,9 +396,9 @@ class Simulation:
 
     def _take_step(self) -> None:
         """Take one step from the front, cut it at the first event."""
-        f, t, y = self.equations.rate, self.front_time, self.front
+        t, y = self.front_time, self.front
         if self.k1 is None:
-            self.k1 = f(t, y)
+            self.k1 = self.equations.rate(t, y)
         h = self.step or min(self.h or self._first_step(self.k1), self._largest_step())
         growth = GROW
         while True:
@@ -407,14 +414,7 @@ class Simulation:
                     "start the simulation nearer to zero"
                 )
             self.equations.trace.clear()
-            try:
-                with np.errstate(over="ignore", invalid="ignore"):
-                    k, y1 = stages(PAIR, f, t, y, h, self.k1)
-                    error = self._error(h * (PAIR.error @ k), y, y1)
-            except SimulationError:  # a stage so far off that its equations mean nothing
-                if self.step or SHRINK * h < SMALLEST_STEP:
-                    raise
-                error = math.inf
+            k, y1, error = self._trial(t, y, h, self.k1)
             if self.step or error <= 1.0:
                 break
             growth = 1.0  # a step that had to be repeated is not followed by a longer one
@@ -440,6 +440,21 @@ class Simulation:
             self.front = self.equations.project(event.time, arc.at(event.time))
         self.arc = arc
 
+    def _trial(self, t: float, y: Real, h: float, k1: Real) -> tuple[Real, Real, float]:
+        """Return the stages of a step, where it leads to, and its error.
+
+        A step that is far too long may lead to where nothing can be computed: its error is
+        infinite, unless the step is fixed.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            try:
+                k, y1 = stages(PAIR, self.equations.rate, t, y, h, k1)
+            except SimulationError:
+                if self.step:
+                    raise
+                return np.zeros((PAIR.error.size, len(y))), y, math.inf
+            return k, y1, self._error(h * (PAIR.error @ k), y, y1)
+
     def _scales(self, y: Real) -> Real:
         """Return the magnitudes against which errors of a state are measured.
 
@@ -462,8 +477,7 @@ class Simulation:
         """Return the angular frequency against which rates are measured [rad/s]."""
         if self.omega > 0.0:
             return self.omega
-        ratio: float = np.abs(self.system.K).max() / np.abs(self.system.H).max()
-        return math.sqrt(ratio)
+        return math.sqrt(self._energy_scale / self._inertia_scale)
 
     def _error(self, difference: Real, y: Real, y1: Real) -> float:
         """Return the root mean square of an error in units of what the tolerance allows."""
@@ -531,10 +545,15 @@ class Simulation:
         sign, is not found again.  A dip below zero between two looks shows in the rates.
         """
         gap_at, near = self._gap_at(arc, i), TOUCHING * self.system.length
+        still, closed = self._still(), constraints.CLOSED * self.system.length
         for j in range(WATCHED):
             a, b = float(times[j]), float(times[j + 1])
             dips = rates[j] < 0.0 < rates[j + 1]
             if gaps[j + 1] > 0.0 and not dips:
+                continue
+            if abs(rates[j]) <= still and abs(gaps[j]) <= closed:
+                if gaps[j + 1] < -near:  # it has let go too early: a little later it is pressed
+                    return _falls(lambda t: gap_at(t) + near, a, b)
                 continue
             if rates[j] > 0.0:
                 if rates[j + 1] >= 0.0:
@@ -656,7 +675,7 @@ class Simulation:
         elif event.kind.startswith("slip "):
             self._settle(yields=(event.kind.removeprefix("slip "), event.index))
         else:
-            self._settle()
+            self._settle(turns=(event.kind, event.index))
 
     def _count(self, event: Event) -> None:
         """Stop a chatter that does not end."""
@@ -874,7 +893,12 @@ class Simulation:
             return IDLE
         return 1 if speed > 0.0 else -1
 
-    def _settle(self, resting: Sequence[int] = (), yields: tuple[str, int] | None = None) -> None:
+    def _settle(
+        self,
+        resting: Sequence[int] = (),
+        yields: tuple[str, int] | None = None,
+        turns: tuple[str, int] | None = None,
+    ) -> None:
         """Choose what holds, sticks and slides at the front, from its state alone.
 
         Parameters
@@ -883,9 +907,12 @@ class Simulation:
             Open stops that touch without closing or opening.
         yields : (str, int) or None
             What has just used up its friction and cannot stick.
+        turns : (str, int) or None
+            What has just stopped sliding, or turns back.
         """
         n, t = self.system.n, self.front_time
         q, v = self.front[:n], self.front[n : 2 * n]
+        slow = self._speed_left(*turns, q, v) if turns else 0.0
         e = self.system.directions(q)
         gaps, rates = self.equations.gaps(t, e), self.equations.gap_rates(e, v)
         near, still = TOUCHING * self.system.length + RELEASE_GAP, self._still()
@@ -901,26 +928,37 @@ class Simulation:
         for _ in range(len(rubbing) + 1):  # what one does may change what another must do
             before = self.discrete
             for kind, i in rubbing:
-                state = self._slide_state(kind, i, q, v, yields == (kind, i))
+                stops = slow if turns == (kind, i) else 0.0
+                state = self._slide_state(kind, i, q, v, yields == (kind, i), stops)
                 self._set_discrete(self._with_slide(kind, i, state))
             if self.discrete == before:
                 break
         if holding:
             self.front = self.equations.project(t, self.front)
 
-    def _slide_state(self, kind: str, i: int, q: Real, v: Real, yields: bool) -> int:
+    def _speed_left(self, kind: str, i: int, q: Real, v: Real) -> float:
+        """Return the sliding speed that the resolution of time leaves when sliding stops [m/s]."""
+        a, _, _ = self.equations.accelerations(q, v)
+        e, rows = self.system.directions(q), self._slide_rows(kind)
+        rate = float(rows.jacobian(e)[i] @ a - rows.convective(e, v)[i])
+        return abs(rate) * (2 * TIME_RESOLUTION + 8 * math.ulp(self.front_time))
+
+    def _slide_state(
+        self, kind: str, i: int, q: Real, v: Real, yields: bool, slow: float = 0.0
+    ) -> int:
         """Return whether something slides (its sign), sticks, or is idle.
 
-        What moves slides.  What is at rest is idle where the loops and the stops that hold leave
-        it no mobility of its own: the stop carries everything and the friction nothing.  Else it
-        sticks as far as Coulomb's law allows, and beyond slides in the direction in which
-        sliding accelerates it.
+        What moves, faster than ``slow``, slides.  What is at rest is idle where the loops and the
+        stops that hold leave it no mobility of its own: the stop carries everything and the
+        friction nothing.  Else it sticks as far as Coulomb's law allows, and beyond slides in the
+        direction in which sliding accelerates it.
         """
         e, M, loops = self._mass_and_loops(q)
         rows = self._slide_rows(kind)
         row = rows.jacobian(e)[[i]]
-        moving = self._sign(float((row @ v).item()))
-        if moving != IDLE:
+        speed = float((row @ v).item())
+        moving = self._sign(speed)
+        if moving != IDLE and abs(speed) > slow:
             return moving
         others = self._equations(self._with_slide(kind, i, IDLE))
         held = others.rows.jacobian(e)
@@ -967,16 +1005,19 @@ class Simulation:
         system, equations, n, t = self.system, self.equations, self.system.n, self.time
         y = self.state()
         q, v = y[:n], y[n : 2 * n]
-        e = self.system.directions(q)
+        e = system.directions(q)
         a, lam, M = equations.accelerations(q, v)
         out: dict[str, float | int | bool] = {}
         for name, frame in system.bodies.items():
-            place = complex(frame.A @ e) + frame.c - frame.drawn
-            velocity = complex(1j * (frame.A @ (e * v)))
+            place, velocity = system.motion(frame, e, v)
             out[f"{name}.x"], out[f"{name}.y"] = place.real, place.imag
             out[f"{name}.angle"] = float(q[frame.j])
             out[f"{name}.vx"], out[f"{name}.vy"] = velocity.real, velocity.imag
             out[f"{name}.omega"] = float(v[frame.j])
+        for frame in system.probes:
+            place, velocity = system.motion(frame, e, v)
+            out[f"{frame.name}.x"], out[f"{frame.name}.y"] = place.real, place.imag
+            out[f"{frame.name}.vx"], out[f"{frame.name}.vy"] = velocity.real, velocity.imag
         gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
         pressed = equations.stop_forces(lam)
         for i, stop in enumerate(self.mechanism.stops):
@@ -999,6 +1040,10 @@ class Simulation:
         for number, j in enumerate(system.links, start=1):
             out[f"link[{number}].angle"] = float(q[j])
             out[f"link[{number}].omega"] = float(v[j])
+        for j, link in zip(system.stretches, system.stretched, strict=True):
+            number = system.links.index(link) + 1
+            out[f"link[{number}].strain"] = float(q[j])
+            out[f"link[{number}].strain_rate"] = float(v[j])
         out["mode.frequency"] = self.frequency
         out.update(self.calculated)
         return out
@@ -1119,9 +1164,11 @@ def _independent(rows: Real, M: Real, loops: Real) -> bool:
 def fundamental_frequency(system: System) -> float:
     """Return the fundamental frequency about the equilibrium under gravity [Hz].
 
-    Zero if that equilibrium is unstable.
+    Zero if that equilibrium is unstable, or something swings without a spring.
     """
-    return max(0.0, float(modes(system, equilibrium(system)).frequency[0]))
+    frequency = modes(system, equilibrium(system)).frequency
+    lowest = float(frequency[0])
+    return lowest if lowest > AT_EASE * float(np.abs(frequency).max()) else 0.0
 
 
 def _tolerance(x: float) -> float:

@@ -87,9 +87,10 @@ def affine(quantity: Quantity) -> Affine:
         RecursionError,
         MemoryError,
     ) as why:
+        reason = why.msg if isinstance(why, SyntaxError) else why
         raise MechanismError(
             f"cannot read the expression {str(quantity)[:80]!r}: write numbers and parameter names "
-            f"joined by + - * /, linear in the parameters ({why})"
+            f"joined by + - * /, linear in the parameters ({reason})"
         ) from None
     if not all(map(math.isfinite, (result.constant, *result.terms.values()))):
         raise MechanismError(f"cannot read the expression {quantity!r}: its numbers are not finite")
@@ -486,13 +487,18 @@ class Mechanism:
             raise MechanismError(f"gravity = {self.gravity!r} must have an x and a y component")
         self._check_references()
         self._check_names()
-        known = {p.name for p in self.parameters}
+        known = {p.name: p for p in self.parameters}
+        given = dict(self._quantities())
         for where, quantity in self._quantities():
             for name in affine(quantity).terms:
+                if name not in known and name in given:
+                    raise MechanismError(
+                        f"{where} refers to {name!r}, which is an expression itself: write it out"
+                    )
                 if name not in known:
                     raise MechanismError(
                         f"{where} refers to {name!r}, which is no parameter of {self.name}; "
-                        f"known are {', '.join(sorted(known))}"
+                        f"{proposal(name, known)}"
                     )
 
     # -- parameters --
@@ -722,8 +728,12 @@ def body_of(reference: str) -> str:
 
 def unknown(name: str, known: Mapping[str, object]) -> str:
     """Return a sentence about an unknown name that proposes the nearest ones."""
+    return f"there is no variable {name!r}; {proposal(name, known)}"
+
+
+def proposal(name: str, known: Mapping[str, object]) -> str:
+    """Return the known names that are nearest to a name, or all, as half a sentence."""
     import difflib
 
     near = difflib.get_close_matches(name, known, n=3, cutoff=0.5)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"
-    return f"there is no variable {name!r}; {hint}"
+    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(known)}"

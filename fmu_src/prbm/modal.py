@@ -32,7 +32,7 @@ class Modes:
 
 
 def modes(system: System, shape: Equilibrium) -> Modes:
-    """Return the modes about a static shape; its holding force stays as a dead load.
+    """Return the modes about a static shape; its loads and holding force stay as dead loads.
 
     Parameters
     ----------
@@ -45,14 +45,13 @@ def modes(system: System, shape: Equilibrium) -> Modes:
     if shape.force != 0.0:
         B = np.vstack([B, system.release])
         lam = np.append(lam, shape.force)
-    return _modes(system, shape.q, B, lam)
+    return _modes(system, shape.q, B, lam, shape.load)
 
 
-def _modes(system: System, q: Real, B: Complex, lam: Real) -> Modes:
-    """Solve K_t phi = omega^2 M phi on the tangent space of the loops."""
+def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
+    """Solve K_t phi = omega^2 M phi on the tangent space of the loops, w the row of the loads."""
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
-    w = field_row(system.spread(system.S), system.gravity)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm)
     rows = constraints.jacobian(system.spread(system.loops), e)
     Z = null_space(rows) if len(rows) else np.eye(system.n)
@@ -89,7 +88,7 @@ def modes_at(system: System, q: Real) -> Modes:
     w = field_row(system.spread(system.S), system.gravity)
     right = np.concatenate([springs(system.K, q - system.q0) + (w * e).real, np.zeros(len(B))])
     lam = -constraints.solve(constraints.saddle(M, rows, rows), right)[system.n :]
-    return _modes(system, q, B, lam)
+    return _modes(system, q, B, lam, w)
 
 
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:

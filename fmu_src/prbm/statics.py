@@ -1,26 +1,29 @@
-r"""Static equilibrium under gravity and a holding force, and the tangent stiffness there.
+r"""Static equilibrium under gravity, loads and a holding force, and the tangent stiffness there.
 
-At rest the torques balance: K (q - q0) - Re(w e) - J^T lam - r^T F = 0 with w the row of gravity,
-J the Jacobian of the loops, r that of the held displacement and F the holding force.  Second
-derivatives couple at most an angle and the stretch of the same link, because every position is
-linear in the arms.
+At rest the torques balance: K (q - q0) - Re(w e) - Q - J^T lam - r^T F = 0 with w the row of
+gravity and the forces, Q the moments, J the Jacobian of the loops, r that of the held displacement
+and F the holding force.  Second derivatives couple at most an angle and the stretch of the same
+link, because every position is linear in the arms.
 """
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from . import constraints
+from . import constraints, contact
 from .assembly import Complex, Real, System, Whole
-from .errors import EquilibriumError, SimulationError
-from .forces import field_row, springs
+from .errors import EquilibriumError, ParameterError, SimulationError
+from .forces import field_row, force_row, springs
 from .kinetics import inertia
+from .mechanism import finite, unknown
 
 NEWTON_STEPS = 30
 LARGEST_TURN = 0.5  # rad per Newton step and per step of the load: further is another shape
 SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
-BALANCED = 1e-12  # of the largest rate of a spring times one radian
+IMMOBILE = 1e-12  # share of a body's mobility that the loops leave it: below, it cannot move
+BALANCED = 1e-12  # of the largest spring rate times one radian, or without springs of the load
 CONVERGED = 1e-8  # rad of the last Newton step; what is left after it is its square
 
 
@@ -36,11 +39,14 @@ class Equilibrium:
         Multipliers of the loops: forces at their closures [N].
     force : float
         Holding force on the released body along the direction of the release [N]; 0 if free.
+    load : (n,) complex
+        Row w of gravity and the forces that act, Q = Re(w e) [N m].
     """
 
     q: Real
     lam: Real
     force: float
+    load: Complex
 
 
 def tangent_stiffness(
@@ -85,10 +91,14 @@ def tangent_stiffness(
     return result
 
 
-def equilibrium(system: System, displacement: float | None = None) -> Equilibrium:
-    """Return the shape under gravity, free or held at a displacement of the released body.
+def equilibrium(
+    system: System,
+    displacement: float | None = None,
+    loads: Mapping[str, float] | None = None,
+) -> Equilibrium:
+    """Return the shape under gravity and loads, free or with the released body held.
 
-    The load and the displacement are raised together from the straight, unloaded shape, so that
+    Gravity, loads and displacement are raised together from the straight, unloaded shape, so that
     the shape found is the one that the mechanism reaches when it is loaded slowly.
 
     Parameters
@@ -98,9 +108,15 @@ def equilibrium(system: System, displacement: float | None = None) -> Equilibriu
     displacement : float or None
         Of the released body's centre of mass along the direction of the release [m]; held by a
         force along that direction.  None: no holding force.
+    loads : mapping or None
+        Forces and moments by the names of the inputs, ``force.x`` and ``force.y`` [N],
+        ``force.moment`` [N m] for a :class:`prbm.Force` of the name ``force``; they keep their
+        directions.  What is not named is zero.
 
     Raises
     ------
+    ParameterError
+        If a load is none of the mechanism's, or not a finite number.
     EquilibriumError
         If there is no such shape, or the loading does not lead there.
     """
@@ -108,22 +124,43 @@ def equilibrium(system: System, displacement: float | None = None) -> Equilibriu
     if displacement is not None:
         B = np.vstack([B, system.release])
         c = np.append(c, system.release_c)
+    w, moment = _loads(system, loads or {})
     state = np.concatenate([system.q0, np.zeros(len(c))])
-    done, fraction, links = 0.0, 1.0, list(system.links)
+    # what hangs on a pin alone may turn at once; a jump of anything else leads to another branch,
+    # where slow loading does not take it
+    bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
+    done, fraction = 0.0, 1.0
     while done < 1.0:
         target = min(1.0, done + fraction)
-        trial = _newton(system, B, c, displacement or 0.0, target, state)
-        # a jump of a link leads to another branch, where slow loading does not take it
-        if trial is not None and np.abs((trial - state)[links]).max() <= LARGEST_TURN:
+        trial = _newton(
+            system, B, c, target * (displacement or 0.0), (target * w, target * moment), state
+        )
+        if trial is not None and np.abs((trial - state)[bent]).max() <= LARGEST_TURN:
             state, done = trial, target
             fraction = min(1.0, 2 * fraction)
         else:
             fraction /= 2
             if fraction < SMALLEST_FRACTION:
-                raise EquilibriumError(_unreachable(system, displacement, done))
+                raise EquilibriumError(_unreachable(displacement, bool(loads), done))
     n, r = system.n, len(system.loops)
     force = float(state[n + r]) if displacement is not None else 0.0
-    return Equilibrium(state[:n], state[n : n + r], force)
+    return Equilibrium(state[:n], state[n : n + r], force, w)
+
+
+def _loads(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
+    """Return the row of gravity and the given forces, and the given moments [N m]."""
+    forces = system.mechanism.forces
+    given = {f"{f.name}.{what}": 0.0 for f in forces for what in ("x", "y", "moment")}
+    for name, x in loads.items():
+        if name not in given:
+            raise ParameterError(unknown(name, given))
+        given[name] = finite(name, x)
+    w, moment = field_row(system.S, system.gravity), np.zeros(system.n)
+    for force, frame in zip(forces, system.pushed, strict=True):
+        x, y, turning = (given[f"{force.name}.{what}"] for what in ("x", "y", "moment"))
+        w = w + force_row(frame.A, complex(x, y))
+        moment[frame.j] += turning
+    return system.spread(w), moment
 
 
 def free_displacement(system: System) -> float:
@@ -136,21 +173,26 @@ def free_displacement(system: System) -> float:
 
 
 def _newton(
-    system: System, B: Complex, c: Real, displacement: float, fraction: float, start: Real
+    system: System,
+    B: Complex,
+    c: Real,
+    displacement: float,
+    load: tuple[Complex, Real],
+    start: Real,
 ) -> Real | None:
-    """Solve the balance at a fraction of the load; None if it does not converge."""
+    """Solve the balance under a load, its row and its moments; None if it does not converge."""
     n = system.n
-    w = fraction * field_row(system.spread(system.S), system.gravity)
+    w, moment = load
     shift = np.zeros(len(c))
     if len(c) > len(system.loops):
-        shift[-1] = fraction * displacement
-    scale = BALANCED * float(np.abs(system.K).max())
+        shift[-1] = displacement
+    scale = BALANCED * float(np.abs(system.K).max() or np.abs(w).max())
     state, turn = start.copy(), math.inf
     for _ in range(NEWTON_STEPS):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
         rows = constraints.jacobian(system.spread(B), e)
-        torque = springs(system.K, q - system.q0) + (w * e).real + lam @ rows
+        torque = springs(system.K, q - system.q0) + (w * e).real + moment + lam @ rows
         open_by = constraints.values(B, c, e) - shift
         closed = not len(open_by) or np.abs(open_by).max() <= 1e-13 * system.length
         balanced = closed and np.abs(torque).max() <= scale
@@ -169,7 +211,12 @@ def _newton(
     return None
 
 
-def _unreachable(system: System, displacement: float | None, done: float) -> str:
+def _unreachable(displacement: float | None, loaded: bool, done: float) -> str:
+    if loaded:
+        return (
+            f"no static equilibrium was found beyond {100 * done:.3g} % of gravity and the loads, "
+            "raised in proportion: reduce the loads, or stiffen the flexures"
+        )
     if displacement is None:
         return (
             "no static equilibrium under gravity was found: the flexures are too weak for this "
@@ -196,12 +243,25 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     -------
     v : (n,)
         What an impulse on the centre of mass along that direction gives [rad/s].
+
+    Raises
+    ------
+    ParameterError
+        If the body cannot move along that direction.
     """
     if speed == 0.0:
         return np.zeros(system.n)
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     rows = constraints.jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    loops, row = rows[:-1], rows[-1:]
+    left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
+    if left <= IMMOBILE * free:
+        raise ParameterError(
+            f"release.velocity = {speed:g} m/s: the body {system.mechanism.release.body} cannot "
+            "move along the direction of the release; choose another direction, or let flexures "
+            "stretch (axial = true)"
+        )
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     return constraints.project_velocities(M, rows, rates, np.zeros(system.n))

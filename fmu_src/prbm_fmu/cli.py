@@ -1,6 +1,7 @@
 """The command that builds FMUs, and shows that they run."""
 
 import argparse
+import json
 import math
 import os
 import signal
@@ -13,7 +14,7 @@ from typing import NoReturn
 
 from prbm import Mechanism, PrbmError
 from prbm.dynamics import input_names
-from prbm_tools.mechanism_file import load, shipped
+from prbm_tools.mechanism_file import load, schema, shipped
 
 from . import __version__, native_fmu, python_fmu
 from .__main__ import command_name
@@ -96,6 +97,10 @@ def parser() -> argparse.ArgumentParser:
         "--simulate", action="store_true",
         help="simulate each FMU with FMPy, print what happens and plot it beside the FMU",
     )  # fmt: skip
+    p.add_argument(
+        "--schema", action="store_true",
+        help="print the JSON schema of mechanism files, for editors, and stop",
+    )  # fmt: skip
     p.add_argument("--list", action="store_true", help="list the shipped mechanisms and stop")
     p.add_argument("--version", action="version", version=f"prbm-impact {__version__}")
     return p
@@ -107,6 +112,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = parser().parse_args(arguments)
         if options.list:
             _list()
+            return OK
+        if options.schema:
+            print(json.dumps(schema(), indent=2))
             return OK
         order = _order(options)
         built, missing = _build(order)

@@ -48,6 +48,8 @@ SOURCES = (
     "Y.-Q. Yu, Z.-L. Feng, Q.-P. Xu, A pseudo-rigid-body 2R model of flexural beam in compliant "
     "mechanisms, Mech. Mach. Theory 55 (2012) 18 (2R).",
     "H.-J. Su, A pseudorigid-body 3R model, J. Mech. Robotics 1 (2009) 021008 (3R).",
+    "H. Hencky, Über die angenäherte Lösung von Stabilitätsproblemen im Raum mittels der "
+    "elastischen Gelenkkette, Der Eisenbau 11 (1920) 437 (nR).",
     "W. J. Stronge, Rigid body collisions with friction, Proc. R. Soc. A 431 (1990) 169 "
     "(restitution with friction).",
 )
@@ -162,12 +164,22 @@ def _use(mechanism: Mechanism) -> str:
     )
 
 
+STRETCHING = (
+    "where links that stretch have e = exp(s + i q), s the logarithm of their stretch, which is a "
+    "coordinate, too (and v is q' - i s' where it is squared), "
+)
+
+
+def _stretches(mechanism: Mechanism) -> bool:
+    return any(kind.axial for kind in mechanism.flexure_types)
+
+
 def _equations(mechanism: Mechanism) -> str:
     flexures = "".join(_flexure_row(mechanism, kind) for kind in mechanism.flexure_types)
     return (
         "<h2>Equations</h2>\n"
         "<p>With the absolute angles q of the links and e = exp(i q), every point is "
-        "z = c + A e, and</p>\n<pre>"
+        f"z = c + A e, {STRETCHING if _stretches(mechanism) else ''}and</p>\n<pre>"
         "[ M      Phi_q^T  -G^T ] [ a      ]   [ Q - C v^2        ]\n"
         "[ Phi_q  0         0   ] [ lambda ] = [ -(d/dt Phi_q) v  ]\n"
         "[ G      0         0   ] [ force  ]   [ -(d/dt G) v      ]   while a stop holds\n\n"
@@ -191,6 +203,7 @@ def _equations(mechanism: Mechanism) -> str:
 def _flexure_row(mechanism: Mechanism, kind: FlexureType) -> str:
     model = mechanism.model(kind)
     coefficients = ", ".join(f"{c.name} = {c.value:g}" for c in model.coefficients)
+    coefficients = coefficients or f"n = {kind.n}"
     cells = (kind.name, kind.model, coefficients, model.source)
     return "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>"
 
@@ -244,16 +257,20 @@ INPUTS_OF_BOTH = (
 
 def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) -> str:
     models = {kind.model for kind in mechanism.flexure_types}
-    items = [
-        "An impact of rigid bodies has an impulse, but no duration and no peak of force. A real "
-        "hit of 0.1 ms is comparable to the axial vibrations of the flexures (0.5 ms in the "
-        "steel structure of the source), which this model does not have: its links do not "
-        "stretch.",
+    impact = "An impact of rigid bodies has an impulse, but no duration and no peak of force."
+    planar = (
         "The motion is planar; flexures are slender, of uniform section and linear elastic "
-        "material, and neither yield nor touch each other.",
+        "material, and neither yield nor touch each other."
+    )
+    rigid = [
+        f"{impact} A real hit of 0.1 ms is comparable to the axial vibrations of the flexures "
+        "(0.5 ms in the steel structure of the source), which this model does not have: its links "
+        "do not stretch.",
+        planar,
         "Links that do not stretch keep a body on parallel, straight flexures from turning, so "
         "that a hit off its centre of mass costs less than it does in reality.",
     ]
+    items = [impact, planar] if _stretches(mechanism) else rigid
     for model in sorted(models & END_MOMENT.keys()):
         items.append(
             f"End moments are the weak side of pivots: under a moment at its end, the tip of a "

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
 from prbm import Mechanism
+from prbm.mechanism import GROUND
 
 from .description import (
     Heading,
@@ -19,7 +20,7 @@ from .description import (
     value_attributes,
 )
 from .structure import dependencies
-from .variables import CLOCK, NativeInterface, Variable
+from .variables import CLOCK, NativeInterface, Variable, pushed
 
 LOG_CATEGORIES = {
     "logEvents": "Impacts, with their time, speeds and loss of energy.",
@@ -213,11 +214,12 @@ def terminals(mechanism: Mechanism) -> bytes:
     ports = SubElement(root, "Terminals")
     for stop in mechanism.stops:
         members = {member: f"{stop.name}.{member}" for member in STOP_MEMBERS}
-        _terminal(ports, stop.name, f"Contact of the {stop.body} with a wall that moves", members)
+        wall = "a wall that moves" if stop.on == GROUND else f"a wall on the {stop.on}"
+        _terminal(ports, stop.name, f"Contact of the {stop.body} with {wall}", members)
     for force in mechanism.forces:
         members = {f"force.{member}": f"{force.name}.{member}" for member in FORCE_MEMBERS}
         members |= {member: f"{force.body}.{member}" for member in MOTION_MEMBERS}
-        text = f"Force on the centre of mass of the {force.body}, and its motion"
+        text = f"Force on {pushed(force)}, and the motion of the {force.body}"
         _terminal(ports, force.name, text, members)
     members = {member: f"base.{member}" for member in BASE_MEMBERS}
     _terminal(ports, "base", "Acceleration of the base, and what it has to bear", members)

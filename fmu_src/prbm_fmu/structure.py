@@ -1,8 +1,8 @@
 """What each variable of a native FMU depends on at an instant of model exchange.
 
-All that moves follows from the independent angles and rates, the inputs and the discrete state;
-nothing depends on time itself.  A dependency is listed where the equations have one for some
-mechanism of this kind or in some discrete state, even if it vanishes in another.
+All that moves follows from the independent angles, strains and their rates, the inputs and the
+discrete state; nothing depends on time itself.  A dependency is listed where the equations have
+one for some mechanism of this kind or in some discrete state, even if it vanishes in another.
 """
 
 from collections.abc import Mapping
@@ -24,23 +24,26 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
         Names in the order of the interface.
     """
     count = len(interface.independent)
-    angles, rates = interface.states[:count], interface.states[count : 2 * count]
-    moving = angles + rates
+    shape, rates = interface.states[:count], interface.states[count : 2 * count]
+    moving = shape + rates
     everything = moving + input_names(mechanism)
     found: dict[str, tuple[str, ...]] = {name: everything for name in BASE_OUTPUTS}
     for body in (b.name for b in mechanism.bodies):
-        found |= {f"{body}.{what}": angles for what in ("x", "y", "angle")}
+        found |= {f"{body}.{what}": shape for what in ("x", "y", "angle")}
         found |= {f"{body}.{what}": moving for what in ("vx", "vy", "omega")}
+    for probe in (p.name for p in mechanism.probes):
+        found |= {f"{probe}.{what}": shape for what in ("x", "y")}
+        found |= {f"{probe}.{what}": moving for what in ("vx", "vy")}
     for stop in (s.name for s in mechanism.stops):
         walls = (f"{stop}.displacement", f"{stop}.velocity")
         found |= {f"{stop}.{what}": () for what in LATCHED}
         found |= {f"{stop}.{what}_indicator": everything for what in INDICATORS}
-        found[f"{stop}.gap"] = angles + walls[:1]
+        found[f"{stop}.gap"] = shape + walls[:1]
         found[f"{stop}.gap_rate"] = moving + walls[1:]
         found[f"{stop}.force"] = everything
         found[f"{stop}.impact"] = moving + walls
     found |= {name: everything for name in interface.indicators}
-    found |= {"energy.kinetic": moving, "energy.elastic": angles, "energy.gravitational": angles}
+    found |= {"energy.kinetic": moving, "energy.elastic": shape, "energy.gravitational": shape}
     found |= {name: everything for name in interface.derivatives}
     found |= {name: (name,) for name in (*moving, *STORED)}  # a state is what it is
     order = {v.name: i for i, v in enumerate(interface.variables)}

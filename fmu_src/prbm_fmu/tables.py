@@ -9,8 +9,18 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from prbm import Flexure, FlexureType, Mechanism, assemble
+from prbm import (
+    Flexure,
+    FlexureType,
+    Force,
+    Friction,
+    Joint,
+    Mechanism,
+    MechanismError,
+    assemble,
+)
 from prbm.dynamics import input_names
+from prbm.flexure import ENDS
 from prbm.mechanism import FIELDS, GROUND, Affine, Part, Point, Quantity, affine, body_of
 
 from .variables import (
@@ -20,17 +30,21 @@ from .variables import (
     ENERGIES,
     INDICATORS,
     LATCHED,
+    LINK_ANGLE,
+    LINK_STRAIN,
+    PROBE_OUTPUTS,
     STOP_OUTPUTS,
     Variable,
-    coordinate_names,
+    coordinate_variables,
     counter_of,
     state_derivatives,
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 1
+MAGIC, VERSION = b"PRBM", 2
 HEAD = 16  # bytes before those that the check sum is of
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
+MOST_COORDINATES, MOST_STOPS, MOST_PLACES, MOST_POINTS = 512, 64, 1024, 4096  # of the C kernel
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
 
 
@@ -52,11 +66,40 @@ def tables(
         The guid or instantiation token of the model description.
     independent : sequence of int
         The coordinates whose angles and rates are states in model exchange.
+
+    Raises
+    ------
+    MechanismError
+        If it has more parts than the C kernel computes with.
     """
+    check_size(mechanism)
     listed = tuple(variables)
     body = b"".join(_Writer(mechanism, listed, independent).parts(token))
     size = struct.pack("<I", HEAD + len(body))
     return MAGIC + _u32(VERSION) + size + _u32(zlib.crc32(body)) + body
+
+
+def check_size(mechanism: Mechanism) -> None:
+    """Refuse a mechanism of more parts than the C kernel computes with.
+
+    Raises
+    ------
+    MechanismError
+        If it has.
+    """
+    m = mechanism
+    for what, count, most in (
+        ("coordinates", assemble(m, m.values()).n, MOST_COORDINATES),
+        ("stops", len(m.stops), MOST_STOPS),
+        ("frictions", len(m.frictions), MOST_STOPS),
+        ("forces", len(m.forces), MOST_PLACES),
+        ("probes", len(m.probes), MOST_PLACES),
+        ("points of the ground", len(m.ground), MOST_POINTS),
+    ):
+        if count > most:
+            raise MechanismError(
+                f"{m.name} has {count} {what}; a native FMU computes with {most} at most"
+            )
 
 
 def slots(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, int]:
@@ -73,14 +116,15 @@ def _names(mechanism: Mechanism, independent: Sequence[int]) -> Iterator[str]:
     yield from BASE_OUTPUTS
     yield from ENERGIES
     yield from (f"{stop}.{what}" for stop in stops for what in LATCHED)
-    links = len(assemble(mechanism, mechanism.values()).links)
-    for number in range(1, links + 1):
-        yield from (f"link[{number}].angle", f"link[{number}].omega")
+    coordinates = coordinate_variables(mechanism)
+    for of_links in (LINK_ANGLE, LINK_STRAIN):
+        yield from (name for pair in coordinates if of_links.search(pair[0]) for name in pair)
+    yield from (f"{probe.name}.{what}" for probe in mechanism.probes for what in PROBE_OUTPUTS)
     yield "mode.frequency"
     for kind in mechanism.flexure_types:
         if len(mechanism.model(kind).gamma) > 1:
             yield f"{kind.name}.gamma0"
-    yield from state_derivatives(coordinate_names(mechanism), independent)
+    yield from state_derivatives(coordinates, independent)
     yield from (f"{stop}.{what}_indicator" for stop in stops for what in INDICATORS)
     yield from (f"{friction.name}.slip_indicator" for friction in mechanism.frictions)
     yield "time"
@@ -131,15 +175,20 @@ class _Writer:
         for kind in m.flexure_types:
             yield self._type(kind)
         for flexure in m.flexures:
-            yield self._flexure(flexure)
+            yield _text(flexure.name) + _u32(self.type[flexure.type]) + self._between(flexure)
+            yield _u32(*map(ENDS.index, flexure.ends))
+        for joint in m.joints:
+            yield _text(joint.name) + self._between(joint)
         for stop in m.stops:
-            yield _text(stop.name) + _u32(self.body[stop.body]) + self._point(stop.point)
-            yield _f64(stop.direction) + self._fields(stop)
+            yield _text(stop.name) + _u32(self.body[stop.body], self.body[stop.on])
+            yield self._point(stop.point) + _f64(stop.direction) + self._fields(stop)
         for friction in m.frictions:
-            yield _text(friction.name) + _u32(self.body[friction.body])
-            yield _f64(friction.direction) + self._fields(friction)
+            yield self._placed(friction) + _f64(friction.direction) + self._fields(friction)
         for force in m.forces:
-            yield _text(force.name) + _u32(self.body[force.body])
+            yield self._placed(force)
+        for probe in m.probes:
+            point = self._point(m.point(probe.point, probe.name))
+            yield _text(probe.name) + _u32(self.body[body_of(probe.point)]) + point
         yield _u32(self.body[m.release.body]) + _f64(m.release.direction)
         yield self._fields(m.release)
         yield from map(self._point, m.ground.values())
@@ -150,8 +199,9 @@ class _Writer:
     def _counts(self) -> tuple[int, ...]:
         m = self.mechanism
         parts: tuple[Mapping[str, object] | Sequence[object], ...] = (
-            self.parameters, m.bodies, m.flexure_types, m.flexures, m.stops, m.frictions, m.forces,
-            m.ground, self.bounds, self.variables, self.independent, self.inputs,
+            self.parameters, m.bodies, m.flexure_types, m.flexures, m.joints, m.stops, m.frictions,
+            m.forces, m.probes, m.ground, self.bounds, self.variables, self.independent,
+            self.inputs,
         )  # fmt: skip
         return tuple(map(len, parts))
 
@@ -193,16 +243,21 @@ class _Writer:
             self._field(f"{kind.name}.{c.name}", kind.coefficients.get(c.name, c.value))
             for c in model.coefficients
         )
-        numbers = _u32(model.lumped, model.rate_with_gamma, len(model.gamma))
+        flags = _u32(model.lumped, model.rate_with_gamma, kind.axial)
+        numbers = flags + _u32(len(model.gamma), model.links)
         return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
 
-    def _flexure(self, flexure: Flexure) -> bytes:
-        ends = b"".join(
-            _u32(self.body[body_of(end)]) + self._point(self.mechanism.point(end, flexure.name))
-            for end in (flexure.start, flexure.end)
+    def _between(self, part: Flexure | Joint) -> bytes:
+        return b"".join(
+            _u32(self.body[body_of(end)]) + self._point(self.mechanism.point(end, part.name))
+            for end in (part.start, part.end)
         )
-        clamped = _u32(*(end == "clamp" for end in flexure.ends))
-        return _text(flexure.name) + _u32(self.type[flexure.type]) + ends + clamped
+
+    def _placed(self, part: Friction | Force) -> bytes:
+        """Return the name, the body and the point of a part: the centre of mass unless given."""
+        body = self.mechanism.bodies[self.body[part.body] - 1]
+        point = self._point(body.centre if part.point is None else part.point)
+        return _text(part.name) + _u32(self.body[part.body]) + point
 
     def _bounds(self) -> Iterator[bytes]:
         """Yield the bounds of the fields that are expressions."""

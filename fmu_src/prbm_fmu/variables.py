@@ -6,12 +6,13 @@ removed or moved, in every version and flavour, and nobody has to keep a registe
 """
 
 import math
+import re
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from prbm import Mechanism, MechanismError, Parameter, ParameterError, assemble
-from prbm.mechanism import affine, unknown
+from prbm import Force, Mechanism, MechanismError, Parameter, ParameterError, Stop, assemble
+from prbm.mechanism import GROUND, affine, unknown
 
 from .units import QUANTITIES, Quantity
 
@@ -22,6 +23,7 @@ CLOCK = "Clock"
 
 # what is computed, in the order in which the C kernel keeps it
 BODY_OUTPUTS = ("x", "y", "angle", "vx", "vy", "omega")
+PROBE_OUTPUTS = ("x", "y", "vx", "vy")
 STOP_OUTPUTS = ("gap", "gap_rate", "force")
 BASE_OUTPUTS = (f"{BASE}.force.x", f"{BASE}.force.y", f"{BASE}.moment")
 STORED = ("energy.dissipated", "energy.work")  # energies that are states
@@ -30,6 +32,8 @@ LATCHED = (
     "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
     "energy_lost", "modal_restitution",
 )  # fmt: skip
+LINK_ANGLE = re.compile(r"^link\[\d+\]\.angle$")
+LINK_STRAIN = re.compile(r"^link\[\d+\]\.strain$")
 INDICATORS = ("impact", "release", "slip")  # event indicators of a stop
 
 
@@ -249,13 +253,16 @@ def _variables(
     yield from _inputs(mechanism, nominal)
     for body in mechanism.bodies:
         yield from _body(body.name, nominal)
+    for probe in mechanism.probes:
+        yield from _probe(probe.name, f"of {probe.point}", nominal)
     for stop in mechanism.stops:
         yield from _stop(stop.name, nominal)
     yield from _base(nominal)
     yield from _energies(nominal)
-    links = (n.removesuffix(".angle") for n in sample if n.startswith("link["))
-    for link in (n for n in links if not n.endswith(".omega")):
+    for link in (n.removesuffix(".angle") for n in sample if LINK_ANGLE.search(n)):
         yield from _link(link, nominal)
+        if f"{link}.strain" in sample:
+            yield from _strain(link)
     yield Variable(
         "mode.frequency",
         "Fundamental frequency about the static equilibrium under gravity, without stops",
@@ -289,27 +296,36 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
         )
 
     for force in mechanism.forces:
-        centre = f"the centre of mass of the {force.body}"
-        yield given(f"{force.name}.x", "N", f"Force on {centre} along x")
-        yield given(f"{force.name}.y", "N", f"Force on {centre} along y")
+        yield given(f"{force.name}.x", "N", f"Force on {pushed(force)} along x")
+        yield given(f"{force.name}.y", "N", f"Force on {pushed(force)} along y")
         yield given(f"{force.name}.moment", "N.m", f"Moment on the {force.body}")
     for stop in mechanism.stops:
         yield given(
             f"{stop.name}.displacement",
             "m",
-            f"Displacement of the wall, added to {stop.name}.position; the wall moves "
+            f"Displacement of the {wall(stop)}, added to {stop.name}.position; the wall moves "
             "there uniformly within a communication step",
         )
         yield given(
             f"{stop.name}.velocity",
             "m/s",
-            f"Velocity of the wall, rate of {stop.name}.displacement",
+            f"Velocity of the {wall(stop)}, rate of {stop.name}.displacement",
         )
     for axis in "xy":
         yield given(
             f"{BASE}.acceleration.{axis}", "m/s2",
             f"Acceleration of the base along {axis}; all motion is relative to the base",
         )  # fmt: skip
+
+
+def pushed(force: Force) -> str:
+    """Return where a force acts, in words."""
+    return f"{'the centre of mass' if force.point is None else 'a point'} of the {force.body}"
+
+
+def wall(stop: Stop) -> str:
+    """Return what the wall of a stop is, in words: its motion is seen from there."""
+    return "wall" if stop.on == GROUND else f"wall on the {stop.on}, as seen from there"
 
 
 def _output(
@@ -327,18 +343,31 @@ def _output(
     )  # fmt: skip
 
 
+def _displacements(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
+    for axis in "xy":
+        yield _output(
+            f"{name}.{axis}", "m", f"Displacement {point} along {axis} from straight", nominal
+        )
+
+
+def _velocities(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
+    for axis in "xy":
+        yield _output(
+            f"{name}.v{axis}", "m/s", f"Velocity {point} along {axis}", nominal,
+            derivative_of=f"{name}.{axis}",
+        )  # fmt: skip
+
+
+def _probe(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
+    yield from _displacements(name, point, nominal)
+    yield from _velocities(name, point, nominal)
+
+
 def _body(body: str, nominal: Scales) -> Iterator[Variable]:
     centre = f"of the centre of mass of the {body}"
-    for axis in "xy":
-        yield _output(
-            f"{body}.{axis}", "m", f"Displacement {centre} along {axis} from straight", nominal
-        )
+    yield from _displacements(body, centre, nominal)
     yield _output(f"{body}.angle", "rad", f"Rotation of the {body} from straight", nominal)
-    for axis in "xy":
-        yield _output(
-            f"{body}.v{axis}", "m/s", f"Velocity {centre} along {axis}", nominal,
-            derivative_of=f"{body}.{axis}",
-        )  # fmt: skip
+    yield from _velocities(body, centre, nominal)
     yield _output(
         f"{body}.omega", "rad/s", f"Angular velocity of the {body}", nominal,
         derivative_of=f"{body}.angle",
@@ -428,6 +457,20 @@ def _link(link: str, nominal: Scales) -> Iterator[Variable]:
     )  # fmt: skip
 
 
+def _strain(link: str) -> Iterator[Variable]:
+    number = link.removeprefix("link[").removesuffix("]")
+    strain = Variable(
+        f"{link}.strain",
+        f"Strain of link {number} of the flexures: logarithm of its length over the straight one",
+        "local", "continuous", "calculated", "1",
+    )  # fmt: skip
+    yield strain
+    yield replace(
+        strain, name=f"{link}.strain_rate", description=f"Rate of the strain of link {number}",
+        unit="1/s", derivative_of=strain.name,
+    )  # fmt: skip
+
+
 # --- native FMUs --------------------------------------------------------------------------------
 
 
@@ -491,9 +534,8 @@ def native_interface(
         If two names share a value reference.
     """
     nominal = scales(mechanism, sample)
-    names = coordinate_names(mechanism)
-    angles = tuple(f"{names[j]}.angle" for j in independent)
-    rates = tuple(f"{names[j]}.omega" for j in independent)
+    names = coordinate_variables(mechanism)
+    angles, rates = (tuple(names[j][order] for j in independent) for order in (0, 1))
     states = (*angles, *rates, *STORED)
     nominals = {
         name: _next_power_of_ten(size)
@@ -524,18 +566,23 @@ def native_interface(
     )
 
 
-def coordinate_names(mechanism: Mechanism) -> tuple[str, ...]:
-    """Return what the variables of each coordinate are named after: ``link[k]``, or a body."""
+def coordinate_variables(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
+    """Return the variables that each coordinate and its rate are: angles, or a link's strain."""
     system = assemble(mechanism, mechanism.values())
     names = {j: f"link[{number}]" for number, j in enumerate(system.links, start=1)}
     names |= {frame.j: name for name, frame in system.bodies.items()}
-    return tuple(names[j] for j in range(system.n))
+    pairs = {j: (f"{name}.angle", f"{name}.omega") for j, name in names.items()}
+    for j, link in zip(system.stretches, system.stretched, strict=True):
+        pairs[j] = (f"{names[link]}.strain", f"{names[link]}.strain_rate")
+    return tuple(pairs[j] for j in range(system.n))
 
 
-def state_derivatives(coordinates: Sequence[str], independent: Sequence[int]) -> tuple[str, ...]:
+def state_derivatives(
+    coordinates: Sequence[tuple[str, str]], independent: Sequence[int]
+) -> tuple[str, ...]:
     """Return the names of those derivatives of states that are no other variable."""
     return (
-        *(f"der({coordinates[j]}.omega)" for j in independent),
+        *(f"der({coordinates[j][1]})" for j in independent),
         *(f"der({name})" for name in STORED),
     )
 
@@ -560,9 +607,11 @@ DERIVATIVES = {
 
 def _derivative(name: str, nominal: Scales) -> Variable:
     state = name.removeprefix("der(").removesuffix(")")
-    unit = "W" if state in DERIVATIVES else "rad/s2"
-    owner = state.removesuffix(".omega")
-    description = DERIVATIVES.get(state, f"Angular acceleration of {owner}")
+    owner, _, rate = state.rpartition(".")
+    unit, description = {
+        "omega": ("rad/s2", f"Angular acceleration of {owner}"),
+        "strain_rate": ("1/s2", f"Rate of the strain rate of {owner}"),
+    }.get(rate, ("W", DERIVATIVES.get(state, "")))
     return Variable(
         name, description, "local", "continuous", "calculated", unit,
         nominal=nominal(unit), derivative_of=state,

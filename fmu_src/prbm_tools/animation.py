@@ -10,7 +10,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from prbm import Mechanism, ParameterError
+from prbm import Mechanism, ParameterError, assemble
 from prbm.errors import PrbmError
 from prbm.mechanism import unknown
 
@@ -31,6 +31,7 @@ from .simulate import (
     Progress,
     Result,
     ResultError,
+    assignment,
     names,
     read_csv,
     reporter,
@@ -326,7 +327,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _result(options: argparse.Namespace) -> Result:
     """Return the result that was asked for: read, or simulated."""
     _writer(Path(options.files[-1]))
-    changes = dict(_assignment(text) for text in options.set)
+    changes = dict(assignment(text) for text in options.set)
     mechanism = None
     if options.mechanism is not None:
         mechanism = load(options.mechanism)
@@ -349,22 +350,19 @@ def _result(options: argparse.Namespace) -> Result:
     return Result(mechanism, mechanism.values(changes), columns)
 
 
-def _assignment(text: str) -> tuple[str, float]:
-    name, _, number = text.partition("=")
-    try:
-        return name.strip(), float(number)
-    except ValueError:
-        raise ParameterError(f"--set {text}: write a name and a number, as name=0.5") from None
-
-
 def _owner(columns: Columns) -> Mechanism:
-    """Return the one shipped mechanism that has just the angles that a result holds."""
+    """Return the one shipped mechanism that has just the angles that a result holds.
+
+    Where several have, as guides whose flexures stretch or do not, the first whose loops close,
+    and of these the one with the fewest coordinates.
+    """
     recorded = {name for name in names(columns) if name.endswith(".angle")}
     every = [load(path) for path in shipped().values()]
-    owners = [m for m in every if _angle_names(m) == recorded]
-    if len(owners) != 1:
-        fewer = [m for m in every if recorded and _angle_names(m) > recorded]
-        if fewer:
+    alike = sorted((m for m in every if _angle_names(m) == recorded), key=_size)
+    owners = [m for m in alike if _is_of(columns, m)]
+    if not owners:
+        fewer = [m for m in every if recorded and _parts(names(columns)) == _parts(needed(m))]
+        if fewer and not alike:
             raise ResultError(
                 "the result lacks the angles of the links; simulate again with\n"
                 + "\nor ".join(fmpy_command(m) for m in fewer)
@@ -376,8 +374,30 @@ def _owner(columns: Columns) -> Mechanism:
     return owners[0]
 
 
+def _is_of(columns: Columns, mechanism: Mechanism) -> bool:
+    """Tell whether the angles in a result close the loops of a mechanism."""
+    try:
+        motion(columns, mechanism)
+    except ResultError:
+        return False
+    return True
+
+
+def _size(mechanism: Mechanism) -> int:
+    return assemble(mechanism, mechanism.values()).n
+
+
 def _angle_names(mechanism: Mechanism) -> set[str]:
     return {name for name in needed(mechanism) if name.endswith(".angle")}
+
+
+def _parts(variables: Iterable[str]) -> set[str]:
+    """Return the angles of the bodies and the gaps of the stops among variables."""
+    return {
+        name
+        for name in variables
+        if name.endswith((".angle", ".gap")) and not name.startswith("link[")
+    }
 
 
 if __name__ == "__main__":

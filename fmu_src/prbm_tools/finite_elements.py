@@ -51,7 +51,7 @@ from scipy.sparse.linalg import splu
 
 from prbm import Impact, Mechanism, ParameterError
 from prbm.assembly import Complex, Real, unit
-from prbm.dynamics import input_names
+from prbm.dynamics import check_input, input_names
 from prbm.errors import EquilibriumError, PrbmError, SimulationError
 from prbm.flexure import PIN
 from prbm.hybrid import Latched
@@ -171,9 +171,11 @@ class FiniteElements:
         if elements < 1:
             raise FiniteElementError(f"elements = {elements} must be at least 1 a flexure")
         changes = dict(values or {})
-        given = {name: changes.pop(name) for name in input_names(mechanism) if name in changes}
+        self.given = dict.fromkeys(input_names(mechanism), 0.0)
+        for name in self.given:
+            if name in changes:
+                self.given[name] = check_input(name, changes.pop(name), self.given)
         self.mechanism, self.values = mechanism, mechanism.values(changes)
-        self.given = dict.fromkeys(input_names(mechanism), 0.0) | given
         self.elements = elements
         self._refuse()
         self.exu, self.items = _exudyn()

@@ -1,58 +1,52 @@
-"""Mechanism files: TOML in, checked :class:`prbm.Mechanism` out."""
+"""Mechanism files: TOML in, checked :class:`prbm.Mechanism` out; and the schema of such files."""
 
 import difflib
+import math
+import re
+import reprlib
 import tomllib
-from dataclasses import fields
+from collections.abc import Iterator, Mapping, Sequence
 from importlib import resources
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, get_args
 
-from pydantic import ConfigDict, TypeAdapter, ValidationError
+from pydantic import ValidationError
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core.core_schema import DictSchema, NullableSchema, TupleSchema, WithDefaultSchema
 
 from prbm.errors import MechanismError, PrbmError
-from prbm.mechanism import (
-    FIELDS,
-    Body,
-    Flexure,
-    FlexureType,
-    Force,
-    Friction,
-    Mechanism,
-    Parameter,
-    Release,
-    Stop,
-)
+from prbm.mechanism import Mechanism
 
+from .mechanism_tables import LONGEST_NAME, TAGS, MechanismTable, Table, mechanism
+from .toml_lines import line_of, lines
+
+Said = TypeVar("Said")
 LARGEST_FILE = 1 << 20  # bytes; a mechanism of a hundred flexures has 20 kB
 MOST_PROBLEMS = 5  # told at a time
-PARTS: dict[str, type] = {
-    "bodies": Body,
-    "flexure_types": FlexureType,
-    "flexures": Flexure,
-    "stops": Stop,
-    "frictions": Friction,
-    "forces": Force,
-    "geometry": Parameter,
-    "release": Release,
-}
-EXPRESSION = "write a number, or an expression in parameters as a text"
+DEEP_KEY = re.compile(r"(?<![\w'\"-])(?:[\w'\"-]+\s*\.\s*){100}")  # tomllib takes hours for more
+DIALECT = "http://json-schema.org/draft-07/schema#"  # the latest that TOML editors know
 REMEDIES = {  # by pydantic's types of errors
-    "float_type": "write a number",
-    "float_parsing": "write a number",
-    "int_type": "write a number",
+    "int_type": "write a whole number",
+    "greater_than_equal": "write a larger number, at least 1",
     "string_type": "write a text in quotes",
+    "string_too_long": f"write a shorter name, of at most {LONGEST_NAME} characters",
     "bool_type": "write true or false",
     "tuple_type": "write a list, [...], or a table [[...]] for every part of a kind",
     "too_long": "take out what is too much",
-    "mapping_type": "write a table, [...]",
     "dict_type": "write a table, [...]",
-    "dataclass_type": "write a table, [...]",
+    "model_type": "write a table, [...]",
+}
+NAMES = {  # by what the pattern of a name admits
+    "start": "write the name of a point, body.point or ground.point",
+    "end": "write the name of a point, body.point or ground.point",
+    "point": "write the name of a point, body.point",
+    "name": "use letters, digits and _, joined by dots",
+    "[key]": "use letters, digits and _ in the name of a point",
 }
 
-for part in (*FIELDS, Parameter, Flexure, Force, Mechanism):
-    # the engine knows nothing of pydantic; a key that it does not know is a mistake, not a note
-    setattr(part, "__pydantic_config__", ConfigDict(extra="forbid"))  # noqa: B010
-_adapter = TypeAdapter(Mechanism)
+
+# --- reading ----------------------------------------------------------------------------------
 
 
 def load(path: str | Path) -> Mechanism:
@@ -62,72 +56,207 @@ def load(path: str | Path) -> Mechanism:
     ------
     MechanismError
         If the file cannot be read, is no TOML, or does not describe a mechanism; the message
-        names the file and the key.
+        names the file, the line if it has one, and the key.
     """
     path = Path(path)
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise MechanismError(f"{path}: larger than {LARGEST_FILE} bytes, no mechanism file")
-        text = path.read_text(encoding="utf-8-sig")
+        text = _text(path)
         data = tomllib.loads(text)
+    except MechanismError:
+        raise
     except OSError as error:
         raise MechanismError(f"{path}: cannot be read ({error.strerror})") from None
+    except RecursionError:
+        raise MechanismError(f"{path}: is nested too deeply for a mechanism file") from None
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise MechanismError(f"{path}: is no TOML file ({error})") from None
+    except ValueError:
+        raise MechanismError(f"{path}: has a number of thousands of digits") from None
     try:
-        return _adapter.validate_python(data | {"drawing": drawing(text)})
+        return mechanism(MechanismTable.model_validate(data), drawing(text))
     except ValidationError as error:
-        told = dict.fromkeys(_problem(dict(e), data) for e in error.errors())
-        lines = [f"{path}: {sentence}" for sentence in [*told][:MOST_PROBLEMS]]
-        raise MechanismError("\n".join(lines)) from None
+        places = [(e["loc"], e) for e in error.errors(include_url=False)]
+        told = [(line, _problem(dict(e), data)) for line, e in _in_order(places, text)]
     except PrbmError as error:
-        raise MechanismError(f"{path}: {error}") from None
+        told = _in_order([(_place(str(error), data), str(error))], text)
+    sentences = (f"line {line}: {sentence}" if line else sentence for line, sentence in told)
+    raise MechanismError("\n".join(f"{path}: {sentence}" for sentence in sentences))
 
 
-def _problem(error: dict[str, Any], data: Any) -> str:
-    """Return a sentence about one error that pydantic found: the key, and what to do."""
-    kind, loc = error["type"], error["loc"]
-    if kind == "value_error":
-        return str(error["ctx"]["error"])
-    if loc and loc[-1] in ("float", "str"):  # it tried both
-        loc, remedy = loc[:-1], EXPRESSION
-    else:
-        remedy = REMEDIES.get(kind, "")
-    where = ".".join(map(str, loc)) + _owner(loc, data)
-    if kind == "missing" and isinstance(loc[-1], int):
-        return f"{'.'.join(map(str, loc[:-1]))} = {error['input']}: a number is missing; add it"
-    if kind == "missing":
-        return f"{where} is missing: add the key"
-    if kind in ("unexpected_keyword_argument", "extra_forbidden"):
-        known = [
-            f.name for f in fields(PARTS.get(str(loc[0]), Mechanism) if loc[1:] else Mechanism)
-        ]
-        near = difflib.get_close_matches(str(loc[-1]), known, n=1, cutoff=0.6)
-        hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
-        return f"{where} is no key that is known there; {hint}"
-    return f"{where} = {str(error['input'])[:60]!s}: {remedy or error['msg']}"
-
-
-def _owner(loc: tuple[int | str, ...], data: Any) -> str:
-    """Return the name of the part that a key belongs to, because parts are counted from 0."""
-    if len(loc) < 3 or not isinstance(loc[1], int):
-        return ""
-    part = data[loc[0]][loc[1]]
-    name = part.get("name") if isinstance(part, dict) else None
-    return f" (of {name})" if isinstance(name, str) else ""
+def _text(path: Path) -> str:
+    with path.open("rb") as file:
+        content = file.read(LARGEST_FILE + 1)
+    if len(content) > LARGEST_FILE:
+        raise MechanismError(f"{path}: larger than {LARGEST_FILE} bytes, no mechanism file")
+    text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    if DEEP_KEY.search(text):
+        raise MechanismError(f"{path}: is nested too deeply for a mechanism file")
+    return text
 
 
 def drawing(text: str) -> str:
-    """Return the comment with which a mechanism file opens, without its marks."""
-    lines = []
+    """Return the comment with which a mechanism file opens, without its marks.
+
+    Directives to editors, ``#:schema``, are no part of it.
+    """
+    comments = []
     for line in text.splitlines():
         if not line.startswith("#"):
             break
-        lines.append(line[1:].removeprefix(" "))
-    return "\n".join(lines)
+        if not line.startswith("#:"):
+            comments.append(line[1:].removeprefix(" "))
+    return "\n".join(comments)
 
 
 def shipped() -> dict[str, Path]:
     """Return the files of the mechanisms that come with the package, by name."""
     folder = Path(str(resources.files("mechanisms")))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+# --- what is wrong ----------------------------------------------------------------------------
+
+
+def _problem(error: dict[str, Any], data: Any) -> str:
+    """Return a sentence about one error that pydantic found: the key, and what to do."""
+    kind = error["type"]
+    loc = tuple(key for key in error["loc"] if key not in TAGS)
+    where = ".".join(str(key) for key in loc if key != "[key]") + _owner(loc, data)
+    if kind == "missing" and isinstance(loc[-1], int):
+        where = ".".join(map(str, loc[:-1])) + _owner(loc[:-1], data)
+        return f"{where} = {reprlib.repr(error['input'])}: a number is missing; add it"
+    if kind == "missing":
+        return f"{where} is missing: add the key"
+    if kind == "extra_forbidden":
+        known = _keys(loc)
+        near = difflib.get_close_matches(str(loc[-1]), known, n=1, cutoff=0.6)
+        hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+        return f"{where} is no key that is known there; {hint}"
+    if kind == "value_error":
+        remedy = str(error["ctx"]["error"])
+    elif kind == "string_pattern_mismatch":
+        remedy = NAMES[str(loc[-1])]
+    elif kind == "tuple_type" and len(loc) > 1:
+        remedy = "write a pair, [..., ...]"
+    else:
+        remedy = REMEDIES.get(kind, error["msg"])
+    if remedy.startswith("cannot read the expression"):
+        return f"{where}: {remedy}"  # which it quotes
+    return f"{where} = {reprlib.repr(error['input'])}: {remedy}"
+
+
+def _keys(loc: Sequence[str | int]) -> list[str]:
+    """Return the keys that are known beside one that is not."""
+    return [*_table(str(loc[0]) if loc[1:] else "").model_fields]
+
+
+def _table(key: str) -> type[Table]:
+    """Return the table that a key of the file holds, or an array of which it holds."""
+    field = MechanismTable.model_fields.get(key)
+    kinds = (field.annotation, *get_args(field.annotation)) if field else ()
+    return next((k for k in kinds if isinstance(k, type) and issubclass(k, Table)), MechanismTable)
+
+
+def _owner(loc: Sequence[str | int], data: Any) -> str:
+    """Return the name of the part that a key belongs to, because parts are counted from 0."""
+    if len(loc) < 3 or not isinstance(loc[1], int):
+        return ""
+    part = data[loc[0]][loc[1]]
+    name = part.get("name") if isinstance(part, dict) else None
+    return f" (of {reprlib.repr(name)[1:-1]})" if isinstance(name, str) else ""
+
+
+def _in_order(
+    places: Sequence[tuple[Sequence[str | int], Said]], text: str
+) -> list[tuple[int | None, Said]]:
+    """Return the first of what is said of some keys, each with the line of its key."""
+    known = lines(text)
+    found = [(line_of(loc, known), said) for loc, said in places]
+    return sorted(found, key=lambda one: one[0] or math.inf)[:MOST_PROBLEMS]
+
+
+_SUBJECT = re.compile(
+    r"(?:^(?:mechanism |(?:the )?(?:flexure|joint|stop) )?|')([\w\[\]]+(?:\.[\w\[\]]+)*)"
+)
+
+
+def _place(sentence: str, data: Mapping[str, Any]) -> tuple[str | int, ...]:
+    """Return the part or the key of it that a sentence of the engine begins with or quotes."""
+    parts = dict(_parts(data))
+    for word in _SUBJECT.findall(sentence):
+        if word in parts:
+            return _quoted(sentence, parts[word], data)
+        name, _, key = word.rpartition(".")
+        if name in parts:
+            return (*parts[name], key)
+        if f"{name}_{key}" in parts:  # the parameter damping.zeta is the key damping_zeta
+            return parts[f"{name}_{key}"]
+    return ()
+
+
+def _quoted(
+    sentence: str, path: tuple[str | int, ...], data: Mapping[str, Any]
+) -> tuple[str | int, ...]:
+    """Return the key of a part whose value a sentence quotes, or the part."""
+    part: Any = data
+    for key in path:
+        part = part[key]
+    values = part.items() if isinstance(part, dict) else ()
+    keys = (k for text in re.findall("'(.*?)'", sentence) for k, v in values if v == text)
+    return (*path, *islice(keys, 1))
+
+
+def _parts(data: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str | int, ...]]]:
+    """Yield the names of what a file describes, and where."""
+    for key, value in data.items():
+        yield key, (key,)
+        for i, part in enumerate(value if isinstance(value, list) else ()):
+            if isinstance(part, dict):
+                yield str(part.get("name")), (key, i)
+
+
+# --- schema -----------------------------------------------------------------------------------
+
+
+class _Schema(GenerateJsonSchema):
+    """What editors of TOML need: no null, which TOML does not have, and no titles."""
+
+    def nullable_schema(self, schema: NullableSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: WithDefaultSchema) -> JsonSchemaValue:
+        if schema.get("default") is None:
+            return self.generate_inner(schema["schema"])
+        return super().default_schema(schema)
+
+    def tuple_schema(self, schema: TupleSchema) -> JsonSchemaValue:
+        result = super().tuple_schema(schema)
+        if "prefixItems" in result:  # of one kind here, and no word of the dialect
+            result["items"] = result.pop("prefixItems")[0]
+        return result
+
+    def dict_schema(self, schema: DictSchema) -> JsonSchemaValue:
+        result = super().dict_schema(schema)
+        if "patternProperties" in result:
+            result["additionalProperties"] = False  # a name of another form is a mistake
+        return result
+
+    def field_title_should_be_set(self, schema: Any) -> bool:
+        return False
+
+
+def schema() -> dict[str, Any]:
+    """Return the JSON schema of mechanism files, with which editors complete and check them.
+
+    Examples
+    --------
+    >>> schema()["definitions"]["BodyTable"]["properties"]["mass"]["description"]
+    'Mass [kg]'
+    """
+    result = MechanismTable.model_json_schema(
+        ref_template="#/definitions/{model}", schema_generator=_Schema
+    )
+    definitions = result.pop("$defs")
+    for table in (result, *definitions.values()):
+        table.pop("title", None)
+    return {"$schema": DIALECT, "title": "Mechanism", **result, "definitions": definitions}

@@ -1,7 +1,8 @@
 """The motion in a result, and which of its times a film shows.
 
-The angles of the links and bodies are all there is to know about a shape, so that a result of
-the engine and one of FMPy give the same motion, if FMPy recorded what is :func:`needed`.
+The angles of the links and bodies are all there is to know about a shape whose links do not
+stretch; stretches follow from the loops and the places of the bodies.  So a result of the engine
+and one of FMPy give the same motion, if FMPy recorded what is :func:`needed`.
 """
 
 import math
@@ -12,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from prbm import Mechanism, ParameterError, System, assemble
-from prbm.assembly import Real
-from prbm.constraints import project_positions
+from prbm.assembly import FIXED, Complex, Real
+from prbm.constraints import Rows, gap_rows, project_positions
 from prbm.mechanism import value
 
 from .simulate import Columns, Result, ResultError, column, names
@@ -24,6 +25,7 @@ FASTEST = 50.0  # frames per second; viewers of GIF files slow down what is fast
 MOST_FRAMES = 5000
 MOVES = 5e-3  # of the largest turn: less than that, which is a pixel or two, is no motion
 STAYS = 0.15  # of the motion, how long its end is shown
+STRETCHING = 4  # corrections of stretches: they are small, and convergence is quadratic
 OPEN = 1e-6  # of the size: loops that stand open by more are those of another mechanism
 
 
@@ -97,8 +99,7 @@ class Motion:
 
 
 def _gaps(system: System, q: Real) -> Real:
-    result: Real = (np.exp(1j * q) @ system.gaps.T).real + system.gaps_c
-    return result
+    return gap_rows(system).values(system.directions(q))
 
 
 def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) -> Real:
@@ -118,17 +119,58 @@ def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) 
     touching = [] if stop is None else [stop]
     B = np.vstack([system.loops, system.gaps[touching]])
     c = np.concatenate([system.loops_c, system.gaps_c[touching] + wall])
-    return project_positions(system.H, np.diag(system.J), B, c, q, system.length)[0]
+    z, on = np.zeros(len(B), complex), np.full(len(B), FIXED)
+    z[len(system.loops) :], on[len(system.loops) :] = system.gaps_z[touching], system.on[touching]
+    return project_positions(system, Rows(system, B, c, z, on), q, c)[0]
+
+
+def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
+    """Return shapes of given angles with the stretches that close the loops and place the bodies.
+
+    The least ones, where several do (Gauss-Newton).
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    q : (m, n)
+        Angles [rad]; what stands for stretches is not used.
+    placed : mapping of str to (m,)
+        Displacements of bodies from the straight shape [m].
+    """
+    k, arms = system.stretches, system.stretched
+    if not len(k):
+        return q
+    q = q.copy()
+    q[:, k] = 0.0
+    B, c = [system.loops], [np.tile(system.loops_c, (len(q), 1))]
+    for name, displacement in placed.items():
+        frame = system.bodies[name]
+        short = frame.c - frame.drawn - displacement
+        B += [frame.A[None], -1j * frame.A[None]]
+        c += [short.real[:, None], short.imag[:, None]]
+    rows, constants = np.vstack(B), np.hstack(c)
+    for _ in range(STRETCHING):
+        E = system.directions(q)
+        x = (E @ rows.T).real + constants
+        change = np.linalg.pinv((rows[:, arms] * E[:, None, arms]).real) @ x[:, :, None]
+        q[:, k] -= change[:, :, 0]
+    return q
 
 
 def needed(mechanism: Mechanism) -> list[str]:
     """Return the variables that an animation of a mechanism needs, for FMPy's ``output``."""
     system = assemble(mechanism, mechanism.values())
-    return list(_angles(system)) + [
-        f"{stop.name}.{what}"
-        for stop in mechanism.stops
-        for what in ("gap", "contact", "impact_count", "impact_time", "approach_speed")
-    ]
+    places = [f"{name}.{axis}" for name in system.bodies for axis in "xy"]
+    return (
+        list(angles(system))
+        + (places if len(system.stretches) else [])
+        + [
+            f"{stop.name}.{what}"
+            for stop in mechanism.stops
+            for what in ("gap", "contact", "impact_count", "impact_time", "approach_speed")
+        ]
+    )
 
 
 def fmpy_command(mechanism: Mechanism) -> str:
@@ -140,7 +182,7 @@ def fmpy_command(mechanism: Mechanism) -> str:
     )
 
 
-def _angles(system: System) -> dict[str, int]:
+def angles(system: System) -> dict[str, int]:
     """Return the coordinates by the names of their angles."""
     links = {f"link[{i}].angle": j for i, j in enumerate(system.links, start=1)}
     return links | {f"{name}.angle": frame.j for name, frame in system.bodies.items()}
@@ -180,19 +222,20 @@ def motion(
     time = np.asarray(column(columns, "time"), float)
     if len(time) < 2 or not (np.diff(time) >= 0.0).all():
         raise ResultError("the times of the result must not decrease, and be two or more")
-    angles = _angles(system)
-    missing = [name for name in angles if name not in names(columns)]
+    columns_of = angles(system)
+    missing = [name for name in columns_of if name not in names(columns)]
     if missing:
         raise ResultError(
             f"the result lacks {', '.join(missing)}; record what an animation needs, in Python "
             "with simulate_fmu(..., output=prbm_tools.motion.needed(mechanism)), on the command "
             f"line with\n{fmpy_command(mechanism)}"
         )
-    q = np.empty((len(time), system.n))
-    for name, j in angles.items():
+    q = np.zeros((len(time), system.n))
+    for name, j in columns_of.items():
         q[:, j] = columns[name]
     if not np.isfinite(q).all():
         raise ResultError("the result holds angles that are no numbers")
+    q = stretched(system, q, _placed(system, columns))
     _check_loops(system, q)
     stops = range(len(mechanism.stops))
     walls = np.array([_wall(system, i, columns, q) for i in stops]).reshape(-1, len(time)).T
@@ -201,9 +244,18 @@ def motion(
     return _with_impacts(Motion(system, time, q, walls, holds, marks(result, mechanism)), result)
 
 
+def _placed(system: System, columns: Columns) -> dict[str, Complex]:
+    """Return the displacements of the bodies that were recorded [m]."""
+    return {
+        name: columns[f"{name}.x"] + 1j * columns[f"{name}.y"]
+        for name in system.bodies
+        if f"{name}.x" in names(columns) and f"{name}.y" in names(columns)
+    }
+
+
 def _check_loops(system: System, q: Real) -> None:
     """Refuse shapes that are not closed: the result of another mechanism or other lengths."""
-    opened = np.abs((np.exp(1j * q) @ system.loops.T).real + system.loops_c)
+    opened = np.abs((system.directions(q) @ system.loops.T).real + system.loops_c)
     if opened.size and opened.max() > OPEN * system.length:
         raise ResultError(
             f"the loops of {system.mechanism.name} stand open by {opened.max():.3g} m in the "

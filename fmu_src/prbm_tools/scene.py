@@ -16,95 +16,37 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from numpy.typing import NDArray
 
-from prbm import System
-from prbm.assembly import Complex, Outline, Real, unit
-from prbm.mechanism import GROUND, Flexure, body_of
+from prbm.assembly import Complex
 
 from .motion import Film, Motion, pace
+from .shapes import Shapes, corners, curve
 
 LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
-STRAIGHT, GRID = "#b4bcc6", "#eeeeee"
+STRAIGHT, GRID, PROBE = "#b4bcc6", "#eeeeee", "#cc79a7"
 PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
-COLOURS = (LINK, FLEXURE, BODY, WALL, STRAIGHT, GRID, FUTURE, IMPACT, REST, "#ffffff", "#000000")
+COLOURS = (
+    LINK,
+    FLEXURE,
+    BODY,
+    WALL,
+    STRAIGHT,
+    GRID,
+    FUTURE,
+    IMPACT,
+    REST,
+    PROBE,
+    "#ffffff",
+    "#000000",
+)
 own_style = partial(matplotlib.style.context, "default")  # whatever matplotlibrc says
-SMOOTH = 40  # points along a flexure's curve
 CHAIN = 9  # pivots; a flexure of more is a smooth curve already
-THINNEST_BODY = 0.04  # of the size of the mechanism: a body without height is drawn this thick
-WALL_LENGTH, GROUND_LENGTH = 0.36, 0.16  # of the size of the mechanism
 MARGIN = 0.06  # of the mechanism's size, around the motion
 FLASH = 0.28  # s of the film that a flash takes to fade
 SMALLEST_FLASH, LARGEST_FLASH = 8.0, 34.0  # points
 SIZE, DPI = (8.0, 6.4), 100  # inches; even numbers of pixels, which video codecs want
 
 
-def corners(outline: Outline, q: Real) -> Complex:
-    """Return the corners of an outline in a shape, z = c + A exp(i q) [m]."""
-    z: Complex = outline.c + outline.A @ np.exp(1j * q)
-    return z
-
-
-def curve(z: Complex, clamped: tuple[bool, bool]) -> Complex:
-    """Return a smooth curve between the ends of a flexure, along the stubs where it is clamped.
-
-    Hermite's cubic, which for small deflections is the elastic line; at a pin its curvature
-    is zero.
-
-    Parameters
-    ----------
-    z : (p,)
-        Corners of the flexure: start, pivots, end [m].
-    clamped : pair of bool
-        Whether the start and the end are clamped.
-    """
-    length = float(np.abs(np.diff(z)).sum())
-    steps = [d for d in np.diff(z) if abs(d) > 1e-9 * length]
-    chord = z[-1] - z[0]
-    a, b = (length * d / abs(d) for d in (steps[0], steps[-1]))
-    if not clamped[0]:
-        a = (3.0 * chord - b) / 2.0
-    if not clamped[1]:
-        b = (3.0 * chord - a) / 2.0
-    s = np.linspace(0.0, 1.0, SMOOTH)
-    r = 1.0 - s
-    result: Complex = (
-        z[0] * (1.0 + 2.0 * s) * r**2 + z[-1] * (3.0 - 2.0 * s) * s**2 + r * s * (r * a - s * b)
-    )
-    return result
-
-
-def box(system: System, name: str) -> Complex:
-    """Return the four corners of a body about its centre of mass, as drawn [m].
-
-    The smallest box about the centre that holds the body's points and the points that hit.
-    """
-    frame = system.bodies[name]
-    points = [c for o in system.outlines if o.name == name for c in corners(o, system.q0)]
-    for stop, line in _hit_outlines(system):
-        if system.mechanism.stops[stop].body == name:
-            points += list(corners(line, system.q0))
-    reach = np.array([*points, frame.drawn]) - frame.drawn
-    least = THINNEST_BODY * system.length / 2
-    x, y = (max(float(np.abs(part).max()), least) for part in (reach.real, reach.imag))
-    return np.array([complex(-x, -y), complex(x, -y), complex(x, y), complex(-x, y)])
-
-
-def _hit_outlines(system: System) -> list[tuple[int, Outline]]:
-    lines = {o.name: o for o in system.outlines if o.kind == "stop"}
-    return [(i, lines[stop.name]) for i, stop in enumerate(system.mechanism.stops)]
-
-
-def hatched(place: complex, into: complex, size: float) -> Complex:
-    """Return a line through a place, hatched towards ``into``; breaks are not numbers."""
-    along = 1j * into * size
-    strokes = 6
-    parts = [place - along / 2, place + along / 2, complex(np.nan, np.nan)]
-    for k in range(strokes):
-        z = place + along * ((k + 0.5) / strokes - 0.5)
-        parts += [z, z + (into * size - along) * 0.6 / strokes, complex(np.nan, np.nan)]
-    return np.array(parts)
-
-
-def _quiet(axes: Axes) -> None:
+def quiet(axes: Axes) -> None:
     """Keep the frame of a plot in the background."""
     axes.tick_params(labelsize=8, colors="#606060")
     axes.set_axisbelow(True)
@@ -173,11 +115,7 @@ class Scene:
         )  # fmt: skip
         self.stage: Axes = self.figure.add_subplot(grid[0])
         self.trace: Axes = self.figure.add_subplot(grid[1])
-        self.flexures = self._flexures()
-        self.clamped = {
-            f.name: (f.ends[0] == "clamp", f.ends[1] == "clamp") for f, _ in self.flexures
-        }
-        self.boxes = {name: box(self.system, name) for name in self.system.bodies}
+        self.shapes = Shapes(self.system)
         self.moving: list[Artist] = []
         self._set_stage()
         self._set_trace()
@@ -191,39 +129,32 @@ class Scene:
         self.moving.append(self.text)
         self.moving.sort(key=lambda artist: artist.get_zorder())
 
-    def _flexures(self) -> list[tuple[Flexure, Outline]]:
-        named = {flexure.name: flexure for flexure in self.system.mechanism.flexures}
-        return [(named[o.name], o) for o in self.system.outlines if o.kind == "flexure"]
-
     # -- what stands still --
 
     def _set_stage(self) -> None:
-        stage, size = self.stage, self.system.length
+        stage = self.stage
         stage.set_aspect("equal", adjustable="box", anchor="C")
         stage.set_xlabel(f"x [{self.unit}]", fontsize=9, labelpad=1)
         stage.set_ylabel(f"y [{self.unit}]", fontsize=9, labelpad=1)
-        _quiet(stage)
-        straight = self.system.q0
-        for flexure, line in self.flexures:
-            z = corners(line, straight)
-            for end, place, into in (
-                (flexure.start, z[0], z[0] - z[-1]), (flexure.end, z[-1], z[-1] - z[0]),
-            ):  # fmt: skip
-                if body_of(end) == GROUND:
-                    self._line(hatched(place, into / abs(into), GROUND_LENGTH * size), WALL, 1.2)
+        quiet(stage)
+        for line in self.shapes.ground():
+            self._line(line, WALL, 1.2, zorder=3.2)
+        for flexure in self.shapes.flexures:
+            z = corners(flexure.outline, self.shapes.straight)
             self._line(z, STRAIGHT, 1.0, zorder=0.5).set_linestyle("--")
         self._set_flexures()
         self._set_bodies()
+        self._set_points()
         self._set_stops()
         self._set_limits()
 
     def _set_flexures(self) -> None:
         self.curves, self.links = {}, {}
-        for flexure, line in self.flexures:
-            pivots = len(line.c) - 2
+        for line in self.shapes.flexures:
+            pivots, name = len(line.outline.c) - 2, line.flexure.name
             if pivots <= CHAIN:
-                self.curves[flexure.name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
-            self.links[flexure.name] = self._moving_line(
+                self.curves[name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
+            self.links[name] = self._moving_line(
                 LINK, 1.3, zorder=4.0, marker="o", markersize=4.2 if pivots <= CHAIN else 2.0,
                 markerfacecolor="white", markevery=slice(1, -1),
             )  # fmt: skip
@@ -233,8 +164,8 @@ class Scene:
         self.centres: dict[str, Line2D] = {}
         for name in self.system.bodies:
             patch = Polygon(
-                np.zeros((4, 2)), facecolor=BODY, edgecolor=LINK, linewidth=1.2, alpha=0.9,
-                joinstyle="round", zorder=3.0,
+                np.zeros((len(self.shapes.bodies[name]), 2)), facecolor=BODY, edgecolor=LINK,
+                linewidth=1.2, alpha=0.9, joinstyle="round", zorder=3.0,
             )  # fmt: skip
             self.stage.add_patch(patch)
             self.moving.append(patch)
@@ -242,6 +173,16 @@ class Scene:
             self.centres[name] = self._moving_line(
                 LINK, 0.0, zorder=4.0, marker="P", markersize=6.0, markeredgecolor="white"
             )
+
+    def _set_points(self) -> None:
+        """Draw pins and joints as open circles, probes as diamonds."""
+        self.pins = self._moving_line(
+            LINK, 0.0, zorder=5.0, marker="o", markersize=7.0, markerfacecolor="white",
+            markeredgewidth=1.6,
+        )  # fmt: skip
+        self.probes = self._moving_line(
+            PROBE, 0.0, zorder=5.5, marker="D", markersize=5.0, markeredgecolor="white"
+        )
 
     def _set_stops(self) -> None:
         self.walls, self.hits, self.flashes = {}, {}, {}
@@ -276,9 +217,10 @@ class Scene:
         places = []
         for t in (self.film.times[0], self.film.times[-1], *self.film.times[rows]):
             q, walls = self.motion.shape(float(t))
-            places += [corners(line, q) for _, line in self.flexures]
-            places += [self._box(name, q) for name in self.boxes]
-            places += [self._wall(i, float(wall)) for i, wall in enumerate(walls)]
+            E = self.shapes.arms(q)
+            places += [corners(line.outline, E) for line in self.shapes.flexures]
+            places += [self.shapes.body(name, E) for name in self.system.bodies]
+            places += [self.shapes.wall(i, float(wall), E) for i, wall in enumerate(walls)]
         places += [
             np.array(line.get_xydata()) @ np.array([1, 1j]) / self.factor
             for line in self.stage.lines
@@ -291,7 +233,7 @@ class Scene:
 
     def _set_trace(self) -> None:
         trace, motion, film = self.trace, self.motion, self.film
-        _quiet(trace)
+        quiet(trace)
         span = (float(film.times[0]), float(film.times[-1]))
         self.time_factor, self.time_unit = time_unit(span[1])
         trace.set_xlabel(f"time [{self.time_unit}]", fontsize=9, labelpad=1)
@@ -301,7 +243,7 @@ class Scene:
             label = "gap" if len(stops) == 1 else "gaps"
         else:
             row, c = self.system.release, self.system.release_c
-            self.traced = ((np.exp(1j * motion.q) @ row).real + c)[:, None]
+            self.traced = ((self.system.directions(motion.q) @ row).real + c)[:, None]
             label = self.system.mechanism.release.body
         shown = (motion.time >= span[0]) & (motion.time <= span[1])
         factor, name = length_unit(float(np.ptp(self.traced[shown])) or self.system.length)
@@ -341,39 +283,29 @@ class Scene:
 
     # -- what moves --
 
-    def _box(self, name: str, q: Real) -> Complex:
-        frame = self.system.bodies[name]
-        centre = frame.c + frame.A @ np.exp(1j * q)
-        z: Complex = centre + np.exp(1j * q[frame.j]) * self.boxes[name]
-        return z
-
-    def _wall(self, i: int, wall: float) -> Complex:
-        stop, line = self.system.mechanism.stops[i], dict(_hit_outlines(self.system))[i]
-        into = unit(stop.direction)
-        touched = complex(corners(line, self.system.q0)[0]) + wall * into
-        return hatched(touched, into, WALL_LENGTH * self.system.length)
-
     def frame(self, k: int) -> list[Artist]:
         """Draw a frame and return what moves, the lowest first."""
         t = float(self.film.times[k])
         q, walls = self.motion.shape(t)
         holding = self.motion.holding(t)
-        for flexure, line in self.flexures:
-            z = corners(line, q)
-            self._move(self.links[flexure.name], z)
-            if flexure.name in self.curves:
-                self._move(self.curves[flexure.name], curve(z, self.clamped[flexure.name]))
+        E = self.shapes.arms(q)
+        for line in self.shapes.flexures:
+            z, name = corners(line.outline, E), line.flexure.name
+            self._move(self.links[name], z)
+            if name in self.curves:
+                self._move(self.curves[name], curve(z, line.guided))
         for name, patch in self.bodies.items():
-            z = self._box(name, q) * self.factor
+            z = self.shapes.body(name, E) * self.factor
             patch.set_xy(np.column_stack([z.real, z.imag]))
-            self._move(self.centres[name], np.array([z.mean() / self.factor]))
-        for i, line in _hit_outlines(self.system):
-            name = self.system.mechanism.stops[i].name
-            self._move(self.walls[name], self._wall(i, float(walls[i])))
-            place = corners(line, q)
-            self._move(self.hits[name], place)
-            self.hits[name].set_markerfacecolor(REST if holding[i] else LINK)
-            self._flash(self.flashes[name], i, k, place)
+            self._move(self.centres[name], np.array([self.shapes.centre(name, E)]))
+        self._move(self.pins, self.shapes.pins(E))
+        self._move(self.probes, self.shapes.probes(E))
+        for i, stop in enumerate(self.system.mechanism.stops):
+            self._move(self.walls[stop.name], self.shapes.wall(i, float(walls[i]), E))
+            place = np.array([self.shapes.hit(i, E)])
+            self._move(self.hits[stop.name], place)
+            self.hits[stop.name].set_markerfacecolor(REST if holding[i] else LINK)
+            self._flash(self.flashes[stop.name], i, k, place)
         self._draw_trace(k, t)
         self.text.set_text(self._caption(t, bool(holding.any())))
         return self.moving

@@ -147,7 +147,7 @@ static uint32_t crc(const uint8_t *bytes, size_t size) {
 
 static void put_right(uint8_t *data, size_t size) {
     if (size >= HEAD) {
-        memcpy(data, "PRBM\1\0\0", SIZE_AT);
+        memcpy(data, "PRBM\2\0\0", SIZE_AT);
         put_u32(data + SIZE_AT, (uint32_t)size);
         put_u32(data + CHECKSUM_AT, crc(data + HEAD, size - HEAD));
     }

@@ -1,10 +1,16 @@
-/* From a mechanism and parameter values to the constant arrays: the twin of prbm/assembly.py. */
+/* From a mechanism and parameter values to the constant arrays: the twin of prbm/assembly.py.
+ *
+ * Each link and body has an arm E = exp(s + i theta), E' = i w E, w = theta' - i s', and places are
+ * z = c + A E.  A coordinate is an angle theta or a stretch s; e has E for angles and -i E for
+ * stretches, so that dE/dq = i e for both.
+ */
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 #include "kernel.h"
 
-enum { NOWHERE = -2, FIXED = -1 }; /* coordinates of a body not reached yet, of the ground */
+#define TOGETHER 1e-9 /* of the size: points that a joint joins are drawn no further apart */
 
 PRBM Complex complex_of(double re, double im) {
     Complex z = {re, im};
@@ -35,6 +41,25 @@ PRBM double modulus(Complex a) {
     return sqrt(a.re * a.re + a.im * a.im);
 }
 
+/* Frames with rows of n columns. */
+static BodyFrame *place_frames(Memory *memory, size_t count, size_t n) {
+    BodyFrame *frames = place(memory, count, sizeof *frames);
+    Complex *rows = place(memory, count * n, sizeof *rows);
+    for (size_t i = 0; memory->base && i < count; i++) {
+        frames[i].A = rows + i * n;
+    }
+    return frames;
+}
+
+static Place *place_origins(Memory *memory, size_t count, size_t n) {
+    Place *origins = place(memory, count, sizeof *origins);
+    Complex *rows = place(memory, count * n, sizeof *rows);
+    for (size_t i = 0; memory->base && i < count; i++) {
+        origins[i].A = rows + i * n;
+    }
+    return origins;
+}
+
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
     const Mechanism *m = mechanism;
     size_t n = (size_t)m->coordinate_count, r = (size_t)m->loop_count;
@@ -43,6 +68,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     System result = {0};
     result.mechanism = mechanism;
     result.n = (int)n;
+    result.even = even_length((int)n);
     result.r = (int)r;
     result.s = (int)s;
     result.f = (int)f;
@@ -61,27 +87,85 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.gaps = place(memory, s * n, sizeof(Complex));
     result.slides = place(memory, s * n, sizeof(Complex));
     result.gaps_c = place(memory, s, sizeof(double));
+    result.gaps_z = place(memory, s, sizeof(Complex));
+    result.slides_z = place(memory, s, sizeof(Complex));
+    result.on = place(memory, s, sizeof(int));
     result.rubs = place(memory, f * n, sizeof(Complex));
     result.lifts = place(memory, f * n, sizeof(Complex));
     result.lifts_c = place(memory, f, sizeof(double));
     result.release = place(memory, n, sizeof(Complex));
-    result.bodies = place(memory, b, sizeof(BodyFrame));
-    result.origins = place(memory, b + 1, sizeof(Place));
-    Complex *frames = place(memory, b * n, sizeof(Complex));
-    Complex *origins = place(memory, (b + 1) * n, sizeof(Complex));
-    result.links = place(memory, n, sizeof(int));
-    result.spring = place(memory, p, sizeof(Spring));
+    result.bodies = place_frames(memory, b, n);
+    result.pushed = place_frames(memory, (size_t)m->force_count, n);
+    result.probes = place_frames(memory, (size_t)m->probe_count, n);
+    result.origins = place_origins(memory, b + 1, n);
+    result.stretch_count = m->stretch_count;
+    result.stretches = m->stretches;
+    result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
     result.blocks = place(memory, n, sizeof(Block));
+    result.coupling = place(memory, n * n, sizeof(Complex));
+    result.own = place(memory, n, sizeof(double));
+    result.straight = place(memory, (size_t)result.even, sizeof(double));
     result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
-    if (memory->base) {
-        for (size_t i = 0; i < b; i++) {
-            result.bodies[i].A = frames + i * n;
-        }
-        for (size_t i = 0; i <= b; i++) {
-            result.origins[i].A = origins + i * n;
+    *system = result;
+}
+
+/* --- arms ------------------------------------------------------------------------------------- */
+
+PRBM int arm_of(const System *system, int j) {
+    return system->mechanism->coordinates[j].arm;
+}
+
+/* Unit vectors e become the arms and, at stretches, -i times those. */
+static void stretch(const System *system, const double *q, Complex *e) {
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k], a = arm_of(system, j);
+        e[a] = scaled(exponential(q[j]), e[a]);
+        e[j] = complex_of(e[a].im, -e[a].re);
+    }
+}
+
+PRBM void directions(const System *system, const double *q, Complex *e) {
+    unit_vectors(system->n, q, e);
+    stretch(system, q, e);
+}
+
+PRBM void turning(const System *system, const double *v, Complex *w) {
+    for (int j = 0; j < system->n; j++) {
+        w[j] = complex_of(v[j], 0.0);
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        w[arm_of(system, j)].im = -v[j];
+        w[j] = complex_of(0.0, 0.0);
+    }
+}
+
+PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
+                 Complex *displacement, Complex *velocity) {
+    Complex at = minus(frame->c, frame->drawn), speed = {0.0, 0.0};
+    for (int j = 0; j < system->n; j++) {
+        Complex arm = product(frame->A[j], e[j]);
+        at = plus(at, arm);
+        speed.re -= arm.im * v[j];
+        speed.im += arm.re * v[j];
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        Complex along_arm = product(frame->A[arm_of(system, j)], e[j]);
+        speed.re -= along_arm.im * v[j];
+        speed.im += along_arm.re * v[j];
+    }
+    *displacement = at;
+    *velocity = speed;
+}
+
+PRBM void spread(const System *system, int r, const Complex *B, Complex *rows) {
+    int n = system->n;
+    for (int i = 0; i < r * n; i += n) {
+        for (int j = 0; j < n; j++) {
+            rows[i + j] = B[i + arm_of(system, j)];
         }
     }
-    *system = result;
 }
 
 /* --- values and places ------------------------------------------------------------------------ */
@@ -123,15 +207,14 @@ static void add_mass(System *system, const Place *spot, double mass) {
     }
 }
 
-/* A slender rod that is fixed to coordinate j. */
+/* A uniform rod that is fixed to coordinate j: two points with its mass, centre and moments. */
 static void add_rod(System *system, double mass, const Place *start, int j, Complex vector,
                     Place *spare) {
-    copy_place(system->n, spare, start);
-    extend(spare, j, scaled(0.5, vector));
-    add_mass(system, spare, mass);
-    if (j != FIXED) {
-        double length = modulus(vector);
-        system->J[j] += mass * (length * length) / 12;
+    static const double FRACTIONS[2] = {0.21132486540518708, 0.7886751345948129};
+    for (int i = 0; i < 2; i++) { /* 1/2 -+ 1/(2 sqrt 3) */
+        copy_place(system->n, spare, start);
+        extend(spare, j, scaled(FRACTIONS[i], vector));
+        add_mass(system, spare, mass / 2);
     }
 }
 
@@ -160,156 +243,204 @@ static Place new_place(int n, Scratch *scratch) {
 
 /* --- walking ---------------------------------------------------------------------------------- */
 
-typedef struct {
-    int coordinates, links, loops; /* so far */
-} Walk;
+static void take_segments(Segments *pieces, int longest, Scratch *scratch) {
+    size_t most = (size_t)longest + 2;
+    pieces->lengths = take(scratch, most);
+    pieces->rates = take(scratch, most);
+    pieces->rods = take(scratch, most);
+    pieces->lumps = take(scratch, most);
+    pieces->axial = take(scratch, most);
+}
 
-static bool cut_flexure(const System *system, const Flexure *flexure, Complex z_start,
-                        Complex z_end, Segments *pieces, Scratch *scratch, Problem *problem) {
+static bool cut_flexure(const System *system, const Flexure *flexure, Segments *pieces,
+                        Scratch *scratch, Problem *problem) {
     const FlexureType *kind = &system->mechanism->types[flexure->type];
-    double L = modulus(minus(z_end, z_start));
+    const Connection *between = &flexure->between;
+    double L = modulus(minus(at_point(system, between->end_point),
+                             at_point(system, between->start_point)));
     if (!(L >= 1e-9)) {
         return fail(problem, "flexure %s has the length %g m: move its ends apart", flexure->name,
                     L);
     }
-    size_t pivots = (size_t)kind->pivots, most = 2 * pivots + 2;
+    size_t pivots = (size_t)kind->pivots;
     double *gamma = take(scratch, pivots), *K_theta = take(scratch, pivots);
     for (size_t i = 0; i < pivots; i++) {
         gamma[i] = evaluate(kind->gamma[i], system->values);
         K_theta[i] = evaluate(kind->K_theta[i], system->values);
     }
-    pieces->lengths = take(scratch, most);
-    pieces->rates = take(scratch, most);
-    pieces->rods = take(scratch, most);
-    pieces->lumps = take(scratch, most);
     double h = evaluate(kind->thickness, system->values);
     double b = evaluate(kind->width, system->values);
     double E = evaluate(kind->youngs_modulus, system->values);
     double rho = evaluate(kind->density, system->values);
-    double EI = E * b * (h * h * h) / 12, mass = rho * b * h * L;
-    return segments(kind, gamma, K_theta, flexure->clamped_start, flexure->clamped_end, L, EI,
-                    mass, pieces, problem);
+    double EI = E * b * (h * h * h) / 12, EA = E * b * h, mass = rho * b * h * L;
+    take_segments(pieces, system->mechanism->longest, scratch);
+    return segments(kind, gamma, K_theta, flexure->start_end, flexure->end_end, L, EI, mass, EA,
+                    pieces, problem);
 }
 
-/* Close a loop: the end of a chain meets a body that is held already. */
-static void close_loop(System *system, Walk *walk, const Place *spot, const Place *pivot) {
+/* Ask for two places to be one. */
+static void close_loop(System *system, const Place *spot, const Place *other) {
     int n = system->n;
-    Complex *x = system->loops + walk->loops * n, *y = x + n;
+    Complex *x = system->loops + system->r * n, *y = x + n;
     for (int j = 0; j < n; j++) {
-        x[j] = minus(spot->A[j], pivot->A[j]);
+        x[j] = minus(spot->A[j], other->A[j]);
         y[j] = complex_of(x[j].im, -x[j].re);
     }
-    Complex c = minus(spot->c, pivot->c);
-    system->loops_c[walk->loops] = c.re;
-    system->loops_c[walk->loops + 1] = c.im;
-    walk->loops += 2;
+    Complex c = minus(spot->c, other->c);
+    system->loops_c[system->r] = c.re;
+    system->loops_c[system->r + 1] = c.im;
+    system->r += 2;
 }
 
-static bool walk_flexure(System *system, const Flexure *flexure, Walk *walk, Scratch *scratch,
-                         Problem *problem) {
-    int n = system->n, root = flexure->start, far = flexure->end;
-    Complex z_start = at_point(system, flexure->start_point);
-    Complex z_end = at_point(system, flexure->end_point);
-    Segments pieces = {0, NULL, NULL, NULL, NULL};
-    if (!cut_flexure(system, flexure, z_start, z_end, &pieces, scratch, problem)) {
-        return false;
+/* Where a drawn point of a body is that turns with coordinate j. */
+static void reach(System *system, int body, const Place *spot, Complex drawn, int j) {
+    Place *origin = &system->origins[body];
+    copy_place(system->n, origin, spot);
+    origin->drawn = drawn;
+    origin->j = j;
+}
+
+/* From which body a step leads to which, and where both ends are drawn. */
+typedef struct {
+    int root, far;
+    Complex z_start, z_end;
+} Span;
+
+static Span span_of(const System *system, const Step *step) {
+    const Connection *c = step->between;
+    Complex start = at_point(system, c->start_point), end = at_point(system, c->end_point);
+    Span forwards = {c->start, c->end, start, end}, backwards = {c->end, c->start, end, start};
+    return step->backwards ? backwards : forwards;
+}
+
+static bool walk_joint(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+    Span span = span_of(system, step);
+    double apart = modulus(minus(span.z_end, span.z_start));
+    if (!(apart <= TOGETHER * system->length)) {
+        return fail(problem,
+                    "the joint %s joins points that are drawn %.4g m apart: draw them at the same "
+                    "place",
+                    step->name, apart);
     }
-    if (system->origins[root].j == NOWHERE) {
-        root = flexure->end;
-        far = flexure->start;
-        Complex kept_one = z_start;
-        z_start = z_end;
-        z_end = kept_one;
-        reverse(pieces.n + 2, pieces.lengths);
-        reverse(pieces.n + 2, pieces.rods);
-        reverse(pieces.n + 1, pieces.rates);
-        reverse(pieces.n + 1, pieces.lumps);
-    }
-    Complex along_it = minus(z_end, z_start);
-    Complex direction = scaled(1.0 / modulus(along_it), along_it);
-    Place spot = new_place(n, scratch), spare = new_place(n, scratch);
-    on_body(system, root, z_start, &spot);
-    int first = walk->coordinates, owner = system->origins[root].j;
-    for (int i = 0; i < pieces.n; i++) {
-        system->q0[first + i] = phase(direction);
-        system->links[walk->links++] = first + i;
-    }
-    walk->coordinates += pieces.n;
-    bool reaches = system->origins[far].j == NOWHERE;
-    int far_index = reaches ? walk->coordinates++ : system->origins[far].j;
-    for (int i = 0; i <= pieces.n; i++) {
-        int j = i == 0 ? owner : first + i - 1, next = i == pieces.n ? far_index : first + i;
-        /* links carry their angle in q, bodies are drawn with q = 0 */
-        Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
-                                : complex_of(pieces.lengths[i], 0.0);
-        add_rod(system, pieces.rods[i], &spot, j, vector, &spare);
-        extend(&spot, j, vector);
-        add_mass(system, &spot, pieces.lumps[i]);
-        add_spring(system, pieces.rates[i], j, next);
-    }
-    Complex last = scaled(pieces.lengths[pieces.n + 1], direction);
-    if (reaches) {
-        Place *origin = &system->origins[far];
-        copy_place(n, origin, &spot);
-        origin->j = far_index;
-        origin->drawn = minus(z_end, last);
+    Place spot = new_place(system->n, scratch), other = new_place(system->n, scratch);
+    on_body(system, span.root, span.z_start, &spot);
+    if (step->closes) {
+        on_body(system, span.far, span.z_end, &other);
+        close_loop(system, &spot, &other);
     } else {
-        on_body(system, far, minus(z_end, last), &spare);
-        close_loop(system, walk, &spot, &spare);
-        copy_place(n, &spot, &spare); /* the stub moves with its body: links share no mass with it */
+        reach(system, span.far, &spot, span.z_end, step->first);
     }
-    add_rod(system, pieces.rods[pieces.n + 1], &spot, far_index, last, &spare);
     return true;
 }
 
-/* The flexure to go on with: the first that touches what is held and has not been walked. */
-static const Flexure *next_flexure(const System *system, const bool *walked) {
-    const Mechanism *m = system->mechanism;
-    for (int i = 0; i < m->flexure_count; i++) {
-        const Flexure *f = &m->flexures[i];
-        if (!walked[i] &&
-            (system->origins[f->start].j != NOWHERE || system->origins[f->end].j != NOWHERE)) {
-            return f;
-        }
+/* The angle of a link and, if it stretches, its stretch; returns the next coordinate. */
+static int lay_link(System *system, Complex direction, double length, double axial, bool stretching,
+                    int j) {
+    system->q0[j] = phase(direction);
+    if (stretching) {
+        add_spring(system, axial * (length * length), FIXED, j + 1);
     }
-    return NULL;
+    return stretching ? j + 2 : j + 1;
+}
+
+static bool is_stretch(const System *system, int j) {
+    return j < system->n && arm_of(system, j) != j;
+}
+
+static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+    int n = system->n;
+    Segments pieces = {0, NULL, NULL, NULL, NULL, NULL};
+    if (!cut_flexure(system, step->flexure, &pieces, scratch, problem)) {
+        return false;
+    }
+    if (step->backwards) {
+        reversed(&pieces);
+    }
+    Span span = span_of(system, step);
+    Complex along_it = minus(span.z_end, span.z_start);
+    Complex direction = scaled(1.0 / modulus(along_it), along_it);
+    Place spot = new_place(n, scratch), spare = new_place(n, scratch);
+    on_body(system, span.root, span.z_start, &spot);
+    int *owners = take_integers(scratch, pieces.n + 2), next = step->first;
+    owners[0] = system->origins[span.root].j;
+    for (int i = 1; i <= pieces.n; i++) {
+        owners[i] = next;
+        next = lay_link(system, direction, pieces.lengths[i], pieces.axial[i - 1],
+                        is_stretch(system, next + 1), next);
+    }
+    int last_one = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
+    for (int i = 0; i <= pieces.n; i++) {
+        /* links carry their angle in q, bodies are drawn with q = 0 */
+        Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
+                                : complex_of(pieces.lengths[i], 0.0);
+        add_rod(system, pieces.rods[i], &spot, owners[i], vector, &spare);
+        extend(&spot, owners[i], vector);
+        add_mass(system, &spot, pieces.lumps[i]);
+        add_spring(system, pieces.rates[i], owners[i], owners[i + 1]);
+    }
+    Complex last = scaled(pieces.lengths[pieces.n + 1], direction);
+    if (step->closes) {
+        on_body(system, span.far, minus(span.z_end, last), &spare);
+        close_loop(system, &spot, &spare);
+        copy_place(n, &spot, &spare); /* the stub moves with its body: links share no mass with it */
+    } else {
+        reach(system, span.far, &spot, minus(span.z_end, last), last_one);
+    }
+    add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
+    return true;
 }
 
 static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
-    Walk walk = {0, 0, 0};
-    size_t mark = scratch->used;
-    bool *walked = (bool *)take(scratch, (size_t)m->flexure_count);
-    memset(walked, 0, (size_t)m->flexure_count * sizeof *walked);
-    for (int i = 0; i < m->flexure_count; i++) {
-        const Flexure *flexure = next_flexure(system, walked);
-        if (!flexure) {
-            return fail(problem, "a flexure has no connection to the ground");
-        }
-        walked[flexure - m->flexures] = true;
-        size_t here = scratch->used;
-        if (!walk_flexure(system, flexure, &walk, scratch, problem)) {
-            return false;
-        }
-        scratch->used = here;
+    bool right = true;
+    system->r = 0;
+    for (int i = 0; right && i < m->flexure_count + m->joint_count; i++) {
+        size_t mark = scratch->used;
+        const Step *step = &m->steps[i];
+        right = step->flexure ? walk_flexure(system, step, scratch, problem)
+                              : walk_joint(system, step, scratch, problem);
+        scratch->used = mark;
     }
+    system->r = m->loop_count;
+    return right;
+}
+
+/* Where a drawn point of a body is. */
+static void add_frame(System *system, int body, Complex drawn, BodyFrame *frame,
+                      Scratch *scratch) {
+    size_t mark = scratch->used;
+    Place spot = new_place(system->n, scratch);
+    on_body(system, body, drawn, &spot);
+    frame->j = system->origins[body].j;
+    frame->c = spot.c;
+    frame->drawn = drawn;
+    memcpy(frame->A, spot.A, (size_t)system->n * sizeof *frame->A);
     scratch->used = mark;
-    return true;
 }
 
 static void add_body(System *system, int body, Scratch *scratch) {
     size_t mark = scratch->used;
     const Body *part = &system->mechanism->bodies[body - 1];
     BodyFrame *frame = &system->bodies[body - 1];
+    Complex drawn = at_point(system, part->centre);
     Place centre = new_place(system->n, scratch);
-    frame->drawn = at_point(system, part->centre);
-    on_body(system, body, frame->drawn, &centre);
+    on_body(system, body, drawn, &centre);
     add_mass(system, &centre, evaluate(part->mass, system->values));
-    frame->j = system->origins[body].j;
-    frame->c = centre.c;
-    memcpy(frame->A, centre.A, (size_t)system->n * sizeof *frame->A);
+    add_frame(system, body, drawn, frame, scratch);
     system->J[frame->j] += evaluate(part->inertia, system->values);
     scratch->used = mark;
+}
+
+static void add_pushed_and_probes(System *system, Scratch *scratch) {
+    const Mechanism *m = system->mechanism;
+    for (int i = 0; i < m->force_count; i++) {
+        const Force *force = &m->forces[i];
+        add_frame(system, force->body, at_point(system, force->point), &system->pushed[i], scratch);
+    }
+    for (int i = 0; i < m->probe_count; i++) {
+        const Probe *probe = &m->probes[i];
+        add_frame(system, probe->body, at_point(system, probe->point), &system->probes[i], scratch);
+    }
 }
 
 /* --- arrays ----------------------------------------------------------------------------------- */
@@ -331,7 +462,7 @@ PRBM Complex unit(double degrees) {
     double angle = rest * RADIANS;
     Complex e = {1.0, 0.0};
     if (rest != 0.0) {
-        directions(1, &angle, &e);
+        unit_vectors(1, &angle, &e);
     }
     for (int i = 0; i < quarter; i++) {
         e = complex_of(-e.im, e.re);
@@ -339,32 +470,54 @@ PRBM Complex unit(double degrees) {
     return e;
 }
 
+/* The gap of a stop, but for its wall's position, as seen from what the wall is fixed to, and the
+ * displacement along it. */
+static void add_stop(System *system, int i, const Complex *e0, Place *hit) {
+    const Stop *stop = &system->mechanism->stops[i];
+    const Place *origin = &system->origins[stop->on];
+    int n = system->n;
+    Complex u = unit(stop->direction), across = product(complex_of(0.0, 1.0), u);
+    double offset = evaluate(stop->offset, system->values);
+    Complex drawn = plus(at_point(system, stop->point), scaled(offset, across));
+    Complex *gap = system->gaps + i * n, *slide = system->slides + i * n;
+    on_body(system, stop->body, drawn, hit);
+    system->on[i] = origin->j;
+    system->gaps_z[i] = system->slides_z[i] = complex_of(0.0, 0.0);
+    if (origin->j != FIXED) {
+        for (int j = 0; j < n; j++) {
+            hit->A[j] = minus(hit->A[j], origin->A[j]);
+        }
+        Complex apart = minus(hit->c, origin->c);
+        system->gaps_z[i] = product(conjugate(scaled(-1.0, u)), apart);
+        system->slides_z[i] = product(conjugate(across), apart);
+    }
+    double straight = along(n, scaled(-1.0, u), hit->A, e0, gap);
+    along(n, across, hit->A, e0, slide);
+    Complex seen_drawn = product(conjugate(u), minus(drawn, origin->drawn));
+    system->gaps_c[i] = origin->j == FIXED ? straight : seen_drawn.re;
+}
+
 static void add_stops(System *system, const Complex *e0, Scratch *scratch) {
     size_t mark = scratch->used;
-    int n = system->n;
-    Place hit = new_place(n, scratch);
+    Place hit = new_place(system->n, scratch);
     for (int i = 0; i < system->s; i++) {
-        const Stop *stop = &system->mechanism->stops[i];
-        Complex u = unit(stop->direction), across = product(complex_of(0.0, 1.0), u);
-        double offset = evaluate(stop->offset, system->values);
-        Complex drawn = plus(at_point(system, stop->point), scaled(offset, across));
-        on_body(system, stop->body, drawn, &hit);
-        Complex *gap = system->gaps + i * n, *slide = system->slides + i * n;
-        system->gaps_c[i] = along(n, scaled(-1.0, u), hit.A, e0, gap);
-        along(n, across, hit.A, e0, slide);
+        add_stop(system, i, e0, &hit);
     }
     scratch->used = mark;
 }
 
-static void add_frictions(System *system, const Complex *e0) {
+static void add_frictions(System *system, const Complex *e0, Scratch *scratch) {
+    size_t mark = scratch->used;
     int n = system->n;
+    Place spot = new_place(n, scratch);
     for (int i = 0; i < system->f; i++) {
         const Friction *friction = &system->mechanism->frictions[i];
-        const Complex *A = system->bodies[friction->body - 1].A;
         Complex u = unit(friction->direction), across = product(complex_of(0.0, 1.0), u);
-        along(n, u, A, e0, system->rubs + i * n);
-        system->lifts_c[i] = along(n, across, A, e0, system->lifts + i * n);
+        on_body(system, friction->body, at_point(system, friction->point), &spot);
+        along(n, u, spot.A, e0, system->rubs + i * n);
+        system->lifts_c[i] = along(n, across, spot.A, e0, system->lifts + i * n);
     }
+    scratch->used = mark;
 }
 
 /* The first coordinate after a start with which none before it shares mass. */
@@ -389,49 +542,74 @@ static void find_blocks(System *system) {
     }
 }
 
-static void add_moments(System *system) {
+/* What the equations of motion read again and again, as they go along it. */
+static void pack_blocks(System *system) {
     int n = system->n;
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; j < n; j++) {
-            Complex sum = {0.0, 0.0};
-            for (int k = 0; k < system->p; k++) {
-                Complex left = scaled(system->m[k], system->A[k * n + j]);
-                sum = plus(sum, product(conjugate(system->A[k * n + i]), left));
-            }
-            system->H[i * n + j] = sum;
+    Complex *next = system->coupling;
+    for (int k = 0; k < system->block_count; k++) {
+        int start = system->blocks[k].start, size = system->blocks[k].size;
+        for (int i = start; i < start + size; i++) {
+            memcpy(next, system->H + i * n + start, (size_t)size * sizeof *next);
+            next += size;
+            system->own[i] = system->H[i * n + i].re + system->J[i];
         }
-        Complex sum = {0.0, 0.0};
-        for (int k = 0; k < system->p; k++) {
-            sum = plus(sum, scaled(system->m[k], system->A[k * n + i]));
-        }
-        system->S[i] = sum;
     }
-    find_blocks(system);
+    pad(n, system->q0, system->straight);
 }
 
-static double size_of(const System *system) {
-    const Mechanism *m = system->mechanism;
-    int count = m->ground_count + m->body_count;
-    double longest = 0.0;
-    for (int i = 0; i < count; i++) {
-        for (int k = 0; k < i; k++) {
-            Complex a = i < m->ground_count ? at_point(system, m->ground[i])
-                                            : system->bodies[i - m->ground_count].drawn;
-            Complex b = k < m->ground_count ? at_point(system, m->ground[k])
-                                            : system->bodies[k - m->ground_count].drawn;
-            double distance = modulus(minus(a, b));
-            longest = distance > longest ? distance : longest;
+/* The moments of one mass point, of the coordinates that it moves with alone. */
+static void add_moments_of(System *system, double mass, const Complex *A) {
+    int n = system->n;
+    for (int j = 0; j < n; j++) {
+        Complex moment = scaled(mass, A[arm_of(system, j)]);
+        if (moment.re == 0.0 && moment.im == 0.0) {
+            continue;
+        }
+        for (int i = 0; i < n; i++) {
+            Complex left = conjugate(A[arm_of(system, i)]), *H = &system->H[i * n + j];
+            *H = plus(*H, product(left, moment));
+        }
+        if (arm_of(system, j) == j) {
+            system->S[j] = plus(system->S[j], moment);
         }
     }
+}
+
+static void add_moments(System *system) {
+    size_t n = (size_t)system->n;
+    memset(system->H, 0, n * n * sizeof *system->H);
+    memset(system->S, 0, n * sizeof *system->S);
+    for (int k = 0; k < system->p; k++) {
+        add_moments_of(system, system->m[k], system->A + (size_t)k * n);
+    }
+    find_blocks(system);
+    pack_blocks(system);
+}
+
+/* The size of the mechanism as drawn. */
+static double size_of(const System *system, Scratch *scratch) {
+    const Mechanism *m = system->mechanism;
+    size_t mark = scratch->used;
+    int count = m->ground_count + m->body_count;
+    Complex *points = take_complex(scratch, count, 1);
+    double longest = 0.0;
+    for (int i = 0; i < count; i++) {
+        points[i] = at_point(system, i < m->ground_count ? m->ground[i]
+                                                         : m->bodies[i - m->ground_count].centre);
+        for (int k = 0; k < i; k++) {
+            longest = greater(modulus(minus(points[i], points[k])), longest);
+        }
+    }
+    scratch->used = mark;
     return longest;
 }
 
 static Complex first_clamp(const System *system) {
     const Mechanism *m = system->mechanism;
     for (int i = 0; i < m->flexure_count; i++) {
-        const Flexure *f = &m->flexures[i];
-        if (f->start == GROUND || f->end == GROUND) {
-            return at_point(system, f->start == GROUND ? f->start_point : f->end_point);
+        const Connection *c = &m->flexures[i].between;
+        if (c->start == GROUND || c->end == GROUND) {
+            return at_point(system, c->start == GROUND ? c->start_point : c->end_point);
         }
     }
     return complex_of(0.0, 0.0);
@@ -466,25 +644,85 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
     return true;
 }
 
+/* The longest of the rows from k on comes to k, with the number of its loop; its length. */
+static double choose_row(int k, int r, int n, double *rows, int *loop) {
+    int best = k;
+    double most = dot(n, rows + k * n, rows + k * n);
+    for (int i = k + 1; i < r; i++) {
+        double square = dot(n, rows + i * n, rows + i * n);
+        best = square > most ? i : best;
+        most = greater(square, most);
+    }
+    int chosen = loop[best];
+    loop[best] = loop[k];
+    loop[k] = chosen;
+    exchange(n, rows + k * n, rows + best * n);
+    return sqrt(most);
+}
+
+/* Which loops have rows that follow from others: Gram and Schmidt's way, the longest first. */
+static bool repeated_loops(int r, int n, double *rows, int *loop, double tolerance,
+                           bool *repeated) {
+    bool any = false;
+    for (int k = 0; k < r; k++) {
+        double length = choose_row(k, r, n, rows, loop), *row = rows + k * n;
+        if (!(length > tolerance)) {
+            repeated[loop[k]] = any = true;
+            continue;
+        }
+        for (int i = k + 1; i < r; i++) {
+            double share = dot(n, row, rows + i * n) / (length * length);
+            add_scaled(n, -share, row, rows + i * n);
+        }
+    }
+    return any;
+}
+
+/* The names of what closes these loops, in the order of the alphabet. */
+static void name_loops(const Mechanism *m, bool *repeated, char *text, size_t size) {
+    text[0] = '\0';
+    for (size_t used = 0;;) {
+        const char *next = NULL;
+        int which = 0;
+        for (int i = 0, loop = 0; i < m->flexure_count + m->joint_count; i++) {
+            const Step *step = &m->steps[i];
+            if (step->closes && repeated[loop] && (!next || strcmp(step->name, next) < 0)) {
+                next = step->name;
+                which = loop;
+            }
+            loop += step->closes;
+        }
+        if (!next || used + strlen(next) + 3 > size) {
+            return;
+        }
+        repeated[which] = false;
+        used += (size_t)snprintf(text + used, size - used, "%s%s", used ? ", " : "", next);
+    }
+}
+
 static bool check_loops(const System *system, const Complex *e0, Scratch *scratch,
                         Problem *problem) {
-    if (system->r == 0) {
-        return true;
+    size_t mark = scratch->used;
+    int r = system->r, n = system->n;
+    double *rows = take_matrix(scratch, r, n);
+    int *loop = take_integers(scratch, r);
+    bool *repeated = (bool *)take_integers(scratch, r);
+    char names[PROBLEM_LENGTH / 2];
+    for (int i = 0; i < r; i++) {
+        loop[i] = i / 2;
+        repeated[i] = false;
     }
-    size_t mark = scratch->used, count = (size_t)(system->r * system->n);
-    double *rows = take(scratch, count);
-    jacobian(system->r, system->n, system->loops, e0, rows);
-    double scale = largest((int)count, rows);
-    int lost = system->r - rank(system->r, system->n, rows, 1e-9 * scale, scratch);
+    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
+    jacobian(&loops, e0, rows);
+    double scale = largest(r * n, rows);
+    bool any = repeated_loops(r, n, rows, loop, 1e-9 * scale, repeated);
+    name_loops(system->mechanism, repeated, names, sizeof names);
     scratch->used = mark;
-    if (lost > 0) {
-        return fail(problem,
-                    "%d of the %d loop closures follow from the others at the straight shape: the "
-                    "mechanism is over-constrained there; take away a flexure or move it out of "
-                    "line",
-                    lost, system->r);
-    }
-    return true;
+    return !any || fail(problem,
+                        "the loops closed by %s ask at the straight shape for what other loops "
+                        "already ask for: rigid links are over-constrained there; take a part "
+                        "away, move it out of line, or let flexures stretch (axial = true)",
+                        names);
 }
 
 static bool stubs(System *system, Scratch *scratch, Problem *problem) {
@@ -493,6 +731,9 @@ static bool stubs(System *system, Scratch *scratch, Problem *problem) {
     for (int i = 0; i < m->type_count; i++) {
         size_t mark = scratch->used;
         int pivots = m->types[i].pivots;
+        if (pivots < 2) {
+            continue;
+        }
         double *gamma = take(scratch, (size_t)pivots), gamma0;
         for (int k = 0; k < pivots; k++) {
             gamma[k] = evaluate(m->types[i].gamma[k], system->values);
@@ -502,9 +743,7 @@ static bool stubs(System *system, Scratch *scratch, Problem *problem) {
         if (!right) {
             return false;
         }
-        if (pivots > 1) {
-            system->calculated[count++] = gamma0;
-        }
+        system->calculated[count++] = gamma0;
     }
     return true;
 }
@@ -526,29 +765,34 @@ static void clear(System *system) {
     }
 }
 
+static void add_arrays(System *system, Scratch *scratch) {
+    const Release *release = &system->mechanism->release;
+    Complex *e0 = system->e0;
+    directions(system, system->q0, e0);
+    for (int body = 1; body <= system->b; body++) {
+        add_body(system, body, scratch);
+    }
+    add_moments(system);
+    add_stops(system, e0, scratch);
+    add_frictions(system, e0, scratch);
+    add_pushed_and_probes(system, scratch);
+    system->release_c = along(system->n, unit(release->direction),
+                              system->bodies[release->body - 1].A, e0, system->release);
+    system->anchor = first_clamp(system);
+}
+
 PRBM bool assemble(System *system, const double *values, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
     size_t mark = scratch->used;
     system->values = values;
     system->gravity = complex_of(values[m->gravity[0]], values[m->gravity[1]]);
     clear(system);
+    system->length = size_of(system, scratch);
     bool right = stubs(system, scratch, problem) && walk_all(system, scratch, problem);
     if (right) {
-        Complex *e0 = system->e0;
-        directions(system->n, system->q0, e0);
-        for (int body = 1; body <= system->b; body++) {
-            add_body(system, body, scratch);
-        }
-        add_moments(system);
-        add_stops(system, e0, scratch);
-        add_frictions(system, e0);
-        const Release *release = &m->release;
-        system->release_c = along(system->n, unit(release->direction),
-                                  system->bodies[release->body - 1].A, e0, system->release);
-        system->anchor = first_clamp(system);
-        system->length = size_of(system);
-        right = check_loops(system, e0, scratch, problem) &&
-                check_masses(system, e0, scratch, problem);
+        add_arrays(system, scratch);
+        right = check_loops(system, system->e0, scratch, problem) &&
+                check_masses(system, system->e0, scratch, problem);
     }
     scratch->used = mark;
     return right;

@@ -1,4 +1,4 @@
-/* Scalars s = Re(B e) + c of the position: the twin of prbm/constraints.py. */
+/* Scalars s = Re(f (B E + z)) + c of the position: the twin of prbm/constraints.py. */
 #include <math.h>
 #include <string.h>
 
@@ -13,27 +13,127 @@ static const char SINGULAR[] =
     "the equations of motion are singular here: two constraints repeat each other, or a part that "
     "can move has no mass";
 
-PRBM void scalars(int r, int n, const Complex *B, const double *c, const Complex *e, double *s) {
-    for (int i = 0; i < r; i++) {
-        s[i] = row_value(n, B + i * n, e) + c[i];
+/* --- rows ------------------------------------------------------------------------------------- */
+
+PRBM Rows plain_rows(const System *system, int count, const Complex *B, const double *c) {
+    Rows rows = {system, count, B, c, NULL, NULL};
+    return rows;
+}
+
+PRBM Rows gap_rows(const System *system) {
+    Rows rows = {system, system->s, system->gaps, system->gaps_c, system->gaps_z, system->on};
+    return rows;
+}
+
+PRBM Rows slide_rows(const System *system) {
+    Rows rows = {system, system->s, system->slides, NULL, system->slides_z, system->on};
+    return rows;
+}
+
+PRBM Rows rub_rows(const System *system) {
+    return plain_rows(system, system->f, system->rubs, NULL);
+}
+
+static int seen_from(const Rows *rows, int i) {
+    return rows->on == NULL ? FIXED : rows->on[i];
+}
+
+/* f (B E + z) of a row that is seen from a body. */
+static Complex seen_value(const Rows *rows, int i, const Complex *e) {
+    int n = rows->system->n;
+    const Complex *B = rows->B + i * n;
+    Complex sum = rows->z[i];
+    for (int j = 0; j < n; j++) {
+        sum = plus(sum, product(B[j], e[j]));
+    }
+    return product(conjugate(e[rows->on[i]]), sum);
+}
+
+PRBM double row_value(const Rows *rows, int i, const Complex *e) {
+    int n = rows->system->n;
+    const Complex *B = rows->B + i * n;
+    if (seen_from(rows, i) != FIXED) {
+        return seen_value(rows, i, e).re;
+    }
+    double sum = 0.0;
+    for (int j = 0; j < n; j++) {
+        sum += B[j].re * e[j].re - B[j].im * e[j].im;
+    }
+    return sum;
+}
+
+/* B E w */
+static Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
+    const System *system = rows->system;
+    const Complex *B = rows->B + i * system->n;
+    Complex sum = {0.0, 0.0};
+    for (int j = 0; j < system->n; j++) {
+        sum = plus(sum, scaled(v[j], product(B[j], e[j])));
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        sum = plus(sum, scaled(v[j], product(B[arm_of(system, j)], e[j])));
+    }
+    return sum;
+}
+
+PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v) {
+    int on = seen_from(rows, i);
+    Complex speed = swing(rows, i, e, v);
+    if (on == FIXED) {
+        return -speed.im;
+    }
+    return v[on] * seen_value(rows, i, e).im - product(conjugate(e[on]), speed).im;
+}
+
+PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row) {
+    const System *system = rows->system;
+    const Complex *B = rows->B + i * system->n;
+    int on = seen_from(rows, i);
+    Complex f = on == FIXED ? complex_of(1.0, 0.0) : conjugate(e[on]);
+    for (int j = 0; j < system->n; j++) {
+        row[j] = -product(f, product(B[j], e[j])).im;
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        row[j] = -product(f, product(B[arm_of(system, j)], e[j])).im;
+    }
+    if (on != FIXED) {
+        row[on] += seen_value(rows, i, e).im;
     }
 }
 
-PRBM void jacobian(int r, int n, const Complex *B, const Complex *e, double *rows) {
-    for (int i = 0; i < r * n; i++) {
-        rows[i] = -product(B[i], e[i % n]).im;
+/* Re(f (B E (w - w_b)^2 + z w_b^2)), w_b of the body that a row is seen from */
+PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v) {
+    const System *system = rows->system;
+    const Complex *B = rows->B + i * system->n;
+    int on = seen_from(rows, i);
+    double turn = on == FIXED ? 0.0 : v[on];
+    Complex sum = on == FIXED ? complex_of(0.0, 0.0) : scaled(turn * turn, rows->z[i]);
+    for (int j = 0; j < system->n; j++) {
+        sum = plus(sum, scaled((v[j] - turn) * (v[j] - turn), product(B[j], e[j])));
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k], a = arm_of(system, j);
+        Complex more = complex_of(-v[j] * v[j], -2.0 * (v[a] - turn) * v[j]);
+        sum = plus(sum, product(more, product(B[a], e[a])));
+    }
+    return on == FIXED ? sum.re : product(conjugate(e[on]), sum).re;
+}
+
+PRBM void scalars(const Rows *rows, const Complex *e, double *s) {
+    for (int i = 0; i < rows->count; i++) {
+        s[i] = row_value(rows, i, e) + rows->c[i];
     }
 }
 
-PRBM void convective(int r, int n, const Complex *B, const Complex *e, const double *v,
-                     double *x) {
-    for (int i = 0; i < r; i++) {
-        x[i] = 0.0;
-        for (int j = 0; j < n; j++) {
-            x[i] += product(B[i * n + j], e[j]).re * (v[j] * v[j]);
-        }
+PRBM void jacobian(const Rows *rows, const Complex *e, double *result) {
+    for (int i = 0; i < rows->count; i++) {
+        row_jacobian(rows, i, e, result + i * rows->system->n);
     }
 }
+
+/* --- saddle points ---------------------------------------------------------------------------- */
 
 PRBM void saddle(int n, int r, const double *M, const double *columns, const double *rows,
                  double *kkt) {
@@ -63,56 +163,56 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
 
 /* --- the same again and again ----------------------------------------------------------------- */
 
-/* M = L D L^T of the lower triangle of M, L with ones on its diagonal, where 1/D is kept; false if M
- * is not positive definite. */
-SIZED bool block_factor(int size, int n, const double *ALONE M, double *ALONE L) {
+/* M = L D L^T of the lower triangle of M, L with ones on its diagonal, and the inverse of D; false
+ * if M is not positive definite. */
+SIZED bool block_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     UNROLLED
     for (int i = 0; i < size; i++) {
-        double pivot = M[i * n + i];
+        double pivot = M[i * size + i];
         const int columns = size <= SMALL ? size : i;
         UNROLLED
         for (int j = 0; j < columns; j++) {
             if (j < i) {
-                double sum = M[i * n + j];
+                double sum = M[i * size + j];
                 const int before = size <= SMALL ? size : j;
                 UNROLLED
                 for (int k = 0; k < before; k++) {
-                    sum = k < j ? sum - L[i * n + k] * L[j * n + k] : sum;
+                    sum = k < j ? sum - L[i * size + k] * L[j * size + k] : sum;
                 }
-                L[i * n + j] = sum; /* L_ij D_j so far */
+                L[i * size + j] = sum; /* L_ij D_j so far */
             }
         }
         UNROLLED
         for (int j = 0; j < columns; j++) {
             if (j < i) {
-                double share = L[i * n + j] * L[j * n + j];
-                pivot -= share * L[i * n + j];
-                L[i * n + j] = share;
+                double share = L[i * size + j] * inverse[j];
+                pivot -= share * L[i * size + j];
+                L[i * size + j] = share;
             }
         }
         if (!(pivot > 0.0)) {
             return false;
         }
-        L[i * n + i] = 1.0 / pivot;
+        inverse[i] = 1.0 / pivot;
     }
     return true;
 }
 
-/* b := L^-1 b and b := L^-T b within a block; L has the stride n. */
-SIZED void block_forward(int size, int n, const double *ALONE L, double *ALONE b) {
+/* b := L^-1 b and b := L^-T b within a block. */
+SIZED void block_forward(int size, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
         double sum = b[i];
         const int columns = size <= SMALL ? size : i;
         UNROLLED
         for (int j = 0; j < columns; j++) {
-            sum = j < i ? sum - L[i * n + j] * b[j] : sum;
+            sum = j < i ? sum - L[i * size + j] * b[j] : sum;
         }
         b[i] = sum;
     }
 }
 
-SIZED void block_backward(int size, int n, const double *ALONE L, double *ALONE b) {
+SIZED void block_backward(int size, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int k = 1; k < size; k++) {
         int i = size - 1 - k;
@@ -120,158 +220,193 @@ SIZED void block_backward(int size, int n, const double *ALONE L, double *ALONE 
         const int from = size <= SMALL ? 0 : i + 1;
         UNROLLED
         for (int j = from; j < size; j++) {
-            sum = j > i ? sum - L[j * n + i] * b[j] : sum;
+            sum = j > i ? sum - L[j * size + i] * b[j] : sum;
         }
         b[i] = sum;
     }
 }
 
-/* y := D^-1 z */
-SIZED void block_scale(int size, int n, const double *ALONE L, const double *z, double *y) {
-    UNROLLED
-    for (int i = 0; i < size; i++) {
-        y[i] = z[i] * L[i * n + i];
-    }
-}
-
 static void forward_all(const Factors *factors, double *b) {
-    int n = factors->n;
+    const double *L = factors->L;
     for (int k = 0; k < factors->block_count; k++) {
-        int o = factors->blocks[k].start;
-        const double *L = factors->L + o * n + o;
-        switch (factors->blocks[k].size) {
-        case 1: block_forward(1, n, L, b + o); break;
-        case 2: block_forward(2, n, L, b + o); break;
-        case 3: block_forward(3, n, L, b + o); break;
-        case 4: block_forward(4, n, L, b + o); break;
-        default: block_forward(factors->blocks[k].size, n, L, b + o);
+        int size = factors->blocks[k].size;
+        switch (size) {
+        case 1: block_forward(1, L, b); break;
+        case 2: block_forward(2, L, b); break;
+        case 3: block_forward(3, L, b); break;
+        case 4: block_forward(4, L, b); break;
+        default: block_forward(size, L, b);
         }
+        L += size * size;
+        b += size;
     }
 }
 
 static void backward_all(const Factors *factors, double *b) {
-    int n = factors->n;
+    const double *L = factors->L;
     for (int k = 0; k < factors->block_count; k++) {
-        int o = factors->blocks[k].start;
-        const double *L = factors->L + o * n + o;
-        switch (factors->blocks[k].size) {
-        case 1: block_backward(1, n, L, b + o); break;
-        case 2: block_backward(2, n, L, b + o); break;
-        case 3: block_backward(3, n, L, b + o); break;
-        case 4: block_backward(4, n, L, b + o); break;
-        default: block_backward(factors->blocks[k].size, n, L, b + o);
+        int size = factors->blocks[k].size;
+        switch (size) {
+        case 1: block_backward(1, L, b); break;
+        case 2: block_backward(2, L, b); break;
+        case 3: block_backward(3, L, b); break;
+        case 4: block_backward(4, L, b); break;
+        default: block_backward(size, L, b);
         }
+        L += size * size;
+        b += size;
     }
 }
 
-/* S = Z Y_columns^T.  It is symmetric, unless a stop slides, whose column is not its row. */
+/* The lower triangle of S = Z D^-1 Z^T, and its factor with the inverse of its D behind it. */
 SIZED bool schur_of_size(int r, Factors *factors) {
-    int n = factors->n;
-    double *S = factors->S;
-    for (int i = 0; i < r; i++) {
-        for (int k = 0; k <= i; k++) {
-            S[i * r + k] = dot(n, factors->Z + i * n, factors->Y + k * n);
+    const int even = factors->even;
+    const double *Z = factors->Z, *inverse = factors->inverse;
+    double *S = factors->S, *L = S + r * r;
+    Lanes sum[SMALL * SMALL][SUMS] = {{NO_LANES}};
+    for (int j = 0; j < even; j += LANES) {
+        Lanes share = lanes_at(inverse + j);
+        UNROLLED
+        for (int i = 0; i < r; i++) {
+            Lanes Y = share * lanes_at(Z + i * even + j);
+            UNROLLED
+            for (int k = 0; k < r; k++) {
+                if (k <= i) {
+                    sum[i * r + k][SUM_OF(j)] += Y * lanes_at(Z + k * even + j);
+                }
+            }
         }
     }
-    return block_factor(r, r, S, S + r * r); /* behind it */
+    UNROLLED
+    for (int i = 0; i < r * r; i++) {
+        S[i] = total(sum[i]);
+    }
+    return block_factor(r, S, L, L + r * r);
 }
 
-PRBM bool factor_schur(Factors *factors) {
-    int n = factors->n, r = factors->r;
-    factors->symmetric = factors->Y_columns == factors->Y && r <= SMALL;
-    if (factors->symmetric) {
-        switch (r) {
-        case 0: return true;
-        case 1: return schur_of_size(1, factors);
-        case 2: return schur_of_size(2, factors);
-        case 3: return schur_of_size(3, factors);
-        default: return schur_of_size(4, factors);
-        }
-    }
+/* A stop that slides has a column that is not its row. */
+static bool factor_unsymmetric(Factors *factors) {
+    int even = factors->even, r = factors->r;
     for (int i = 0; i < r; i++) {
         for (int k = 0; k < r; k++) {
-            factors->S[i * r + k] = dot(n, factors->Z + i * n, factors->Y_columns + k * n);
+            const double *row = factors->Z + i * even, *column = factors->Z_columns + k * even;
+            double sum = 0.0;
+            for (int j = 0; j < even; j++) {
+                sum += row[j] * factors->inverse[j] * column[j];
+            }
+            factors->S[i * r + k] = sum;
         }
     }
     return lu_factor(r, factors->S, factors->pivots);
 }
 
-SIZED void multipliers_of_size(int r, const double *S, double *lam) {
-    const double *L = S + r * r;
-    block_forward(r, r, L, lam);
-    block_scale(r, r, L, lam, lam);
-    block_backward(r, r, L, lam);
-}
-
-static void multipliers(const Factors *factors, double *lam) {
+PRBM bool factor_schur(Factors *factors) {
+    factors->symmetric = factors->Z_columns == factors->Z && factors->r <= SMALL;
     if (!factors->symmetric) {
-        lu_solve(factors->r, factors->S, factors->pivots, lam);
-        return;
+        return factor_unsymmetric(factors);
     }
     switch (factors->r) {
-    case 0: break;
-    case 1: multipliers_of_size(1, factors->S, lam); break;
-    case 2: multipliers_of_size(2, factors->S, lam); break;
-    case 3: multipliers_of_size(3, factors->S, lam); break;
-    default: multipliers_of_size(4, factors->S, lam);
+    case 0: return true;
+    case 1: return schur_of_size(1, factors);
+    case 2: return schur_of_size(2, factors);
+    case 3: return schur_of_size(3, factors);
+    default: return schur_of_size(4, factors);
     }
 }
 
-/* x := a from x = D^-1 L^-1 f and the multipliers behind it, which change their sign. */
-static void add_multipliers(const Factors *factors, double *x) {
-    int n = factors->n;
-    double *lam = x + n;
-    for (int k = 0; k < factors->r; k++) {
-        add_scaled(n, lam[k], factors->Y_columns + k * n, x);
-        lam[k] = -lam[k];
+/* The multipliers lam from what the rows ask for. */
+SIZED void multipliers_of_size(int r, const double *S, double *lam) {
+    const double *L = S + r * r, *inverse = L + r * r;
+    block_forward(r, L, lam);
+    UNROLLED
+    for (int k = 0; k < r; k++) {
+        lam[k] *= inverse[k];
+    }
+    block_backward(r, L, lam);
+}
+
+/* lam -= Z D^-1 x */
+SIZED void ask_multipliers(int count, int even, const double *ALONE Z, const double *ALONE x,
+                           const double *ALONE inverse, double *ALONE lam) {
+    Lanes sum[SMALL][SUMS] = {{NO_LANES}};
+    for (int j = 0; j < even; j += LANES) {
+        Lanes share = lanes_at(x + j) * lanes_at(inverse + j);
+        UNROLLED
+        for (int k = 0; k < count; k++) {
+            sum[k][SUM_OF(j)] += lanes_at(Z + k * even + j) * share;
+        }
+    }
+    UNROLLED
+    for (int k = 0; k < count; k++) {
+        lam[k] -= total(sum[k]);
+    }
+}
+
+/* From x = L^-1 f and what the rows ask for: lam and x := D^-1 (x + Z^T lam). */
+SIZED void constrain_of_size(int r, const Factors *factors, double *ALONE x, double *ALONE lam) {
+    const int even = factors->even;
+    const double *ALONE Z = factors->Z, *ALONE columns = factors->Z_columns;
+    const double *ALONE inverse = factors->inverse;
+    const int together = r <= SMALL ? r : 1;
+    for (int k = 0; k < r; k += together) {
+        ask_multipliers(together, even, Z + k * even, x, inverse, lam + k);
+    }
+    if (factors->symmetric) {
+        multipliers_of_size(r, factors->S, lam);
+    } else {
+        lu_solve(r, factors->S, factors->pivots, lam);
+    }
+    for (int j = 0; j < even; j += LANES) {
+        Lanes sum = lanes_at(x + j);
+        UNROLLED
+        for (int k = 0; k < r; k++) {
+            sum += lam[k] * lanes_at(columns + k * even + j);
+        }
+        set_lanes(x + j, sum * lanes_at(inverse + j));
+    }
+}
+
+/* The solution from x = L^-1 f and what the rows ask for. */
+static void finish(const Factors *factors, double *x, double *lam) {
+    switch (factors->r) {
+    case 0: constrain_of_size(0, factors, x, lam); break;
+    case 1: constrain_of_size(1, factors, x, lam); break;
+    case 2: constrain_of_size(2, factors, x, lam); break;
+    case 3: constrain_of_size(3, factors, x, lam); break;
+    case 4: constrain_of_size(4, factors, x, lam); break;
+    default: constrain_of_size(factors->r, factors, x, lam);
     }
     backward_all(factors, x);
 }
 
-/* Multipliers from x = L^-1 f and what the rows ask for, then x := a. */
-static void finish(const Factors *factors, double *x) {
-    int n = factors->n;
-    double *lam = x + n;
-    for (int k = 0; k < factors->r; k++) {
-        lam[k] -= dot(n, factors->Y + k * n, x);
-    }
-    multipliers(factors, lam);
-    block_scale(n, n, factors->L, x, x);
-    add_multipliers(factors, x);
-}
-
-/* The same without loads: x (n + r,) begins with zeros. */
-static void solve_rows(const Factors *factors, double *x) {
-    multipliers(factors, x + factors->n);
-    add_multipliers(factors, x);
-}
-
-PRBM void solve_again(const Factors *factors, double *x) {
+PRBM void solve_again(const Factors *factors, double *x, double *lam) {
     forward_all(factors, x);
-    finish(factors, x);
+    finish(factors, x, lam);
 }
 
-PRBM bool project_positions(const System *system, int r, const Complex *B, const double *c,
-                            double *q, Complex *e, Scratch *scratch, Problem *problem) {
-    size_t mark = scratch->used, n = (size_t)system->n, size = n + (size_t)r;
-    double *s = take(scratch, (size_t)r), *rows = take(scratch, (size_t)r * n);
+PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
+                            Complex *e, Scratch *scratch, Problem *problem) {
+    size_t mark = scratch->used, n = (size_t)system->n, r = (size_t)rows->count, size = n + r;
+    double *s = take(scratch, r), *G = take(scratch, r * n);
     double *M = take(scratch, n * n), *C = take(scratch, n * n);
     double *kkt = take(scratch, size * size), *right = take(scratch, size);
     double best = INFINITY;
     bool right_way = true, closed = false;
+    Rows now = *rows;
+    now.c = c;
     for (int step = 0; step < ITERATIONS && right_way && !closed; step++) {
-        directions(system->n, q, e);
-        scalars(r, system->n, B, c, e, s);
-        double error = largest(r, s), length = system->length;
+        directions(system, q, e);
+        scalars(&now, e, s);
+        double error = largest(rows->count, s), length = system->length;
         closed = error <= CLOSED * length || (BARELY_CLOSED * length >= best && best <= error);
         best = error < best ? error : best;
         if (!closed) {
-            jacobian(r, system->n, B, e, rows);
+            jacobian(rows, e, G);
             inertia(system->n, system->H, system->J, e, M, C);
-            saddle(system->n, r, M, rows, rows, kkt);
-            memset(right, 0, n * sizeof *right);
-            for (int k = 0; k < r; k++) {
-                right[n + (size_t)k] = -s[k];
+            saddle(system->n, rows->count, M, G, G, kkt);
+            zeros(system->n, right);
+            for (size_t k = 0; k < r; k++) {
+                right[n + k] = -s[k];
             }
             right_way = solve((int)size, kkt, right, scratch, problem);
             for (size_t i = 0; right_way && i < n; i++) {

@@ -40,12 +40,20 @@ static void dependents(const Mechanism *m, int *result) {
     }
 }
 
-/* The slot of the angle of a coordinate. */
-static int angle_slot(const Mechanism *m, int j) {
-    if (m->link_of[j] >= 0) {
-        return m->slots.links + PER_LINK * m->link_of[j];
+/* The slot of a coordinate: of its angle or strain, of its rate behind it. */
+static int slot_of(const Mechanism *m, int j, bool rate) {
+    const Coordinate *coordinate = &m->coordinates[j];
+    if (coordinate->arm != j) {
+        int k = 0;
+        while (m->stretches[k] != j) {
+            k++;
+        }
+        return m->slots.stretches + PER_STRETCH * k + rate;
     }
-    return m->slots.bodies + PER_BODY * (m->body_of[j] - 1) + 2;
+    if (coordinate->link >= 0) {
+        return m->slots.links + PER_LINK * coordinate->link + rate;
+    }
+    return m->slots.bodies + PER_BODY * (coordinate->body - 1) + (rate ? 5 : 2);
 }
 
 PRBM int exchange_slot(const Simulation *simulation, int k) {
@@ -54,15 +62,16 @@ PRBM int exchange_slot(const Simulation *simulation, int k) {
     if (k >= 2 * count) {
         return m->slots.energies + 3 + (k - 2 * count);
     }
-    int j = m->independent[k % count];
-    return angle_slot(m, j) + (k < count ? 0 : m->link_of[j] >= 0 ? 1 : 3);
+    return slot_of(m, m->independent[k % count], k >= count);
 }
 
 static const char *coordinate_name(const Mechanism *m, int j, char *text, size_t size) {
-    if (m->link_of[j] >= 0) {
-        (void)snprintf(text, size, "link[%d].angle", m->link_of[j] + 1);
+    const Coordinate *coordinate = &m->coordinates[j];
+    if (coordinate->link >= 0) {
+        const char *what = coordinate->arm == j ? "angle" : "strain";
+        (void)snprintf(text, size, "link[%d].%s", coordinate->link + 1, what);
     } else {
-        (void)snprintf(text, size, "%s.angle", m->bodies[m->body_of[j] - 1].name);
+        (void)snprintf(text, size, "%s.angle", m->bodies[coordinate->body - 1].name);
     }
     return text;
 }
@@ -105,15 +114,16 @@ static bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
     int *dependent = take_integers(&sim->scratch, r), *pivot = take_integers(&sim->scratch, r);
     double *rows = take_matrix(&sim->scratch, r, n), *a = take_matrix(&sim->scratch, r, r);
     double *s = take(&sim->scratch, (size_t)r), best = HUGE_VAL;
+    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
     bool closed = false, regular = true;
     dependents(sim->mechanism, dependent);
     for (int step = 0; step < ITERATIONS && regular && !closed; step++) {
-        directions(n, q, sim->e);
-        scalars(r, n, system->loops, system->loops_c, sim->e, s);
+        directions(system, q, sim->e);
+        scalars(&loops, sim->e, s);
         double error = largest(r, s), length = system->length;
         closed = error <= CLOSED * length || (BARELY_CLOSED * length >= best && best <= error);
         best = lesser(best, error);
-        jacobian(r, n, system->loops, sim->e, rows);
+        jacobian(&loops, sim->e, rows);
         regular = factor_dependents(sim, rows, dependent, a, pivot);
         if (regular && !closed) {
             lu_solve(r, a, pivot, s);
@@ -308,21 +318,21 @@ static double impact_indicator(const Simulation *sim, int i) {
 }
 
 /* Falls through zero as what slides has come to rest, up to what counts as rest. */
-static double slip_speed(const Simulation *sim, const Complex *row, int sign) {
-    const Equations *q = &sim->equations;
-    return sign * row_rate(sim->system.n, row, q->e, sim->at + sim->system.n) + 0.5 * still(sim);
+static double slip_speed(const Simulation *sim, const Rows *rows, int i, int sign) {
+    const double *v = sim->at + sim->system.n;
+    return sign * row_rate(rows, i, sim->equations.e, v) + 0.5 * still(sim);
 }
 
 static void friction_indicators(const Simulation *sim, double *z) {
     const Equations *q = &sim->equations;
-    const System *system = &sim->system;
-    double *rubs = z + STOP_INDICATORS * system->s;
+    Rows walls = slide_rows(&sim->system), points = rub_rows(&sim->system);
+    double *rubs = z + STOP_INDICATORS * sim->system.s;
     for (int k = 0; k < q->stuck_count; k++) {
         z[STOP_INDICATORS * q->stuck[k] + 2] = margin_stick(sim, k) / force_scale(sim);
     }
     for (int k = 0; k < q->sliding_count; k++) {
         int i = q->sliding[k];
-        double speed = slip_speed(sim, system->slides + i * system->n, q->discrete.slides[i]);
+        double speed = slip_speed(sim, &walls, i, q->discrete.slides[i]);
         z[STOP_INDICATORS * i + 2] = speed / speed_scale(sim);
     }
     for (int k = 0; k < q->rubbing_count; k++) {
@@ -330,7 +340,7 @@ static void friction_indicators(const Simulation *sim, double *z) {
     }
     for (int k = 0; k < q->rub_slide_count; k++) {
         int i = q->rub_slides[k];
-        double speed = slip_speed(sim, system->rubs + i * system->n, q->discrete.rubs[i]);
+        double speed = slip_speed(sim, &points, i, q->discrete.rubs[i]);
         rubs[i] = speed / speed_scale(sim);
     }
 }
@@ -374,7 +384,7 @@ static double drift(const Simulation *sim) {
         most = greater(most, drift_of_held(sim, q->held[k]));
     }
     for (int k = q->first_stick; k < q->r; k++) {
-        double speed = fabs(row_rate(n, q->B + k * n, q->e, sim->front + n));
+        double speed = fabs(row_rate(&q->active, k, q->e, sim->front + n));
         most = greater(most, speed / speed_scale(sim));
     }
     return most;
@@ -413,7 +423,7 @@ static bool follow(Simulation *sim, bool *followed, Problem *problem) {
     double *y = sim->front, *v = y + n, *rows = take_matrix(&sim->scratch, r, n);
     double *M = take_matrix(&sim->scratch, n, n), *C = take_matrix(&sim->scratch, n, n);
     double *kkt = take_matrix(&sim->scratch, size, size), *x = take(&sim->scratch, (size_t)size);
-    jacobian(r, n, q->B, q->e, rows);
+    jacobian(&q->active, q->e, rows);
     inertia(n, sim->system.H, sim->system.J, q->e, M, C);
     saddle(n, r, M, rows, rows, kkt);
     zeros(n, x);
@@ -446,7 +456,7 @@ static bool break_away(Simulation *sim, Problem *problem) {
         return impact(sim, struck, problem);
     }
     return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
-           settle(sim, NULL, 0, NO_EVENT, 0, problem);
+           settle(sim, NULL, 0, NULL, problem);
 }
 
 /* Bring held stops back onto their walls, let them go or strike where a wall has changed its
@@ -472,10 +482,9 @@ static bool follow_walls(Simulation *sim, Problem *problem) {
 /* What has stopped sliding is at rest: a solver overshoots by its own resolution of time, which
  * must not look like sliding back. */
 static void stop_sliding(Simulation *sim, const Event *event) {
-    const System *system = &sim->system;
-    const Complex *rows = event->kind == RUB ? system->rubs : system->slides;
-    int n = system->n;
-    double speed = row_rate(n, rows + event->index * n, sim->equations.e, sim->front + n);
+    Rows rows = rows_of(sim, event->kind);
+    const double *v = sim->front + sim->system.n;
+    double speed = row_rate(&rows, event->index, sim->equations.e, v);
     if (fabs(speed) <= DRIFT * speed_scale(sim)) {
         Problem ignored; /* held and stuck at once may be one constraint too many: then it stays */
         with_slide(sim, event->kind, event->index, STICKS);
@@ -488,6 +497,7 @@ static void stop_sliding(Simulation *sim, const Event *event) {
 static Event due_here(const Simulation *sim, bool *struck) {
     const Equations *q = &sim->equations;
     const System *system = &sim->system;
+    Rows walls = slide_rows(system), points = rub_rows(system);
     double near = TOUCHING * system->length, bound = still(sim);
     Event event = {NO_EVENT, 0, sim->now->time};
     for (int k = 0; k < q->held_count; k++) {
@@ -513,7 +523,7 @@ static Event due_here(const Simulation *sim, bool *struck) {
     }
     for (int k = 0; k < q->sliding_count; k++) {
         int i = q->sliding[k];
-        if (slip_speed(sim, system->slides + i * system->n, q->discrete.slides[i]) <= 0.0) {
+        if (slip_speed(sim, &walls, i, q->discrete.slides[i]) <= 0.0) {
             event.kind = SLIDE;
             event.index = i;
             return event;
@@ -521,7 +531,7 @@ static Event due_here(const Simulation *sim, bool *struck) {
     }
     for (int k = 0; k < q->rub_slide_count; k++) {
         int i = q->rub_slides[k];
-        if (slip_speed(sim, system->rubs + i * system->n, q->discrete.rubs[i]) <= 0.0) {
+        if (slip_speed(sim, &points, i, q->discrete.rubs[i]) <= 0.0) {
             event.kind = RUB;
             event.index = i;
             return event;
@@ -615,35 +625,149 @@ PRBM void exchange_begin(Simulation *sim) {
 
 /* --- directional derivatives ------------------------------------------------------------------ */
 
-/* A change of everything with the states and inputs: dq, dv, da, -dlam, of the rows B of what is
- * active. */
+/* A change of everything with the states and inputs: dq, dv, da, dlam.  With the complex changes
+ * dphi = dtheta - i ds of an arm E, and dw of its rate, dE = i E dphi, d(E w) = E (i dphi w + dw), and
+ * so on: what is written for an angle holds for a stretch, too. */
 typedef struct {
     Simulation *sim;
     const Equations *q;
     const Complex *e;
     const double *y, *v, *a, *du;
-    double *dq, *dv, *dx; /* (n,), (n,), (n + r,) = (da, -dlam) */
+    double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,) = da, (r,) */
+    Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
+    Complex *dE;                    /* (n,) i E dphi */
+    Complex *swing, *dswing;        /* (n,) E w */
+    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); at first without the change of w' */
+    Complex *pull;                  /* (n,) torques on the arms and, -i times, forces along them */
 } Tangent;
 
+static Complex times_i(Complex z) {
+    return complex_of(-z.im, z.re);
+}
+
 static double multiplier(const Tangent *t, int k) {
-    return -t->q->x[t->q->system->n + k];
+    return t->q->lam[k];
 }
 
 static double multiplier_change(const Tangent *t, int k) {
-    return -t->dx[t->q->system->n + k];
+    return t->dlam[k];
 }
 
-/* Change of a scalar -Im(B e) v along dq and dv. */
-static double rate_change(const Tangent *t, const Complex *row) {
+/* --- of rows --- */
+
+/* A vector that turns, and its motion. */
+typedef struct {
+    Complex E, w, alpha, dphi, dw;
+} Arm;
+
+static Arm arm_at(const Tangent *t, int j) {
+    Complex none = {0.0, 0.0}, one = {1.0, 0.0};
+    Arm still_one = {one, none, none, none, none};
+    if (j == FIXED) {
+        return still_one;
+    }
+    Arm arm = {t->e[j], t->w[j], t->alpha[j], t->dphi[j], t->dw[j]};
+    return arm;
+}
+
+/* A part of a row as it is seen from where the row is: f B_j E_j, and f z for j = n; false if it has
+ * no such part. */
+static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
+    int n = rows->system->n, on = seen_from(rows, i);
+    Complex size = {0.0, 0.0};
+    if (j < n) {
+        size = rows->B[i * n + j];
+    } else if (on != FIXED) {
+        size = rows->z[i];
+    }
+    Arm arm = arm_at(t, j < n ? j : FIXED), body = arm_at(t, on);
+    seen->E = product(product(conjugate(body.E), arm.E), size);
+    seen->w = minus(arm.w, body.w);
+    seen->alpha = minus(arm.alpha, body.alpha);
+    seen->dphi = minus(arm.dphi, body.dphi);
+    seen->dw = minus(arm.dw, body.dw);
+    return size.re != 0.0 || size.im != 0.0;
+}
+
+/* E (i dphi w + dw) */
+static Complex swing_change(const Arm *arm) {
+    return product(arm->E, plus(times_i(product(arm->dphi, arm->w)), arm->dw));
+}
+
+/* i w' - w^2 */
+static Complex bend_of(const Arm *arm) {
+    return minus(times_i(arm->alpha), product(arm->w, arm->w));
+}
+
+/* E (i dphi (i w' - w^2) - 2 w dw) */
+static Complex bend_change(const Arm *arm) {
+    Complex turned = times_i(product(arm->dphi, bend_of(arm)));
+    return product(arm->E, minus(turned, scaled(2.0, product(arm->w, arm->dw))));
+}
+
+static double value_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
-    for (int j = 0; j < t->q->system->n; j++) {
-        Complex arm_j = product(row[j], t->e[j]);
-        sum -= arm_j.re * t->dq[j] * t->v[j] + arm_j.im * t->dv[j];
+    Arm part;
+    for (int j = 0; j <= rows->system->n; j++) {
+        sum -= seen_part(t, rows, i, j, &part) ? product(part.E, part.dphi).im : 0.0;
     }
     return sum;
 }
 
-/* dq and dv from the changes of the independent ones: J dq = 0, J dv = Re(B e) v dq. */
+static double rate_change(const Tangent *t, const Rows *rows, int i) {
+    double sum = 0.0;
+    Arm part;
+    for (int j = 0; j <= rows->system->n; j++) {
+        sum -= seen_part(t, rows, i, j, &part) ? swing_change(&part).im : 0.0;
+    }
+    return sum;
+}
+
+/* Of the second derivative, as far as it is not one of the accelerations. */
+static double second_change(const Tangent *t, const Rows *rows, int i) {
+    double sum = 0.0;
+    Arm part;
+    for (int j = 0; j <= rows->system->n; j++) {
+        sum += seen_part(t, rows, i, j, &part) ? bend_change(&part).re : 0.0;
+    }
+    return sum;
+}
+
+/* A force along a row, whose gradient i f B E turns; what the arms take, the body of the wall gives. */
+static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
+    int n = rows->system->n, on = seen_from(rows, i);
+    Arm part;
+    for (int j = 0; j <= n; j++) {
+        if (seen_part(t, rows, i, j, &part)) {
+            Complex change = scaled(force, product(part.E, part.dphi));
+            if (j < n) {
+                t->pull[j] = minus(t->pull[j], change);
+            }
+            if (on != FIXED) {
+                t->pull[on] = plus(t->pull[on], change);
+            }
+        }
+    }
+}
+
+/* --- of coordinates --- */
+
+/* What follows for the arms from dq and dv. */
+static void move_arms(const Tangent *t) {
+    const System *system = t->q->system;
+    turning(system, t->dq, t->dphi);
+    turning(system, t->dv, t->dw);
+    for (int j = 0; j < system->n; j++) {
+        Arm arm = arm_at(t, j);
+        t->dE[j] = times_i(product(arm.E, arm.dphi));
+        t->swing[j] = product(arm.E, arm.w);
+        t->dswing[j] = swing_change(&arm);
+        t->bend[j] = product(arm.E, bend_of(&arm));
+        t->dbend[j] = bend_change(&arm);
+    }
+}
+
+/* dq and dv from the changes of the independent ones: the loops and their rates do not change. */
 static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) {
     Simulation *sim = t->sim;
     const Mechanism *m = sim->mechanism;
@@ -652,8 +776,9 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
     int *dependent = take_integers(&sim->scratch, r), *pivot = take_integers(&sim->scratch, r);
     double *rows = take_matrix(&sim->scratch, r, n), *a = take_matrix(&sim->scratch, r, r);
     double *s = take(&sim->scratch, (size_t)r);
+    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
     dependents(m, dependent);
-    jacobian(r, n, system->loops, t->e, rows);
+    jacobian(&loops, t->e, rows);
     if (!factor_dependents(sim, rows, dependent, a, pivot)) {
         return singular_choice(sim, dependent, problem);
     }
@@ -670,37 +795,24 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
     for (int k = 0; k < r; k++) {
         t->dq[dependent[k]] = s[k];
     }
+    move_arms(t);
     for (int i = 0; i < r; i++) {
-        s[i] = -rate_change(t, system->loops + i * n);
+        s[i] = -rate_change(t, &loops, i);
     }
     lu_solve(r, a, pivot, s);
     for (int k = 0; k < r; k++) {
         t->dv[dependent[k]] = s[k];
     }
+    move_arms(t);
     return true;
 }
 
-/* Im and Re of diag(e)^H H diag(e), without J. */
-static Complex turned_moment(const Tangent *t, int i, int j) {
-    const System *system = t->q->system;
-    return product(product(conjugate(t->e[i]), system->H[i * system->n + j]), t->e[j]);
-}
+/* --- of loads --- */
 
-/* dM x, from dM_ij = -Im(Hq_ij) (dq_j - dq_i). */
-static double mass_change(const Tangent *t, int i, const double *x) {
-    double sum = 0.0;
-    for (int j = 0; j < t->q->system->n; j++) {
-        sum -= turned_moment(t, i, j).im * (t->dq[j] - t->dq[i]) * x[j];
-    }
-    return sum;
-}
-
-static double momentum_of(const Tangent *t, int i, const double *x) {
-    double sum = t->q->system->J[i] * x[i];
-    for (int j = 0; j < t->q->system->n; j++) {
-        sum += turned_moment(t, i, j).re * x[j];
-    }
-    return sum;
+/* (H x)_i over the arms */
+static Complex through_mass(const Tangent *t, int i, const Complex *x) {
+    int n = t->q->system->n;
+    return along_arms(n, t->q->system->H + i * n, x);
 }
 
 /* Change of the row of loads of the inputs. */
@@ -714,7 +826,7 @@ static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     field_row(n, system->S, complex_of(-base[0], -base[1]), dw);
     zeros(n, dmoment);
     for (int i = 0; i < m->force_count; i++) {
-        const BodyFrame *frame = &system->bodies[m->forces[i].body - 1];
+        const BodyFrame *frame = &system->pushed[i];
         const double *given = t->du + 3 * i;
         force_row(n, frame->A, complex_of(given[0], given[1]), one);
         for (int j = 0; j < n; j++) {
@@ -725,30 +837,51 @@ static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     t->sim->scratch.used = mark;
 }
 
-/* Loads and quadratic velocities: change of Q - C v^2. */
-static void load_change(const Tangent *t, const Complex *dw, const double *dmoment) {
+/* Momentum of an arm, E conj(H (E w)), and its change. */
+static Complex momentum_change(const Tangent *t, int j) {
+    Complex momentum = product(t->e[j], conjugate(through_mass(t, j, t->swing)));
+    Complex turned = times_i(product(t->dphi[j], momentum));
+    return plus(turned, product(t->e[j], conjugate(through_mass(t, j, t->dswing))));
+}
+
+/* Change of the inertial load -i E conj(H bend) of an arm. */
+static Complex inertial_change(const Tangent *t, int j) {
+    Complex load = product(t->e[j], conjugate(through_mass(t, j, t->bend)));
+    Complex turned = times_i(product(t->dphi[j], load));
+    Complex change = plus(turned, product(t->e[j], conjugate(through_mass(t, j, t->dbend))));
+    return scaled(-1.0, times_i(change));
+}
+
+/* Loads, inertia and damping in proportion to mass: change of the pull on the arms. */
+static void arm_load_change(const Tangent *t, const Complex *dw) {
+    const Equations *q = t->q;
+    for (int j = 0; j < q->system->n; j++) {
+        if (arm_of(q->system, j) == j) {
+            Complex load = plus(product(dw[j], t->e[j]), product(q->w[j], t->dE[j]));
+            Complex lost = scaled(-q->mass_damping, momentum_change(t, j));
+            t->pull[j] = plus(plus(load, inertial_change(t, j)), lost);
+        }
+    }
+}
+
+/* Springs, moments and damping of the bodies' own inertia. */
+static void coordinate_load_change(const Tangent *t, const double *dmoment) {
     const Equations *q = t->q;
     const System *system = q->system;
     int n = system->n;
     for (int i = 0; i < n; i++) {
-        Complex turned = product(q->w[i], t->e[i]);
-        double sum = product(dw[i], t->e[i]).re - turned.im * t->dq[i] + dmoment[i];
+        double sum = dmoment[i] - q->mass_damping * system->J[i] * t->dv[i];
         for (int j = 0; j < n; j++) {
-            Complex moment = turned_moment(t, i, j);
-            sum += moment.re * (t->dq[j] - t->dq[i]) * (t->v[j] * t->v[j]) +
-                   moment.im * 2.0 * t->v[j] * t->dv[j];
             sum -= system->K[i * n + j] * (t->dq[j] + q->beta * t->dv[j]);
         }
-        if (q->mass_damping != 0.0) {
-            sum -= q->mass_damping * (mass_change(t, i, t->v) + momentum_of(t, i, t->dv));
-        }
-        t->dx[i] = sum - mass_change(t, i, t->a);
+        t->dx[i] += sum;
     }
 }
 
 static double lift_change(const Tangent *t, int i) {
     const System *system = t->q->system;
-    return row_rate(system->n, system->lifts + i * system->n, t->e, t->dq);
+    Rows lifts = plain_rows(system, system->f, system->lifts, system->lifts_c);
+    return value_change(t, &lifts, i);
 }
 
 /* Change of the limit of friction of a friction point. */
@@ -759,72 +892,103 @@ static double limit_change(const Tangent *t, int i) {
 
 static void rub_change(const Tangent *t) {
     const Equations *q = t->q;
-    const System *system = q->system;
-    int n = system->n;
+    Scratch *scratch = &t->sim->scratch;
+    size_t mark = scratch->used;
+    double *row = take(scratch, (size_t)q->system->n);
+    Rows rubs = rub_rows(q->system);
     for (int k = 0; k < q->rub_slide_count; k++) {
         int i = q->rub_slides[k];
-        double force = rub_force(q, i), change = -q->discrete.rubs[i] * limit_change(t, i);
-        for (int j = 0; j < n; j++) {
-            Complex arm_j = product(system->rubs[i * n + j], t->e[j]);
-            t->dx[j] -= change * arm_j.im + force * arm_j.re * t->dq[j];
-        }
+        row_jacobian(&rubs, i, t->e, row);
+        add_scaled(q->system->n, -q->discrete.rubs[i] * limit_change(t, i), row, t->dx);
+        add_pull(t, &rubs, i, rub_force(q, i));
     }
+    scratch->used = mark;
 }
 
-/* Rows and columns: change of the right side by dR^T lam and -dR a, and of Re(B e) v^2. */
+/* Rows and columns: change of the right side by dR^T lam, -dR a and what convects. */
 static void row_change(const Tangent *t) {
     const Equations *q = t->q;
-    int n = q->system->n;
+    Rows walls = slide_rows(q->system);
     for (int k = 0; k < q->r; k++) {
-        double lam = multiplier(t, k), sum = 0.0;
-        for (int j = 0; j < n; j++) {
-            Complex arm_j = product(q->B[k * n + j], t->e[j]);
-            t->dx[j] -= lam * arm_j.re * t->dq[j];
-            sum += arm_j.re * t->dq[j] * t->a[j] - arm_j.im * t->dq[j] * (t->v[j] * t->v[j]) +
-                   arm_j.re * 2.0 * t->v[j] * t->dv[j];
-        }
-        t->dx[n + k] = sum;
+        add_pull(t, &q->active, k, multiplier(t, k));
+        t->dlam[k] = -second_change(t, &q->active, k);
     }
     for (int k = 0; k < q->sliding_count; k++) {
         int i = q->sliding[k];
         double share = -q->stop_friction[i] * q->discrete.slides[i];
-        double lam = multiplier(t, q->first_hold + held_at(q, i));
-        for (int j = 0; j < n; j++) {
-            Complex arm_j = product(q->system->slides[i * n + j], t->e[j]);
-            t->dx[j] -= lam * share * arm_j.re * t->dq[j];
-        }
+        add_pull(t, &walls, i, share * multiplier(t, q->first_hold + held_at(q, i)));
+    }
+}
+
+/* The pull on an arm is a torque; -i times it, along a stretch. */
+static void apply_pull(const Tangent *t) {
+    const System *system = t->q->system;
+    for (int j = 0; j < system->n; j++) {
+        int a = arm_of(system, j);
+        t->dx[j] += a == j ? t->pull[j].re : t->pull[a].im;
     }
 }
 
 /* --- their outputs --- */
 
+static void point_changes(const Tangent *t, const BodyFrame *frame, Complex *moved,
+                          Complex *speed) {
+    int n = t->q->system->n;
+    *moved = along_arms(n, frame->A, t->dE);
+    *speed = times_i(along_arms(n, frame->A, t->dswing));
+}
+
 static void body_changes(const Tangent *t, double *out) {
-    const System *system = t->q->system;
-    for (int i = 0; i < system->b; i++) {
-        const BodyFrame *frame = &system->bodies[i];
+    for (int i = 0; i < t->q->system->b; i++) {
+        const BodyFrame *frame = &t->q->system->bodies[i];
         double *d = out + PER_BODY * i;
-        for (int j = 0; j < system->n; j++) {
-            Complex arm_j = product(frame->A[j], t->e[j]);
-            d[0] -= arm_j.im * t->dq[j];
-            d[1] += arm_j.re * t->dq[j];
-            d[3] -= arm_j.re * t->dq[j] * t->v[j] + arm_j.im * t->dv[j];
-            d[4] += -arm_j.im * t->dq[j] * t->v[j] + arm_j.re * t->dv[j];
-        }
+        Complex moved, speed;
+        point_changes(t, frame, &moved, &speed);
+        d[0] = moved.re;
+        d[1] = moved.im;
         d[2] = t->dq[frame->j];
+        d[3] = speed.re;
+        d[4] = speed.im;
         d[5] = t->dv[frame->j];
+    }
+}
+
+static void probe_changes(const Tangent *t, double *out) {
+    for (int i = 0; i < t->sim->mechanism->probe_count; i++) {
+        double *d = out + PER_PROBE * i;
+        Complex moved, speed;
+        point_changes(t, &t->q->system->probes[i], &moved, &speed);
+        d[0] = moved.re;
+        d[1] = moved.im;
+        d[2] = speed.re;
+        d[3] = speed.im;
+    }
+}
+
+static void link_changes(const Tangent *t, double *links, double *stretches_out) {
+    const Mechanism *m = t->sim->mechanism;
+    for (int k = 0; k < m->link_count; k++) {
+        links[PER_LINK * k] = t->dq[m->links[k]];
+        links[PER_LINK * k + 1] = t->dv[m->links[k]];
+    }
+    for (int k = 0; k < m->stretch_count; k++) {
+        stretches_out[PER_STRETCH * k] = t->dq[m->stretches[k]];
+        stretches_out[PER_STRETCH * k + 1] = t->dv[m->stretches[k]];
     }
 }
 
 static double gap_change(const Tangent *t, int i) {
     const System *system = t->q->system;
+    Rows gaps = gap_rows(system);
     double displacement = t->du[3 * system->mechanism->force_count + 2 * i];
-    return row_rate(system->n, system->gaps + i * system->n, t->e, t->dq) + displacement;
+    return value_change(t, &gaps, i) + displacement;
 }
 
 static double gap_rate_change(const Tangent *t, int i) {
     const System *system = t->q->system;
+    Rows gaps = gap_rows(system);
     double velocity = t->du[3 * system->mechanism->force_count + 2 * i + 1];
-    return rate_change(t, system->gaps + i * system->n) + velocity;
+    return rate_change(t, &gaps, i) + velocity;
 }
 
 static void stop_changes(const Tangent *t, double *out) {
@@ -837,6 +1001,15 @@ static void stop_changes(const Tangent *t, double *out) {
     }
 }
 
+/* dbend, complete with the change of the accelerations. */
+static void bend_arms(const Tangent *t) {
+    Complex *dalpha = t->pull; /* which has been applied */
+    turning(t->q->system, t->dx, dalpha);
+    for (int j = 0; j < t->q->system->n; j++) {
+        t->dbend[j] = plus(t->dbend[j], times_i(product(t->e[j], dalpha[j])));
+    }
+}
+
 static void base_changes(const Tangent *t, double *out) {
     const System *system = t->q->system;
     const Mechanism *m = system->mechanism;
@@ -845,19 +1018,10 @@ static void base_changes(const Tangent *t, double *out) {
     Complex field = minus(system->gravity, t->q->inputs.base), force = {0.0, 0.0};
     double moment = 0.0;
     for (int i = 0; i < system->p; i++) {
-        Complex z = minus(system->c[i], system->anchor), dz = {0.0, 0.0};
-        Complex bend = {0.0, 0.0}, dbend = {0.0, 0.0};
-        for (int j = 0; j < n; j++) {
-            Complex arm_j = product(system->A[i * n + j], t->e[j]);
-            double v2 = t->v[j] * t->v[j];
-            double along_it = -t->a[j] * t->dq[j] - 2.0 * t->v[j] * t->dv[j];
-            double across = t->dx[j] - t->dq[j] * v2;
-            z = plus(z, arm_j);
-            dz = plus(dz, complex_of(-arm_j.im * t->dq[j], arm_j.re * t->dq[j]));
-            bend = plus(bend, product(arm_j, complex_of(-v2, t->a[j])));
-            dbend = plus(dbend, product(arm_j, complex_of(along_it, across)));
-        }
-        Complex load = scaled(system->m[i], minus(field, bend));
+        const Complex *A = system->A + i * n;
+        Complex z = plus(along_arms(n, A, t->e), minus(system->c[i], system->anchor));
+        Complex dz = along_arms(n, A, t->dE), dbend = along_arms(n, A, t->dbend);
+        Complex load = scaled(system->m[i], minus(field, along_arms(n, A, t->bend)));
         Complex change = scaled(-system->m[i], plus(complex_of(base[0], base[1]), dbend));
         force = plus(force, change);
         moment += product(conjugate(dz), load).im + product(conjugate(z), change).im;
@@ -866,28 +1030,25 @@ static void base_changes(const Tangent *t, double *out) {
         moment -= system->J[j] * t->dx[j];
     }
     for (int i = 0; i < m->force_count; i++) {
-        const BodyFrame *frame = &system->bodies[m->forces[i].body - 1];
+        const BodyFrame *frame = &system->pushed[i];
         const double *df = t->du + 3 * i, *f = given + 3 * i;
-        Complex centre = minus(frame->c, system->anchor), moved = {0.0, 0.0};
-        for (int j = 0; j < n; j++) {
-            Complex arm_j = product(frame->A[j], t->e[j]);
-            centre = plus(centre, arm_j);
-            moved = plus(moved, complex_of(-arm_j.im * t->dq[j], arm_j.re * t->dq[j]));
-        }
+        Complex z = plus(along_arms(n, frame->A, t->e), minus(frame->c, system->anchor));
+        Complex dz = along_arms(n, frame->A, t->dE);
         force = plus(force, complex_of(df[0], df[1]));
-        moment += product(conjugate(moved), complex_of(f[0], f[1])).im +
-                  product(conjugate(centre), complex_of(df[0], df[1])).im + df[2];
+        moment += product(conjugate(dz), complex_of(f[0], f[1])).im +
+                  product(conjugate(z), complex_of(df[0], df[1])).im + df[2];
     }
     out[0] = force.re;
     out[1] = force.im;
     out[2] = moment;
 }
 
-/* Change of the kinetic energy, v^T (M dv + dM v / 2). */
+/* Change of the kinetic energy, Re(d(E w)^H H (E w)) and what the bodies' own inertia adds. */
 static double kinetic_change(const Tangent *t) {
     double sum = 0.0;
     for (int i = 0; i < t->q->system->n; i++) {
-        sum += t->v[i] * (momentum_of(t, i, t->dv) + 0.5 * mass_change(t, i, t->v));
+        sum += product(conjugate(t->dswing[i]), through_mass(t, i, t->swing)).re;
+        sum += t->q->system->J[i] * t->v[i] * t->dv[i];
     }
     return sum;
 }
@@ -895,16 +1056,13 @@ static double kinetic_change(const Tangent *t) {
 static void energy_changes(const Tangent *t, const double *dx, double *out) {
     const System *system = t->q->system;
     int n = system->n, count = system->mechanism->independent_count;
-    Complex fall = {0.0, 0.0};
     out[0] = kinetic_change(t);
     for (int i = 0; i < n; i++) {
-        Complex arm_j = product(system->S[i], t->e[i]);
-        fall = plus(fall, complex_of(-arm_j.im * t->dq[i], arm_j.re * t->dq[i]));
         for (int j = 0; j < n; j++) {
             out[1] += (t->y[i] - system->q0[i]) * system->K[i * n + j] * t->dq[j];
         }
     }
-    out[2] = -product(conjugate(system->gravity), fall).re;
+    out[2] = -product(conjugate(system->gravity), along_arms(n, system->S, t->dE)).re;
     out[3] = dx[2 * count];
     out[4] = dx[2 * count + 1];
 }
@@ -912,26 +1070,24 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
 static double dissipation_change(const Tangent *t) {
     const Equations *q = t->q;
     const System *system = q->system;
+    Rows walls = slide_rows(system), rubs = rub_rows(system);
     int n = system->n;
-    double sum = 0.0;
+    double sum = 2.0 * q->mass_damping * kinetic_change(t);
     for (int i = 0; i < n; i++) {
         for (int j = 0; j < n; j++) {
             sum += 2.0 * q->beta * t->v[i] * system->K[i * n + j] * t->dv[j];
         }
     }
-    sum += 2.0 * q->mass_damping * kinetic_change(t);
     for (int k = 0; k < q->rub_slide_count; k++) {
         int i = q->rub_slides[k];
-        const Complex *row = system->rubs + i * n;
         double change = -q->discrete.rubs[i] * limit_change(t, i);
-        sum -= change * row_rate(n, row, t->e, t->v) + rub_force(q, i) * rate_change(t, row);
+        sum -= change * row_rate(&rubs, i, t->e, t->v) + rub_force(q, i) * rate_change(t, &rubs, i);
     }
     for (int k = 0; k < q->sliding_count; k++) {
         int i = q->sliding[k], h = q->first_hold + held_at(q, i);
-        const Complex *row = system->slides + i * n;
         sum += q->stop_friction[i] * q->discrete.slides[i] *
-               (multiplier_change(t, h) * row_rate(n, row, t->e, t->v) +
-                multiplier(t, h) * rate_change(t, row));
+               (multiplier_change(t, h) * row_rate(&walls, i, t->e, t->v) +
+                multiplier(t, h) * rate_change(t, &walls, i));
     }
     return sum;
 }
@@ -939,11 +1095,10 @@ static double dissipation_change(const Tangent *t) {
 static double power_change(const Tangent *t, const Complex *dw, const double *dmoment) {
     const Equations *q = t->q;
     const System *system = q->system;
-    double sum = 0.0;
-    for (int j = 0; j < system->n; j++) {
-        Complex load = product(q->w_input[j], t->e[j]);
-        double change = product(dw[j], t->e[j]).re - load.im * t->dq[j] + dmoment[j];
-        sum += change * t->v[j] + (load.re + q->moment[j]) * t->dv[j];
+    int n = system->n;
+    double sum = along_arms(n, dw, t->swing).re + along_arms(n, q->w_input, t->dswing).re;
+    for (int j = 0; j < n; j++) {
+        sum += dmoment[j] * t->v[j] + q->moment[j] * t->dv[j];
     }
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k], h = q->first_hold + k;
@@ -953,15 +1108,16 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
     return sum;
 }
 
+/* Change of |x|; at zero, where it has two, their mean. */
 static double sign_times(double x, double change) {
-    return x < 0.0 ? -change : change;
+    return x < 0.0 ? -change : x > 0.0 ? change : 0.0;
 }
 
 static void indicator_changes(const Tangent *t, double *out) {
     const Simulation *sim = t->sim;
     const Equations *q = t->q;
     const System *system = q->system;
-    int n = system->n;
+    Rows walls = slide_rows(system), points = rub_rows(system);
     double *rubs = out + STOP_INDICATORS * system->s;
     for (int i = 0; i < system->s; i++) {
         if (sim->holds[i] == 0.0) {
@@ -986,7 +1142,7 @@ static void indicator_changes(const Tangent *t, double *out) {
     }
     for (int k = 0; k < q->sliding_count; k++) {
         int i = q->sliding[k];
-        double change = rate_change(t, system->slides + i * n);
+        double change = rate_change(t, &walls, i);
         out[STOP_INDICATORS * i + 2] = q->discrete.slides[i] * change / speed_scale(sim);
     }
     for (int k = 0; k < q->rubbing_count; k++) {
@@ -996,7 +1152,7 @@ static void indicator_changes(const Tangent *t, double *out) {
     }
     for (int k = 0; k < q->rub_slide_count; k++) {
         int i = q->rub_slides[k];
-        double change = rate_change(t, system->rubs + i * n);
+        double change = rate_change(t, &points, i);
         rubs[i] = q->discrete.rubs[i] * change / speed_scale(sim);
     }
 }
@@ -1004,18 +1160,15 @@ static void indicator_changes(const Tangent *t, double *out) {
 static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
                         const double *dmoment, double *out) {
     const Mechanism *m = t->sim->mechanism;
-    const System *system = t->q->system;
     const Slots *slots = &m->slots;
     zeros(slots->count, out);
     copy(m->input_count, t->du, out + slots->inputs);
     body_changes(t, out + slots->bodies);
+    probe_changes(t, out + slots->probes);
+    link_changes(t, out + slots->links, out + slots->stretches);
     stop_changes(t, out + slots->stops);
     base_changes(t, out + slots->base);
     energy_changes(t, dx, out + slots->energies);
-    for (int k = 0; k < m->link_count; k++) {
-        out[slots->links + PER_LINK * k] = t->dq[system->links[k]];
-        out[slots->links + PER_LINK * k + 1] = t->dv[system->links[k]];
-    }
     for (int k = 0; k < m->independent_count; k++) {
         out[slots->derivatives + k] = t->dx[m->independent[k]];
     }
@@ -1025,28 +1178,49 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     indicator_changes(t, out + slots->indicators);
 }
 
+/* Room for the changes, and what they are changes of. */
+static Tangent begin_tangent(Simulation *sim, const double *du) {
+    const Equations *q = &sim->equations;
+    Scratch *scratch = &sim->scratch;
+    int n = sim->system.n;
+    Tangent t = {sim, q, q->e, sim->at, sim->at + n, q->x, du, NULL, NULL, NULL, NULL,
+                 NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL, NULL};
+    Complex **arrays[] = {&t.w, &t.alpha, &t.dphi, &t.dw, &t.dE,
+                          &t.swing, &t.dswing, &t.bend, &t.dbend, &t.pull};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        *arrays[i] = take_complex(scratch, n, 1);
+    }
+    t.dq = take(scratch, (size_t)n);
+    t.dv = take(scratch, (size_t)n);
+    t.dx = take(scratch, (size_t)sim->system.even);
+    t.dlam = take(scratch, (size_t)q->r);
+    zeros(sim->system.even, t.dx);
+    memset(t.pull, 0, (size_t)n * sizeof *t.pull);
+    turning(&sim->system, t.v, t.w);
+    turning(&sim->system, t.a, t.alpha);
+    return t;
+}
+
 PRBM bool exchange_directional(Simulation *simulation, const double *dx, const double *du,
                                double *dvalues, Problem *problem) {
     Simulation *sim = simulation;
     size_t mark = sim->scratch.used;
-    int n = sim->system.n;
     if (!evaluate_motion(sim, problem)) {
         return false;
     }
-    const Equations *q = &sim->equations;
-    Tangent t = {sim, q, q->e, sim->at, sim->at + n, q->x, du, NULL, NULL, NULL};
-    t.dq = take(&sim->scratch, (size_t)n);
-    t.dv = take(&sim->scratch, (size_t)n);
-    t.dx = take(&sim->scratch, (size_t)(n + q->r));
-    double *dmoment = take(&sim->scratch, (size_t)n);
-    Complex *dw = take_complex(&sim->scratch, n, 1);
+    Tangent t = begin_tangent(sim, du);
+    double *dmoment = take(&sim->scratch, (size_t)sim->system.n);
+    Complex *dw = take_complex(&sim->scratch, sim->system.n, 1);
     bool right = tangent_coordinates(&t, dx, problem);
     if (right) {
         load_row_change(&t, dw, dmoment);
-        load_change(&t, dw, dmoment);
+        arm_load_change(&t, dw);
+        coordinate_load_change(&t, dmoment);
         rub_change(&t);
         row_change(&t);
-        solve_again(&q->factors, t.dx);
+        apply_pull(&t);
+        solve_again(&t.q->factors, t.dx, t.dlam);
+        bend_arms(&t);
         all_changes(&t, dx, dw, dmoment, dvalues);
     }
     sim->scratch.used = mark;

@@ -1,4 +1,4 @@
-/* Flexures as rigid segments and torsion springs: the twin of prbm/flexure.py. */
+/* Flexures as rigid segments, torsion springs and axial ones: the twin of prbm/flexure.py. */
 #include <math.h>
 
 #include "kernel.h"
@@ -27,11 +27,65 @@ PRBM void reverse(int count, double *x) {
     }
 }
 
-/* The segments of one cantilever, from the clamp to the tip, mirrored at its tip or not. */
-static void cut(const FlexureType *model, double gamma0, const double *gamma,
-                const double *K_theta, bool mirrored, double h, double EI, Segments *result) {
-    int pivots = model->pivots, n = mirrored ? 2 * pivots - 1 : pivots;
-    result->n = n;
+PRBM void reversed(Segments *pieces) {
+    int n = pieces->n;
+    reverse(n + 2, pieces->lengths);
+    reverse(n + 1, pieces->rates);
+    reverse(n + 2, pieces->rods);
+    reverse(n + 1, pieces->lumps);
+    reverse(n, pieces->axial);
+}
+
+/* Mirrored halves share the middle link; at a free end the last link is part of the body. */
+PRBM int links_of(const FlexureType *model, int start_end, int end_end) {
+    if (model->links > 0) {
+        return model->links;
+    }
+    if (start_end == PIN && end_end == PIN) {
+        return 1;
+    }
+    if (start_end == CLAMP && end_end == CLAMP) {
+        return 2 * model->pivots - 1;
+    }
+    return start_end == FREE || end_end == FREE ? model->pivots - 1 : model->pivots;
+}
+
+/* The middle link stands for all, but in a chain. */
+PRBM bool stretches(const FlexureType *model, int i, int n) {
+    return model->axial && (model->links > 0 || i == n / 2);
+}
+
+/* A chain of equal links. */
+static void cut_chain(const FlexureType *model, int start_end, int end_end, double L, double EI,
+                      Segments *result) {
+    int n = model->links;
+    double rate = n * EI / L;
+    for (int i = 0; i <= n; i++) {
+        result->lengths[i] = i == 0 ? 0.0 : L / n;
+        result->rates[i] = rate;
+    }
+    result->lengths[n + 1] = 0.0;
+    result->rates[0] = start_end == PIN ? 0.0 : 2 * rate;
+    result->rates[n] = end_end == PIN ? 0.0 : 2 * rate;
+}
+
+/* One link between two pins. */
+static void cut_bar(double L, Segments *result) {
+    result->lengths[0] = result->lengths[2] = 0.0;
+    result->lengths[1] = L;
+    result->rates[0] = result->rates[1] = 0.0;
+}
+
+/* One cantilever of the length h, from the clamp to the tip, or two mirrored ones. */
+static bool cut_cantilevers(const FlexureType *model, const double *gamma, const double *K_theta,
+                            int start_end, int end_end, double L, double EI, Segments *result,
+                            Problem *problem) {
+    bool mirrored = start_end == CLAMP && end_end == CLAMP;
+    int pivots = model->pivots, n = result->n;
+    double h = mirrored ? L / 2 : L, gamma0;
+    if (!stub(pivots, gamma, &gamma0, problem)) {
+        return false;
+    }
     for (int i = 0; i <= pivots; i++) {
         result->lengths[i] = h * (i == 0 ? gamma0 : gamma[i - 1]);
     }
@@ -44,36 +98,42 @@ static void cut(const FlexureType *model, double gamma0, const double *gamma,
             result->lengths[n + 1 - i] = result->lengths[i];
             result->rates[n - i] = result->rates[i];
         }
-    } else {
+    } else if (n == pivots) { /* a pin at the tip */
         result->lengths[n + 1] = 0.0;
         result->rates[n] = 0.0;
     }
-}
-
-PRBM bool segments(const FlexureType *model, const double *gamma, const double *K_theta,
-                   bool clamped_start, bool clamped_end, double L, double EI, double mass,
-                   Segments *result, Problem *problem) {
-    bool mirrored = clamped_start && clamped_end;
-    double gamma0;
-    if (!stub(model->pivots, gamma, &gamma0, problem)) {
-        return false;
-    }
-    cut(model, gamma0, gamma, K_theta, mirrored, mirrored ? L / 2 : L, EI, result);
-    int n = result->n;
-    if (!clamped_start) {
+    if (start_end != CLAMP) {
         reverse(n + 2, result->lengths);
         reverse(n + 1, result->rates);
     }
-    double r = 0.0;
-    for (int i = 1; i <= n; i++) {
-        r = result->lengths[i] > r ? result->lengths[i] : r;
+    return true;
+}
+
+PRBM bool segments(const FlexureType *model, const double *gamma, const double *K_theta,
+                   int start_end, int end_end, double L, double EI, double mass, double EA,
+                   Segments *result, Problem *problem) {
+    int n = result->n = links_of(model, start_end, end_end);
+    bool clamped = start_end == CLAMP || end_end == CLAMP;
+    bool freed = start_end == FREE || end_end == FREE;
+    if (model->links > 0) {
+        cut_chain(model, start_end, end_end, L, EI, result);
+    } else if (start_end == PIN && end_end == PIN) {
+        cut_bar(L, result);
+    } else if (!cut_cantilevers(model, gamma, K_theta, start_end, end_end, L, EI, result,
+                                problem)) {
+        return false;
     }
-    double lump = model->lumped ? mass / 4 + (mass * (L * L) / 12) / (r * r) : 0.0;
+    bool lumped = model->lumped && clamped && !freed;
+    double r = lumped ? largest(n, result->lengths + 1) : 1.0;
     for (int i = 0; i < n + 1; i++) {
-        result->lumps[i] = lump;
+        result->lumps[i] = lumped ? mass / 4 + (mass * (L * L) / 12) / (r * r) : 0.0;
     }
     for (int i = 0; i < n + 2; i++) {
-        result->rods[i] = model->lumped ? 0.0 : mass * result->lengths[i] / L;
+        result->rods[i] = lumped ? 0.0 : mass * result->lengths[i] / L;
+    }
+    for (int i = 0; i < n; i++) {
+        double stiffness = (model->links > 0 ? model->links : 1) * EA / L;
+        result->axial[i] = stretches(model, i, n) ? stiffness : 0.0;
     }
     return true;
 }

@@ -12,6 +12,7 @@
 #define LOWEST_BOUNCE 1e-10   /* of the size, in model exchange: gaps close a little late there */
 #define DEPENDENT 1e-4        /* share of a row's mobility that the stops leave */
 #define ALIGNED 1e-9          /* the same for stops among each other */
+#define NO_SPRING TWO_PI      /* rad/s; the scale of rates of a linkage without springs */
 #define STILL 1e-9            /* of the velocity scale: what rounding leaves of none */
 #define SLACK 1e-6            /* of the limit of friction: excess before what sticks slips */
 #define CHATTER_SPAN 5e-3     /* of a period: in which CHATTER events are too many */
@@ -28,7 +29,6 @@
 #define SMALLEST_STEP 1e-13   /* s */
 #define ROUNDED 1e-12         /* of a time: what importers lose when they add up steps */
 #define MOST_STEPS 1e9        /* of the longest, to one time: more is a mistake of units */
-#define LARGEST_WEIGHT 1.1    /* more than the sum of |b_i(theta)| of the dense output, 1.03 */
 #define MOST_IMPACTS 2147483647.0 /* that an Integer of FMI can count */
 #define TWO_PI 6.283185307179586
 
@@ -94,14 +94,15 @@ static void place_discrete(Discrete *discrete, const Mechanism *m, Memory *memor
 }
 
 static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) {
-    size_t n = (size_t)m->coordinate_count, s = (size_t)m->stop_count, pivots = 0;
+    size_t n = (size_t)m->coordinate_count, s = (size_t)m->stop_count;
     size_t size = n + (size_t)m->loop_count + 2 * s + (size_t)m->friction_count + 2;
+    size_t drawn = (size_t)m->ground_count + (size_t)m->body_count, pieces = (size_t)m->longest;
     for (int i = 0; i < m->type_count; i++) {
-        size_t of_type = (size_t)m->types[i].pivots;
-        pivots = of_type > pivots ? of_type : pivots;
+        size_t pivots = (size_t)m->types[i].pivots;
+        pieces = pivots > pieces ? pivots : pieces;
     }
-    size_t single = size * size + 4 * size + 4 * (size_t)m->flexure_count + 4 * pivots + 16;
-    scratch->size = 12 * size * size + 60 * size + 16 * pivots + (size_t)m->flexure_count + 64;
+    size_t single = size * size + 4 * size + 2 * drawn + 4 * pieces + 16;
+    scratch->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64;
     scratch->base = place(memory, scratch->size, sizeof(double));
     scratch->spare = place(memory, single, sizeof(double));
     scratch->used = scratch->most = 0;
@@ -208,13 +209,7 @@ PRBM double omega_scale(const Simulation *sim) {
     if (sim->omega > 0.0) {
         return sim->omega;
     }
-    double stiffest = 0.0, heaviest = 0.0;
-    int n = sim->system.n;
-    for (int i = 0; i < n * n; i++) {
-        stiffest = greater(stiffest, fabs(sim->system.K[i]));
-        heaviest = greater(heaviest, modulus(sim->system.H[i]));
-    }
-    return sqrt(stiffest / heaviest);
+    return sqrt(sim->energy_scale / sim->inertia_scale);
 }
 
 PRBM double still(const Simulation *sim) {
@@ -225,11 +220,24 @@ PRBM double period(const Simulation *sim) {
     return TWO_PI / omega_scale(sim);
 }
 
-/* The scales that follow from frequency and stiffness. */
+/* The scales that follow from frequency and stiffness: of the largest inertia, and of one radian
+ * against the stiffest torsion spring or, where nothing bends, of a turn by one radian in a period. */
 static void set_scales(Simulation *sim) {
-    int n = sim->system.n;
+    const System *system = &sim->system;
+    int n = system->n;
+    double stiffest = 0.0, heaviest = 0.0;
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            if (arm_of(system, i) == i && arm_of(system, j) == j) {
+                stiffest = greater(stiffest, fabs(system->K[i * n + j]));
+                heaviest = greater(heaviest, modulus(system->H[i * n + j]));
+            }
+        }
+    }
     sim->omega = TWO_PI * sim->now->frequency;
-    sim->energy_scale = largest(n * n, sim->system.K); /* one radian, the stiffest spring [J] */
+    double turning = sim->omega > 0.0 ? sim->omega : NO_SPRING;
+    sim->inertia_scale = heaviest;
+    sim->energy_scale = stiffest > 0.0 ? stiffest : heaviest * (turning * turning);
 }
 
 /* --- discrete state --------------------------------------------------------------------------- */
@@ -360,7 +368,7 @@ static bool check_tolerance(double x, Problem *problem) {
 static bool check_walls(Simulation *sim, Problem *problem) {
     int n = sim->system.n, struck = -1;
     const double *v = sim->front + n;
-    directions(n, sim->front, sim->e);
+    directions(&sim->system, sim->front, sim->e);
     for (int i = 0; i < sim->system.s; i++) {
         double distance = gap(&sim->equations, i, sim->now->front_time, sim->e);
         if (distance < -RELEASE_GAP) {
@@ -420,7 +428,7 @@ static bool set_off(Simulation *sim, Problem *problem) {
     return start_shape(sim, problem) &&
            project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
            check_walls(sim, problem) &&
-           settle(sim, every, sim->system.s, NO_EVENT, 0, problem);
+           settle(sim, every, sim->system.s, NULL, problem);
 }
 
 /* Keep what was before if an attempt fails. */
@@ -445,7 +453,7 @@ static bool attempt(Simulation *sim, bool right, Problem *problem) {
 }
 
 static void keep_backup(Simulation *sim) {
-    copy((int)sim->state_count, sim->state, sim->backup);
+    memcpy(sim->backup, sim->state, sim->state_count * sizeof *sim->state);
 }
 
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
@@ -459,7 +467,7 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
     sim->now->time = sim->now->front_time = sim->now->window_since = start_time;
     sim->now->tolerance = wanted;
     sim->now->exchange = exchange;
-    sim->now->last_error = LEAST_ERROR;
+    sim->now->log_of_error = natural_log(LEAST_ERROR);
     bool right = check_tolerance(wanted, problem) && take_values(sim, problem) &&
                  fundamental_frequency(&sim->system, &sim->now->frequency, &sim->scratch, problem);
     if (right) {
@@ -499,7 +507,7 @@ static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
 PRBM int unsettled_by_walls(Simulation *sim) {
     int n = sim->system.n, struck = -1, held[MOST_STOPS], count = sim->equations.held_count;
     double rates[MOST_STOPS], bound = still(sim);
-    directions(n, sim->front, sim->e);
+    directions(&sim->system, sim->front, sim->e);
     for (int k = 0; k < count; k++) {
         held[k] = sim->equations.held[k];
         rates[k] = gap_rate(&sim->equations, held[k], sim->e, sim->front + n);
@@ -513,18 +521,22 @@ PRBM int unsettled_by_walls(Simulation *sim) {
     return struck;
 }
 
-/* The state y = (q, v, dissipated energy, work) at the present time, on the constraints. */
+/* The state y = (q, v, dissipated energy, work) at the present time, on the constraints; the start
+ * of the equations is near it. */
 static bool state_at(Simulation *sim, double *y, Problem *problem) {
     const Scalars *now = sim->now;
     int ny = state_size(sim), n = sim->system.n;
     if (now->has_arc == 0.0 || now->time >= now->front_time) {
         copy(ny, sim->front, y);
+        start_from(&sim->equations, y);
         return true;
     }
     double theta = (now->time - now->arc_start) / now->arc_h;
     interpolate(ny, sim->arc_y, sim->arc_k, now->arc_h, theta, y);
-    return accelerations(&sim->equations, y, y + n, sim->a, sim->lam, problem) &&
-           project_from_here(&sim->equations, now->time, y, &sim->scratch, problem);
+    if (!factor_start(&sim->equations, y, y + n)) {
+        return fail(problem, "%s", SINGULAR);
+    }
+    return project_near(&sim->equations, now->time, y, true, &sim->scratch, problem);
 }
 
 /* Go on from the present state with the present inputs and parameters. */
@@ -546,31 +558,29 @@ static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
         return impact(sim, struck, problem);
     }
     return project(&sim->equations, sim->now->time, sim->front, &sim->scratch, problem) &&
-           settle(sim, NULL, 0, NO_EVENT, 0, problem);
+           settle(sim, NULL, 0, NULL, problem);
 }
 
 /* --- steps ------------------------------------------------------------------------------------ */
 
-/* The magnitude against which the error of a component of the state is measured. */
-static double scale_of(const Simulation *sim, int i, double size, double omega) {
-    int n = sim->system.n;
-    if (i < n) {
-        return 1.0;
-    }
-    return greater(size, i < 2 * n ? omega : sim->energy_scale);
-}
-
-/* The root mean square of an error in units of what the tolerance allows. */
-static double relative_error(const Simulation *sim, const double *difference, const double *y,
-                             const double *y1) {
-    int ny = state_size(sim);
-    double sum = 0.0, omega = omega_scale(sim);
-    for (int i = 0; i < ny; i++) {
-        double size = greater(fabs(y[i]), fabs(y1[i]));
-        double ratio = difference[i] / scale_of(sim, i, size, omega);
+/* The sum of the squares of errors x against the sizes of y and y1, which count as no less than the
+ * least. */
+static double squares_of(int n, const double *x, const double *y, const double *y1, double least) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        double ratio = x[i] / greater(least, greater(fabs(y[i]), fabs(y1[i])));
         sum += ratio * ratio;
     }
-    return sqrt(sum / ny) / (STRICTNESS * sim->now->tolerance);
+    return sum;
+}
+
+/* The root mean square of differences in units of the scales of angles, their rates, energies. */
+static double relative_size(const Simulation *sim, const double *x, const double *y,
+                            const double *y1) {
+    int n = sim->system.n;
+    double sum = dot(n, x, x) + squares_of(n, x + n, y + n, y1 + n, omega_scale(sim)) +
+                 squares_of(2, x + 2 * n, y + 2 * n, y1 + 2 * n, sim->energy_scale);
+    return sqrt(sum / state_size(sim));
 }
 
 static double largest_step(const Simulation *sim) {
@@ -579,13 +589,7 @@ static double largest_step(const Simulation *sim) {
 
 /* A first step size from the size of the rates (Hairer, II.4). */
 static double first_step(const Simulation *sim) {
-    int ny = state_size(sim);
-    double sum = 0.0;
-    for (int i = 0; i < ny; i++) {
-        double ratio = sim->k1[i] / scale_of(sim, i, fabs(sim->front[i]), omega_scale(sim));
-        sum += ratio * ratio;
-    }
-    double size = greater(sqrt(sum / ny), 1e-6);
+    double size = greater(relative_size(sim, sim->k1, sim->front, sim->front), 1e-6);
     return lesser(largest_step(sim), 0.1 * power(sim->now->tolerance, 0.2) / size);
 }
 
@@ -615,7 +619,8 @@ static bool find_step(Simulation *sim, double *step, Problem *problem) {
         if (stages(&sim->equations, ny, now->front_time, sim->arc_y, h, sim->arc_k, sim->y1,
                    problem)) {
             error_of(ny, sim->arc_k, h, sim->error);
-            error = relative_error(sim, sim->error, sim->arc_y, sim->y1);
+            error = relative_size(sim, sim->error, sim->arc_y, sim->y1) /
+                    (STRICTNESS * now->tolerance);
         }
         if (error <= 1.0) {
             break;
@@ -625,9 +630,11 @@ static bool find_step(Simulation *sim, double *step, Problem *problem) {
         h *= greater(SHRINK, factor_h);
     }
     error = greater(error, LEAST_ERROR);
-    growth = lesser(growth, SAFETY * power(error, -STEP_EXPONENT) * power(now->last_error, MEMORY));
+    double log_of_error = natural_log(error);
+    double trend = MEMORY * now->log_of_error - STEP_EXPONENT * log_of_error;
+    growth = lesser(growth, SAFETY * exponential(trend));
     now->h = h * greater(SHRINK, growth);
-    now->last_error = error;
+    now->log_of_error = log_of_error;
     *step = h;
     return true;
 }
@@ -657,7 +664,7 @@ static bool take_step(Simulation *sim, Problem *problem) {
     now->arc_end = now->arc_start + h;
     now->event_kind = NO_EVENT;
     copy(ny, sim->y1, sim->front); /* the last stage was there */
-    if (!project_from_here(&sim->equations, now->arc_end, sim->front, &sim->scratch, problem)) {
+    if (!project_near(&sim->equations, now->arc_end, sim->front, true, &sim->scratch, problem)) {
         return false;
     }
     Event event;
@@ -687,31 +694,33 @@ typedef struct {
     Simulation *sim;
     int kind, index;
     double sign;
+    double depth; /* of a gap, at which it counts as fallen */
 } Guard;
 
 enum { GAP_FALLS, GAP_RATE_FALLS, SPEED_FALLS, MARGIN_FALLS };
 
-static const Complex *slide_row(const Simulation *sim, int kind, int i) {
+/* The rows of the friction points, or of the stops along their walls. */
+static Rows rows_of(const Simulation *sim, int kind) {
     bool rubs = kind == RUB || kind == SLIP_RUB;
-    return (rubs ? sim->system.rubs : sim->system.slides) + i * sim->system.n;
+    return rubs ? rub_rows(&sim->system) : slide_rows(&sim->system);
 }
 
 PRBM double margin_release(const Simulation *sim, int k) {
-    return -sim->equations.x[sim->system.n + sim->equations.first_hold + k];
+    return sim->equations.lam[sim->equations.first_hold + k];
 }
 
 /* What is left before the k-th stop that sticks slips. */
 PRBM double margin_stick(const Simulation *sim, int k) {
     const Equations *q = &sim->equations;
     int i = q->stuck[k];
-    double normal = -q->x[q->system->n + q->first_hold + held_at(q, i)];
-    double friction = fabs(q->x[q->system->n + q->first_stick + k]);
+    double normal = q->lam[q->first_hold + held_at(q, i)];
+    double friction = fabs(q->lam[q->first_stick + k]);
     return (1.0 + SLACK) * (q->stop_friction[i] * normal) - friction;
 }
 
 PRBM double margin_rub(const Simulation *sim, int k) {
     const Equations *q = &sim->equations;
-    double friction = fabs(q->x[q->system->n + q->first_rub + k]);
+    double friction = fabs(q->lam[q->first_rub + k]);
     return (1.0 + SLACK) * rub_limit(q, q->rubbing[k], q->e) - friction;
 }
 
@@ -735,14 +744,15 @@ static double guard_at(const Guard *guard, int what, double t) {
         }
         return margin(sim, guard->kind, guard->index);
     }
-    directions(n, y, sim->e);
+    directions(&sim->system, y, sim->e);
     if (what == GAP_FALLS) {
-        return gap(&sim->equations, guard->index, t, sim->e);
+        return gap(&sim->equations, guard->index, t, sim->e) + guard->depth;
     }
     if (what == GAP_RATE_FALLS) {
         return guard->sign * gap_rate(&sim->equations, guard->index, sim->e, y + n);
     }
-    return guard->sign * row_rate(n, slide_row(sim, guard->kind, guard->index), sim->e, y + n);
+    Rows rows = rows_of(sim, guard->kind);
+    return guard->sign * row_rate(&rows, guard->index, sim->e, y + n);
 }
 
 /* Brent's search for the fall of a guard between a, where it is positive, and b, where it is not
@@ -805,28 +815,38 @@ static void note(Event *first, int kind, int index, double time) {
     }
 }
 
-/* Whether an open stop may be reached within the step: angles change by no more than the dense
- * output can make of the stages, gaps by no more than the angles at their arms. */
+/* How far the arms may move within the step: coordinates change by no more than the dense output
+ * can make of the stages, |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
+static void furthest_arms(const Simulation *sim, double *turn) {
+    const System *system = &sim->system;
+    furthest(system->n, state_size(sim), sim->arc_k, sim->now->arc_h, turn);
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k], a = arm_of(system, j);
+        double longest = modulus(sim->equations.e_at_start[a]) * exponential(turn[j]);
+        turn[a] = longest * (turn[a] + turn[j]);
+    }
+}
+
+/* Whether an open stop may be reached within the step: gaps change by no more than the arms do, and
+ * than what is seen by a wall that turns. */
 static bool within_reach(Simulation *sim) {
     const Scalars *now = sim->now;
-    int n = sim->system.n, ny = state_size(sim);
+    const Complex *e = sim->equations.e_at_start;
+    int n = sim->system.n;
     double near = TOUCHING * sim->system.length, *turn = sim->error;
-    for (int j = 0; j < n; j++) {
-        double fastest = 0.0;
-        for (int i = 0; i < STAGES; i++) {
-            fastest = greater(fastest, fabs(sim->arc_k[i * ny + j]));
-        }
-        turn[j] = LARGEST_WEIGHT * now->arc_h * fastest;
-    }
-    directions(n, sim->arc_y, sim->e);
+    Rows gaps = gap_rows(&sim->system);
+    furthest_arms(sim, turn);
     for (int s = 0; s < sim->system.s; s++) {
         if (sim->holds[s] == 0.0) {
-            const Complex *row = sim->system.gaps + s * n;
+            const Complex *row = gaps.B + s * n;
             double reach = near + fabs(sim->walls[s].rate) * now->arc_h;
             for (int j = 0; j < n; j++) {
                 reach += (fabs(row[j].re) + fabs(row[j].im)) * turn[j];
             }
-            if (!(gap(&sim->equations, s, now->arc_start, sim->e) > reach)) {
+            if (gaps.on[s] != FIXED) {
+                reach += modulus(seen_value(&gaps, s, e)) * turn[gaps.on[s]];
+            }
+            if (!(gap(&sim->equations, s, now->arc_start, e) > reach)) {
                 return true;
             }
         }
@@ -847,7 +867,7 @@ static void look(Simulation *sim) {
         for (int j = 0; j < 2 * n; j++) {
             y[j] = sim->arc_y[j] + now->arc_h * y[j];
         }
-        directions(n, y, sim->look_e + k * n);
+        directions(&sim->system, y, sim->look_e + k * n);
     }
 }
 
@@ -864,7 +884,7 @@ static bool polished(Simulation *sim, int i, double *time, Problem *problem) {
         if (!project(&sim->equations, t, sim->y1, &sim->scratch, problem)) {
             return false;
         }
-        directions(n, sim->y1, sim->e);
+        directions(&sim->system, sim->y1, sim->e);
         double distance = gap(&sim->equations, i, t, sim->e);
         double speed = gap_rate(&sim->equations, i, sim->e, sim->y1 + n);
         double change = -distance / speed;
@@ -885,7 +905,9 @@ static bool polished(Simulation *sim, int i, double *time, Problem *problem) {
 static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
     int n = sim->system.n;
     double near = TOUCHING * sim->system.length, *gaps = sim->look_gap, *rates = sim->look_rate;
-    Guard guard = {sim, IMPACT, i, 1.0}, opening = {sim, IMPACT, i, -1.0};
+    double bound = still(sim), closed = CLOSED * sim->system.length;
+    Guard guard = {sim, IMPACT, i, 1.0, 0.0}, opening = {sim, IMPACT, i, -1.0, 0.0};
+    Guard deeper = {sim, IMPACT, i, 1.0, near};
     for (int k = 0; k <= WATCHED; k++) {
         const Complex *e = sim->look_e + k * n;
         gaps[k] = gap(&sim->equations, i, look_time(sim, k), e);
@@ -895,6 +917,13 @@ static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
         double a = look_time(sim, k), b = look_time(sim, k + 1);
         bool dips = rates[k] < 0.0 && 0.0 < rates[k + 1];
         if (gaps[k + 1] > 0.0 && !dips) {
+            continue;
+        }
+        if (fabs(rates[k]) <= bound && fabs(gaps[k]) <= closed) {
+            if (gaps[k + 1] < -near) { /* it has let go too early: a little later it is pressed */
+                note(first, IMPACT, i, falls(&deeper, GAP_FALLS, a, b));
+                return true;
+            }
             continue;
         }
         if (rates[k] > 0.0) {
@@ -930,13 +959,13 @@ static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
 }
 
 /* When a sliding velocity changes its sign. */
-static void turning(Simulation *sim, int kind, int i, int sign, Event *first) {
+static void turning_back(Simulation *sim, int kind, int i, int sign, Event *first) {
     int n = sim->system.n;
     double z[WATCHED + 1];
-    const Complex *row = slide_row(sim, kind, i);
-    Guard guard = {sim, kind, i, sign};
+    Rows rows = rows_of(sim, kind);
+    Guard guard = {sim, kind, i, sign, 0.0};
     for (int k = 0; k <= WATCHED; k++) {
-        z[k] = sign * row_rate(n, row, sim->look_e + k * n, sim->look_y + k * 2 * n + n);
+        z[k] = sign * row_rate(&rows, i, sim->look_e + k * n, sim->look_y + k * 2 * n + n);
     }
     for (int k = 0; k < WATCHED; k++) {
         if (z[k] > 0.0 && z[k + 1] <= 0.0) {
@@ -966,7 +995,7 @@ static bool may_yield(const Simulation *sim) {
 
 /* When one margin is used up, from its values at the start, the middle and the end. */
 static void yields_at(Simulation *sim, int kind, int k, int index, Event *first) {
-    Guard guard = {sim, kind, k, 1.0};
+    Guard guard = {sim, kind, k, 1.0, 0.0};
     const Scalars *now = sim->now;
     double times[3] = {now->arc_start, now->arc_start + now->arc_h / 2,
                        now->arc_start + now->arc_h};
@@ -1011,11 +1040,11 @@ static bool first_event(Simulation *sim, Event *event, Problem *problem) {
         }
         for (int k = 0; k < q->rub_slide_count; k++) {
             int i = q->rub_slides[k];
-            turning(sim, RUB, i, q->discrete.rubs[i], event);
+            turning_back(sim, RUB, i, q->discrete.rubs[i], event);
         }
         for (int k = 0; k < q->sliding_count; k++) {
             int i = q->sliding[k];
-            turning(sim, SLIDE, i, q->discrete.slides[i], event);
+            turning_back(sim, SLIDE, i, q->discrete.slides[i], event);
         }
     }
     if (may_yield(sim)) {
@@ -1054,13 +1083,9 @@ static bool happen(Simulation *sim, const Event *event, Problem *problem) {
         return impact(sim, event->index, problem);
     case RELEASE:
         without_hold(sim, event->index);
-        return settle(sim, NULL, 0, NO_EVENT, 0, problem);
-    case SLIP_SLIDE:
-    case SLIP_RUB:
-        return settle(sim, NULL, 0, event->kind == SLIP_SLIDE ? SLIDE : RUB, event->index,
-                      problem);
+        return settle(sim, NULL, 0, NULL, problem);
     default:
-        return settle(sim, NULL, 0, NO_EVENT, 0, problem);
+        return settle(sim, NULL, 0, event, problem);
     }
 }
 
@@ -1080,9 +1105,10 @@ static Here mass_and_loops(Simulation *sim, const double *q) {
                  take_matrix(&sim->scratch, system->n, system->n),
                  take_matrix(&sim->scratch, system->r, system->n)};
     double *C = take_matrix(&sim->scratch, system->n, system->n);
-    directions(system->n, q, here.e);
+    directions(system, q, here.e);
     inertia(system->n, system->H, system->J, here.e, here.M, C);
-    jacobian(system->r, system->n, system->loops, here.e, here.loops);
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    jacobian(&loops, here.e, here.loops);
     return here;
 }
 
@@ -1130,19 +1156,19 @@ static int sign_of_speed(const Simulation *sim, double speed) {
 static void equations_holding(Simulation *sim, int count, const int *stops, const double *q,
                               const double *v) {
     const System *system = &sim->system;
-    int n = system->n;
-    directions(n, q, sim->e);
+    Rows walls = slide_rows(system), rubs = rub_rows(system);
+    directions(system, q, sim->e);
     for (int i = 0; i < system->s; i++) {
         bool holds = false;
         for (int k = 0; k < count; k++) {
             holds = holds || stops[k] == i;
         }
-        double speed = row_rate(n, system->slides + i * n, sim->e, v);
+        double speed = row_rate(&walls, i, sim->e, v);
         sim->other.holds[i] = holds;
         sim->other.slides[i] = holds ? sign_of_speed(sim, speed) : IDLE;
     }
     for (int i = 0; i < system->f; i++) {
-        double speed = row_rate(n, system->rubs + i * n, sim->e, v);
+        double speed = row_rate(&rubs, i, sim->e, v);
         sim->other.rubs[i] = sign_of_speed(sim, speed);
     }
     try_equations(sim, &sim->other);
@@ -1211,8 +1237,11 @@ static bool find_holding(Simulation *sim, int count, const int *candidates, cons
     Here here = mass_and_loops(sim, q);
     double *G = take_matrix(&sim->scratch, system->s, n);
     double *bend = take(&sim->scratch, (size_t)system->s);
-    jacobian(system->s, n, system->gaps, here.e, G);
-    convective(system->s, n, system->gaps, here.e, v, bend);
+    Rows gaps = gap_rows(system);
+    jacobian(&gaps, here.e, G);
+    for (int i = 0; i < system->s; i++) {
+        bend[i] = row_convective(&gaps, i, here.e, v);
+    }
     holding->count = 0;
     for (int size = many; right && !found && size > 0; size--) {
         Holding best = {0, {0}, -HUGE_VAL}, tried;
@@ -1279,7 +1308,7 @@ static bool has_mobility(Simulation *sim, int kind, int i, const Here *here, con
     with_slide(sim, kind, i, IDLE);
     try_equations(sim, &sim->other);
     double *held = take_matrix(&sim->scratch, sim->trial.r, n);
-    jacobian(sim->trial.r, n, sim->trial.B, here->e, held);
+    jacobian(&sim->trial.active, here->e, held);
     bool right = mobility(sim, here->M, sim->trial.r, held, row, &left, problem) &&
                  mobility(sim, here->M, sim->system.r, here->loops, row, &own, problem);
     *result = left > DEPENDENT * own;
@@ -1305,7 +1334,8 @@ static bool state_at_rest(Simulation *sim, int kind, int i, const double *q, con
     if (fabs(friction) <= limit && !yields) {
         return true;
     }
-    convective(1, n, slide_row(sim, kind, i), here->e, v, &bend);
+    Rows rows_here = rows_of(sim, kind);
+    bend = row_convective(&rows_here, i, here->e, v);
     int gives = friction > 0.0 ? -1 : 1;
     for (int attempt_sign = 0; attempt_sign < 2; attempt_sign++) {
         int sign = attempt_sign == 0 ? gives : -gives;
@@ -1323,19 +1353,22 @@ static bool state_at_rest(Simulation *sim, int kind, int i, const double *q, con
     return true;
 }
 
-/* Whether something slides (its sign), sticks, or is idle.  What moves slides.  What is at rest is
+/* Whether something slides (its sign), sticks, or is idle.  What moves, faster than slow, slides.
+ * What is at rest is
  * idle where the loops and the stops that hold leave it no mobility of its own: the stop carries
  * everything and the friction nothing.  Else it sticks as far as Coulomb's law allows, and beyond
  * slides in the direction in which sliding accelerates it. */
 static bool slide_state(Simulation *sim, int kind, int i, const double *q, const double *v,
-                        bool yields, int *state, Problem *problem) {
+                        bool yields, double slow, int *state, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = sim->system.n;
     bool mobile = false, right = true;
     Here here = mass_and_loops(sim, q);
     double *row = take(&sim->scratch, (size_t)n);
-    jacobian(1, n, slide_row(sim, kind, i), here.e, row);
-    *state = sign_of_speed(sim, dot(n, row, v));
+    Rows rows = rows_of(sim, kind);
+    row_jacobian(&rows, i, here.e, row);
+    double speed = dot(n, row, v);
+    *state = fabs(speed) > slow ? sign_of_speed(sim, speed) : IDLE;
     if (*state == IDLE) {
         right = has_mobility(sim, kind, i, &here, row, &mobile, problem);
         if (right && mobile) {
@@ -1346,9 +1379,19 @@ static bool slide_state(Simulation *sim, int kind, int i, const double *q, const
     return right;
 }
 
-static bool settle_one(Simulation *sim, int kind, int i, bool yields, Problem *problem) {
+/* What has just happened to what slides, if anything: it has used up its friction and cannot stick,
+ * or it has stopped sliding and has no more than a slow speed left. */
+typedef struct {
+    int kind, index;
+    bool yields;
+    double slow;
+} Turn;
+
+static bool settle_one(Simulation *sim, int kind, int i, const Turn *turn, Problem *problem) {
     int state, n = sim->system.n;
-    if (!slide_state(sim, kind, i, sim->front, sim->front + n, yields, &state, problem)) {
+    bool this_one = turn->kind == kind && turn->index == i, yields = this_one && turn->yields;
+    double slow = this_one ? turn->slow : 0.0;
+    if (!slide_state(sim, kind, i, sim->front, sim->front + n, yields, slow, &state, problem)) {
         return false;
     }
     with_slide(sim, kind, i, state);
@@ -1363,7 +1406,7 @@ static bool same_discrete(const Simulation *sim, const double *before) {
 }
 
 /* Choose what sticks and slides; what one does may change what another must do. */
-static bool settle_friction(Simulation *sim, const Holding *holding, int yields, int yields_index,
+static bool settle_friction(Simulation *sim, const Holding *holding, const Turn *turn,
                             Problem *problem) {
     int s = sim->system.s, f = sim->system.f, rubbing = 0;
     double before[2 * MOST_STOPS];
@@ -1379,13 +1422,13 @@ static bool settle_friction(Simulation *sim, const Holding *holding, int yields,
         for (int k = 0; k < holding->count; k++) {
             int i = holding->stops[k];
             if (sim->equations.stop_friction[i] > 0.0 &&
-                !settle_one(sim, SLIDE, i, yields == SLIDE && yields_index == i, problem)) {
+                !settle_one(sim, SLIDE, i, turn, problem)) {
                 return false;
             }
         }
         for (int i = 0; i < f; i++) {
             if (sim->equations.rub_law[3 * i] > 0.0 &&
-                !settle_one(sim, RUB, i, yields == RUB && yields_index == i, problem)) {
+                !settle_one(sim, RUB, i, turn, problem)) {
                 return false;
             }
         }
@@ -1396,11 +1439,51 @@ static bool settle_friction(Simulation *sim, const Holding *holding, int yields,
     return true;
 }
 
+/* The spacing of the numbers around x. */
+static double spacing(double x) {
+    int exponent;
+    (void)frexp(x, &exponent);
+    return ldexp(1.0, exponent - 53);
+}
+
+/* The sliding speed that the resolution of time leaves when sliding stops. */
+static bool speed_left(Simulation *sim, int kind, int i, double *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = sim->system.n;
+    const double *q = sim->front, *v = sim->front + n;
+    double *row = take(&sim->scratch, (size_t)n);
+    Rows rows = rows_of(sim, kind);
+    bool right = accelerations(&sim->equations, q, v, sim->a, sim->lam, problem);
+    directions(&sim->system, q, sim->e);
+    row_jacobian(&rows, i, sim->e, row);
+    double rate = dot(n, row, sim->a) - row_convective(&rows, i, sim->e, v);
+    *result = fabs(rate) * (2 * TIME_RESOLUTION + 8 * spacing(sim->now->front_time));
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* What an event, NULL for none, does to what slides. */
+static bool turn_of(Simulation *sim, const Event *event, Turn *turn, Problem *problem) {
+    Turn none = {NO_EVENT, 0, false, 0.0};
+    *turn = none;
+    if (!event) {
+        return true;
+    }
+    turn->yields = event->kind == SLIP_SLIDE || event->kind == SLIP_RUB;
+    turn->kind = event->kind == SLIDE || event->kind == SLIP_SLIDE ? SLIDE : RUB;
+    turn->index = event->index;
+    return turn->yields || speed_left(sim, turn->kind, turn->index, &turn->slow, problem);
+}
+
 /* Choose what holds, sticks and slides at the front, from its state alone.  resting: open stops
- * that touch without closing or opening; yields: SLIDE or RUB of what has just used up its
- * friction and cannot stick. */
-PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yields,
-                 int yields_index, Problem *problem) {
+ * that touch without closing or opening; event: of what slides, which has just used up its friction
+ * and cannot stick, or has stopped sliding or turns back; NULL for none. */
+PRBM bool settle(Simulation *sim, const int *resting, int resting_count, const Event *event,
+                 Problem *problem) {
+    Turn turn;
+    if (!turn_of(sim, event, &turn, problem)) {
+        return false;
+    }
     int n = sim->system.n, s = sim->system.s, candidates[2 * MOST_STOPS], count = 0;
     double near = TOUCHING * sim->system.length + RELEASE_GAP, bound = still(sim);
     const double *v = sim->front + n;
@@ -1409,7 +1492,7 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yie
             candidates[count++] = i;
         }
     }
-    directions(n, sim->front, sim->e);
+    directions(&sim->system, sim->front, sim->e);
     for (int k = 0; k < resting_count; k++) {
         int i = resting[k];
         if (sim->holds[i] == 0.0 && gap(&sim->equations, i, sim->now->front_time, sim->e) <= near &&
@@ -1433,7 +1516,7 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yie
         sim->discrete.holds[holding.stops[k]] = 1;
     }
     set_discrete(sim, &sim->discrete);
-    if (!settle_friction(sim, &holding, yields, yields_index, problem)) {
+    if (!settle_friction(sim, &holding, &turn, problem)) {
         return false;
     }
     return holding.count == 0 ||
@@ -1481,10 +1564,11 @@ static bool hits_without_friction(Simulation *sim, const Here *here, const doubl
     double *G = take_matrix(&sim->scratch, k, n), *X = take_matrix(&sim->scratch, n, k);
     double *W = take_matrix(&sim->scratch, k, k), *rates = take(&sim->scratch, (size_t)k);
     double *eps = take(&sim->scratch, (size_t)k), *P = take(&sim->scratch, (size_t)k);
+    Rows gaps = gap_rows(system);
     for (int a = 0; a < k; a++) {
         bool struck = a < hits->struck_count;
         int i = struck ? hits->struck[a] : hits->held[a - hits->struck_count];
-        jacobian(1, n, system->gaps + i * n, here->e, G + a * n);
+        row_jacobian(&gaps, i, here->e, G + a * n);
         rates[a] = lesser(u[i], 0.0);
         eps[a] = struck ? hits->restitution[a] : 0.0;
     }
@@ -1539,14 +1623,15 @@ static bool hits_with_friction(Simulation *sim, const Here *here, const double *
     double *X = take_matrix(&sim->scratch, n, 2 * k);
     double *W = take_matrix(&sim->scratch, 2 * k, 2 * k);
     double *rates = take(&sim->scratch, 2 * (size_t)k), *P = take(&sim->scratch, 2 * (size_t)k);
+    Rows gaps = gap_rows(system), walls = slide_rows(system);
     copy(system->r * n, here->loops, rows);
     for (int a = 0; a < *kept_count; a++) {
-        jacobian(1, n, system->gaps + kept[a] * n, here->e, rows + (system->r + a) * n);
+        row_jacobian(&gaps, kept[a], here->e, rows + (system->r + a) * n);
     }
     for (int a = 0; a < k; a++) {
         int i = hits->struck[a];
-        jacobian(1, n, system->gaps + i * n, here->e, GT + a * n);
-        jacobian(1, n, system->slides + i * n, here->e, GT + (k + a) * n);
+        row_jacobian(&gaps, i, here->e, GT + a * n);
+        row_jacobian(&walls, i, here->e, GT + (k + a) * n);
         rates[a] = u[i];
         rates[k + a] = dot(n, GT + (k + a) * n, v);
     }
@@ -1656,7 +1741,8 @@ static bool captured(Simulation *sim, int i, const Hits *hits, const double *q, 
             equations_holding(sim, holding.count, holding.stops, q, soft.after);
             right = accelerations(&sim->trial, q, soft.after, a, lam, problem);
             Here here = mass_and_loops(sim, q);
-            jacobian(1, n, sim->system.gaps + i * n, here.e, G);
+            Rows gaps = gap_rows(&sim->system);
+            row_jacobian(&gaps, i, here.e, G);
             right = right &&
                     mobility(sim, here.M, sim->system.r, here.loops, G, &free, problem);
             double pressing =
@@ -1686,15 +1772,15 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
                  const double *v, Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = &sim->system;
+    Rows walls = slide_rows(system);
     int n = system->n, s = system->s;
     bool any = false, right = true;
     double lost[MOST_STOPS], before[MOST_STOPS], after[MOST_STOPS], all_lost = 0.0, work = 0.0, modal = 0.0;
-    directions(n, q, sim->e);
+    directions(&sim->system, q, sim->e);
     for (int i = 0; i < s; i++) {
         before[i] = gap_rate(&sim->equations, i, sim->e, v);
         after[i] = gap_rate(&sim->equations, i, sim->e, hits->after);
-        double slid = row_rate(n, system->slides + i * n, sim->e, v) +
-                      row_rate(n, system->slides + i * n, sim->e, hits->after);
+        double slid = row_rate(&walls, i, sim->e, v) + row_rate(&walls, i, sim->e, hits->after);
         lost[i] = -hits->normal[i] * (before[i] + after[i]) / 2 - hits->tangential[i] * slid / 2;
         all_lost += hits->with_normal[i] ? lost[i] : 0.0;
         work -= hits->with_normal[i] ? hits->normal[i] * sim->walls[i].rate : 0.0;
@@ -1737,7 +1823,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     hits.struck_count = hits.held_count = 0;
     copy(n, sim->front, q);
     copy(n, sim->front + n, v);
-    directions(n, q, sim->e);
+    directions(&sim->system, q, sim->e);
     for (int i = 0; i < s; i++) {
         double distance = gap(&sim->equations, i, sim->now->front_time, sim->e);
         rates[i] = gap_rate(&sim->equations, i, sim->e, v);
@@ -1750,7 +1836,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     }
     if (hits.struck_count == 0) {
         sim->scratch.used = mark;
-        return settle(sim, &hit, fabs(rates[hit]) <= bound, NO_EVENT, 0, problem);
+        return settle(sim, &hit, fabs(rates[hit]) <= bound, NULL, problem);
     }
     bool right = true;
     for (int k = 0; right && k < hits.struck_count; k++) {
@@ -1764,7 +1850,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     right = right && impulse(sim, q, v, &hits, problem) &&
             book(sim, &hits, counted, q, v, problem);
     if (right) {
-        directions(n, q, sim->e);
+        directions(&sim->system, q, sim->e);
         for (int k = 0; k < hits.struck_count + hits.held_count; k++) {
             int i = k < hits.struck_count ? hits.struck[k] : hits.held[k - hits.struck_count];
             if (gap_rate(&sim->equations, i, sim->e, hits.after) <= bound) {
@@ -1775,7 +1861,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         set_inputs(sim);
     }
     sim->scratch.used = mark;
-    return right && settle(sim, resting, resting_count, NO_EVENT, 0, problem);
+    return right && settle(sim, resting, resting_count, NULL, problem);
 }
 
 /* --- going on --------------------------------------------------------------------------------- */
@@ -1911,23 +1997,26 @@ static void output_places(Simulation *sim) {
     const Slots *slots = &sim->mechanism->slots;
     int n = system->n;
     double *out = sim->outputs, *v = sim->y + n;
-    directions(n, sim->y, sim->e);
     for (int i = 0; i < system->b; i++) {
         const BodyFrame *frame = &system->bodies[i];
         double *values = out + slots->bodies + PER_BODY * i;
-        Complex at = minus(frame->c, frame->drawn), speed = {0.0, 0.0};
-        for (int j = 0; j < n; j++) {
-            Complex arm = product(frame->A[j], sim->e[j]);
-            at = plus(at, arm);
-            speed.re -= arm.im * v[j];
-            speed.im += arm.re * v[j];
-        }
+        Complex at, speed;
+        motion(system, frame, sim->e, v, &at, &speed);
         values[0] = at.re;
         values[1] = at.im;
         values[2] = sim->y[frame->j];
         values[3] = speed.re;
         values[4] = speed.im;
         values[5] = v[frame->j];
+    }
+    for (int i = 0; i < sim->mechanism->probe_count; i++) {
+        double *values = out + slots->probes + PER_PROBE * i;
+        Complex at, speed;
+        motion(system, &system->probes[i], sim->e, v, &at, &speed);
+        values[0] = at.re;
+        values[1] = at.im;
+        values[2] = speed.re;
+        values[3] = speed.im;
     }
     for (int i = 0; i < system->s; i++) {
         double *values = out + slots->stops + PER_STOP * i;
@@ -1938,8 +2027,14 @@ static void output_places(Simulation *sim) {
         memcpy(last + 1, &sim->latched[i], sizeof(Latched));
     }
     for (int k = 0; k < sim->mechanism->link_count; k++) {
-        out[slots->links + PER_LINK * k] = sim->y[system->links[k]];
-        out[slots->links + PER_LINK * k + 1] = v[system->links[k]];
+        int j = sim->mechanism->links[k];
+        out[slots->links + PER_LINK * k] = sim->y[j];
+        out[slots->links + PER_LINK * k + 1] = v[j];
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        out[slots->stretches + PER_STRETCH * k] = sim->y[j];
+        out[slots->stretches + PER_STRETCH * k + 1] = v[j];
     }
     out[slots->energies + 3] = sim->y[2 * n];
     out[slots->energies + 4] = sim->y[2 * n + 1];
@@ -1951,15 +2046,16 @@ static void output_places(Simulation *sim) {
 static bool output_motion(Simulation *sim, Problem *problem) {
     const Slots *slots = &sim->mechanism->slots;
     double *out = sim->outputs, *v = sim->y + sim->system.n;
-    if (!accelerations(&sim->equations, sim->y, v, sim->a, sim->lam, problem)) {
-        return false;
+    if (!solve_motion(&sim->equations, sim->y, v, sim->now->exchange == 0.0)) {
+        return fail(problem, "%s", SINGULAR);
     }
+    copy(sim->system.n, sim->equations.x, sim->a);
     for (int i = 0; i < sim->system.s; i++) {
         out[slots->stops + PER_STOP * i + 2] = 0.0;
     }
     for (int k = 0; k < sim->equations.held_count; k++) {
         out[slots->stops + PER_STOP * sim->equations.held[k] + 2] =
-            sim->lam[sim->equations.first_hold + k];
+            sim->equations.lam[sim->equations.first_hold + k];
     }
     out[slots->energies] = energy_here(&sim->equations, v);
     return true;
@@ -1968,8 +2064,8 @@ static bool output_motion(Simulation *sim, Problem *problem) {
 static void output_base(Simulation *sim) {
     double *out = sim->outputs + sim->mechanism->slots.base;
     Complex force;
-    directions(sim->system.n, sim->y, sim->e);
-    base_reaction(&sim->equations, sim->e, sim->y + sim->system.n, sim->a, &force, out + 2);
+    base_reaction(&sim->equations, sim->e, sim->y + sim->system.n, sim->a, &force, out + 2,
+                  &sim->scratch);
     out[0] = force.re;
     out[1] = force.im;
 }
@@ -1981,15 +2077,19 @@ static void output_energies(Simulation *sim) {
     for (int j = 0; j < n; j++) {
         deflection[j] = sim->y[j] - system->q0[j];
     }
-    directions(n, sim->y, sim->e);
     out[1] = elastic_energy(n, system->K, deflection);
     out[2] = gravitational_energy(system, sim->e);
 }
 
+/* y and e at the present time, and what follows from them alone. */
 static bool output_state(Simulation *sim, Problem *problem) {
+    int n = sim->system.n;
     if (sim->now->exchange != 0.0) {
         copy(state_size(sim), sim->front, sim->y);
-    } else if (!state_at(sim, sim->y, problem)) {
+        directions(&sim->system, sim->y, sim->e);
+    } else if (state_at(sim, sim->y, problem)) {
+        memcpy(sim->e, directions_near(&sim->equations, sim->y), (size_t)n * sizeof *sim->e);
+    } else {
         return false;
     }
     output_places(sim);
@@ -2104,7 +2204,7 @@ static bool sound_state(const Simulation *sim) {
                  now->window_count <= CHATTER && sound_event(sim);
     if (sound && now->started != 0.0) {
         sound = now->tolerance >= 1e-13 && now->tolerance <= 1e-2 && now->frequency >= 0.0 &&
-                now->last_error > 0.0 && (now->has_arc == 0.0 || now->arc_h > 0.0) &&
+                (now->has_arc == 0.0 || now->arc_h > 0.0) &&
                 (now->exchange != 0.0 || now->front_time >= now->time);
     }
     for (int i = 0; sound && i < m->stop_count; i++) {

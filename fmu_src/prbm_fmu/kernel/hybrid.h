@@ -11,7 +11,7 @@ enum { NO_EVENT, IMPACT, RELEASE, SLIP_SLIDE, SLIP_RUB, SLIDE, RUB };
 /* Numbers of the state; all of them doubles, so that the state is one array. */
 typedef struct {
     double started, exchange, time, tolerance, frequency;
-    double h, last_error, has_k1;
+    double h, log_of_error, has_k1; /* error: of the last step, to what the tolerance allows */
     double front_time;
     double window_since, window_count; /* of the events that are counted against chatter */
     double has_arc, arc_start, arc_h, arc_end;
@@ -54,7 +54,7 @@ struct Simulation {
     double *held_rates, *held_times;      /* (s,): of the walls at the last event, and its time */
     /* not state: what can be computed again */
     Discrete discrete, other;
-    double omega, energy_scale;
+    double omega, energy_scale, inertia_scale;
     double *forces; /* (3 b,) acting inputs */
     double grid[WATCHED + 1][STAGES]; /* weights of the stages at the looks */
     double *look_y, *look_gap, *look_rate, *y1, *error;
@@ -76,8 +76,8 @@ PRBM void read_discrete(Simulation *sim);
 PRBM void set_discrete(Simulation *sim, const Discrete *discrete);
 PRBM void set_inputs(Simulation *sim);
 PRBM bool take_values(Simulation *sim, Problem *problem);
-PRBM bool settle(Simulation *sim, const int *resting, int resting_count, int yields,
-                 int yields_index, Problem *problem);
+PRBM bool settle(Simulation *sim, const int *resting, int resting_count, const Event *event,
+                 Problem *problem);
 PRBM bool impact(Simulation *sim, int hit, Problem *problem);
 PRBM bool count_event(Simulation *sim, double time, int kind, Problem *problem);
 PRBM void without_hold(Simulation *sim, int stop);

@@ -38,6 +38,12 @@
 #else
 #define SIZED static
 #endif
+/* What few mechanisms need stays out of the way of what all do. */
+#if defined(__GNUC__)
+#define RARE static __attribute__((noinline))
+#else
+#define RARE static
+#endif
 #if defined(__GNUC__) && !defined(__clang__) /* which needs to be told */
 #define UNROLLED _Pragma("GCC unroll 8")
 #else
@@ -83,13 +89,19 @@ typedef struct {
     double re, im;
 } Complex;
 
+/* Complex numbers with their parts apart, in vectors that are padded with zeros to an even length,
+ * so that they are worked on by pairs. */
+typedef struct {
+    double *re, *im;
+} Parts;
+
 PRBM double *take_matrix(Scratch *scratch, int rows, int columns);
 PRBM Complex *take_complex(Scratch *scratch, int rows, int columns);
 PRBM int *take_integers(Scratch *scratch, int count);
 
 /* --- numbers.c: elementary functions, the same bits on every platform --------------------------- */
 
-PRBM void directions(int n, const double *q, Complex *e);   /* e = exp(i q), as np.exp(1j * q) */
+PRBM void unit_vectors(int n, const double *q, Complex *e); /* exp(i q), as np.exp(1j * q) */
 PRBM double natural_log(double x);                          /* x > 0 */
 PRBM double exponential(double x);
 PRBM double power(double x, double y);                      /* x^y for x > 0 */
@@ -117,8 +129,6 @@ PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */
  * below rcond times the largest count as zero.  a is (m, n). */
 PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
                         Scratch *scratch);
-/* The rank of a (m, n): number of singular values above the tolerance. */
-PRBM int rank(int m, int n, const double *a, double tolerance, Scratch *scratch);
 /* Eigenvalues w in rising order and, unless NULL, orthonormal eigenvectors as columns of z, of a
  * symmetric matrix, which is destroyed (cyclic Jacobi). */
 PRBM void symmetric_eigen(int n, double *a, double *w, double *z);
@@ -155,23 +165,36 @@ typedef struct {
 
 typedef struct {
     const char *name;
-    bool lumped, rate_with_gamma;
-    int pivots; /* of a cantilever */
+    bool lumped, rate_with_gamma, axial;
+    int pivots; /* of a cantilever; 0: a chain */
+    int links;  /* of a chain; 0: a set of coefficients */
     Expression thickness, width, youngs_modulus, density;
     const Expression *gamma, *K_theta; /* (pivots,) */
 } FlexureType;
 
+/* Two points of different bodies, GROUND or 1 ... */
+typedef struct {
+    int start, end;
+    Point start_point, end_point;
+} Connection;
+
+enum { CLAMP, PIN, FREE };
+
 typedef struct {
     const char *name;
     int type;
-    int start, end; /* bodies, GROUND or 1 ... */
-    Point start_point, end_point;
-    bool clamped_start, clamped_end;
+    Connection between;
+    int start_end, end_end; /* CLAMP, PIN or FREE */
 } Flexure;
 
 typedef struct {
     const char *name;
-    int body; /* 1 ... */
+    Connection between;
+} Joint;
+
+typedef struct {
+    const char *name;
+    int body, on; /* 1 ...; what its wall is fixed to, GROUND or 1 ... */
     Point point;
     double direction; /* deg */
     Expression position, offset, restitution, friction, rest_speed;
@@ -180,6 +203,7 @@ typedef struct {
 typedef struct {
     const char *name;
     int body;
+    Point point;
     double direction;
     Expression coefficient, normal_force, normal_stiffness;
 } Friction;
@@ -187,7 +211,14 @@ typedef struct {
 typedef struct {
     const char *name;
     int body;
+    Point point;
 } Force;
+
+typedef struct {
+    const char *name;
+    int body; /* GROUND or 1 ... */
+    Point point;
+} Probe;
 
 typedef struct {
     int body;
@@ -213,8 +244,8 @@ typedef struct {
 
 /* The vector of all values: where each group begins. */
 typedef struct {
-    int parameters, inputs, bodies, stops, base, energies, latched, links, frequency, calculated,
-        derivatives, indicators, time, count;
+    int parameters, inputs, bodies, stops, base, energies, latched, links, stretches, probes,
+        frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
 enum {
@@ -225,30 +256,55 @@ enum {
     PER_LATCHED = 8, /* contact, impact_count, impact_time, approach_speed, rebound_speed, impulse,
                         energy_lost, modal_restitution */
     PER_LINK = 2,    /* angle, omega */
+    PER_STRETCH = 2, /* strain, strain_rate */
+    PER_PROBE = 4,   /* x, y, vx, vy */
     STOP_INDICATORS = 3, /* impact, release, slip; then one slip for each friction point */
 };
 
+/* A part that the assembly walks along, from what is held already. */
+typedef struct {
+    const char *name;
+    const Connection *between;
+    const Flexure *flexure; /* NULL: a joint */
+    bool backwards;         /* from its end to its start */
+    bool closes;            /* a loop: what it leads to is held, too */
+    int first;              /* of the coordinates that it adds */
+} Step;
+
+/* What a coordinate is: the angle of a link, its stretch, or the angle of a body. */
+typedef struct {
+    int link, body; /* 0 ... or -1; 1 ... or 0 */
+    int arm;        /* whose arm it turns or stretches: its own, or that of a link */
+} Coordinate;
+
 typedef struct {
     const char *token, *name;
-    int parameter_count, body_count, type_count, flexure_count, stop_count, friction_count,
-        force_count, ground_count, bound_count, variable_count, independent_count, input_count;
+    int parameter_count, body_count, type_count, flexure_count, joint_count, stop_count,
+        friction_count, force_count, probe_count, ground_count, bound_count, variable_count,
+        independent_count, input_count;
     const Parameter *parameters;
     const Body *bodies; /* (body_count,): body k is bodies[k - 1] */
     const FlexureType *types;
     const Flexure *flexures;
+    const Joint *joints;
     const Stop *stops;
     const Friction *frictions;
     const Force *forces;
+    const Probe *probes;
     const Point *ground;
     const Bound *bounds;
     const Variable *variables; /* in rising order of their references */
     const char *const *input_names;
     const double *input_starts; /* (input_count,) */
-    const int *link_of, *body_of; /* of each coordinate: which link it is, or -1; which body */
-    const int *independent; /* coordinates whose angles and rates are states in model exchange */
+    const Step *steps;             /* flexures and joints in the order of the assembly */
+    const Coordinate *coordinates; /* (coordinate_count,) */
+    const int *links, *stretches;  /* coordinates that are angles and stretches of links */
+    const int *independent; /* coordinates that are states, with their rates, in model exchange */
     Release release;
     int gravity[2], tolerance, damping_zeta, damping_beta; /* parameters */
-    int coordinate_count, loop_count, link_count, mass_count; /* of the assembled system */
+    /* of the assembled system */
+    int coordinate_count, loop_count, link_count, stretch_count, mass_count, spring_count;
+    int longest; /* links of a flexure at most */
     Slots slots;
 } Mechanism;
 
@@ -264,27 +320,35 @@ PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t referenc
 
 /* --- flexure.c ------------------------------------------------------------------------------------ */
 
-/* A flexure cut into rigid segments: n + 2 lengths and rods, n + 1 rates and lumps. */
+/* A flexure cut into segments: n + 2 lengths and rods, n + 1 rates and lumps, n axial. */
 typedef struct {
     int n;
-    double *lengths, *rates, *rods, *lumps;
+    double *lengths, *rates, *rods, *lumps, *axial;
 } Segments;
 
 PRBM bool stub(int pivots, const double *gamma, double *gamma0, Problem *problem);
 PRBM void reverse(int count, double *x);
+/* How many links stand for a flexure, and whether the i-th of n stretches. */
+PRBM int links_of(const FlexureType *model, int start_end, int end_end);
+PRBM bool stretches(const FlexureType *model, int i, int n);
 PRBM bool segments(const FlexureType *model, const double *gamma, const double *K_theta,
-                   bool clamped_start, bool clamped_end, double L, double EI, double mass,
+                   int start_end, int end_end, double L, double EI, double mass, double EA,
                    Segments *result, Problem *problem);
+/* The same flexure from its end to its start. */
+PRBM void reversed(Segments *pieces);
 
 /* --- assembly.c ----------------------------------------------------------------------------------- */
 
+enum { NOWHERE = -2, FIXED = -1 }; /* coordinates of a body not reached yet, of the ground */
+
+/* Where a point of a body is, z = c + A E; its coordinate, and where it is drawn. */
 typedef struct {
-    int j; /* coordinate */
+    int j;
     Complex c, drawn;
     Complex *A; /* (n,) */
 } BodyFrame;
 
-/* A point of the mechanism, z = c + A e; as the origin of a body: with its coordinate and where it
+/* A point of the mechanism, z = c + A E; as the origin of a body: with its coordinate and where it
  * is drawn. */
 typedef struct {
     Complex c, drawn;
@@ -293,9 +357,9 @@ typedef struct {
     bool moves;
 } Place;
 
-/* A torsion spring between two coordinates, n: the ground. */
+/* A spring between two coordinates, n: the ground. */
 typedef struct {
-    double rate; /* N m/rad */
+    double rate; /* N m/rad, N m */
     int a, b;
 } Spring;
 
@@ -306,13 +370,14 @@ typedef struct {
 } Block;
 
 /* The constant arrays of a mechanism, as in the twin; n coordinates, r loop rows, p mass points,
- * s stops, f friction points, b bodies. */
+ * s stops, f friction points, b bodies.  Columns of A and of the rows are zero at stretches: see
+ * spread.  Vectors over the coordinates are padded to an even length where that is said. */
 typedef struct {
     const Mechanism *mechanism;
     const double *values;
-    int n, r, p, s, f, b;
+    int n, even, r, p, s, f, b;
     double *q0, *J, *K;       /* (n,), (n,), (n, n) */
-    Complex *e0;              /* (n,) exp(i q0) */
+    Complex *e0;              /* (n,) directions of the straight shape */
     Complex *H, *A, *c;       /* (n, n), (p, n), (p,) */
     double *m;                /* (p,) */
     Complex *S;               /* (n,) first mass moments */
@@ -320,17 +385,25 @@ typedef struct {
     double *loops_c;          /* (r,) */
     Complex *gaps, *slides;   /* (s, n) */
     double *gaps_c;           /* (s,) */
+    Complex *gaps_z, *slides_z; /* (s,) */
+    int *on;                  /* (s,) the coordinate of what a wall is fixed to, or FIXED */
     Complex *rubs, *lifts;    /* (f, n) */
     double *lifts_c;          /* (f,) */
     Complex *release;         /* (n,) */
     double release_c;
     BodyFrame *bodies;        /* (b,) */
+    BodyFrame *pushed;        /* where forces act */
+    BodyFrame *probes;        /* points that are watched */
     Place *origins;           /* (b + 1,): the ground's first */
-    int *links;               /* coordinates of the links */
+    int stretch_count;
+    const int *stretches;     /* coordinates that are stretches */
     int spring_count;
     Spring *spring;           /* what K is made of */
     int block_count;
     Block *blocks;            /* of M */
+    Complex *coupling;        /* of H, these blocks, one behind the other */
+    double *own;              /* (n,) the diagonal of M */
+    double *straight;         /* (even,) q0 */
     double *calculated;       /* gamma0 of the flexure types of several pivots */
     Complex anchor, gravity;
     double length;
@@ -338,6 +411,16 @@ typedef struct {
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory);
 PRBM bool assemble(System *system, const double *values, Scratch *scratch, Problem *problem);
+PRBM int arm_of(const System *system, int j);
+/* e (n,): the arms exp(s + i theta), and -i times that for stretches. */
+PRBM void directions(const System *system, const double *q, Complex *e);
+/* w (n,): the complex rates theta' - i s' of the arms, zero for stretches. */
+PRBM void turning(const System *system, const double *v, Complex *w);
+/* The displacement from the straight shape and the velocity of a point. */
+PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
+                 Complex *displacement, Complex *velocity);
+/* Rows (r, n) with the column of each arm repeated for its stretch; rows may be B. */
+PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
 PRBM Complex unit(double degrees);
 PRBM Complex complex_of(double re, double im);
 PRBM Complex plus(Complex a, Complex b);
@@ -354,26 +437,45 @@ PRBM double kinetic_energy(int n, const double *M, const double *v);
 
 /* --- constraints.c --------------------------------------------------------------------------------- */
 
-PRBM void scalars(int r, int n, const Complex *B, const double *c, const Complex *e, double *s);
-PRBM void jacobian(int r, int n, const Complex *B, const Complex *e, double *rows);
-PRBM void convective(int r, int n, const Complex *B, const Complex *e, const double *v, double *x);
+/* Scalars s = Re(f (B E + z)) + c: f = 1, or conj(E) of the body that they are seen from. */
+typedef struct {
+    const System *system;
+    int count;
+    const Complex *B;       /* (count, n) */
+    const double *c;        /* (count,) */
+    const Complex *z;       /* (count,) */
+    const int *on;          /* (count,) coordinates, FIXED: f = 1, z = 0; or NULL: all of them */
+} Rows;
+
+PRBM Rows plain_rows(const System *system, int count, const Complex *B, const double *c);
+PRBM Rows gap_rows(const System *system);
+PRBM Rows slide_rows(const System *system);
+PRBM Rows rub_rows(const System *system);
+PRBM double row_value(const Rows *rows, int i, const Complex *e); /* without c */
+PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v);
+PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row);
+PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v);
+PRBM void scalars(const Rows *rows, const Complex *e, double *s);
+PRBM void jacobian(const Rows *rows, const Complex *e, double *result); /* (count, n) */
 PRBM void saddle(int n, int r, const double *M, const double *columns, const double *rows,
                  double *kkt);
 /* Solve a saddle-point system by LU; right (n + r,) becomes the solution. */
 PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem *problem);
-/* J, H, length from the system; q (n,) moves onto the constraints, e = exp(i q) of the result. */
-PRBM bool project_positions(const System *system, int r, const Complex *B, const double *c,
-                            double *q, Complex *e, Scratch *scratch, Problem *problem);
+/* q (n,) moves onto the rows, of which c (count,) are the constants now; e: its directions. */
+PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
+                            Complex *e, Scratch *scratch, Problem *problem);
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, Scratch *scratch, Problem *problem);
 
-/* M = L D L^T block by block, Z = L^-1 rows^T, Y = D^-1 Z, and the Schur complement S of a
- * saddle-point matrix [[M, columns^T], [rows, 0]]: what to solve with, again and again. */
+/* M = L D L^T block by block, Z = L^-1 rows^T and the Schur complement S of a saddle-point matrix
+ * [[M, columns^T], [rows, 0]]: what to solve with, again and again.  Vectors are padded to an even
+ * length. */
 typedef struct {
-    int n, r, block_count;
+    int even, r, block_count;
     const Block *blocks;
-    double *L;                  /* (n, n); 1/D on its diagonal */
-    double *Z, *Y, *Y_columns;  /* (r, n); of the columns as of the rows, or the same array */
+    double *L;                  /* its blocks, one behind the other, below their diagonals */
+    double *inverse;            /* (even,) 1/D */
+    double *Z, *Z_columns;      /* (r, even); of the columns as of the rows, or the same array */
     double *S;                  /* (r, r), and room for its factor */
     int *pivots;                /* (r,) */
     bool symmetric;             /* S is, and small: its factor is L D L^T, else LU */
@@ -381,8 +483,8 @@ typedef struct {
 
 /* S from Z and Y_columns, factored. */
 PRBM bool factor_schur(Factors *factors);
-/* x (n + r,): in, the right side; out, the solution (a, -lam). */
-PRBM void solve_again(const Factors *factors, double *x);
+/* x (even,) and lam (r,): in, the right side; out, the solution a and the multipliers. */
+PRBM void solve_again(const Factors *factors, double *x, double *lam);
 
 /* --- forces.c --------------------------------------------------------------------------------------- */
 
@@ -425,17 +527,30 @@ typedef struct {
     int *held, *stuck, *rubbing, *sliding, *rub_slides; /* stops, stops, frictions, stops, ... */
     double *stop_friction;  /* (s,) */
     double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
-    Complex *B;             /* (r, n) active rows */
+    Complex *B, *z;         /* (r, n), (r,) of the active rows */
     double *c;              /* (r,) */
+    int *on, *carried;      /* (r,), (carried_count,) those that are seen from a body */
+    int carried_count;
+    Rows active;
     Complex *w, *w_input;   /* (n,) */
-    double *moment;         /* (n,) */
+    double *moment;         /* (even,) */
     bool driven, walls_push;
-    /* at the state that was evaluated last */
-    Complex *e;                         /* (n,) */
-    double *M, *rows, *columns;         /* (n, n) lower blocks, (r, n), (r, n) */
-    double *x, *squares;                /* (n + r,) = (a, -lam); (n,) */
-    double *turns;                      /* (n + 1,): deflections, of the ground last */
-    double *least, *most;               /* (held,) extremes of the forces since the trace began */
+    Parts B_conjugate;      /* (r, even) */
+    Parts w_parts;          /* (even,) */
+    double *own;            /* (n,) the diagonal of M now */
+    /* where the present step began, or something else that others are near */
+    double *start;          /* (even,) its angles */
+    Complex *e_at_start;    /* (even,) */
+    Parts e_start;          /* (even,) the same */
+    /* at the state that was evaluated last; of the coordinates and, behind them, of the ground */
+    double *angle, *speed, *squares, *turns; /* (even + 2,) */
+    Complex *e;                              /* (n,) */
+    Parts e_parts;                           /* (even,) */
+    double *rows, *columns;                  /* (r, even) */
+    double *x, *lam;                         /* (even + 2,) accelerations; (r,) */
+    double *block;                           /* of M, below its diagonal */
+    double spring_loss;                      /* the power that the springs' damping takes */
+    double *least, *most;                    /* (held,) extremes of the forces since the trace */
     Factors factors;
 } Equations;
 
@@ -457,10 +572,8 @@ PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *
 PRBM double wall_at(const Wall *wall, double t);
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e);
 PRBM double gap_rate(const Equations *equations, int i, const Complex *e, const double *v);
-PRBM double row_value(int n, const Complex *row, const Complex *e);                   /* Re(B e) */
-PRBM double row_rate(int n, const Complex *row, const Complex *e, const double *v);   /* -Im(B e) v */
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
-                        const double *a, Complex *force, double *moment);
+                        const double *a, Complex *force, double *moment, Scratch *scratch);
 
 /* --- runge_kutta.c ------------------------------------------------------------------------------------ */
 
@@ -494,7 +607,8 @@ typedef struct {
 
 /* B (r + 1, n), c (r + 1,): the loops and, below them, the row of the released body. */
 PRBM void stack_release(const System *system, Complex *B, double *c);
-PRBM void tangent_stiffness(int n, int r, const double *K, const Complex *w, const Complex *B,
+/* w is spread, B is not. */
+PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t);
 /* held: whether the released body is held at the displacement. */
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,

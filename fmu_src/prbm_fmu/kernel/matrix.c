@@ -18,6 +18,15 @@ PRBM double dot(int n, const double *a, const double *b) {
     return sum;
 }
 
+/* Of vectors of an even length. */
+static double even_dot(int even, const double *a, const double *b) {
+    Lanes sum[SUMS] = {NO_LANES};
+    for (int i = 0; i < even; i += LANES) {
+        sum[SUM_OF(i)] += lanes_at(a + i) * lanes_at(b + i);
+    }
+    return total(sum);
+}
+
 PRBM void zeros(int n, double *x) {
     for (int i = 0; i < n; i++) {
         x[i] = 0.0;
@@ -25,7 +34,11 @@ PRBM void zeros(int n, double *x) {
 }
 
 PRBM void copy(int n, const double *from, double *to) {
-    for (int i = 0; i < n; i++) {
+    int i = 0;
+    for (; i + LANES <= n; i += LANES) {
+        set_lanes(to + i, lanes_at(from + i));
+    }
+    if (i < n) {
         to[i] = from[i];
     }
 }
@@ -227,18 +240,6 @@ PRBM void least_squares(int m, int n, const double *a, const double *b, double r
         }
     }
     scratch->used = used;
-}
-
-PRBM int rank(int m, int n, const double *a, double tolerance, Scratch *scratch) {
-    size_t used = scratch->used;
-    int k = m < n ? m : n, count = 0;
-    double *s = take(scratch, (size_t)k), *g = take_matrix(scratch, m, n);
-    singular_values(m, n, a, s, g, NULL);
-    for (int i = 0; i < k; i++) {
-        count += s[i] > tolerance;
-    }
-    scratch->used = used;
-    return count;
 }
 
 /* --- eigenvalues ------------------------------------------------------------------------------ */

@@ -6,13 +6,15 @@
 #include "kernel.h"
 
 enum {
-    TABLES_VERSION = 1,
+    TABLES_VERSION = 2,
     CHECKED_FROM = 16,         /* bytes before what the checksum covers */
     MOST_COORDINATES = 512,    /* a mass matrix of 2 MB; no mechanism of this kind has as many */
     MOST_STOPS = 64,           /* and friction points */
+    MOST_PLACES = 1024,        /* where forces act, that are watched */
     MOST_POINTS = 4096,        /* of the ground: every pair of them has a distance */
-    MOST_PIVOTS = 256,
+    MOST_PIVOTS = 256,         /* and links of a chain */
     ROOM = 8,                  /* bytes of memory for each byte of the tables, more than needed */
+    ROOM_OF_COORDINATE = 32,   /* and for each coordinate */
 };
 
 typedef struct {
@@ -195,7 +197,12 @@ static void read_types(Reader *reader, Mechanism *m) {
         t->name = read_text(reader);
         t->lumped = read_flag(reader);
         t->rate_with_gamma = read_flag(reader);
-        t->pivots = read_index(reader, 1, MOST_PIVOTS + 1);
+        t->axial = read_flag(reader);
+        t->pivots = read_index(reader, 0, MOST_PIVOTS + 1);
+        t->links = read_index(reader, 0, MOST_PIVOTS + 1);
+        if ((t->pivots == 0) == (t->links == 0)) {
+            reader->wrong = reader->wrong ? reader->wrong : "a flexure of no kind";
+        }
         t->thickness = read_expression(reader, m);
         t->width = read_expression(reader, m);
         t->youngs_modulus = read_expression(reader, m);
@@ -206,23 +213,42 @@ static void read_types(Reader *reader, Mechanism *m) {
     m->types = types;
 }
 
+static Connection read_connection(Reader *reader, Mechanism *m) {
+    Connection result;
+    result.start = read_index(reader, 0, m->body_count + 1);
+    result.start_point = read_point(reader, m);
+    result.end = read_index(reader, 0, m->body_count + 1);
+    result.end_point = read_point(reader, m);
+    if (result.start == result.end) {
+        reader->wrong = reader->wrong ? reader->wrong : "a part that joins nothing";
+    }
+    return result;
+}
+
 static void read_flexures(Reader *reader, Mechanism *m) {
     Flexure *flexures = kept(reader, (size_t)m->flexure_count, sizeof *flexures);
     for (int i = 0; i < m->flexure_count && !reader->wrong; i++) {
         Flexure *f = &flexures[i];
         f->name = read_text(reader);
         f->type = read_index(reader, 0, m->type_count);
-        f->start = read_index(reader, 0, m->body_count + 1);
-        f->start_point = read_point(reader, m);
-        f->end = read_index(reader, 0, m->body_count + 1);
-        f->end_point = read_point(reader, m);
-        f->clamped_start = read_flag(reader);
-        f->clamped_end = read_flag(reader);
-        if (f->start == f->end || !(f->clamped_start || f->clamped_end)) {
-            reader->wrong = reader->wrong ? reader->wrong : "a flexure that joins nothing";
+        f->between = read_connection(reader, m);
+        f->start_end = read_index(reader, CLAMP, FREE + 1);
+        f->end_end = read_index(reader, CLAMP, FREE + 1);
+        bool freed = f->start_end == FREE || f->end_end == FREE;
+        if (freed && f->start_end != CLAMP && f->end_end != CLAMP) {
+            reader->wrong = reader->wrong ? reader->wrong : "a flexure that nothing clamps";
         }
     }
     m->flexures = flexures;
+}
+
+static void read_joints(Reader *reader, Mechanism *m) {
+    Joint *joints = kept(reader, (size_t)m->joint_count, sizeof *joints);
+    for (int i = 0; i < m->joint_count && !reader->wrong; i++) {
+        joints[i].name = read_text(reader);
+        joints[i].between = read_connection(reader, m);
+    }
+    m->joints = joints;
 }
 
 static void read_stops(Reader *reader, Mechanism *m) {
@@ -231,6 +257,10 @@ static void read_stops(Reader *reader, Mechanism *m) {
         Stop *s = &stops[i];
         s->name = read_text(reader);
         s->body = read_index(reader, 1, m->body_count + 1);
+        s->on = read_index(reader, 0, m->body_count + 1);
+        if (s->on == s->body) {
+            reader->wrong = reader->wrong ? reader->wrong : "a stop that is fixed to what it stops";
+        }
         s->point = read_point(reader, m);
         s->direction = read_finite(reader);
         s->position = read_expression(reader, m);
@@ -248,6 +278,7 @@ static void read_frictions(Reader *reader, Mechanism *m) {
         Friction *f = &frictions[i];
         f->name = read_text(reader);
         f->body = read_index(reader, 1, m->body_count + 1);
+        f->point = read_point(reader, m);
         f->direction = read_finite(reader);
         f->coefficient = read_expression(reader, m);
         f->normal_force = read_expression(reader, m);
@@ -261,8 +292,19 @@ static void read_forces(Reader *reader, Mechanism *m) {
     for (int i = 0; i < m->force_count && !reader->wrong; i++) {
         forces[i].name = read_text(reader);
         forces[i].body = read_index(reader, 1, m->body_count + 1);
+        forces[i].point = read_point(reader, m);
     }
     m->forces = forces;
+}
+
+static void read_probes(Reader *reader, Mechanism *m) {
+    Probe *probes = kept(reader, (size_t)m->probe_count, sizeof *probes);
+    for (int i = 0; i < m->probe_count && !reader->wrong; i++) {
+        probes[i].name = read_text(reader);
+        probes[i].body = read_index(reader, 0, m->body_count + 1);
+        probes[i].point = read_point(reader, m);
+    }
+    m->probes = probes;
 }
 
 static void read_release(Reader *reader, Mechanism *m) {
@@ -294,94 +336,137 @@ static void read_bounds(Reader *reader, Mechanism *m) {
 
 /* --- sizes and order -------------------------------------------------------------------------- */
 
-/* The links that stand for a flexure: mirrored halves share the middle one. */
-static int links_of(const Mechanism *m, const Flexure *flexure) {
-    int pivots = m->types[flexure->type].pivots;
-    return flexure->clamped_start && flexure->clamped_end ? 2 * pivots - 1 : pivots;
+static const FlexureType *kind_of(const Mechanism *m, const Flexure *flexure) {
+    return &m->types[flexure->type];
 }
 
-/* Bodies that flexures join to the ground, as the assembly walks. */
-static bool all_held(Reader *reader, const Mechanism *m) {
-    bool *reached = kept(reader, (size_t)m->body_count + 1, sizeof *reached);
-    if (reader->wrong) {
-        return false;
-    }
-    memset(reached, 0, ((size_t)m->body_count + 1) * sizeof *reached);
-    reached[GROUND] = true;
-    int held = 0;
-    for (bool more = true; more;) {
-        more = false;
-        for (int i = 0; i < m->flexure_count; i++) {
-            const Flexure *f = &m->flexures[i];
-            if (reached[f->start] != reached[f->end]) {
-                reached[f->start] = reached[f->end] = more = true;
-                held++;
-            }
-        }
-    }
-    return held == m->body_count;
+static int link_count(const Mechanism *m, const Flexure *flexure) {
+    return links_of(kind_of(m, flexure), flexure->start_end, flexure->end_end);
 }
 
 static void count_coordinates(Reader *reader, Mechanism *m) {
-    long long links = 0;
+    long long links = 0, stretching = 0;
     for (int i = 0; i < m->flexure_count && !reader->wrong; i++) {
-        links += links_of(m, &m->flexures[i]);
+        int count = link_count(m, &m->flexures[i]);
+        links += count;
+        m->longest = count > m->longest ? count : m->longest;
+        for (int k = 0; k < count; k++) {
+            stretching += stretches(kind_of(m, &m->flexures[i]), k, count);
+        }
     }
-    long long n = links + m->body_count, r = 2LL * (m->flexure_count - m->body_count);
+    long long parts = (long long)m->flexure_count + m->joint_count, b = m->body_count;
+    long long n = links + stretching + b, r = 2 * (parts - b);
     if (!reader->wrong &&
         (n > MOST_COORDINATES || r >= n || m->stop_count > MOST_STOPS ||
-         m->friction_count > MOST_STOPS || m->ground_count > MOST_POINTS)) {
+         m->friction_count > MOST_STOPS || m->force_count > MOST_PLACES ||
+         m->probe_count > MOST_PLACES || m->ground_count > MOST_POINTS)) {
         reader->wrong = "more parts than can be computed with, or loops that leave no motion";
-    } else if (!reader->wrong && (m->body_count < 1 || !all_held(reader, m))) {
-        reader->wrong = reader->wrong ? reader->wrong : "a body that nothing holds";
+    } else if (!reader->wrong && (b < 1 || r < 0)) {
+        reader->wrong = "a body that nothing holds";
     }
     if (!reader->wrong) {
         m->link_count = (int)links;
+        m->stretch_count = (int)stretching;
         m->coordinate_count = (int)n;
         m->loop_count = (int)r;
-        m->mass_count = (int)(2 * links + 3LL * m->flexure_count + m->body_count);
+        m->spring_count = (int)(links + stretching + m->flexure_count);
+        m->mass_count = (int)(2 * links + 4LL * m->flexure_count + b);
     }
 }
 
-/* Which flexure the assembly walks next: the first that touches what is held and has not been. */
-static int next_to_walk(const Mechanism *m, const bool *held, const bool *walked) {
-    for (int i = 0; i < m->flexure_count; i++) {
-        if (!walked[i] && (held[m->flexures[i].start] || held[m->flexures[i].end])) {
-            return i;
+/* Where the assembly is: what is held, which parts it has walked along, what it has added. */
+typedef struct {
+    bool *held, *walked;
+    Coordinate *coordinates;
+    int *links, *stretches;
+    int added, link_count, stretch_count;
+} Walk;
+
+static void add_coordinate(Walk *walk, int link, int body, int arm) {
+    Coordinate coordinate = {link, body, arm};
+    walk->coordinates[walk->added++] = coordinate;
+}
+
+/* The angle of a link, and its stretch. */
+static void add_link(Walk *walk, bool stretching) {
+    int j = walk->added;
+    add_coordinate(walk, walk->link_count, 0, j);
+    walk->links[walk->link_count++] = j;
+    if (stretching) {
+        add_coordinate(walk, walk->link_count - 1, 0, j);
+        walk->stretches[walk->stretch_count++] = j + 1;
+    }
+}
+
+/* A flexure or, behind them all, a joint. */
+static Step part(const Mechanism *m, int i) {
+    Step step = {NULL, NULL, NULL, false, false, 0};
+    if (i < m->flexure_count) {
+        step.name = m->flexures[i].name;
+        step.between = &m->flexures[i].between;
+        step.flexure = &m->flexures[i];
+    } else {
+        step.name = m->joints[i - m->flexure_count].name;
+        step.between = &m->joints[i - m->flexure_count].between;
+    }
+    return step;
+}
+
+/* Go along the first part that touches what is held and has not been walked; false if none does. */
+static bool walk_on(const Mechanism *m, Walk *walk, Step *step) {
+    for (int i = 0; i < m->flexure_count + m->joint_count; i++) {
+        *step = part(m, i);
+        const bool *held = walk->held;
+        if (!walk->walked[i] && (held[step->between->start] || held[step->between->end])) {
+            walk->walked[i] = true;
+            step->backwards = !held[step->between->start];
+            step->first = walk->added;
+            return true;
         }
     }
-    return 0; /* not reached: everything is held */
+    return false;
 }
 
-/* Which coordinates are those of links, and which of bodies, in the order of the assembly. */
-static void name_coordinates(Reader *reader, Mechanism *m) {
-    int *link = kept(reader, (size_t)m->coordinate_count, sizeof *link);
-    int *body = kept(reader, (size_t)m->coordinate_count, sizeof *body);
-    bool *held = kept(reader, (size_t)m->body_count + 1, sizeof *held);
-    bool *walked = kept(reader, (size_t)m->flexure_count, sizeof *walked);
+static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
+    int count = step->flexure ? link_count(m, step->flexure) : 0;
+    for (int k = 0; k < count; k++) {
+        int i = step->backwards ? count - 1 - k : k;
+        add_link(walk, stretches(kind_of(m, step->flexure), i, count));
+    }
+    int far = step->backwards ? step->between->start : step->between->end;
+    step->closes = walk->held[far];
+    if (!step->closes) {
+        walk->held[far] = true;
+        add_coordinate(walk, -1, far, walk->added);
+    }
+}
+
+/* The order of the assembly, and what each coordinate is. */
+static void lay_out_coordinates(Reader *reader, Mechanism *m) {
+    size_t parts = (size_t)m->flexure_count + (size_t)m->joint_count;
+    size_t n = (size_t)m->coordinate_count, b = (size_t)m->body_count;
+    Walk walk = {kept(reader, b + 1, sizeof(bool)), kept(reader, parts, sizeof(bool)),
+                 kept(reader, n, sizeof(Coordinate)), kept(reader, n, sizeof(int)),
+                 kept(reader, n, sizeof(int)), 0, 0, 0};
+    Step *steps = kept(reader, parts, sizeof *steps);
     if (reader->wrong) {
         return;
     }
-    memset(held, 0, ((size_t)m->body_count + 1) * sizeof *held);
-    memset(walked, 0, (size_t)m->flexure_count * sizeof *walked);
-    held[GROUND] = true;
-    for (int step = 0, j = 0, links = 0; step < m->flexure_count; step++) {
-        int i = next_to_walk(m, held, walked);
-        const Flexure *f = &m->flexures[i];
-        int far = held[f->start] ? f->end : f->start;
-        walked[i] = true;
-        for (int k = 0; k < links_of(m, f); k++, j++) {
-            link[j] = links++;
-            body[j] = 0;
-        }
-        if (!held[far]) {
-            held[far] = true;
-            link[j] = -1;
-            body[j++] = far;
-        }
+    memset(walk.held, 0, (b + 1) * sizeof *walk.held);
+    memset(walk.walked, 0, parts * sizeof *walk.walked);
+    walk.held[GROUND] = true;
+    size_t reached = 1;
+    for (size_t i = 0; i < parts && walk_on(m, &walk, &steps[i]); i++) {
+        add_coordinates(m, &walk, &steps[i]);
+        reached += !steps[i].closes;
     }
-    m->link_of = link;
-    m->body_of = body;
+    if (reached != b + 1) {
+        reader->wrong = "a body that nothing holds";
+    }
+    m->steps = steps;
+    m->coordinates = walk.coordinates;
+    m->links = walk.links;
+    m->stretches = walk.stretches;
 }
 
 static void read_independents(Reader *reader, Mechanism *m) {
@@ -405,7 +490,9 @@ static void lay_out_slots(Mechanism *m) {
     s->energies = s->base + PER_BASE;
     s->latched = s->energies + PER_ENERGY;
     s->links = s->latched + PER_LATCHED * m->stop_count;
-    s->frequency = s->links + PER_LINK * m->link_count;
+    s->stretches = s->links + PER_LINK * m->link_count;
+    s->probes = s->stretches + PER_STRETCH * m->stretch_count;
+    s->frequency = s->probes + PER_PROBE * m->probe_count;
     s->calculated = s->frequency + 1;
     s->derivatives = s->calculated;
     for (int i = 0; i < m->type_count; i++) {
@@ -471,9 +558,11 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     m->body_count = read_count(reader, 4);
     m->type_count = read_count(reader, 4);
     m->flexure_count = read_count(reader, 4);
+    m->joint_count = read_count(reader, 4);
     m->stop_count = read_count(reader, 4);
     m->friction_count = read_count(reader, 4);
     m->force_count = read_count(reader, 4);
+    m->probe_count = read_count(reader, 4);
     m->ground_count = read_count(reader, 4);
     m->bound_count = read_count(reader, 4);
     m->variable_count = read_count(reader, 16);
@@ -487,14 +576,16 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     read_bodies(reader, m);
     read_types(reader, m);
     read_flexures(reader, m);
+    read_joints(reader, m);
     read_stops(reader, m);
     read_frictions(reader, m);
     read_forces(reader, m);
+    read_probes(reader, m);
     read_release(reader, m);
     read_ground(reader, m);
     read_bounds(reader, m);
     count_coordinates(reader, m);
-    name_coordinates(reader, m);
+    lay_out_coordinates(reader, m);
     read_independents(reader, m);
     if (reader->wrong) {
         return; /* with counts of parts that may not be there */
@@ -511,7 +602,7 @@ PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem 
     read_header(&reader, bytes, size);
     Mechanism *m = NULL;
     if (!reader.wrong) {
-        size_t room = sizeof *m + 64 + ROOM * size;
+        size_t room = sizeof *m + ROOM * size + MOST_COORDINATES * ROOM_OF_COORDINATE;
         m = calloc(1, room);
         if (!m) {
             fail(problem, "there is not enough memory for the tables of the mechanism");

@@ -4,6 +4,8 @@
 
 #include "kernel.h"
 
+#define AT_EASE 1e-7 /* of the highest frequency: a lower one is what rounding leaves of none */
+
 #define FULL_TURN 6.283185307179586 /* rad */
 
 /* c = a^T b a for a (n, k), b (n, n) */
@@ -72,11 +74,18 @@ static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y,
     return true;
 }
 
+/* The row of gravity, spread. */
+static void gravity_row(const System *system, Complex *w) {
+    field_row(system->n, system->S, system->gravity, w);
+    spread(system, 1, w, w);
+}
+
 /* Z (n, k): a basis of the motions that the loops leave. */
 static void tangent_space(const System *system, const Complex *e, double *Z, Scratch *scratch) {
     size_t used = scratch->used;
     double *rows = take_matrix(scratch, system->r, system->n);
-    jacobian(system->r, system->n, system->loops, e, rows);
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    jacobian(&loops, e, rows);
     null_space(system->r, system->n, rows, Z, scratch);
     scratch->used = used;
 }
@@ -92,10 +101,10 @@ static bool modes_about(const System *system, const double *q, int r, const Comp
     double *K_t = take_matrix(scratch, n, n), *Z = take_matrix(scratch, n, k);
     double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
     double *reduced = take_matrix(scratch, k, k);
-    directions(n, q, e);
+    directions(system, q, e);
     inertia(n, system->H, system->J, e, M, K_t); /* the velocity matrix is not needed */
-    field_row(n, system->S, system->gravity, w);
-    tangent_stiffness(n, r, system->K, w, B, lam, e, K_t);
+    gravity_row(system, w);
+    tangent_stiffness(system, r, w, B, lam, e, K_t);
     tangent_space(system, e, Z, scratch);
     congruent(n, k, Z, K_t, K_z, scratch);
     congruent(n, k, Z, M, M_z, scratch);
@@ -140,7 +149,8 @@ PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch
     bool found = equilibrium(system, false, 0.0, &shape, scratch, problem) &&
                  modes(system, &shape, frequencies, phi, scratch, problem);
     if (found) {
-        *frequency = greater(0.0, frequencies[0]);
+        bool bends = frequencies[0] > AT_EASE * largest(k, frequencies);
+        *frequency = bends ? frequencies[0] : 0.0;
     }
     scratch->used = used;
     return found;
@@ -156,10 +166,11 @@ static bool resting_multipliers(const System *system, const double *q, const Com
     double *rows = take_matrix(scratch, r, n), *kkt = take_matrix(scratch, size, size);
     double *right = take(scratch, (size_t)size), *C = take_matrix(scratch, n, n);
     double *turned = take(scratch, (size_t)n), *load = take(scratch, (size_t)n);
-    directions(n, q, e);
+    directions(system, q, e);
     inertia(n, system->H, system->J, e, M, C);
-    jacobian(r, n, B, e, rows);
-    field_row(n, system->S, system->gravity, w);
+    Rows held = plain_rows(system, r, B, NULL);
+    jacobian(&held, e, rows);
+    gravity_row(system, w);
     generalised(n, w, e, load);
     for (int j = 0; j < n; j++) {
         turned[j] = q[j] - system->q0[j];

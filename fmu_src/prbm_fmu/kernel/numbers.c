@@ -11,6 +11,65 @@
 
 #include "kernel.h"
 
+/* --- pairs of numbers ------------------------------------------------------------------------- */
+
+/* Two numbers at a time where the compiler has vectors, else one: the same operations on each. */
+#if defined(__GNUC__)
+typedef double Lanes __attribute__((vector_size(16)));
+typedef uint64_t LaneBits __attribute__((vector_size(16)));
+typedef double LanesInMemory __attribute__((vector_size(16), aligned(8)));
+#define NO_LANES {0.0, 0.0}
+#define LANE(x, i) (x)[i]
+#else
+typedef double Lanes;
+typedef uint64_t LaneBits;
+typedef double LanesInMemory;
+#define NO_LANES 0.0
+#define LANE(x, i) (x)
+#endif
+enum { LANES = sizeof(Lanes) / sizeof(double), PAIR = 2, SUMS = PAIR / LANES };
+
+static Lanes lanes_at(const double *x) {
+    return *(const LanesInMemory *)x;
+}
+
+static void set_lanes(double *x, Lanes lanes) {
+    *(LanesInMemory *)x = lanes;
+}
+
+/* The sum of the even terms and that of the odd ones, added up in the end: Lanes sum[SUMS], whose
+ * part for the term i is sum[SUM_OF(i)]. */
+#define SUM_OF(i) ((i) / LANES % SUMS)
+
+static double total(const Lanes *sum) {
+    return LANE(sum[0], 0) + LANE(sum[SUMS - 1], LANES - 1);
+}
+
+static int even_length(int n) {
+    return n + n % PAIR;
+}
+
+/* A vector padded with a zero to an even length. */
+static void pad(int n, const double *x, double *padded) {
+    padded[even_length(n) - 1] = 0.0;
+    copy(n, x, padded);
+}
+
+static void pad_parts(int n, const Complex *z, Parts parts) {
+    parts.re[even_length(n) - 1] = parts.im[even_length(n) - 1] = 0.0;
+    for (int i = 0; i < n; i++) {
+        parts.re[i] = z[i].re;
+        parts.im[i] = z[i].im;
+    }
+}
+
+static void set_complex(Complex *z, Lanes re, Lanes im) {
+    for (int i = 0; i < LANES; i++) {
+        z[i].re = LANE(re, i);
+        z[i].im = LANE(im, i);
+    }
+}
+
 /* --- exp(i q) --------------------------------------------------------------------------------- */
 
 #define LARGEST_ANGLE UINT64_C(0x40f86a0000000000) /* the bits of 1e5 rad */
@@ -22,16 +81,6 @@
 /* Adding it rounds to an integer, which the last bits of the sum then are. */
 #define ROUNDER 6755399441055744.0 /* 1.5 2^52 */
 
-/* Two angles at a time where the compiler has vectors, else one: the same operations on each. */
-#if defined(__GNUC__)
-typedef double Lanes __attribute__((vector_size(16)));
-typedef uint64_t LaneBits __attribute__((vector_size(16)));
-#else
-typedef double Lanes;
-typedef uint64_t LaneBits;
-#endif
-enum { LANES = sizeof(Lanes) / sizeof(double) };
-
 static LaneBits bits_of(Lanes x) {
     LaneBits bits;
     memcpy(&bits, &x, sizeof bits);
@@ -42,6 +91,10 @@ static Lanes from_bits(LaneBits bits) {
     Lanes x;
     memcpy(&x, &bits, sizeof x);
     return x;
+}
+
+static Lanes magnitudes(Lanes x) {
+    return from_bits(bits_of(x) & (UINT64_MAX >> 1));
 }
 
 /* The angle, or something that is not a number (all bits set) unless it is below the limit. */
@@ -94,23 +147,21 @@ static void turn_quarters(LaneBits quarters, LaneBits s, LaneBits c, Lanes *re, 
     *im = from_bits(s ^ exchange ^ s_sign);
 }
 
-static void lane_directions(const double *q, Complex *e) {
-    Lanes given, y, rest, re, im;
+static void direction_parts(Lanes q, Lanes *re, Lanes *im) {
+    Lanes y, rest;
     LaneBits quarters;
-    memcpy(&given, q, sizeof given);
-    reduce_angle(valid_angle(given), &y, &rest, &quarters);
-    turn_quarters(quarters, bits_of(sine(y, rest)), bits_of(cosine(y, rest)), &re, &im);
-    double parts[2][LANES];
-    memcpy(parts[0], &re, sizeof re);
-    memcpy(parts[1], &im, sizeof im);
-    for (int i = 0; i < LANES; i++) {
-        e[i].re = parts[0][i];
-        e[i].im = parts[1][i];
-    }
+    reduce_angle(valid_angle(q), &y, &rest, &quarters);
+    turn_quarters(quarters, bits_of(sine(y, rest)), bits_of(cosine(y, rest)), re, im);
+}
+
+static void lane_directions(const double *q, Complex *e) {
+    Lanes re, im;
+    direction_parts(lanes_at(q), &re, &im);
+    set_complex(e, re, im);
 }
 
 /* The last ones are done together with some before them, which are done twice. */
-PRBM void directions(int n, const double *q, Complex *e) {
+PRBM void unit_vectors(int n, const double *q, Complex *e) {
     int i = 0;
     for (; i + LANES <= n; i += LANES) {
         lane_directions(q + i, e + i);
@@ -124,6 +175,35 @@ PRBM void directions(int n, const double *q, Complex *e) {
         lane_directions(padded, found);
         e[0] = found[0];
     }
+}
+
+#define SMALL_TURN 0.0625 /* rad: below, Taylor's four terms are exact to rounding */
+
+/* sin d = d - d^3/6 + ..., cos d - 1 = -d^2/2 + ... */
+static void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
+    Lanes z = d * d;
+    Lanes odd = -1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880)));
+    Lanes even = -1.0 / 2 + z * (1.0 / 24 + z * (-1.0 / 720 + z * (1.0 / 40320)));
+    *s = d + d * z * odd;
+    *c_less_1 = z * even;
+}
+
+/* e = exp(i q) by turning e_start = exp(i start): exp(i q) = e_start exp(i (q - start)).  False
+ * unless all angles are near their start. */
+static bool turned_directions(int even, const double *q, const double *start, Parts e_start,
+                              Parts parts, Complex *e) {
+    LaneBits near = ~(bits_of(lanes_at(q)) & 0);
+    for (int i = 0; i < even; i += LANES) {
+        Lanes d = lanes_at(q + i) - lanes_at(start + i), s, c_less_1;
+        Lanes re = lanes_at(e_start.re + i), im = lanes_at(e_start.im + i);
+        small_turn(d, &s, &c_less_1);
+        near &= bits_of(d * d - SMALL_TURN * SMALL_TURN); /* whose sign is one, then */
+        Lanes turned_re = re + (re * c_less_1 - im * s), turned_im = im + (im * c_less_1 + re * s);
+        set_lanes(parts.re + i, turned_re);
+        set_lanes(parts.im + i, turned_im);
+        set_complex(e + i, turned_re, turned_im);
+    }
+    return (LANE(near, 0) & LANE(near, LANES - 1)) >> 63 != 0;
 }
 
 /* --- logarithm, exponential ------------------------------------------------------------------- */

@@ -14,9 +14,6 @@ static const double STAGE[STAGES][STAGES] = {
      7267.0 / 94080},
 };
 
-static const double NODE[STAGES] = {0.0,      1.0 / 6,  2.0 / 9, 3.0 / 7,
-                                    2.0 / 3,  3.0 / 4,  1.0,     1.0};
-
 static const double ERROR_WEIGHT[STAGES] = {
     -3817.0 / 1959552,          0.0,
     140181.0 / 15491840,        -4224731.0 / 272937600,
@@ -35,50 +32,46 @@ static const double DENSE_WEIGHT[STAGES][DENSE] = {
     {0.0, 3.0 / 2, -4.0, 5.0 / 2},
 };
 
-/* result = y + sum(a_i k_i) for n even, as it is with two rates for each angle and two energies;
- * two components at a time, which the compilers turn into vectors. */
-SIZED void combine_of(int count, int n, const double *a, const double *k, const double *y,
-                      double *result) {
-    for (int j = 0; j < n; j += 2) {
-        double first = 0.0, second = 0.0;
+/* More than the largest magnitudes of the weights of the dense output at any fraction. */
+static const double LARGEST_WEIGHT[STAGES] = {0.103, 0.0,  0.329, 0.196,
+                                              0.009, 0.36, 0.078, 0.068};
+
+/* result = y + h sum(a_i k_i) for n even, as it is with two rates for each angle and two energies. */
+SIZED void combine_of(int count, int n, int stride, double h, const double *a, const double *k,
+                      const double *y, double *result) {
+    for (int j = 0; j < n; j += LANES) {
+        Lanes sum = a[0] * lanes_at(k + j);
         UNROLLED
-        for (int i = 0; i < count; i++) {
-            first += a[i] * k[i * n + j];
-            second += a[i] * k[i * n + j + 1];
+        for (int i = 1; i < count; i++) {
+            sum += a[i] * lanes_at(k + i * stride + j);
         }
-        result[j] = y[j] + first;
-        result[j + 1] = y[j + 1] + second;
+        set_lanes(result + j, lanes_at(y + j) + h * sum);
     }
 }
 
-static void combine(int n, int count, const double *a, const double *k, const double *y,
-                    double *result) {
+static void combine(int n, int stride, int count, double h, const double *a, const double *k,
+                    const double *y, double *result) {
     switch (count) {
-    case 1: combine_of(1, n, a, k, y, result); break;
-    case 2: combine_of(2, n, a, k, y, result); break;
-    case 3: combine_of(3, n, a, k, y, result); break;
-    case 4: combine_of(4, n, a, k, y, result); break;
-    case 5: combine_of(5, n, a, k, y, result); break;
-    case 6: combine_of(6, n, a, k, y, result); break;
-    case 7: combine_of(7, n, a, k, y, result); break;
-    default: combine_of(STAGES, n, a, k, y, result);
-    }
-}
-
-static void times_step(int count, const double *a, double h, double *scaled_ones) {
-    for (int i = 0; i < count; i++) {
-        scaled_ones[i] = a[i] * h;
+    case 1: combine_of(1, n, stride, h, a, k, y, result); break;
+    case 2: combine_of(2, n, stride, h, a, k, y, result); break;
+    case 3: combine_of(3, n, stride, h, a, k, y, result); break;
+    case 4: combine_of(4, n, stride, h, a, k, y, result); break;
+    case 5: combine_of(5, n, stride, h, a, k, y, result); break;
+    case 6: combine_of(6, n, stride, h, a, k, y, result); break;
+    case 7: combine_of(7, n, stride, h, a, k, y, result); break;
+    default: combine_of(STAGES, n, stride, h, a, k, y, result);
     }
 }
 
 /* The stages k (STAGES, n), of which the first is given, and the new state y1. */
 PRBM bool stages(Equations *equations, int n, double t, const double *y, double h, double *k,
                  double *y1, Problem *problem) {
-    double a[STAGES];
+    (void)t; /* see rate */
+    start_from(equations, y);
     for (int i = 1; i < STAGES; i++) {
-        times_step(i, STAGE[i], h, a);
-        combine(n, i, a, k, y, y1);
-        if (!rate(equations, t + NODE[i] * h, y1, k + i * n, problem)) {
+        int acting = i + 1 < STAGES ? n - 2 : n; /* what was dissipated and done does not act */
+        combine(acting, n, i, h, STAGE[i], k, y, y1);
+        if (!rates_at(equations, y1, true, k + i * n, problem)) {
             return false;
         }
     }
@@ -86,10 +79,19 @@ PRBM bool stages(Equations *equations, int n, double t, const double *y, double 
 }
 
 PRBM void error_of(int n, const double *k, double h, double *error) {
-    double a[STAGES];
-    times_step(STAGES, ERROR_WEIGHT, h, a);
     zeros(n, error);
-    combine(n, STAGES, a, k, error, error);
+    combine(n, n, STAGES, h, ERROR_WEIGHT, k, error, error);
+}
+
+/* How far the first n components of the dense output can be from the start of the step. */
+static void furthest(int n, int ny, const double *k, double h, double *distance) {
+    for (int j = 0; j < n; j += LANES) {
+        Lanes sum = NO_LANES;
+        for (int i = 0; i < STAGES; i++) {
+            sum += LARGEST_WEIGHT[i] * magnitudes(lanes_at(k + i * ny + j));
+        }
+        set_lanes(distance + j, h * sum);
+    }
 }
 
 /* The weights of the stages at a fraction of a step. */
@@ -104,6 +106,5 @@ PRBM void interpolate(int n, const double *y, const double *k, double h, double 
                       double *result) {
     double b[STAGES];
     weights(theta, b);
-    times_step(STAGES, b, h, b);
-    combine(n, STAGES, b, k, y, result);
+    combine(n, n, STAGES, h, b, k, y, result);
 }

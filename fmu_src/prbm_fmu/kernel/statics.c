@@ -8,7 +8,9 @@
 
 #define LARGEST_TURN 0.5 /* rad per Newton step and step of the load: further is another shape */
 #define SMALLEST_FRACTION (1.0 / 512) /* of the load, before the continuation gives up */
-#define BALANCED 1e-12 /* of the largest torsion rate times one radian */
+#define BALANCED 1e-12 /* of the largest spring rate times one radian, or else of the load */
+#define CONVERGED 1e-8 /* rad of the last Newton step; what is left after it is its square */
+#define IMMOBILE 1e-12 /* share of a body's mobility that loops leave it: below, it cannot move */
 
 enum { NEWTON_STEPS = 30 };
 
@@ -24,25 +26,32 @@ PRBM void stack_release(const System *system, Complex *B, double *c) {
     c[r] = system->release_c;
 }
 
-PRBM void tangent_stiffness(int n, int r, const double *K, const Complex *w, const Complex *B,
+/* K + diag(Re(p)) with the pull p = (lam^T B - i w) e of each arm; a stretch has -Re(p) of its arm on
+ * the diagonal and Im(p) beside the arm's angle. */
+PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t) {
-    copy(n * n, K, K_t);
+    int n = system->n;
+    copy(n * n, system->K, K_t);
     for (int j = 0; j < n; j++) {
-        Complex row = {0.0, 0.0};
+        int a = arm_of(system, j);
+        Complex row = complex_of(w[a].im, -w[a].re);
         for (int i = 0; i < r; i++) {
-            row = plus(row, scaled(lam[i], B[i * n + j]));
+            row = plus(row, scaled(lam[i], B[i * n + a]));
         }
-        K_t[j * n + j] += product(w[j], e[j]).im + product(row, e[j]).re;
+        Complex pull = product(row, e[a]);
+        K_t[j * n + j] += a == j ? pull.re : -pull.re;
+        if (a != j) {
+            K_t[j * n + a] += pull.im;
+            K_t[a * n + j] += pull.im;
+        }
     }
 }
 
 /* What must hold at a fraction of the load: s = Re(B e) + c = 0, and the dead loads of row w. */
 typedef struct {
     const System *system;
-    int r;
-    Complex *B; /* (r, n) */
-    double *c;  /* (r,) */
-    Complex *w; /* (n,) */
+    Rows rows;
+    Complex *w; /* (n,) spread */
 } Balance;
 
 /* Torques and openings at (q, lam), and the rows of the constraints. */
@@ -50,33 +59,33 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
                        double *torque, double *open_by, double *rows, Scratch *scratch) {
     const System *system = balance->system;
     size_t used = scratch->used;
-    int n = system->n, r = balance->r;
+    int n = system->n, r = balance->rows.count;
     double *turned = take(scratch, (size_t)n), *load = take(scratch, (size_t)n);
     for (int j = 0; j < n; j++) {
         turned[j] = state[j] - system->q0[j];
     }
     springs(n, system->K, turned, torque);
     generalised(n, balance->w, e, load);
-    jacobian(r, n, balance->B, e, rows);
+    jacobian(&balance->rows, e, rows);
     for (int j = 0; j < n; j++) {
         torque[j] += load[j];
         for (int i = 0; i < r; i++) {
             torque[j] += state[n + i] * rows[i * n + j];
         }
     }
-    scalars(r, n, balance->B, balance->c, e, open_by);
+    scalars(&balance->rows, e, open_by);
     scratch->used = used;
 }
 
 /* One Newton step, of no more than the largest turn; false if there is none. */
 static bool newton_step(const Balance *balance, const Complex *e, double *torque, double *open_by,
-                        const double *rows, double *state, Scratch *scratch) {
+                        const double *rows, double *state, double *turned, Scratch *scratch) {
     size_t used = scratch->used;
-    int n = balance->system->n, r = balance->r, size = n + r;
+    int n = balance->system->n, r = balance->rows.count, size = n + r;
     double *K_t = take_matrix(scratch, n, n), *kkt = take_matrix(scratch, size, size);
     double *change = take(scratch, (size_t)size);
     Problem ignored;
-    tangent_stiffness(n, r, balance->system->K, balance->w, balance->B, state + n, e, K_t);
+    tangent_stiffness(balance->system, r, balance->w, balance->rows.B, state + n, e, K_t);
     saddle(n, r, K_t, rows, rows, kkt);
     copy(n, torque, change);
     for (int i = 0; i < r; i++) {
@@ -89,6 +98,7 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
         state[i] += (i < n ? share : -share) * change[i];
     }
     scratch->used = used;
+    *turned = turn;
     return finite_number(turn);
 }
 
@@ -96,20 +106,25 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
 static bool balance_out(const Balance *balance, double *state, Scratch *scratch) {
     const System *system = balance->system;
     size_t used = scratch->used;
-    int n = system->n, r = balance->r;
+    int n = system->n, r = balance->rows.count;
     Complex *e = take_complex(scratch, 1, n);
     double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
     double *rows = take_matrix(scratch, r, n), scale = BALANCED * largest(n * n, system->K);
-    bool going = true, balanced = false;
-    for (int step = 0; step < NEWTON_STEPS && going && !balanced; step++) {
-        directions(n, state, e);
+    double turn = HUGE_VAL;
+    bool going = true, balanced = false, done = false;
+    for (int j = 0; j < n && scale == 0.0; j++) {
+        scale = greater(scale, BALANCED * modulus(balance->w[j]));
+    }
+    for (int step = 0; step < NEWTON_STEPS && going && !done; step++) {
+        directions(system, state, e);
         unbalanced(balance, state, e, torque, open_by, rows, scratch);
         bool closed = largest(r, open_by) <= 1e-13 * system->length;
         balanced = closed && largest(n, torque) <= scale;
-        going = balanced || newton_step(balance, e, torque, open_by, rows, state, scratch);
+        done = balanced && turn <= CONVERGED;
+        going = done || newton_step(balance, e, torque, open_by, rows, state, &turn, scratch);
     }
     scratch->used = used;
-    return balanced;
+    return done || (balanced && !going);
 }
 
 /* The balance at a fraction of gravity and, if held, of the displacement. */
@@ -117,23 +132,27 @@ static bool loaded(const System *system, bool held, double displacement, double 
                    double *state, Scratch *scratch) {
     size_t used = scratch->used;
     int n = system->n, r = system->r;
-    Balance balance = {system, r + held, take_complex(scratch, r + 1, n),
-                       take(scratch, (size_t)r + 1), take_complex(scratch, 1, n)};
-    stack_release(system, balance.B, balance.c);
-    balance.c[r] -= fraction * displacement;
+    Complex *B = take_complex(scratch, r + 1, n);
+    double *c = take(scratch, (size_t)r + 1);
+    Balance balance = {system, plain_rows(system, r + held, B, c), take_complex(scratch, 1, n)};
+    stack_release(system, B, c);
+    c[r] -= fraction * displacement;
     field_row(n, system->S, scaled(fraction, system->gravity), balance.w);
+    spread(system, 1, balance.w, balance.w);
     bool balanced = balance_out(&balance, state, scratch);
     scratch->used = used;
     return balanced;
 }
 
-/* The largest change of a link between two states [rad]. */
+/* The largest change between two states of what bends [rad]; what hangs on a pin alone may turn at
+ * once. */
 static double jump(const System *system, const double *from, const double *to) {
     double top = 0.0;
-    for (int i = 0; i < system->mechanism->link_count; i++) {
-        int j = system->links[i];
+    for (int j = 0; j < system->n; j++) {
         double turn = to[j] - from[j];
-        top = greater(top, largest(1, &turn));
+        bool link = system->mechanism->coordinates[j].link >= 0;
+        bool bends = link || system->K[j * system->n + j] > 0.0;
+        top = bends ? greater(top, largest(1, &turn)) : top;
     }
     return top;
 }
@@ -190,6 +209,27 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     return found;
 }
 
+/* Whether the loops let the released body move: rows (r, n), its own the last. */
+static bool releasable(const System *system, const double *M, int r, const double *rows,
+                       double speed, Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    int n = system->n;
+    const double *row = rows + (r - 1) * n;
+    double *left = take(scratch, (size_t)n), *free = take(scratch, (size_t)n);
+    bool right = response(n, r - 1, 1, M, rows, row, left, scratch, problem) &&
+                 response(n, 0, 1, M, rows, row, free, scratch, problem);
+    double share = right ? dot(n, row, left) / dot(n, row, free) : 0.0;
+    scratch->used = used;
+    if (right && !(share > IMMOBILE)) {
+        const Mechanism *m = system->mechanism;
+        return fail(problem,
+                    "release.velocity = %g m/s: the body %s cannot move along the direction of the "
+                    "release; choose another direction, or let flexures stretch (axial = true)",
+                    speed, m->bodies[m->release.body - 1].name);
+    }
+    return right;
+}
+
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,
                            Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -201,13 +241,15 @@ PRBM bool release_velocity(const System *system, const double *q, double speed, 
     Complex *e = take_complex(scratch, 1, n), *B = take_complex(scratch, r, n);
     double *M = take_matrix(scratch, n, n), *C = take_matrix(scratch, n, n);
     double *rows = take_matrix(scratch, r, n), *rates = take(scratch, (size_t)r);
-    directions(n, q, e);
+    directions(system, q, e);
     inertia(n, system->H, system->J, e, M, C);
     stack_release(system, B, rates);
-    jacobian(r, n, B, e, rows);
+    Rows held = plain_rows(system, r, B, NULL);
+    jacobian(&held, e, rows);
     zeros(r, rates);
     rates[r - 1] = -speed;
-    bool found = project_velocities(n, r, M, rows, rates, v, scratch, problem);
+    bool found = releasable(system, M, r, rows, speed, scratch, problem) &&
+                 project_velocities(n, r, M, rows, rates, v, scratch, problem);
     scratch->used = used;
     return found;
 }

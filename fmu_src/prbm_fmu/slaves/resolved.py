@@ -11,9 +11,11 @@ PARTS = {
     "bodies": "Body",
     "flexure_types": "FlexureType",
     "flexures": "Flexure",
+    "joints": "Joint",
     "stops": "Stop",
     "frictions": "Friction",
     "forces": "Force",
+    "probes": "Probe",
     "geometry": "Parameter",
 }
 EMPTY: dict[str, Any] = {"Real": float("nan"), "Integer": 0, "Boolean": False, "String": ""}

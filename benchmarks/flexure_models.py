@@ -1,0 +1,361 @@
+"""How good the flexure models are: cantilevers against beam theory, a guide against elements.
+
+    python benchmarks/flexure_models.py
+
+writes the tables of ``docs/flexure-models.md`` (between their marks) and the figure
+``docs/figures/flexure-models.png``.  The tests compare the page with what is computed here.
+
+Model errors alone: the equations of each model are solved to rounding.
+"""
+
+import math
+import re
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from numpy.typing import NDArray
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
+
+from prbm import (
+    Body,
+    Flexure,
+    FlexureType,
+    Force,
+    Mechanism,
+    Release,
+    System,
+    assemble,
+    equilibrium,
+    free_displacement,
+    modal_restitution,
+    modes,
+)
+from prbm.mechanism import Probe
+from prbm_tools.beams import Tip, end_force, end_moment, wavenumber
+from prbm_tools.mechanism_file import load, shipped
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+Real = NDArray[np.float64]
+Cell = float | None
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "flexure-models.md"
+FIGURE = ROOT / "docs" / "figures" / "flexure-models.png"
+MODELS = ("1R", "2R", "3R", "10R", "40R")
+FORCES = (0.1, 1.0, 2.0, 4.0, 8.0)  # P L^2/EI
+MOMENTS = (0.1, math.pi / 4, math.pi / 2, math.pi)  # M L/EI
+TIPS = ((0.0, 0.0), (1.0, 0.0), (10.0, 0.0), (1.0, 0.1))  # body at the tip: m, J of the beam's
+WEIGHTLESS = 1e-8  # mass of a tip body that is none, in units of the beam's
+
+FE_GUIDE = (10.7206, 4.9065, 130.65, 209.82, 302.05, 327.65)
+"""Rest position [mm] and frequencies at rest [Hz] of the steel guide: 64 ANCF cable elements a
+flexure (Exudyn), which stretch and have no rotary inertia of their sections."""
+FE_STRAIGHT = 4.6405  # Hz, without gravity; 32 elements
+FE_RESTITUTION = {
+    -4: (0.4089, 0.5483, 0.4084),
+    0: (0.4519, 0.5947, 0.4519),
+    4: (0.4104, 0.5482, 0.4108),
+}
+"""Algebraic modal restitution by the same elements, eps = 0.6, without gravity: by offset of the
+hit from the centre of mass [mm], for walls at -10, 0 and 10 mm."""
+
+# --- cantilevers --------------------------------------------------------------------------------
+
+L, THICKNESS, WIDTH, MODULUS, DENSITY = 0.1, 5e-4, 1e-2, 2e11, 7800.0
+EI = MODULUS * WIDTH * THICKNESS**3 / 12
+MASS = DENSITY * WIDTH * THICKNESS * L
+
+
+def kind(name: str, model: str, *, axial: bool = False) -> FlexureType:
+    """Return a flexure type of the steel cantilever; ``10R`` is a chain of ten links."""
+    n = int(model[:-1])
+    which = ("nR", n) if n > 3 else (model, 0)
+    return FlexureType(name, which[0], THICKNESS, WIDTH, MODULUS, DENSITY, n=which[1], axial=axial)
+
+
+def cantilever(model: str, tip: tuple[float, float] = (0.0, 0.0), *, axial: bool = False) -> System:
+    """Return a cantilever with a body at its tip, its mass and inertia in units of m, m L^2."""
+    mass, inertia = (max(x, WEIGHTLESS) for x in tip)
+    mechanism = Mechanism(
+        name="Cantilever",
+        title="A flexure, clamped at one end",
+        ground={"clamp": (0.0, 0.0)},
+        bodies=(Body("tip", mass * MASS, inertia * MASS * L**2, (L, 0.0), {"end": (L, 0.0)}),),
+        flexure_types=(kind("leaf", model, axial=axial),),
+        flexures=(Flexure("leaf1", "leaf", "ground.clamp", "tip.end", ("clamp", "free")),),
+        forces=(Force("force", "tip"),),
+        probes=(Probe("end", "tip.end"),),
+        release=Release("tip", direction=90.0),
+    )
+    return assemble(mechanism, mechanism.values())
+
+
+def tip_of(system: System, force: float = 0.0, moment: float = 0.0) -> Tip:
+    """Return the tip under P L^2/EI across the beam and M L/EI."""
+    loads = {"force.y": force * EI / L**2, "force.moment": moment * EI / L}
+    q = equilibrium(system, loads=loads).q
+    probe = system.probes[0]
+    z = complex(probe.A @ system.directions(q)) + probe.c
+    return Tip(z / L, float(q[probe.j]))
+
+
+def displacement_error(found: Tip, exact: Tip) -> float:
+    """Return how far the tip is from where it should be, over its displacement [%]."""
+    return 100 * abs(found.z - exact.z) / abs(exact.z - 1)
+
+
+def frequency_error(system: System, tip: tuple[float, float], mode: int) -> float | None:
+    """Return the relative error of a frequency [%]; None if the model has no such mode."""
+    found = modes(system, equilibrium(system)).frequency
+    if mode > len(found):
+        return None
+    b = wavenumber(mode, *(max(x, WEIGHTLESS) for x in tip))
+    exact = b**2 * math.sqrt(EI / (MASS * L**3)) / (2 * math.pi)
+    return 100 * (float(found[mode - 1]) / exact - 1)
+
+
+# --- the guide ----------------------------------------------------------------------------------
+
+
+@cache
+def guide(model: str, *, axial: bool = False) -> Mechanism:
+    """Return the steel guide of the thesis with another model of its flexures."""
+    shipped_guide = load(shipped()["PRBDM2R"])
+    section = kind("flexure", model, axial=axial)
+    flexure = replace(shipped_guide.flexure_types[0], model=section.model, n=section.n, axial=axial)
+    return replace(shipped_guide, flexure_types=(flexure,))
+
+
+@cache
+def guide_figures(model: str, *, axial: bool = False) -> Real:
+    """Return rest position [mm], five frequencies at rest and f1 straight [Hz]; NaN: no mode."""
+    mechanism = guide(model, axial=axial)
+    system = assemble(mechanism, mechanism.values())
+    f = modes(system, equilibrium(system)).frequency[:5]
+    straight = assemble(mechanism, mechanism.values({"gravity.x": 0.0}))
+    f1 = modes(straight, equilibrium(straight)).frequency[0]
+    missing = [math.nan] * (5 - len(f))
+    return np.array([1e3 * free_displacement(system), *f, *missing, f1])
+
+
+@cache
+def restitution_error(model: str, *, axial: bool) -> float:
+    """Return the largest difference of the modal restitution from finite elements [-]."""
+    mechanism = guide(model, axial=axial)
+    worst = 0.0
+    for offset, row in FE_RESTITUTION.items():
+        changes = {"gravity.x": 0.0, "stop.offset": 1e-3 * offset}
+        system = assemble(mechanism, mechanism.values(changes))
+        for x, exact in zip((-10e-3, 0.0, 10e-3), row, strict=True):
+            found = modal_restitution(system, equilibrium(system, x), 0, 0.6)
+            worst = max(worst, abs(found - exact))
+    return worst
+
+
+# --- tables -------------------------------------------------------------------------------------
+
+
+def table(head: Sequence[str], rows: Sequence[tuple[str, Sequence[Cell]]], form: str) -> str:
+    """Return a table in Markdown, its numbers in one form."""
+    lines = ["| " + " | ".join(head) + " |", "|---" + "|---:" * (len(head) - 1) + "|"]
+    for name, cells in rows:
+        written = ["-" if c is None or math.isnan(c) else format(c, form) for c in cells]
+        lines.append("| " + " | ".join([name, *written]) + " |")
+    return "\n".join(lines)
+
+
+def force_table() -> str:
+    """Error of the tip's place under an end force, over its displacement [%]."""
+    systems = [cantilever(model) for model in MODELS]
+    rows = [
+        (
+            f"{load:g}",
+            [displacement_error(tip_of(s, force=load), end_force(load)) for s in systems],
+        )
+        for load in FORCES
+    ]
+    return table(["P L²/EI", *MODELS], rows, ".2f")
+
+
+def moment_table() -> str:
+    """Error of the tip's place under an end moment [%], and the tip's slope over the exact one."""
+    systems = [cantilever(model) for model in MODELS]
+    rows = [
+        (
+            f"{load / math.pi:g} π" if load > 0.5 else f"{load:g}",
+            [displacement_error(tip_of(s, moment=load), end_moment(load)) for s in systems],
+        )
+        for load in MOMENTS
+    ]
+    slopes = [tip_of(s, moment=1.0).slope for s in systems]
+    # fmt: off
+    return table(["M L/EI", *MODELS], rows, ".2f") + "\n" + table(
+        [], [("slope / exact", slopes)], ".3f"
+    ).splitlines()[-1]
+    # fmt: on
+
+
+def frequency_table() -> str:
+    """Errors of the first two frequencies with a body at the tip [%]."""
+    rows = []
+    for tip in TIPS:
+        systems = [cantilever(model, tip) for model in MODELS]
+        for mode in (1, 2):
+            errors = [frequency_error(s, tip, mode) for s in systems]
+            rows.append((f"{tip[0]:g}, {tip[1]:g}: f{mode}", errors))
+    return table(["m, J of the body", *MODELS], rows, "+.2f")
+
+
+def guide_table() -> str:
+    """Rest position and frequencies of the steel guide by model, and by finite elements."""
+    names = ("rest, mm", "f1", "f2", "f3", "f4", "f5", "f1 straight")
+    columns = [guide_figures(model) for model in MODELS]
+    columns += [guide_figures(model, axial=True) for model in ("2R", "40R")]
+    columns.append(np.array([*FE_GUIDE, FE_STRAIGHT]))
+    head = ["", *MODELS, "2R axial", "40R axial", "FE"]
+    rows = [(name, [float(c[i]) for c in columns]) for i, name in enumerate(names)]
+    return table(head, rows, ".5g")
+
+
+def restitution_table() -> str:
+    """Largest difference of the modal restitution from finite elements [-]."""
+    rows = [
+        (name, [restitution_error(model, axial=axial) for model in MODELS])
+        for name, axial in (("inextensible", False), ("axial", True))
+    ]
+    return table(["", *MODELS], rows, ".4f")
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "end force": force_table,
+    "end moment": moment_table,
+    "frequencies": frequency_table,
+    "guide": guide_table,
+    "restitution": restitution_table,
+}
+MARKED = r"(<!-- table: {} -->\n)(.*?)(<!-- end -->)"
+
+
+def shown(page: str, name: str) -> str:
+    """Return the table of a name as it stands on the page."""
+    found = re.search(MARKED.format(name), page, re.DOTALL)
+    assert found, f"the page has no table {name!r}"
+    return found[2].strip()
+
+
+# --- convergence and figure ---------------------------------------------------------------------
+
+CHAINS = (5, 10, 20, 40, 80)
+
+
+def richardson(values: Sequence[Real]) -> Real:
+    """Return the limit of figures at doubled n whose error falls as n^-2, and then n^-4."""
+    a, b, c = values[-3:]
+    once = (4 * b - a) / 3, (4 * c - b) / 3
+    return (16 * once[1] - once[0]) / 15
+
+
+def order(ns: Sequence[int], errors: Sequence[float]) -> float:
+    """Return the order of convergence by a least-squares line through logarithms."""
+    return -float(np.polyfit(np.log(ns), np.log(errors), 1)[0])
+
+
+COLOURS = dict(
+    zip(MODELS, ("#d55e00", "#e69f00", "#cc79a7", "#009e73", "#0072b2"), strict=True)
+)  # also for those who see colours differently
+LOADS: dict[str, tuple[str, Callable[[float], Tip], float]] = {
+    "force": ("end force, P L²/EI", end_force, 8.0),
+    "moment": ("end moment, M L/EI", end_moment, math.pi),
+}
+
+
+def figure() -> None:
+    """Draw tip paths, their errors, and the convergence of the chain."""
+    fig, ((paths, chains), below) = plt.subplots(2, 2, figsize=(9.0, 7.6), layout="constrained")
+    draw_paths(paths)
+    draw_convergence(chains)
+    for axes, what in zip(below, LOADS, strict=True):
+        draw_errors(axes, what)
+    FIGURE.parent.mkdir(exist_ok=True)
+    fig.savefig(FIGURE, dpi=110, metadata={"Software": None})
+    plt.close(fig)
+
+
+def draw_paths(axes: plt.Axes) -> None:
+    """Draw where the tip is under both loads."""
+    for what, (_, exact, most) in LOADS.items():
+        path = np.array([exact(x).z for x in np.linspace(0.0, most, 200)])
+        axes.plot(path.real, path.imag, color="0.7", lw=4)
+        marks = np.array([exact(x).z for x in np.linspace(0, most, 5)])
+        axes.plot(marks.real, marks.imag, "o", color="0.35", mfc="none", ms=10)
+        for model in MODELS[:3]:
+            system = cantilever(model)
+            z = np.array([tip_of(system, **{what: x}).z for x in np.linspace(0.0, most, 33)])
+            axes.plot(z.real, z.imag, color=COLOURS[model], lw=1.2)
+            axes.plot(z.real[::8], z.imag[::8], "o", color=COLOURS[model], ms=4)
+    axes.set(xlabel="x / L", ylabel="y / L", xlim=(-0.08, 1.08), title="Tip of a cantilever")
+    axes.set_aspect("equal")
+    axes.annotate("end moment 0 to π", (0.02, 0.56), color="0.35")
+    axes.annotate("end force\n0 to 8", (0.76, 0.68), color="0.35")
+    lines = [plt.Line2D([], [], color="0.7", lw=4)]
+    lines += [plt.Line2D([], [], color=COLOURS[model], marker="o", ms=4) for model in MODELS[:3]]
+    axes.legend(lines, ["elastica", *MODELS[:3]], loc="lower left")
+
+
+def draw_errors(axes: plt.Axes, what: str) -> None:
+    """Draw the errors of the tip's place over a load."""
+    name, exact, most = LOADS[what]
+    loads = np.linspace(0.0, most, 60)[1:]
+    for model in MODELS:
+        system = cantilever(model)
+        errors = [displacement_error(tip_of(system, **{what: x}), exact(x)) for x in loads]
+        axes.semilogy(loads, errors, color=COLOURS[model], label=model)
+    axes.set(
+        xlabel=name,
+        ylabel="error of the tip / its displacement, %",
+        title=name.split(",")[0].capitalize(),
+    )
+    axes.legend(loc=(0.5, 0.13 if what == "force" else 0.02), ncols=2)
+    axes.grid(alpha=0.3)
+
+
+def draw_convergence(axes: plt.Axes) -> None:
+    """Draw how the chain converges to finite elements on the steel guide."""
+    chains = np.array([guide_figures(f"{n}R", axial=True) for n in CHAINS])
+    limit = richardson(list(chains))
+    for i, (name, mark) in enumerate((("rest position", "o"), ("f1", "s"), ("f2", "^"))):
+        errors = 100 * np.abs(chains[:, i] / limit[i] - 1)
+        axes.loglog(CHAINS, errors, mark + "-", ms=4, label=name)
+    axes.loglog(CHAINS, 2.5e2 / np.array(CHAINS) ** 2.0, "k:", label="1/n²")
+    axes.set(
+        xlabel="links of a chain, n", ylabel="error, %", title="Steel guide, chains that stretch"
+    )
+    axes.set_xticks(CHAINS, [str(n) for n in CHAINS], minor=False)
+    axes.minorticks_off()
+    axes.grid(alpha=0.3)
+    axes.legend()
+
+
+def main() -> None:
+    """Bring the page and its figure up to date."""
+    page = PAGE.read_text(encoding="utf-8")
+    for name, make in TABLES.items():
+        body = make()
+        print(f"{name}\n{body}\n")
+        page = re.sub(
+            MARKED.format(name), lambda m, body=body: f"{m[1]}{body}\n{m[3]}", page, flags=re.DOTALL
+        )
+    PAGE.write_text(page, encoding="utf-8")
+    figure()
+
+
+if __name__ == "__main__":
+    main()

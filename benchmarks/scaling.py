@@ -1,0 +1,118 @@
+"""How the cost of a right-hand side grows with the number of links, and of loops.
+
+    python benchmarks/scaling.py
+
+Counted by valgrind are the instructions of the native right-hand side; the exponent is the slope
+of a least-squares line through the logarithms of the upper half of the sizes.
+
+links   the guide with two chains of n links each, 4 to 50: one loop, blocks of mass that grow
+loops   a shuttle on k two-rotation flexures, 2 to 12: k - 1 loops, blocks of mass that do not
+axial   the same chains, whose links stretch: twice the coordinates
+"""
+
+import argparse
+import dataclasses
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
+
+from native import inclusive
+
+from c_importer import Job, execute, kernel_library, unpack, write
+from prbm import Flexure, Mechanism, assemble
+from prbm_fmu import native_fmu
+from support import mechanism
+
+LINKS = (4, 8, 12, 18, 25, 35, 50)  # a flexure
+LEAVES = (2, 3, 4, 6, 8, 10, 12)
+UNTIL = 2e-5  # s: enough steps for a mean
+
+
+def chains(n: int, axial: bool = False) -> Mechanism:
+    """Return the guide on two chains of n links."""
+    guide = mechanism("PRBDM2R")
+    leaf = dataclasses.replace(guide.flexure_types[0], model="nR", n=n, axial=axial)
+    return dataclasses.replace(guide, name=f"Chains{n}{'Axial' * axial}", flexure_types=(leaf,))
+
+
+def leaves(k: int) -> Mechanism:
+    """Return a shuttle on k flexures side by side, of which the first and last are the guide's."""
+    guide = mechanism("PRBDM2R")
+    shuttle, x = guide.bodies[0], [f"{i / (k - 1):.17g}*shuttle.width" for i in range(k)]
+    body = dataclasses.replace(
+        shuttle, points={f"p{i}": (x[i], "flexure.length") for i in range(k)}
+    )
+    flexures = tuple(
+        Flexure(f"leaf_{i}", "flexure", f"ground.p{i}", f"shuttle.p{i}") for i in range(k)
+    )
+    return dataclasses.replace(
+        guide,
+        name=f"Leaves{k}",
+        ground={f"p{i}": (x[i], 0.0) for i in range(k)},
+        bodies=(body,),
+        flexures=flexures,
+    )
+
+
+def instructions(given: Mechanism) -> float:
+    """Return the instructions of a right-hand side of a mechanism, on average."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write(folder / "model.fmu", native_fmu.build(given, {}, 2, ("host",)))
+        unpack(folder / "model.fmu", folder / "model")
+        library = kernel_library("profiled", ("-g",))
+        job = Job(
+            folder / "model", points=np.array([0.0, UNTIL]), records=("time",), library=library
+        )
+        counted = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")
+        done = execute(job, before=counted)
+        if done.status:
+            raise RuntimeError(done.errors)
+        calls, total = inclusive(folder / "profile", "solve_motion")
+    return total / calls
+
+
+def rows(sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Iterator[tuple[int, float]]:
+    """Print and yield size and cost of mechanisms."""
+    for size in sizes:
+        given = make(size)
+        system = assemble(given, given.values())
+        cost = instructions(given)
+        print(
+            f"  {size:4d}: {system.n:4d} coordinates, {len(system.links):4d} links, "
+            f"{len(system.loops) // 2:3d} loops {cost:12.0f} instructions"
+        )
+        yield size, cost
+
+
+def grows(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> None:
+    """Print costs and with which exponent they grow."""
+    print(f"\n{title}")
+    size, cost = np.array([*rows(sizes, make)]).T
+    half = len(size) // 2
+    slope = np.polyfit(np.log(size[half:]), np.log(cost[half:]), 1)[0]
+    print(f"  exponent {slope:.2f} over the upper half of the sizes")
+
+
+def main() -> None:
+    """Print what was asked for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--largest", type=int, default=50, help="links a chain, at most")
+    most = parser.parse_args().largest
+    if shutil.which("valgrind") is None:
+        sys.exit("valgrind is not installed, so no instructions can be counted")
+    sizes = tuple(n for n in LINKS if n <= most)
+    grows("Links: two chains of n links", sizes, chains)
+    grows("Axial: two chains of n links that stretch", sizes, lambda n: chains(n, axial=True))
+    grows("Loops: k two-rotation flexures side by side", LEAVES, leaves)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,90 @@
+"""In which line of a TOML text each table and key stands, which tomllib does not tell."""
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+
+Path = tuple[str | int, ...]
+
+_STRING = (
+    r'"""(?:\\.|[^\\])*?"""(?:"{0,2})'
+    r"|'''.*?'''(?:'{0,2})"
+    r'|"(?:\\.|[^"\\\n])*"'
+    r"|'[^'\n]*'"
+)
+_PIECE = re.compile(rf"{_STRING}|\#[^\n]*|[\[\]{{}}\n]|[^\[\]{{}}\n\"'#]+", re.DOTALL)
+_HEADER = re.compile(r"\s*(\[\[?)(.*)", re.DOTALL)
+_KEY = re.compile(rf"\s*((?:{_STRING}|[^=\"'#])+?)\s*=", re.DOTALL)
+
+
+def lines(text: str) -> dict[Path, int]:
+    r"""Return the lines, counted from 1, of all tables and keys of a valid TOML text.
+
+    Tables of an array are counted from 0; the array is where its first table is.  What stands
+    inside a value has no line of its own.
+
+    Examples
+    --------
+    >>> lines("a = 1\n[[b]]\nc = 2\n[[b]]\n")
+    {('a',): 1, ('b',): 2, ('b', 0): 2, ('b', 0, 'c'): 3, ('b', 1): 4}
+    """
+    result: dict[Path, int] = {}
+    counts: dict[Path, int] = {}
+    table: Path = ()
+    for line, statement in _statements(text):
+        header = _HEADER.match(statement)
+        if header:
+            table = _opened(_keys(statement), counts, array=header[1] == "[[")
+            result.setdefault(table[:1], line)
+            result[table] = line
+        elif key := _KEY.match(statement):
+            path = (*table, *_keys(f"{key[1]} = 0"))
+            result.setdefault(path[: len(table) + 1], line)
+            result[path] = line
+    return result
+
+
+def line_of(path: Sequence[str | int], known: Mapping[Path, int]) -> int | None:
+    """Return the line of a key, or of the nearest table around it that has one."""
+    for length in range(len(path), 0, -1):
+        if tuple(path[:length]) in known:
+            return known[tuple(path[:length])]
+    return None
+
+
+def _statements(text: str) -> Iterator[tuple[int, str]]:
+    """Yield every key with its value, and every header, with the line where it begins."""
+    line, first, begin, depth = 1, 1, 0, 0
+    for piece in _PIECE.finditer(text + "\n"):
+        token = piece[0]
+        line += token.count("\n")
+        depth += (token in "[{") - (token in "]}")
+        if token == "\n" and not depth:
+            yield first, text[begin : piece.start()]
+            first, begin = line, piece.end()
+
+
+def _keys(statement: str) -> list[str]:
+    """Return the keys of a header, or of a key with a value that is no table."""
+    keys = []
+    data = tomllib.loads(statement)
+    while isinstance(data, dict) and data:
+        key, data = next(iter(data.items()))
+        keys.append(key)
+        data = data[0] if isinstance(data, list) else data
+    return keys
+
+
+def _opened(keys: Sequence[str], counts: dict[Path, int], array: bool) -> Path:
+    """Return the path of the table that a header opens."""
+    path: Path = ()
+    for key in keys[:-1]:
+        path = _last((*path, key), counts)
+    path = (*path, keys[-1])
+    if array:
+        counts[path] = counts.get(path, 0) + 1
+    return _last(path, counts)
+
+
+def _last(path: Path, counts: Mapping[Path, int]) -> Path:
+    return (*path, counts[path] - 1) if path in counts else path

@@ -1,0 +1,488 @@
+"""A mechanism file that uses everything there is, and what can be wrong with one."""
+
+from prbm.flexure import MOST_LINKS
+from prbm_tools.mechanism_file import LARGEST_FILE
+
+EXAMPLE = """\
+#:schema mechanism.schema.json
+#  ground --- arm --- tip
+name = "Striker"
+title = "An arm on a leaf that strikes an anvil, which hangs on a pin"
+gravity = ["0 m/s2", "-981 cm/s2"]
+damping_zeta = 0.01
+damping_beta = "8 us"
+
+[[geometry]]
+name = "arm.length"
+value = "40 mm"
+minimum = "1 nm"
+
+[[geometry]]
+name = "ratio"
+value = 0.5
+
+[[materials]]
+name = "steel"
+youngs_modulus = "181.5 GPa"
+density = "7.8 g/cm3"
+
+[[flexure_types]]
+name = "leaf"
+model = "2R"
+thickness = "0.1 mm"
+width = "8 mm"
+material = "steel"
+
+[ground]
+foot = [0, 0]
+side = [0, "10 mm"]
+far = ["arm.length + 2 cm", "50 mm"]
+
+[[bodies]]
+name = "arm"
+mass = "53.187 g"
+inertia = "28366.4 g.mm2"
+centre = ["arm.length/2 + 3 mm", 0.0]
+
+[bodies.points]
+root = ["20 mm", 0.0]
+tip = ["arm.length", "0 m"]
+
+[[bodies]]
+name = "anvil"
+mass = "2e-3 kg"
+inertia = 1e-6
+centre = [0.06, 0.0]
+points.top = ["arm.length + 2 cm", "20 mm"]
+points.hook = ["arm.length", 0]
+
+[[flexures]]
+name = "left"
+type = "leaf"
+start = "ground.foot"
+end = "arm.root"
+
+[[flexures]]
+name = "right"
+model = "nR"
+n = 8
+thickness = "50 um"
+width = 8e-3
+material = "steel"
+axial = true
+start = "ground.side"
+end = "arm.root"
+ends = "clamp"
+
+[[flexures]]
+name = "hanger"
+model = "1R"
+thickness = 1e-4
+width = "8 mm"
+youngs_modulus = "70 GPa"
+density = 2700
+coefficients = { gamma = 0.85 }
+start = "ground.far"
+end = "anvil.top"
+ends = ["clamp", "pin"]
+
+[[joints]]
+name = "hook"
+start = "arm.tip"
+end = "anvil.hook"
+
+[[stops]]
+name = "wall"
+body = "arm"
+point = "arm.tip"
+direction = "-90 deg"
+position = "2 mm"
+on = "anvil"
+
+[[frictions]]
+name = "rub"
+body = "arm"
+point = ["1 cm", "2 mm"]
+normal_force = "3 mN"
+normal_stiffness = "2 N/mm"
+
+[[forces]]
+name = "push"
+body = "arm"
+point = "arm.tip"
+
+[[forces]]
+name = "pull"
+body = "anvil"
+
+[[probes]]
+name = "watch"
+point = "arm.tip"
+
+[release]
+body = "arm"
+direction = "1.5707963267948966 rad"
+displacement = "-3 mm"
+"""
+
+HANGER = 'youngs_modulus = "70 GPa"\ndensity = 2700\n'
+RIGHT = 'thickness = "50 um"\nwidth = 8e-3\nmaterial = "steel"\n'
+CHANGES = {
+    # units
+    "unknown unit": ('"53.187 g"', '"3 furlong"', "bodies.0.mass (of arm) = '3 furlong': the unit"),
+    "wrong dimension": ('"0.1 mm"', '"3 kg"', "flexure_types.0.thickness (of leaf) = '3 kg': 'kg'"),
+    "unit of another dimension in an expression": ("/2 + 3 mm", "/2 + 3 s", "'s' is the unit of"),
+    "unknown unit in an expression": ("/2 + 3 mm", "/2 + 3 ell", "the unit 'ell' is unknown"),
+    "product of units": ("/2 + 3 mm", "* 3 mm", "is a term of a sum"),
+    "unit of gravity": ('"-981 cm/s2"', '"-981 cm"', "gravity.1 = '-981 cm': 'cm' is the unit"),
+    "direction in metres": ('"-90 deg"', '"-90 m"', "stops.0.direction (of wall)"),
+    "value in another unit": (
+        "value = 0.5",
+        'value = "5 mm"\nunit = "kg"',
+        "geometry.1.value (of ratio) = '5 mm': 'mm' is the unit of something else",
+    ),
+    "minimum in another unit": ('"1 nm"', '"1 ng"', "geometry.0.minimum (of arm.length)"),
+    "unit that is not SI": (
+        '"40 mm"',
+        '40\nunit = "mm"',
+        "arm.length has the unit 'mm': parameters",
+    ),
+    "unit of a parameter unknown": (
+        "= 0.5",
+        '= 5\nunit = "ell"',
+        "ratio has the unit 'ell': the unit",
+    ),
+    "unit in a coefficient": ("gamma = 0.85", 'gamma = "85 mm"', "write a number without a unit"),
+    # types
+    "text as a number": (
+        "damping_zeta = 0.01",
+        'damping_zeta = "much"',
+        "damping_zeta = 'much': write",
+    ),
+    "expression as gravity": (
+        '"-981 cm/s2"',
+        '"ratio"',
+        "gravity.1 = 'ratio': write a number in m",
+    ),
+    "list as a number": ('mass = "53.187 g"', "mass = [1, 2]", "(of arm) = [1, 2]: write a number"),
+    "list as a value": (
+        "value = 0.5",
+        "value = [1]",
+        "geometry.1.value (of ratio) = [1]: write a number",
+    ),
+    "truth as a number": (
+        'mass = "53.187 g"',
+        "mass = true",
+        "(of arm) = True: write a number, or",
+    ),
+    "date as a number": (
+        'mass = "53.187 g"',
+        "mass = 2020-01-01",
+        "write a number, or an expression",
+    ),
+    "number as a name": ('name = "leaf"', "name = 7", "flexure_types.0.name = 7: write a text"),
+    "number as a title": ("title = ", "title = 3 # ", "title = 3: write a text in quotes"),
+    "text as a truth": ("axial = true", 'axial = "yes"', "axial (of right) = 'yes': write true or"),
+    "part of a link": ("n = 8", "n = 8.5", "flexures.1.n (of right) = 8.5: write a whole number"),
+    "gravity with three numbers": ('"0 m/s2", ', "0, 0, ", "take out what is too much"),
+    "gravity with one number": ('"0 m/s2", ', "", "a number is missing; add it"),
+    "point with one number": (
+        "side = [0, ",
+        "side = [",
+        "ground.side = ['10 mm']: a number is missing",
+    ),
+    "point that is a number": (
+        'point = ["1 cm", "2 mm"]',
+        "point = 1",
+        "frictions.0.point (of rub)",
+    ),
+    "point without a body": (
+        'point = "arm.tip"\ndir',
+        'point = "tip"\ndir',
+        "write the name of a point",
+    ),
+    "array instead of table": ("[release]", "[[release]]", "release = [{"),
+    "table instead of array": ("[[joints]]", "[joints]", "joints = {"),
+    "ground as an array": ("[ground]", "[[ground]]", "ground = [{"),
+    "value instead of an array": (
+        '[[probes]]\nname = "watch"\npoint = "arm.tip"\n',
+        "[probes]\n",
+        "probes = {}: write a list",
+    ),
+    # keys
+    "unknown key": ("inertia = 1e-6", "inertai = 1e-6", "did you mean inertia?"),
+    "unknown key of the file": ("title = ", "titel = ", "titel is no key that is known there; did"),
+    "unknown table": (
+        "[[probes]]",
+        "[[prones]]",
+        "prones is no key that is known there; did you mean",
+    ),
+    "key of another part": ("n = 8", "stroke = 8", "known are name, model, n, thickness, width"),
+    "missing key": ("inertia = 1e-6\n", "", "bodies.1.inertia (of anvil) is missing: add the key"),
+    "body without mass": ('mass = "2e-3 kg"\n', "", "bodies.1.mass (of anvil) is missing: add the"),
+    "missing release": ("[release]", "[relaese]", "relaese is no key that is known there; did you"),
+    "key defined twice": ("damping_zeta = 0.01", "name = 'x'", "(at line 6, column "),
+    "table defined twice": ("[release]", "[ground]", "line 116"),
+    # names
+    "name of two parts": ('name = "anvil"', 'name = "arm"', "the name 'arm' is used twice"),
+    "name of two types": ('name = "hanger"', 'name = "leaf"', "the name 'leaf' is used twice"),
+    "name of two materials": (
+        "[[flexure_types]]",
+        "[[materials]]\nname = 'steel'\ndensity = 1\nyoungs_modulus = 1\n[[flexure_types]]",
+        "'steel' is used twice",
+    ),
+    "name of a material and a body": (
+        'name = "steel"',
+        'name = "arm"',
+        "'arm' is used twice or reserved",
+    ),
+    "name that is reserved": (
+        'name = "rub"',
+        'name = "energy"',
+        "'energy' is used twice or reserved",
+    ),
+    "parameter defined twice": (
+        '"ratio"',
+        '"arm.mass"',
+        "the parameter 'arm.mass' is defined twice",
+    ),
+    "name of Python": ('name = "Striker"', 'name = "class"', "mechanism name 'class'"),
+    "name with a path": ('"Striker"', '"../../etc/x"', "mechanism name '../../etc/x': use letters"),
+    "name that is empty": ('"Striker"', '""', "mechanism name ''"),
+    "name too long": ('"Striker"', f'"{"x" * 300}"', "write a shorter name, of at most 100"),
+    "part with a path": ('name = "anvil"', 'name = "../anvil"', "bodies.1.name (of ../anvil)"),
+    "part with a name of Python": ('name = "anvil"', 'name = "lambda"', "a word of Python"),
+    "part with a name too long": ('name = "rub"', f'name = "{"x" * 300}"', "write a shorter name"),
+    "point with spaces": ("side = [0", '"my side" = [0', "ground.my side = 'my side': use letters"),
+    # references
+    "missing point": (
+        'end = "anvil.hook"',
+        'end = "anvil.nose"',
+        "hook refers to the point 'anvil.nose",
+    ),
+    "body of a point not described": (
+        '"anvil.top"',
+        '"hammer.top"',
+        "the point 'hammer.top', which",
+    ),
+    "probe of nothing": (
+        'name = "watch"\npoint = "arm.tip"',
+        'name = "watch"\npoint = "arm.x"',
+        "watch refers to the point 'arm.x'",
+    ),
+    "stop at a point of another body": (
+        'point = "arm.tip"\ndir',
+        'point = "anvil.top"\ndir',
+        "wall.point = 'anvil.top' is no point of the body arm",
+    ),
+    "stop of an unknown body": (
+        'body = "arm"\npoint = "arm.tip"\ndir',
+        'body = "harm"\npoint = [0, 0]\ndir',
+        "wall.body = 'harm' is not",
+    ),
+    "stop on itself": ('on = "anvil"', 'on = "arm"', "wall is fixed to the body that it stops"),
+    "stop on nothing": ('on = "anvil"', 'on = "air"', "wall.on = 'air' is not described"),
+    "force on nothing": ('name = "pull"\nbody = "anvil"', 'name = "pull"\nbody = "x"', "pull.body"),
+    "release of an unknown body": (
+        'body = "arm"\ndirection = "1.57',
+        'body = "a"\ndirection = "1.57',
+        "release.body = 'a' is not described",
+    ),
+    "unknown type": ('type = "leaf"', 'type = "leave"', "left.type = 'leave' is not described"),
+    "unknown parameter": (
+        '"arm.length + 2 cm", "50',
+        '"arm.lenght + 2 cm", "50',
+        "ground.far refers to 'arm.lenght'",
+    ),
+    "cycle of references": (
+        'mass = "53.187 g"\ninertia = "28366.4 g.mm2"',
+        'mass = "arm.inertia"\ninertia = "arm.mass"',
+        "arm.mass refers to 'arm.inertia', which is an expression itself",
+    ),
+    "reference to itself": (
+        'mass = "53.187 g"',
+        'mass = "2*arm.mass"',
+        "arm.mass refers to 'arm.mass', which is an expression itself",
+    ),
+    "parameter that is an expression": (
+        "value = 0.5",
+        'value = "2*ratio"',
+        "geometry.1.value (of ratio",
+    ),
+    # materials and sections
+    "material unknown": (
+        'material = "steel"\naxial',
+        'material = "stel"\naxial',
+        "right.material = 'stel' is not described; materials are steel",
+    ),
+    "both material and density": (
+        'material = "steel"\naxial',
+        'material = "steel"\ndensity = 1\naxial',
+        "right has a material and density of its own: leave one out",
+    ),
+    "neither material nor density": (
+        HANGER,
+        "",
+        "hanger has no material: write material = and its",
+    ),
+    "half a material": (
+        "density = 2700\n",
+        "",
+        "hanger has no material: write material = and its name, or density",
+    ),
+    "type and section": (
+        'type = "leaf"',
+        'type = "leaf"\nwidth = 1',
+        "left has a type and width of",
+    ),
+    "no type and no section": (
+        'type = "leaf"\n',
+        "",
+        "left.model is missing: add the key, or a type",
+    ),
+    "section without width": (RIGHT, RIGHT.replace("width = 8e-3\n", ""), "right.width is missing"),
+    "negative thickness": ('"0.1 mm"', '"-0.1 mm"', "leaf.thickness = -0.0001 m must be at least"),
+    "negative thickness by expression": (
+        '"0.1 mm"',
+        '"0.1 mm - arm.length"',
+        "leaf.thickness = -0.0399",
+    ),
+    "too dense": (
+        "density = 2700",
+        "density = 2700e9",
+        "hanger.density = 2.7e+12 kg/m3 must be at most",
+    ),
+    "coefficient of another model": (
+        "gamma = 0.85",
+        "gamma1 = 0.85",
+        "hanger.gamma1 is no coefficient",
+    ),
+    "unknown model": (
+        'model = "2R"',
+        'model = "7R"',
+        "leaf.model = '7R' is unknown: choose one of",
+    ),
+    "n missing": ("n = 8\n", "", "right.n = 0 must be the number of links of the chain"),
+    "n too large": ("n = 8\n", "n = 100000\n", f"from 1 to {MOST_LINKS}"),
+    "n of nothing": ("n = 8\n", "n = 0\n", "flexures.1.n (of right) = 0: write a larger number"),
+    "n with 2R": (
+        'model = "2R"',
+        'model = "2R"\nn = 3',
+        "leaf.n = 3: the 2R model has its own number",
+    ),
+    # geometry of the drawing
+    "ends wrong": (
+        'ends = "clamp"',
+        'ends = "glue"',
+        "right.ends = ('glue', 'glue'): each of the two",
+    ),
+    "three ends": ('ends = ["clamp", "pin"]', 'ends = ["clamp", "pin", "pin"]', "flexures.2.ends"),
+    "one end": ('ends = ["clamp", "pin"]', 'ends = ["clamp"]', "flexures.2.ends (of hanger)"),
+    "free at both ends": (
+        'ends = "clamp"',
+        'ends = "free"',
+        "a free end needs a clamp at the other",
+    ),
+    "free and pinned": ('ends = "clamp"', 'ends = ["pin", "free"]', "a free end needs a clamp"),
+    "flexure of one body": (
+        '"anvil.top"',
+        '"ground.foot"',
+        "flexure hanger joins ground to itself",
+    ),
+    "joint of one body": (
+        'end = "anvil.hook"',
+        'end = "arm.root"',
+        "joint hook joins arm to itself",
+    ),
+    "zero-length flexure": (
+        "foot = [0, 0]",
+        'foot = ["2 cm", 0]',
+        "flexure left from ground.foot to arm",
+    ),
+    "joint of points drawn apart": (
+        'points.hook = ["arm.length", 0]',
+        "points.hook = [0.041, 0]",
+        "joint hook: arm.tip and anvil.hook are drawn 0.001 m apart",
+    ),
+    # numbers
+    "not a number": (
+        "damping_zeta = 0.01",
+        "damping_zeta = nan",
+        "damping_zeta = nan: write a finite",
+    ),
+    "infinite": (
+        'mass = "53.187 g"',
+        "mass = inf",
+        "bodies.0.mass (of arm) = inf: write a finite number",
+    ),
+    "huge": ('mass = "53.187 g"', "mass = 1e300", "arm.mass = 1e+300 kg must be at most 1e+06 kg"),
+    "huge with a unit": ('"53.187 g"', '"1e999 g"', "(of arm) = '1e999 g': write a finite number"),
+    "huge whole": ('mass = "53.187 g"', f"mass = {'9' * 400}", "write a finite number"),
+    "thousands of digits": (
+        'mass = "53.187 g"',
+        f"mass = {'9' * 9999}",
+        "has a number of thousands of digits",
+    ),
+    "damping out of bounds": (
+        "damping_zeta = 0.01",
+        "damping_zeta = 11",
+        "damping.zeta = 11 must be",
+    ),
+    "value out of its own bounds": (
+        '"40 mm"',
+        '"0.1 nm"',
+        "arm.length = 1e-10 m must be at least 1e",
+    ),
+    "bound that is none": (
+        '"1 nm"',
+        "nan",
+        "geometry.0.minimum (of arm.length) = nan: write a finite",
+    ),
+    # expressions
+    "product of two parameters": ("/2 + 3 mm", "*ratio", "(a product of two parameters)"),
+    "division by zero": (
+        "/2 + 3 mm",
+        "/0",
+        "bodies.0.centre.0 (of arm): cannot read the expression",
+    ),
+    "division by a parameter": ("/2 + 3 mm", "/ratio", "(a division by a parameter)"),
+    "call": ("arm.length/2 + 3 mm", "abs(arm.length)", "'abs(arm.length)' is not allowed"),
+    "code": ("arm.length/2 + 3 mm", "__import__('os').system('x')", "cannot read the expression"),
+    "no expression": (
+        "arm.length/2 + 3 mm",
+        "",
+        "bodies.0.centre.0 (of arm): cannot read the expression ''",
+    ),
+    "half an expression": ("arm.length/2 + 3 mm", "arm.length +", "cannot read the expression"),
+    "parentheses": ("arm.length/2 + 3 mm", "(" * 900, "cannot read the expression"),
+    "long expression": ("arm.length/2 + 3 mm", "1+" * 9999 + "1", "of at most 1000 characters"),
+}
+BOMB = 100_000
+CONTENTS = {
+    "empty": (b"", "name is missing: add the key"),
+    "blank": (b"\n\n# nothing\n", "name is missing: add the key"),
+    "garbage": (b"\x00\xff garbage" * 1_000_000, f"larger than {LARGEST_FILE} bytes"),
+    "binary": (bytes(range(256)), "is no TOML file ('utf-8' codec"),
+    "not UTF-8": (
+        EXAMPLE.replace("strikes", "schlägt").encode("latin-1"),
+        "is no TOML file ('utf-8",
+    ),
+    "UTF-16": (EXAMPLE.encode("utf-16"), "is no TOML file ('utf-8' codec"),
+    "zip": (b"PK\x03\x04\x14\x00", "is no TOML file ("),
+    "JSON": (b'{"name": "x"}', "is no TOML file (Invalid statement (at line 1, column 1))"),
+    "value instead of a table": (b"release = 3", "line 1: release = 3: write a table, [...]"),
+    "half a line": (
+        b'name = "x"\ntitle = \n',
+        "is no TOML file (Invalid value (at line 2, column 9))",
+    ),
+    "bomb of lists": (b"x = " + b"[" * BOMB + b"]" * BOMB, "is nested too deeply"),
+    "bomb of tables": (b"x = " + b"{a=" * BOMB + b"1" + b"}" * BOMB, "is nested too deeply"),
+    "bomb of keys": (b"a." * BOMB + b"a = 1", "is nested too deeply"),
+    "bomb of a header": (b"[" + b"a." * BOMB + b"a]", "is nested too deeply"),
+    "deep key": (b"a." * 90 + b"a = 1", "line 1: a is no key that is known there"),
+    "bomb in its place": (
+        b"release = " + b"[" * 300 + b"]" * 300,
+        "release = [[[[[[[...]]]]]]]: write",
+    ),
+    "many mistakes": (b"[[bodies]]\n" * 5_000, "bodies.0.name is missing"),
+}

@@ -1,0 +1,253 @@
+"""Random valid mechanisms: trees and loops of all that a mechanism can be made of.
+
+The structure (what is joined to what, by which model, held how) is drawn by hypothesis, which
+shrinks it, or from a seed; lengths, masses and stiffnesses come from a seed always, so that no
+two points fall together by chance::
+
+    @given(mechanisms())                    # hypothesis
+    def test_...(mechanism): ...
+
+    mechanism = seeded(7)                   # the same one each time
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import assume
+from hypothesis import strategies as st
+
+from prbm import (
+    Body,
+    EquilibriumError,
+    Flexure,
+    FlexureType,
+    Force,
+    Friction,
+    Mechanism,
+    ParameterError,
+    PrbmError,
+    Release,
+    Simulation,
+    Stop,
+    assemble,
+)
+from prbm.constraints import jacobian
+from prbm.contact import response
+from prbm.flexure import CLAMP, FREE, PIN
+from prbm.kinetics import inertia
+from prbm.mechanism import GROUND, Joint, Probe
+
+Choose = Callable[[Sequence], object]
+"""Picks one of a sequence; the first is the simplest."""
+
+CELL = 0.06  # m: bodies lie on a lattice of this size, shifted by up to a fifth of it
+MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 1), ("nR", 2), ("nR", 4))
+ENDS = ((CLAMP, CLAMP), (CLAMP, PIN), (PIN, CLAMP), (CLAMP, FREE), (FREE, CLAMP), (PIN, PIN))
+RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # stretches at a few hundred Hz
+STEEL = {"thickness": (2e-4, 3e-4), "modulus": (1e9, 1e10)}
+MOBILE = 1e-2  # share of its mobility that the loops leave to the released body, at least
+
+
+class _Builder:
+    """Adds part after part to a mechanism; ``choose`` decides what, ``rng`` how much."""
+
+    def __init__(self, choose: Choose, rng: np.random.Generator) -> None:
+        self.choose, self.rng = choose, rng
+        self.ground: dict[str, tuple[float, float]] = {}
+        self.centres: dict[str, complex] = {}
+        self.points: dict[str, dict[str, tuple[float, float]]] = {}
+        self.types: list[FlexureType] = []
+        self.flexures: list[Flexure] = []
+        self.joints: list[Joint] = []
+
+    def real(self, low: float, high: float) -> float:
+        return float(self.rng.uniform(low, high))
+
+    def disc(self, radius: float) -> complex:
+        return self.real(0.2, 1.0) * radius * complex(np.exp(1j * self.real(0, 2 * math.pi)))
+
+    def add_type(self) -> None:
+        model, n = self.choose(MODELS)
+        axial = self.choose((False, True)) and model != "1R"  # whose cantilevers cannot stretch
+        section = RUBBER if axial or self.choose((False, True)) else STEEL
+        self.types.append(
+            FlexureType(
+                f"type{len(self.types)}", model, self.real(*section["thickness"]),
+                self.real(5e-3, 2e-2), self.real(*section["modulus"]), self.real(1e3, 8e3),
+                n=n, axial=axial,
+            )
+        )  # fmt: skip
+
+    def add_body(self, cell: complex) -> str:
+        name = f"body{len(self.centres)}"
+        self.centres[name] = CELL * cell + self.disc(CELL / 5)
+        self.points[name] = {}
+        return name
+
+    def point(self, owner: str, z: complex) -> str:
+        """Add a point to a body or to the ground and return its reference."""
+        named = self.ground if owner == GROUND else self.points[owner]
+        name = f"p{len(named)}"
+        named[name] = (z.real, z.imag)
+        return f"{owner}.{name}"
+
+    def near(self, body: str) -> complex:
+        return self.centres[body] + self.disc(CELL / 6)
+
+    def connect(self, first: str, second: str, *, joint: bool) -> None:
+        """Join a body or the ground to a body."""
+        far = self.near(second)
+        if joint:
+            pair = [self.point(first, far), self.point(second, far)]
+        else:
+            root = far + self.disc(CELL) * 1.5 if first == GROUND else self.near(first)
+            pair = [self.point(first, root), self.point(second, far)]
+        if self.choose((False, True)):
+            pair.reverse()
+        if joint:
+            self.joints.append(Joint(f"joint{len(self.joints)}", *pair))
+        else:
+            kind, ends = self.choose(self.types), self.choose(ENDS)
+            name = f"flexure{len(self.flexures)}"
+            self.flexures.append(Flexure(name, kind.name, *pair, ends=ends))
+
+
+def build(
+    choose: Choose,
+    rng: np.random.Generator,
+    *,
+    bodies: int = 3,
+    loops: int = 2,
+    stops: int = 2,
+    friction: bool = True,
+    damping: bool = True,
+) -> Mechanism:
+    """Return a mechanism of at most so many bodies, loops and stops; it may be over-constrained."""
+    b = _Builder(choose, rng)
+    for _ in range(choose((1, 2, 3))):
+        b.add_type()
+    names: list[str] = []
+    for k in range(choose(range(1, bodies + 1))):
+        name = b.add_body(complex(k, (0, 1, 0, -1)[k % 4]))
+        parent = choose((GROUND, *names))
+        b.connect(parent, name, joint=bool(names) and choose((False, True)))
+        names.append(name)
+    for _ in range(choose(range(loops + 1))):
+        first, second = choose((GROUND, *names)), choose(names)
+        if first != second:
+            b.connect(first, second, joint=choose((False, False, True)))
+    directions = (0.0, 90.0, 180.0, 31.7, 200.3)
+    coefficient = (0.0, 0.3) if friction else (0.0,)
+    walls = []
+    for i in range(choose(range(stops + 1))):
+        body, on = choose(names), choose((GROUND, *names))
+        z = b.near(body)
+        walls.append(
+            Stop(
+                f"stop{i}", body, (z.real, z.imag), choose(directions), b.real(1e-4, 8e-4),
+                b.real(-3e-3, 3e-3), choose((0.6, 0.0, 1.0)), choose(coefficient),
+                on=GROUND if on == body else on,
+            )
+        )  # fmt: skip
+    rubs = []
+    for i in range(choose((0, 1)) if friction else 0):
+        z = b.near(body := choose(names))
+        point = choose((None, (z.real, z.imag)))
+        rubs.append(Friction(f"rub{i}", body, choose(directions), 0.2, 0.1, 3.0, point))
+    pushes = []
+    for i in range(choose((0, 1, 2))):
+        z = b.near(body := choose(names))
+        pushes.append(Force(f"force{i}", body, choose((None, (z.real, z.imag)))))
+    probes = [Probe("probe", f"{names[-1]}.p0")]
+    aimed = [(stop.body, stop.direction) for stop in walls]
+    body, direction = choose((*aimed, *aimed, (choose(names), choose(directions))))
+    gravity = choose(((0.0, 0.0), (0.0, -1.0), (0.3, 0.4)))
+    return Mechanism(
+        name="Random",
+        title="A random mechanism",
+        ground=b.ground,
+        bodies=tuple(
+            Body(name, b.real(0.02, 0.1), b.real(5e-6, 5e-5), (z.real, z.imag), b.points[name])
+            for name, z in b.centres.items()
+        ),
+        flexure_types=tuple(b.types),
+        flexures=tuple(b.flexures),
+        joints=tuple(b.joints),
+        stops=tuple(walls),
+        frictions=tuple(rubs),
+        forces=tuple(pushes),
+        probes=tuple(probes),
+        release=Release(body, direction, velocity=b.real(0.2, 0.6)),
+        gravity=gravity,
+        damping_zeta=choose((0.0, 0.02)) if damping else 0.0,
+        damping_beta=choose((0.0, 1e-5)) if damping else 0.0,
+    )
+
+
+def inputs(mechanism: Mechanism, seed: int) -> dict[str, float]:
+    """Return forces, moments and a base acceleration for a mechanism, of the size of its weight."""
+    rng = np.random.default_rng(seed)
+    given = {"base.acceleration.x": rng.uniform(-2, 2), "base.acceleration.y": rng.uniform(-2, 2)}
+    for force in mechanism.forces:
+        given |= {f"{force.name}.{axis}": rng.uniform(-0.05, 0.05) for axis in "xy"}
+        given[f"{force.name}.moment"] = rng.uniform(-1e-3, 1e-3)
+    return {name: float(x) for name, x in given.items()}
+
+
+def assembles(mechanism: Mechanism) -> bool:
+    """Tell whether a mechanism is neither over-constrained nor without motion."""
+    try:
+        assemble(mechanism, mechanism.values())
+    except PrbmError:
+        return False
+    return True
+
+
+def starts(mechanism: Mechanism) -> bool:
+    """Tell whether a mechanism has a shape to start from, clear of its walls, and can move then."""
+    try:
+        sim = Simulation(mechanism)
+    except (EquilibriumError, ParameterError):
+        return False
+    system = sim.system
+    e = system.directions(sim.front[: system.n])
+    M, _ = inertia(system.H, np.diag(system.J), e)
+    rows = jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    left, free = (
+        (rows[-1] @ response(M, held, rows[-1:])).item() for held in (rows[:-1], rows[:0])
+    )
+    return left > MOBILE * free
+
+
+@st.composite
+def mechanisms(draw, *, starting: bool = False, **most) -> Mechanism:
+    """Draw mechanisms that assemble or, if ``starting``, that can be simulated, too."""
+
+    def attempt() -> Mechanism | None:
+        rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+        try:
+            return build(lambda options: draw(st.sampled_from(options)), rng, **most)
+        except PrbmError:  # no flexure at all, a bar that is free
+            return None
+
+    made = attempt()
+    assume(made is not None and assembles(made) and (not starting or starts(made)))
+    return made
+
+
+def seeded(seed: int, *, starting: bool = True, **most) -> Mechanism:
+    """Return a valid mechanism, the same for the same seed."""
+    rng = np.random.default_rng(seed)
+
+    def choose(options: Sequence) -> object:
+        return options[int(rng.integers(len(options)))]
+
+    while True:
+        try:
+            made = build(choose, rng, **most)
+        except PrbmError:
+            continue
+        if assembles(made) and (not starting or starts(made)):
+            return replace(made, name=f"Random{seed}")

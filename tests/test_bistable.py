@@ -1,0 +1,118 @@
+"""The bistable shuttle against the closed form of four struts of the stiffness EA."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
+
+from prbm import assemble
+from prbm_tools.equilibria import force_curve, holding_force, rests, snap
+from support import mechanism, run
+
+BISTABLE = mechanism("Bistable")
+SYSTEM = assemble(BISTABLE, BISTABLE.values())
+V = SYSTEM.values
+SPAN, RISE, MASS = V["strut.span"], V["strut.rise"], V["shuttle.mass"]
+LENGTH = math.hypot(SPAN, RISE)
+EA = V["polyurethane.youngs_modulus"] * V["strut.thickness"] * V["strut.width"]
+
+
+def energy(d: float) -> float:
+    """Return the elastic energy of the struts, 4 EA L s^2 / 2 with s = ln(l / L) [J]."""
+    return 2 * EA * LENGTH * math.log(math.hypot(SPAN, RISE - d) / LENGTH) ** 2
+
+
+def force(d: float) -> float:
+    """Return dU/dd, which pushes the shuttle down by d [N]."""
+    length = math.hypot(SPAN, RISE - d)
+    return -4 * EA * LENGTH * math.log(length / LENGTH) * (RISE - d) / length**2
+
+
+def speed(start: float, d: float) -> float:
+    """Return the speed at d after a release from rest, undamped [m/s].
+
+    A strut moves about its pin as a rod, also while it stretches: a third of its mass goes along.
+    """
+    strut = V["polyurethane.density"] * V["strut.thickness"] * V["strut.width"] * LENGTH
+    return math.sqrt(2 * (energy(start) - energy(d)) / (MASS + 4 * strut / 3))
+
+
+def test_forces_are_those_of_four_struts() -> None:
+    d = np.linspace(-0.3, 2.4, 28) * RISE
+    np.testing.assert_allclose(force_curve(SYSTEM, d), [force(x) for x in d], atol=1e-9)
+
+
+def test_there_are_two_stable_places_and_one_between_them() -> None:
+    """Drawn, mirrored at the pins' level, and where the struts are shortest."""
+    found = rests(SYSTEM, np.array([-0.3, 0.4, 1.3, 2.3]) * RISE)
+    assert [rest.stable for rest in found] == [True, False, True]
+    np.testing.assert_allclose([r.displacement for r in found], [0, RISE, 2 * RISE], atol=1e-12)
+
+
+def test_snap_force_is_the_extremum_of_the_closed_form() -> None:
+    options = {"xatol": 1e-10}
+    there = minimize_scalar(
+        lambda d: -force(d), bounds=(0, RISE), method="bounded", options=options
+    )
+    place, largest = snap(SYSTEM, 0.0, RISE)
+    assert largest == pytest.approx(-there.fun, rel=1e-12)  # flat there
+    assert place == pytest.approx(there.x, abs=1e-7)
+    back = snap(SYSTEM, RISE, 2 * RISE)
+    assert back[1] == pytest.approx(-largest, rel=1e-9)
+
+
+def test_struts_that_are_clamped_to_the_ground_are_stiffer_by_their_bending() -> None:
+    """Four cantilevers of 3 EI/L^3 across their length, beside the struts along it.
+
+    Small displacements; the 2R is 0.7 % too soft.
+    """
+    values = {"strut.thickness": 2e-3, "strut.width": 5e-2}  # the same EA
+    kind = replace(BISTABLE.flexure_types[0], model="2R")
+    bent = replace(
+        BISTABLE,
+        flexure_types=(kind,),
+        flexures=tuple(replace(f, ends=("clamp", "pin")) for f in BISTABLE.flexures),
+    )
+    system = assemble(bent, bent.values(values))
+    EI = EA * values["strut.thickness"] ** 2 / 12
+    across = 4 * 3 * EI / LENGTH**3 * (SPAN / LENGTH) ** 2
+    more = (holding_force(system, 1e-6) - force(1e-6)) / 1e-6
+    assert more == pytest.approx(across, rel=0.01)
+
+
+def test_it_snaps_hits_the_far_stop_and_rests_there() -> None:
+    result = run(BISTABLE, stop_time=0.5)
+    y = result.column("shuttle.y")
+    assert y[0] == pytest.approx(-0.0125)
+    first = result.simulation.record[0]
+    assert {impact.stop for impact in result.simulation.record} == {"far_stop"}
+    assert 0.0 < first.latched.approach_speed < speed(0.0125, 0.022)
+    assert y[-1] == pytest.approx(-0.022, abs=1e-12)
+    assert result.outputs[-1]["far_stop.contact"]
+    # held against the stop by what would push it on to the second stable place
+    assert result.outputs[-1]["far_stop.force"] == pytest.approx(-force(0.022), rel=1e-8)
+    assert result.outputs[-1]["energy.elastic"] == pytest.approx(energy(0.022), rel=1e-8)
+
+
+def test_speed_of_the_snap_is_that_of_the_energy_set_free() -> None:
+    """Without damping, at every point of the way and at the stop.
+
+    To the tolerance, of the energy of a unit stretch (EA L = 122 J).
+    """
+    result = run(BISTABLE, {"damping.beta": 0.0}, stop_time=0.04, step=2e-3, tolerance=1e-11)
+    impact = result.simulation.record[0]
+    assert impact.latched.approach_speed == pytest.approx(speed(0.0125, 0.022), rel=1e-7)
+    before = [row for k, row in enumerate(result.outputs) if k * 2e-3 < impact.time]
+    assert len(before) > 10
+    for row in before:
+        exact = speed(0.0125, max(0.0125, -row["shuttle.y"]))
+        assert row["shuttle.vy"] ** 2 == pytest.approx(exact**2, abs=2e-11 * EA * LENGTH / MASS)
+        assert abs(row["shuttle.vx"]) < 1e-9
+
+
+def test_released_before_the_half_it_goes_back_to_where_it_was_drawn() -> None:
+    result = run(BISTABLE, {"release.displacement": 0.0115, "damping.beta": 2e-3}, stop_time=0.5)
+    assert abs(result.outputs[-1]["shuttle.y"]) < 1e-4
+    assert result.outputs[-1]["far_stop.impact_count"] == 0

@@ -1,0 +1,281 @@
+"""Pictures of mechanisms: what is drawn where, with which names, by which command."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+from PIL import Image
+
+from prbm import (
+    Body,
+    Flexure,
+    FlexureType,
+    Mechanism,
+    ParameterError,
+    Release,
+    Simulation,
+    Stop,
+    assemble,
+    equilibrium,
+    modes,
+)
+from prbm.mechanism import Joint, Probe
+from prbm_fmu.picture import icon, shape
+from prbm_fmu.start import start_sample
+from prbm_tools.figures import png
+from prbm_tools.mechanism_file import shipped
+from prbm_tools.motion import film, motion, needed
+from prbm_tools.picture import SHOWN, find, main, moved, picture
+from prbm_tools.scene import Scene
+from prbm_tools.shapes import Shapes, box, corners, hull
+from prbm_tools.simulate import simulate
+from support import mechanism
+
+LEAF = FlexureType("leaf", "2R", 2e-4, 1e-2, 2e11, 7800.0, axial=True)
+CRANK = Mechanism(
+    "Crank",
+    "A leaning bar on pins between a lever and a guide",
+    {"left": (0.0, 0.0), "right": (0.02, 0.0), "hinge": (0.1, 0.0)},
+    (
+        Body("stage", 0.05, 1e-5, (0.01, 0.06), {
+            "left": (0.0, 0.05), "right": (0.02, 0.05), "ear": (0.02, 0.07), "top": (0.0, 0.07),
+        }),
+        Body("bar", 0.01, 1e-5, (0.06, 0.05), {"start": (0.02, 0.07), "end": (0.1, 0.03)}),
+        Body("lever", 0.02, 1e-5, (0.1, 0.02), {"foot": (0.1, 0.0), "joint": (0.1, 0.03)}),
+    ),
+    (LEAF,),
+    (
+        Flexure("one", "leaf", "ground.left", "stage.left"),
+        Flexure("two", "leaf", "ground.right", "stage.right"),
+    ),
+    Release("stage", displacement=-2e-3),
+    joints=(
+        Joint("upper", "bar.start", "stage.ear"),
+        Joint("lower", "lever.joint", "bar.end"),
+        Joint("pivot", "ground.hinge", "lever.foot"),
+    ),
+    stops=(Stop("knock", "stage", (0.02, 0.06), position=3e-3, on="lever"),),
+    probes=(Probe("ear", "stage.ear"),),
+)  # fmt: skip
+
+
+def shapes_of(chosen: Mechanism, displacement: float | None = None) -> tuple[Shapes, np.ndarray]:
+    """Return the shapes of a mechanism and the arms of a held one."""
+    system = assemble(chosen, chosen.values())
+    shapes = Shapes(system)
+    if displacement is None:
+        return shapes, shapes.straight
+    return shapes, shapes.arms(equilibrium(system, displacement).q)
+
+
+# --- shapes -----------------------------------------------------------------------------------
+
+
+def test_bodies_turn_with_what_they_carry() -> None:
+    """Pins, the hit point, the wall and the probe stay where they are on their bodies."""
+    shapes, E = shapes_of(CRANK, -4e-3)
+    at = {name: shapes.centre(name, E) for name in shapes.bodies}
+    turn = {name: E[shapes.system.bodies[name].j] for name in at}
+    np.testing.assert_allclose(np.abs([*turn.values()]), 1.0, rtol=1e-14)
+    ear = at["stage"] + turn["stage"] * (0.01 + 0.01j)
+    upper, lower, pivot = shapes.pins(E)
+    assert abs(upper - ear) < 1e-12
+    assert abs(upper - (at["bar"] + turn["bar"] * (-0.04 + 0.02j))) < 1e-12
+    assert abs(lower - (at["lever"] + turn["lever"] * 0.01j)) < 1e-12
+    assert abs(pivot - 0.1) < 1e-12
+    assert abs(shapes.probes(E)[0] - ear) < 1e-12
+    assert abs(shapes.hit(0, E) - (at["stage"] + turn["stage"] * 0.01)) < 1e-12
+    wall = shapes.wall(0, 3e-3, E)
+    middle = at["lever"] + turn["lever"] * (0.023 + 0.06j - 0.1 - 0.02j)
+    assert abs(wall[:2].mean() - middle) < 1e-12
+    assert abs(np.angle((wall[1] - wall[0]) / (1j * turn["lever"]))) < 1e-12
+
+
+def test_the_gap_that_is_drawn_to_a_wall_on_a_body_is_that_of_the_engine() -> None:
+    simulation = Simulation(CRANK)
+    simulation.advance(0.003)
+    shapes = Shapes(simulation.system)
+    E = shapes.arms(simulation.state()[: simulation.system.n])
+    wall, hit = shapes.wall(0, 3e-3, E), shapes.hit(0, E)
+    along = (wall[1] - wall[0]) / abs(wall[1] - wall[0])
+    apart = ((wall[0] - hit) * along.conjugate()).imag
+    assert abs(apart) == pytest.approx(simulation.outputs()["knock.gap"], abs=1e-12)
+
+
+def test_a_leaning_bar_is_drawn_as_one() -> None:
+    """Along its points, and as thin as a body without height; a square is upright."""
+    shapes, E = shapes_of(CRANK)
+    z = shapes.body("bar", E)
+    sides = np.diff(z, append=z[:1])
+    longest = max(sides, key=abs)
+    assert abs(longest) == pytest.approx(abs(0.08 - 0.04j), rel=1e-9)
+    assert abs((longest * (0.08 + 0.04j)).imag) < 1e-12  # along the bar
+    assert min(abs(side) for side in sides) < 0.1 * abs(longest)
+    upright = box(np.array([1.0, 1j, -1.0]), 0.01)
+    np.testing.assert_allclose(sorted(np.angle(upright, deg=True)), [-135, -45, 45, 135])
+
+
+def test_a_body_whose_points_surround_its_centre_is_their_hull() -> None:
+    shapes, E = shapes_of(CRANK)
+    z = shapes.body("stage", E)
+    expected = {0.05j, 0.02 + 0.05j, 0.02 + 0.07j, 0.07j}
+    assert {complex(round(x.real, 9), round(x.imag, 9)) for x in z} >= expected
+    triangle = hull(np.array([0, 1, 1j, 0.2 + 0.2j]))
+    assert len(triangle) == 3
+    area = 0.5 * abs(np.sum(triangle.real * np.roll(triangle.imag, -1)
+                            - triangle.imag * np.roll(triangle.real, -1)))  # fmt: skip
+    assert area == pytest.approx(0.5)
+
+
+def test_stretches_follow_from_what_a_result_tells() -> None:
+    """Angles, loops and places of the bodies give back the stretches of the engine."""
+    for name, stop_time in (("FoldedSuspension", 0.02), ("Bistable", 0.03), ("PRBDM2RAxial", 0.01)):
+        result = simulate(mechanism(name), stop_time=stop_time)
+        told = motion(result)
+        simulation = Simulation(mechanism(name))
+        simulation.advance(stop_time)
+        n = simulation.system.n
+        exact = simulation.state()[:n]
+        assert len(simulation.system.stretches)
+        assert np.abs(exact[simulation.system.stretches]).max() > 1e-8
+        np.testing.assert_allclose(told.q[-1], exact, atol=1e-12)
+        assert {f"{body}.x" for body in simulation.system.bodies} <= set(needed(mechanism(name)))
+
+
+# --- pictures ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [*shipped(), "Crank"])
+def test_every_name_is_written_and_everything_is_in_the_picture(name: str) -> None:
+    chosen = CRANK if name == "Crank" else mechanism(name)
+    figure = picture(chosen, shown=1)
+    png(figure)
+    stage = figure.axes[0]
+    written = {text.get_text().strip() for text in stage.findobj(Text)}
+    parts = (*chosen.bodies, *chosen.flexures, *chosen.stops, *chosen.joints, *chosen.probes)
+    assert {part.name for part in (*parts, *chosen.forces)} <= written
+    assert chosen.title in {text.get_text() for text in stage.findobj(Text)}
+    shapes, E = shapes_of(chosen)
+    (left, right), (low, high) = stage.get_xlim(), stage.get_ylim()
+    scale = 1e3  # all are drawn in mm
+    for body in shapes.bodies:
+        z = scale * shapes.body(body, E)
+        assert left < z.real.min() < z.real.max() < right
+        assert low < z.imag.min() < z.imag.max() < high
+
+
+def test_modes_are_titled_with_their_frequencies() -> None:
+    folded = mechanism("FoldedSuspension")
+    system = assemble(folded, folded.values())
+    exact = modes(system, equilibrium(system)).frequency[:3]
+    titles = [axes.get_title() for axes in picture(folded, shown=3).axes[1:]]
+    assert titles == [f"{f:.4g} Hz" for f in exact]
+
+
+def test_a_mode_moves_the_largest_part_by_what_can_be_seen() -> None:
+    """Linear in the mode, the loops closed to first order: flexures end on their bodies."""
+    for name in shipped():
+        shapes, E = shapes_of(mechanism(name), 0.0)
+        system = shapes.system
+        rest = equilibrium(system)
+        E = shapes.arms(rest.q)
+        found = modes(system, rest)
+        for k in range(min(2, len(found.frequency))):
+            new = moved(shapes, E, found, k)
+            places = [(corners(o.outline, new), corners(o.outline, E)) for o in shapes.flexures]
+            places += [(shapes.body(b, new), shapes.body(b, E)) for b in shapes.bodies]
+            largest = max(float(np.abs(a - b).max()) for a, b in places)
+            assert largest == pytest.approx(SHOWN * shapes.size, rel=1e-9)
+            phi = (system.loops @ new).real + system.loops_c
+            assert np.abs(phi).max() < 1e-9 * shapes.size if len(phi) else True
+
+
+def test_an_unstable_shape_says_so() -> None:
+    """A mass on top of a leaf that is too thin to hold it upright."""
+    top = replace(
+        mechanism("Cantilever"), gravity=(-9.81, 0.0), stops=(), flexure_types=(
+            replace(mechanism("Cantilever").flexure_types[0], thickness=6e-5),
+        ),
+    )  # fmt: skip
+    assert [axes.get_title() for axes in picture(top, shown=1).axes[1:]] == ["unstable"]
+
+
+def test_too_many_modes_are_refused() -> None:
+    with pytest.raises(ParameterError, match="ImpactOscillator has 2 modes, 3 are asked for"):
+        picture(mechanism("ImpactOscillator"), shown=3)
+    with pytest.raises(ParameterError, match="choose a number from 0 to"):
+        picture(mechanism("ImpactOscillator"), shown=99)
+
+
+@pytest.mark.parametrize("name", [*shipped(), "Crank"])
+def test_a_film_holds_the_whole_motion_of_any_mechanism(name: str) -> None:
+    chosen = CRANK if name == "Crank" else mechanism(name)
+    result = simulate(chosen, stop_time=0.02)
+    scene = Scene(motion(result), film(motion(result)))
+    (left, right), (low, high) = scene.stage.get_xlim(), scene.stage.get_ylim()
+    for k in (0, len(scene.film.times) // 2, len(scene.film.times) - 1):
+        scene.frame(k)
+        for artist in (*scene.links.values(), *scene.walls.values(), scene.pins):
+            x, y = np.array(artist.get_data(), float)
+            if x.size:
+                assert left <= np.nanmin(x) <= np.nanmax(x) <= right
+                assert low <= np.nanmin(y) <= np.nanmax(y) <= high
+
+
+@pytest.mark.parametrize("name", list(shipped()))
+def test_the_icon_shows_the_shape_at_release(name: str) -> None:
+    chosen = mechanism(name)
+    simulation = Simulation(chosen)
+    sample = start_sample(chosen, {})
+    exact = simulation.state()[: simulation.system.n]
+    np.testing.assert_allclose(shape(simulation.system, sample), exact, atol=1e-9)
+    first, again = icon(chosen, sample), icon(chosen, sample)
+    assert first == again
+    assert first.startswith(b"\x89PNG")
+
+
+# --- command ----------------------------------------------------------------------------------
+
+
+def test_the_command_draws_a_shipped_mechanism(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["Cantilever", "--modes", "2", "--set", "leaf.length=0.05"]) == 0
+    assert capsys.readouterr().out == "Cantilever.png\n"
+    with Image.open("Cantilever.png") as image:
+        assert image.format == "PNG"
+        assert min(image.size) > 300
+
+
+def test_a_file_is_found_as_well_as_a_name() -> None:
+    path = shipped()["Bistable"]
+    assert find(str(path)) == find("Bistable")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["Bistabel"], "there is no model 'Bistabel'; did you mean Bistable?"),
+        (["none.toml"], "none.toml: cannot be read"),
+        (["PRBDM", "--set", "shuttle.mas=1"], "did you mean shuttle.mass"),
+        (["PRBDM", "--set", "shuttle.mass"], "write a name and a number"),
+        (["PRBDM", "--modes", "5"], "PRBDM has 1 modes, 5 are asked for"),
+        (["PRBDM", "--out", "nowhere/a.png"], "nowhere/a.png: cannot be written"),
+    ],
+)
+def test_mistakes_end_the_command_with_a_sentence(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    sentence: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2
+    assert sentence in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,496 @@
+"""Laws that hold for every mechanism, tried on random ones: trees, loops, all models and ends.
+
+The laws are written with positions alone, from the definition of a place, and differences of
+them: the engine's rows, matrices and convective terms are on the other side.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from prbm import (
+    Body,
+    EquilibriumError,
+    Flexure,
+    FlexureType,
+    Mechanism,
+    Release,
+    Simulation,
+    Stop,
+    assemble,
+    constraints,
+    equilibrium,
+    modes,
+)
+from prbm.assembly import unit
+from prbm.dynamics import IDLE, Discrete, Equations
+from prbm.kinetics import inertia
+from prbm.mechanism import GROUND, value
+from random_mechanisms import inputs, mechanisms, seeded
+from support import energy_balance
+
+SEEDS = st.integers(0, 10**6)
+STEP = np.cbrt(np.finfo(float).eps)  # of first differences, central: error of the order STEP^2
+WIDE = np.finfo(float).eps ** 0.25  # of second differences
+
+
+def laws(count, *, shrink=True):
+    """Return settings: the same examples each time, as slow as simulations are."""
+    return settings(
+        phases=[Phase.generate, Phase.shrink] if shrink else [Phase.generate],
+        max_examples=count,
+        deadline=None,
+        derandomize=True,
+        suppress_health_check=[HealthCheck.filter_too_much, HealthCheck.too_slow],
+    )
+
+
+# --- positions, from their definition -----------------------------------------------------------
+
+
+def arms(system, q):
+    """Return exp(s + i theta) of every arm; what stands at stretches is not looked at."""
+    E = np.exp(1j * q)
+    for k in system.stretches:
+        E[system.arm[k]] *= np.exp(q[k])
+    return E
+
+
+def masses(system, q):
+    """Return the positions of all mass points."""
+    return system.A @ arms(system, q) + system.c
+
+
+def closures(system, q):
+    return (system.loops @ arms(system, q)).real + system.loops_c
+
+
+def body_point(system, body, drawn, q):
+    """Return where a drawn point of a body is, from its centre of mass and its angle."""
+    if body == GROUND:
+        return drawn
+    frame = system.bodies[body]
+    centre = complex(frame.A @ arms(system, q)) + frame.c
+    return centre + np.exp(1j * q[frame.j]) * (drawn - frame.drawn)
+
+
+def seen(system, stop, q):
+    """Return the displacement of a hit point, along u and to its left, as its wall sees it."""
+    u = unit(stop.direction)
+    drawn = complex(*stop.point) + value(stop, "offset", system.values) * 1j * u
+    hit = body_point(system, stop.body, drawn, q)
+    origin = body_point(system, stop.on, 0j, q)
+    turned = 0.0 if stop.on == GROUND else q[system.bodies[stop.on].j]
+    return np.conj(u) * ((hit - origin) * np.exp(-1j * turned) - drawn)
+
+
+def gaps(system, q):
+    """Return the gaps of all stops."""
+    return np.array(
+        [value(s, "position", system.values) - seen(system, s, q).real
+         for s in system.mechanism.stops]
+    )  # fmt: skip
+
+
+def slides(system, q):
+    return np.array([seen(system, s, q).imag for s in system.mechanism.stops])
+
+
+def rubs(system, q):
+    """Return the displacements of the friction points along their directions."""
+    found = []
+    for f in system.mechanism.frictions:
+        body = next(b for b in system.mechanism.bodies if b.name == f.body)
+        drawn = complex(*(f.point or body.centre))
+        found.append(
+            (np.conj(unit(f.direction)) * (body_point(system, f.body, drawn, q) - drawn)).real
+        )
+    return np.array(found)
+
+
+def first(f, q):
+    """Return df/dq by central differences, (values, n)."""
+    columns = [(f(q + d) - f(q - d)) / (2 * STEP) for d in STEP * np.eye(len(q))]
+    return np.array(columns).T.reshape(-1, len(q))
+
+
+def second(f, q, v):
+    """Return the second derivative of f along q + t v at t = 0."""
+    h = WIDE / np.abs(v).max()
+    return (f(q + h * v) - 2 * f(q) + f(q - h * v)) / h**2
+
+
+def somewhere(system, seed):
+    """Return coordinates off the straight shape, and rates."""
+    rng = np.random.default_rng(seed)
+    size = np.where(system.arm == np.arange(system.n), 0.3, 0.05)
+    return system.q0 + size * rng.normal(size=system.n), rng.normal(size=system.n)
+
+
+# --- assembly -----------------------------------------------------------------------------------
+
+
+@given(mechanisms(), SEEDS)
+@laws(40)
+def test_the_mass_matrix_is_that_of_the_positions(mechanism, seed):
+    """M = Re(T^H m T) + J with T = dz/dq; quadratic velocities: Re(T^H m z'') at constant rates."""
+    system = assemble(mechanism, mechanism.values())
+    q, v = somewhere(system, seed)
+    T = first(lambda q: masses(system, q), q)
+    e, w = system.directions(q), system.turning(v)
+    M, C = inertia(system.H, np.diag(system.J), e)
+    expected = (T.conj().T @ (system.m[:, None] * T)).real + np.diag(system.J)
+    np.testing.assert_allclose(M, expected, atol=1e-9 * np.abs(M).max())
+    w2 = w * w
+    quadratic = C @ w2.real - (M - np.diag(system.J)) @ w2.imag  # -Im(Hq w^2)
+    bent = (T.conj().T @ (system.m * second(lambda q: masses(system, q), q, v))).real
+    np.testing.assert_allclose(quadratic, bent, atol=2e-6 * np.abs(M).max() * v @ v)
+
+
+@given(mechanisms(), SEEDS)
+@laws(40)
+def test_rows_are_the_derivatives_of_what_they_constrain(mechanism, seed):
+    """Loops, gaps, slides and friction points: values, gradients, rates and convective terms.
+
+    Walls may be on bodies: what they see is written with the frames of the bodies.
+    """
+    system = assemble(mechanism, mechanism.values())
+    q, v = somewhere(system, seed)
+    e = system.directions(q)
+    places = np.array([value(s, "position", system.values) for s in mechanism.stops])
+    scalars = [
+        (constraints.Rows(system, system.loops, system.loops_c), closures, 0.0),
+        (constraints.gap_rows(system), gaps, places),
+        (constraints.slide_rows(system), slides, None),
+        (constraints.rub_rows(system), rubs, None),
+    ]
+    for rows, scalar, shift in scalars:
+        if not len(rows):
+            continue
+
+        def f(q, scalar=scalar):
+            return scalar(system, q)
+
+        if shift is not None:
+            np.testing.assert_allclose(rows.values(e) + shift, f(q), atol=1e-14)
+        gradient = first(f, q)
+        np.testing.assert_allclose(rows.jacobian(e), gradient, atol=1e-10)
+        np.testing.assert_allclose(rows.rates(e, v), gradient @ v, atol=1e-9)
+        np.testing.assert_allclose(rows.convective(e, v), -second(f, q, v), atol=1e-6 * v @ v)
+
+
+@given(mechanisms(), SEEDS)
+@laws(30)
+def test_what_is_closed_at_the_straight_shape_is_closed_and_clear(mechanism, seed):
+    """Loops are closed as drawn, gaps are their positions, nothing has moved; mass is kept."""
+    system = assemble(mechanism, mechanism.values())
+    np.testing.assert_allclose(closures(system, system.q0), 0.0, atol=1e-15)
+    places = [value(s, "position", system.values) for s in mechanism.stops]
+    np.testing.assert_allclose(gaps(system, system.q0), places, atol=1e-15)
+    for body in mechanism.bodies:
+        frame = system.bodies[body.name]
+        assert complex(frame.A @ arms(system, system.q0)) + frame.c == pytest.approx(frame.drawn)
+    assert system.m.sum() <= sum(b.mass for b in mechanism.bodies) + leaf_mass(mechanism) + 1e-15
+
+
+def leaf_mass(mechanism):
+    """Return the mass of all flexures; what is clamped to the ground, or lumped, weighs less."""
+    total = 0.0
+    for flexure in mechanism.flexures:
+        kind = next(k for k in mechanism.flexure_types if k.name == flexure.type)
+        ends = [complex(*mechanism.point(p, "")) for p in (flexure.start, flexure.end)]
+        total += kind.density * kind.thickness * kind.width * abs(ends[1] - ends[0])
+    return total
+
+
+# --- motion -------------------------------------------------------------------------------------
+
+
+def potential(sim, q):
+    """Return springs, gravity, base acceleration and inputs as one potential energy [J]."""
+    system, given = sim.system, sim.inputs
+    V = 0.5 * (q - system.q0) @ system.K @ (q - system.q0)
+    field = system.gravity - given.base
+    V -= (np.conj(field) * (system.m @ masses(system, q))).real
+    for force, F, moment in zip(sim.mechanism.forces, given.forces, given.moments, strict=True):
+        body = next(b for b in sim.mechanism.bodies if b.name == force.body)
+        z = body_point(system, force.body, complex(*(force.point or body.centre)), q)
+        V -= (np.conj(F) * z).real + moment * q[system.bodies[force.body].j]
+    return V
+
+
+@given(mechanisms(starting=True, damping=False, friction=False), SEEDS, st.booleans())
+@laws(30)
+def test_accelerations_obey_lagrange(mechanism, seed, held):
+    """T^H m (T a + z''|_a=0) + J a = -dV/dq + rows^T lam, rows a + (second derivative) = 0."""
+    sim = Simulation(mechanism, inputs(mechanism, seed))
+    system = sim.system
+    q, v = somewhere(system, seed)
+    holds = [held and i == 0 for i in range(len(mechanism.stops))]
+    discrete = Discrete(tuple(holds), (IDLE,) * len(holds), ())
+    a, lam, _ = Equations(system, sim.inputs, discrete, sim.omega).accelerations(q, v)
+
+    def scalars(q):
+        return np.concatenate([closures(system, q), gaps(system, q)[holds]])
+
+    T, rows = first(lambda q: masses(system, q), q), first(scalars, q)
+    z2 = T @ a + second(lambda q: masses(system, q), q, v)
+    inertial = (T.conj().T @ (system.m * z2)).real + system.J * a
+    torque = -first(lambda q: np.array([potential(sim, q)]), q)[0] + rows.T @ lam
+    size = np.abs(torque).max() + np.abs(rows.T @ lam).max() + np.abs(system.J * a).max()
+    np.testing.assert_allclose(inertial, torque, atol=1e-5 * size)
+    if len(rows):
+        bend = second(scalars, q, v)
+        np.testing.assert_allclose(
+            rows @ a, -bend, atol=1e-8 * np.abs(rows @ np.diag(a)).max() + 1e-6
+        )
+
+
+@given(mechanisms(starting=True), SEEDS)
+@laws(30)
+def test_a_static_shape_is_where_the_potential_is_stationary(mechanism, seed):
+    """dV/dq = rows^T lam under loads; frequencies are those of its second derivative."""
+    given = {k: x / 4 for k, x in inputs(mechanism, seed).items() if not k.startswith("base")}
+    sim = Simulation(mechanism, given)
+    system = sim.system
+    try:
+        shape = equilibrium(system, loads=given)
+    except EquilibriumError:
+        return  # the loads are random, too
+    q, lam = shape.q, shape.lam
+
+    def lagrangian(q):
+        return np.array([potential(sim, q) - lam @ closures(system, q)])
+
+    stiffest = np.abs(system.K).max()
+    np.testing.assert_allclose(first(lagrangian, q)[0], 0.0, atol=1e-9 * stiffest)
+    np.testing.assert_allclose(closures(system, q), 0.0, atol=1e-13)
+    found = modes(system, shape)
+    for phi, f in zip(found.shape.T, found.frequency, strict=True):
+        unit_phi = phi / np.abs(phi).max()
+        omega2 = second(lagrangian, q, unit_phi)[0] / (unit_phi @ found.M @ unit_phi)
+        scale = np.abs(found.frequency).max() ** 2
+        assert omega2 / (2 * math.pi) ** 2 == pytest.approx(f * abs(f), rel=1e-4, abs=1e-6 * scale)
+
+
+SPAN = 4e-3  # s
+RICH = range(10)  # seeds that between them have everything
+
+
+@given(mechanisms(starting=True, damping=False), SEEDS)
+@laws(15, shrink=False)
+def test_energy_is_kept_and_nothing_comes_apart(mechanism, seed):
+    keeps_energy(mechanism, seed)
+
+
+def keeps_energy(mechanism, seed):
+    """Check that T + V + dissipated - work is constant, through impacts, rest and friction.
+
+    Without friction and with restitution 1, nothing is dissipated either.
+    """
+    sim = Simulation(mechanism, inputs(mechanism, seed), tolerance=1e-10)
+    system, n = sim.system, sim.system.n
+    balance, kinetic = [], []
+    for t in np.linspace(0, SPAN, 9):
+        sim.advance(float(t))
+        out = sim.outputs()
+        balance.append(energy_balance(out))
+        kinetic.append(out["energy.kinetic"])
+        y = sim.state()
+        assert np.abs(closures(system, y[:n])).max(initial=0.0) < 1e-12
+        assert gaps(system, y[:n]).min(initial=1.0) > -1e-9
+    assert np.ptp(balance) < 1e-7 * max(kinetic)
+    lossless = all(s.restitution == 1.0 and s.friction == 0.0 for s in mechanism.stops)
+    if lossless and not mechanism.frictions and not any(sim.discrete.holds):
+        assert abs(out["energy.dissipated"]) < 1e-7 * max(kinetic)
+
+
+def momentum(sim):
+    """Return linear momentum and angular momentum about the first clamp, [N s] and [N m s]."""
+    system, y, n = sim.system, sim.state(), sim.system.n
+    q, v = y[:n], y[n : 2 * n]
+    z = masses(system, q) - system.anchor
+    p = system.m * (1j * (system.A @ (arms(system, q) * system.turning(v))))
+    return p.sum(), float((z.conj() * p).imag.sum() + system.J @ v)
+
+
+@given(mechanisms(starting=True), SEEDS)
+@laws(15, shrink=False)
+def test_the_base_carries_what_the_momentum_does_not(mechanism, seed):
+    balances_momentum(mechanism, seed)
+
+
+def balances_momentum(mechanism, seed):
+    """Check base reaction = weight + inputs - d/dt momentum, linear and angular."""
+    given = inputs(mechanism, seed)
+    sim = Simulation(mechanism, given, tolerance=1e-10)
+    system, h = sim.system, 1e-7
+    for t in (0.6e-3, 2.1e-3, 3.9e-3):
+        found, states = [], []
+        for time in (t - h, t, t + h):
+            sim.advance(time)
+            found.append(momentum(sim))
+            states.append((sim.discrete, list(sim.latched)))
+            if time == t:
+                out, y = sim.outputs(), sim.state()
+        if any(state != states[0] for state in states):
+            continue  # an event within the difference
+        z = masses(system, y[: system.n]) - system.anchor
+        weight = system.m * (system.gravity - sim.inputs.base)
+        force, moment = weight.sum(), (z.conj() * weight).imag.sum()
+        for one, F, M in zip(mechanism.forces, sim.inputs.forces, sim.inputs.moments, strict=True):
+            body = next(b for b in mechanism.bodies if b.name == one.body)
+            drawn = complex(*(one.point or body.centre))
+            arm = body_point(system, one.body, drawn, y[: system.n]) - system.anchor
+            force, moment = force + F, moment + (np.conj(arm) * F).imag + M
+        rates = [(late - early) / (2 * h) for early, late in zip(found[0], found[2], strict=True)]
+        size = sum(abs(x) for x in rates) + abs(force) + 1e-3
+        reaction = complex(out["base.force.x"], out["base.force.y"])
+        assert reaction == pytest.approx(force - rates[0], abs=1e-5 * size)
+        assert out["base.moment"] == pytest.approx(moment - rates[1], abs=1e-5 * size)
+
+
+# --- impacts ------------------------------------------------------------------------------------
+
+
+@given(mechanisms(starting=True), SEEDS)
+@laws(25, shrink=False)
+def test_an_impact_is_an_impulse_along_the_rows_of_what_touches(mechanism, seed):
+    has_lawful_impacts(mechanism, seed)
+
+
+def has_lawful_impacts(mechanism, seed):
+    """Check M (v+ - v-) = G^T P + T^T P_t + loops^T Lambda, P >= 0; energy is not gained.
+
+    Alone and without friction: u+ = -eps u-, and -P (u- + u+)/2 is lost.
+    """
+    sim = Simulation(mechanism, inputs(mechanism, seed))
+    sim.record = []
+    sim.advance(SPAN)
+    system = sim.system
+    for impact in sim.record:
+        q, jump = impact.q, impact.after - impact.before
+        T = first(lambda q: masses(system, q), q)
+        M = (T.conj().T @ (system.m[:, None] * T)).real + np.diag(system.J)
+        touching = np.flatnonzero(np.abs(gaps(system, q)) < 1e-8)
+        i = next(k for k, s in enumerate(mechanism.stops) if s.name == impact.stop)
+        assert i in touching
+        G, loops = first(lambda q: gaps(system, q), q), first(lambda q: closures(system, q), q)
+        rubbed = [k for k in touching if mechanism.stops[k].friction]
+        along = first(lambda q: slides(system, q), q)[rubbed]
+        rows = np.vstack([G[touching], along, loops])
+        impulses = np.linalg.lstsq(rows.T, M @ jump, rcond=1e-12)[0]
+        size = np.abs(M @ jump).max()
+        np.testing.assert_allclose(rows.T @ impulses, M @ jump, atol=1e-7 * size)
+        u = G[i] @ impact.before, G[i] @ impact.after
+        kinetic = [0.5 * v @ M @ v for v in (impact.before, impact.after)]
+        assert impact.impulse >= 0.0
+        assert u[0] < 0.0
+        assert u[1] >= -1e-7 * abs(u[0])
+        assert kinetic[1] <= kinetic[0] * (1 + 1e-9)
+        assert impact.latched.approach_speed == pytest.approx(-u[0], rel=1e-7)
+        if len(touching) == 1 and not rubbed:
+            assert impact.impulse == pytest.approx(impulses[0], rel=1e-6)
+            assert u[1] == pytest.approx(-mechanism.stops[i].restitution * u[0], abs=1e-7 * -u[0])
+            lost = -impact.impulse * (u[0] + u[1]) / 2
+            assert impact.latched.energy_lost == pytest.approx(lost, abs=1e-8 * kinetic[0])
+            assert kinetic[0] - kinetic[1] == pytest.approx(lost, abs=1e-8 * kinetic[0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(300))
+def test_the_laws_hold_for_many_more(seed):
+    quiet = seeded(seed, damping=False)
+    keeps_energy(quiet, seed)
+    balances_momentum(seeded(seed), seed)
+    has_lawful_impacts(seeded(seed), seed)
+
+
+def test_the_examples_are_rich():
+    """Impacts at walls on the ground and on bodies, alone and with friction, rest, and loops."""
+    seen_kinds = set()
+    for seed in RICH:
+        mechanism = seeded(seed)
+        sim = Simulation(mechanism, inputs(mechanism, seed))
+        sim.record = []
+        sim.advance(SPAN)
+        seen_kinds |= {"loop"} if len(sim.system.loops) else set()
+        seen_kinds |= {"stretch"} if len(sim.system.stretches) else set()
+        seen_kinds |= {"rest"} if any(sim.discrete.holds) else set()
+        for impact in sim.record:
+            stop = next(s for s in mechanism.stops if s.name == impact.stop)
+            seen_kinds.add("ground" if stop.on == GROUND else "body")
+            seen_kinds |= {"friction"} if stop.friction else set()
+    assert seen_kinds == {"loop", "stretch", "rest", "ground", "body", "friction"}
+
+
+def test_a_seed_makes_the_same_mechanism_again():
+    assert seeded(3) == seeded(3)
+    assert seeded(3) != seeded(4)
+
+
+def free_pair(friction):
+    """Return two bodies on threads so soft and light that they are free while they collide."""
+    thread = FlexureType("thread", "nR", 1e-5, 1e-5, 1e3, 1.0, n=2, axial=True)
+    return Mechanism(
+        name="Pair",
+        title="Two bodies, free for as long as a collision lasts",
+        ground={"a": (-0.1, 0.0), "b": (0.2, 0.01)},
+        bodies=(
+            Body("A", 0.03, 4e-6, (0.0, 0.0), {"p": (-0.01, 0.0)}),
+            Body("B", 0.05, 9e-6, (0.05, 0.002), {"p": (0.06, 0.01)}),
+        ),
+        flexure_types=(thread,),
+        flexures=(
+            Flexure("fa", "thread", "ground.a", "A.p"),
+            Flexure("fb", "thread", "ground.b", "B.p"),
+        ),
+        stops=(Stop("stop", "A", (0.01, 0.006), 20.0, 1e-3, friction=friction, on="B"),),
+        release=Release("A", 10.0, velocity=0.5),
+    )
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2, 5.0])
+@pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
+def test_a_free_pair_keeps_its_momentum(friction, restitution):
+    """Linear and angular, through a hit off both centres; what the threads weigh is 1e-9 of it.
+
+    Without friction, the impulse is that of two free bodies: (1 + eps) closing / W with
+    W = sum of 1/m + (arm x n)^2/J.
+    """
+    pair = free_pair(friction)
+    sim = Simulation(pair, {"stop.restitution": restitution, "stop.rest_speed": 0.0})
+    sim.record = []
+    while not sim.record:
+        sim.advance(sim.time + 1e-4)
+    (impact,) = sim.record
+    system, q = sim.system, impact.q
+    centres = {b: complex(f.A @ arms(system, q)) + f.c for b, f in system.bodies.items()}
+    angles = {b: q[f.j] for b, f in system.bodies.items()}
+
+    def motion(v):
+        p, L = 0j, 0.0
+        for body in pair.bodies:
+            frame = system.bodies[body.name]
+            u = 1j * complex(frame.A @ (arms(system, q) * system.turning(v)))
+            p += body.mass * u
+            L += body.mass * (centres[body.name].conjugate() * u).imag + body.inertia * v[frame.j]
+        return p, L
+
+    (p0, L0), (p1, L1) = motion(impact.before), motion(impact.after)
+    assert p1 == pytest.approx(p0, abs=1e-6 * abs(p0))
+    assert abs(L1 - L0) < 1e-6 * abs(p0) * 0.05
+    if friction:
+        return
+    n = unit(20.0) * np.exp(1j * angles["B"])
+    hit = centres["A"] + np.exp(1j * angles["A"]) * (0.01 + 0.006j)
+    W = sum(
+        1 / b.mass + ((hit - centres[b.name]).conjugate() * n).imag ** 2 / b.inertia
+        for b in pair.bodies
+    )
+    closing = impact.latched.approach_speed
+    assert impact.impulse == pytest.approx((1 + restitution) * closing / W, rel=1e-6)
+    assert impact.latched.rebound_speed == pytest.approx(restitution * closing, abs=1e-9)
