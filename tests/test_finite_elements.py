@@ -5,10 +5,23 @@ import math
 import numpy as np
 import pytest
 
-from prbm import Body, Flexure, FlexureType, Force, Mechanism, Release, Simulation, Stop
+from prbm import (
+    Body,
+    Flexure,
+    FlexureType,
+    Force,
+    Mechanism,
+    Release,
+    Simulation,
+    Stop,
+    assemble,
+    equilibrium,
+    modes,
+)
 from prbm.mechanism import Joint
 from prbm_tools import finite_elements
 from prbm_tools.finite_elements import FiniteElementError, FiniteElements
+from prbm_tools.mechanism_file import shipped
 from support import PMMA, mechanism
 
 pytest.importorskip(
@@ -297,6 +310,18 @@ def test_free_swing_of_the_pmma_guide_has_the_known_frequency():
     crossings = np.append(0.0, t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i]))
     assert 1 / np.diff(crossings).mean() == pytest.approx(5.6375, abs=5e-3)
     assert 26.2e-3 < x.max() < 28.1e-3
+
+
+@pytest.mark.parametrize("name", sorted(shipped()))
+def test_elements_and_model_agree_about_every_shipped_mechanism(name):
+    """The fundamental frequency at rest to 2.5 %: clamps, pins, joints and bodies are the same."""
+    parts = mechanism(name)
+    system = assemble(parts, parts.values())
+    model = modes(system, equilibrium(system)).frequency[0]
+    without = {f"{friction.name}.coefficient": 0.0 for friction in parts.frictions}
+    without |= {f"{stop.name}.friction": 0.0 for stop in parts.stops} | {"damping.zeta": 0.0}
+    fe = FiniteElements(parts, without, elements=8)
+    assert fe.modes(fe.equilibrium()).frequency[0] == pytest.approx(model, rel=0.025)
 
 
 # --- transients with impact -------------------------------------------------------------------

@@ -14,8 +14,8 @@ transposed Jacobian of the constraints Phi, and r F the holding force.
 
 What it can be trusted to
 -------------------------
-* Shapes and modes converge with the elements: 16 a flexure are within 1e-4 of 32 for the guides
-  in this package.
+* Shapes and modes converge with the elements: for the steel guide at rest, 16 a flexure are within
+  2e-5 of 32 in the displacement and the fundamental frequency, within 2e-4 in the next two.
 * The sections are thin: no shear, no rotary inertia, no anticlastic curvature.
 * An impact is the same event as in the engine, Newton's law at an instant, with the masses of the
   elements.  The hit body carries only the mass of what is clamped to it at once, so that waves run
