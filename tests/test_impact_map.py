@@ -2,6 +2,7 @@
 
 import csv
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -174,6 +175,20 @@ def test_walls_out_of_reach_and_unknown_stops_are_told():
         impact_map.fit_response(guide(), ["stop.bounce"], np.zeros(2), np.zeros(2))
 
 
-def test_first_impact_belongs_to_the_stop_that_was_asked_for():
-    sim = Simulation(guide("1R"), WEIGHTLESS)
+def test_the_first_impact_is_that_of_the_stop_that_was_asked_for():
+    """The body starts backwards, into a wall behind it: that impact is not the one of the map."""
+    one = guide("1R")
+    behind = replace(one.stops[0], name="behind", direction=180.0, position=9e-3)
+    sim = Simulation(
+        replace(one, stops=(replace(one.stops[0], position=-5e-3), behind)),
+        WEIGHTLESS | {"release.displacement": -8.9e-3, "release.velocity": -0.5},
+    )
     assert impact_map.first_impact(sim, 0).stop == "stop"
+    assert sim.record[0].stop == "behind"
+
+
+def test_own_coefficients_stay_where_the_model_does():
+    own = replace(guide("1R").flexure_types[0], coefficients={"K_theta": 2.5449})
+    parts = replace(guide("1R"), flexure_types=(own,))
+    assert impact_map.with_flexures(parts, "1R", axial=True).values()["flexure.K_theta"] == 2.5449
+    assert impact_map.with_flexures(parts, "2R").values()["flexure.K_theta1"] == 3.4710
