@@ -519,3 +519,17 @@ def test_a_release_velocity_that_the_loops_forbid_is_refused():
         ParameterError, match=r"release.velocity = 0.1 m/s: the body shuttle cannot"
     ):
         Simulation(upwards, values)
+
+
+def test_a_step_that_is_far_too_long_for_stretching_links_is_taken_again():
+    """The axial modes of a chain are a thousand times faster than what chooses the first step."""
+    from dataclasses import replace
+
+    guide = mechanism("PRBDM2R")
+    kinds = tuple(
+        replace(k, model="nR", n=2, axial=True, coefficients={}) for k in guide.flexure_types
+    )
+    sim = Simulation(replace(guide, flexure_types=kinds), tolerance=1e-7)
+    start = energy_balance(sim.outputs())
+    sim.advance(1e-4)
+    assert energy_balance(sim.outputs()) == pytest.approx(start, abs=1e-9)

@@ -63,16 +63,23 @@ def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
 def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
     """Return the fundamental mode at a shape that is not in equilibrium, and M there.
 
-    The multipliers are those of the shape held at rest by a force on the released body (Gauss'
-    principle: the accelerations left over are the least ones); at a static shape they are
-    exact.
-
     Returns
     -------
     phi : (n,)
         Mass-normalised mode.
     M : (n, n)
         Mass matrix [kg m^2].
+    """
+    found = modes_at(system, q)
+    return found.shape[:, 0], found.M
+
+
+def modes_at(system: System, q: Real) -> Modes:
+    """Return the modes at a shape that is not in equilibrium.
+
+    The multipliers are those of the shape held at rest by a force on the released body (Gauss'
+    principle: the accelerations left over are the least ones); at a static shape they are
+    exact.
     """
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
@@ -81,8 +88,7 @@ def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
     w = field_row(system.spread(system.S), system.gravity)
     right = np.concatenate([springs(system.K, q - system.q0) + (w * e).real, np.zeros(len(B))])
     lam = -constraints.solve(constraints.saddle(M, rows, rows), right)[system.n :]
-    found = _modes(system, q, B, lam, w)
-    return found.shape[:, 0], found.M
+    return _modes(system, q, B, lam, w)
 
 
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:

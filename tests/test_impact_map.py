@@ -1,0 +1,194 @@
+"""Maps of impact efficiency: laws of energy, independent routes, finite elements."""
+
+import csv
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prbm import EquilibriumError, ParameterError, Simulation, assemble, constraints, modes
+from prbm.contact import response as impulse_response
+from prbm.kinetics import inertia
+from prbm.modal import modes_at
+from prbm_tools import impact_map
+from prbm_tools.figures import png
+from support import mechanism
+
+WEIGHTLESS = {"gravity.x": 0.0}
+CORNERS = {"heights": (-10e-3, 0.0, 10e-3), "offsets": (-4e-3, 0.0, 4e-3)}
+
+
+def guide(model="2R", *, axial=False, n=0):
+    return impact_map.with_flexures(mechanism("PRBDM2R"), model, axial=axial, n=n)
+
+
+def test_energies_of_a_pure_mode_add_up():
+    """Sum of what the modes keep and the contact takes, for any rows and restitution."""
+    rng = np.random.default_rng(0)
+    for restitution in (0.0, 0.3, 1.0):
+        G = rng.standard_normal(6)
+        C, after, lost = impact_map.shares(G, restitution)
+        assert after.sum() + lost == pytest.approx(1.0, rel=1e-12)
+        assert after[0] == pytest.approx(C**2)
+
+
+@pytest.mark.parametrize("model", ["1R", "2R", "3R"])
+@pytest.mark.parametrize("axial", [False, True])
+def test_algebraic_restitution_is_that_of_an_impulse(model, axial):
+    """The sum over modes against the mass matrix on the tangent of the loops."""
+    values = WEIGHTLESS | {"stop.offset": 3e-3, "stop.position": -7e-3}
+    system = assemble(m := guide(model, axial=axial), m.values(values))
+    shape = impact_map.impact_shape(system, 0, -7e-3)
+    e = system.directions(shape.q)
+    M, _ = inertia(system.H, np.diag(system.J), e)
+    loops = constraints.jacobian(system.spread(system.loops), e)
+    G = constraints.gap_rows(system).jacobian(e)[[0]]
+    assert constraints.gap_rows(system).values(e)[0] - 7e-3 == pytest.approx(0.0, abs=1e-10)
+    found = modes(system, shape)
+    v = found.shape[:, 0]
+    X = impulse_response(M, loops, G)
+    after = v - 1.6 * X[:, 0] * float(G[0] @ v) / float(G[0] @ X[:, 0])
+    C = impact_map.algebraic(m, [-7e-3], [3e-3], WEIGHTLESS).restitution.item()
+    assert pytest.approx(-(v @ M @ after), abs=1e-9) == C
+
+
+def test_the_inextensible_1r_knows_neither_wall_nor_offset():
+    """One degree of freedom: what arrives is the mode, and Newton's law is all there is."""
+    flat = impact_map.algebraic(guide("1R"), **CORNERS, values=WEIGHTLESS)
+    np.testing.assert_allclose(flat.restitution, 0.6, atol=1e-12)
+    hit = impact_map.simulated(guide("1R"), [-5e-3], [4e-3], WEIGHTLESS)
+    np.testing.assert_allclose(hit.restitution, 0.6, atol=1e-9)
+
+
+def test_the_closed_form_is_near_the_model_that_stretches():
+    """A free body on the path: within 0.0064 of finite elements, and about that of the 2R."""
+    closed = impact_map.closed_form(guide(), values=WEIGHTLESS)
+    model = impact_map.algebraic(guide(axial=True), values=WEIGHTLESS)
+    np.testing.assert_allclose(closed.restitution, model.restitution, atol=0.0064)
+    centre = closed.restitution[2, 2]
+    assert centre == pytest.approx(0.6, abs=1e-6)  # straight and centred: nothing is in the way
+
+
+def test_the_stretching_2r_agrees_with_finite_elements_everywhere():
+    """To 0.005 at the source's 25 points, nothing fitted; without stretching it does not."""
+    pytest.importorskip(
+        "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
+    )
+    wanted = impact_map.by_elements(guide(), values=WEIGHTLESS, elements=8).restitution
+    model = impact_map.algebraic(guide(axial=True), values=WEIGHTLESS).restitution
+    assert wanted.shape == (5, 5)
+    assert np.abs(model - wanted).max() < 0.005
+    rigid = impact_map.algebraic(guide(), values=WEIGHTLESS).restitution
+    assert np.abs(rigid - wanted).max() > 0.03
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("model", "n", "error"),
+    [("1R", 0, 0.014), ("2R", 0, 0.003), ("3R", 0, 0.006), ("nR", 40, 5e-4)],
+)
+def test_models_that_stretch_are_as_near_to_finite_elements_as_is_said(model, n, error):
+    """Section 2.6 of the design: 1R 0.013, 2R 0.003, 3R 0.006; the long chain converges."""
+    pytest.importorskip(
+        "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
+    )
+    wanted = impact_map.by_elements(guide(), **CORNERS, values=WEIGHTLESS, elements=16)
+    found = impact_map.algebraic(guide(model, axial=True, n=n), **CORNERS, values=WEIGHTLESS)
+    assert np.abs(found.restitution - wanted.restitution).max() < error
+
+
+def test_energies_of_a_simulated_impact_add_up():
+    """What arrives is in the modes, what leaves in the modes and the contact."""
+    hit = impact_map.simulated(guide(), [-10e-3], [4e-3], WEIGHTLESS).hits[0][0]
+    assert (hit.height, hit.offset) == (-10e-3, 4e-3)
+    assert hit.before.sum() == pytest.approx(1.0, rel=1e-12)
+    assert hit.after.sum() + hit.lost == pytest.approx(1.0, rel=1e-9)
+    assert hit.after[0] / hit.before[0] == pytest.approx(hit.restitution**2, rel=1e-9)
+    assert hit.before[0] > 0.95  # nearly, but never, the pure mode
+    assert "contact" in hit.table()
+
+
+def test_modes_at_a_static_shape_are_those_of_the_shape():
+    """Gauss' multipliers are the static ones where the body is held."""
+    system = assemble(m := guide(axial=True), m.values(WEIGHTLESS))
+    shape = impact_map.impact_shape(system, 0, -5e-3)
+    np.testing.assert_allclose(
+        modes_at(system, shape.q).frequency, modes(system, shape).frequency, rtol=1e-7
+    )
+
+
+def test_a_1r_is_recovered_from_its_own_response():
+    truth = {"stop.restitution": 0.47, "flexure.K_theta": 2.7, "stop.position": -2e-3}
+    times = np.linspace(0.0, 0.12, 60)
+    wanted = impact_map.response(guide("1R"), WEIGHTLESS | truth, times)
+    fit = impact_map.fit_response(
+        guide("1R"),
+        ["stop.restitution", "flexure.K_theta"],
+        times,
+        wanted,
+        WEIGHTLESS | {"stop.position": -2e-3},
+    )
+    assert fit.values["stop.restitution"] == pytest.approx(0.47, abs=1e-4)
+    assert fit.values["flexure.K_theta"] == pytest.approx(2.7, rel=1e-4)
+    assert fit.rmse < 1e-7
+
+
+def test_the_fit_finds_the_simulated_restitution():
+    """The source's way and the mode's own velocity, where the flexures are straight."""
+    point = {"heights": [0.0], "offsets": [0.0], "values": WEIGHTLESS}
+    fit = impact_map.fitted(guide(), **point).restitution.item()
+    assert fit == pytest.approx(impact_map.simulated(guide(), **point).restitution.item(), abs=0.01)
+
+
+@pytest.mark.slow
+def test_a_rebound_through_straight_is_fitted_lower_than_one_outwards():
+    """Modes whose frequency rises on the way take energy from the fundamental one, and back."""
+    point = {"heights": [-10e-3, 10e-3], "offsets": [0.0], "values": WEIGHTLESS}
+    outwards, through = impact_map.fitted(guide(), **point).restitution[0]
+    direct = impact_map.simulated(guide(), **point).restitution[0]
+    assert outwards > direct[0] + 0.03
+    assert through < direct[1] - 0.05
+
+
+def test_a_map_is_written_and_drawn(tmp_path):
+    one = impact_map.algebraic(guide(), **CORNERS, values=WEIGHTLESS, label="2R")
+    rows = list(csv.reader(io.StringIO(one.write(tmp_path / "map.csv").read_text())))
+    assert len(rows) == 10
+    assert all(len(row) == len(rows[0]) for row in rows)
+    assert sum(map(float, rows[1][4:])) == pytest.approx(1.0, abs=5e-6)
+    assert str(one).splitlines()[0] == "2R"
+    for figure in (
+        impact_map.heat_map([one, one]), impact_map.surface([one, one]), impact_map.energies(one),
+    ):  # fmt: skip
+        assert png(figure).startswith(b"\x89PNG")
+
+
+def test_walls_out_of_reach_and_unknown_stops_are_told():
+    with pytest.raises(EquilibriumError, match="release further away"):
+        impact_map.simulated(
+            guide(), [17.9e-3], [0.0], WEIGHTLESS | {"release.displacement": -5e-3}
+        )
+    with pytest.raises(ParameterError, match="no stop bumper"):
+        impact_map.algebraic(guide(), stop="bumper")
+    with pytest.raises(ParameterError, match="no parameter"):
+        impact_map.fit_response(guide(), ["stop.bounce"], np.zeros(2), np.zeros(2))
+
+
+def test_the_first_impact_is_that_of_the_stop_that_was_asked_for():
+    """The body starts backwards, into a wall behind it: that impact is not the one of the map."""
+    one = guide("1R")
+    behind = replace(one.stops[0], name="behind", direction=180.0, position=9e-3)
+    sim = Simulation(
+        replace(one, stops=(replace(one.stops[0], position=-5e-3), behind)),
+        WEIGHTLESS | {"release.displacement": -8.9e-3, "release.velocity": -0.5},
+    )
+    assert impact_map.first_impact(sim, 0).stop == "stop"
+    assert sim.record[0].stop == "behind"
+
+
+def test_own_coefficients_stay_where_the_model_does():
+    own = replace(guide("1R").flexure_types[0], coefficients={"K_theta": 2.5449})
+    parts = replace(guide("1R"), flexure_types=(own,))
+    assert impact_map.with_flexures(parts, "1R", axial=True).values()["flexure.K_theta"] == 2.5449
+    assert impact_map.with_flexures(parts, "2R").values()["flexure.K_theta1"] == 3.4710
