@@ -3,15 +3,14 @@
 from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
 from typing import Any
-from unittest.mock import patch
 
 import pytest
 
 from prbm import Mechanism
-from prbm_fmu import native_fmu, python_fmu
+from prbm_fmu import python_fmu
 from prbm_fmu.archive import write
 from prbm_tools.mechanism_file import shipped
-from support import COSTLY, GUIDES, mechanism
+from support import GUIDES, built, mechanism
 
 
 class Built(dict[Any, Path]):
@@ -24,11 +23,6 @@ class Built(dict[Any, Path]):
     def __missing__(self, key: Hashable) -> Path:
         self[key] = self.build(key)
         return self[key]
-
-
-def without_results(*_: object) -> dict[str, bytes]:
-    """Stand in for the reference results of what takes the engine long."""
-    return {}
 
 
 @pytest.fixture(scope="session")
@@ -44,11 +38,11 @@ def fmus(
     """Return the Python FMUs by name."""
     folder = tmp_path_factory.mktemp("fmus")
 
-    def built(name: str) -> Path:
+    def one(name: str) -> Path:
         write(folder / f"{name}.fmu", python_fmu.build(mechanisms[name]))
         return folder / f"{name}.fmu"
 
-    return Built(built, GUIDES)
+    return Built(one, GUIDES)
 
 
 @pytest.fixture(scope="session")
@@ -61,11 +55,10 @@ def native(
     """
     folder = tmp_path_factory.mktemp("native")
 
-    def built(key: tuple[str, int]) -> Path:
+    def one(key: tuple[str, int]) -> Path:
         name, fmi = key
         path = folder / f"fmi{fmi}" / f"{name}.fmu"
-        with patch.object(native_fmu, "reference", without_results if name in COSTLY else native_fmu.reference):
-            write(path, native_fmu.build(mechanisms[name], fmi=fmi))
+        write(path, built(mechanisms[name], fmi))
         return path
 
-    return Built(built, [(name, fmi) for name in GUIDES for fmi in (2, 3)])
+    return Built(one, [(name, fmi) for name in GUIDES for fmi in (2, 3)])

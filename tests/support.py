@@ -3,14 +3,16 @@
 import math
 from dataclasses import dataclass
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from prbm import Mechanism, Simulation
+from prbm import Mechanism, Simulation, assemble, equilibrium, modes
 from prbm.hybrid import Impact
+from prbm_fmu import native_fmu
 from prbm_tools.mechanism_file import load, shipped
 
 
@@ -95,6 +97,30 @@ class Case:
         """Return outputs of all stops, such as contact."""
         return [f"{stop.name}.{name}" for stop in self.mechanism.stops for name in what]
 
+    def starts(self) -> dict[str, float]:
+        """Return start values that differ from the defaults: half the release, and a force."""
+        return {"release.displacement": 0.5 * self.displacement, f"{self.force}.x": 0.05}
+
+    def changes(self) -> dict[int, dict[str, float]]:
+        """Return inputs and tunable parameters that change on the way, by communication step."""
+        return {
+            3: {f"{self.force}.x": 0.3, "base.acceleration.y": 2.0},
+            5: {f"{self.stop}.displacement": 1e-3, f"{self.stop}.velocity": 0.0},
+            8: {f"{self.stop}.restitution": 0.9, "damping.zeta": 0.05},
+            12: {f"{self.stop}.displacement": -1e-3, f"{self.force}.moment": 1e-3},
+        }
+
+    def substep(self, largest: float) -> float:
+        """Return a step [s] at which Runge and Kutta's classical steps are stable.
+
+        Half the bound of the fastest mode at release, h omega < 2 and h beta omega^2 < 2.
+        """
+        values = self.mechanism.values()
+        system = assemble(self.mechanism, values)
+        shape = equilibrium(system, self.displacement)
+        omega = 2.0 * math.pi * float(modes(system, shape).frequency.max())
+        return min(largest, 1.0 / omega, 1.0 / max(values["damping.beta"] * omega**2, 1e-300))
+
     def impacts(self, values) -> int:
         """Return how many impacts there have been at all stops, by values of outputs."""
         return sum(int(values[name]) for name in self.at_stops("impact_count"))
@@ -103,6 +129,13 @@ class Case:
 @cache
 def case(name: str) -> Case:
     return Case(mechanism(name), ENDS.get(name, 0.3))
+
+
+def built(guide: Mechanism, fmi: int, platforms=("host",)) -> bytes:
+    """Return a native FMU; without reference results if they take the engine long."""
+    reference = (lambda *_: {}) if guide.name in COSTLY else native_fmu.reference
+    with patch.object(native_fmu, "reference", reference):
+        return native_fmu.build(guide, fmi=fmi, platforms=platforms)
 
 
 def simulation(name: str, values=None, **options) -> Simulation:

@@ -14,7 +14,7 @@ from prbm import Simulation
 from prbm_fmu import python_fmu
 from prbm_fmu.archive import write
 from prbm_fmu.python_fmu import interface
-from support import GUIDES, SHIPPED, case, each_shipped, record
+from support import GUIDES, SHIPPED, case, record, selected
 
 END = 0.3  # s; the default run of the guides bounces until 0.243 s, then it rests
 SEEN = 6  # times at which all is compared
@@ -90,18 +90,11 @@ def test_an_fmu_is_the_engine_whatever_the_communication_step(fmus, model, grid)
         assert rows[-1]["stop.contact"]
 
 
-@each_shipped
+@pytest.mark.parametrize("model", selected(lambda name: name != "PRBDM2R"))
 def test_inputs_walls_and_tunable_parameters_reach_the_engine(fmus, model):
     """From half the release and another start time, at the tolerance that the importer asks for."""
     it, listed = case(model), {v.name: v for v in interface(case(model).mechanism, {})}
-    force, stop, step = it.force, it.stop, it.end / 30
-    start = {"release.displacement": 0.5 * it.displacement, f"{force}.x": 0.05}
-    changes = {
-        3: {f"{force}.x": 0.3, "base.acceleration.y": 2.0},
-        5: {f"{stop}.displacement": 1e-3, f"{stop}.velocity": 0.0},
-        8: {f"{stop}.restitution": 0.9, "damping.zeta": 0.05},
-        12: {f"{stop}.displacement": -1e-3, f"{force}.moment": 1e-3},
-    }
+    start, changes, step = it.starts(), it.changes(), it.end / 30
     simulation = Simulation(it.mechanism, start, start_time=2.0, tolerance=1e-9)
     given = {n: v.start for n, v in listed.items() if v.start is not None} | start
     with Instance(fmus[model]) as instance:
