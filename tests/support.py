@@ -115,11 +115,8 @@ class Case:
 
         Half the bound of the fastest mode at release, h omega < 2 and h beta omega^2 < 2.
         """
-        values = self.mechanism.values()
-        system = assemble(self.mechanism, values)
-        shape = equilibrium(system, self.displacement)
-        omega = 2.0 * math.pi * float(modes(system, shape).frequency.max())
-        return min(largest, 1.0 / omega, 1.0 / max(values["damping.beta"] * omega**2, 1e-300))
+        omega, beta = fastest(self.mechanism.name), self.mechanism.damping_beta
+        return min(largest, 1.0 / omega, 1.0 / max(beta * omega**2, 1e-300))
 
     def impacts(self, values) -> int:
         """Return how many impacts there have been at all stops, by values of outputs."""
@@ -131,11 +128,11 @@ def case(name: str) -> Case:
     return Case(mechanism(name), ENDS.get(name, 0.3))
 
 
-def built(guide: Mechanism, fmi: int, platforms=("host",)) -> bytes:
+def built(guide: Mechanism, fmi: int, platforms=("host",), clock=False) -> bytes:
     """Return a native FMU; without reference results if they take the engine long."""
     reference = (lambda *_: {}) if guide.name in COSTLY else native_fmu.reference
     with patch.object(native_fmu, "reference", reference):
-        return native_fmu.build(guide, fmi=fmi, platforms=platforms)
+        return native_fmu.build(guide, fmi=fmi, platforms=platforms, clock=clock)
 
 
 def simulation(name: str, values=None, **options) -> Simulation:
@@ -143,6 +140,15 @@ def simulation(name: str, values=None, **options) -> Simulation:
     sim = Simulation(mechanism(name), values, **options)
     sim.record = []
     return sim
+
+
+@cache
+def fastest(name: str) -> float:
+    """Return the circular frequency of the fastest mode at release [rad/s]."""
+    guide = mechanism(name)
+    system = assemble(guide, guide.values())
+    shape = equilibrium(system, system.values["release.displacement"])
+    return 2.0 * math.pi * float(modes(system, shape).frequency.max())
 
 
 @cache

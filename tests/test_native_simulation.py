@@ -23,6 +23,7 @@ from support import (
     case,
     each_shipped,
     energy_balance,
+    fastest,
     mechanism,
     record,
     selected,
@@ -91,9 +92,10 @@ def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: fl
 
     Event indicators are positive between events.  Derivatives (up to 2e5 rad/s2) are compared with
     differences of the engine, which interpolates: its fast modes keep a noise of 1e-4 rad/s in
-    the worst case, which changes within 1e-3 s or less.
+    the worst case, which changes within 1e-3 s or less.  An error of a tenth of the tolerance in a
+    fast mode is one of omega^2 times as much in its acceleration: 20 for the axial modes.
     """
-    found = instance.values()
+    found, noise = instance.values(), 1e-9 * fastest(instance.description.modelName) ** 2
     compared = set()
     for name, value in found.items():
         compared.add(name)
@@ -101,8 +103,8 @@ def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: fl
             assert value > 0.0, name
             continue
         scale = max(listed[name].nominal or 1.0, abs(expected[name]))
-        bound = 1e-2 if name.startswith("der(") else tolerance
-        assert abs(value - expected[name]) <= bound * scale, (name, value, expected[name])
+        bound = max(1e-2 * scale, noise) if name.startswith("der(") else tolerance * scale
+        assert abs(value - expected[name]) <= bound, (name, value, expected[name])
     assert compared == instance.references.keys()
     assert compared == set(listed) - ({"time"} if instance.version == 2 else set())
 
@@ -111,9 +113,18 @@ def worst(found: np.ndarray, expected: np.ndarray, name: str) -> float:
     return float(np.abs(found[name] - expected[name]).max())
 
 
-@pytest.mark.parametrize("grid", GRIDS)
+def on_grids() -> list:
+    """Return each mechanism with each grid; what is slow anyway with the hardest one alone."""
+    return [
+        pytest.param(*getattr(p, "values", (p,)), grid, marks=getattr(p, "marks", ()))
+        for p in SHIPPED
+        for grid in GRIDS
+        if isinstance(p, str) or grid == "uneven"
+    ]
+
+
+@pytest.mark.parametrize(("model", "grid"), on_grids())
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
 def test_co_simulation_is_the_engine_whatever_the_communication_step(native, model, fmi, grid):
     """To 1e-7 of each nominal: rounding, times what the motion amplifies it by."""
     run, it = engine_run(model), case(model)
@@ -210,7 +221,7 @@ def test_the_default_experiment_in_fmpy_comes_to_its_end_with_the_books_balanced
 @pytest.mark.parametrize("fmi", [2, 3])
 @models
 def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
-    """At a relative tolerance of 1e-9: positions to 1e-6 of the release, the same impacts.
+    """At a relative tolerance of 1e-9: the guides to 1e-6 of the release, the same impacts.
 
     The last bounces are slow (1 mm/s): an error of 1e-9 m in place is one of 1e-6 s in time.
     FMPy gives CVode no more than 500 steps for a communication step: hence small ones.
@@ -222,8 +233,9 @@ def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
         str(native[model, fmi]), fmi_type="ModelExchange", relative_tolerance=1e-9, **options
     )
     assert found["time"] == pytest.approx(expected["time"], abs=1e-12)
+    bound = 1e-6 * 0.018 if model in GUIDES else 5e-8  # m; a snap makes more of an error
     for name in it.outputs("x", "y"):
-        assert worst(found, expected, name) < 1e-6 * abs(it.displacement), name  # m
+        assert worst(found, expected, name) < bound, name
     for name in it.outputs("angle"):
         assert worst(found, expected, name) < 1e-6, name  # rad
     for name in it.outputs("vx"):
@@ -244,17 +256,20 @@ def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
 def test_model_exchange_at_fmpys_default_settings_tells_the_same_story(native, model, fmi):
     """FMPy takes the default experiment's tolerance, 1e-8: within 1e-7 m, of a release by 18 mm.
 
+    The guides come to rest; what does not is followed for a few impacts, which amplify the errors.
+
     What has fast modes needs more than the 500 steps that FMPy gives CVode for the communication
     step of these settings.
     """
     it, path = case(model), str(native[model, fmi])
-    expected = simulate_fmu(path)
-    found = simulate_fmu(path, fmi_type="ModelExchange", record_events=False)
+    span = {} if model in GUIDES else {"stop_time": it.end, "output_interval": it.end / 300}
+    expected = simulate_fmu(path, **span)
+    found = simulate_fmu(path, fmi_type="ModelExchange", record_events=False, **span)
     same = np.isin(np.round(found["time"], 9), np.round(expected["time"], 9))
     assert same.sum() > 100
     for name in it.outputs("x"):
         x = np.interp(found["time"], expected["time"], expected[name])
-        assert np.abs(found[name] - x)[same].max() < 1e-7  # m
+        assert np.abs(found[name] - x)[same].max() < (1e-7 if model in GUIDES else 1e-6)  # m
     assert it.impacts(found[-1]) == it.impacts(expected[-1]) > 0
     for name in it.at_stops("contact"):
         assert found[name][-1] == expected[name][-1]
@@ -308,7 +323,7 @@ def test_model_exchange_with_an_integrator_of_our_own_is_the_engine(native, mode
     with their fourth power: at 0.06 s, after the first impact, 8e-7 m and then 6e-8 m.
     """
     run, it, errors = engine_run(model), case(model), []
-    step = it.substep(4e-5)
+    step = it.substep(4e-5 if model in GUIDES else 2e-5)
     for h in (step, step / 2):
         with Instance(native[model, fmi], "me", substep=h).initialize() as instance:
             for row in run.rows[1:4]:
@@ -556,11 +571,11 @@ def test_directional_derivatives_are_those_of_differences(native, model, fmi, sh
             errors = np.minimum(errors, np.abs(found - slope) / (np.abs(slope) + 1e-4 * sizes))
         assert errors.max() < 1e-6, dict(zip(unknowns, errors, strict=True))
         assert instance.values()[f"{it.stop}.contact"] == (share == 1.0)
+        at(0.0)
         single = sum(
             w * np.array(instance.fmu.getDirectionalDerivative(references[0], [r], [1.0]))
             for w, r in zip([*dx, *du], references[1], strict=True)
         )
-        at(0.0)
         assert single == pytest.approx(found, rel=1e-3, abs=1e-3 * np.abs(found).max())
 
 
@@ -579,7 +594,8 @@ def test_what_depends_on_an_input_or_a_state_says_so(native, model, fmi):
         }
         inputs = [v.name for v in d.modelVariables if v.causality == "input"]
         states = [u.variable.derivative.name for u in d.derivatives]
-        assert len(unknowns) == len(d.outputs) + len(d.derivatives)
+        listed = {u.variable.name for u in (*d.outputs, *d.derivatives)}
+        assert unknowns.keys() == listed  # the turning of a body may be an output and a derivative
         before, moved = instance.values(), 0
         for name in inputs + states:
             assert instance.set({name: before[name] + 1e-3 * rng.uniform(0.5, 1.0)}) == OK
@@ -691,7 +707,7 @@ def test_the_importers_tolerance_wins_over_the_parameter(native, fmi, kind):
 def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi, kind):
     it, values = case(model), mechanism(model).values()
     modulus = next(name for name in values if name.endswith(".youngs_modulus"))
-    change = {modulus: 2.0 * values[modulus], "release.displacement": 0.3 * it.displacement}
+    change = {modulus: 2.0 * values[modulus], "release.displacement": 0.5 * it.displacement}
     with Instance(native[model, fmi], kind).enter() as instance:
         softer = instance.values()
         assert instance.set(change) == OK
@@ -700,7 +716,7 @@ def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi,
         assert instance.values() == stiffer
     placed, size = it.released, abs(it.displacement)
     assert abs(softer[placed]) == pytest.approx(size, abs=1e-12)  # tolerance of the statics
-    assert stiffer[placed] == pytest.approx(0.3 * softer[placed], abs=1e-12)
+    assert stiffer[placed] == pytest.approx(0.5 * softer[placed], abs=1e-12)
     assert stiffer["mode.frequency"] > softer["mode.frequency"] > 0.0
 
 
@@ -716,9 +732,12 @@ def test_time_that_starts_elsewhere_shifts_the_motion_and_nothing_else(native, m
             instance.advance(start + span)
             rows.append(instance.values())
     moved = {"time", *(n for n in it.at_stops("impact_time") if rows[0][n] > 0.0)}
-    assert {n: v for n, v in rows[1].items() if n not in moved} == pytest.approx(
-        {n: v for n, v in rows[0].items() if n not in moved}, rel=1e-6, abs=1e-9
-    )
+    for ders, share in ((False, 1e-6), (True, 1e-4)):  # stiff axial modes show in derivatives
+        first, second = (
+            {n: v for n, v in row.items() if n not in moved and n.startswith("der(") == ders}
+            for row in rows
+        )
+        assert second == pytest.approx(first, rel=share, abs=1e-9)
     if fmi == 3:
         assert rows[1]["time"] == pytest.approx(shift + span)
 
@@ -778,8 +797,8 @@ def test_the_clock_changes_nothing_of_the_motion(model):
     rows = [(round(float(row["time"]), 9), row[it.released]) for row in found]
     compared = [(x, expected[t]) for t, x in rows if t in expected]
     assert len(compared) == len(run.rows)
-    assert [x for x, _ in compared] == pytest.approx([x for _, x in compared], abs=1e-9)
-    assert found["stop.impact_count"][-1] == IMPACTS
+    assert [x for x, _ in compared] == pytest.approx([y for _, y in compared], abs=1e-8)
+    assert it.impacts(found[-1]) == len(run.record)
     exchanged = simulate_fmu(
         str(clocked(model)), fmi_type="ModelExchange", relative_tolerance=1e-9, stop_time=it.end,
         output_interval=it.end / 300, record_events=False, output=names,
