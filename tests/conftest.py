@@ -1,45 +1,64 @@
 """What several test files need: the shipped mechanisms and their FMUs, built once."""
 
+from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from prbm import Mechanism
-from prbm_fmu import native_fmu, python_fmu
+from prbm_fmu import python_fmu
 from prbm_fmu.archive import write
-from prbm_tools.mechanism_file import load, shipped
+from prbm_tools.mechanism_file import shipped
+from support import GUIDES, built, mechanism
 
-BUILT = ("PRBDM", "PRBDM2R")  # what the tests of FMUs simulate; others take longer to build
+
+class Built(dict[Any, Path]):
+    """FMUs by what they are of: the guides' at once, others when they are asked for."""
+
+    def __init__(self, build: Callable[[Any], Path], first: Iterable[Hashable]) -> None:
+        super().__init__((key, build(key)) for key in first)
+        self.build = build
+
+    def __missing__(self, key: Hashable) -> Path:
+        self[key] = self.build(key)
+        return self[key]
 
 
 @pytest.fixture(scope="session")
 def mechanisms() -> dict[str, Mechanism]:
     """Return the shipped mechanisms by name."""
-    return {name: load(path) for name, path in shipped().items()}
+    return {name: mechanism(name) for name in shipped()}
 
 
 @pytest.fixture(scope="session")
 def fmus(
     mechanisms: dict[str, Mechanism], tmp_path_factory: pytest.TempPathFactory
 ) -> dict[str, Path]:
-    """Return the Python FMUs of the guides by name."""
+    """Return the Python FMUs by name."""
     folder = tmp_path_factory.mktemp("fmus")
-    paths = {}
-    for name in BUILT:
-        paths[name] = folder / f"{name}.fmu"
-        write(paths[name], python_fmu.build(mechanisms[name]))
-    return paths
+
+    def one(name: str) -> Path:
+        write(folder / f"{name}.fmu", python_fmu.build(mechanisms[name]))
+        return folder / f"{name}.fmu"
+
+    return Built(one, GUIDES)
 
 
 @pytest.fixture(scope="session")
 def native(
     mechanisms: dict[str, Mechanism], tmp_path_factory: pytest.TempPathFactory
 ) -> dict[tuple[str, int], Path]:
-    """Return the native FMUs of the guides for this machine, by name and version of FMI."""
+    """Return the native FMUs for this machine, by name and version of FMI.
+
+    Those that take the engine long are without reference results.
+    """
     folder = tmp_path_factory.mktemp("native")
-    paths = {}
-    for name in BUILT:
-        for fmi in (2, 3):
-            paths[name, fmi] = folder / f"fmi{fmi}" / f"{name}.fmu"
-            write(paths[name, fmi], native_fmu.build(mechanisms[name], fmi=fmi))
-    return paths
+
+    def one(key: tuple[str, int]) -> Path:
+        name, fmi = key
+        path = folder / f"fmi{fmi}" / f"{name}.fmu"
+        write(path, built(mechanisms[name], fmi))
+        return path
+
+    return Built(one, [(name, fmi) for name in GUIDES for fmi in (2, 3)])

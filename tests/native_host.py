@@ -19,9 +19,8 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription
 
-from prbm_fmu import native_fmu
 from prbm_fmu.archive import write
-from support import mechanism
+from support import built, mechanism
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 REAL, INTEGER, BOOLEAN = "Real", "Integer", "Boolean"
@@ -73,7 +72,7 @@ def clocked(model: str) -> Path:
     folder = TemporaryDirectory(prefix="prbm_clocked_")
     _folders.append(folder)
     path = Path(folder.name) / f"{model}.fmu"
-    write(path, native_fmu.build(mechanism(model), fmi=3, clock=True))
+    write(path, built(mechanism(model), fmi=3, clock=True))
     return path
 
 

@@ -3,12 +3,16 @@
 import math
 from dataclasses import dataclass
 from functools import cache
+from unittest.mock import patch
 
 import numpy as np
+import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from prbm import Mechanism, Simulation
+from prbm import Mechanism, Simulation, assemble, equilibrium, modes
+from prbm.hybrid import Impact
+from prbm_fmu import native_fmu
 from prbm_tools.mechanism_file import load, shipped
 
 
@@ -17,11 +21,152 @@ def mechanism(name: str) -> Mechanism:
     return load(shipped()[name])
 
 
+GUIDES = ("PRBDM", "PRBDM2R")
+"""What has friction on the shuttle and comes to rest on the stop: for tests of that."""
+
+ENDS = {
+    "Bistable": 0.09, "Cantilever": 0.24, "FoldedSuspension": 0.135, "ImpactOscillator": 0.12,
+    "PRBDM2RAxial": 0.045, "PRBDM3R": 0.048,
+}  # fmt: skip
+"""Until when [s] something happens, where it is not by 0.3 s that all does."""
+
+QUICK = (*GUIDES, "ImpactOscillator")
+"""What is checked by default: the guides, and a stop on a body that moves; the others as slow."""
+
+COSTLY = ("FoldedSuspension", "PRBDM2RAxial", "PRBDM3R")
+"""What takes the engine 5 to 20 s for the second of the default experiment."""
+
+SHIPPED = [
+    name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in shipped()
+]
+"""The shipped mechanisms as parameters of a check that holds for every one of them."""
+
+each_shipped = pytest.mark.parametrize("model", SHIPPED)
+
+
+def selected(keep) -> list:
+    """Return those of SHIPPED of which something is true, by their names."""
+    return [p for p in SHIPPED if keep(p if isinstance(p, str) else p.values[0])]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What a check that holds for every mechanism needs to know of one of them.
+
+    ``end`` is a time [s] by which the default experiment has had an impact, if it has any.
+    """
+
+    mechanism: Mechanism
+    end: float
+
+    @property
+    def costly(self) -> bool:
+        return self.mechanism.name in COSTLY
+
+    @property
+    def body(self) -> str:
+        """The body that is released."""
+        return self.mechanism.release.body
+
+    @property
+    def stop(self) -> str:
+        """The first stop."""
+        return self.mechanism.stops[0].name
+
+    @property
+    def force(self) -> str:
+        """The first force."""
+        return self.mechanism.forces[0].name
+
+    @property
+    def displacement(self) -> float:
+        """The default displacement at release, along its direction [m]."""
+        return float(self.mechanism.values()["release.displacement"])
+
+    @property
+    def released(self) -> str:
+        """The output that shows it but for its sign."""
+        upright = round(self.mechanism.release.direction) % 180 != 0
+        return f"{self.body}.{'y' if upright else 'x'}"
+
+    def outputs(self, *what: str) -> list[str]:
+        """Return outputs of all bodies, such as x and y."""
+        return [f"{body.name}.{name}" for body in self.mechanism.bodies for name in what]
+
+    def at_stops(self, *what: str) -> list[str]:
+        """Return outputs of all stops, such as contact."""
+        return [f"{stop.name}.{name}" for stop in self.mechanism.stops for name in what]
+
+    def starts(self) -> dict[str, float]:
+        """Return start values that differ from the defaults: half the release, and a force."""
+        return {"release.displacement": 0.5 * self.displacement, f"{self.force}.x": 0.05}
+
+    def changes(self) -> dict[int, dict[str, float]]:
+        """Return inputs and tunable parameters that change on the way, by communication step."""
+        return {
+            3: {f"{self.force}.x": 0.3, "base.acceleration.y": 2.0},
+            5: {f"{self.stop}.displacement": 1e-3, f"{self.stop}.velocity": 0.0},
+            8: {f"{self.stop}.restitution": 0.9, "damping.zeta": 0.05},
+            12: {f"{self.stop}.displacement": -1e-3, f"{self.force}.moment": 1e-3},
+        }
+
+    def substep(self, largest: float) -> float:
+        """Return a step [s] at which Runge and Kutta's classical steps are stable.
+
+        Half the bound of the fastest mode at release, h omega < 2 and h beta omega^2 < 2.
+        """
+        omega, beta = fastest(self.mechanism.name), self.mechanism.damping_beta
+        return min(largest, 1.0 / omega, 1.0 / max(beta * omega**2, 1e-300))
+
+    def impacts(self, values) -> int:
+        """Return how many impacts there have been at all stops, by values of outputs."""
+        return sum(int(values[name]) for name in self.at_stops("impact_count"))
+
+
+@cache
+def case(name: str) -> Case:
+    return Case(mechanism(name), ENDS.get(name, 0.3))
+
+
+def built(guide: Mechanism, fmi: int, platforms=("host",), clock=False) -> bytes:
+    """Return a native FMU; without reference results if they take the engine long."""
+    reference = (lambda *_: {}) if guide.name in COSTLY else native_fmu.reference
+    with patch.object(native_fmu, "reference", reference):
+        return native_fmu.build(guide, fmi=fmi, platforms=platforms, clock=clock)
+
+
 def simulation(name: str, values=None, **options) -> Simulation:
     """Return a simulation that keeps a record of its impacts."""
     sim = Simulation(mechanism(name), values, **options)
     sim.record = []
     return sim
+
+
+@cache
+def fastest(name: str) -> float:
+    """Return the circular frequency of the fastest mode at release [rad/s]."""
+    guide = mechanism(name)
+    system = assemble(guide, guide.values())
+    shape = equilibrium(system, system.values["release.displacement"])
+    return 2.0 * math.pi * float(modes(system, shape).frequency.max())
+
+
+@cache
+def record(name: str) -> list[Impact]:
+    """Return the impacts that the engine finds in the span of a case."""
+    sim = simulation(name)
+    sim.advance(case(name).end)
+    return sim.record
+
+
+def around_first_impact(name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return times from 0 until shortly before the first impact, and from there to some more.
+
+    Both are communication points, 16 and 47 steps.
+    """
+    first, end = record(name)[0].time, case(name).end
+    middle = 0.975 * first
+    return np.linspace(0.0, middle, 17), np.linspace(middle, min(end, 4 * first), 48)
 
 
 def energy_balance(out) -> float:

@@ -10,9 +10,8 @@ from prbm.constraints import jacobian
 from prbm.dynamics import input_names
 from prbm.exchange import conditioning, independent
 from prbm.statics import equilibrium
-from support import energy_balance, mechanism
+from support import GUIDES, case, each_shipped, energy_balance, mechanism
 
-MODELS = ("PRBDM", "PRBDM2R")
 INPUTS = {
     "force.x": 0.1, "force.y": -0.2, "force.moment": 1e-3, "stop.displacement": 1e-3,
     "stop.velocity": 0.02, "base.acceleration.x": 0.3, "base.acceleration.y": -0.4,
@@ -24,7 +23,7 @@ FRICTION = {
 SCALARS = 20  # numbers before the values in the array of the state
 
 
-@pytest.mark.parametrize("model", MODELS)
+@each_shipped
 def test_the_dependent_coordinates_are_determined_at_every_shape(model):
     """Their columns of the loops' Jacobian keep a tenth of its size from straight to release."""
     guide = mechanism(model)
@@ -32,9 +31,9 @@ def test_the_dependent_coordinates_are_determined_at_every_shape(model):
     chosen = independent(guide)
     dependent = tuple(j for j in range(system.n) if j not in chosen)
     assert len(chosen) == system.n - len(system.loops)
-    for x in np.linspace(-0.018, 0.018, 7):
-        q = equilibrium(system, x).q
-        assert conditioning(jacobian(system.loops, np.exp(1j * q)), dependent) > 0.1
+    for share in (-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0) if len(system.loops) else ():
+        q = equilibrium(system, share * case(model).displacement).q
+        assert conditioning(jacobian(system.loops, system.directions(q)), dependent) > 0.1
 
 
 def discrete_states():
@@ -43,7 +42,7 @@ def discrete_states():
     One degree of freedom cannot be held and stuck at once.
     """
     for rubs in (2, 0, 1, -1):
-        for model in MODELS:
+        for model in GUIDES:
             yield model, (0, 2, rubs)
         for slides in (2, 0, 1, -1):
             yield "PRBDM2R", (1, slides, rubs)
@@ -110,6 +109,17 @@ def test_directional_derivatives_are_those_of_differences(model, discrete):
     assert_directional(mechanism(model), FRICTION, INPUTS, discrete)
 
 
+@each_shipped
+def test_directional_derivatives_of_every_mechanism_in_flight_are_those_of_differences(model):
+    guide = mechanism(model)
+    names = input_names(guide)
+    inputs = dict(zip(names, np.linspace(-0.4, 0.3, len(names)), strict=True))
+    inputs |= {name: 1e-3 for name in names if name.endswith((".moment", ".displacement"))}
+    inputs |= {name: 0.02 for name in names if name.endswith(".velocity")}
+    friction = FRICTION if guide.frictions else {"damping.zeta": 0.05}
+    assert_directional(guide, friction, inputs, ())
+
+
 HAMMER = {
     "face.friction": 0.3, "rub.coefficient": 0.4, "rub.normal_force": 0.5,
     "rub.normal_stiffness": 30.0, "damping.zeta": 0.05,
@@ -142,7 +152,7 @@ def test_directional_derivatives_of_a_mechanism_of_many_parts():
         assert_directional(guide, friction, inputs, discrete)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@each_shipped
 def test_derivatives_are_those_of_the_motion(model):
     """What co-simulation moves by in a short time, without any event."""
     exchange = KernelSimulation(mechanism(model), {"release.velocity": 0.2}, exchange=True)

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from fmu_host import DISCARD, OK, Instance
+from support import around_first_impact, case, each_shipped
 
-MODELS = ("PRBDM", "PRBDM2R")
 STEP = 2.5e-3
 BEFORE = STEP * np.arange(17)  # the first impact comes at 0.041 s, within the next step
 AFTER = STEP * np.arange(16, 64)  # and six more come until 0.1575 s or later
@@ -16,43 +16,46 @@ AFTER = STEP * np.arange(16, 64)  # and six more come until 0.1575 s or later
 pytestmark = pytest.mark.fmu
 
 
-@pytest.mark.parametrize("model", MODELS)
+@each_shipped
 def test_a_state_restored_before_an_impact_gives_the_same_bytes(fmus, model):
     """Restored twice, the second time from a motion that has gone elsewhere."""
+    it, (before, after) = case(model), around_first_impact(model)
     with Instance(fmus[model]).initialize() as instance:
-        instance.run(BEFORE)
-        assert instance.values()["stop.impact_count"] == 0
+        instance.run(before)
+        assert it.impacts(instance.values()) == 0
         state = instance.fmu.getFMUState()
         here = instance.bytes()
-        first = instance.run(AFTER)
+        first = instance.run(after)
         instance.fmu.setFMUState(state)
         assert instance.bytes() == here
-        assert instance.run(AFTER) == first
-        assert instance.values()["stop.impact_count"] >= 2
-        instance.set({"stop.restitution": 0.1, "force.x": 0.2})
-        assert instance.step(AFTER[-1], STEP) == OK
+        assert instance.run(after) == first
+        assert it.impacts(instance.values()) >= 1
+        instance.set({f"{it.stop}.restitution": 0.1, f"{it.force}.x": 0.2})
+        assert instance.step(after[-1], after[1] - after[0]) == OK
         instance.fmu.setFMUState(state)
-        assert instance.run(AFTER) == first
+        assert instance.run(after) == first
         instance.fmu.freeFMUState(state)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@each_shipped
 def test_a_state_through_bytes_into_another_instance_gives_the_same_bytes(fmus, model):
     """Fixed and tunable parameters, inputs, tolerance and time go with it."""
-    with Instance(fmus[model]).initialize(tolerance=1e-7, shuttle__mass=0.06) as instance:
-        instance.run(BEFORE)
-        instance.set({"force.x": 0.05, "stop.restitution": 0.7})
+    it, (before, after) = case(model), around_first_impact(model)
+    mass = 1.1 * it.mechanism.values()[f"{it.body}.mass"]
+    with Instance(fmus[model]).initialize(tolerance=1e-7, **{f"{it.body}__mass": mass}) as instance:
+        instance.run(before)
+        instance.set({f"{it.force}.x": 0.05, f"{it.stop}.restitution": 0.7})
         state = instance.fmu.getFMUState()
         data = instance.fmu.serializeFMUstate(state)
         assert data == instance.fmu.serializeFMUstate(state)
         instance.fmu.freeFMUState(state)
-        expected = instance.run(AFTER)
-    with Instance(fmus[model], "other").initialize(shuttle__mass=0.05) as other:
+        expected = instance.run(after)
+    with Instance(fmus[model], "other").initialize() as other:
         state = other.fmu.deSerializeFMUstate(data)
         other.fmu.setFMUState(state)
-        assert other.run(AFTER) == expected
+        assert other.run(after) == expected
         other.fmu.freeFMUState(state)
-        assert other.values()["shuttle.mass"] == 0.06
+        assert other.values()[f"{it.body}.mass"] == mass
 
 
 def test_a_state_saved_before_initialization_is_one_too(fmus):
@@ -112,16 +115,18 @@ def test_a_state_of_the_other_model_is_refused(fmus):
         instance.fmu.freeFMUState(state)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@each_shipped
 def test_reset_is_a_new_instance(fmus, model):
-    times = STEP * np.arange(30)
+    it = case(model)
+    times = np.linspace(0.0, (0.1 if it.costly else 0.25) * it.end, 30)
+    changed = {f"{it.body}__mass": 0.1, f"{it.stop}__restitution": 0.2}
     with Instance(fmus[model]).initialize() as new:
         start, expected = new.bytes(), new.run(times)
     with Instance(fmus[model]) as used:
-        used.initialize(start=1.0, tolerance=1e-5, shuttle__mass=0.1, stop__restitution=0.2)
-        assert used.step(1.0, 0.05) == OK
-        used.set({"force.x": 1.0})
-        assert used.step(1.05, -1.0) == DISCARD
+        used.initialize(start=1.0, tolerance=1e-5, **changed)
+        assert used.step(1.0, times[-1]) == OK
+        used.set({f"{it.force}.x": 1.0})
+        assert used.step(1.0 + times[-1], -1.0) == DISCARD
         used.fmu.reset()
         used.initialize()
         assert used.bytes() == start

@@ -47,7 +47,7 @@ from prbm import (
 )
 from prbm.errors import EquilibriumError, MechanismError, ParameterError, SimulationError
 from prbm.mechanism import Affine
-from support import mechanism
+from support import SHIPPED, mechanism
 
 TWINS = {}
 
@@ -155,7 +155,7 @@ def near_loops(system, rng):
     return constraints.project_positions(system, loops, bent(system, rng), loops.c)[0]
 
 
-each_mechanism = pytest.mark.parametrize("name", NAMES)
+each_mechanism = pytest.mark.parametrize("name", [*SHIPPED, *OWN_MECHANISMS])
 
 
 # --- mechanism.c, flexure.c ----------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import threading
 from ctypes import c_double
+from functools import cache
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -14,13 +15,26 @@ from prbm import Simulation
 from prbm_fmu import native_fmu
 from prbm_fmu.archive import write
 from prbm_fmu.native_fmu import described
-from support import mechanism, simulation
+from support import (
+    COSTLY,
+    GUIDES,
+    QUICK,
+    SHIPPED,
+    case,
+    each_shipped,
+    energy_balance,
+    fastest,
+    mechanism,
+    record,
+    selected,
+    simulation,
+)
 
-MODELS = ("PRBDM", "PRBDM2R")
-END, SEEN = 0.3, 0.01  # s; the default run bounces until 0.243 s, then it rests
-IMPACTS = 14
+END = 0.3  # s; the default run of the guides bounces until 0.243 s, then it rests
+SEEN = 30  # times at which all is compared
+IMPACTS = 14  # of the guides
 ways = pytest.mark.parametrize(("fmi", "kind"), WAYS)
-models = pytest.mark.parametrize("model", MODELS)
+models = each_shipped
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
@@ -30,15 +44,17 @@ def points(step: float, end: float = END) -> np.ndarray:
 
 
 def uneven(end: float) -> np.ndarray:
-    """Communication points with steps over three decades that include every SEEN."""
+    """Communication points with steps over three decades that include all that are compared."""
     rng = np.random.default_rng(0)
-    inner = np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
-    return np.unique(np.concatenate([[0.0], inner[inner < end], points(SEEN, end)]))
+    inner = end / END * np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
+    return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / SEEN, end)]))
 
 
-GRIDS = {
-    "0.1 ms": points(1e-4), "1 ms": points(1e-3), "50 ms": points(0.05), "uneven": uneven(END),
-}  # fmt: skip
+GRIDS = {"3000 steps": 3000, "300 steps": 300, "6 steps": 6, "uneven": 0}
+
+
+def grid_of(name: str, end: float) -> np.ndarray:
+    return points(end / GRIDS[name], end) if GRIDS[name] else uneven(end)
 
 
 def slopes(sim: Simulation, listed: dict, now: dict) -> dict[str, float]:
@@ -57,21 +73,18 @@ def slopes(sim: Simulation, listed: dict, now: dict) -> dict[str, float]:
     return result
 
 
-@pytest.fixture(scope="module")
-def engine_runs():
-    """Return what the engine says at every SEEN, all that is declared, by model."""
-    runs = {}
-    for model in MODELS:
-        listed = {v.name: v for v in described(mechanism(model), {}, 3).variables}
-        sim = simulation(model)
-        given = {n: v.start for n, v in listed.items() if v.start is not None}
-        rows = []
-        for t in points(SEEN):
-            sim.advance(t)
-            rows.append(given | sim.outputs() | {"time": t})
-            rows[-1] |= slopes(sim, listed, rows[-1])
-        runs[model] = SimpleNamespace(listed=listed, rows=rows, record=sim.record)
-    return runs
+@cache
+def engine_run(model: str) -> SimpleNamespace:
+    """Return what is listed, what the engine says of all of it, and its impacts."""
+    listed = {v.name: v for v in described(mechanism(model), {}, 3).variables}
+    sim, end = simulation(model), case(model).end
+    given = {n: v.start for n, v in listed.items() if v.start is not None}
+    rows = []
+    for t in points(end / SEEN, end):
+        sim.advance(t)
+        rows.append(given | sim.outputs() | {"time": t})
+        rows[-1] |= slopes(sim, listed, rows[-1])
+    return SimpleNamespace(listed=listed, rows=rows, record=record(model))
 
 
 def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: float = 1e-7) -> None:
@@ -79,9 +92,10 @@ def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: fl
 
     Event indicators are positive between events.  Derivatives (up to 2e5 rad/s2) are compared with
     differences of the engine, which interpolates: its fast modes keep a noise of 1e-4 rad/s in
-    the worst case, which changes within 1e-3 s or less.
+    the worst case, which changes within 1e-3 s or less.  An error of a tenth of the tolerance in a
+    fast mode is one of omega^2 times as much in its acceleration: 20 for the axial modes.
     """
-    found = instance.values()
+    found, noise = instance.values(), 1e-9 * fastest(instance.description.modelName) ** 2
     compared = set()
     for name, value in found.items():
         compared.add(name)
@@ -89,8 +103,8 @@ def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: fl
             assert value > 0.0, name
             continue
         scale = max(listed[name].nominal or 1.0, abs(expected[name]))
-        bound = 1e-2 if name.startswith("der(") else tolerance
-        assert abs(value - expected[name]) <= bound * scale, (name, value, expected[name])
+        bound = max(1e-2 * scale, noise) if name.startswith("der(") else tolerance * scale
+        assert abs(value - expected[name]) <= bound, (name, value, expected[name])
     assert compared == instance.references.keys()
     assert compared == set(listed) - ({"time"} if instance.version == 2 else set())
 
@@ -99,26 +113,35 @@ def worst(found: np.ndarray, expected: np.ndarray, name: str) -> float:
     return float(np.abs(found[name] - expected[name]).max())
 
 
-@pytest.mark.parametrize("grid", GRIDS)
+def on_grids() -> list:
+    """Return each mechanism with each grid; what is slow anyway with the hardest one alone."""
+    return [
+        pytest.param(*getattr(p, "values", (p,)), grid, marks=getattr(p, "marks", ()))
+        for p in SHIPPED
+        for grid in GRIDS
+        if isinstance(p, str) or grid == "uneven"
+    ]
+
+
+@pytest.mark.parametrize(("model", "grid"), on_grids())
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
-def test_co_simulation_is_the_engine_whatever_the_communication_step(
-    native, engine_runs, model, fmi, grid
-):
+def test_co_simulation_is_the_engine_whatever_the_communication_step(native, model, fmi, grid):
     """To 1e-7 of each nominal: rounding, times what the motion amplifies it by."""
-    run = engine_runs[model]
+    run, it = engine_run(model), case(model)
     with Instance(native[model, fmi]).initialize() as instance:
         assert_equal(instance, run.rows[0], run.listed)
         compared = 0
-        for begin, end in pairwise(GRIDS[grid]):
+        for begin, end in pairwise(grid_of(grid, it.end)):
             assert instance.step(begin, end - begin) == OK
-            k = round(end / SEEN)
-            if abs(end - k * SEEN) < 1e-12:
+            k = round(SEEN * end / it.end)
+            if abs(end - k * it.end / SEEN) < 1e-12:
                 assert_equal(instance, run.rows[k], run.listed)
                 compared += 1
-    assert compared == (6 if grid == "50 ms" else 30)
-    assert run.rows[-1]["stop.contact"]
-    assert run.rows[-1]["stop.impact_count"] == IMPACTS
+    assert compared == (6 if grid == "6 steps" else SEEN)
+    assert it.impacts(run.rows[-1]) == len(run.record) > 0
+    if model in GUIDES:
+        assert run.rows[-1]["stop.contact"]
+        assert len(run.record) == IMPACTS
 
 
 @models
@@ -127,9 +150,9 @@ def test_the_communication_step_leaves_no_trace(native, model):
 
     Steps of so many 2^-16 s, so that their sums are exact.
     """
-    rng, found = np.random.default_rng(0), set()
-    inner = np.unique(rng.integers(1, 2**14, 100))
-    for counts in (range(0, 2**14 + 1, 2**4), (0, 2**14), (0, *inner, 2**14)):
+    rng, found, last = np.random.default_rng(0), set(), int(case(model).end * 2**16)
+    inner = np.unique(rng.integers(1, last, 100))
+    for counts in ((*range(0, last, 2**4), last), (0, last), (0, *inner, last)):
         grid = np.array([*counts]) / 2**16
         for fmi, kind in ((2, "cs"), (3, "cs"), (3, "events")):
             with Instance(native[model, fmi], kind).initialize() as instance:
@@ -137,14 +160,14 @@ def test_the_communication_step_leaves_no_trace(native, model):
                     instance.advance(end)
                 values = {n: v for n, v in instance.values().items() if n != "time"}
                 found.add(np.array([*values.values()], dtype=float).tobytes())
-    assert values["stop.impact_count"] == IMPACTS
+    assert case(model).impacts(values) == len(record(model)) > 0
     assert len(found) == 1
 
 
 @pytest.mark.parametrize("kind", ["cs", "events", "late"])
 @models
-def test_event_mode_shows_the_same_trajectory(native, engine_runs, model, kind):
-    run = engine_runs[model]
+def test_event_mode_shows_the_same_trajectory(native, model, kind):
+    run = engine_run(model)
     with Instance(native[model, 3], kind).initialize() as instance:
         for row in run.rows[1:]:
             instance.advance(row["time"])
@@ -153,18 +176,43 @@ def test_event_mode_shows_the_same_trajectory(native, engine_runs, model, kind):
 
 @models
 def test_a_native_fmu_is_the_python_fmu(fmus, native, model):
-    """The default run in FMPy: to 1e-7 m and 1e-7 s in the times of all impacts."""
-    python = simulate_fmu(str(fmus[model]))
+    """In FMPy: to 1e-7 m and 1e-7 s in the times of all impacts.
+
+    The default run; its beginning, where the engine takes long for it.
+    """
+    it = case(model)
+    span = {"stop_time": it.end, "output_interval": it.end / 300} if it.costly else {}
+    python = simulate_fmu(str(fmus[model]), **span)
     for fmi in (2, 3):
-        ours = simulate_fmu(str(native[model, fmi]))
+        ours = simulate_fmu(str(native[model, fmi]), **span)
         assert python.dtype.names == ours.dtype.names
         assert (python["time"] == ours["time"]).all()
-        assert len(ours) == 1001
-        for name in ("shuttle.x", "shuttle.y", "stop.impact_time"):
+        assert len(ours) == (301 if it.costly else 1001)
+        for name in it.outputs("x", "y") + it.at_stops("impact_time"):
             assert worst(ours, python, name) <= 1e-7, name  # m, s
-        assert (ours["stop.impact_count"] == python["stop.impact_count"]).all()
-        assert ours["stop.impact_count"][-1] == IMPACTS
-        assert ours["stop.contact"][-1]
+        for name in it.at_stops("impact_count", "contact"):
+            assert (ours[name] == python[name]).all(), name
+        assert it.impacts(ours[-1]) >= len(record(model))
+        if model in GUIDES:
+            assert ours["stop.impact_count"][-1] == IMPACTS
+            assert ours["stop.contact"][-1]
+
+
+@each_shipped
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_default_experiment_in_fmpy_comes_to_its_end_with_the_books_balanced(
+    native, model, fmi
+):
+    """All is finite and energy kept through all impacts, to 2e-6 of what is stored at release.
+
+    The tolerance is that of a radian and of a unit stretch; the energies are smaller than those.
+    """
+    found = simulate_fmu(str(native[model, fmi]))
+    assert found["time"][-1] == pytest.approx(1.0)
+    assert all(np.isfinite(found[name]).all() for name in found.dtype.names)
+    balance = energy_balance(found)
+    assert np.abs(balance - balance[0]).max() < 2e-6 * found["energy.elastic"][0]
+    assert case(model).impacts(found[-1]) >= len(record(model)) > 0
 
 
 # -- model exchange --
@@ -173,54 +221,73 @@ def test_a_native_fmu_is_the_python_fmu(fmus, native, model):
 @pytest.mark.parametrize("fmi", [2, 3])
 @models
 def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
-    """At a relative tolerance of 1e-9: positions to 1e-6 of the release, the same 14 impacts.
+    """At a relative tolerance of 1e-9: the guides to 1e-6 of the release, the same impacts.
 
     The last bounces are slow (1 mm/s): an error of 1e-9 m in place is one of 1e-6 s in time.
+    FMPy gives CVode no more than 500 steps for a communication step: hence small ones.
     """
-    options = {"stop_time": END, "output_interval": 1e-3, "record_events": False}
-    expected = simulate_fmu(str(native[model, fmi]), stop_time=END, output_interval=1e-3)
+    it = case(model)
+    options = {"stop_time": it.end, "output_interval": it.end / 300, "record_events": False}
+    expected = simulate_fmu(str(native[model, fmi]), stop_time=it.end, output_interval=it.end / 300)
     found = simulate_fmu(
         str(native[model, fmi]), fmi_type="ModelExchange", relative_tolerance=1e-9, **options
     )
     assert found["time"] == pytest.approx(expected["time"], abs=1e-12)
-    assert worst(found, expected, "shuttle.x") < 1e-6 * 0.018  # m
-    assert worst(found, expected, "shuttle.y") < 1e-6 * 0.018
-    assert worst(found, expected, "shuttle.angle") < 1e-6  # rad
-    assert worst(found, expected, "shuttle.vx") < 5e-6  # m/s: of 0.5; late impacts are a bit off
-    assert worst(found, expected, "stop.impact_time") < 5e-6  # s
-    assert (found["stop.impact_count"] == expected["stop.impact_count"]).all()
-    assert found["stop.impact_count"][-1] == IMPACTS
-    assert found["stop.contact"][-1] == expected["stop.contact"][-1] == True  # noqa: E712
-    assert found["stop.force"][-1] == pytest.approx(expected["stop.force"][-1], rel=1e-6)
+    bound = 1e-6 * 0.018 if model in GUIDES else 5e-8  # m; a snap makes more of an error
+    for name in it.outputs("x", "y"):
+        assert worst(found, expected, name) < bound, name
+    for name in it.outputs("angle"):
+        assert worst(found, expected, name) < 1e-6, name  # rad
+    for name in it.outputs("vx"):
+        assert worst(found, expected, name) < 5e-6, name  # m/s: of 0.5; late impacts are a bit off
+    for name in it.at_stops("impact_time"):
+        assert worst(found, expected, name) < 5e-6, name  # s
+    for name in it.at_stops("impact_count"):
+        assert (found[name] == expected[name]).all(), name
+    assert it.impacts(found[-1]) == len(record(model)) > 0
+    for stop in it.at_stops("contact"):
+        assert found[stop][-1] == expected[stop][-1]
+    for stop in it.at_stops("force"):
+        assert found[stop][-1] == pytest.approx(expected[stop][-1], rel=1e-6)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
+@pytest.mark.parametrize("model", selected(lambda name: name not in COSTLY))
 def test_model_exchange_at_fmpys_default_settings_tells_the_same_story(native, model, fmi):
-    """FMPy takes the default experiment's tolerance, 1e-8: within 1e-7 m, of a release by 18 mm."""
-    path = str(native[model, fmi])
-    expected = simulate_fmu(path)
-    found = simulate_fmu(path, fmi_type="ModelExchange", record_events=False)
-    x = np.interp(found["time"], expected["time"], expected["shuttle.x"])
+    """FMPy takes the default experiment's tolerance, 1e-8: within 1e-7 m, of a release by 18 mm.
+
+    The guides come to rest; what does not is followed for a few impacts, which amplify the errors.
+
+    What has fast modes needs more than the 500 steps that FMPy gives CVode for the communication
+    step of these settings.
+    """
+    it, path = case(model), str(native[model, fmi])
+    span = {} if model in GUIDES else {"stop_time": it.end, "output_interval": it.end / 300}
+    expected = simulate_fmu(path, **span)
+    found = simulate_fmu(path, fmi_type="ModelExchange", record_events=False, **span)
     same = np.isin(np.round(found["time"], 9), np.round(expected["time"], 9))
     assert same.sum() > 100
-    assert np.abs(found["shuttle.x"] - x)[same].max() < 1e-7  # m
-    assert found["stop.impact_count"][-1] == expected["stop.impact_count"][-1] == IMPACTS
-    assert found["stop.contact"][-1]
-    assert found["stop.force"][-1] == pytest.approx(expected["stop.force"][-1], rel=1e-5)
+    for name in it.outputs("x"):
+        x = np.interp(found["time"], expected["time"], expected[name])
+        assert np.abs(found[name] - x)[same].max() < (1e-7 if model in GUIDES else 1e-6)  # m
+    assert it.impacts(found[-1]) == it.impacts(expected[-1]) > 0
+    for name in it.at_stops("contact"):
+        assert found[name][-1] == expected[name][-1]
+    for name in it.at_stops("force"):
+        assert found[name][-1] == pytest.approx(expected[name][-1], rel=1e-5)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_model_exchange_with_cvode_shows_each_impact_before_and_after(native, engine_runs, fmi):
+def test_model_exchange_with_cvode_shows_each_impact_before_and_after(native, fmi):
     """Two rows at one time; the times as exact as the positions are."""
     found = simulate_fmu(
         str(native["PRBDM2R", fmi]), fmi_type="ModelExchange", relative_tolerance=1e-9,
         stop_time=END, output=["stop.gap_rate", "stop.impact_count", "stop.impact_time"],
     )  # fmt: skip
     hits = np.flatnonzero(np.diff(found["stop.impact_count"]))
-    record = engine_runs["PRBDM2R"].record
-    assert len(hits) == len(record) == IMPACTS
-    for k, impact in zip(hits, record, strict=True):
+    expected = record("PRBDM2R")
+    assert len(hits) == len(expected) == IMPACTS
+    for k, impact in zip(hits, expected, strict=True):
         assert found["time"][k] == found["time"][k + 1] == found["stop.impact_time"][k + 1]
         assert found["time"][k] == pytest.approx(impact.time, abs=1e-6)
         assert found["stop.gap_rate"][k] < 0.0 < found["stop.gap_rate"][k + 1]
@@ -249,23 +316,22 @@ def test_model_exchange_with_eulers_steps_converges_to_co_simulation(native, mod
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @models
-def test_model_exchange_with_an_integrator_of_our_own_is_the_engine(
-    native, engine_runs, model, fmi
-):
+def test_model_exchange_with_an_integrator_of_our_own_is_the_engine(native, model, fmi):
     """Classical steps of 40 us: every declared variable to 1e-6 of its nominal, and on from there.
 
     Near the straight shape the 2R's fast modes feel the truncation of such steps, which falls
     with their fourth power: at 0.06 s, after the first impact, 8e-7 m and then 6e-8 m.
     """
-    run, errors = engine_runs[model], []
-    for h in (4e-5, 2e-5):
+    run, it, errors = engine_run(model), case(model), []
+    step = it.substep(4e-5 if model in GUIDES else 2e-5)
+    for h in (step, step / 2):
         with Instance(native[model, fmi], "me", substep=h).initialize() as instance:
             for row in run.rows[1:4]:
                 instance.advance(row["time"])
                 assert_equal(instance, row, run.listed, 1e-6)
             instance.advance(run.rows[6]["time"])
-            (x,) = instance.get("shuttle.x")
-            errors.append(abs(x - run.rows[6]["shuttle.x"]))
+            (x,) = instance.get(it.released)
+            errors.append(abs(x - run.rows[6][it.released]))
     assert errors[1] < max(errors[0] / 10, 1e-9)  # m: what the engine's tolerance leaves
 
 
@@ -273,31 +339,35 @@ def test_model_exchange_with_an_integrator_of_our_own_is_the_engine(
 
 
 @models
-def test_event_mode_records_each_impact_before_and_after_at_its_time(native, engine_runs, model):
+def test_event_mode_records_each_impact_before_and_after_at_its_time(native, model):
     """As FMPy records it: two rows at one time, and the time is the engine's to 1e-9 s."""
+    it = case(model)
+    what = ("gap_rate", "gap", "impact_count", "impact_time", "approach_speed", "rebound_speed")
     found = simulate_fmu(
-        str(native[model, 3]), use_event_mode=True, early_return_allowed=True, stop_time=END,
-        output_interval=1e-3,
-        output=["stop.gap_rate", "stop.gap", "stop.impact_count", "stop.impact_time",
-                "stop.approach_speed", "stop.rebound_speed", "stop.contact"],
+        str(native[model, 3]), use_event_mode=True, early_return_allowed=True, stop_time=it.end,
+        output_interval=it.end / 300, output=it.at_stops(*what, "contact"),
     )  # fmt: skip
-    record = engine_runs[model].record
+    expected, seen = record(model), dict.fromkeys(it.at_stops("impact_time"), 0.0)
     twice = np.flatnonzero(np.diff(found["time"]) == 0.0)
-    hits = [k for k in twice if found["stop.impact_count"][k + 1] > found["stop.impact_count"][k]]
-    assert len(hits) == len(record) == IMPACTS
-    for n, (k, impact) in enumerate(zip(hits, record, strict=True)):
-        before, after = found[k], found[k + 1]
-        assert before["time"] == after["time"] == after["stop.impact_time"]
+    hits = [k for k in twice if it.impacts(found[k + 1]) > it.impacts(found[k])]
+    assert len(hits) == len(expected) > 0
+    for n, (k, impact) in enumerate(zip(hits, expected, strict=True)):
+        before, after, stop = found[k], found[k + 1], impact.stop
+        assert before["time"] == after["time"] == after[f"{stop}.impact_time"]
         assert after["time"] == pytest.approx(impact.time, abs=1e-9)
-        assert before["stop.gap_rate"] < 0.0 < after["stop.gap_rate"]
-        assert (before["stop.impact_count"], after["stop.impact_count"]) == (n, n + 1)
-        assert before["stop.impact_time"] == (found["time"][hits[n - 1]] if n else 0.0)
-        assert abs(before["stop.gap"]) < 1e-12  # m: where the root was found
-        assert after["stop.approach_speed"] == pytest.approx(-before["stop.gap_rate"], rel=1e-9)
-        assert after["stop.rebound_speed"] == pytest.approx(after["stop.gap_rate"], rel=1e-9)
-    captured = [k for k in twice if found["stop.contact"][k + 1] and not found["stop.contact"][k]]
-    assert captured
-    assert captured[-1] > hits[-1]  # coming to rest is an event as well, but no impact
+        assert before[f"{stop}.gap_rate"] < 0.0 < after[f"{stop}.gap_rate"]
+        assert (it.impacts(before), it.impacts(after)) == (n, n + 1)
+        assert before[f"{stop}.impact_time"] == seen[f"{stop}.impact_time"]
+        assert abs(before[f"{stop}.gap"]) < 1e-12  # m: where the root was found
+        closing, opening = before[f"{stop}.gap_rate"], after[f"{stop}.gap_rate"]
+        assert after[f"{stop}.approach_speed"] == pytest.approx(-closing, rel=1e-9)
+        assert after[f"{stop}.rebound_speed"] == pytest.approx(opening, rel=1e-9)
+        seen[f"{stop}.impact_time"] = after["time"]
+    contact = np.any([found[name] for name in it.at_stops("contact")], axis=0)
+    if engine_run(model).rows[-1][f"{expected[-1].stop}.contact"]:
+        captured = [k for k in twice if contact[k + 1] and not contact[k]]
+        assert captured[-1] > hits[-1]  # coming to rest is an event as well, but no impact
+    assert contact[-1] or model not in GUIDES
 
 
 def test_without_early_return_the_step_ends_where_it_should_and_tells_of_its_events(native):
@@ -320,18 +390,19 @@ def test_without_early_return_the_step_ends_where_it_should_and_tells_of_its_eve
 @models
 def test_an_event_that_waits_shows_the_values_before_it_until_the_update(native, model):
     """Also through gets in Event Mode, and through evaluateDiscreteStates."""
+    it, first = case(model), record(model)[0]
     with Instance(native[model, 3], "events").initialize() as instance:
-        event, _, early, time = instance.fmu.doStep(0.0, 0.1)
+        event, _, early, time = instance.fmu.doStep(0.0, it.end)
         assert (event, early) == (True, True)
-        assert time < 0.1
+        assert time == pytest.approx(first.time, abs=1e-9)
         waiting = instance.bytes()
         instance.fmu.enterEventMode()
         assert instance.call("EvaluateDiscreteStates") == OK
         assert instance.bytes() == waiting
         instance.update()
         values = instance.values()
-        assert values["time"] == values["stop.impact_time"] == time
-        assert values["stop.impact_count"] == 1
+        assert values["time"] == values[f"{first.stop}.impact_time"] == time
+        assert it.impacts(values) == 1
 
 
 def test_rest_ends_when_the_wall_retreats_and_that_is_an_event(native):
@@ -453,15 +524,26 @@ def test_in_an_intermediate_update_only_what_was_asked_for_may_be_read(native):
 # -- directional derivatives --
 
 
-@pytest.mark.parametrize("time", [0.02, END])
+def in_flight_and_at_rest() -> list:
+    """Return each mechanism in flight, and the guides at rest."""
+    flying = [
+        pytest.param(*getattr(p, "values", (p,)), 1 / 15, marks=getattr(p, "marks", ()))
+        for p in SHIPPED
+    ]
+    return flying + [(model, 1.0) for model in GUIDES]
+
+
+@pytest.mark.parametrize(("model", "share"), in_flight_and_at_rest())
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
-def test_directional_derivatives_are_those_of_differences(native, model, fmi, time):
+def test_directional_derivatives_are_those_of_differences(native, model, fmi, share):
     """Of all outputs and derivatives, along all states and inputs at once; flying and at rest."""
-    rng = np.random.default_rng(fmi)
-    with Instance(native[model, fmi], "me", substep=2e-5 if time < END else 1e-4) as instance:
-        instance.initialize(values={"damping.zeta": 0.05, "friction.coefficient": 0.1,
-                                    "friction.normal_force": 0.2})  # fmt: skip
+    rng, it = np.random.default_rng(fmi), case(model)
+    time = share * it.end
+    rubbing = {"friction.coefficient": 0.1, "friction.normal_force": 0.2}
+    rough = {"damping.zeta": 0.05} | (rubbing if it.mechanism.frictions else {})
+    substep = it.substep(2e-5 if share < 1.0 else 1e-4)
+    with Instance(native[model, fmi], "me", substep=substep) as instance:
+        instance.initialize(values=rough)
         instance.advance(time)
         d = instance.description
         states = [u.variable.derivative.name for u in d.derivatives]
@@ -488,12 +570,12 @@ def test_directional_derivatives_are_those_of_differences(native, model, fmi, ti
             slope = (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h)
             errors = np.minimum(errors, np.abs(found - slope) / (np.abs(slope) + 1e-4 * sizes))
         assert errors.max() < 1e-6, dict(zip(unknowns, errors, strict=True))
-        assert instance.values()["stop.contact"] == (time == END)
+        assert instance.values()[f"{it.stop}.contact"] == (share == 1.0)
+        at(0.0)
         single = sum(
             w * np.array(instance.fmu.getDirectionalDerivative(references[0], [r], [1.0]))
             for w, r in zip([*dx, *du], references[1], strict=True)
         )
-        at(0.0)
         assert single == pytest.approx(found, rel=1e-3, abs=1e-3 * np.abs(found).max())
 
 
@@ -501,9 +583,9 @@ def test_directional_derivatives_are_those_of_differences(native, model, fmi, ti
 @models
 def test_what_depends_on_an_input_or_a_state_says_so(native, model, fmi):
     """Move each alone: nothing changes but what has it among its dependencies."""
-    rng = np.random.default_rng(0)
-    with Instance(native[model, fmi], "me").initialize() as instance:
-        instance.advance(0.02)
+    rng, it = np.random.default_rng(0), case(model)
+    with Instance(native[model, fmi], "me", substep=it.substep(1e-4)).initialize() as instance:
+        instance.advance(it.end / 15)
         d = instance.description
         unknowns = {
             u.variable.name: {k.name for k in u.dependencies}
@@ -512,7 +594,8 @@ def test_what_depends_on_an_input_or_a_state_says_so(native, model, fmi):
         }
         inputs = [v.name for v in d.modelVariables if v.causality == "input"]
         states = [u.variable.derivative.name for u in d.derivatives]
-        assert len(unknowns) == len(d.outputs) + len(d.derivatives)
+        listed = {u.variable.name for u in (*d.outputs, *d.derivatives)}
+        assert unknowns.keys() == listed  # the turning of a body may be an output and a derivative
         before, moved = instance.values(), 0
         for name in inputs + states:
             assert instance.set({name: before[name] + 1e-3 * rng.uniform(0.5, 1.0)}) == OK
@@ -527,47 +610,35 @@ def test_what_depends_on_an_input_or_a_state_says_so(native, model, fmi):
 
 # -- inputs, parameters, start --
 
-CHANGES = {
-    3: {"force.x": 0.3, "base.acceleration.y": 2.0},
-    5: {"stop.displacement": 1e-3, "stop.velocity": 0.0},
-    8: {"stop.restitution": 0.9, "damping.zeta": 0.05},
-    12: {"stop.displacement": -1e-3, "force.moment": 1e-3},
-}
-"""By the step before which they are set."""
-STARTS = {"release.displacement": -0.01, "stop.position": 2e-3, "force.x": 0.05}
 
-
-@pytest.fixture(scope="module")
-def driven_rows():
-    """Return what the engine says to the changes, from another start time, by model."""
-    result = {}
-    for model in MODELS:
-        listed = {v.name: v for v in described(mechanism(model), {}, 3).variables}
-        sim = Simulation(mechanism(model), STARTS, start_time=2.0, tolerance=1e-9)
-        given = {n: v.start for n, v in listed.items() if v.start is not None} | STARTS
-        rows = []
-        for k in range(20):
-            sim.set(CHANGES.get(k, {}))
-            sim.advance(2.0 + (k + 1) * 0.01)
-            given |= CHANGES.get(k, {})
-            rows.append(given | sim.outputs() | {"time": 2.0 + (k + 1) * 0.01})
-            rows[-1] |= slopes(sim, listed, rows[-1])
-        assert rows[-1]["stop.impact_count"] > 0
-        result[model] = listed, rows
-    return result
+@cache
+def driven(model: str) -> tuple[dict, list[dict]]:
+    """Return what the engine says to changes, from another start time."""
+    it = case(model)
+    listed = {v.name: v for v in described(it.mechanism, {}, 3).variables}
+    sim = Simulation(it.mechanism, it.starts(), start_time=2.0, tolerance=1e-9)
+    given = {n: v.start for n, v in listed.items() if v.start is not None} | it.starts()
+    rows = []
+    for k in range(20):
+        time, change = 2.0 + (k + 1) * it.end / 30, it.changes().get(k, {})
+        sim.set(change)
+        sim.advance(time)
+        given |= change
+        rows.append(given | sim.outputs() | {"time": time})
+        rows[-1] |= slopes(sim, listed, rows[-1])
+    assert model not in GUIDES or rows[-1]["stop.impact_count"] > 0
+    return listed, rows
 
 
 @pytest.mark.parametrize(("fmi", "kind"), [*(way for way in WAYS if way[1] != "me"), (3, "late")])
 @models
-def test_inputs_walls_and_tunable_parameters_reach_the_equations(
-    native, driven_rows, model, fmi, kind
-):
+def test_inputs_walls_and_tunable_parameters_reach_the_equations(native, model, fmi, kind):
     """From another start time than 0, at the tolerance that the importer asks for."""
-    listed, rows = driven_rows[model]
+    it, (listed, rows) = case(model), driven(model)
     with Instance(native[model, fmi], kind) as instance:
-        instance.initialize(start=2.0, tolerance=1e-9, values=STARTS)
+        instance.initialize(start=2.0, tolerance=1e-9, values=it.starts())
         for k, row in enumerate(rows):
-            instance.change(CHANGES.get(k, {}))
+            instance.change(it.changes().get(k, {}))
             instance.advance(row["time"])
             assert_equal(instance, row, listed)
 
@@ -576,20 +647,23 @@ def test_inputs_walls_and_tunable_parameters_reach_the_equations(
 @models
 def test_inputs_and_tunable_parameters_reach_model_exchange(native, model, fmi):
     """The same but for the wall, whose motion co-simulation interpolates."""
-    sim = Simulation(mechanism(model), STARTS, start_time=2.0, tolerance=1e-9)
-    with Instance(native[model, fmi], "me", substep=2e-5) as instance:
-        instance.initialize(start=2.0, values=STARTS)
+    it, step = case(model), case(model).end / 30
+    changes = it.changes()
+    changes = {3: changes[3], 4: changes[8], 5: {f"{it.force}.moment": 1e-3}}
+    sim = Simulation(it.mechanism, it.starts(), start_time=2.0, tolerance=1e-9)
+    with Instance(native[model, fmi], "me", substep=it.substep(2e-5)) as instance:
+        instance.initialize(start=2.0, values=it.starts())
         for k in range(7):
-            change = {3: CHANGES[3], 4: CHANGES[8], 5: {"force.moment": 1e-3}}.get(k, {})
+            change = changes.get(k, {})
             instance.change(change)
             sim.set(change)
-            instance.advance(2.0 + (k + 1) * 0.01)
-            sim.advance(2.0 + (k + 1) * 0.01)
+            instance.advance(2.0 + (k + 1) * step)
+            sim.advance(2.0 + (k + 1) * step)
             found, expected = instance.values(), sim.outputs()
-            for name in ("shuttle.x", "shuttle.y", "shuttle.angle"):
+            for name in it.outputs("x", "y", "angle"):
                 # the truncation of the steps, through an impact
                 assert found[name] == pytest.approx(expected[name], abs=1e-7), name
-            assert found["stop.impact_count"] == expected["stop.impact_count"]
+            assert it.impacts(found) == it.impacts(expected)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -631,14 +705,18 @@ def test_the_importers_tolerance_wins_over_the_parameter(native, fmi, kind):
 @ways
 @models
 def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi, kind):
+    it, values = case(model), mechanism(model).values()
+    modulus = next(name for name in values if name.endswith(".youngs_modulus"))
+    change = {modulus: 2.0 * values[modulus], "release.displacement": 0.5 * it.displacement}
     with Instance(native[model, fmi], kind).enter() as instance:
         softer = instance.values()
-        assert instance.set({"flexure.youngs_modulus": 4e11, "release.displacement": -5e-3}) == OK
+        assert instance.set(change) == OK
         stiffer = instance.values()
         instance.begin()
         assert instance.values() == stiffer
-    assert softer["shuttle.x"] == pytest.approx(-18e-3, abs=1e-12)  # tolerance of the statics
-    assert stiffer["shuttle.x"] == pytest.approx(-5e-3, abs=1e-12)
+    placed, size = it.released, abs(it.displacement)
+    assert abs(softer[placed]) == pytest.approx(size, abs=1e-12)  # tolerance of the statics
+    assert stiffer[placed] == pytest.approx(0.5 * softer[placed], abs=1e-12)
     assert stiffer["mode.frequency"] > softer["mode.frequency"] > 0.0
 
 
@@ -646,25 +724,31 @@ def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi,
 @models
 def test_time_that_starts_elsewhere_shifts_the_motion_and_nothing_else(native, model, fmi, kind):
     """To what the rounding of the time leaves, 1e-14 s."""
-    shift, rows = -7.0, []
+    shift, rows, it = -7.0, [], case(model)
+    span, substep = it.end / 10, it.substep(1e-4)
     for start in (0.0, shift):
-        with Instance(native[model, fmi], kind).initialize(start=start) as instance:
-            instance.advance(start + 0.03)
+        with Instance(native[model, fmi], kind, substep=substep) as instance:
+            instance.initialize(start=start)
+            instance.advance(start + span)
             rows.append(instance.values())
-    moved = {"time", "stop.impact_time"}
-    assert {n: v for n, v in rows[1].items() if n not in moved} == pytest.approx(
-        {n: v for n, v in rows[0].items() if n not in moved}, rel=1e-6, abs=1e-9
-    )
+    moved = {"time", *(n for n in it.at_stops("impact_time") if rows[0][n] > 0.0)}
+    for ders, share in ((False, 1e-6), (True, 1e-4)):  # stiff axial modes show in derivatives
+        first, second = (
+            {n: v for n, v in row.items() if n not in moved and n.startswith("der(") == ders}
+            for row in rows
+        )
+        assert second == pytest.approx(first, rel=share, abs=1e-9)
     if fmi == 3:
-        assert rows[1]["time"] == pytest.approx(shift + 0.03)
+        assert rows[1]["time"] == pytest.approx(shift + span)
 
 
 @ways
 @models
 def test_values_are_within_their_declared_bounds_through_a_run(native, model, fmi, kind):
-    with Instance(native[model, fmi], kind, substep=1e-4).initialize() as instance:
+    it = case(model)
+    with Instance(native[model, fmi], kind, substep=it.substep(1e-4)).initialize() as instance:
         for k in range(30):
-            instance.advance((k + 1) * 4e-3)
+            instance.advance((k + 1) * it.end / 75)
             for name, value in instance.values().items():
                 v = instance.variables[name]
                 assert v.min is None or value >= float(v.min), name
@@ -675,69 +759,74 @@ def test_values_are_within_their_declared_bounds_through_a_run(native, model, fm
 
 
 @models
-def test_the_clock_ticks_at_impacts_and_only_there(engine_runs, model):
+def test_the_clock_ticks_at_impacts_and_only_there(model):
     """Once for each, in an instant of its own with the values after it; not for the capture."""
-    ticked, events = [], 0
+    ticked, events, it = [], 0, case(model)
     with Instance(clocked(model), "events").initialize() as instance:
-        while instance.time < END:
-            event, _, _, instance.time = instance.fmu.doStep(instance.time, END - instance.time)
+        while instance.time < it.end:
+            event, _, _, instance.time = instance.fmu.doStep(instance.time, it.end - instance.time)
             if not event:
                 continue
             events += 1
             instance.fmu.enterEventMode()
-            count = instance.values()["stop.impact_count"]
+            count = it.impacts(instance.values())
             clock = [v.valueReference for v in instance.description.modelVariables
                      if v.type == "Clock"]  # fmt: skip
-            assert instance.fmu.getClock(clock) == [False]
+            assert not any(instance.fmu.getClock(clock))
             ticks = instance.update()
-            grown = instance.values()["stop.impact_count"] - count
+            grown = it.impacts(instance.values()) - count
             assert (sum(ticks), grown) in ((0, 0), (1, 1))
             ticked += [instance.time] * grown
-    expected = [impact.time for impact in engine_runs[model].record]
+    expected = [impact.time for impact in record(model)]
     assert ticked == pytest.approx(expected, abs=1e-9)
-    assert events > len(expected)
+    assert events >= len(expected)
+    if model in GUIDES:
+        assert events > len(expected)  # the capture is one
 
 
 @models
-def test_the_clock_changes_nothing_of_the_motion(engine_runs, model):
+def test_the_clock_changes_nothing_of_the_motion(model):
     """Also in FMPy, and in model exchange."""
-    run = engine_runs[model]
+    run, it = engine_run(model), case(model)
+    names = [it.released, *it.at_stops("impact_count")]
     found = simulate_fmu(
-        str(clocked(model)), use_event_mode=True, early_return_allowed=True, stop_time=END,
-        output_interval=SEEN, output=["shuttle.x", "stop.impact_count"],
+        str(clocked(model)), use_event_mode=True, early_return_allowed=True, stop_time=it.end,
+        output_interval=it.end / SEEN, output=names,
     )  # fmt: skip
-    expected = {round(row["time"], 9): row["shuttle.x"] for row in run.rows}
-    rows = [(round(float(row["time"]), 9), row["shuttle.x"]) for row in found]
+    expected = {round(row["time"], 9): row[it.released] for row in run.rows}
+    rows = [(round(float(row["time"]), 9), row[it.released]) for row in found]
     compared = [(x, expected[t]) for t, x in rows if t in expected]
     assert len(compared) == len(run.rows)
-    assert [x for x, _ in compared] == pytest.approx([x for _, x in compared], abs=1e-9)
-    assert found["stop.impact_count"][-1] == IMPACTS
+    assert [x for x, _ in compared] == pytest.approx([y for _, y in compared], abs=1e-8)
+    assert it.impacts(found[-1]) == len(run.record)
     exchanged = simulate_fmu(
-        str(clocked(model)), fmi_type="ModelExchange", relative_tolerance=1e-9, stop_time=END,
-        output_interval=1e-3, record_events=False, output=["shuttle.x", "stop.impact_count"],
+        str(clocked(model)), fmi_type="ModelExchange", relative_tolerance=1e-9, stop_time=it.end,
+        output_interval=it.end / 300, record_events=False, output=names,
     )  # fmt: skip
-    assert exchanged["shuttle.x"][::10] == pytest.approx([*expected.values()], abs=1e-8)
-    assert exchanged["stop.impact_count"][-1] == IMPACTS
+    assert exchanged[it.released][::10] == pytest.approx([*expected.values()], abs=1e-8)
+    assert it.impacts(exchanged[-1]) == len(run.record)
 
 
 @models
 def test_the_clock_ticks_in_a_late_event_mode_too(model):
     """Events inside a step are over at its end; one tick tells of all of them."""
     with Instance(clocked(model), "late").initialize() as instance:
-        total = 0
+        total, it = 0, case(model)
         for k in range(6):
-            before = instance.values()["stop.impact_count"]
-            event, *_ = instance.fmu.doStep(k * 0.05, 0.05)
-            grown = instance.values()["stop.impact_count"] - before
+            before = instance.values()
+            event, *_ = instance.fmu.doStep(k * it.end / 6, it.end / 6)
+            after = instance.values()
+            struck = [after[n] > before[n] for n in it.at_stops("impact_count")]
+            grown = it.impacts(after) - it.impacts(before)
             if event:
                 instance.fmu.enterEventMode()
                 clock = [v.valueReference for v in instance.description.modelVariables
                          if v.type == "Clock"]  # fmt: skip
-                assert instance.fmu.getClock(clock) == [grown > 0]
+                assert instance.fmu.getClock(clock) == struck
                 instance.update()
             assert event or not grown
             total += grown
-    assert total == IMPACTS
+    assert total == len(record(model))
 
 
 # -- many of them --
@@ -751,7 +840,7 @@ def alone(fmu, kind: str) -> list[bytes]:
 
 
 def test_instances_of_all_fmus_in_one_process_do_not_disturb_each_other(native):
-    everything = [(model, fmi, kind) for model in MODELS for fmi, kind in WAYS]
+    everything = [(model, fmi, kind) for model in QUICK for fmi, kind in WAYS]
     expected = {key: alone(native[key[:2]], key[2]) for key in everything}
     instances = [(key, Instance(native[key[:2]], key[2]).initialize()) for key in everything * 2]
     for k, time in enumerate(SHORT):

@@ -9,16 +9,22 @@ import pytest
 from fmpy import simulate_fmu
 
 from native_host import DISCARD, ERROR, OK, WAYS, Instance, Integrator, status
+from support import around_first_impact, case, each_shipped
 
-MODELS = ("PRBDM", "PRBDM2R")
 STEP = 2.5e-3
 TIMES = STEP * np.arange(1, 49)  # until 0.12 s: the first impact comes at 0.041 s, four till then
 BEFORE, AFTER = TIMES[:16], TIMES[16:]
 EVERY = (*WAYS, (3, "late"))
 ways = pytest.mark.parametrize(("fmi", "kind"), EVERY)
-models = pytest.mark.parametrize("model", MODELS)
+models = each_shipped
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
+
+
+def spans(model: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return times until shortly before the first impact, and from there to some more."""
+    before, after = around_first_impact(model)
+    return before[1:], after[1:33]
 
 
 def waiting(instance: Instance) -> None:
@@ -33,9 +39,12 @@ def waiting(instance: Instance) -> None:
 @models
 def test_a_state_restored_gives_the_same_bytes(native, model, fmi, kind):
     """Before an impact and after some; the second time from a motion that has gone elsewhere."""
-    with Instance(native[model, fmi], kind, substep=2e-4).initialize() as instance:
+    it, (before, after) = case(model), spans(model)
+    twice = ((before, after), (np.concatenate([before, after[:20]]), after[20:]))
+    substep = it.substep(2e-4)
+    with Instance(native[model, fmi], kind, substep=substep).initialize() as instance:
         unborn = instance.saved()
-        for first, then in ((BEFORE, AFTER), (TIMES[:36], TIMES[36:])):
+        for first, then in twice:
             instance.restore(unborn)
             instance.time = 0.0
             instance.run(first)
@@ -46,12 +55,12 @@ def test_a_state_restored_gives_the_same_bytes(native, model, fmi, kind):
             assert instance.bytes() == here
             assert instance.saved() == data
             assert instance.run(then) == expected
-            instance.change({"stop.restitution": 0.1, "force.x": 0.2})
-            instance.advance(then[-1] + STEP)
+            instance.change({f"{it.stop}.restitution": 0.1, f"{it.force}.x": 0.2})
+            instance.advance(2 * then[-1] - then[-2])
             instance.fmu.setFMUState(state)
             instance.time = first[-1]
             assert instance.run(then) == expected
-            assert instance.values()["stop.impact_count"] >= 2
+            assert it.impacts(instance.values()) >= 1
             instance.fmu.freeFMUState(state)
 
 
@@ -59,29 +68,32 @@ def test_a_state_restored_gives_the_same_bytes(native, model, fmi, kind):
 @models
 def test_a_state_through_bytes_into_another_instance_gives_the_same_bytes(native, model, fmi, kind):
     """Fixed and tunable parameters, inputs, tolerance and time go with it."""
-    mass = {"shuttle.mass": 0.06}
-    with Instance(native[model, fmi], kind, substep=2e-4) as instance:
-        instance.initialize(tolerance=1e-7, values=mass).run(BEFORE)
-        instance.change({"force.x": 0.05, "stop.restitution": 0.7})
+    it, (before, after) = case(model), spans(model)
+    name, substep = f"{it.body}.mass", it.substep(2e-4)
+    mass = 1.1 * it.mechanism.values()[name]
+    with Instance(native[model, fmi], kind, substep=substep) as instance:
+        instance.initialize(tolerance=1e-7, values={name: mass}).run(before)
+        instance.change({f"{it.force}.x": 0.05, f"{it.stop}.restitution": 0.7})
         data = instance.saved()
         assert data == instance.saved()
-        expected = instance.run(AFTER)
-    with Instance(native[model, fmi], kind, "other", substep=2e-4) as other:
-        other.initialize(values={"shuttle.mass": 0.05})
+        expected = instance.run(after)
+    with Instance(native[model, fmi], kind, "other", substep=substep) as other:
+        other.initialize(values={name: 1.05 * mass})
         other.restore(data)
         assert other.saved() == data
-        other.time = BEFORE[-1]
-        assert other.run(AFTER) == expected
-        assert other.values()["shuttle.mass"] == 0.06
-    with Instance(native[model, fmi], kind, substep=2e-4) as fresh:  # not even initialized
+        other.time = before[-1]
+        assert other.run(after) == expected
+        assert other.values()[name] == mass
+    with Instance(native[model, fmi], kind, substep=substep) as fresh:  # not even initialized
         fresh.restore(data)
-        fresh.time = BEFORE[-1]
-        assert fresh.run(AFTER) == expected
+        fresh.time = before[-1]
+        assert fresh.run(after) == expected
 
 
 @models
 def test_an_event_that_waits_is_part_of_the_state(native, model):
     """Saved within Event Mode before the update, before entering it, and after the update."""
+    it = case(model)
     with Instance(native[model, 3], "events").initialize() as instance:
         event, _, _, instance.time = instance.fmu.doStep(0.0, 1.0)
         assert event
@@ -91,7 +103,7 @@ def test_an_event_that_waits_is_part_of_the_state(native, model):
         assert instance.fmu.updateDiscreteStates()[0] is False
         over = instance.saved()
         instance.fmu.enterStepMode()
-        time, end = instance.time, instance.time + 0.03
+        time, end = instance.time, instance.time + it.end / 20
         instance.advance(end)
         expected = instance.bytes()
     assert len({due, inside, over}) == 3
@@ -107,11 +119,11 @@ def test_an_event_that_waits_is_part_of_the_state(native, model):
             if ways_on >= 2:
                 assert status(other.fmu.enterStepMode) == ERROR
                 assert other.said("the event is not finished")
-                assert other.values()["stop.impact_count"] == 0
+                assert it.impacts(other.values()) == 0
                 other.update()
             else:
                 other.fmu.enterStepMode()
-            assert other.values()["stop.impact_count"] == 1
+            assert it.impacts(other.values()) == 1
             other.advance(end)
             assert other.bytes() == expected
 
@@ -120,13 +132,14 @@ def test_an_event_that_waits_is_part_of_the_state(native, model):
 @models
 def test_a_trial_step_of_model_exchange_is_undone_by_a_restored_state(native, model, fmi):
     """Time, states and derivatives are those of the saved instant again."""
-    with Instance(native[model, fmi], "me", substep=2e-4).initialize() as instance:
-        instance.run(BEFORE)
+    it, (before, _) = case(model), spans(model)
+    with Instance(native[model, fmi], "me", substep=it.substep(2e-4)).initialize() as instance:
+        instance.run(before)
         data, here = instance.saved(), instance.bytes()
         integrator = Integrator(instance)
         x = integrator.x()
-        integrator.put(0.05, x + 0.01)
-        assert instance.set({"force.x": 1.0}) == OK
+        integrator.put(1.25 * before[-1], x + 0.01)
+        assert instance.set({f"{it.force}.x": 1.0}) == OK
         assert instance.bytes() != here
         instance.restore(data)
         assert instance.bytes() == here
@@ -219,9 +232,10 @@ def resealed(data: bytes) -> bytes:
 @models
 def test_a_forged_state_is_refused_or_harmless(native, model, fmi, kind):
     """With a right checksum: a mode that there is not, NaN, a clock that stands; never a crash."""
-    rng, refused = np.random.default_rng(1), 0
-    with Instance(native[model, fmi], kind, substep=2e-4).initialize() as instance:
-        instance.run(BEFORE[:3])
+    rng, refused, it = np.random.default_rng(1), 0, case(model)
+    before, _ = spans(model)
+    with Instance(native[model, fmi], kind, substep=it.substep(2e-4)).initialize() as instance:
+        instance.run(before[:3])
         data, here = instance.saved(), instance.bytes()
         token = 36 + struct.unpack_from("<I", data, 32)[0]
         assert resealed(data) == data
@@ -310,21 +324,22 @@ def test_buffers_that_are_too_small_or_missing_are_refused(native, fmi, kind):
 @models
 def test_reset_is_a_new_instance(native, model, fmi, kind):
     """To the byte: of the values, of the motion, and of the state itself."""
-    times = STEP * np.arange(1, 20)
-    with Instance(native[model, fmi], kind, substep=2e-4) as new:
+    it, times = case(model), np.linspace(0.0, spans(model)[0][-1], 20)[1:]
+    substep = it.substep(2e-4)
+    with Instance(native[model, fmi], kind, substep=substep) as new:
         unborn = new.saved()
         new.initialize()
         born, start, expected = new.saved(), new.bytes(), new.run(times)
         last = new.saved()
-    wrong = {"shuttle.mass": 0.1, "stop.restitution": 0.2}
-    with Instance(native[model, fmi], kind, substep=2e-4) as used:
+    wrong = {f"{it.body}.mass": 0.1, f"{it.stop}.restitution": 0.2}
+    with Instance(native[model, fmi], kind, substep=substep) as used:
         used.initialize(start=1.0, tolerance=1e-5, stop=9.0, values=wrong)
-        used.advance(1.05)
-        used.change({"force.x": 1.0})
-        assert used.set({"shuttle.y": 1.0, "stop.restitution": 7.0}) == ERROR
+        used.advance(1.0 + times[-1])
+        used.change({f"{it.force}.x": 1.0})
+        assert used.set({f"{it.body}.y": 1.0, f"{it.stop}.restitution": 7.0}) == ERROR
         assert status(used.function("setReal", "setFloat64"), [12345], [1.0]) == ERROR
         if kind != "me":
-            assert used.step(1.05, -1.0) == DISCARD
+            assert used.step(1.0 + times[-1], -1.0) == DISCARD
         for _ in range(2):
             used.reset()
             assert used.saved() == unborn

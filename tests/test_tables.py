@@ -16,6 +16,7 @@ from prbm_fmu.native_fmu import described
 from prbm_fmu.tables import HEAD, slots, tables
 from prbm_fmu.variables import CLOCK
 from prbm_tools.mechanism_file import load, shipped
+from support import SHIPPED
 
 TOKEN = "{0}"
 TYPES = {0: "Real", 1: "Integer", 2: "Boolean", 3: CLOCK}
@@ -111,7 +112,7 @@ class Reader:
         return lambda values: (x(values), y(values))
 
 
-@pytest.fixture(scope="module", params=["PRBDM", "PRBDM2R", "Lever", "Elastic"])
+@pytest.fixture(scope="module", params=[*SHIPPED, "Lever", "Elastic"])
 def mechanism(request, tmp_path_factory) -> Mechanism:
     if request.param == "Elastic":
         return elastic()
