@@ -753,9 +753,12 @@ def energies(one: ImpactMap) -> Figure:
     for i, axes in enumerate(every[::-1]):
         shares_of = np.array([[*grouped(hit.after), hit.lost] for hit in one.hits[i]])
         _bars(axes, 1e3 * one.heights, shares_of, names, colours)
-        axes.set_ylabel(f"{1e3 * one.offsets[i]:g} mm")
+        axes.annotate(
+            f"offset\n{1e3 * one.offsets[i]:g} mm", (1.01, 0.5), xycoords="axes fraction",
+            va="center", fontsize=9,
+        )  # fmt: skip
     every[-1].set_xlabel("position of the wall [mm]")
-    figure.supylabel("share of the arriving energy [-], by offset", fontsize=10, x=-0.01)
+    figure.supylabel("share of the arriving energy [-]", fontsize=10)
     handles, labels = every[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=5, fontsize=9, frameon=False)
     return figure
