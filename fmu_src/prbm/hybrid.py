@@ -172,13 +172,13 @@ class Simulation:
             raise ParameterError(f"step = {step} s must be positive")
         self.frequency = fundamental_frequency(self.system)
         self.omega = 2 * math.pi * self.frequency
-        # of the largest inertia [kg m^2], and of one radian against the stiffest torsion spring or,
-        # where nothing bends, of a turn by one radian in a period [J]
-        turns = np.ix_(*2 * (np.setdiff1d(np.arange(self.system.n), self.system.stretches),))
-        self._inertia_scale = float(np.abs(self.system.H[turns]).max())
+        # scales of rates without a fundamental frequency, and of energies: one radian against the
+        # stiffest torsion spring or, where nothing bends, a turn by one radian in a period [J]
+        K, inertia_scale = np.abs(self.system.K), float(np.abs(self.system.H).max())
+        turns = np.setdiff1d(np.arange(self.system.n), self.system.stretches)
+        self._spring_rate = math.sqrt(float(K.max()) / inertia_scale) or NO_SPRING
         self._energy_scale = (
-            float(np.abs(self.system.K[turns]).max())
-            or self._inertia_scale * (self.omega or NO_SPRING) ** 2
+            float(K[np.ix_(turns, turns)].max()) or inertia_scale * self._omega_scale() ** 2
         )
 
         displacement, speed = (
@@ -475,9 +475,7 @@ class Simulation:
 
     def _omega_scale(self) -> float:
         """Return the angular frequency against which rates are measured [rad/s]."""
-        if self.omega > 0.0:
-            return self.omega
-        return math.sqrt(self._energy_scale / self._inertia_scale)
+        return self.omega or self._spring_rate
 
     def _error(self, difference: Real, y: Real, y1: Real) -> float:
         """Return the root mean square of an error in units of what the tolerance allows."""

@@ -206,10 +206,7 @@ PRBM double simulation_time(const Simulation *simulation) {
 /* --- scales ----------------------------------------------------------------------------------- */
 
 PRBM double omega_scale(const Simulation *sim) {
-    if (sim->omega > 0.0) {
-        return sim->omega;
-    }
-    return sqrt(sim->energy_scale / sim->inertia_scale);
+    return sim->omega > 0.0 ? sim->omega : sim->spring_rate;
 }
 
 PRBM double still(const Simulation *sim) {
@@ -220,24 +217,22 @@ PRBM double period(const Simulation *sim) {
     return TWO_PI / omega_scale(sim);
 }
 
-/* The scales that follow from frequency and stiffness: of the largest inertia, and of one radian
- * against the stiffest torsion spring or, where nothing bends, of a turn by one radian in a period. */
+/* The scales that follow from frequency and stiffness: of rates without a fundamental frequency, and
+ * of energies, one radian against the stiffest torsion spring or, where nothing bends, a turn by one
+ * radian in a period. */
 static void set_scales(Simulation *sim) {
     const System *system = &sim->system;
     int n = system->n;
-    double stiffest = 0.0, heaviest = 0.0;
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; j < n; j++) {
-            if (arm_of(system, i) == i && arm_of(system, j) == j) {
-                stiffest = greater(stiffest, fabs(system->K[i * n + j]));
-                heaviest = greater(heaviest, modulus(system->H[i * n + j]));
-            }
-        }
+    double torsion = 0.0, stiffest = largest(n * n, system->K), heaviest = 0.0;
+    for (int i = 0; i < n * n; i++) {
+        bool turns = arm_of(system, i / n) == i / n && arm_of(system, i % n) == i % n;
+        torsion = turns ? greater(torsion, fabs(system->K[i])) : torsion;
+        heaviest = greater(heaviest, modulus(system->H[i]));
     }
     sim->omega = TWO_PI * sim->now->frequency;
-    double turning = sim->omega > 0.0 ? sim->omega : NO_SPRING;
-    sim->inertia_scale = heaviest;
-    sim->energy_scale = stiffest > 0.0 ? stiffest : heaviest * (turning * turning);
+    sim->spring_rate = stiffest > 0.0 ? sqrt(stiffest / heaviest) : NO_SPRING;
+    double turning = omega_scale(sim);
+    sim->energy_scale = torsion > 0.0 ? torsion : heaviest * (turning * turning);
 }
 
 /* --- discrete state --------------------------------------------------------------------------- */

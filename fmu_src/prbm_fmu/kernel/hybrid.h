@@ -54,7 +54,7 @@ struct Simulation {
     double *held_rates, *held_times;      /* (s,): of the walls at the last event, and its time */
     /* not state: what can be computed again */
     Discrete discrete, other;
-    double omega, energy_scale, inertia_scale;
+    double omega, energy_scale, spring_rate;
     double *forces; /* (3 b,) acting inputs */
     double grid[WATCHED + 1][STAGES]; /* weights of the stages at the looks */
     double *look_y, *look_gap, *look_rate, *y1, *error;
