@@ -25,7 +25,7 @@ SCALARS = 20  # numbers before the values in the array of the state
 
 @each_shipped
 def test_the_dependent_coordinates_are_determined_at_every_shape(model):
-    """Their columns of the loops' Jacobian keep a twentieth of its size from straight to release."""
+    """Their columns of the loops' Jacobian keep a thirtieth of its size, straight to release."""
     guide = mechanism(model)
     system = assemble(guide, guide.values())
     chosen = independent(guide)
@@ -34,7 +34,7 @@ def test_the_dependent_coordinates_are_determined_at_every_shape(model):
     loops = system.spread(system.loops)
     for share in (-1.0, -0.6, -0.3, 0.0, 0.3, 0.6, 1.0) if len(system.loops) else ():
         q = equilibrium(system, share * case(model).displacement).q
-        assert conditioning(jacobian(loops, system.directions(q)), dependent) > 0.05
+        assert conditioning(jacobian(loops, system.directions(q)), dependent) > 1 / 30
 
 
 def discrete_states():
