@@ -95,7 +95,8 @@ def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: fl
     the worst case, which changes within 1e-3 s or less.  An error of a tenth of the tolerance in a
     fast mode is one of omega^2 times as much in its acceleration: 20 for the axial modes.
     """
-    found, noise = instance.values(), 1e-9 * fastest(instance.description.modelName) ** 2
+    found, omega = instance.values(), fastest(instance.description.modelName)
+    noise, tolerance = 1e-9 * omega**2, tolerance * max(1.0, omega / 1e4)
     compared = set()
     for name, value in found.items():
         compared.add(name)
@@ -323,12 +324,13 @@ def test_model_exchange_with_an_integrator_of_our_own_is_the_engine(native, mode
     with their fourth power: at 0.06 s, after the first impact, 8e-7 m and then 6e-8 m.
     """
     run, it, errors = engine_run(model), case(model), []
+    share = 1e-6 if model in GUIDES else max(1e-6, 1e-9 * fastest(model))  # of the engine's own
     step = it.substep(4e-5 if model in GUIDES else 2e-5)
     for h in (step, step / 2):
         with Instance(native[model, fmi], "me", substep=h).initialize() as instance:
             for row in run.rows[1:4]:
                 instance.advance(row["time"])
-                assert_equal(instance, row, run.listed, 1e-6)
+                assert_equal(instance, row, run.listed, share)
             instance.advance(run.rows[6]["time"])
             (x,) = instance.get(it.released)
             errors.append(abs(x - run.rows[6][it.released]))
@@ -788,6 +790,7 @@ def test_the_clock_ticks_at_impacts_and_only_there(model):
 def test_the_clock_changes_nothing_of_the_motion(model):
     """Also in FMPy, and in model exchange."""
     run, it = engine_run(model), case(model)
+    bound = 1e-8 if model in GUIDES else 5e-8  # m; a snap makes more of an error
     names = [it.released, *it.at_stops("impact_count")]
     found = simulate_fmu(
         str(clocked(model)), use_event_mode=True, early_return_allowed=True, stop_time=it.end,
@@ -803,7 +806,7 @@ def test_the_clock_changes_nothing_of_the_motion(model):
         str(clocked(model)), fmi_type="ModelExchange", relative_tolerance=1e-9, stop_time=it.end,
         output_interval=it.end / 300, record_events=False, output=names,
     )  # fmt: skip
-    assert exchanged[it.released][::10] == pytest.approx([*expected.values()], abs=1e-8)
+    assert exchanged[it.released][::10] == pytest.approx([*expected.values()], abs=bound)
     assert it.impacts(exchanged[-1]) == len(run.record)
 
 
