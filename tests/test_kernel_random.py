@@ -1,4 +1,4 @@
-"""The C kernel moves random mechanisms as the engine does: trees, loops, joints, walls on bodies."""
+"""The C kernel moves random mechanisms as the engine does: loops, joints, walls on bodies."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ COUNTED = ("impact_count", "contact")
 
 
 def deviations(seed):
-    """Return by how much the two differ, in units of nominals, by name; what is counted is equal."""
+    """Return by how much the two differ, in units of nominals; what is counted is equal."""
     mechanism = seeded(seed)
     values = inputs(mechanism, seed)
     engine, kernel = Simulation(mechanism, values), KernelSimulation(mechanism, values)
