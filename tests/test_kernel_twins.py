@@ -1136,7 +1136,7 @@ ELSEWHERE = {
     "flexure": set(),
     "forces": set(),
     "kinetics": {"mass_accelerations"},
-    "modal": {"modal_restitution"},
+    "modal": {"modal_restitution", "modes_at"},
     "runge_kutta": {"rk4"},
     "statics": {"free_displacement"},
 }  # fmt: skip
