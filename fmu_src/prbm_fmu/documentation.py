@@ -280,8 +280,8 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
     straight = "kilohertz" if _stretches(mechanism) else "infinite stiffness"
     if "2R" in models:
         items.append(
-            "Without damping the motion of a 2R guide through its straight shape is chaotic: two of "
-            f"its modes go from about a hundred hertz to {straight} there. A "
+            "Without damping the motion of a 2R guide through its straight shape is chaotic: "
+            f"two of its modes go from about a hundred hertz to {straight} there. A "
             "little damping in proportion to stiffness cures that, hence the default of "
             f"<code>damping.beta</code> ({_default('damping.beta', variables)} s). With none, "
             "single impacts mean little after a few bounces."
