@@ -69,7 +69,7 @@ def instructions(given: Mechanism) -> float:
         unpack(folder / "model.fmu", folder / "model")
         library = kernel_library("profiled", ("-g",))
         job = Job(
-            folder / "model", points=np.array([0.0, UNTIL]), records=("time",), library=library
+            folder / "model", points=np.array([0.0, UNTIL]), records=("shuttle.x",), library=library
         )
         counted = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")
         done = execute(job, before=counted)

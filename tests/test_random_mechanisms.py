@@ -349,7 +349,8 @@ def balances_momentum(mechanism, seed):
         rates = [(late - early) / (2 * h) for early, late in zip(found[0], found[2], strict=True)]
         size = sum(abs(x) for x in rates) + abs(force) + 1e-3
         reaction = complex(out["base.force.x"], out["base.force.y"])
-        assert reaction == pytest.approx(force - rates[0], abs=1e-5 * size)
+        # what differences leave of the fastest vibrations
+        assert reaction == pytest.approx(force - rates[0], abs=5e-5 * size)
         assert out["base.moment"] == pytest.approx(moment - rates[1], abs=1e-5 * size)
 
 
@@ -391,7 +392,8 @@ def has_lawful_impacts(mechanism, seed):
         assert u[0] < 0.0
         assert u[1] >= -1e-7 * abs(u[0])
         assert kinetic[1] <= kinetic[0] * (1 + 1e-9)
-        assert impact.latched.approach_speed == pytest.approx(-u[0], rel=1e-7)
+        parts = np.abs(G[i]) @ np.abs(impact.before)  # which differences know to eight digits
+        assert impact.latched.approach_speed == pytest.approx(-u[0], rel=1e-7, abs=1e-8 * parts)
         if len(touching) == 1 and not rubbed:
             assert impact.impulse == pytest.approx(impulses[0], rel=1e-6)
             assert u[1] == pytest.approx(-mechanism.stops[i].restitution * u[0], abs=1e-7 * -u[0])
