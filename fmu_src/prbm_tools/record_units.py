@@ -6,18 +6,9 @@ from decimal import Decimal
 from functools import cache
 from typing import Any
 
-DEFINITIONS = """
-femto- = 1e-15 = f-
-pico- = 1e-12 = p-
-nano- = 1e-9 = n-
-micro- = 1e-6 = u- = µ- = μ-
-milli- = 1e-3 = m-
-centi- = 1e-2 = c-
-deci- = 1e-1 = d-
-kilo- = 1e3 = k-
-mega- = 1e6 = M-
-giga- = 1e9 = G-
-metre = [length] = m = meter
+from .units import PREFIXES
+
+DEFINITIONS = f"""{PREFIXES}metre = [length] = m = meter
 inch = 0.0254 * metre = in = inches
 gram = [mass] = g
 second = [time] = s = sec

@@ -19,7 +19,7 @@ LONGEST_TEXT = 1000  # characters of an expression
 COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
 )  # fmt: skip
-DEFINITIONS = """
+PREFIXES = """
 femto- = 1e-15 = f-
 pico- = 1e-12 = p-
 nano- = 1e-9 = n-
@@ -30,7 +30,8 @@ deci- = 1e-1 = d-
 kilo- = 1e3 = k-
 mega- = 1e6 = M-
 giga- = 1e9 = G-
-tera- = 1e12 = T-
+"""
+DEFINITIONS = f"""{PREFIXES}tera- = 1e12 = T-
 metre = [length] = m = meter
 gram = [mass] = g
 second = [time] = s
