@@ -259,11 +259,11 @@ static void backward_all(const Factors *factors, double *b) {
 }
 
 /* The lower triangle of S = Z D^-1 Z^T, and its factor with the inverse of its D behind it. */
-SIZED bool schur_of_size(int r, Factors *factors) {
-    const int even = factors->even;
+SIZED bool schur_of_size(int r, int even, Factors *factors) {
     const double *Z = factors->Z, *inverse = factors->inverse;
     double *S = factors->S, *L = S + r * r;
     Lanes sum[SMALL * SMALL][SUMS] = {{NO_LANES}};
+    UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes share = lanes_at(inverse + j);
         UNROLLED
@@ -300,18 +300,26 @@ static bool factor_unsymmetric(Factors *factors) {
     return lu_factor(r, factors->S, factors->pivots);
 }
 
-PRBM bool factor_schur(Factors *factors) {
+SIZED bool schur_to_length(int even, Factors *factors) {
     factors->symmetric = factors->Z_columns == factors->Z && factors->r <= SMALL;
     if (!factors->symmetric) {
         return factor_unsymmetric(factors);
     }
     switch (factors->r) {
     case 0: return true;
-    case 1: return schur_of_size(1, factors);
-    case 2: return schur_of_size(2, factors);
-    case 3: return schur_of_size(3, factors);
-    default: return schur_of_size(4, factors);
+    case 1: return schur_of_size(1, even, factors);
+    case 2: return schur_of_size(2, even, factors);
+    case 3: return schur_of_size(3, even, factors);
+    default: return schur_of_size(4, even, factors);
     }
+}
+
+PRBM bool factor_schur(Factors *factors) {
+    return schur_to_length(factors->even, factors);
+}
+
+SIZED bool schur_of_length(int even, Factors *factors) {
+    return KNOWN(even) ? schur_to_length(even, factors) : factor_schur(factors);
 }
 
 /* The multipliers lam from what the rows ask for. */
@@ -329,6 +337,7 @@ SIZED void multipliers_of_size(int r, const double *S, double *lam) {
 SIZED void ask_multipliers(int count, int even, const double *ALONE Z, const double *ALONE x,
                            const double *ALONE inverse, double *ALONE lam) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};
+    UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes share = lanes_at(x + j) * lanes_at(inverse + j);
         UNROLLED
@@ -343,8 +352,8 @@ SIZED void ask_multipliers(int count, int even, const double *ALONE Z, const dou
 }
 
 /* From x = L^-1 f and what the rows ask for: lam and x := D^-1 (x + Z^T lam). */
-SIZED void constrain_of_size(int r, const Factors *factors, double *ALONE x, double *ALONE lam) {
-    const int even = factors->even;
+SIZED void constrain_of_size(int r, int even, const Factors *factors, double *ALONE x,
+                             double *ALONE lam) {
     const double *ALONE Z = factors->Z, *ALONE columns = factors->Z_columns;
     const double *ALONE inverse = factors->inverse;
     const int together = r <= SMALL ? r : 1;
@@ -356,6 +365,7 @@ SIZED void constrain_of_size(int r, const Factors *factors, double *ALONE x, dou
     } else {
         lu_solve(r, factors->S, factors->pivots, lam);
     }
+    UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes sum = lanes_at(x + j);
         UNROLLED
@@ -367,16 +377,28 @@ SIZED void constrain_of_size(int r, const Factors *factors, double *ALONE x, dou
 }
 
 /* The solution from x = L^-1 f and what the rows ask for. */
-static void finish(const Factors *factors, double *x, double *lam) {
+SIZED void finish_to_length(int even, const Factors *factors, double *x, double *lam) {
     switch (factors->r) {
-    case 0: constrain_of_size(0, factors, x, lam); break;
-    case 1: constrain_of_size(1, factors, x, lam); break;
-    case 2: constrain_of_size(2, factors, x, lam); break;
-    case 3: constrain_of_size(3, factors, x, lam); break;
-    case 4: constrain_of_size(4, factors, x, lam); break;
-    default: constrain_of_size(factors->r, factors, x, lam);
+    case 0: constrain_of_size(0, even, factors, x, lam); break;
+    case 1: constrain_of_size(1, even, factors, x, lam); break;
+    case 2: constrain_of_size(2, even, factors, x, lam); break;
+    case 3: constrain_of_size(3, even, factors, x, lam); break;
+    case 4: constrain_of_size(4, even, factors, x, lam); break;
+    default: constrain_of_size(factors->r, even, factors, x, lam);
     }
     backward_all(factors, x);
+}
+
+static void finish(const Factors *factors, double *x, double *lam) {
+    finish_to_length(factors->even, factors, x, lam);
+}
+
+SIZED void finish_of_length(int even, const Factors *factors, double *x, double *lam) {
+    if (KNOWN(even)) {
+        finish_to_length(even, factors, x, lam);
+    } else {
+        finish(factors, x, lam);
+    }
 }
 
 PRBM void solve_again(const Factors *factors, double *x, double *lam) {

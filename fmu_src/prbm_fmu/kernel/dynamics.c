@@ -240,8 +240,7 @@ RARE void stretch_links(Equations *q) {
 }
 
 /* The directions at the angles: from those of the start, or afresh. */
-static void find_directions(Equations *q, bool turned) {
-    int even = q->system->even;
+SIZED void directions_of(int even, Equations *q, bool turned) {
     if (!turned ||
         !turned_directions(even, q->angle, q->start, q->e_start, q->e_parts, q->e)) {
         unit_vectors(even, q->angle, q->e);
@@ -250,6 +249,10 @@ static void find_directions(Equations *q, bool turned) {
     if (q->system->stretch_count > 0) {
         stretch_links(q);
     }
+}
+
+static void find_directions(Equations *q, bool turned) {
+    directions_of(q->system->even, q, turned);
 }
 
 /* Re(w^2) of the complex rates w = theta' - i s' of arms, for the squares of all rates. */
@@ -262,11 +265,11 @@ RARE void stretch_squares(const System *system, double *squares) {
 }
 
 /* x: the loads Re(w e) + moment. */
-static void find_loads(Equations *q) {
-    const int even = q->system->even;
+SIZED void find_loads(int even, Equations *q) {
     const double *moment = q->moment, *v = q->speed;
     double *x = q->x, *squares = q->squares;
     Parts w = q->w_parts, e = q->e_parts;
+    UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes re = lanes_at(w.re + j) * lanes_at(e.re + j);
         Lanes im = lanes_at(w.im + j) * lanes_at(e.im + j);
@@ -286,11 +289,12 @@ static double coriolis(const Equations *q, int stretch_coordinate) {
 
 /* What springs and their damping take up: x -= K (q - q0 + beta v), spring by spring, and the
  * power beta v^T K v of the damping. */
-static void add_springs(Equations *q) {
+SIZED void add_springs(int even, Equations *q) {
     const System *system = q->system;
-    const int n = system->n, even = system->even;
+    const int n = system->n;
     const double *angle = q->angle, *straight = system->straight, *v = q->speed;
     double *turns = q->turns, *x = q->x, sum = 0.0; /* x has room for the ground's share */
+    UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes turn = lanes_at(angle + j) - lanes_at(straight + j);
         set_lanes(turns + j, turn + q->beta * lanes_at(v + j));
@@ -311,6 +315,7 @@ static void add_springs(Equations *q) {
 SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE squares,
                    double *ALONE rows, double *ALONE lam) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};
+    UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes e_re = lanes_at(e.re + j), e_im = lanes_at(e.im + j), square = lanes_at(squares + j);
         UNROLLED
@@ -341,8 +346,7 @@ RARE void carried_rows(Equations *q, double *rows) {
     }
 }
 
-static void rows_and_convection(Equations *q, double *rows) {
-    int even = q->system->even;
+SIZED void rows_to_length(int even, Equations *q, double *rows) {
     Parts B = q->B_conjugate, e = q->e_parts;
     switch (q->r) {
     case 1: convect(1, even, B, e, q->squares, rows, q->lam); break;
@@ -355,6 +359,18 @@ static void rows_and_convection(Equations *q, double *rows) {
     }
     if (q->carried_count > 0) {
         carried_rows(q, rows);
+    }
+}
+
+static void rows_and_convection(Equations *q, double *rows) {
+    rows_to_length(q->system->even, q, rows);
+}
+
+SIZED void rows_of_length(int even, Equations *q, double *rows) {
+    if (KNOWN(even)) {
+        rows_to_length(even, q, rows);
+    } else {
+        rows_and_convection(q, rows);
     }
 }
 
@@ -496,14 +512,14 @@ static void set_columns(Equations *q) {
 }
 
 /* The factors, and x := L^-1 x, from the rows in Z. */
-static bool factor_motion(Equations *q) {
+SIZED bool factor_motion(int even, Equations *q) {
     q->factors.r = q->r;
     q->factors.block_count = q->system->block_count;
     if (!blocks_motion(q)) {
         return false;
     }
     set_columns(q);
-    return factor_schur(&q->factors);
+    return schur_of_length(even, &q->factors);
 }
 
 RARE void add_coriolis(Equations *q) {
@@ -514,23 +530,28 @@ RARE void add_coriolis(Equations *q) {
 }
 
 /* Solve for x = a and lam; turned: near the start. */
-static bool solve_motion(Equations *q, const double *angle, const double *v, bool turned) {
+SIZED bool motion_of_length(int even, Equations *q, const double *angle, const double *v,
+                            bool turned) {
     const System *system = q->system;
-    pad(system->n, angle, q->angle);
-    pad(system->n, v, q->speed);
-    find_directions(q, turned);
-    find_loads(q);
-    add_springs(q);
-    rows_and_convection(q, q->factors.Z);
+    pad_of(even, system->n, angle, q->angle);
+    pad_of(even, system->n, v, q->speed);
+    directions_of(even, q, turned);
+    find_loads(even, q);
+    add_springs(even, q);
+    rows_of_length(even, q, q->factors.Z);
     add_rubs(q);
-    if (!factor_motion(q)) {
+    if (!factor_motion(even, q)) {
         return false;
     }
-    finish(&q->factors, q->x, q->lam);
+    finish_of_length(even, &q->factors, q->x, q->lam);
     if (system->stretch_count > 0) {
         add_coriolis(q);
     }
     return true;
+}
+
+static bool solve_motion(Equations *q, const double *angle, const double *v, bool turned) {
+    return motion_of_length(q->system->even, q, angle, v, turned);
 }
 
 /* Only the factors, at a state that is then a start. */
@@ -539,9 +560,9 @@ static bool factor_start(Equations *q, const double *angle, const double *v) {
     pad(q->system->n, angle, q->angle);
     pad(q->system->n, v, q->speed);
     find_directions(q, true);
-    find_loads(q);
+    find_loads(q->system->even, q);
     rows_and_convection(q, q->factors.Z);
-    return factor_motion(q);
+    return factor_motion(q->system->even, q);
 }
 
 PRBM bool accelerations(Equations *equations, const double *q, const double *v, double *a,
@@ -599,16 +620,34 @@ PRBM void begin_trace(Equations *q) {
     }
 }
 
+SIZED bool rates_of_length(int even, Equations *q, const double *y, bool turned, double *dy) {
+    int n = q->system->n;
+    if (!motion_of_length(even, q, y, y + n, turned)) {
+        return false;
+    }
+    copy_of(even, n, q->speed, dy);
+    copy_of(even, n, q->x, dy + n);
+    return true;
+}
+
+/* The lengths of the guides' vectors are known where they are compiled, so that loops unroll. */
+static bool rates_of_motion(Equations *q, const double *y, bool turned, double *dy) {
+    int even = q->system->even;
+    switch (even) {
+    case 4: return rates_of_length(4, q, y, turned, dy);
+    case 8: return rates_of_length(8, q, y, turned, dy);
+    default: return rates_of_length(even, q, y, turned, dy);
+    }
+}
+
 /* The rates of y; turned: near the start. */
 static bool rates_at(Equations *q, const double *y, bool turned, double *dy, Problem *problem) {
     int n = q->system->n;
     const double *v = y + n;
-    if (!solve_motion(q, y, v, turned)) {
+    if (!rates_of_motion(q, y, turned, dy)) {
         return fail(problem, "%s", SINGULAR);
     }
     trace_forces(q);
-    copy(n, v, dy);
-    copy(n, q->x, dy + n);
     dy[2 * n] = q->spring_loss;
     dy[2 * n + 1] = 0.0;
     if (q->mass_damping != 0.0) {
@@ -673,13 +712,13 @@ PRBM bool project(Equations *equations, double t, double *y, Scratch *scratch, P
 }
 
 /* The value of an active row, but for its constant, at the state that was evaluated last. */
-static double active_value(const Equations *q, int k) {
-    const int even = q->system->even;
+SIZED double active_value(int even, const Equations *q, int k) {
     if (q->system->stretch_count > 0 || q->on[k] != FIXED) {
         return row_value(&q->active, k, q->e);
     }
     Parts B = parts_from(q->B_conjugate, k * even), e = q->e_parts;
     Lanes sum[SUMS] = {NO_LANES};
+    UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes re = lanes_at(B.re + j) * lanes_at(e.re + j);
         Lanes im = lanes_at(B.im + j) * lanes_at(e.im + j);
@@ -689,46 +728,57 @@ static double active_value(const Equations *q, int k) {
 }
 
 /* The worst distance from the constraints, in what lam asks for. */
-static double ask_positions(Equations *q, double t) {
+SIZED double ask_positions(int even, Equations *q, double t) {
     double worst = 0.0;
     for (int k = 0; k < q->r; k++) {
-        q->lam[k] = k < q->first_stick ? -(active_value(q, k) + offset(q, k, t)) : 0.0;
+        q->lam[k] = k < q->first_stick ? -(active_value(even, q, k) + offset(q, k, t)) : 0.0;
         worst = fabs(q->lam[k]) <= worst ? worst : fabs(q->lam[k]); /* a NaN stays */
     }
     return worst;
 }
 
-static void ask_velocities(Equations *q) {
-    int even = q->system->even;
-    rows_and_convection(q, q->rows);
+SIZED void ask_velocities(int even, Equations *q) {
+    rows_of_length(even, q, q->rows);
     for (int k = 0; k < q->r; k++) {
         q->lam[k] = -(even_dot(even, q->rows + k * even, q->speed) + prescribed(q, k));
     }
 }
 
 /* y += what the rows ask for. */
-static void correct(Equations *q, double *y) {
-    zeros(q->system->even, q->x);
-    finish(&q->factors, q->x, q->lam);
+SIZED void correct(int even, Equations *q, double *y) {
+    UNROLLED_BY_LANES
+    for (int j = 0; j < even; j += LANES) {
+        set_lanes(q->x + j, all_lanes(0.0));
+    }
+    finish_of_length(even, &q->factors, q->x, q->lam);
     for (int i = 0; i < q->system->n; i++) {
         y[i] += q->x[i];
     }
 }
 
 /* One correction by the factors at hand; turned: near the start. */
-static bool corrected(Equations *q, double t, double *y, bool turned) {
+SIZED bool corrected_of_length(int even, Equations *q, double t, double *y, bool turned) {
     int n = q->system->n;
-    ask_positions(q, t); /* e is that of y: evaluated last */
-    correct(q, y);
-    pad(n, y, q->angle);
-    find_directions(q, turned);
-    if (!(ask_positions(q, t) <= CLOSED * q->system->length)) {
+    ask_positions(even, q, t); /* e is that of y: evaluated last */
+    correct(even, q, y);
+    pad_of(even, n, y, q->angle);
+    directions_of(even, q, turned);
+    if (!(ask_positions(even, q, t) <= CLOSED * q->system->length)) {
         return false;
     }
-    pad(n, y + n, q->speed);
-    ask_velocities(q);
-    correct(q, y + n);
+    pad_of(even, n, y + n, q->speed);
+    ask_velocities(even, q);
+    correct(even, q, y + n);
     return true;
+}
+
+static bool corrected(Equations *q, double t, double *y, bool turned) {
+    int even = q->system->even;
+    switch (even) {
+    case 4: return corrected_of_length(4, q, t, y, turned);
+    case 8: return corrected_of_length(8, q, t, y, turned);
+    default: return corrected_of_length(even, q, t, y, turned);
+    }
 }
 
 static bool project_near(Equations *q, double t, double *y, bool turned, Scratch *scratch,

@@ -46,8 +46,17 @@
 #endif
 #if defined(__GNUC__) && !defined(__clang__) /* which needs to be told */
 #define UNROLLED _Pragma("GCC unroll 8")
+#define UNROLLED_BY_LANES _Pragma("GCC unroll 4")
 #else
 #define UNROLLED
+#define UNROLLED_BY_LANES
+#endif
+/* Whether the compiler knows a length where a function is inlined; loops over unknown ones are
+ * compiled once. */
+#if defined(__GNUC__)
+#define KNOWN(length) __builtin_constant_p(length)
+#else
+#define KNOWN(length) false
 #endif
 enum { SMALL = 4 }; /* the largest such size; loops to a constant are the ones that unroll */
 

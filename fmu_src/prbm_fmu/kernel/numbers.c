@@ -33,6 +33,11 @@ static Lanes lanes_at(const double *x) {
     return *(const LanesInMemory *)x;
 }
 
+static Lanes all_lanes(double x) {
+    Lanes lanes = NO_LANES;
+    return x - lanes;
+}
+
 static void set_lanes(double *x, Lanes lanes) {
     *(LanesInMemory *)x = lanes;
 }
@@ -49,10 +54,27 @@ static int even_length(int n) {
     return n + n % PAIR;
 }
 
+/* Copy n numbers, which are even if a padding counts. */
+SIZED void copy_of(int even, int n, const double *from, double *to) {
+    UNROLLED_BY_LANES
+    for (int i = 0; i + PAIR < even; i += LANES) {
+        set_lanes(to + i, lanes_at(from + i));
+    }
+    for (int i = even - PAIR; i < n; i++) {
+        to[i] = from[i];
+    }
+}
+
 /* A vector padded with a zero to an even length. */
+SIZED void pad_of(int even, int n, const double *x, double *padded) {
+    padded[even - 1] = 0.0;
+    copy_of(even, n, x, padded);
+}
+
 static void pad(int n, const double *x, double *padded) {
-    padded[even_length(n) - 1] = 0.0;
-    copy(n, x, padded);
+    if (n > 0) {
+        pad_of(even_length(n), n, x, padded);
+    }
 }
 
 static void pad_parts(int n, const Complex *z, Parts parts) {
@@ -190,9 +212,10 @@ static void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
 
 /* e = exp(i q) by turning e_start = exp(i start): exp(i q) = e_start exp(i (q - start)).  False
  * unless all angles are near their start. */
-static bool turned_directions(int even, const double *q, const double *start, Parts e_start,
-                              Parts parts, Complex *e) {
+SIZED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
+                             Parts parts, Complex *e) {
     LaneBits near = ~(bits_of(lanes_at(q)) & 0);
+    UNROLLED_BY_LANES
     for (int i = 0; i < even; i += LANES) {
         Lanes d = lanes_at(q + i) - lanes_at(start + i), s, c_less_1;
         Lanes re = lanes_at(e_start.re + i), im = lanes_at(e_start.im + i);

@@ -39,18 +39,24 @@ static const double LARGEST_WEIGHT[STAGES] = {0.103, 0.0,  0.329, 0.196,
 /* result = y + h sum(a_i k_i) for n even, as it is with two rates for each angle and two energies. */
 SIZED void combine_of(int count, int n, int stride, double h, const double *a, const double *k,
                       const double *y, double *result) {
+    Lanes weight[STAGES];
+    UNROLLED
+    for (int i = 0; i < count; i++) {
+        weight[i] = all_lanes(a[i]);
+    }
+    UNROLLED_BY_LANES
     for (int j = 0; j < n; j += LANES) {
-        Lanes sum = a[0] * lanes_at(k + j);
+        Lanes sum = weight[0] * lanes_at(k + j);
         UNROLLED
         for (int i = 1; i < count; i++) {
-            sum += a[i] * lanes_at(k + i * stride + j);
+            sum += weight[i] * lanes_at(k + i * stride + j);
         }
         set_lanes(result + j, lanes_at(y + j) + h * sum);
     }
 }
 
-static void combine(int n, int stride, int count, double h, const double *a, const double *k,
-                    const double *y, double *result) {
+SIZED void combine_length(int n, int stride, int count, double h, const double *a,
+                          const double *k, const double *y, double *result) {
     switch (count) {
     case 1: combine_of(1, n, stride, h, a, k, y, result); break;
     case 2: combine_of(2, n, stride, h, a, k, y, result); break;
@@ -63,14 +69,22 @@ static void combine(int n, int stride, int count, double h, const double *a, con
     }
 }
 
+static void combine(int n, int count, double h, const double *a, const double *k, const double *y,
+                    double *result) {
+    switch (n) {
+    case 8: combine_length(8, 8, count, h, a, k, y, result); break;
+    case 16: combine_length(16, 16, count, h, a, k, y, result); break;
+    default: combine_length(n, n, count, h, a, k, y, result);
+    }
+}
+
 /* The stages k (STAGES, n), of which the first is given, and the new state y1. */
 PRBM bool stages(Equations *equations, int n, double t, const double *y, double h, double *k,
                  double *y1, Problem *problem) {
     (void)t; /* see rate */
     start_from(equations, y);
     for (int i = 1; i < STAGES; i++) {
-        int acting = i + 1 < STAGES ? n - 2 : n; /* what was dissipated and done does not act */
-        combine(acting, n, i, h, STAGE[i], k, y, y1);
+        combine(n, i, h, STAGE[i], k, y, y1);
         if (!rates_at(equations, y1, true, k + i * n, problem)) {
             return false;
         }
@@ -80,7 +94,7 @@ PRBM bool stages(Equations *equations, int n, double t, const double *y, double 
 
 PRBM void error_of(int n, const double *k, double h, double *error) {
     zeros(n, error);
-    combine(n, n, STAGES, h, ERROR_WEIGHT, k, error, error);
+    combine(n, STAGES, h, ERROR_WEIGHT, k, error, error);
 }
 
 /* How far the first n components of the dense output can be from the start of the step. */
@@ -106,5 +120,5 @@ PRBM void interpolate(int n, const double *y, const double *k, double h, double 
                       double *result) {
     double b[STAGES];
     weights(theta, b);
-    combine(n, n, STAGES, h, b, k, y, result);
+    combine(n, STAGES, h, b, k, y, result);
 }
