@@ -188,11 +188,14 @@ class Monolith:
                 last = self.time + h >= end - LOCATED
                 self.time, self.y = end if last else self.time + h, y
                 continue
-            wall = hit[0]
-            if self._gap(wall, self.y) > 0.0:
-                h = brentq(lambda s: self._gap(wall, self._step(s)), 0.0, h, xtol=LOCATED)
-                self.time, self.y = self.time + h, self._step(h)
-            self._impact(wall)
+            self._reach(hit[0], h)
+            self._impact(hit[0])
+
+    def _reach(self, wall: float, h: float) -> None:
+        """Go to where the gap of a wall closes, within a step [s]."""
+        if self._gap(wall, self.y) > 0.0:
+            h = brentq(lambda s: self._gap(wall, self._step(s)), 0.0, h, xtol=LOCATED)
+            self.time, self.y = self.time + h, self._step(h)
 
     def _impact(self, wall: float) -> None:
         self.y[0] = math.asin(wall / self.guide.r)

@@ -194,7 +194,9 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
     # half a step less: FMPy adds up its steps, and may take one more by rounding
     end = times[-2] + step / 2
     try:
-        result = simulate_ssp(str(path), stop_time=end, step_size=step, parameter_set=every)
+        result: Columns = simulate_ssp(
+            str(path), stop_time=end, step_size=step, parameter_set=every
+        )
     except Exception as error:
         _refuse(path, error)
     result["time"] = np.minimum(result["time"] + step, stop_time)  # FMPy writes the beginnings
@@ -202,4 +204,5 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
 
 
 def _refuse(path: str | Path, error: Exception) -> NoReturn:
+    """Say in a sentence what FMPy has found."""
     raise CouplingError(f"{path}: FMPy cannot simulate it ({error})") from None
