@@ -402,13 +402,12 @@ class System:
         for instance in first:
             self.wire(instance)
         end, happens = self._lead(leaders, end)
+        for instance in leaders:
+            self.look(instance)
         for instance in others:
             if self.scheme == GAUSS_SEIDEL:
                 self.wire(instance)
             instance.step(end)
-            if self.scheme == GAUSS_SEIDEL:
-                self.look(instance)
-        for instance in self.instances.values():
             self.look(instance)
         self.time = end
         return happens
