@@ -82,9 +82,7 @@ def sweep(frequencies: Sequence[float], progress: Progress | None = None) -> np.
             shake(coupled, frequency, MEASURED)
             change = [coupled.values[name] - before[name] for name in WATCHED]
             span = MEASURED / frequency
-            rows.append(
-                (frequency, change[0] / span, change[1] / span, sum(change[2:]) / MEASURED)
-            )
+            rows.append((frequency, change[0] / span, change[1] / span, sum(change[2:]) / MEASURED))
             if progress is not None:
                 progress((k + 1) / len(frequencies))
     return np.array(rows, ROW)
