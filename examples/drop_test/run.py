@@ -1,4 +1,4 @@
-"""A device is dropped: how hard does the shuttle inside it hit its stop?
+"""Drop a device, and see how hard the shuttle inside it hits its stop.
 
     python examples/drop_test/run.py
 
