@@ -204,7 +204,7 @@ class OneSolver:
         which ``happens`` tells, None after the event.
         """
         nominal = np.concatenate([self.model.nominals, np.ones(len(self.z))])
-        absolute = ABSOLUTE * self.tolerance * nominal
+        absolute: Any = ABSOLUTE * self.tolerance * nominal
         while self.time < end:
             y = np.concatenate([self.model.x, self.z])
             sign, self.happens = self.indicators(self.time, y) > 0.0, False
