@@ -1,6 +1,7 @@
 """The page about embedding runs as it stands there, and its ways agree."""
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -43,7 +44,7 @@ def test_embedding_page_runs_and_its_ways_agree(printed):
     pairs = re.findall(r"taken (\S+) mJ, given (\S+) mJ", printed)
     taken, given = ([float(pair[k]) for pair in pairs] for k in (0, 1))
     *gaps, none = (a - b for a, b in zip(taken, given, strict=True))
-    for longer, shorter in zip(gaps, gaps[1:], strict=False):
+    for longer, shorter in pairwise(gaps):
         assert shorter == pytest.approx(longer / 2, rel=0.05)  # and terms of the second order
     assert abs(none) < 2e-5  # mJ: both are rounded to 1e-5
     errors = [abs(x - taken[-1]) for x in taken[:-1]]

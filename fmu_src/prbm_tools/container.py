@@ -138,8 +138,12 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
         causality=variable.causality,
         variability=variable.variability,
         initial="calculated" if output else None,
-        start=None if output else str(start),
+        start=None if output else _text(start),
     )
+
+
+def _text(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _wire(inside: Mapping[str, Any], to: str, source: str) -> Any:

@@ -90,18 +90,26 @@ class Instance:
             modelIdentifier=interface.modelIdentifier,
             instanceName=name,
         )
-        options = {}
+        self.said = ""  # by the FMU, about what is wrong
+        options: dict[str, Any] = {}
         if self.version > 2:
-            options = {"eventModeUsed": self.events, "earlyReturnAllowed": self.events}
+            options = {"eventModeUsed": self.events, "earlyReturnAllowed": self.events,
+                       "loggingOn": True, "logMessage": self._note}  # fmt: skip
         self._call("instantiate", **options)
+
+    def _note(self, _: Any, status: int, category: bytes, message: bytes) -> None:
+        """Keep what is wrong, not what happens; in FMI 2.0 FMPy prints it."""
+        if status > 0:
+            self.said = message.decode(errors="replace")
 
     def _call(self, function: str, *arguments: Any, **options: Any) -> Any:
         try:
             return getattr(self.fmu, function)(*arguments, **options)
         except FMICallException as error:
+            why = self.said or "what the FMU has written above tells why"
             raise CouplingError(
                 f"{self.name}: {error.function} at {self.time:g} s returned the status "
-                f"{error.status}; what the FMU has written above tells why"
+                f"{error.status}: {why}"
             ) from None
         except Exception as error:
             raise CouplingError(f"{self.name}: {function} failed ({error})") from None

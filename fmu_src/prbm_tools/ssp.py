@@ -190,6 +190,8 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
             for parameters in binding.parameterValues:
                 for parameter in parameters.parameters:
                     parameter.name = f"{component.name}.{parameter.name}"
+                    if parameter.type == "Boolean":  # FMPy takes the text, which is not 0, as true
+                        parameter.value = parameter.value in ("true", "1")
                     every.parameters.append(parameter)
     # half a step less: FMPy adds up its steps, and may take one more by rounding
     end = times[-2] + step / 2
