@@ -111,7 +111,11 @@ def test_libcosim_runs_the_package_as_our_master_does(package, ours):
     np.testing.assert_allclose(rows, ours["follower.shuttle.x"][1:], rtol=1e-9, atol=1e-12)
 
 
-@pytest.mark.parametrize(("outer", "inner"), [(2, 2), (3, 2), (3, 3), (2, 3)])
+def slow(*values):
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize(("outer", "inner"), [(2, 2), (3, 3), slow(3, 2), slow(2, 3)])
 def test_container_does_as_our_master_does(outer, inner, ours, tmp_path):
     """An FMU of either version, validated, with either inside."""
     path = tmp_path / "walls.fmu"
@@ -171,3 +175,13 @@ def test_fmpy_does_not_run_packages_of_fmi_3(tmp_path):
     ssp.package(path, {"guide": guide(3)}, {})
     with pytest.raises(CouplingError, match=r"three\.ssp: FMPy cannot simulate it"):
         ssp.simulate(path, 0.01, 1e-3)
+
+
+def test_what_fmpy_would_get_wrong_is_refused(package, tmp_path):
+    """A last step that is shorter; names of which one begins with the other."""
+    with pytest.raises(CouplingError, match=r"stop_time = 1 s is no multiple of step = 0\.3 s"):
+        ssp.simulate(package, 1.0, 0.3)
+    path = tmp_path / "names.ssp"
+    ssp.package(path, {"ab": integrator(), "a": integrator()}, {})
+    with pytest.raises(CouplingError, match="FMPy takes start values of ab as those of a: let no"):
+        ssp.simulate(path, 1.0, 0.5)

@@ -6,7 +6,8 @@ written for co-simulation; start values stand in it, and FMPy gets them from the
 
 import io
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
@@ -175,17 +176,25 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
     ------
     CouplingError
         If the package cannot be read or FMPy cannot simulate it.
+    ParameterError
+        If there is no step to take.
     """
     from fmpy.ssp.simulation import simulate_ssp  # type: ignore[import-untyped]
     from fmpy.ssp.ssd import ParameterSet, find_components, read_ssd  # type: ignore[import-untyped]
 
     times = communication_points(stop_time, step)
+    if times[-1] - times[-2] < (1 - 1e-6) * step:  # more than rounding
+        raise CouplingError(
+            f"stop_time = {stop_time:g} s is no multiple of step = {step:g} s, as FMPy needs it"
+        )
     try:
         description = read_ssd(str(path))
     except Exception as error:
         _refuse(path, error)
+    components = find_components(description.system)
+    _check_names(component.name for component in components)
     every = ParameterSet(name="start values")
-    for component in find_components(description.system):
+    for component in components:
         for binding in component.parameterBindings:
             for parameters in binding.parameterValues:
                 for parameter in parameters.parameters:
@@ -203,6 +212,16 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
         _refuse(path, error)
     result["time"] = np.minimum(result["time"] + step, stop_time)  # FMPy writes the beginnings
     return result
+
+
+def _check_names(names: Iterable[str]) -> None:
+    """Refuse names that FMPy takes for each other when it hands out start values."""
+    for one, other in pairwise(sorted(names)):
+        if other.startswith(one):
+            raise CouplingError(
+                f"FMPy takes start values of {other} as those of {one}: let no instance have a "
+                "name with which another one begins"
+            )
 
 
 def _refuse(path: str | Path, error: Exception) -> NoReturn:
