@@ -15,15 +15,16 @@ from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Intege
 
 
 class Integrator(Fmi2Slave):
-    """value' = gain * rate, the rate being held."""
+    """value' = gain * rate, the rate being held; value(0) = start + passed * rate."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
-        self.gain, self.value, self.rate, self.again = 1.0, 0.0, 0.0, 0.0
-        self.start, self.skipped, self.off = 0.0, 0, False
+        self.gain, self.value, self.rate = 1.0, 0.0, 0.0
+        self.start, self.passed, self.skipped, self.off = 0.0, 0.0, 0, False
         for kind, name, causality, variability in (
             (Real, "gain", "parameter", "fixed"),
             (Real, "start", "parameter", "fixed"),
+            (Real, "passed", "parameter", "fixed"),
             (Integer, "skipped", "parameter", "fixed"),
             (Boolean, "off", "parameter", "fixed"),
             (Real, "rate", "input", "continuous"),
@@ -35,7 +36,7 @@ class Integrator(Fmi2Slave):
             )
 
     def exit_initialization_mode(self):
-        self.value = self.start
+        self.value = self.start + self.passed * self.rate
 
     def do_step(self, current_time, step_size):
         if self.skipped > 0 or self.off:

@@ -69,7 +69,7 @@ def package(
     elements = _add(system, SSD, "Elements")
     for name in fmus:
         _component(elements, name, variables[name], connections, values)
-    wires = _add(system, SSD, "Connections")
+    wires = _add(system, SSD, "Connections") if connections else system
     for to, source in connections.items():
         (start, output), (end, given) = _found(variables, source), _found(variables, to)
         _add(wires, SSD, "Connection", startElement=start, startConnector=output,
@@ -119,12 +119,12 @@ def _component(
         type="application/x-fmu-sharedlibrary", implementation="CoSimulation",
     )  # fmt: skip
     ends = [*((to, "input") for to in connections), *((x, "output") for x in connections.values())]
-    connectors = _add(component, SSD, "Connectors")
-    for full, kind in dict.fromkeys(ends):
-        start, _, variable = full.partition(".")
-        if start == name and variable in variables:
-            connector = _add(connectors, SSD, "Connector", name=variable, kind=kind)
-            _add(connector, SSC, _kind(full, variables[variable]))
+    mine = [end for end in dict.fromkeys(ends) if end[0].partition(".")[0] == name]
+    connectors = _add(component, SSD, "Connectors") if mine else component
+    for full, kind in mine:
+        variable = _found({name: variables}, full)[1]
+        connector = _add(connectors, SSD, "Connector", name=variable, kind=kind)
+        _add(connector, SSC, _kind(full, variables[variable]))
     own = {x.partition(".")[2]: value for x, value in values.items() if x.startswith(f"{name}.")}
     if not own:
         return
@@ -134,10 +134,10 @@ def _component(
         _add(inside, SSV, "ParameterSet", version="1.0", name=name), SSV, "Parameters"
     )
     for variable, value in own.items():
-        if variable in variables:
-            kind = _kind(f"{name}.{variable}", variables[variable])
-            parameter = _add(parameters, SSV, "Parameter", name=variable)
-            _add(parameter, SSV, kind, value=_number(kind, value))
+        full = f"{name}.{variable}"
+        kind = _kind(full, variables[_found({name: variables}, full)[1]])
+        parameter = _add(parameters, SSV, "Parameter", name=variable)
+        _add(parameter, SSV, kind, value=_number(kind, value))
 
 
 def _kind(full: str, variable: Any) -> str:
