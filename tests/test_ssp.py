@@ -85,6 +85,8 @@ def test_package_holds_the_fmus_as_they_are(package):
 def test_equal_systems_are_equal_bytes(package, tmp_path):
     again = tmp_path / "again.ssp"
     ssp.package(again, fmus(), WIRES, VALUES, STOP, "Walls")
+    with zipfile.ZipFile(again) as archive:
+        assert {info.date_time for info in archive.infolist()} == {ssp.EPOCH}
     digests = {hashlib.sha256(path.read_bytes()).digest() for path in (package, again)}
     assert len(digests) == 1
 

@@ -3,11 +3,11 @@
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
+from copy import copy
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
-import attrs
 from fmpy import read_model_description  # type: ignore[import-untyped]
 from fmpy.container_fmu import config  # type: ignore[import-untyped]
 from fmpy.container_fmu.cli import create_container_fmu  # type: ignore[import-untyped]
@@ -149,5 +149,7 @@ def _text(value: Any) -> str:
 def _wire(inside: Mapping[str, Any], to: str, source: str) -> Any:
     """Return a connection; FMPy's library knows the names of types of FMI 3.0 alone."""
     (giver, output), (taker, given) = _found(inside, source), _found(inside, to)
-    renamed = [attrs.evolve(v, type=_type(v.type, 3)) for v in (output, given)]
+    renamed = [copy(v) for v in (output, given)]
+    for variable in renamed:
+        variable.type = _type(variable.type, 3)
     return config.Connection(giver, renamed[:1], taker, renamed[1:])
