@@ -23,7 +23,7 @@ from prbm import Mechanism, ParameterError, assemble
 from prbm.errors import PrbmError
 from prbm.mechanism import unknown
 
-from .mechanism_file import load, shipped
+from .mechanism_file import find, load, shipped
 from .motion import FPS, film, fmpy_command, motion, needed
 from .scene import COLOURS, DPI, SIZE, Scene, pictures
 from .simulate import (
@@ -332,9 +332,7 @@ def _result(options: argparse.Namespace) -> Result:
     if options.mechanism is not None:
         mechanism = load(options.mechanism)
     elif options.model is not None:
-        if options.model not in shipped():
-            raise ParameterError(unknown(options.model, shipped()).replace("variable", "model"))
-        mechanism = load(shipped()[options.model])
+        mechanism = find(options.model)
     if len(options.files) == 1:
         if mechanism is None:
             raise ParameterError("name what to show: RESULT.csv, --model or --mechanism")

@@ -21,11 +21,11 @@ from matplotlib.patheffects import withStroke
 from prbm import Mechanism, ParameterError, assemble, equilibrium, modes
 from prbm.assembly import Complex
 from prbm.errors import PrbmError
-from prbm.mechanism import unknown, value
+from prbm.mechanism import value
 from prbm.modal import Modes
 
 from .figures import save
-from .mechanism_file import load, shipped
+from .mechanism_file import find
 from .scene import (
     BODY,
     CHAIN,
@@ -306,23 +306,6 @@ class _Drawing:
 
 
 # --- command ----------------------------------------------------------------------------------
-
-
-def find(name: str) -> Mechanism:
-    """Return the mechanism of a file, or the shipped one of a name.
-
-    Raises
-    ------
-    ParameterError
-        If there is no shipped mechanism of that name.
-    MechanismError
-        If the file describes none.
-    """
-    if name in shipped():
-        return load(shipped()[name])
-    if not Path(name).suffix:
-        raise ParameterError(unknown(name, shipped()).replace("variable", "model"))
-    return load(name)
 
 
 def main(arguments: list[str] | None = None) -> int:
