@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from prbm import Mechanism, Simulation, assemble, equilibrium, modes
-from prbm.assembly import Real, Whole
+from prbm.assembly import Real, Whole, unit
 from prbm.errors import ParameterError, PrbmError
 from prbm.mechanism import unknown
 
@@ -42,8 +42,9 @@ MOST_STARTS = 400
 RECORD_SHIFT, RECORD_ZERO = "record.shift", "record.zero"
 OWN = (RECORD_SHIFT, RECORD_ZERO)  # parameters of a record, not of the mechanism
 OWN_UNITS = {RECORD_SHIFT: "s", RECORD_ZERO: "m"}
+DISPLACEMENT = "displacement"  # of the released body along the direction of its release
 
-Progress = Callable[[float], None]
+Progress = Callable[[float], object]
 
 
 @dataclass(frozen=True)
@@ -157,7 +158,8 @@ class Response:
     series : Series
         The record; its times are counted from the release.
     output : str
-        Name of the output, for instance ``shuttle.x``.
+        Name of the output, for instance ``shuttle.x``; or ``displacement``, that of the released
+        body along the direction of its release.
     uncertainty : float or None
         Standard uncertainty of a sample; None: estimated from the residuals.
     tolerance : float or None
@@ -199,11 +201,21 @@ class Response:
         for i, t in enumerate(times):
             if t > simulation.time:
                 simulation.advance(float(t))
-            outputs = simulation.outputs()
-            if self.output not in outputs:
-                raise EvaluationError(unknown(self.output, outputs))
-            result[i] = outputs[self.output]
+            result[i] = _output(simulation, self.output)
         return result + values.get(RECORD_ZERO, 0.0)
+
+
+def _output(simulation: Simulation, name: str) -> float:
+    """Return an output by its name, or the displacement of the released body [m]."""
+    outputs = simulation.outputs()
+    if name == DISPLACEMENT:
+        release = simulation.mechanism.release
+        x, y = (outputs[f"{release.body}.{axis}"] for axis in "xy")
+        u = unit(release.direction)
+        return float(u.real * x + u.imag * y)
+    if name not in outputs:
+        raise EvaluationError(unknown(name, {DISPLACEMENT: 0.0, **outputs}))
+    return float(outputs[name])
 
 
 @dataclass(frozen=True)
@@ -731,7 +743,11 @@ class Valley:
 
 
 def valley(
-    found: Fit, along: str | None = None, span: tuple[float, float] | None = None, points: int = 11
+    found: Fit,
+    along: str | None = None,
+    span: tuple[float, float] | None = None,
+    points: int = 11,
+    progress: Progress | None = None,
 ) -> Valley:
     """Return the profile of a fit along one of its parameters, all others fitted again.
 
@@ -745,6 +761,8 @@ def valley(
         Its values; None: a factor of two to both sides, within the bounds.
     points : int
         Number of values.
+    progress : callable or None
+        Told the fraction of the values that is done, from 0 to 1.
 
     Raises
     ------
@@ -772,6 +790,8 @@ def valley(
         near = found.p
         for j in order:
             rows[j] = near = problem.minimised(_replaced(near, i, values[j]), others)[0]
+            if progress is not None:
+                progress(len(rows) / len(values))
     ordered = np.array([rows[j] for j in sorted(rows)])
     misfit = np.array([float(np.sum(problem.residuals(p) ** 2)) for p in ordered])
     return Valley(problem.names, along, ordered, misfit, found.p)
@@ -795,6 +815,7 @@ def fitted_restitution(
     stop: str = "stop",
     uncertainty: float | None = None,
     free: Sequence[Free | str] = (),
+    starts: int | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit the restitution of a stop to a bouncing response.
@@ -813,7 +834,7 @@ def fitted_restitution(
     values : mapping
         Parameters that differ from the mechanism's: release, position of the stop, stiffness.
     output : str
-        What was recorded.
+        What was recorded; as :class:`Response` has it.
     stop : str
         Name of the stop.
     uncertainty : float or None
@@ -821,7 +842,7 @@ def fitted_restitution(
     free : sequence of Free or str
         Further parameters, for instance ``Free("stop.position", -1e-3, 1e-3)``,
         ``Free("record.shift", -5e-3, 5e-3)``.
-    progress : callable or None
+    starts, progress
         As for :func:`fit`.
 
     Raises
@@ -833,4 +854,4 @@ def fitted_restitution(
     name = f"{stop}.restitution"
     wanted = [Free(name, 0.0, 1.0), *free]
     target = Response(series, output, uncertainty)
-    return fit(mechanism, wanted, target, values, progress=progress)
+    return fit(mechanism, wanted, target, values, starts=starts, progress=progress)

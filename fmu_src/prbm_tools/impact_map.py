@@ -37,7 +37,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from scipy.optimize import least_squares
 
 from prbm import Impact, Mechanism, ParameterError, Simulation, assemble, equilibrium, modes
 from prbm.assembly import Real, System, unit
@@ -48,6 +47,8 @@ from prbm.modal import Modes, modes_at
 from prbm.statics import Equilibrium
 
 from .finite_elements import FiniteElements, Shape
+from .fit import DISPLACEMENT, Free, Response, fitted_restitution
+from .records import Series
 from .scene import GRID, own_style
 from .simulate import Progress
 
@@ -58,6 +59,7 @@ SECANTS = 20
 PATIENCE = 1.5  # periods of the fundamental mode in which a wall must be reached
 SAMPLES = 200  # of a response that is fitted
 REBOUND = 0.4  # periods after the first impact that a fit looks at
+SOFTER = 4.0  # times as soft or stiff as published, at most, is a 1R model that is fitted
 MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 12))
 FUNDAMENTAL, LOST = "#0072b2", "#bbbbbb"
 HIGHER = ("#e69f00", "#d55e00", "#cc79a7", "#009e73")
@@ -322,6 +324,19 @@ def _map(label: str, rows: Sequence[Sequence[Hit]]) -> ImpactMap:
     )
 
 
+def _counted(progress: Progress | None, count: int) -> Callable[[], None]:
+    """Return what tells, when it is called for one of so many points, which fraction is done."""
+    done = 0
+
+    def told() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / count)
+
+    return told
+
+
 def algebraic(
     mechanism: Mechanism,
     heights: Sequence[float] = HEIGHTS,
@@ -330,6 +345,7 @@ def algebraic(
     *,
     stop: str | None = None,
     label: str = "algebraic",
+    progress: Progress | None = None,
 ) -> ImpactMap:
     """Return the map of a pure fundamental mode that arrives at the held shape.
 
@@ -345,6 +361,8 @@ def algebraic(
         Which stop; None: the first.
     label : str
         What to call it.
+    progress : callable or None
+        Told the fraction that is done, from 0 to 1.
 
     Raises
     ------
@@ -355,6 +373,8 @@ def algebraic(
     """
     which = _Stop.of(mechanism, stop)
 
+    told = _counted(progress, len(heights) * len(offsets))
+
     def hits(offset: float) -> Iterator[Hit]:
         system = assemble(mechanism, mechanism.values(which.at(values, 0.0, offset)))
         eps = value(mechanism.stops[which.index], "restitution", system.values)
@@ -362,6 +382,7 @@ def algebraic(
             shape = impact_shape(system, which.index, h)
             G = gap_rows(system).jacobian(system.directions(shape.q))[which.index]
             yield _hit(h, offset, modes(system, shape), G, eps)
+            told()
 
     return _map(label, [list(hits(d)) for d in offsets])
 
@@ -375,6 +396,7 @@ def by_elements(
     stop: str | None = None,
     elements: int = 16,
     label: str = "finite elements",
+    progress: Progress | None = None,
 ) -> ImpactMap:
     """Return the algebraic map of finite elements; parameters as :func:`algebraic` has them.
 
@@ -390,6 +412,8 @@ def by_elements(
     """
     which = _Stop.of(mechanism, stop)
 
+    told = _counted(progress, len(heights) * len(offsets))
+
     def hits(offset: float) -> Iterator[Hit]:
         fe = FiniteElements(mechanism, which.at(values, 0.0, offset), elements=elements)
         eps = value(mechanism.stops[which.index], "restitution", fe.values)
@@ -402,6 +426,7 @@ def by_elements(
 
             shape = _touching(fe.equilibrium, gap, h, size, shape)
             yield _hit(h, offset, fe.modes(shape), fe.gap_row(which.index, shape.q), eps)
+            told()
 
     return _map(label, [list(hits(d)) for d in offsets])
 
@@ -414,6 +439,7 @@ def closed_form(
     *,
     stop: str | None = None,
     label: str = "closed form",
+    progress: Progress | None = None,
 ) -> ImpactMap:
     """Return (1 + eps)/((1 + y'^2)(1 + m d^2/J)) - 1, y(x) the path of the body that hits.
 
@@ -432,6 +458,7 @@ def closed_form(
     point = complex(*(affine(coordinate)(system.values) for coordinate in s.point))
     lever = (u.conjugate() * (point - frame.drawn)).imag
     step = 1e-4 * system.length
+    told = _counted(progress, len(heights))
     for j, h in enumerate(heights):
         x = impact_shape(system, which.index, h).q
         held = float((system.release @ system.directions(x)).real) + system.release_c
@@ -440,6 +467,7 @@ def closed_form(
         slope = moved.imag / moved.real
         for i, d in enumerate(offsets):
             result[i, j] = (1 + eps) / ((1 + slope**2) * (1 + m * (lever + d) ** 2 / J)) - 1
+        told()
     return ImpactMap(label, np.array(heights), np.array(offsets), result)
 
 
@@ -526,101 +554,28 @@ def simulated(
         If a wall is not reached: release further away.
     """
     which = _Stop.of(mechanism, stop)
-    count = len(heights) * len(offsets)
+    told = _counted(progress, len(heights) * len(offsets))
 
-    def hits(i: int, offset: float) -> Iterator[Hit]:
-        for j, h in enumerate(heights):
+    def hits(offset: float) -> Iterator[Hit]:
+        for h in heights:
             simulation = Simulation(mechanism, which.at(values, h, offset), tolerance=tolerance)
             impact = first_impact(simulation, which.index)
             yield mode_energies(simulation.system, impact)
-            if progress is not None:
-                progress((i * len(heights) + j + 1) / count)
+            told()
 
-    return _map(label, [list(hits(i, d)) for i, d in enumerate(offsets)])
+    return _map(label, [list(hits(d)) for d in offsets])
 
 
 # --- fitted -----------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Parameters that bring a model nearest to a response.
-
-    Parameters
-    ----------
-    values : mapping
-        By name.
-    rmse : float
-        What is left between the two, root mean square [m].
-    """
-
-    values: Mapping[str, float]
-    rmse: float
-
-
-def response(
+def displacement(
     mechanism: Mechanism, values: Mapping[str, float], times: Real, tolerance: float = 1e-7
-) -> Real:
-    """Return the displacement of the released body along its release at times, (m,) [m]."""
-    simulation = Simulation(mechanism, values, tolerance=tolerance)
-    u, body = unit(mechanism.release.direction), mechanism.release.body
-    found = np.zeros(len(times))
-    for i, t in enumerate(times):
-        simulation.advance(float(t))
-        out = simulation.outputs()
-        found[i] = u.real * out[f"{body}.x"] + u.imag * out[f"{body}.y"]
-    return found
-
-
-def fit_response(
-    mechanism: Mechanism,
-    names: Sequence[str],
-    times: Real,
-    wanted: Real,
-    values: Mapping[str, float] | None = None,
-) -> Fit:
-    """Fit parameters of a mechanism to a response by least squares, within their bounds.
-
-    Parameters
-    ----------
-    mechanism : Mechanism
-        The model, a 1R say.
-    names : sequence of str
-        Of the parameters to fit; they start from their values.
-    times : (m,)
-        Increasing, from the release on [s].
-    wanted : (m,)
-        Displacement of the released body along the direction of its release [m].
-    values : mapping
-        Parameters that differ from their defaults.
-
-    Raises
-    ------
-    ParameterError
-        If a name is unknown.
-    """
-    known = mechanism.values(values)
-    parameters = {p.name: p for p in mechanism.parameters}
-    for name in names:
-        if name not in parameters:
-            raise ParameterError(f"there is no parameter {name!r} to fit in {mechanism.name}")
-    start = np.array([known[name] for name in names])
-    size = np.where(start != 0.0, np.abs(start), 1.0)
-    scale = float(np.abs(wanted).max()) or 1.0
-    low, high = (
-        np.array([getattr(parameters[name], bound) for name in names]) / size
-        for bound in ("minimum", "maximum")
-    )
-
-    def difference(x: Real) -> Real:
-        tried = {**(values or {}), **dict(zip(names, (x * size).tolist(), strict=True))}
-        result: Real = (response(mechanism, tried, times) - wanted) / scale
-        return result
-
-    inside = np.clip(start / size, low + 1e-9, high - 1e-9)
-    found = least_squares(difference, inside, bounds=(low, high), diff_step=[1e-4], xtol=1e-8)
-    rmse = scale * math.sqrt(float(found.fun @ found.fun) / len(times))
-    return Fit(dict(zip(names, (found.x * size).tolist(), strict=True)), rmse)
+) -> Series:
+    """Return the displacement of the released body along its release at m times [m]."""
+    release = Response(Series(times, np.zeros(len(times))), DISPLACEMENT, tolerance=tolerance)
+    source = f"simulated {mechanism.name}"
+    return Series(times, release.model(mechanism, values), DISPLACEMENT, source=source)
 
 
 def fitted(
@@ -650,23 +605,29 @@ def fitted(
     """
     which = _Stop.of(mechanism, stop)
     model = with_flexures(mechanism, "1R")
-    stiffness = [f"{kind.name}.K_theta" for kind in model.flexure_types
-                 if not isinstance(kind.coefficients.get("K_theta", 0.0), str)]  # fmt: skip
     eps = f"{which.name}.restitution"
     result = np.zeros((len(offsets), len(heights)))
-    own = {p.name for p in model.parameters}
-    shared = {name: x for name, x in (values or {}).items() if name in own}
+    told = _counted(progress, result.size)
+    known = model.values()
+    shared = {name: x for name, x in (values or {}).items() if name in known}
+    stiffness = [
+        Free(name, shared.get(name, known[name]) / SOFTER, shared.get(name, known[name]) * SOFTER)
+        for name in (f"{kind.name}.K_theta" for kind in model.flexure_types)
+        if name in known
+    ]
     for i, d in enumerate(offsets):
         for j, h in enumerate(heights):
             simulation = Simulation(mechanism, which.at(values, h, d), tolerance=1e-6)
             hit = first_impact(simulation, which.index).time
             end = hit + REBOUND / simulation.frequency
             times = np.linspace(0.0, end, SAMPLES)
-            wanted = response(mechanism, which.at(values, h, d), times)
-            fit = fit_response(model, [eps, *stiffness], times, wanted, which.at(shared, h, 0.0))
-            result[i, j] = fit.values[eps]
-            if progress is not None:
-                progress((i * len(heights) + j + 1) / result.size)
+            seen = displacement(mechanism, which.at(values, h, d), times)
+            found = fitted_restitution(
+                model, seen, which.at(shared, h, 0.0), output=DISPLACEMENT, stop=which.name,
+                free=stiffness, starts=1,
+            )  # fmt: skip
+            result[i, j] = found.values[eps]
+            told()
     return ImpactMap(label, np.array(heights), np.array(offsets), result)
 
 
@@ -674,6 +635,16 @@ def fitted(
 
 
 def _edges(x: Real) -> Real:
+    """Return the edges of cells about points in order.
+
+    Examples
+    --------
+    >>> _edges(np.array([0.0, 2.0, 4.0])), _edges(np.array([5.0]))
+    (array([-1.,  1.,  3.,  5.]), array([4.5, 5.5]))
+    """
+    if len(x) == 1:
+        single: Real = x + np.array([-0.5, 0.5])
+        return single
     middle = (x[1:] + x[:-1]) / 2
     return np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]])
 
