@@ -21,12 +21,13 @@ from matplotlib.figure import Figure
 from scipy.signal import detrend, find_peaks
 from scipy.signal.windows import hann
 
-from prbm import Impact, Mechanism, ParameterError, Simulation
+from prbm import Impact, Mechanism, ParameterError, Simulation, assemble
 from prbm.assembly import Real, unit
 from prbm.modal import modes_at
 
 from .impact_map import first_impact
 from .scene import GRID, IMPACT, PAST, own_style
+from .simulate import Result
 
 FAR = 10.0  # sizes of the mechanism, to which a wall is taken away
 FEWEST = 16  # samples of a spectrum
@@ -120,6 +121,44 @@ def after_impact(
     along, across, turning = moved.T
     since = times + begin - impact.time
     return AfterImpact(mechanism.title, impact, since, along, across, turning, found)
+
+
+def after_last_impact(result: Result) -> AfterImpact:
+    """Return what a result holds of the motion after its last impact, in its equal steps.
+
+    The wall is where it is: nothing but the mechanism is heard for as long as it is not touched.
+
+    Raises
+    ------
+    ParameterError
+        If there is no impact, too little is recorded after it, or the body rests on the stop.
+    """
+    if not result.impacts:
+        raise ParameterError("the result has no impact: simulate longer, or move the stop")
+    impact, columns = result.impacts[-1], result.columns
+    s = next(stop for stop in result.mechanism.stops if stop.name == impact.stop)
+    later = columns[columns["time"] > impact.time]
+    if len(later) and (later[f"{s.name}.contact"] != 0).any():
+        raise ParameterError(
+            f"after the last impact, at t = {impact.time:.6g} s, {s.body} rests on {s.name}: there "
+            "is nothing to hear; listen after the first one, or simulate less long"
+        )
+    steps = np.diff(later["time"])
+    if len(steps) and abs(steps[-1] - steps[0]) > 1e-6 * steps[0]:
+        later = later[:-1]  # the last step may be shorter
+    if len(later) < FEWEST:
+        raise ParameterError(
+            f"{len(later)} samples follow the last impact, at t = {impact.time:.6g} s; a spectrum "
+            f"needs at least {FEWEST}: simulate longer, or in smaller steps"
+        )
+    v = unit(s.direction).conjugate() * (later[f"{s.body}.vx"] + 1j * later[f"{s.body}.vy"])
+    own = {p.name for p in result.mechanism.parameters}
+    values = {name: x for name, x in result.values.items() if name in own}
+    found = modes_at(assemble(result.mechanism, values), impact.q).frequency
+    return AfterImpact(
+        result.mechanism.title, impact, later["time"] - impact.time, v.real, v.imag,
+        later[f"{s.body}.omega"], found,
+    )  # fmt: skip
 
 
 def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
