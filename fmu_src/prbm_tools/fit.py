@@ -31,6 +31,7 @@ from .vibration import impacts
 
 STEP = 1e-4  # of a parameter's size, of the central differences: the integration's noise is 1e-8
 LOOSE = 0.5  # relative standard uncertainty; twice that includes zero: the data know nothing
+EXACT = 1e-9  # of the data: a model that is nearer to them is as near as it is computed
 NOISE = 1e-6  # of the largest singular value: what rounding leaves of none
 PART = 0.1  # share of a direction in which a parameter takes part
 AT_BOUND = 1e-6  # of the range
@@ -591,7 +592,8 @@ def _assessed(problem: Problem, p: Real, evaluations: int) -> Fit:
             f"{m} data cannot give {k} parameters and their own scatter: give their uncertainty"
         )
     noise *= widening(serial_correlation(rest), m) if m > k else 1.0
-    s = s / noise if noise > 0.0 else s
+    least = EXACT * float(np.abs(problem.data / problem.uncertainty).max())
+    s = s / max(noise, least, 1e-300)
     s[s <= NOISE * s.max(initial=0.0)] = 0.0
     valleys = []
     for row, known in zip(V, s, strict=True):

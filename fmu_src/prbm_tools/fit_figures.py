@@ -31,6 +31,12 @@ def _figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure, li
     return figure, every
 
 
+def _title(found: Fit) -> str:
+    """Return the parameters that were fitted, two in a line."""
+    words = [f"{name} = {x}" for name, x in found.estimates.items()]
+    return "\n".join(", ".join(words[i : i + 2]) for i in range(0, len(words), 2))
+
+
 @own_style()
 def bending_figure(result: YoungsModulus) -> Figure:
     """Plot the averaged force over the deflection with the line that was fitted."""
@@ -77,9 +83,7 @@ def response_figure(found: Fit) -> Figure:
     upper.plot(t, factor * series.values, ".", color=PAST, markersize=3, label="measured")
     upper.plot(t, factor * model, color=IMPACT, linewidth=1.0, label="model")
     upper.set_ylabel(f"{target.output} [{unit}]")
-    upper.set_title(
-        ", ".join(f"{name} = {x}" for name, x in found.estimates.items()), fontsize=10, loc="left"
-    )
+    upper.set_title(_title(found), fontsize=10, loc="left")
     upper.legend(fontsize=9, frameon=False)
     lower.plot(t, factor * (model - series.values), ".", color=LINK, markersize=3)
     lower.set_ylabel(f"model - measured [{unit}]")
@@ -135,10 +139,7 @@ def force_figure(found: Fit) -> Figure:
     upper.plot(x, 1e3 * target.force[order], ".", color=PAST, markersize=4, label="measured")
     upper.plot(x, 1e3 * model[order], color=IMPACT, linewidth=1.2, label="model")
     upper.set_ylabel("holding force [mN]")
-    upper.set_title(
-        ", ".join(f"{name} = {value}" for name, value in found.estimates.items()),
-        fontsize=10, loc="left",
-    )  # fmt: skip
+    upper.set_title(_title(found), fontsize=10, loc="left")
     upper.legend(fontsize=9, frameon=False)
     lower.plot(x, 1e3 * (model - target.force)[order], ".", color=LINK, markersize=4)
     lower.set_ylabel("model - measured [mN]")
@@ -200,6 +201,7 @@ def vibration_figure(series: Series, found: FreeVibration) -> Figure:
     upper.set_ylabel(f"{series.name} [{unit}]")
     upper.set_xlabel(f"time [{time_name}]")
     upper.set_title(f"{found.frequency}, damping ratio {found.damping}", fontsize=10, loc="left")
+    upper.margins(y=0.2)  # room for the legend
     upper.legend(loc="upper right", fontsize=9, frameon=False)
     grid: Real = np.linspace(0.0, since[-1], len(since))
     even: Real = np.interp(grid, since, series.values)

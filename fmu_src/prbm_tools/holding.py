@@ -25,6 +25,7 @@ from .equilibria import Rest, holding_force, rests, snap
 from .scene import GRID, IMPACT, PAST, REST, length_unit, own_style
 from .simulate import Progress
 
+ROUNDING = 1e-9  # of its scale: what a computation leaves of zero
 DIFFERENCE = 1e-5  # of the size of the mechanism: step of the stiffness, whose error is its square
 
 
@@ -145,7 +146,7 @@ def curve(
 def figure(curve: Curve, title: str) -> Figure:
     """Draw force, motion across and fundamental frequency over the displacement.
 
-    Places of rest are filled where they are stable and open where they are not; triangles are
+    Places of rest are filled where they are stable and open where they are not; diamonds are
     where a force makes the mechanism snap.
     """
     x = np.array([point.displacement for point in curve.points])
@@ -159,17 +160,24 @@ def figure(curve: Curve, title: str) -> Figure:
     scale, newton = _force_unit(max(abs(point.force) for point in curve.points))
     force.plot(factor * x, [scale * p.force for p in curve.points], color=PAST, linewidth=1.4)
     force.axhline(0.0, color="#808080", linewidth=0.8)
-    for rest in curve.rests:
-        force.plot(
-            factor * rest.displacement, 0.0, "o", color=REST, markersize=7,
-            markerfacecolor=REST if rest.stable else "white",
-        )  # fmt: skip
-    for place, most in curve.snaps:
-        force.plot(factor * place, scale * most, "v" if most > 0 else "^", color=IMPACT)
+    for stable, words in ((True, "stable rest"), (False, "unstable rest")):
+        places = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
+        if places:
+            force.plot(
+                places, np.zeros(len(places)), "o", color=REST, markersize=7,
+                markerfacecolor=REST if stable else "white", label=words,
+            )  # fmt: skip
+    if curve.snaps:
+        snaps = np.array(curve.snaps) * (factor, scale)
+        force.plot(*snaps.T, "D", color=IMPACT, markersize=5, label="snaps through")
+    if curve.rests:
+        force.legend(fontsize=9, frameon=False)
     force.set_ylabel(f"holding force [{newton}]")
     force.set_title(title, fontsize=11, loc="left")
-    aside, small = length_unit(max(abs(point.across) for point in curve.points) or 1.0)
-    across.plot(factor * x, [aside * p.across for p in curve.points], color=PAST, linewidth=1.2)
+    y = np.array([p.across for p in curve.points])
+    y = np.where(np.abs(y) > ROUNDING * np.abs(x).max(), y, 0.0)
+    aside, small = length_unit(float(np.abs(y).max()) or 1e-4)
+    across.plot(factor * x, aside * y, color=PAST, linewidth=1.2)
     across.set_ylabel(f"across [{small}]")
     hertz = np.array([point.frequency for point in curve.points])
     frequency.plot(factor * x, np.where(hertz > 0.0, hertz, np.nan), color=PAST, linewidth=1.2)

@@ -223,7 +223,14 @@ class _Stop:
         if not names or (name is not None and name not in names):
             known = ", ".join(names) or "none"
             raise ParameterError(f"{mechanism.name} has no stop {name or 'to hit'}; it has {known}")
-        return cls(names.index(name) if name is not None else 0, name or names[0])
+        found = cls(names.index(name) if name is not None else 0, name or names[0])
+        for what in ("position", "offset"):
+            if f"{found.name}.{what}" not in mechanism.values():
+                raise ParameterError(
+                    f"{mechanism.name}: the {what} of {found.name} is an expression in other "
+                    f"parameters, and a map moves it: write a number there"
+                )
+        return found
 
     def at(
         self, values: Mapping[str, float] | None, height: float, offset: float

@@ -231,6 +231,18 @@ def peaks(frequency: Real, amplitude: Real, share: float = 0.02) -> Real:
     return result
 
 
+def numbered(modes: Real) -> list[tuple[int, float]]:
+    """Return the first modes with their numbers, those that vibrate.
+
+    Examples
+    --------
+    >>> numbered(np.array([-1.6, 116.0]))
+    [(2, 116.0)]
+    """
+    first = enumerate(map(float, modes[:MODES_SHOWN]), start=1)
+    return [(i, f) for i, f in first if f > 0.0]
+
+
 @own_style()
 def figure(
     response: AfterImpact,
@@ -251,13 +263,13 @@ def figure(
     drawn = Figure((8.0, 0.9 + 2.0 * len(signals)), dpi=120, layout="constrained")
     FigureCanvasAgg(drawn)
     every = np.atleast_1d(drawn.subplots(len(signals), 1, sharex=True))
-    shown = [f for f in response.modes[:MODES_SHOWN] if f > 0.0]
+    shown = numbered(response.modes)
     for axes, name in zip(every, signals, strict=True):
         frequency, amplitude = spectrum(response.time, getattr(response, name))
         end = highest or float(frequency[-1])
         inside = (frequency <= end) & (frequency > 0.0)
         axes.semilogy(frequency[inside], amplitude[inside], color=PAST, linewidth=1.1)
-        for f in shown:
+        for _, f in shown:
             if f < end:
                 axes.axvline(f, color=IMPACT, linewidth=1.0, linestyle="--")
         top = float(amplitude[inside].max())
@@ -268,7 +280,7 @@ def figure(
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
     last = -np.inf
-    for i, f in enumerate(shown, start=1):
+    for i, f in shown:
         if f < end and f - last > 0.035 * end:  # labels do not overlap
             every[0].annotate(
                 f"{i}", (f, 1.0), (0, 3), xycoords=("data", "axes fraction"),

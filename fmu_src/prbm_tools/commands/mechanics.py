@@ -105,7 +105,7 @@ def _shares(system: System, e: Complex, phi: Real) -> list[float]:
 
 
 def _hertz(frequency: float) -> str:
-    return f"{frequency:.5g} Hz" if frequency > 0.0 else "unstable"
+    return f"{frequency:#.5g} Hz" if frequency > 0.0 else "unstable"
 
 
 def _where(system: System, shape: Equilibrium, at: float | None) -> str:
@@ -147,7 +147,8 @@ def equilibria(options: argparse.Namespace) -> None:
         rest = holding.free(system)
         print(_table([rest]))
         stable = rest.frequency > 0.0
-        print(f"rests at {1e3 * rest.displacement:.6g} mm: {'stable' if stable else 'unstable'}")
+        at = _tiny(1e3 * rest.displacement, 1e3 * system.length)
+        print(f"rests at {at} mm: {'stable' if stable else 'unstable'}")
         output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows([rest]))
     output.write()
 
@@ -169,9 +170,8 @@ def _range(
     if every > 1:
         print(f"every {every}th of {options.points} points; --out DIR writes all")
     for rest in curve.rests:
-        print(
-            f"rests at {1e3 * rest.displacement:.6g} mm: {'stable' if rest.stable else 'unstable'}"
-        )
+        at = _tiny(1e3 * rest.displacement, 1e3 * system.length)
+        print(f"rests at {at} mm: {'stable' if rest.stable else 'unstable'}")
     if not curve.rests:
         print("no place of rest in this range")
     for place, force in curve.snaps:
@@ -196,10 +196,11 @@ def _rows(points: Sequence[holding.Held]) -> list[list[float]]:
 
 
 def _table(points: Sequence[holding.Held]) -> str:
+    most = max(abs(p.force) for p in points)
     rows = [
         [
-            f"{1e3 * p.displacement:.5g}", f"{p.force:.5g}", f"{p.stiffness:.5g}",
-            f"{1e6 * p.across:.5g}", _tiny(1e3 * p.angle),
+            f"{1e3 * p.displacement:.5g}", _tiny(p.force, most), f"{p.stiffness:.5g}",
+            _tiny(1e6 * p.across, 1e3), _tiny(1e3 * p.angle, 1e3),
             f"{p.frequency:.5g}" if p.frequency > 0.0 else "unstable",
         ]
         for p in points
@@ -207,9 +208,9 @@ def _table(points: Sequence[holding.Held]) -> str:
     return aligned(HELD_WORDS, rows)
 
 
-def _tiny(x: float) -> str:
+def _tiny(x: float, scale: float) -> str:
     """Return a number, what rounding leaves of zero as zero."""
-    return f"{x:.4g}" if abs(x) > 1e-9 else "0"
+    return f"{x:.6g}" if abs(x) > holding.ROUNDING * scale else "0"
 
 
 # --- simulate ---------------------------------------------------------------------------------
@@ -236,9 +237,9 @@ def simulated(options: argparse.Namespace) -> None:
     output.table(f"{mechanism.name}.csv", columns, (list(row) for row in result.columns.tolist()))
     output.table(f"{mechanism.name}-impacts.csv", IMPACT_HEAD, _impacts(result))
     output.figure(f"{mechanism.name}.png", lambda: response(result))
-    if options.spectrum is not None:
-        _spectrum(options, result, values, output)
     output.write()
+    if options.spectrum is not None:
+        _spectrum(options, result, values)
 
 
 def _tolerance(text: str | None) -> float | None:
@@ -259,11 +260,9 @@ def _impacts(result: Result) -> Iterator[list[object]]:
         ]  # fmt: skip
 
 
-def _spectrum(
-    options: argparse.Namespace, result: Result, values: dict[str, float], output: Output
-) -> None:
+def _spectrum(options: argparse.Namespace, result: Result, values: dict[str, float]) -> None:
     """Tell which frequencies are heard after an impact."""
-    mechanism = result.mechanism
+    mechanism, output = result.mechanism, Output(options.out)
     if not result.impacts:
         raise UserMistake(
             f"--spectrum: there is no impact in {result.columns['time'][-1]:g} s; simulate longer "
@@ -282,13 +281,16 @@ def _spectrum(
         f"{1e3 * (heard.time[-1] - heard.time[0]):.4g} ms"
         + (" without the wall" if options.spectrum == "first" else "")
     )
-    shown = [f"{f:.4g}" for f in heard.modes[: spectrum.MODES_SHOWN] if f > 0.0]
-    print(f"modes at its shape   {', '.join(shown)} Hz")
+    shown = ", ".join(f"{i}: {f:.4g} Hz" for i, f in spectrum.numbered(heard.modes))
+    print(f"modes at its shape   {shown}")
     lines = {name: spectrum.spectrum(heard.time, getattr(heard, name)) for name in spectrum.SIGNALS}
+    size = assemble(mechanism, mechanism.values()).length
+    loudest = float(lines["along"][1].max())
     for name, (frequency, amplitude) in lines.items():
-        loud = amplitude.max() > 0.0
+        speed = float(amplitude.max()) * (size if name == "turning" else 1.0)
+        loud = speed > holding.ROUNDING * loudest
         found = spectrum.peaks(frequency, amplitude)[:PEAKS_TOLD].tolist() if loud else []
-        print(f"peaks {name:14} {', '.join(f'{f:.4g}' for f in found) or 'none'} Hz")
+        print(f"peaks {name:14} {', '.join(f'{f:.4g} Hz' for f in found) or 'none'}")
     frequency = next(iter(lines.values()))[0]
     output.table(
         f"{mechanism.name}-spectrum.csv",
@@ -296,3 +298,4 @@ def _spectrum(
         np.column_stack([frequency, *(amplitude for _, amplitude in lines.values())]).tolist(),
     )
     output.figure(f"{mechanism.name}-spectrum.png", lambda: spectrum.figure(heard))
+    output.write()

@@ -25,7 +25,7 @@ def _source(options: argparse.Namespace) -> None:
     for option in ("measured", "set"):
         if getattr(options, option):
             raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
-    from ..validation import reproduce
+    from ..validation import reproduce  # type: ignore[import-untyped, unused-ignore]
 
     if options.out is not None:
         check_writable(options.out)
