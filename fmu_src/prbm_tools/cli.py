@@ -10,6 +10,7 @@ import importlib
 import os
 import re
 import sys
+import textwrap
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -22,6 +23,7 @@ from .arguments import (
 )
 
 OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
+WIDTH = 79  # columns of a description
 NEGATIVE = re.compile(r"-\.?\d")
 MECHANISM = "name of a shipped mechanism (prbm list), or a mechanism file, FILE.toml"
 QUANTITIES = 'quantities are in SI, or have a unit: 0.01, 10mm, "-10 mm"; lists also -10 0 10 mm'
@@ -48,7 +50,7 @@ def _command(
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
         help=summary[0].lower() + summary[1:],
-        description=f"{summary[0].upper()}{summary[1:]}.",
+        description=textwrap.fill(f"{summary[0].upper()}{summary[1:]}.", WIDTH),
         epilog=f"{example}\n\n{QUANTITIES}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,

@@ -9,7 +9,7 @@ from ..mechanism_file import find
 from ..settings import UserMistake, settings
 from ..simulate import reporter
 from .output import Output
-from .words import measured, stem
+from .words import measured
 
 
 def validated(options: argparse.Namespace) -> None:
@@ -25,29 +25,31 @@ def _source(options: argparse.Namespace) -> None:
     for option in ("measured", "set"):
         if getattr(options, option):
             raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
-    from ..validation import reproduce  # type: ignore[import-untyped, unused-ignore]
+    from ..validation import PAGE, reproduce  # type: ignore[import-untyped, unused-ignore]
 
     if options.out is not None:
         check_writable(options.out)
     with tempfile.TemporaryDirectory(prefix="prbm_") as folder:
         results = reproduce(options.out or Path(folder), options.only, reporter())
     for result in results:
-        print(result)
+        print(f"{result.where}: {result.verdict}")
+    if options.out is not None:
+        print(options.out / PAGE)
 
 
 def _mechanism(options: argparse.Namespace) -> None:
     """Compare a mechanism with finite elements and measurements."""
     if options.only:
         raise UserMistake("--only chooses among the source's results: leave MECHANISM out")
+    mechanism = find(options.mechanism)
+    values, output = settings(mechanism, options.set), Output(options.out)
+    known = dict(map(measured, options.measured))
     from ..comparison import compare  # type: ignore[import-untyped, unused-ignore]
 
-    mechanism = find(options.mechanism)
-    output = Output(options.out)
     found = compare(
-        mechanism, settings(mechanism, options.set), elements=options.elements,
-        measured=dict(map(measured, options.measured)), progress=reporter(),
-    )  # fmt: skip
+        mechanism, values, elements=options.elements, measured=known, progress=reporter()
+    )
     print(found)
-    output.text(f"{stem(mechanism.name)}-comparison.csv", found.csv)
-    output.figure(f"{stem(mechanism.name)}-comparison.png", lambda: found.figure)
+    output.text(f"{mechanism.name}-comparison.csv", found.csv())
+    output.figure(f"{mechanism.name}-comparison.png", found.figure)
     output.write()
