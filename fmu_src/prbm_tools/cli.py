@@ -111,14 +111,14 @@ def _out(parser: argparse.ArgumentParser) -> None:
 
 def _list(commands: Commands) -> None:
     _command(
-        commands, "list", "mechanics:listed", "the shipped mechanisms, a line each",
+        commands, "list", "shipped:listed", "the shipped mechanisms, a line each",
         _examples("prbm list"),
     )  # fmt: skip
 
 
 def _modes(commands: Commands) -> None:
     parser = _command(
-        commands, "modes", "mechanics:frequencies",
+        commands, "modes", "modes:frequencies",
         "natural frequencies and modes, at rest under gravity or held at a displacement",
         _examples("prbm modes PRBDM2R", "prbm modes PRBDM2R --held -10mm --out modes"),
     )  # fmt: skip
@@ -133,7 +133,7 @@ def _modes(commands: Commands) -> None:
 
 def _equilibrium(commands: Commands) -> None:
     parser = _command(
-        commands, "equilibrium", "mechanics:equilibria",
+        commands, "equilibrium", "rest:equilibria",
         "places of rest under gravity, the force that holds the released body elsewhere, where "
         "it snaps through",
         _examples(
@@ -154,7 +154,7 @@ def _equilibrium(commands: Commands) -> None:
 
 def _simulate(commands: Commands) -> None:
     parser = _command(
-        commands, "simulate", "mechanics:simulated",
+        commands, "simulate", "simulation:simulated",
         "the motion from the release through impacts to rest",
         _examples(
             "prbm simulate PRBDM2R --set stop.restitution=0.5 --out results",
@@ -474,7 +474,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         status = _status(error)
         if status is None:
             raise
-        from .commands.words import in_options
+        from .settings import in_options
 
         return _told(f"{name}: {in_options(str(error))}", status)
 

@@ -5,11 +5,12 @@ import io
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
-
-from ..figures import png
 from ..files import FileError, check_no_folder, check_writable, write_all
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass
@@ -44,9 +45,11 @@ class Output:
         if self.folder is not None:
             self.text(name, csv_text(head, rows))
 
-    def figure(self, name: str, draw: Callable[[], Figure]) -> None:
+    def figure(self, name: str, draw: Callable[[], "Figure"]) -> None:
         """Keep a figure as PNG."""
         if self.folder is not None:
+            from ..figures import png  # here, because it takes a second
+
             self.files[self.folder / name] = png(draw())
 
     def write(self) -> None:

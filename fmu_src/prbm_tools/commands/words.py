@@ -14,30 +14,6 @@ from ..units import si_unit
 
 PLUS_MINUS = re.compile(r"\s*(?:\+\s*/?\s*-|±)\s*")
 WHERE = re.compile(r"(?P<value>.*?)(?:\s+mode\s+(?P<mode>\d+))?(?:\s+at\s+(?P<at>.+))?\s*")
-REMEDIES = (  # of the library, in words of the command line
-    (re.compile(r"units=\{'([^']*)': '([^']*)'\}"), r'--unit "\1=\2"'),
-    (re.compile(r"columns=\[\.\.\.\]"), "--columns"),
-    (re.compile(r"columns=\[([^\]]*\][^\]]*\][^\]]*)\]"), r"--columns \1"),
-    (re.compile(r"(?<=\[s\]\"), (?=\"x)"), " "),
-    (re.compile(r"\(Series\.between\)"), "(--from, --to)"),
-    (re.compile(r"give Free\('([^']*)', lower, upper\)"), r"give --free \1=LOW:HIGH"),
-    (re.compile(r"fit_range = "), "--fit-range "),
-)  # fmt: skip
-
-
-def in_options(sentence: str) -> str:
-    r"""Return a sentence of the library with its remedies as options of the command.
-
-    Examples
-    --------
-    >>> in_options("the column 'x' has no unit: give it, units={'x': 'm'}")
-    'the column \'x\' has no unit: give it, --unit "x=m"'
-    >>> in_options('write a head, or give columns=["t [s]", "x [mm]"] and the like')
-    'write a head, or give --columns "t [s]" "x [mm]" and the like'
-    """
-    for pattern, words in REMEDIES:
-        sentence = pattern.sub(words, sentence)
-    return sentence
 
 
 def estimate(text: str, unit: str, what: str) -> Estimate:
