@@ -17,6 +17,9 @@ from .output import Output
 from .systems import ROUNDING
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
     pass
 
 IMPACT_HEAD = (
