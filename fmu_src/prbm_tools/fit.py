@@ -817,7 +817,6 @@ def fitted_restitution(
     stop: str = "stop",
     uncertainty: float | None = None,
     free: Sequence[Free | str] = (),
-    starts: int | None = None,
     progress: Progress | None = None,
 ) -> Fit:
     """Fit the restitution of a stop to a bouncing response.
@@ -844,7 +843,7 @@ def fitted_restitution(
     free : sequence of Free or str
         Further parameters, for instance ``Free("stop.position", -1e-3, 1e-3)``,
         ``Free("record.shift", -5e-3, 5e-3)``.
-    starts, progress
+    progress : callable or None
         As for :func:`fit`.
 
     Raises
@@ -856,4 +855,4 @@ def fitted_restitution(
     name = f"{stop}.restitution"
     wanted = [Free(name, 0.0, 1.0), *free]
     target = Response(series, output, uncertainty)
-    return fit(mechanism, wanted, target, values, starts=starts, progress=progress)
+    return fit(mechanism, wanted, target, values, progress=progress)

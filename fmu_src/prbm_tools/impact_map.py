@@ -47,7 +47,7 @@ from prbm.modal import Modes, modes_at
 from prbm.statics import Equilibrium
 
 from .finite_elements import FiniteElements, Shape
-from .fit import DISPLACEMENT, Free, Response, fitted_restitution
+from .fit import DISPLACEMENT, Fit, Response, fit
 from .records import Series
 from .scene import GRID, own_style
 from .simulate import Progress
@@ -60,7 +60,6 @@ PATIENCE = 1.5  # periods of the fundamental mode in which a wall must be reache
 SAMPLES = 200  # of a response that is fitted
 REBOUND = 0.4  # periods after the first impact that a fit looks at
 LOOSE = 1e-7  # tolerance of simulations for a fit; its differences are of 1e-4
-SOFTER = 4.0  # times as soft or stiff as published, at most, is a 1R model that is fitted
 MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 12))
 FUNDAMENTAL, LOST = "#0072b2", "#bbbbbb"
 HIGHER = ("#e69f00", "#d55e00", "#cc79a7", "#009e73")
@@ -577,13 +576,45 @@ def simulated(
 # --- fitted -----------------------------------------------------------------------------------
 
 
-def displacement(
+def response(
     mechanism: Mechanism, values: Mapping[str, float], times: Real, tolerance: float = LOOSE
-) -> Series:
-    """Return the displacement of the released body along its release at m times [m]."""
-    release = Response(Series(times, np.zeros(len(times))), DISPLACEMENT, tolerance=tolerance)
-    source = f"simulated {mechanism.name}"
-    return Series(times, release.model(mechanism, values), DISPLACEMENT, source=source)
+) -> Real:
+    """Return the displacement of the released body along its release at times, (m,) [m]."""
+    seen = Response(Series(times, np.zeros(len(times))), DISPLACEMENT, tolerance=tolerance)
+    return seen.model(mechanism, values)
+
+
+def fit_response(
+    mechanism: Mechanism,
+    names: Sequence[str],
+    times: Real,
+    wanted: Real,
+    values: Mapping[str, float] | None = None,
+) -> Fit:
+    """Fit parameters of a mechanism to a computed response, from their values on.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The model, a 1R say.
+    names : sequence of str
+        Of the parameters to fit; they start from their values.
+    times : (m,)
+        Increasing, from the release on [s].
+    wanted : (m,)
+        Displacement of the released body along the direction of its release [m].
+    values : mapping
+        Parameters that differ from their defaults.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown.
+    RecordError
+        If the times have gaps or are fewer than 16.
+    """
+    target = Response(Series(times, wanted, DISPLACEMENT), DISPLACEMENT, tolerance=LOOSE)
+    return fit(mechanism, names, target, values, starts=1)
 
 
 def fitted(
@@ -616,24 +647,18 @@ def fitted(
     eps = f"{which.name}.restitution"
     result = np.zeros((len(offsets), len(heights)))
     told = _counted(progress, result.size)
-    known, loose = model.values(), {"solver.tolerance": LOOSE}
+    known = model.values()
     shared = {name: x for name, x in (values or {}).items() if name in known}
-    stiffness = [
-        Free(name, shared.get(name, known[name]) / SOFTER, shared.get(name, known[name]) * SOFTER)
-        for name in (f"{kind.name}.K_theta" for kind in model.flexure_types)
-        if name in known
-    ]
+    kinds = (f"{kind.name}.K_theta" for kind in model.flexure_types)
+    stiffness = [name for name in kinds if name in known]
     for i, d in enumerate(offsets):
         for j, h in enumerate(heights):
             simulation = Simulation(mechanism, which.at(values, h, d), tolerance=1e-6)
             hit = first_impact(simulation, which.index).time
             end = hit + REBOUND / simulation.frequency
             times = np.linspace(0.0, end, SAMPLES)
-            seen = displacement(mechanism, which.at(values, h, d), times)
-            found = fitted_restitution(
-                model, seen, loose | which.at(shared, h, 0.0), output=DISPLACEMENT, stop=which.name,
-                free=stiffness, starts=1,
-            )  # fmt: skip
+            wanted = response(mechanism, which.at(values, h, d), times)
+            found = fit_response(model, [eps, *stiffness], times, wanted, which.at(shared, h, 0.0))
             result[i, j] = found.values[eps]
             told()
     return ImpactMap(label, np.array(heights), np.array(offsets), result)
