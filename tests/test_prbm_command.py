@@ -17,6 +17,7 @@ from PIL import Image
 
 from prbm import assemble, free_displacement
 from prbm_tools import cli, files
+from prbm_tools.__main__ import main as started
 from prbm_tools.mechanism_file import find, shipped
 from test_measurements_page import records
 
@@ -482,7 +483,7 @@ def environment() -> dict[str, str]:
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is another thing on Windows")
-@pytest.mark.parametrize("moment", [0.15, 1.5])  # s: while it imports, while it simulates
+@pytest.mark.parametrize("moment", [0.2, 3.0])  # s: while it imports, while it simulates
 def test_ctrl_c_ends_a_command_without_a_traceback(moment):
     words = [sys.executable, "-m", "prbm_tools", "simulate", "PRBDM2R", "--stop-time", "1000"]
     with subprocess.Popen(
@@ -492,9 +493,36 @@ def test_ctrl_c_ends_a_command_without_a_traceback(moment):
         process.send_signal(signal.SIGINT)
         _, told = process.communicate(timeout=30)
     assert process.returncode == cli.INTERRUPTED
-    assert told.decode().splitlines()[-1].endswith("interrupted")
     assert b"Traceback" not in told
+    assert re.search(r"^prbm( simulate)?: interrupted$", told.decode(), re.MULTILINE)
     assert [*Path().iterdir()] == []
+
+
+@pytest.mark.parametrize(
+    ("raised", "sentence", "status"),
+    [
+        (KeyboardInterrupt(), "prbm: interrupted", cli.INTERRUPTED),
+        (ModuleNotFoundError("no", name="scipy"), "prbm needs the Python package scipy", 2),
+    ],
+)
+def test_what_happens_before_the_command_runs_has_a_sentence_too(
+    raised, sentence, status, monkeypatch, capsys
+):
+    def ends() -> int:
+        raise raised
+
+    monkeypatch.setattr(cli, "main", ends)
+    assert started() == status
+    assert sentence in capsys.readouterr().err
+
+
+def test_ctrl_c_names_the_command_that_it_ended(monkeypatch, capsys):
+    def ends(_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "_function", lambda _: ends)
+    assert run("simulate PRBDM") == cli.INTERRUPTED
+    assert capsys.readouterr().err == "prbm simulate: interrupted\n"
 
 
 def test_a_reader_that_has_seen_enough_is_no_failure_to_talk_about():
