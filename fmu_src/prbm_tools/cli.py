@@ -49,7 +49,7 @@ def _command(
     """Add a command; ``run`` is module:function, imported when it is needed."""
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
-        help=summary[0].lower() + summary[1:],
+        help=summary,
         description=textwrap.fill(f"{summary[0].upper()}{summary[1:]}.", WIDTH),
         epilog=f"{example}\n\n{QUANTITIES}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
@@ -452,7 +452,16 @@ def _restitution(kinds: Commands) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    words = [*(sys.argv[1:] if arguments is None else arguments)]
+    try:
+        status = _run([*(sys.argv[1:] if arguments is None else arguments)])
+        sys.stdout.flush()
+    except BrokenPipeError:  # whoever read the text has seen enough of it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    return status
+
+
+def _run(words: Sequence[str]) -> int:
     if not words:
         parser().print_help(sys.stderr)
         return MISTAKE
@@ -461,15 +470,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = parser().parse_args(protected(words))
         name = options.prog
         _function(options.run)(options)
-        sys.stdout.flush()
+        return OK
+    except SystemExit:  # after the help
         return OK
     except _ArgumentError as error:
         return _told(str(error), MISTAKE)
     except KeyboardInterrupt:
         return _told(f"{name}: interrupted", INTERRUPTED)
-    except BrokenPipeError:  # whoever read the text has seen enough of it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return FAILED
     except Exception as error:
         status = _status(error)
         if status is None:

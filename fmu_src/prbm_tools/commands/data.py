@@ -103,7 +103,7 @@ def series(path: str, options: argparse.Namespace, unit: str) -> Series:
             found.time.values, channel.values, channel.name, kind, found.source, found.lines
         )
     if sensor:
-        signal = calibration(sensor, options, signal.unit)[0].applied(signal)
+        signal = _sensor(sensor, signal.unit).applied(signal)
         if unit and signal.unit != unit:
             raise UserMistake(
                 f"{found.source}: {name}, calibrated by {sensor}, is in {signal.unit}, but {unit} "
@@ -122,9 +122,7 @@ def series(path: str, options: argparse.Namespace, unit: str) -> Series:
     return signal
 
 
-def calibration(
-    path: str, options: argparse.Namespace, reading_unit: str = ""
-) -> tuple[Calibration, Real, Real]:
+def calibration(path: str, options: argparse.Namespace) -> tuple[Calibration, Real, Real]:
     """Return the calibration in a record, its quantities and its readings.
 
     Raises
@@ -132,21 +130,35 @@ def calibration(
     RecordError, UserMistake, EvaluationError
         If there is none.
     """
-    found = record(path, argparse.Namespace(unit=[], columns=[])) if reading_unit else (
-        record(path, options)
-    )  # fmt: skip
-    reading = getattr(options, "reading", None)
-    quantity_name = getattr(options, "quantity", None)
-    if quantity_name is None:
-        quantity_name = only(found, "m", "quantity", "--quantity", [reading] if reading else [])
+    found, reading = record(path, options), options.reading
+    name = options.quantity
+    if name is None:
+        name = only(found, "m", "quantity", "--quantity", [reading] if reading else [])
     if reading is None:
-        reading = only(found, reading_unit, "reading", "--reading", [quantity_name])
-    for name in (quantity_name, reading):
-        unit = found.channel(name).unit
-        found.column(name, unit or "m")  # which says what is wrong if the unit is missing
-    one, other = found.channel(quantity_name), found.channel(reading)
+        reading = only(found, "", "reading", "--reading", [name])
+    return _calibrated(found, name, reading)
+
+
+def _calibrated(found: Record, name: str, reading: str) -> tuple[Calibration, Real, Real]:
+    one, other = found.channel(name), found.channel(reading)
+    for channel in (one, other):
+        found.column(channel.name, channel.unit or "m")  # says what is wrong if there is no unit
     sensor = calibrate(one.values, other.values, str(one.unit), str(other.unit))
     return sensor, one.values, other.values
+
+
+def _sensor(path: str, unit: str) -> Calibration:
+    """Return the calibration of a sensor whose readings have a unit."""
+    found = read_record(Path(path))
+    readings = [c.name for c in found.channels if _measures(c, unit)]
+    lengths = [c.name for c in found.channels if _measures(c, "m") and c.name not in readings]
+    if len(readings) != 1 or len(lengths) != 1:
+        heads = ", ".join(f"{c.name} [{c.written or '?'}]" for c in found.channels)
+        raise UserMistake(
+            f"--calibration {path}: it needs one column in {unit}, as the signal is, and one "
+            f"length beside it; columns are {heads}: leave it out if the signal is a length already"
+        )
+    return _calibrated(found, lengths[0], readings[0])[0]
 
 
 def output_unit(name: str, channel: str = "") -> str:

@@ -15,10 +15,11 @@ from ..mechanism_file import find
 from ..settings import UserMistake, quantities, settings
 from ..simulate import Progress, reporter
 from .output import Output
+from .systems import check_length
 
 WALLS, OFFSETS = 5 / 9, 1 / 20  # of the release, of the size: the source's, whatever the size
 STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)
-MOST_MODES_OF_MAP = 400  # points of a map; more are a mistake
+MOST_POINTS = 400  # points of a map; more are a mistake
 MODELS = ("1R", "2R", "3R", "nR")
 
 Way = Callable[..., ImpactMap]
@@ -72,12 +73,12 @@ def _points(
         )  # fmt: skip
         if len(set(chosen)) < len(chosen):
             raise UserMistake(f"--{name} {' '.join(texts or [])}: a place stands there twice")
-        result.append(sorted(chosen))
+        result.append(sorted(check_length(x, system.length, f"--{name}") for x in chosen))
     heights, offsets = result
-    if len(heights) * len(offsets) > MOST_MODES_OF_MAP:
+    if len(heights) * len(offsets) > MOST_POINTS:
         raise UserMistake(
             f"{len(heights)} walls and {len(offsets)} offsets are {len(heights) * len(offsets)} "
-            f"points: choose {MOST_MODES_OF_MAP} or fewer"
+            f"points: choose {MOST_POINTS} or fewer"
         )
     return heights, offsets
 

@@ -13,7 +13,7 @@ from prbm.statics import Equilibrium
 
 from ..settings import UserMistake, quantity
 from .output import Output, aligned
-from .systems import assembled
+from .systems import assembled, check_length
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,7 +25,9 @@ def frequencies(options: argparse.Namespace) -> None:
     output = Output(options.out)
     if options.count < 1:
         raise UserMistake(f"--count {options.count}: ask for one mode or more")
-    at = None if options.held is None else quantity(options.held, "m", "--held")
+    at = None
+    if options.held is not None:
+        at = check_length(quantity(options.held, "m", "--held"), system.length, "--held")
     shape = equilibrium(system, at)
     found = modes(system, shape)
     count = min(options.count, len(found.frequency))

@@ -11,7 +11,7 @@ from .. import holding
 from ..settings import UserMistake, quantities, quantity
 from ..simulate import reporter
 from .output import Output, aligned
-from .systems import assembled, tiny
+from .systems import assembled, check_length, tiny
 
 HELD_HEAD = (
     "displacement [m]", "holding force [N]", "stiffness [N/m]", "across [m]", "angle [rad]",
@@ -36,7 +36,8 @@ def equilibria(options: argparse.Namespace) -> None:
     if ranged != (None, None):
         _range(options, mechanism, system, output)
     elif options.held:
-        points = [holding.held(system, x) for x in quantities(options.held, "m", "--held")]
+        places = quantities(options.held, "m", "--held")
+        points = [holding.held(system, check_length(x, system.length, "--held")) for x in places]
         print(_table(points))
         output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows(points))
     else:
@@ -53,7 +54,7 @@ def _range(
     options: argparse.Namespace, mechanism: Mechanism, system: System, output: Output
 ) -> None:
     low, high = (
-        quantity(text, "m", option)
+        check_length(quantity(text, "m", option), system.length, option)
         for text, option in ((options.start, "--from"), (options.end, "--to"))
     )
     if not low < high:

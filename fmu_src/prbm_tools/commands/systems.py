@@ -24,6 +24,22 @@ def assembled(options: argparse.Namespace) -> tuple[Mechanism, dict[str, float],
     return mechanism, values, assemble(mechanism, mechanism.values(values))
 
 
+def check_length(x: float, size: float, option: str) -> float:
+    """Return a length that is not larger than the mechanism.
+
+    Raises
+    ------
+    UserMistake
+        If it is: its unit was forgotten, or is another one.
+    """
+    if abs(x) > size:
+        raise UserMistake(
+            f"{option} {x:g} m is more than the whole mechanism, {size:.3g} m: check the unit, as "
+            f"in {option} {x:g}mm"
+        )
+    return x
+
+
 def tiny(x: float, scale: float) -> str:
     """Return a number, what rounding leaves of zero as zero.
 
