@@ -2,12 +2,13 @@
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from prbm import assemble
+from prbm.assembly import Real
 
 from ..headline import told
 from ..mechanism_file import find
@@ -27,6 +28,7 @@ IMPACT_HEAD = (
     "energy lost [J]", "modal restitution [-]",
 )  # fmt: skip
 PEAKS_TOLD = 6
+SHOWN = 1.5  # times the highest mode that is marked: as far as a spectrum is drawn
 
 
 def simulated(options: argparse.Namespace) -> None:
@@ -34,9 +36,13 @@ def simulated(options: argparse.Namespace) -> None:
     mechanism = find(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
-    stop_time, step = (
+    stop_time, step, duration = (
         quantity(text, "s", option)
-        for text, option in ((options.stop_time, "--stop-time"), (options.step, "--step"))
+        for text, option in (
+            (options.stop_time, "--stop-time"),
+            (options.step, "--step"),
+            (options.spectrum_time, "--spectrum-time"),
+        )
     )
     communication_points(stop_time, step)
     begin = time.perf_counter()
@@ -52,7 +58,7 @@ def simulated(options: argparse.Namespace) -> None:
     output.figure(f"{mechanism.name}.png", lambda: _figure(result))
     output.write()
     if options.spectrum is not None:
-        _spectrum(options, result, values)
+        _spectrum(options, result, values, duration)
 
 
 def _tolerance(text: str | None) -> float | None:
@@ -79,7 +85,9 @@ def _figure(result: Result) -> "Figure":
     return response(result)
 
 
-def _spectrum(options: argparse.Namespace, result: Result, values: dict[str, float]) -> None:
+def _spectrum(
+    options: argparse.Namespace, result: Result, values: dict[str, float], duration: float
+) -> None:
     """Tell which frequencies are heard after an impact."""
     from .. import spectrum  # here, because it takes two seconds
 
@@ -91,32 +99,36 @@ def _spectrum(options: argparse.Namespace, result: Result, values: dict[str, flo
         )
     if options.spectrum == "first":
         stop = next(i for i, s in enumerate(mechanism.stops) if s.name == result.impacts[0].stop)
-        heard = spectrum.after_impact(
-            mechanism, values,
-            quantity(options.spectrum_time, "s", "--spectrum-time"), stop=stop,
-        )  # fmt: skip
+        heard = spectrum.after_impact(mechanism, values, duration, stop=stop)
     else:
         heard = spectrum.after_last_impact(result)
+    lines = {name: spectrum.spectrum(heard.time, getattr(heard, name)) for name in spectrum.SIGNALS}
+    grid, modes = lines["along"][0], spectrum.numbered(heard.modes)
     print(
         f"after the {options.spectrum} impact, at t = {heard.impact.time:.5f} s, "
         f"{1e3 * (heard.time[-1] - heard.time[0]):.4g} ms"
         + (" without the wall" if options.spectrum == "first" else "")
+        + f", lines {grid[1]:.3g} Hz apart"
     )
-    shown = ", ".join(f"{i}: {f:.4g} Hz" for i, f in spectrum.numbered(heard.modes))
-    print(f"modes at its shape   {shown}")
-    lines = {name: spectrum.spectrum(heard.time, getattr(heard, name)) for name in spectrum.SIGNALS}
-    size = assemble(mechanism, mechanism.values()).length
+    print("modes at its shape   " + ", ".join(f"{i}: {f:.4g} Hz" for i, f in modes))
+    _tell_peaks(lines, assemble(mechanism, mechanism.values()).length)
+    output.table(
+        f"{mechanism.name}-spectrum.csv",
+        ["frequency [Hz]", "along [m/s]", "across [m/s]", "turning [rad/s]"],
+        np.column_stack([grid, *(amplitude for _, amplitude in lines.values())]).tolist(),
+    )
+    highest = min(SHOWN * max([f for _, f in modes], default=grid[-1]), float(grid[-1]))
+    output.figure(f"{mechanism.name}-spectrum.png", lambda: spectrum.figure(heard, highest=highest))
+    output.write()
+
+
+def _tell_peaks(lines: Mapping[str, tuple[Real, Real]], size: float) -> None:
+    """Print the peaks of every signal that is more than rounding."""
+    from ..spectrum import peaks
+
     loudest = float(lines["along"][1].max())
     for name, (frequency, amplitude) in lines.items():
         speed = float(amplitude.max()) * (size if name == "turning" else 1.0)
         loud = speed > ROUNDING * loudest
-        found = spectrum.peaks(frequency, amplitude)[:PEAKS_TOLD].tolist() if loud else []
+        found = peaks(frequency, amplitude)[:PEAKS_TOLD].tolist() if loud else []
         print(f"peaks {name:14} {', '.join(f'{f:.4g} Hz' for f in found) or 'none'}")
-    frequency = next(iter(lines.values()))[0]
-    output.table(
-        f"{mechanism.name}-spectrum.csv",
-        ["frequency [Hz]", "along [m/s]", "across [m/s]", "turning [rad/s]"],
-        np.column_stack([frequency, *(amplitude for _, amplitude in lines.values())]).tolist(),
-    )
-    output.figure(f"{mechanism.name}-spectrum.png", lambda: spectrum.figure(heard))
-    output.write()
