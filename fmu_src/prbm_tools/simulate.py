@@ -196,26 +196,6 @@ def structured(rows: Iterable[Mapping[str, float | int | bool]]) -> Columns:
     return np.array([tuple(row.values()) for row in table], dtype)
 
 
-def assignment(text: str) -> tuple[str, float]:
-    """Return the name and the number of a text name=number, of a command line.
-
-    Raises
-    ------
-    ParameterError
-        If it is none.
-
-    Examples
-    --------
-    >>> assignment("stop.restitution=0.5")
-    ('stop.restitution', 0.5)
-    """
-    name, _, number = text.partition("=")
-    try:
-        return name.strip(), float(number)
-    except ValueError:
-        raise ParameterError(f"--set {text}: write a name and a number, as name=0.5") from None
-
-
 WORDS = {"true": 1.0, "false": 0.0}
 
 
