@@ -81,6 +81,7 @@ LOCATED = 1e-10  # of the size: gap at which an impact counts as located
 LOCATIONS = 12  # attempts to locate it
 SHORT_STEPS = 8  # at a time, after one that failed
 SMALLEST_STEP = 1 / 4096  # of the step asked for, before giving up
+REACHED = 1e-6  # of the step: what Exudyn leaves to the end of an interval by rounding
 MOST_HITS = 10_000
 MOST_GAIN = 0.01  # of the largest kinetic energy, in one step: more is no solution of the equations
 
@@ -725,7 +726,7 @@ class _Transient:
             self.armed[i] = gap > 1e-9
         self._keep(t, q, v)
         try:
-            while t < stop_time - 1e-12 and (most is None or len(self.run_.impacts) < most):
+            while stop_time - t > REACHED * self.step and (most is None or len(self.run_.impacts) < most):
                 t, q, v, struck = self._fly(t, q, v, stop_time)
                 if struck is not None:
                     v = self._strike(t, q, v, struck)
@@ -762,7 +763,7 @@ class _Transient:
             return not released
 
         h, after = self.step, before
-        while after[0] < end and not struck and not released:
+        while end - after[0] > REACHED * self.step and not struck and not released:
             now = end if h == self.step else min(end, after[0] + SHORT_STEPS * h)
             steps = max(1, math.ceil((now - after[0]) / h - 1e-9))
             try:
