@@ -79,6 +79,7 @@ BALANCED = 1e-7  # of the force of one radian: what is left in a step of a trans
 DIFFERENCE = 1e-6  # m and rad, for the second derivatives of the constraints
 LOCATED = 1e-10  # of the size: gap at which an impact counts as located
 LOCATIONS = 12  # attempts to locate it
+LOCATING_STEPS = (1, 4, 16, 64)  # into which a step that does not converge is divided
 SHORT_STEPS = 8  # at a time, after one that failed
 SMALLEST_STEP = 1 / 4096  # of the step asked for, before giving up
 REACHED = 1e-6  # of the step: what Exudyn leaves to the end of an interval by rounding
@@ -726,7 +727,9 @@ class _Transient:
             self.armed[i] = gap > 1e-9
         self._keep(t, q, v)
         try:
-            while stop_time - t > REACHED * self.step and (most is None or len(self.run_.impacts) < most):
+            while stop_time - t > REACHED * self.step and (
+                most is None or len(self.run_.impacts) < most
+            ):
                 t, q, v, struck = self._fly(t, q, v, stop_time)
                 if struck is not None:
                     v = self._strike(t, q, v, struck)
@@ -807,7 +810,7 @@ class _Transient:
             if gap_low <= small:
                 break
             h = low + (high - low) * gap_low / (gap_low - gap_high)
-            best = self._integrate(t, q, v, t + h, 1, lambda *_: True)
+            best = self._reach(t, q, v, t + h)
             gap = self.fe.gap(i, best[1])
             if abs(gap) <= small:
                 break
@@ -815,6 +818,15 @@ class _Transient:
                 (h, gap, high, gap_high) if gap > 0.0 else (low, gap_low, h, gap)
             )
         return (*best, i)
+
+    def _reach(self, t: float, q: Real, v: Real, end: float) -> tuple[float, Real, Real]:
+        """Return the state at a time within a step, by one step if that converges, or by more."""
+        for steps in LOCATING_STEPS[:-1]:
+            try:
+                return self._integrate(t, q, v, end, steps, lambda *_: True)
+            except _StepError:
+                continue
+        return self._integrate(t, q, v, end, LOCATING_STEPS[-1], lambda *_: True)
 
     def _integrate(
         self, t: float, q: Real, v: Real, end: float, steps: int,

@@ -86,12 +86,12 @@ class Number:
             return ""
         if self.absolute:
             return f"{self.difference:+.2g}"
-        return f"{100 * self.difference:+.2f} %"
+        return f"{round(100 * self.difference, 2) + 0.0:+.2f} %"
 
     def _verdict(self) -> str:
         if self.agrees is None:
             return ""
-        limit = f"{self.within:g}" if self.absolute else f"{100 * (self.within or 0.0):g} %"
+        limit = f"{self.within:.3g}" if self.absolute else f"{100 * (self.within or 0.0):g} %"
         return f"within {limit}" if self.agrees else f"**not** within {limit}"
 
 
@@ -154,7 +154,10 @@ class Result:
         """Return the section of the page."""
         lines = [f'<a id="{self.key}"></a>', f"## {self.where}: {self.what}", ""]
         lines += [f"**{self.verdict[0].upper()}{self.verdict[1:]}.** {self.because}", ""]
-        lines += ["| | printed | ours | reference | difference | |", "|---|---:|---:|---:|---:|---|"]
+        lines += [
+            "| | printed | ours | reference | difference | |",
+            "|---|---:|---:|---:|---:|---|",
+        ]
         lines += ["| " + " | ".join(number.cells()) + " |" for number in self.numbers]
         lines.append("")
         for drawing in self.drawings:

@@ -1,4 +1,4 @@
-"""The source's results, reproduced: a page that puts printed, own and finite-element values together.
+"""The source's results, reproduced: a page with printed, own and finite-element values.
 
     python -m prbm_tools.validation --out docs
 
@@ -34,18 +34,25 @@ class ValidationError(PrbmError, ValueError):
 
 HEAD = """# The source, reproduced
 
-What S. Boersma's thesis (*Modelling and Validation of the Impact Response in Compliant Mechanisms*, TU
+What S. Boersma's thesis (*Modelling and Validation of the Impact Response in Compliant
+Mechanisms*, TU
 Delft, 2015) prints, beside what this package computes and beside a reference that knows nothing of
-pseudo-rigid bodies: finite elements (**FE**, Exudyn's ANCF cables, from the same mechanism files), closed
-forms (**exact**), or what was **put in** to a synthetic record. `python -m prbm_tools.validation --out docs`
+pseudo-rigid bodies: finite elements (**FE**, Exudyn's ANCF cables, from the same mechanism
+files), closed
+forms (**exact**), or what was **put in** to a synthetic record. `python -m prbm_tools.validation
+--out docs`
 computes every number and figure of this page; the tests compute them again and compare.
 
-The thesis' measured records are not public: where it measures, a synthetic record of its sensors' noise
-(laser 4 µm at 750 Hz, load cell 0 to 0.5 N) takes their place, and shows what an evaluation can know. Its
+The thesis' measured records are not public: where it measures, a synthetic record of its
+sensors' noise
+(laser 4 µm at 750 Hz, load cell 0 to 0.5 N) takes their place, and shows what an evaluation can
+know. Its
 curves exist as pictures only, so that for these the printed words are compared.
 
-*Difference* is ours less the printed value, or less the reference where nothing is printed. A limit stands
-beside a number only where agreement is claimed, and the verdict counts these claims; "not" is meant as it
+*Difference* is ours less the printed value, or less the reference where nothing is printed. A
+limit stands
+beside a number only where agreement is claimed, and the verdict counts these claims; "not" is
+meant as it
 is said. What the source got wrong is shown on its own algorithm (`prbm_tools.source_model`, derived
 again), with its errors as switches.
 """
