@@ -174,10 +174,10 @@ def table_4_1(_: Progress) -> Result:
         "The MATLAB row repeats the values of the ANSYS row; what its errors say instead is our 1R "
         "model to 0.6 %. The errors of the two COMSOL rows are swapped. The 1R is 1.9 % too fast "
         "beside either finite-element program: K_Θ = 2.65 is for a force alone.",
-        f"""The amplitude is mostly a matter of how the guide is set going. With the shuttle alone at
-1 m/s the finite elements swing {1e3 * a_fe:.2f} mm, with the flexures moving along as in the mode 1/ω =
-{moving_along:.2f} mm, and a
-1R has no choice but the latter. K_Θ does not explain the 8 %.""",
+        f"""The amplitude is mostly a matter of how the guide is set going. With the shuttle
+alone at 1 m/s the finite elements swing {1e3 * a_fe:.2f} mm, with the flexures moving along as in
+the mode v/ω = {moving_along:.2f} mm, and a 1R has no choice but the latter. K_Θ does not
+explain the 8 %.""",
         (
             Drawing(
                 "swing", "Swing of the PMMA guide: 1R models over finite elements", figure_of(left)
@@ -229,8 +229,8 @@ def k_theta(_: Progress) -> Result:
         "angle, so that its frequency does not depend on the amplitude, and that of the elements "
         "hardly does.",
         """What remains between 2.545 and our 2.551 is the difference of the two finite-element
-programs (ANSYS' beams shear and have rotary inertia, the cables do not) and the amplitude, which the thesis'
-least squares
+programs (ANSYS' beams shear and have rotary inertia, the cables do not) and the amplitude, which
+the thesis' least squares
 trade against the frequency. A guide that gravity deflects by a quarter of its length is stiffer
 than the 1R
 knows: the steel guide at rest takes 2.586. One K_Θ does not serve both.""",
