@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import brentq
 
-from prbm import Mechanism, assemble, equilibrium, modal_restitution, modes
+from prbm import Mechanism, Simulation, assemble, equilibrium, modal_restitution, modes
 from prbm.assembly import Real
 from prbm.errors import SimulationError
 
@@ -18,12 +18,11 @@ from ..fit import Frequency, fit, fitted_restitution
 from ..impact_map import (
     HEIGHTS,
     OFFSETS,
-    REBOUND,
-    SAMPLES,
     ImpactMap,
     algebraic,
     by_elements,
     closed_form,
+    first_impact,
     fit_response,
     heat_map,
     response,
@@ -400,7 +399,9 @@ def figure_5_6(tell: Progress) -> Result:
 
 # --- figures 5.7 to 5.9: the map ----------------------------------------------------------------
 
-MAP_ELEMENTS, MAP_STEP, MAP_END = 8, 1e-4, 0.14  # a flexure; s; s
+MAP_ELEMENTS, MAP_STEP = 8, 1e-4  # a flexure; s
+MAP_REBOUND = 0.05  # s after the first impact that the fits look at, a quarter of a period
+MAP_SAMPLES = 100  # of a response that is fitted
 CORNERS = ((0.0, 0.0), (-10e-3, 4e-3), (10e-3, -4e-3))
 
 
@@ -408,18 +409,25 @@ def element_impact(mechanism: Mechanism, h: float, d: float, fine: bool = False)
     """Return the modal restitution of the first impact after the release, by finite elements."""
     count, step = (2 * MAP_ELEMENTS, MAP_STEP / 2) if fine else (MAP_ELEMENTS, MAP_STEP)
     fe = FiniteElements(mechanism, {"stop.position": h, "stop.offset": d}, elements=count)
-    return fe.transient(MAP_END, step, impacts=1).impacts[0].latched.modal_restitution
+    return fe.transient(0.1, step, impacts=1).impacts[0].latched.modal_restitution
+
+
+def reached(mechanism: Mechanism, h: float, d: float) -> float:
+    """Return when a released mechanism reaches its wall [s]."""
+    values = {"stop.position": h, "stop.offset": d}
+    return first_impact(Simulation(mechanism, values, tolerance=1e-6), 0).time
 
 
 def element_run(mechanism: Mechanism, h: float, d: float) -> Motion:
     """Return the release and what follows by finite elements; steps that fail are made shorter."""
     fe = FiniteElements(mechanism, {"stop.position": h, "stop.offset": d}, elements=MAP_ELEMENTS)
+    end = reached(mechanism, h, d) + MAP_REBOUND
     for halvings in range(3):
         try:
-            return fe.transient(MAP_END, MAP_STEP / 2**halvings)
+            return fe.transient(end, MAP_STEP / 2**halvings)
         except SimulationError:
             continue
-    return fe.transient(MAP_END, MAP_STEP / 8)
+    return fe.transient(end, MAP_STEP / 8)
 
 
 def transients(tell: Progress) -> tuple[ImpactMap, ImpactMap]:
@@ -430,8 +438,7 @@ def transients(tell: Progress) -> tuple[ImpactMap, ImpactMap]:
         h, d = HEIGHTS[j], OFFSETS[i]
         run = element_run(two, h, d)
         first[i, j] = run.impacts[0].latched.modal_restitution
-        end = min(MAP_END, run.impacts[0].time + REBOUND / 4.9)
-        times = np.linspace(0.0, end, SAMPLES)
+        times = np.linspace(0.0, run["time"][-1], MAP_SAMPLES)
         wanted = np.interp(times, run["time"], run["shuttle.x"])
         found = fit_response(one, ["stop.restitution", K], times, wanted, {"stop.position": h})
         read[i, j] = found.values["stop.restitution"]

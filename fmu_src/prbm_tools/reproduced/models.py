@@ -735,7 +735,7 @@ def figure_6_5(_: Progress) -> Result:
     for i, mode in enumerate(at_hit):
         axes.axvline(mode, color=RED, linewidth=0.8, label="modes at the impact" if not i else None)
     axes.set_xlim(0, 260)
-    axes.set_ylim(1e-5, 1)
+    axes.set_ylim(1e-5, 20)
     axes.set_xlabel("frequency [Hz]")
     axes.set_ylabel("amplitude [m/s]")
     legend(axes, loc="upper right")
