@@ -254,7 +254,7 @@ def figure_4_4(_: Progress) -> Result:
     one, end = guide("PRBDM"), 0.28
     ours = simulate(one, CAST, end, 1e-3)
     bare = {name: x for name, x in CAST.items() if name != K}
-    theirs = FiniteElements(one, bare, elements=8).transient(end, 5e-5)
+    theirs = FiniteElements(one, bare, elements=8).transient(end, 5e-5, spectral_radius=0.5)
     model = with_flexures(guide("PRBDM2R"), "2R", axial=True)
     wall = [CAST["stop.position"]]
     returned = [
@@ -609,7 +609,7 @@ def figure_6_4(tell: Progress) -> Result:
     two, end = guide("PRBDM2R"), 0.3
     ours = simulate(two, {}, end, 1e-3)
     tell(0.3)
-    fe = FiniteElements(two, elements=8).transient(end, 1e-4)
+    fe = FiniteElements(two, elements=8).transient(end, 1e-4, spectral_radius=0.5)
     hits = [route(two, [0.0], [0.0], WEIGHTLESS).hits[0][0] for route in (algebraic, by_elements)]
     higher = [float(hit.after[1:].sum()) for hit in hits]
     rest = [float(run["time"][np.flatnonzero(run["stop.contact"])[0]]) for run in (ours, fe)]
