@@ -78,7 +78,7 @@ class Number:
         ours = "" if self.ours is None else format(self.ours, self.form)
         reference = ""
         if self.reference is not None:
-            reference = f"{format(self.reference, self.form)} ({self.by})"
+            reference = f"{format(self.reference, self.form) if self.reference else 0} ({self.by})"
         return [self.name, self.printed or "", ours, reference, self._off(), self._verdict()]
 
     def _off(self) -> str:
