@@ -24,6 +24,7 @@ from prbm_fmu.python_fmu import interface, start_sample
 from prbm_fmu.slaves.resolved import mechanism_from, resolved
 from prbm_fmu.units import UNITS
 from prbm_fmu.variables import variables, with_starts
+from prbm_tools.simulate import Experiment
 from support import GUIDES, case, each_shipped
 
 ROOT = Path(__file__).parents[1]
@@ -204,7 +205,7 @@ def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
 @each_shipped
 def test_the_page_names_every_variable_and_the_limits(mechanisms, model):
     listed = interface(mechanisms[model], {})
-    html = page(mechanisms[model], listed)
+    html = page(mechanisms[model], listed, Experiment())
     for v in listed:
         assert f"<code>{v.name}</code>" in html
     for limit in ("no duration", "Stronge", "NumPy", "percent-encoded", "End moments", "retreats"):

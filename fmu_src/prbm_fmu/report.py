@@ -20,14 +20,16 @@ from prbm import Mechanism, assemble, free_displacement
 from prbm.assembly import unit
 from prbm_tools.figures import png, response
 from prbm_tools.motion import marks
+from prbm_tools.scene import frequency_unit, length_unit, time_unit
 from prbm_tools.simulate import Progress, reporter, rest_time
 
 from .archive import write
 from .cli import FAILED, INTERRUPTED, MISTAKE, OK
 from .slaves.resolved import read
-from .variables import CLOCK
+from .variables import CLOCK, extent
 
 FREQUENCY = "mode.frequency"
+SHORT = 0.1  # s; the times of a run that is shorter are not told in seconds
 
 
 @dataclass(frozen=True)
@@ -150,15 +152,30 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def millimetres(x: float) -> str:
-    """Return a length in mm to a hundredth, without a negative zero.
+def length(x: float, size: float) -> str:
+    """Return a length in mm, or what is handy in a smaller mechanism, to a hundredth.
+
+    There is no negative zero.
 
     Examples
     --------
-    >>> millimetres(-1.8e-3), millimetres(-1e-9)
-    ('-1.80 mm', '0.00 mm')
+    >>> length(-1.8e-3, 0.08), length(-1e-9, 0.08), length(3e-6, 2e-4)
+    ('-1.80 mm', '0.00 mm', '3.00 µm')
     """
-    return f"{round(1e3 * x, 2) + 0.0:.2f} mm"
+    factor, unit = length_unit(min(size, 1.0))
+    return f"{round(factor * x, 2) + 0.0:.2f} {unit}"
+
+
+def instant(t: float, span: float, digits: int) -> str:
+    """Return a time of a run in seconds, or what is handy if that is short.
+
+    Examples
+    --------
+    >>> instant(0.0349812, 1.0, 5), instant(2.71034e-6, 1e-4, 3)
+    ('0.03498 s', '2.710 µs')
+    """
+    factor, unit = (1.0, "s") if span >= SHORT else time_unit(span)
+    return f"{factor * t:.{digits}f} {unit}"
 
 
 def headline(run: Run) -> list[str]:
@@ -172,13 +189,14 @@ def headline(run: Run) -> list[str]:
         told = ""
         if first is not None:
             which = "the first" if first.count == 1 else f"number {first.count}"
-            told = f", {which} at t = {first.time:.5f} s with {first.speed:.3f} m/s"
+            hit = instant(first.time, run.stop_time, 5)
+            told = f", {which} at t = {hit} with {first.speed:.3f} m/s"
         lines.append(f"impacts at {stop:9} {count}{told}")
         since = rest_time(record, stop)
         if since is not None:
             lines.append(
-                f"came to rest         at t = {since:.3f} s on {stop}, {_place(run)}, pressed with "
-                f"{record[f'{stop}.force'][-1]:.4g} N"
+                f"came to rest         at t = {instant(since, run.stop_time, 3)} on {stop}, "
+                f"{_place(run)}, pressed with {record[f'{stop}.force'][-1]:.4g} N"
             )
     if not run.finished:
         lines.append(
@@ -197,10 +215,11 @@ def _free(run: Run) -> list[str]:
     parameters = {p.name for p in run.mechanism.parameters}
     values = {name: x for name, x in run.values.items() if name in parameters}
     rest = free_displacement(assemble(run.mechanism, values))
+    factor, hertz = frequency_unit(frequency)
     release = run.mechanism.release
     return [
-        f"fundamental          {frequency:.4g} Hz",
-        f"free rest position   {release.body} {millimetres(rest)} from straight"
+        f"fundamental          {factor * frequency:.4g} {hertz}",
+        f"free rest position   {release.body} {length(rest, extent(run.mechanism))} from straight"
         f"{_along(release.direction)}, under gravity, without stops",
     ]
 
@@ -213,10 +232,10 @@ def _place(run: Run) -> str:
     """Tell where the released body is at the end."""
     body, direction = run.mechanism.release.body, run.mechanism.release.direction
     x, y = (float(run.record[f"{body}.{axis}"][-1]) for axis in "xy")
-    u = unit(direction)
+    u, size = unit(direction), extent(run.mechanism)
     if direction == 0.0:
-        return f"{body}.x = {millimetres(x)}"
-    return f"{body} {millimetres(x * u.real + y * u.imag)} from straight{_along(direction)}"
+        return f"{body}.x = {length(x, size)}"
+    return f"{body} {length(x * u.real + y * u.imag, size)} from straight{_along(direction)}"
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -28,10 +28,12 @@ from .motion import FPS, film, fmpy_command, motion, needed
 from .scene import COLOURS, DPI, SIZE, Scene, pictures
 from .simulate import (
     Columns,
+    Experiment,
     Progress,
     Result,
     ResultError,
     assignment,
+    experiment,
     names,
     read_csv,
     reporter,
@@ -302,7 +304,7 @@ def main(arguments: list[str] | None = None) -> int:
     which.add_argument("--model", metavar="NAME", help="a mechanism that comes with the package")
     which.add_argument("--mechanism", metavar="FILE.toml", help="one of your own")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter or input")
-    add("--stop-time", type=float, default=1.0, help="of the simulation [s]; %(default)s")
+    add("--stop-time", type=float, help="of the simulation [s]; as in an FMU of it, mostly 1")
     add("--slow", type=float, help="factor of slow motion; a round one for about ten seconds")
     add("--fps", type=float, default=FPS, help="frames per second; %(default)g")
     add("--from", dest="start", type=float, help="first time shown [s]")
@@ -338,7 +340,11 @@ def _result(options: argparse.Namespace) -> Result:
     if len(options.files) == 1:
         if mechanism is None:
             raise ParameterError("name what to show: RESULT.csv, --model or --mechanism")
-        return simulate(mechanism, changes, options.stop_time)
+        chosen = experiment(mechanism, changes)
+        if options.stop_time is not None:
+            step = min(chosen.step, Experiment(options.stop_time).step)
+            return simulate(mechanism, changes, options.stop_time, step)
+        return simulate(mechanism, changes, chosen.stop_time, chosen.step)
     if len(options.files) > 2:
         raise ParameterError(f"{len(options.files)} files are given: RESULT.csv OUT, or OUT")
     columns = read_csv(options.files[0])
