@@ -30,6 +30,7 @@ from .errors import MechanismError, ParameterError
 from .flexure import Segments, segments, stub
 from .mechanism import (
     GROUND,
+    TINY_LENGTH,
     Flexure,
     FlexureType,
     Joint,
@@ -327,6 +328,10 @@ class _Assembler:
         """Return where an end of a part is drawn."""
         return self.at(self.mechanism.point(reference, part.name))
 
+    def length(self, flexure: Flexure) -> float:
+        """Return the length of a flexure as drawn [m]."""
+        return abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
+
     def coordinate(self, start: float, arm: int | None = None) -> int:
         """Add an angle, or the stretch of an arm."""
         j = len(self.q0)
@@ -460,8 +465,8 @@ class _Assembler:
 
     def segments(self, flexure: Flexure) -> Segments:
         kind = next(k for k in self.mechanism.flexure_types if k.name == flexure.type)
-        L = abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
-        if L < 1e-9:
+        L = self.length(flexure)
+        if L < TINY_LENGTH:
             raise ParameterError(
                 f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
                 f"{L:g} m: move its ends apart"
@@ -474,10 +479,15 @@ class _Assembler:
         return segments(model, gamma, K_theta, flexure.ends, L, EI, mass, EA if kind.axial else 0.0)
 
     def size(self) -> float:
-        """Return the size of the mechanism as drawn [m]."""
+        """Return the size of the mechanism as drawn [m].
+
+        The largest distance between points of the ground and centres of mass, or the length of the
+        longest flexure, where all of these are at one place.
+        """
         points = [self.at(p) for p in self.mechanism.ground.values()]
         points += [self.at(body.centre) for body in self.mechanism.bodies]
-        return max(abs(a - b) for a in points for b in points)
+        lengths = [self.length(flexure) for flexure in self.mechanism.flexures]
+        return max(*lengths, *(abs(a - b) for a in points for b in points))
 
     # -- arrays --
 
@@ -702,4 +712,8 @@ def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
             "away, move it out of line, or let flexures stretch (axial = true)"
         )
     if len(loops) >= len(e):
-        raise MechanismError("the loops leave the mechanism no motion")
+        raise MechanismError(
+            f"the loops closed by {', '.join(names)} leave the mechanism no motion: rigid links "
+            "hold every body; take a part away, or let flexures bend (clamp their ends) or stretch "
+            "(axial = true)"
+        )
