@@ -8,6 +8,7 @@ import sys
 import tomllib
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,6 +21,7 @@ import prbm_fmu
 from fmu_host import OK, Instance
 from prbm_fmu.description import Heading, model_description
 from prbm_fmu.documentation import page
+from prbm_fmu.native_fmu import described
 from prbm_fmu.python_fmu import interface, start_sample
 from prbm_fmu.slaves.resolved import mechanism_from, resolved
 from prbm_fmu.units import UNITS
@@ -200,6 +202,23 @@ def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
         with_starts(listed, {"shuttle.x": 1.0})
     with pytest.raises(prbm.ParameterError, match=r"did you mean stop\.restitution"):
         with_starts(listed, {"stop.restitutoin": 1.0})
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "shuttle.x", "stop.gap", "stop.displacement", "force.x", "energy.work", "link[1].angle",
+        "mode.frequency", "time", "flexure.gamma0", "stop.slip_indicator", "stop.impact",
+    ],
+)  # fmt: skip
+def test_a_parameter_cannot_have_the_name_of_another_variable(mechanisms, name):
+    """Of none that is in any of the FMUs of a mechanism."""
+    guide = mechanisms["PRBDM2R"]
+    named = replace(guide, geometry=(*guide.geometry, prbm.Parameter(name, 1.0)))
+    with pytest.raises(prbm.MechanismError, match=f"have the name {re.escape(name)}: rename"):
+        described(named, {}, 3, clock=True)
+    harmless = replace(guide, geometry=(*guide.geometry, prbm.Parameter("shuttle.depth", 1.0)))
+    assert {v.name for v in interface(harmless, {})} > {"shuttle.depth", "shuttle.x"}
 
 
 @each_shipped
