@@ -6,8 +6,9 @@ Counted by valgrind are the instructions of the native right-hand side; the expo
 of a least-squares line through the logarithms of the upper half of the sizes.
 
 links   the guide with two chains of n links each, 4 to 50: one loop, blocks of mass that grow
-loops   a shuttle on k two-rotation flexures, 2 to 12: k - 1 loops, blocks of mass that do not
 axial   the same chains, whose links stretch: twice the coordinates
+loops   a shuttle on k two-rotation flexures that stretch, 2 to 12: k - 1 loops, blocks of mass
+        that do not grow (rigid links side by side would be over-constrained)
 """
 
 import argparse
@@ -45,7 +46,7 @@ def chains(n: int, axial: bool = False) -> Mechanism:
 
 def leaves(k: int) -> Mechanism:
     """Return a shuttle on k flexures side by side, of which the first and last are the guide's."""
-    guide = mechanism("PRBDM2R")
+    guide = mechanism("PRBDM2RAxial")
     shuttle, x = guide.bodies[0], [f"{i / (k - 1):.17g}*shuttle.width" for i in range(k)]
     body = dataclasses.replace(
         shuttle, points={f"p{i}": (x[i], "flexure.length") for i in range(k)}
@@ -94,13 +95,14 @@ def rows(sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Iterator[t
         yield size, cost
 
 
-def grows(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> None:
-    """Print costs and with which exponent they grow."""
+def grows(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> float:
+    """Print costs and with which exponent they grow; return that."""
     print(f"\n{title}")
     size, cost = np.array([*rows(sizes, make)]).T
     half = len(size) // 2
     slope = np.polyfit(np.log(size[half:]), np.log(cost[half:]), 1)[0]
-    print(f"  exponent {slope:.2f} over the upper half of the sizes")
+    print(f"  exponent {slope:.2f} over the upper half of the sizes", flush=True)
+    return float(slope)
 
 
 def main() -> None:
@@ -113,7 +115,7 @@ def main() -> None:
     sizes = tuple(n for n in LINKS if n <= most)
     grows("Links: two chains of n links", sizes, chains)
     grows("Axial: two chains of n links that stretch", sizes, lambda n: chains(n, axial=True))
-    grows("Loops: k two-rotation flexures side by side", LEAVES, leaves)
+    grows("Loops: k two-rotation flexures that stretch, side by side", LEAVES, leaves)
 
 
 if __name__ == "__main__":
