@@ -374,7 +374,11 @@ class _Assembler:
             if body.name not in self.origin:
                 raise MechanismError(f"the body {body.name} is not held by any flexure or joint")
             self.body(body.name)
-        return self.arrays()
+        result = self.arrays()
+        e = result.directions(result.q0)
+        check_loops(result.spread(result.loops), e, [name for name, _ in self.loops])
+        check_masses((e.conj()[:, None] * result.H * e).real, self.J)
+        return result
 
     def body(self, name: str) -> None:
         body = next(b for b in self.mechanism.bodies if b.name == name)
@@ -496,16 +500,12 @@ class _Assembler:
         arm = np.array(self.arm)
         A = np.array([place.row(n) for place, _ in self.masses])
         m = np.array([mass for _, mass in self.masses])
-        e0 = np.exp(1j * np.array(self.q0))[arm]
+        e0 = np.exp(1j * np.array(self.q0))  # of arms: no place depends on stretches, which are 0
         closures = [place for _, place in self.loops]
         loops = np.array([r for p in closures for r in (p.row(n), -1j * p.row(n))])
         loops_c = np.array([x for p in closures for x in (p.c.real, p.c.imag)])
         loops = loops.reshape(-1, n)
-        e = np.where(arm == np.arange(n), e0, -1j * e0)
         spread = A[:, arm]
-        H = spread.conj().T @ (m[:, None] * spread)
-        check_loops(loops[:, arm], e, [name for name, _ in self.loops])
-        check_masses((e.conj()[:, None] * H * e).real, self.J)
 
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
         self.lines += [(body, "body", self.corners(body)) for body in frames]
@@ -521,7 +521,7 @@ class _Assembler:
             values=dict(self.values),
             q0=np.array(self.q0),
             arm=arm,
-            H=H,
+            H=spread.conj().T @ (m[:, None] * spread),
             J=np.array(self.J),
             K=self.stiffness(),
             A=A,
