@@ -21,6 +21,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,9 @@ from .mechanism import (
     body_of,
     value,
 )
+
+if TYPE_CHECKING:
+    from .constraints import Watched
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -197,6 +201,13 @@ class System:
         """First mass moments m^T A, (n,) complex [kg m]."""
         result: Complex = self.m @ self.A
         return result
+
+    @cached_property
+    def watched(self) -> "Watched":
+        """The rows of all gaps, slides and rubs, made once: discrete changes do not touch them."""
+        from .constraints import Watched  # which is about systems
+
+        return Watched.of(self)
 
     @cached_property
     def stretches(self) -> Whole:
