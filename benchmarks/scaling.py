@@ -30,11 +30,14 @@ from native import inclusive
 from c_importer import Job, execute, kernel_library, unpack, write
 from prbm import Flexure, Mechanism, assemble
 from prbm_fmu import native_fmu
+from prbm_fmu.reference import steps
+from prbm_tools.simulate import Experiment
 from support import mechanism
 
 LINKS = (4, 8, 12, 18, 25, 35, 50)  # a flexure
 LEAVES = (2, 3, 4, 6, 8, 10, 12)
 UNTIL = 2e-5  # s: enough steps for a mean
+STEPS = 20  # are enough, too, where they are short
 
 
 def chains(n: int, axial: bool = False) -> Mechanism:
@@ -65,6 +68,7 @@ def leaves(k: int) -> Mechanism:
 
 def instructions(given: Mechanism) -> float:
     """Return the instructions of a right-hand side of a mechanism, on average."""
+    until = min(UNTIL, STEPS / steps(given, {}, Experiment(1.0)))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with patch.object(native_fmu, "reference", lambda *_: {}):  # else a second in the engine
@@ -72,7 +76,7 @@ def instructions(given: Mechanism) -> float:
         unpack(folder / "model.fmu", folder / "model")
         library = kernel_library("profiled", ("-g",))
         job = Job(
-            folder / "model", points=np.array([0.0, UNTIL]), records=("shuttle.x",), library=library
+            folder / "model", points=np.array([0.0, until]), records=("shuttle.x",), library=library
         )
         counted = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")
         done = execute(job, before=counted)
