@@ -374,7 +374,7 @@ class _Assembler:
             else:
                 names = ", ".join(part.name for part in waiting)
                 raise MechanismError(
-                    f"{names} have no connection to the ground: the mechanism falls apart"
+                    f"nothing connects {names} to the ground: the mechanism falls apart"
                 )
             waiting.remove(part)
             if isinstance(part, Joint):
