@@ -8,6 +8,7 @@ import sys
 import tomllib
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,10 +21,12 @@ import prbm_fmu
 from fmu_host import OK, Instance
 from prbm_fmu.description import Heading, model_description
 from prbm_fmu.documentation import page
+from prbm_fmu.native_fmu import described
 from prbm_fmu.python_fmu import interface, start_sample
 from prbm_fmu.slaves.resolved import mechanism_from, resolved
 from prbm_fmu.units import UNITS
 from prbm_fmu.variables import variables, with_starts
+from prbm_tools.simulate import Experiment
 from support import GUIDES, case, each_shipped
 
 ROOT = Path(__file__).parents[1]
@@ -201,10 +204,27 @@ def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
         with_starts(listed, {"stop.restitutoin": 1.0})
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "shuttle.x", "stop.gap", "stop.displacement", "force.x", "energy.work", "link[1].angle",
+        "mode.frequency", "time", "flexure.gamma0", "stop.slip_indicator", "stop.impact",
+    ],
+)  # fmt: skip
+def test_a_parameter_cannot_have_the_name_of_another_variable(mechanisms, name):
+    """Of none that is in any of the FMUs of a mechanism."""
+    guide = mechanisms["PRBDM2R"]
+    named = replace(guide, geometry=(*guide.geometry, prbm.Parameter(name, 1.0)))
+    with pytest.raises(prbm.MechanismError, match=f"have the name {re.escape(name)}: rename"):
+        described(named, {}, 3, clock=True)
+    harmless = replace(guide, geometry=(*guide.geometry, prbm.Parameter("shuttle.depth", 1.0)))
+    assert {v.name for v in interface(harmless, {})} > {"shuttle.depth", "shuttle.x"}
+
+
 @each_shipped
 def test_the_page_names_every_variable_and_the_limits(mechanisms, model):
     listed = interface(mechanisms[model], {})
-    html = page(mechanisms[model], listed)
+    html = page(mechanisms[model], listed, Experiment())
     for v in listed:
         assert f"<code>{v.name}</code>" in html
     for limit in ("no duration", "Stronge", "NumPy", "percent-encoded", "End moments", "retreats"):

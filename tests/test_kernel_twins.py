@@ -299,6 +299,17 @@ def test_the_arrays_of_a_mechanism_are_the_same(name):
         assert not (outside * np.abs(system.H)).any()
 
 
+def test_the_size_is_the_same_where_all_centres_are_at_one_place():
+    guide = mechanism("Cantilever")
+    (root,), (tip,) = guide.ground.values(), guide.bodies
+    balanced = replace(guide, bodies=(replace(tip, centre=root),))
+    system = assembly.assemble(balanced, balanced.values())
+    ours = KernelSystem(balanced, system.n)
+    ours.assemble(balanced.values())
+    assert_same(ours.length, system.length)
+    assert system.length > 0.0
+
+
 @pytest.mark.parametrize(
     "change",
     [

@@ -16,7 +16,7 @@ import numpy as np
 
 from . import constraints, forces
 from .assembly import FIXED, Complex, Real, System
-from .constraints import Rows, gap_rows, rub_rows, slide_rows
+from .constraints import Rows
 from .errors import ParameterError
 from .kinetics import inertia, kinetic_energy, mass_accelerations
 from .mechanism import Mechanism, finite, unknown, value
@@ -173,8 +173,8 @@ class Equations:
         on[loops : len(B) - rubs] = [*system.on[held], *system.on[stuck]]
         self.rows = Rows(system, B, c, z, on)
         self.positions = self.rows.first(self.first_stick)
-        self.gap_rows, self.slide_rows = gap_rows(system), slide_rows(system)
-        self.rub_rows = rub_rows(system)
+        self.gap_rows, self.slide_rows = system.watched.gaps, system.watched.slides
+        self.rub_rows = system.watched.rubs
 
         # one product with e serves loads, inertia and constraints: see accelerations
         self.stack: Complex = np.vstack([self.w, system.H, 1j * self.rows.spread])

@@ -95,7 +95,7 @@ def _fmi2(heading: Heading, mechanism: Mechanism, interface: NativeInterface, so
     add_units(root, interface.variables)
     add_types(root, interface.variables)
     add_log_categories(root, heading)
-    add_experiment(root, interface.variables)
+    add_experiment(root, heading, interface.variables)
     index = {v.name: str(i) for i, v in enumerate(interface.variables, start=1)}
     add_variables(root, interface.variables, index)
     structure = SubElement(root, "ModelStructure")
@@ -143,7 +143,7 @@ def _fmi3(heading: Heading, mechanism: Mechanism, interface: NativeInterface) ->
     for name, attributes in used_types(interface.variables):
         SubElement(types, "Float64Type", {"name": name} | attributes)
     add_log_categories(root, heading)
-    add_experiment(root, interface.variables)
+    add_experiment(root, heading, interface.variables)
     listed = SubElement(root, "ModelVariables")
     reference = {v.name: str(v.reference) for v in interface.variables}
     for v in interface.variables:

@@ -167,8 +167,8 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
     Raises
     ------
     MechanismError
-        If two names share a value reference or one is none of FMI, or if a parameter has a unit
-        that is not known or a nominal value that is none.
+        If two variables share a name or a value reference, a name is none of FMI, or a parameter
+        has a unit that is not known or a nominal value that is none.
     """
     nominal = scales(mechanism, sample)
     result = tuple(_variables(mechanism, sample, nominal))
@@ -180,7 +180,7 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
 
 
 def check_names(variables: Sequence[Variable]) -> None:
-    """Refuse names that FMI does not have, and two with the same value reference.
+    """Refuse names that FMI does not have, that are taken, or of the same value reference.
 
     Raises
     ------
@@ -189,6 +189,13 @@ def check_names(variables: Sequence[Variable]) -> None:
     """
     seen: dict[int, str] = {}
     for variable in variables:
+        if seen.get(variable.reference) == variable.name or (
+            variable.name == TIME.name and variable is not TIME
+        ):
+            raise MechanismError(
+                f"two variables of the FMU would have the name {variable.name}: rename the "
+                "parameter or the part that it comes from"
+            )
         if not variable.name.isascii():
             raise MechanismError(
                 f"{variable.name}: names of FMI are of the letters a to z, digits and _, without "
@@ -241,9 +248,8 @@ def _variables(
                 f"{parameter.name}: nominal = {nominal_value} must be positive and finite"
             )
         yield _parameter(parameter)
-    known = {p.name for p in mechanism.parameters}
     for name in sample:
-        if name.endswith(".gamma0") and name not in known:
+        if name.endswith(".gamma0"):
             yield Variable(
                 name,
                 "Length of the stubs at the clamps in units of the length of the cantilever: "
@@ -531,7 +537,7 @@ def native_interface(
     Raises
     ------
     MechanismError
-        If two names share a value reference.
+        If two variables share a name or a value reference.
     """
     nominal = scales(mechanism, sample)
     names = coordinate_variables(mechanism)

@@ -27,7 +27,7 @@ from .arguments import ANIMATION_USAGE, animation_arguments
 from .mechanism_file import find, load, shipped
 from .motion import FPS, film, fmpy_command, motion, needed
 from .scene import COLOURS, DPI, SIZE, Scene, pictures
-from .settings import quantity, settings
+from .settings import quantity, settings, span
 from .simulate import (
     Columns,
     Progress,
@@ -337,7 +337,7 @@ def _result(options: argparse.Namespace) -> Result:
         if mechanism is None:
             raise ParameterError("name what to show: RESULT.csv, --model or --mechanism")
         changes = settings(mechanism, options.set)
-        return simulate(mechanism, changes, quantity(options.stop_time, "s", "--stop-time"))
+        return simulate(mechanism, changes, *span(mechanism, changes, options.stop_time))
     if len(files) > 2:
         raise ParameterError(f"{len(files)} files are given: RESULT.csv OUT, or OUT")
     columns = read_csv(files[0])

@@ -26,11 +26,19 @@ def animation_arguments(parser: ArgumentParser) -> None:
     which.add_argument("--model", metavar="NAME", help="a mechanism that comes with the package")
     which.add_argument("--mechanism", metavar="FILE.toml", help="one of your own")
     set_argument(parser, "a parameter or input")
-    add("--stop-time", default="1.0", metavar="T", help="of the simulation [s]; %(default)s")
+    stop_time_argument(parser)
     add("--slow", type=float, help="factor of slow motion; a round one for about ten seconds")
     add("--fps", type=float, help="frames per second; 25")
     add("--from", dest="start", metavar="T", help="first time shown [s]")
     add("--to", dest="stop", metavar="T", help="last time shown [s]")
+
+
+def stop_time_argument(parser: ArgumentParser) -> None:
+    """Add --stop-time."""
+    parser.add_argument(
+        "--stop-time", metavar="T",
+        help="duration of the simulation [s]; as in an FMU of the mechanism, mostly 1",
+    )  # fmt: skip
 
 
 def set_argument(parser: ArgumentParser, what: str = "a parameter") -> None:

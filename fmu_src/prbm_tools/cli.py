@@ -20,6 +20,7 @@ from .arguments import (
     animation_arguments,
     picture_arguments,
     set_argument,
+    stop_time_argument,
 )
 
 OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
@@ -163,8 +164,8 @@ def _simulate(commands: Commands) -> None:
     )  # fmt: skip
     _mechanism(parser)
     add = parser.add_argument
-    add("--stop-time", default="1", metavar="T", help="duration [s]; %(default)s")
-    add("--step", default="0.001", metavar="T", help="between rows of the table [s]; %(default)s")
+    stop_time_argument(parser)
+    add("--step", metavar="T", help="between rows of the table [s]; mostly 0.001")
     add("--tolerance", metavar="X", help="relative, of the integration; default: solver.tolerance")
     set_argument(parser, "a parameter or an input")
     add(

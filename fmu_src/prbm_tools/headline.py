@@ -2,24 +2,41 @@
 
 from collections.abc import Mapping
 
-from prbm import Mechanism, assemble, free_displacement
+from prbm import Mechanism, System, assemble, free_displacement
 from prbm.assembly import unit
 
 from .motion import marks
+from .scene import frequency_unit, length_unit, time_unit
 from .simulate import Columns, column, rest_time
 
 FREQUENCY = "mode.frequency"
+SHORT = 0.1  # s; the times of a run that is shorter are not told in seconds
 
 
-def millimetres(x: float) -> str:
-    """Return a length in mm to a hundredth, without a negative zero.
+def length(x: float, size: float) -> str:
+    """Return a length in mm, or what is handy in a smaller mechanism, to a hundredth.
+
+    There is no negative zero.
 
     Examples
     --------
-    >>> millimetres(-1.8e-3), millimetres(-1e-9)
-    ('-1.80 mm', '0.00 mm')
+    >>> length(-1.8e-3, 0.08), length(-1e-9, 0.08), length(3e-6, 2e-4)
+    ('-1.80 mm', '0.00 mm', '3.00 µm')
     """
-    return f"{round(1e3 * x, 2) + 0.0:.2f} mm"
+    factor, unit = length_unit(min(size, 1.0))
+    return f"{round(factor * x, 2) + 0.0:.2f} {unit}"
+
+
+def instant(t: float, span: float, digits: int) -> str:
+    """Return a time of a run in seconds, or what is handy if that is short.
+
+    Examples
+    --------
+    >>> instant(0.0349812, 1.0, 5), instant(2.71034e-6, 1e-4, 3)
+    ('0.03498 s', '2.710 µs')
+    """
+    factor, unit = (1.0, "s") if span >= SHORT else time_unit(span)
+    return f"{factor * t:.{digits}f} {unit}"
 
 
 def told(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
@@ -39,7 +56,11 @@ def told(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) ->
     ResultError
         If a column is missing.
     """
-    lines = _free(columns, mechanism, values)
+    parameters = {p.name for p in mechanism.parameters}
+    system = assemble(mechanism, {n: x for n, x in values.items() if n in parameters})
+    time = column(columns, "time")
+    span = float(time[-1] - time[0])
+    lines = _free(columns, system)
     seen = marks(columns, mechanism)
     for i, stop in enumerate(s.name for s in mechanism.stops):
         count = int(column(columns, f"{stop}.impact_count")[-1])
@@ -47,32 +68,31 @@ def told(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) ->
         more = ""
         if first is not None:
             which = "the first" if first.count == 1 else f"number {first.count}"
-            more = f", {which} at t = {first.time:.5f} s with {first.speed:.3f} m/s"
+            more = f", {which} at t = {instant(first.time, span, 5)} with {first.speed:.3f} m/s"
         lines.append(f"impacts at {stop:9} {count}{more}")
         since = rest_time(columns, stop)
         if since is not None:
             lines.append(
-                f"came to rest         at t = {since:.3f} s on {stop}, "
-                f"{_place(columns, mechanism)}, pressed with "
+                f"came to rest         at t = {instant(since, span, 3)} on {stop}, "
+                f"{_place(columns, system)}, pressed with "
                 f"{column(columns, f'{stop}.force')[-1]:.4g} N"
             )
     return lines
 
 
-def _free(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
+def _free(columns: Columns, system: System) -> list[str]:
     """Tell about the equilibrium without stops, if it is one that lasts."""
     frequency = column(columns, FREQUENCY)[0]
     if frequency == 0.0:
         return [
             "fundamental          none: without stops, the equilibrium under gravity is unstable"
         ]
-    parameters = {p.name for p in mechanism.parameters}
-    own = {name: x for name, x in values.items() if name in parameters}
-    rest = free_displacement(assemble(mechanism, own))
-    release = mechanism.release
+    factor, hertz = frequency_unit(frequency)
+    release = system.mechanism.release
+    rest = length(free_displacement(system), system.length)
     return [
-        f"fundamental          {frequency:.4g} Hz",
-        f"free rest position   {release.body} {millimetres(rest)} from straight"
+        f"fundamental          {factor * frequency:.4g} {hertz}",
+        f"free rest position   {release.body} {rest} from straight"
         f"{_along(release.direction)}, under gravity, without stops",
     ]
 
@@ -81,11 +101,13 @@ def _along(direction: float) -> str:
     return "" if direction == 0.0 else f" along {direction:g} degrees"
 
 
-def _place(columns: Columns, mechanism: Mechanism) -> str:
+def _place(columns: Columns, system: System) -> str:
     """Tell where the released body is at the end."""
-    body, direction = mechanism.release.body, mechanism.release.direction
+    body, direction = system.mechanism.release.body, system.mechanism.release.direction
     x, y = (float(column(columns, f"{body}.{axis}")[-1]) for axis in "xy")
     u = unit(direction)
     if direction == 0.0:
-        return f"{body}.x = {millimetres(x)}"
-    return f"{body} {millimetres(x * u.real + y * u.imag)} from straight{_along(direction)}"
+        return f"{body}.x = {length(x, system.length)}"
+    return (
+        f"{body} {length(x * u.real + y * u.imag, system.length)} from straight{_along(direction)}"
+    )

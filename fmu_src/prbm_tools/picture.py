@@ -36,6 +36,7 @@ from .scene import (
     PROBE,
     STRAIGHT,
     WALL,
+    frequency_unit,
     length_unit,
     own_style,
     quiet,
@@ -128,12 +129,13 @@ def _frequency(frequency: float) -> str:
 
     Examples
     --------
-    >>> _frequency(4.8899), _frequency(-2.0)
-    ('4.890 Hz', 'unstable')
+    >>> _frequency(4.8899), _frequency(92086.3), _frequency(-2.0)
+    ('4.890 Hz', '92.09 kHz', 'unstable')
     """
     if frequency <= 0.0:
         return "unstable"
-    return f"{frequency:#.4g} Hz".replace(". Hz", " Hz")
+    factor, unit = frequency_unit(frequency)
+    return f"{frequency * factor:#.4g} {unit}".replace(". ", " ")
 
 
 def moved(shapes: Shapes, E: Complex, found: Modes, k: int) -> Complex:

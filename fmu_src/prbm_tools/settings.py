@@ -2,13 +2,14 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from prbm import Mechanism, ParameterError
 from prbm.dynamics import input_names
 from prbm.errors import MechanismError, PrbmError
 from prbm.mechanism import unknown
 
+from .simulate import Experiment, experiment
 from .units import number
 
 INPUT_UNITS = {
@@ -189,3 +190,33 @@ def settings(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, float]:
             raise ParameterError(f"--set {text}: {unknown(name, units)}")
         found[name] = quantity(value, units[name], f"--set {name}=")
     return found
+
+
+def span(
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    stop_time: str | None,
+    step: str | None = None,
+) -> tuple[float, float]:
+    """Return duration and step of a simulation [s], as given or as suits the mechanism.
+
+    Raises
+    ------
+    UserMistake, ParameterError, EquilibriumError
+        As :func:`quantity` and :func:`prbm_tools.simulate.experiment` do.
+
+    Examples
+    --------
+    >>> from prbm_tools.mechanism_file import find
+    >>> span(find("PRBDM"), {}, None), span(find("PRBDM"), {}, "200 ms", "1e-4")
+    ((1.0, 0.001), (0.2, 0.0001))
+    """
+    duration = None if stop_time is None else quantity(stop_time, "s", "--stop-time")
+    if step is not None and duration is not None:
+        return duration, quantity(step, "s", "--step")
+    chosen = experiment(mechanism, values)
+    if duration is None:
+        duration, distance = chosen.stop_time, chosen.step
+    else:
+        distance = min(chosen.step, Experiment(duration).step) if duration > 0.0 else chosen.step
+    return duration, distance if step is None else quantity(step, "s", "--step")

@@ -12,7 +12,7 @@ from prbm.assembly import Real
 
 from ..headline import told
 from ..mechanism_file import find
-from ..settings import UserMistake, quantity, settings
+from ..settings import UserMistake, quantity, settings, span
 from ..simulate import Result, communication_points, names, reporter, simulate
 from .output import Output
 from .systems import ROUNDING
@@ -36,14 +36,8 @@ def simulated(options: argparse.Namespace) -> None:
     mechanism = find(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
-    stop_time, step, duration = (
-        quantity(text, "s", option)
-        for text, option in (
-            (options.stop_time, "--stop-time"),
-            (options.step, "--step"),
-            (options.spectrum_time, "--spectrum-time"),
-        )
-    )
+    stop_time, step = span(mechanism, values, options.stop_time, options.step)
+    duration = quantity(options.spectrum_time, "s", "--spectrum-time")
     communication_points(stop_time, step)
     begin = time.perf_counter()
     result = simulate(
