@@ -418,8 +418,9 @@ class _Sweep:
             self._install(rows, retries, timeout)
             self._gather(deque(rows), retries)
         except KeyboardInterrupt:
+            kept = len(self.results.read())
             raise KeyboardInterrupt(
-                f"the sweep was stopped: {self.done} of {len(self.plan.rows)} runs are kept in "
+                f"the sweep was stopped: {kept} of {len(self.plan.rows)} runs are kept in "
                 f"{self.results.folder}, and the same call does the rest"
             ) from None
         finally:
@@ -451,22 +452,41 @@ class _Sweep:
         from distributed import as_completed
 
         running: dict[Any, list[int]] = {}
-        lost: dict[int, int] = {}
+        deaths: dict[int, int] = {}  # of workers, by rows that were alone with them
+        suspects: deque[int] = deque()
         completed = as_completed(loop=self.client.loop)  # type: ignore[no-untyped-call]
         self._submit(rest, running, completed)
         for future in completed:
             rows = running.pop(future)
             outcomes = self._outcomes(future)
-            if outcomes is None:  # the worker died, not the FMU's process: one of the rows may be
-                again, outcomes, rows = self._after_loss(rows, lost, retries)  # at fault
-                for row in again:
-                    self._send([row], running, completed)
-            if rows:
-                self.results.add(rows, [self.plan.rows[row] for row in rows], outcomes)
-                self.recent.extend(o.seconds for o in outcomes if o.seconds > 0.0)
-                self.done += len(rows)
-                self.progress(self.done / len(self.plan.rows))
+            if outcomes is None:
+                outcomes = self._after_death(rows, deaths, suspects, retries)
+            if outcomes:
+                self._keep(rows, outcomes)
             self._submit(rest, running, completed)
+            if suspects and not running:
+                self._send([suspects.popleft()], running, completed)
+
+    def _after_death(
+        self, rows: list[int], deaths: dict[int, int], suspects: deque[int], retries: int
+    ) -> list[Outcome]:
+        """Return the outcome of a row whose workers died too often, or have the rows done again.
+
+        Not only the row that kills a worker is lost with it. So all that were are done again in
+        the end, one by one, with nothing else under way: then it is clear which one it is.
+        """
+        for row in rows:
+            deaths[row] = deaths.get(row, -1) + 1
+        if deaths[rows[0]] > retries:
+            return [Outcome(CRASHED, "the workers that had it died, one after the other")]
+        suspects.extend(rows)
+        return []
+
+    def _keep(self, rows: list[int], outcomes: list[Outcome]) -> None:
+        self.results.add(rows, [self.plan.rows[row] for row in rows], outcomes)
+        self.recent.extend(o.seconds for o in outcomes if o.seconds > 0.0)
+        self.done += len(rows)
+        self.progress(self.done / len(self.plan.rows))
 
     def _submit(self, rest: deque[int], running: dict[Any, list[int]], completed: Any) -> None:
         """Have enough batches under way."""
@@ -503,18 +523,6 @@ class _Sweep:
             return None
         except Unusable as error:
             raise SweepError(f"{self.plan.name}: {error}") from None
-
-    def _after_loss(
-        self, rows: list[int], lost: dict[int, int], retries: int
-    ) -> tuple[list[int], list[Outcome], list[int]]:
-        """Return the rows to do again one by one, and the outcomes of those that had their turn."""
-        if len(rows) > 1:
-            return rows, [], []
-        (row,) = rows
-        lost[row] = lost.get(row, 0) + 1
-        if lost[row] <= retries:
-            return rows, [], []
-        return [], [Outcome(CRASHED, "the workers that had it died, one after the other")], rows
 
 
 # --- the command --------------------------------------------------------------------------------

@@ -159,11 +159,14 @@ class Results:
     def _write(self, table: Any, part: Path) -> None:
         """Write a part under another name first: a kill leaves a draft, which nobody reads."""
         draft = part.with_name(f"_{part.name}.draft")
-        with draft.open("wb") as file:
-            pq.write_table(table, file)
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(part)
+        try:
+            with draft.open("wb") as file:
+                pq.write_table(table, file)
+                file.flush()
+                os.fsync(file.fileno())
+            draft.replace(part)
+        finally:
+            draft.unlink(missing_ok=True)
 
 
 def _is_empty(folder: Path) -> bool:

@@ -62,6 +62,7 @@ C_TYPES_3: dict[str, Any] = {
 }  # fmt: skip
 IDLE = 600.0  # s without a run after which the process ends, for nobody may be left to end it
 PRESENT = 5  # messages of the FMU that a failure tells at most
+CHATTY = 100  # messages in a run after which the FMU is asked for no more of them
 
 
 class SpecificationError(ValueError):
@@ -262,7 +263,7 @@ class Runner:
         variables = self.description.modelVariables
         self.events = not self.two and any(v.type == "Clock" for v in variables)
         self.resets: bool | None = None if job.reuse else False
-        self.used = False
+        self.used, self.logging, self.heard = False, True, 0
         self.points = communication_points(job.start, job.stop, job.step)
         self.every = any(output.reduction != "final" for output in job.outputs)
         self.fmu = instantiate_fmu(
@@ -270,6 +271,7 @@ class Runner:
             self.description,
             "CoSimulation",
             event_mode_used=self.events,
+            debug_logging=self.logging,
             logger=self._log2 if self.two else self._log3,
             require_functions=False,
         )
@@ -292,7 +294,6 @@ class Runner:
 
     def _once(self, values: Mapping[str, float], renew: bool = False) -> Outcome:
         begin = time.perf_counter()
-        self.messages.clear()
         try:
             self._prepare(renew)
             status, message, found = self._simulate({**self.job.values, **values})
@@ -325,14 +326,18 @@ class Runner:
         self._note(status, text)
 
     def _note(self, status: int, text: bytes) -> None:
+        self.heard += 1
         if status > 0:
             self.messages.append((status, (text or b"").decode(errors="replace").strip()))
             del self.messages[: -10 * PRESENT]
 
     def _prepare(self, renew: bool) -> None:
         """Have an instance that nothing was done with yet."""
+        chatty = self.logging and self.heard > CHATTY
+        self.logging, self.heard = self.logging and not chatty, 0
+        self.messages.clear()
         if self.used or renew:
-            if self.resets is False or renew:
+            if self.resets is False or renew or chatty:
                 self._instantiate()
             else:
                 self.fmu.reset()
@@ -344,9 +349,11 @@ class Runner:
         getattr(self.fmu, f"{prefix}FreeInstance")(self.fmu.component)
         self.fmu.component = None
         if self.two:
-            self.fmu.instantiate(callbacks=self.fmu.callbacks)
+            self.fmu.instantiate(callbacks=self.fmu.callbacks, loggingOn=self.logging)
         else:
-            self.fmu.instantiate(eventModeUsed=self.events, logMessage=self._log3)
+            self.fmu.instantiate(
+                eventModeUsed=self.events, logMessage=self._log3, loggingOn=self.logging
+            )
 
     def _simulate(self, values: dict[str, float]) -> tuple[str, str, tuple[float, ...]]:
         self._initialize(values)
