@@ -2,14 +2,12 @@
 
 import signal
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from urllib.parse import unquote
 
 import fmpy  # type: ignore[import-untyped]
 import numpy as np
@@ -20,6 +18,7 @@ from prbm import Mechanism
 from prbm_tools.figures import png, response
 from prbm_tools.headline import FREQUENCY, told
 from prbm_tools.simulate import Progress, reporter
+from prbm_tools.unpack import unpacked
 
 from .archive import write
 from .cli import FAILED, INTERRUPTED, MISTAKE, OK
@@ -58,40 +57,6 @@ class Run:
     def finished(self) -> bool:
         """Whether the simulation came to its end."""
         return bool(np.isclose(self.record["time"][-1], self.stop_time))
-
-
-@contextmanager
-def unpacked(fmu: Path) -> Iterator[Path]:
-    """Unpack an FMU to a folder that pythonfmu can read, and remove it afterwards.
-
-    Raises
-    ------
-    RuntimeError
-        If every candidate has characters that a URI encodes.
-    """
-    candidates = (tempfile.gettempdir(), "/tmp", "/var/tmp", r"C:\Users\Public", ".")
-    for candidate in map(Path, candidates):
-        if candidate.is_dir() and plain(candidate.resolve()):
-            with tempfile.TemporaryDirectory(prefix="prbm_", dir=candidate.resolve()) as folder:
-                fmpy.extract(str(fmu), unzipdir=folder)
-                yield Path(folder)
-            return
-    raise RuntimeError(
-        f"no folder for temporary files has a path of plain ASCII letters (tried {candidates[0]}); "
-        "set the environment variable TMPDIR to one that has"
-    )
-
-
-def plain(path: Path) -> bool:
-    """Whether pythonfmu can read a path: its URI encodes nothing but spaces.
-
-    Examples
-    --------
-    >>> plain(Path("/tmp/my model")), plain(Path("/tmp/modèle")), plain(Path("/tmp/100%"))
-    (True, False, False)
-    """
-    uri = path.absolute().as_uri().replace("%20", " ")
-    return unquote(uri) == uri and "%" not in uri
 
 
 def simulate(fmu: Path, progress: Progress) -> Run:
