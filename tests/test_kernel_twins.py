@@ -1136,8 +1136,8 @@ ELSEWHERE = {
     "constraints": {"carried_convective", "first"},
     "contact": set(),
     "dynamics": {
-        "check_input", "impulse_names", "input_names", "mass_accelerations", "offsets", "stop_forces", "torques",
-        "without_hold",
+        "check_input", "impulse_names", "input_names", "mass_accelerations", "offsets",
+        "stop_forces", "torques", "without_hold",
     },
     "flexure": set(),
     "forces": set(),

@@ -411,8 +411,8 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
         "not a force", nominal, minimum=0.0,
     )  # fmt: skip
     yield _output(
-        f"{stop}.point.displacement", "m", "Displacement of the hit point, in the direction of that "
-        "of the wall: the gap is closed where both are equal", nominal,
+        f"{stop}.point.displacement", "m", "Displacement of the hit point, in the direction of the "
+        "wall's: the gap is closed where both are equal", nominal,
     )  # fmt: skip
     yield _output(
         f"{stop}.point.velocity", "m/s", "Velocity of the hit point in that direction", nominal,
