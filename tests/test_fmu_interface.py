@@ -66,12 +66,14 @@ NAMES = {
     "friction.normal_stiffness stop.position stop.offset stop.restitution stop.friction "
     "stop.rest_speed",
     "input continuous": "force.x force.y force.moment stop.displacement stop.velocity "
-    "base.acceleration.x base.acceleration.y",
+    "base.acceleration.x base.acceleration.y stop.mobility",
+    "input discrete": "force.impulse.x force.impulse.y force.impulse.moment",
     "output continuous": "shuttle.x shuttle.y shuttle.angle shuttle.vx shuttle.vy shuttle.omega "
-    "stop.gap stop.gap_rate stop.force base.force.x base.force.y base.moment energy.kinetic "
+    "stop.gap stop.gap_rate stop.force stop.point.displacement stop.point.velocity "
+    "stop.point.mobility base.force.x base.force.y base.moment energy.kinetic "
     "energy.elastic energy.gravitational energy.dissipated energy.work",
     "output discrete": "stop.contact stop.impact_count stop.impact_time stop.approach_speed "
-    "stop.rebound_speed stop.impulse stop.energy_lost stop.modal_restitution",
+    "stop.rebound_speed stop.impulse stop.energy_lost stop.modal_restitution stop.impulse_sum",
     "local fixed": "mode.frequency",
 }
 FLEXURES = {
@@ -127,10 +129,13 @@ def test_display_units_are_scaled_as_their_prefixes_say():
 @each_shipped
 def test_velocities_are_declared_as_derivatives(fmus, model):
     listed = {v.name: v for v in read_model_description(str(fmus[model])).modelVariables}
-    rates = {"vx": "x", "vy": "y", "omega": "angle", "gap_rate": "gap", "strain_rate": "strain"}
+    rates = {"vx": "x", "vy": "y", "omega": "angle", "gap_rate": "gap", "strain_rate": "strain",
+             "point.velocity": "point.displacement"}  # fmt: skip
     declared = set()
     for name, v in listed.items():
         owner, _, what = name.rpartition(".")
+        if owner.endswith(".point"):
+            owner, what = owner.removesuffix(".point"), f"point.{what}"
         if what in rates:
             assert v.derivative is listed[f"{owner}.{rates[what]}"], name
             declared.add(what)
@@ -162,7 +167,7 @@ def test_no_output_depends_at_once_on_an_input(fmus, model):
         instance.set(dict.fromkeys(inputs, 1e-3))
         after = instance.values()
     outputs = [n for n, v in instance.variables.items() if v.causality == "output"]
-    assert len(inputs) == 3 * len(guide.forces) + 2 * len(guide.stops) + 2
+    assert len(inputs) == 6 * len(guide.forces) + 3 * len(guide.stops) + 2
     assert {n: after[n] for n in outputs} == {n: before[n] for n in outputs}
 
 

@@ -31,6 +31,7 @@ KINDS = {
     ("parameter", "tunable"): "Parameters that may change while the simulation runs",
     ("calculatedParameter", "fixed"): "Calculated parameters",
     ("input", "continuous"): "Inputs",
+    ("input", "discrete"): "Inputs that act when they change",
     ("output", "continuous"): "Outputs",
     ("output", "discrete"): "Outputs that an impact changes (latched)",
     ("local", "continuous"): "Local variables",
@@ -324,6 +325,12 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
             "and the gap opens. What presses the body closes the gap again; it bounces on the "
             "moving wall, each impact counted, until one below <code>rest_speed</code> captures "
             "it, and then goes with the wall. A wall that advances strikes what rests on it."
+        )
+        items.append(
+            "A wall that is part of another model takes part in impacts by its "
+            "<code>mobility</code>: the impulse is that between two masses, the wall changes its "
+            "velocity within the step, and <code>impulse_sum</code> is what the other model has to "
+            "receive. With <code>mobility</code> 0 the wall is immovable."
         )
     items.append(inputs)
     return _list("Limits", items)

@@ -194,8 +194,11 @@ def _attributes(v: Variable, reference: Mapping[str, str]) -> dict[str, str]:
 
 # --- terminals ------------------------------------------------------------------------------------
 
-STOP_MEMBERS = ("displacement", "velocity", "gap", "gap_rate", "force", "contact")
-FORCE_MEMBERS = ("x", "y", "moment")
+STOP_MEMBERS = (
+    "displacement", "velocity", "mobility", "gap", "gap_rate", "force", "contact", "impulse_sum",
+    "point.displacement", "point.velocity", "point.mobility",
+)  # fmt: skip
+FORCE_MEMBERS = ("x", "y", "moment", "impulse.x", "impulse.y", "impulse.moment")
 MOTION_MEMBERS = ("x", "y", "angle", "vx", "vy", "omega")
 BASE_MEMBERS = ("acceleration.x", "acceleration.y", "force.x", "force.y", "moment")
 
