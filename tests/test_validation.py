@@ -20,8 +20,9 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 
 
 def rows(text):
-    """Return the cells of the lines of a section's table, less its head."""
-    lines = [line for line in text.splitlines() if line.startswith("| ")]
+    """Return the cells of the lines of the first table of a section, and its head."""
+    table = re.search(r"(?:^\|.*\n?)+", text, re.MULTILINE)[0]
+    lines = [line for line in table.splitlines() if line.startswith("| ")]
     return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
 
 

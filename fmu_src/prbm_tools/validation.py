@@ -34,27 +34,21 @@ class ValidationError(PrbmError, ValueError):
 
 HEAD = """# The source, reproduced
 
-What S. Boersma's thesis (*Modelling and Validation of the Impact Response in Compliant
-Mechanisms*, TU
-Delft, 2015) prints, beside what this package computes and beside a reference that knows nothing of
-pseudo-rigid bodies: finite elements (**FE**, Exudyn's ANCF cables, from the same mechanism
-files), closed
-forms (**exact**), or what was **put in** to a synthetic record. `python -m prbm_tools.validation
---out docs`
-computes every number and figure of this page; the tests compute them again and compare.
+What S. Boersma's thesis (*Modelling and Validation of the Impact Response in Compliant Mechanisms*,
+TU Delft, 2015) prints, beside what this package computes and beside a reference that knows nothing
+of pseudo-rigid bodies: finite elements (**FE**, Exudyn's ANCF cables, from the same mechanism
+files), closed forms (**exact**), or what was **put in** to a synthetic record.
+`python -m prbm_tools.validation --out docs` computes every number and figure of this page in a few
+minutes; the tests compute them again and compare.
 
-The thesis' measured records are not public: where it measures, a synthetic record of its
-sensors' noise
-(laser 4 µm at 750 Hz, load cell 0 to 0.5 N) takes their place, and shows what an evaluation can
-know. Its
-curves exist as pictures only, so that for these the printed words are compared.
+The thesis' measured records are not public: where it measures, a synthetic record with its sensors'
+noise (laser 4 µm at 750 Hz, load cell 0 to 0.5 N) takes their place, and shows what an evaluation
+can know. Its curves exist as pictures only, so that for these its words are compared.
 
-*Difference* is ours less the printed value, or less the reference where nothing is printed. A
-limit stands
-beside a number only where agreement is claimed, and the verdict counts these claims; "not" is
-meant as it
-is said. What the source got wrong is shown on its own algorithm (`prbm_tools.source_model`, derived
-again), with its errors as switches.
+*Difference* is ours less the printed value, or less the reference where nothing is printed. A limit
+stands beside a number only where agreement is claimed, and the verdict counts these claims; where
+one does not hold, the section says why, or that we do not know. What the source got wrong is shown
+on its own algorithm (`prbm_tools.source_model`, derived again), with its errors as switches.
 """
 SUMMARY = "| in the source | | printed | ours | reference | difference | |"
 RULE = "|---|---|---:|---:|---:|---:|---|"

@@ -119,13 +119,11 @@ def figure_5_1(_: Progress) -> Result:
         "modal analysis of the steel structure",
         numbers,
         "With the values of listing B.2.2 (180 GPa, massless flexures, a point mass that "
-        "resists no "
-        "rotation) our elements have 136 Hz at 10.4 mm. The second frequency falls steeply "
-        "with the deflection, so that the thesis' 136 Hz agrees with either reading of its \"10 mm "
-        'deflected"; its 4.8 Hz is rounded.',
+        "resists no rotation) our elements have 136 Hz at 10.4 mm. The second frequency falls "
+        "steeply with the deflection, so that the thesis' 136 Hz agrees with either reading of "
+        'its "10 mm deflected"; its 4.8 Hz is rounded.',
         "The values of the figure itself are in a picture; the text quotes these two. The 2R "
-        "has f2 too low, as "
-        "everywhere.",
+        "has f2 too low, as everywhere.",
     )
 
 
@@ -180,13 +178,12 @@ def elements_of_steel(_: Progress) -> Result:
         "steel guide by 32 elements a flexure",
         tuple(numbers),
         "The 2R has the rest position and the fundamental frequency to 0.6 %, the second and "
-        "third 11 to 13 % too "
-        "low. The measured 4.82 ± 0.06 Hz is 1.8 % below the elements: half again as far as its "
-        "uncertainty allows with 181.5 GPa and 0.1 mm taken as exact; the frequency goes with the "
-        "thickness to the power 1.5, so that 1.2 µm of 100 µm would do.",
-        f"Between 16 and 32 elements nothing moves by more than {change:.1e}. The thesis' "
-        "4.8224 Hz of its 1R is neither the frequency at rest nor that of a swing of the "
-        "model that it "
+        "third 11 to 13 % too low. The measured 4.82 ± 0.06 Hz is 1.8 % below the elements: "
+        "half again as far as its uncertainty allows with 181.5 GPa and 0.1 mm taken as exact; "
+        "the frequency goes with the thickness to the power 1.5, so that 1.2 µm of 100 µm would "
+        "do.",
+        f"Between 16 and 32 elements nothing moves by more than {change:.1e}. The thesis' 4.8224 "
+        "Hz of its 1R is neither the frequency at rest nor that of a swing of the model that it "
         "describes, and we do not know why.",
     )
 
@@ -245,11 +242,9 @@ def figure_5_4(_: Progress) -> Result:
         "Figure 5.4",
         "Young's modulus of a flexure",
         numbers,
-        "A cell of 0 to 0.5 N with 0.2 % of noise on a flexure that is bent by 17 mN finds E "
-        "to a few parts "
-        "in a thousand from ten cycles. A micrometre of the thickness, 3 % of E, is the "
-        "larger doubt; "
-        "the thesis states neither.",
+        "A cell of 0 to 0.5 N with 0.2 % of noise on a flexure that is bent by 17 mN finds E to "
+        "a few parts in a thousand from ten cycles. A micrometre of the thickness, 3 % of E, is "
+        "the larger doubt; the thesis states neither.",
         "",
         (Drawing("bending", "A synthetic bending test of a steel flexure", figure_of(axes)),),
     )
@@ -305,14 +300,12 @@ def figure_5_5(_: Progress) -> Result:
         "Figures 5.5 and 7",
         "free vibration: frequency and damping",
         numbers,
-        "A fit of a damped sine knows the frequency a thousand times better than the ± 0.06 "
-        "Hz of the "
-        "thesis' spectrum. **Its ζ = 6.88e-9 is too small to measure**: ten seconds of its laser "
-        f"resolve {smallest:.0e}, and the evaluation says so of a record that holds it "
+        "A fit of a damped sine knows the frequency a thousand times better than the ± 0.06 Hz "
+        "of the thesis' spectrum. **Its ζ = 6.88e-9 is too small to measure**: ten seconds of "
+        f"its laser resolve {smallest:.0e}, and the evaluation says so of a record that holds it "
         f'("{tiny.damping}").',
-        "As a damping ratio it would let the guide swing for 1/(ζ ω) = 55 days. Neither "
-        "reading of eq. 3.16 makes "
-        "the number plausible; it is no default here.",
+        "As a damping ratio it would let the guide swing for 1/(ζ ω) = 55 days. Neither reading "
+        "of eq. 3.16 makes the number plausible; it is no default here.",
         (
             Drawing(
                 "vibration",
@@ -382,10 +375,8 @@ def figure_5_6(tell: Progress) -> Result:
         "impact on the centre of mass: the fitted restitution",
         numbers,
         "With straight flexures the restitution that a 1R needs is that of the contact less "
-        "what the flexures "
-        "carry on: 0.6 put in, 0.59 to 0.60 read. The record plays the experiment: 2R with "
-        "flexures that "
-        "stretch, 750 Hz, 4 µm.",
+        "what the flexures carry on: 0.6 put in, 0.59 to 0.60 read. The record plays the "
+        "experiment: 2R with flexures that stretch, 750 Hz, 4 µm.",
         "",
         (
             Drawing(
@@ -492,6 +483,7 @@ def figure_5_7(tell: Progress) -> Result:
         return Number(name, found, None, 0.0, "equal", within, True, ".4f")
 
     numbers = (
+        largest("2R that stretches less FE, largest of 25", off(model, fe), 0.005),
         Number(
             "centred, straight",
             model.restitution[2, 2],
@@ -502,7 +494,6 @@ def figure_5_7(tell: Progress) -> Result:
             True,
             ".4f",
         ),
-        largest("2R that stretches less FE, largest of 25", off(model, fe), 0.005),
         largest("closed form less FE, largest", off(exact, fe), 0.0064),
         largest("2R that does not stretch less FE, largest", off(rigid, fe)),
         Number(
@@ -536,29 +527,31 @@ def figure_5_7(tell: Progress) -> Result:
         "Figures 5.7 to 5.9 and 9",
         "restitution over 5 walls and 5 offsets",
         numbers,
-        "What an arriving pure mode keeps is known: 2R with flexures that stretch, finite elements "
-        "and the closed form agree, and no number was fitted; the inextensible 1R is flat. A "
-        "released guide of elements arrives with little else than this mode; the 2R's other "
-        "modes, 11 % too slow, arrive in another phase and move its restitution by up to 0.05. "
-        "What a 1R reads from a response is a third thing again, and it alone has the "
-        "asymmetry that the thesis found.",
+        "What an arriving pure mode keeps is known: 2R with flexures that stretch, finite "
+        "elements and the closed form agree, and no number was fitted; the inextensible 1R is "
+        "flat. A released guide of elements arrives with little else than this mode; the 2R's "
+        "other modes, 11 % too slow, arrive in another phase and move its restitution by up to "
+        "0.05. What a 1R reads from a response is a third thing again, and it alone has the "
+        "asymmetry between the walls that the thesis found. Its trend towards the base is in "
+        "none.",
         "The thesis measured: most is left near the centre of mass; less is lost on the side of "
         'the base; much more is lost at the wall of "-10 mm". These trends here, as means of '
         "differences, C(-d) - C(d) and C(-h) - C(h):\n\n" + "\n".join(rows) + "\n\n"
         "- *Offset.* Every route loses most off the centre of mass. The side does not matter: "
         f"{sides:.3f} at most, of either sign. The trend towards the base is not found.\n"
-        "- *Wall.* A pure mode does not tell the two sides apart, because the path is symmetric, "
-        "and a first impact hardly does. The response does: a guide that has passed its straight "
-        "shape (h > 0, in the direction of gravity) rebounds towards it, where the other modes "
-        "become stiffer and take energy from the fundamental one, and the fitted restitution is "
-        "much lower there. That is the thesis' finding if its heights count upwards: 10 mm below "
-        "the straight shape, where the velocity points into the buckling direction of the "
-        "flexures (its section 8.2.1), is +10 mm along gravity. If its -10 mm is a wall before the "
-        "straight shape, the sign is the opposite one.\n"
+        "- *Wall.* A pure mode does not tell the two sides apart, because the path is "
+        "symmetric, and a first impact hardly does. The response does: a guide that has passed "
+        "its straight shape (h > 0, in the direction of gravity) rebounds towards it, where the "
+        "other modes become stiffer and take energy from the fundamental one, and the fitted "
+        "restitution is much lower there. That is the thesis' finding if its heights count "
+        "upwards: 10 mm below the straight shape, where the velocity points into the buckling "
+        "direction of the flexures (its section 8.2.1), is +10 mm along gravity. If its -10 mm "
+        "is a wall before the straight shape, the sign is the opposite one.\n"
         "- *Trust.* The first impact of the elements converges to the number in the table. The "
-        "time step matters: with a spectral radius of 0.9 in place of 0.5 the waves that an impact "
-        "leaves in the flexures grow in some of these runs, until they are nonsense. The fits look "
-        "at 50 ms after the first impact, further ones included: differences of 0.05 mean little.",
+        "time step matters: with a spectral radius of 0.9 in place of 0.5 the waves that an "
+        "impact leaves in the flexures grow in some of these runs, until they are nonsense. The "
+        "fits look at 50 ms after the first impact, further ones included: differences of 0.05 "
+        "mean little.",
         (
             Drawing(
                 "map",
@@ -663,17 +656,14 @@ def chapter_7(_: Progress) -> Result:
         "beams of carbon nanotubes",
         tuple(numbers),
         "The evaluation (sorting, averaging, fit from 25 to 90 % of the range, sensor at 30°) "
-        "returns what "
-        "was put in. A hysteresis of 10 % makes E from both branches 2 to 3 % too high, and "
-        "is said beside "
-        "it. The printed tensile strength of 46.6 MPa does not fit the dimensions of listing "
-        "A.6: a "
-        "cantilever of them has 7.2 MPa at its root under the printed 2 mN.",
+        "returns what was put in. A hysteresis of 10 % makes E from both branches 2 to 3 % too "
+        "high, and is said beside it. The printed tensile strength of 46.6 MPa does not fit the "
+        "dimensions of listing A.6: a cantilever of them has 7.2 MPa at its root under the "
+        "printed 2 mN.",
         "The factor of 10 between the thesis' structures is not in question: no evaluation "
-        "makes that. Its "
-        "table 7.1 has no values in the text. The thesis takes 400 µm for the height of "
-        "structures that "
-        "were not imaged and found 350 µm where it looked, which is 14 % of E.",
+        "makes that. Its table 7.1 has no values in the text. The thesis takes 400 µm for the "
+        "height of structures that were not imaged and found 350 µm where it looked, which is "
+        "14 % of E.",
         (
             Drawing(
                 "nanotubes", "Synthetic records of four nanotube beams, averaged", figure_of(axes)

@@ -79,9 +79,9 @@ def table_1(_: Progress) -> Result:
         "Table 1, eq. 6.1-6.5",
         "coefficients of the 2R model",
         numbers,
-        "The published coefficients are right and ours. The thesis multiplies them by γ once more "
-        "(eq. 2 and 3, listing A.5), which makes its guide 2.26 times too soft; its later fit of "
-        "K_Θ = 8.7614, 4.0104 is that missing factor, found again to 11 %.",
+        "The published coefficients are right and ours. The thesis multiplies them by γ once "
+        "more (eq. 2 and 3, listing A.5), which makes its guide 2.26 times too soft; its later "
+        "fit of K_Θ = 8.7614, 4.0104 is that missing factor, found again to 11 %.",
     )
 
 
@@ -171,9 +171,9 @@ def table_4_1(_: Progress) -> Result:
         "Figures 4.1 and 4.2, table 4.1",
         "free swing of the PMMA guide, K_Θ = 2.65",
         numbers,
-        "The MATLAB row repeats the values of the ANSYS row; what its errors say instead is our 1R "
-        "model to 0.6 %. The errors of the two COMSOL rows are swapped. The 1R is 1.9 % too fast "
-        "beside either finite-element program: K_Θ = 2.65 is for a force alone.",
+        "The MATLAB row repeats the values of the ANSYS row; what its errors say instead is our "
+        "1R model to 0.6 %. The errors of the two COMSOL rows are swapped. The 1R is 1.9 % too "
+        "fast beside either finite-element program: K_Θ = 2.65 is for a force alone.",
         f"""The amplitude is mostly a matter of how the guide is set going. With the shuttle
 alone at 1 m/s the finite elements swing {1e3 * a_fe:.2f} mm, with the flexures moving along as in
 the mode v/ω = {moving_along:.2f} mm, and a 1R has no choice but the latter. K_Θ does not
@@ -222,12 +222,10 @@ def k_theta(_: Progress) -> Result:
         "Figure 4.3",
         "K_Θ fitted to finite elements",
         numbers,
-        "2.545 ± 0.01 is met by the small-motion frequency, by the frequency of the swing at "
-        "1 m/s and "
-        "by its whole response: the 1R guide without gravity is an exact harmonic oscillator "
-        "in its "
-        "angle, so that its frequency does not depend on the amplitude, and that of the elements "
-        "hardly does.",
+        "2.545 ± 0.01 is met by the small-motion frequency, by the frequency of the swing at 1 "
+        "m/s and by its whole response: the 1R guide without gravity is an exact harmonic "
+        "oscillator in its angle, so that its frequency does not depend on the amplitude, and "
+        "that of the elements hardly does.",
         """What remains between 2.545 and our 2.551 is the difference of the two finite-element
 programs (ANSYS' beams shear and have rotary inertia, the cables do not) and the amplitude, which
 the thesis' least squares
@@ -312,16 +310,12 @@ def figure_4_4(_: Progress) -> Result:
         "Figure 4.4",
         "impacts of the PMMA guide, restitution 0.7",
         numbers,
-        '"Matches nicely" in the thesis; here the 1R arrives at the wall as the elements do '
-        "and leaves it "
-        "too fast. Each PMMA flexure has a tenth of the shuttle's mass and does not stop with "
-        "it: Newton's "
-        "law at the shuttle leaves them moving, and less than 0.7 is left in the fundamental "
-        "mode. The 2R "
-        "has most of that, the 1R none.",
+        "A good match in the thesis; here the 1R arrives at the wall as the elements do and "
+        "leaves it too fast. Each PMMA flexure has a tenth of the shuttle's mass and does not "
+        "stop with it: Newton's law at the shuttle leaves them moving, and less than 0.7 is "
+        "left in the fundamental mode. The 2R has most of that, the 1R none.",
         "What ANSYS' contact element does with its coefficient the thesis does not say; its "
-        "curve follows "
-        "the 1R. Release and wall are those of listing B.1.4, -120 mm and 20 mm.",
+        "curve follows the 1R. Release and wall are those of listing B.1.4, -120 mm and 20 mm.",
         (
             Drawing(
                 "impact",
@@ -392,10 +386,9 @@ def figure_4_5(tell: Progress) -> Result:
         "a swing with Coulomb friction",
         numbers,
         "The thesis gives no numbers for its simplified friction, a force against the motion "
-        "that grows "
-        "where the guide passes its neutral position. Ours has the same law, with stick and "
-        "slip as "
-        "states, and is held against the work of the force, 2 k (Θ₁² - Θ₂²) = μ N (x₁ + x₂).",
+        "that grows where the guide passes its neutral position. Ours has the same law, with "
+        "stick and slip as states, and is held against the work of the force, 2 k (Θ₁² - Θ₂²) = "
+        "μ N (x₁ + x₂).",
         "",
         (Drawing("friction", "Swings that friction ends", figure_of(axes)),),
     )
@@ -494,16 +487,13 @@ def figure_6_2(tell: Progress) -> Result:
         "Figure 6.2, section 6.3",
         "two K_Θ fitted to one response",
         numbers,
-        "The fit does what the thesis says: its coefficients meet the 1R response. But that "
-        "1R has the K_Θ "
-        "of 2.65 that chapter 4 had just found 4 % too stiff, and one response of one mode "
-        "does not tell "
-        "two coefficients apart: other pairs fit as well. The published pair, without the "
-        "factor, needs no "
-        "fit.",
+        "The fit does what the thesis says: its coefficients meet the 1R response. But that 1R "
+        "has the K_Θ of 2.65 that chapter 4 had just found 4 % too stiff, and one response of "
+        "one mode does not tell two coefficients apart: other pairs fit as well. The published "
+        "pair, without the factor, needs no fit.",
         "All curves are of the source's algorithm (PMMA, gravity along the motion, let go "
-        "straight, its step of "
-        "2 ms). `prbm_tools.fit` says of such a fit that K_Θ1 and K_Θ2 cannot be told apart.",
+        "straight, its step of 2 ms). `prbm_tools.fit` says of such a fit that K_Θ1 and K_Θ2 "
+        "cannot be told apart.",
         (
             Drawing(
                 "optimised",
@@ -585,16 +575,12 @@ def figure_6_3(tell: Progress) -> Result:
         "free vibration of the 2R model",
         numbers,
         "The acceleration constraint needs the right side -(dΦ_q/dt) v; the printed equations "
-        "have zeros. "
-        "In the 1R parallelogram the terms cancel, in the 2R they do not: released from 18 "
-        "mm, the printed "
-        "model gains energy from nothing and ends in no number. The thesis' smooth curve must "
-        "be of a "
-        "smaller motion: at the PMMA guide's 15 mm (a thirteenth of its length) the error "
-        "stays small.",
+        "have zeros. In the 1R parallelogram the terms cancel, in the 2R they do not: released "
+        "from 18 mm, the printed model gains energy from nothing and ends in no number. The "
+        "thesis' smooth curve must be of a smaller motion: at the PMMA guide's 15 mm (a "
+        "thirteenth of its length) the error stays small.",
         "The thesis suspects its impact law, its contact condition on one side, and its "
-        "integrator for the 2R's "
-        "troubles (sections 6.5 and 8.3). It is this term.",
+        "integrator for the 2R's troubles (sections 6.5 and 8.3). It is this term.",
         (
             Drawing(
                 "energy", "Free vibration of the steel 2R as printed and corrected", figure_of(left)
@@ -663,11 +649,10 @@ def figure_6_4(tell: Progress) -> Result:
         "Figures 6.4 and 10",
         "centred impact, straight flexures",
         numbers,
-        "All energy returns to the fundamental mode, up to what the flexures carry: they are "
-        "1 % of the "
-        "moving mass, do not stop with the shuttle, and keep 1 % of the energy. The bounces "
-        "die out and the "
-        "guide rests on the wall, where the printed loop falls through it.",
+        "All energy returns to the fundamental mode, up to what the flexures carry: they are 1 "
+        "% of the moving mass, do not stop with the shuttle, and keep 1 % of the energy. The "
+        "bounces die out and the guide rests on the wall, where the printed loop falls through "
+        "it.",
         "",
         (
             Drawing(
@@ -738,19 +723,16 @@ def figure_6_5(_: Progress) -> Result:
     axes.set_ylim(1e-5, 20)
     axes.set_xlabel("frequency [Hz]")
     axes.set_ylabel("amplitude [m/s]")
-    legend(axes, loc="upper right")
+    legend(axes, loc="upper center", bbox_to_anchor=(0.585, 1.0))
     return Result(
         "figure-6-5",
         "Figures 6.5 and 11",
         "impact 10 mm from straight",
         numbers,
-        'The 108 and 205 Hz that the thesis finds "at a different frequency than the higher '
-        'eigenfrequencies" '
-        "are modes of the model that it had: the PMMA guide of listing A.5 with the re-fitted "
-        "K_Θ, not the "
-        "steel guide whose modes it compared them with. A centred hit on a sloping path does "
-        "excite "
-        "them; the share is that of the elements.",
+        "The 108 and 205 Hz, which the thesis found at none of the higher frequencies that it "
+        "knew, are modes of the model that it had: the PMMA guide of listing A.5 with the "
+        "re-fitted K_Θ, not the steel guide whose modes it compared them with. A centred hit on "
+        "a sloping path does excite them; the share is that of the elements.",
         "The 2R has the second and third frequency of the steel guide 11 and 12 % too low "
         "([flexure-models.md](flexure-models.md)); how much goes there does not suffer.",
         (
