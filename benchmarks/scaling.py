@@ -25,7 +25,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from native import inclusive
+from native import RIGHT_HAND_SIDE, inclusive
 
 from c_importer import Job, execute, kernel_library, unpack, write
 from prbm import Flexure, Mechanism, assemble
@@ -82,7 +82,7 @@ def instructions(given: Mechanism) -> float:
         done = execute(job, before=counted)
         if done.status:
             raise RuntimeError(done.errors)
-        calls, total = inclusive(folder / "profile", "solve_motion")
+        calls, total = inclusive(folder / "profile", RIGHT_HAND_SIDE)
     return total / calls
 
 
