@@ -13,7 +13,8 @@ from .simulate import Experiment, experiment
 from .units import number
 
 INPUT_UNITS = {
-    "x": "N", "y": "N", "moment": "N.m", "displacement": "m", "velocity": "m/s",
+    "x": "N", "y": "N", "moment": "N.m", "impulse.x": "N.s", "impulse.y": "N.s",
+    "impulse.moment": "N.m.s", "displacement": "m", "velocity": "m/s", "mobility": "1/kg",
     "acceleration.x": "m/s2", "acceleration.y": "m/s2",
 }  # fmt: skip
 PERCENT = re.compile(r"(.*\d)\s*%")
@@ -151,15 +152,8 @@ def units_of(mechanism: Mechanism) -> dict[str, str]:
     >>> units["flexure.length"], units["force.moment"], units["base.acceleration.x"]
     ('m', 'N.m', 'm/s2')
     """
-    inputs = {
-        name: INPUT_UNITS[name.removeprefix("base.") if name.startswith("base.") else _last(name)]
-        for name in input_names(mechanism)
-    }
+    inputs = {name: INPUT_UNITS[name.partition(".")[2]] for name in input_names(mechanism)}
     return inputs | {p.name: p.unit for p in mechanism.parameters}
-
-
-def _last(name: str) -> str:
-    return name.rpartition(".")[2]
 
 
 def settings(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, float]:
