@@ -1,0 +1,511 @@
+"""Runs of an FMU for a sweep, in a process of their own that may crash: ``sweep_worker`` starts it.
+
+It needs FMPy and NumPy only and is quick to start.  The FMU is instantiated once.  Between runs it
+is reset if that leaves nothing behind, which the second run finds out: it is done twice, after a
+reset and after a new instantiation, and only if both agree to the last bit do resets go on.
+"""
+
+import os
+import pickle
+import queue
+import re
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from ctypes import (
+    c_bool,
+    c_double,
+    c_float,
+    c_int,
+    c_int8,
+    c_int16,
+    c_int32,
+    c_int64,
+    c_uint,
+    c_uint8,
+    c_uint16,
+    c_uint32,
+    c_uint64,
+)
+from dataclasses import dataclass
+from itertools import pairwise
+from math import isclose, nan
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import fmpy  # type: ignore[import-untyped]
+import numpy as np
+from fmpy.fmi1 import FMICallException  # type: ignore[import-untyped]
+from fmpy.simulation import (  # type: ignore[import-untyped]
+    apply_start_values,
+    instantiate_fmu,
+    settable_in_initialization_mode,
+    settable_in_instantiated,
+)
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+
+OK, ENDED, FAILED, CRASHED, TIMEOUT = "ok", "ended", "failed", "crashed", "timeout"
+"""How a run went: to its end; to an end that the FMU set; refused; its process died; too long."""
+GOOD = OK, ENDED
+
+DISCARD, FATAL = 2, 4  # fmi2Status, fmi3Status
+LAST_TIME, TERMINATED = 2, 3  # fmi2StatusKind
+C_TYPES_2: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int}
+C_TYPES_3: dict[str, Any] = {
+    "Float64": c_double, "Float32": c_float, "Boolean": c_bool,
+    "Int8": c_int8, "Int16": c_int16, "Int32": c_int32, "Int64": c_int64,
+    "UInt8": c_uint8, "UInt16": c_uint16, "UInt32": c_uint32, "UInt64": c_uint64,
+}  # fmt: skip
+IDLE = 600.0  # s without a run after which the process ends, for nobody may be left to end it
+PRESENT = 5  # messages of the FMU that a failure tells at most
+CHATTY = 100  # messages in a run after which the FMU is asked for no more of them
+
+
+class SpecificationError(ValueError):
+    """An output is none: the message says what is wrong with it."""
+
+
+# --- outputs ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Output:
+    """A number that a run leaves behind.
+
+    Parameters
+    ----------
+    column : str
+        Its name in the results.
+    variable : str
+        Of the FMU.
+    reduction : str
+        ``final``, ``max``, ``min``, ``mean``, ``first`` or ``since``.
+    relation, bound : str, float
+        When ``first`` and ``since`` hold: ``>``, ``>=``, ``<`` or ``<=`` and a number.
+    """
+
+    column: str
+    variable: str
+    reduction: str = "final"
+    relation: str = ">"
+    bound: float = 0.0
+
+
+RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
+    ">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.less_equal,
+}  # fmt: skip
+_REDUCTION = re.compile(r"(final|max|min|mean|first|since)\((.*)\)", re.DOTALL)
+_CONDITION = re.compile(r"(.*?)\s*(<=|>=|<|>)\s*([^<>=]+)", re.DOTALL)
+
+
+def parsed(text: str, known: Container[str], column: str | None = None) -> Output:
+    """Return the output that a text means, as ``max(shuttle.x)`` or ``since(stop.contact)``.
+
+    Raises
+    ------
+    SpecificationError
+        If the bound of a condition is no number.
+
+    Examples
+    --------
+    >>> parsed("shuttle.x", {"shuttle.x"})
+    Output(column='shuttle.x', variable='shuttle.x', reduction='final', relation='>', bound=0.0)
+    >>> parsed("first(shuttle.x < -1e-3)", {"shuttle.x"}, "there").bound
+    -0.001
+    """
+    name = text if column is None else column
+    call = None if text in known else _REDUCTION.fullmatch(text.strip())
+    if call is None:
+        return Output(name, text)
+    reduction, inner = call[1], call[2].strip()
+    condition = _CONDITION.fullmatch(inner)
+    if reduction not in ("first", "since") or inner in known or condition is None:
+        return Output(name, inner, reduction)
+    try:
+        bound = float(condition[3])
+    except ValueError:
+        raise SpecificationError(
+            f"{text}: {condition[3]!r} is no number; write a condition as first(shuttle.x > 0.001)"
+        ) from None
+    return Output(name, condition[1], reduction, condition[2], bound)
+
+
+def reduced(output: Output, t: Real, x: Real) -> float:
+    """Return the number that a trajectory is reduced to.
+
+    Parameters
+    ----------
+    t : (m,)
+        Communication points [s].
+    x : (m,)
+        The variable there.
+
+    Returns
+    -------
+    float
+        ``final``, ``max``, ``min``: in the unit of the variable. ``mean``: over time, the
+        variable taken as linear in between. ``first``: the first communication point at which
+        the condition holds [s]; ``since``: the first one from which on it holds to the end [s];
+        NaN if there is none.
+
+    Examples
+    --------
+    >>> t, x = np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.0, 2.0, 0.0, 2.0])
+    >>> [reduced(Output("", "x", how), t, x) for how in ("final", "max", "mean", "first", "since")]
+    [2.0, 2.0, 1.0, 1.0, 4.0]
+    """
+    match output.reduction:
+        case "final":
+            return float(x[-1])
+        case "max":
+            return float(x.max())
+        case "min":
+            return float(x.min())
+        case "mean":
+            span = float(t[-1] - t[0])
+            return float(np.diff(t) @ (x[1:] + x[:-1])) / (2 * span) if span > 0.0 else float(x[0])
+    holds = RELATIONS[output.relation](x, output.bound)
+    if output.reduction == "first":
+        return float(t[holds.argmax()]) if holds.any() else nan
+    broken = np.flatnonzero(~holds)
+    begin = int(broken[-1]) + 1 if len(broken) else 0
+    return float(t[begin]) if begin < len(t) else nan
+
+
+# --- one run ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all runs of a sweep have in common.
+
+    Parameters
+    ----------
+    start, stop, step : float
+        Beginning, end and distance of the communication points [s].
+    tolerance : float or None
+        Relative tolerance that the FMU is given; None: none.
+    values : mapping
+        Start values that all runs have.
+    outputs : tuple of Output
+        What is kept.
+    reuse : bool
+        Whether to reset the instance, if it passes the test, instead of making a new one.
+    """
+
+    start: float
+    stop: float
+    step: float
+    tolerance: float | None
+    values: Mapping[str, float]
+    outputs: tuple[Output, ...]
+    reuse: bool = True
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a run.
+
+    ``values`` are the outputs in their order, empty if there are none; ``seconds`` is what it
+    took, and ``spent`` whether the process must not be used any more.
+    """
+
+    status: str
+    message: str = ""
+    seconds: float = nan
+    values: tuple[float, ...] = ()
+    spent: bool = False
+
+
+def communication_points(start: float, stop: float, step: float) -> list[float]:
+    """Return start, start + step, start + 2 step, ... [s], to the last bit as FMPy chooses them.
+
+    Examples
+    --------
+    >>> communication_points(0.0, 1.0, 0.4)
+    [0.0, 0.4, 0.8, 1.0]
+    >>> communication_points(0.0, 0.3, 0.1)
+    [0.0, 0.1, 0.2, 0.30000000000000004]
+    """
+    points, t = [start], start
+    while not (t > stop or isclose(t, stop)):
+        t = start + len(points) * step
+        if t > stop and not isclose(t, stop):
+            t = stop
+        points.append(t)
+    return points
+
+
+class Runner:
+    """An FMU that runs again and again.
+
+    Parameters
+    ----------
+    folder : Path
+        Where it is unpacked.
+    job : Job
+        What to do.
+
+    Raises
+    ------
+    Exception
+        Whatever FMPy raises if the FMU cannot be loaded or instantiated.
+    """
+
+    def __init__(self, folder: Path, job: Job) -> None:
+        self.job, self.messages = job, list[tuple[int, str]]()
+        self.description = fmpy.read_model_description(str(folder), validate=False)
+        self.two = self.description.fmiVersion.startswith("2")
+        variables = self.description.modelVariables
+        self.events = not self.two and any(v.type == "Clock" for v in variables)
+        self.resets: bool | None = None if job.reuse else False
+        self.used, self.logging, self.heard = False, True, 0
+        self.points = communication_points(job.start, job.stop, job.step)
+        self.every = any(output.reduction != "final" for output in job.outputs)
+        self.fmu = instantiate_fmu(
+            str(folder),
+            self.description,
+            "CoSimulation",
+            event_mode_used=self.events,
+            debug_logging=self.logging,
+            logger=self._log2 if self.two else self._log3,
+            require_functions=False,
+        )
+        groups = _grouped(variables, {output.variable for output in job.outputs}, self.two)
+        self.readers = [_Reader(self.fmu, kind, group, self.two) for kind, group in groups.items()]
+        listed = [variable.name for group in groups.values() for variable in group]
+        self.place = {name: k for k, name in enumerate(listed)}
+
+    def run(self, values: Mapping[str, float]) -> Outcome:
+        """Do a run with start values; return its outcome, whatever happens."""
+        if not (self.used and self.resets is None):
+            return self._once(values)
+        after_reset = self._once(values)
+        if after_reset.spent:
+            return after_reset
+        fresh = self._once(values, renew=True)
+        if fresh.status == OK:
+            self.resets = _bits(after_reset) == _bits(fresh)
+        return fresh
+
+    def _once(self, values: Mapping[str, float], renew: bool = False) -> Outcome:
+        begin = time.perf_counter()
+        try:
+            self._prepare(renew)
+            status, message, found = self._simulate({**self.job.values, **values})
+            return Outcome(status, message, time.perf_counter() - begin, found)
+        except Exception as error:
+            seconds, message = time.perf_counter() - begin, self._reason(error)
+            return Outcome(FAILED, message, seconds, spent=not self._recovers(error))
+
+    def _recovers(self, error: Exception) -> bool:
+        """Replace an instance in a state of error, which a reset need not leave, if that works."""
+        if isinstance(error, FMICallException) and error.status == FATAL:
+            return False
+        try:
+            self._instantiate()
+        except Exception:
+            return False
+        self.used = False
+        return True
+
+    def _reason(self, error: Exception) -> str:
+        """Return the FMU's own words about an error before FMPy's."""
+        worst = [text for status, text in self.messages if status >= DISCARD]
+        told = list(dict.fromkeys(worst or [text for _, text in self.messages]))[-PRESENT:]
+        return "; ".join(told) or str(error) or type(error).__name__
+
+    def _log2(self, _: object, __: bytes, status: int, ___: bytes, text: bytes) -> None:
+        self._note(status, text)
+
+    def _log3(self, _: object, status: int, __: bytes, text: bytes) -> None:
+        self._note(status, text)
+
+    def _note(self, status: int, text: bytes) -> None:
+        self.heard += 1
+        if status > 0:
+            self.messages.append((status, (text or b"").decode(errors="replace").strip()))
+            del self.messages[: -10 * PRESENT]
+
+    def _prepare(self, renew: bool) -> None:
+        """Have an instance that nothing was done with yet."""
+        chatty = self.logging and self.heard > CHATTY
+        self.logging, self.heard = self.logging and not chatty, 0
+        self.messages.clear()
+        if self.used or renew:
+            if self.resets is False or renew or chatty:
+                self._instantiate()
+            else:
+                self.fmu.reset()
+        self.used = True
+
+    def _instantiate(self) -> None:
+        """Replace the instance, the library staying loaded."""
+        prefix = "fmi2" if self.two else "fmi3"
+        getattr(self.fmu, f"{prefix}FreeInstance")(self.fmu.component)
+        self.fmu.component = None
+        if self.two:
+            self.fmu.instantiate(callbacks=self.fmu.callbacks, loggingOn=self.logging)
+        else:
+            self.fmu.instantiate(
+                eventModeUsed=self.events, logMessage=self._log3, loggingOn=self.logging
+            )
+
+    def _simulate(self, values: dict[str, float]) -> tuple[str, str, tuple[float, ...]]:
+        self._initialize(values)
+        times, rows = [self.points[0]], [self._sample()] if self.every else []
+        status, message = OK, ""
+        for begin, end in pairwise(self.points):
+            ended = self._step(begin, end - begin)
+            times.append(end if ended is None else ended)
+            if self.every:
+                rows.append(self._sample())
+            if ended is not None:
+                status, message = ENDED, f"the FMU ended the run at t = {ended:.9g} s"
+                break
+        if not self.every:
+            times, rows = times[-1:], [self._sample()]
+        self.fmu.terminate()
+        t, table = np.array(times), np.array(rows, dtype=np.float64)
+        return status, message, tuple(
+            reduced(output, t, table[:, self.place[output.variable]]) for output in self.job.outputs
+        )  # fmt: skip
+
+    def _initialize(self, values: dict[str, float]) -> None:
+        """Set start values and pass through initialization, in FMPy's order."""
+        experiment = {
+            "tolerance": self.job.tolerance, "startTime": self.job.start, "stopTime": self.job.stop,
+        }  # fmt: skip
+        if self.two:
+            self.fmu.setupExperiment(**experiment)
+        rest = self._set(values, settable_in_instantiated)
+        self.fmu.enterInitializationMode(**({} if self.two else experiment))
+        rest = self._set(rest, settable_in_initialization_mode)
+        self.fmu.exitInitializationMode()
+        if rest:
+            raise ValueError(f"the FMU lets nobody set {', '.join(rest)}")
+        if self.events:
+            self._update()
+
+    def _set(self, values: dict[str, float], when: Callable[[Any], bool]) -> dict[str, float]:
+        """Set what can be set now; return the rest."""
+        return apply_start_values(self.fmu, self.description, values, settable=when)  # type: ignore[no-any-return]
+
+    def _step(self, t: float, size: float) -> float | None:
+        """Make a step; return when the FMU ended the simulation [s], None if it did not."""
+        if not self.two:
+            event, ended, _, last = self.fmu.doStep(t, size)
+            if self.events and event and not ended:
+                self.fmu.enterEventMode()
+                ended = self._update()
+            return float(last) if ended else None
+        try:
+            self.fmu.doStep(t, size)
+        except FMICallException as error:
+            if error.status == DISCARD and self.fmu.getBooleanStatus(TERMINATED):
+                return float(self.fmu.getRealStatus(LAST_TIME))
+            raise
+        return None
+
+    def _update(self) -> bool:
+        """Let happen what is due in event mode and leave it; return whether that is the end."""
+        again, ended = True, False
+        while again and not ended:
+            again, ended = self.fmu.updateDiscreteStates()[:2]
+        if not ended:
+            self.fmu.enterStepMode()
+        return bool(ended)
+
+    def _sample(self) -> list[float]:
+        """Return the recorded variables, type by type."""
+        row: list[float] = []
+        for reader in self.readers:
+            row += reader.read(self.fmu.component)
+        return row
+
+
+class _Reader:
+    """Reads variables of one type into memory that is kept, which FMPy's getters make each time."""
+
+    def __init__(self, fmu: Any, kind: str, variables: Sequence[Any], two: bool) -> None:
+        n = len(variables)
+        self.values = ((C_TYPES_2 if two else C_TYPES_3)[kind] * n)()
+        references = (c_uint * n)(*(variable.valueReference for variable in variables))
+        self.function = getattr(fmu, f"fmi{2 if two else 3}Get{kind}")
+        self.arguments = (references, n, self.values) + (() if two else (n,))
+
+    def read(self, component: Any) -> list[float]:
+        """Return their values."""
+        self.function(component, *self.arguments)
+        return list(self.values)
+
+
+def _grouped(variables: Sequence[Any], names: set[str], two: bool) -> dict[str, list[Any]]:
+    """Return the named variables by the type whose function reads them."""
+    groups: dict[str, list[Any]] = {}
+    for variable in variables:
+        if variable.name in names:
+            whole = "Integer" if two else "Int64"
+            kind = whole if variable.type == "Enumeration" else variable.type
+            groups.setdefault(kind, []).append(variable)
+    return groups
+
+
+def _bits(outcome: Outcome) -> tuple[str, bytes]:
+    return outcome.status, np.array(outcome.values).tobytes()
+
+
+# --- the process --------------------------------------------------------------------------------
+
+
+def main() -> None:
+    """Run what comes through standard input until it closes; answer each run with its outcome."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # what the FMU prints does not get between the answers
+    batches: queue.Queue[Any] = queue.Queue()
+    threading.Thread(target=_read, args=(sys.stdin.buffer, batches), daemon=True).start()
+    folder, job = batches.get()
+    try:
+        runner = Runner(folder, job)
+    except Exception as error:
+        _answer(answers, f"the FMU cannot be loaded: {error}")
+        return
+    _answer(answers, "")
+    for values in _waiting(batches):
+        outcome = runner.run(values)
+        _answer(answers, outcome)
+        if outcome.spent:
+            break
+    answers.flush()
+    os._exit(0)  # an FMU in a state of error may hang when its library is unloaded
+
+
+def _waiting(batches: "queue.Queue[Any]") -> Iterator[Mapping[str, float]]:
+    while True:
+        try:
+            yield from batches.get(timeout=IDLE)
+        except queue.Empty:
+            return
+
+
+def _read(stream: BinaryIO, batches: "queue.Queue[Any]") -> None:
+    """Pass on what is sent; end this process with the one that sends, if in the middle of a run."""
+    try:
+        while True:
+            batches.put(pickle.load(stream))
+    except (EOFError, OSError, pickle.UnpicklingError):
+        os._exit(0)
+
+
+def _answer(stream: BinaryIO, answer: object) -> None:
+    pickle.dump(answer, stream)
+    stream.flush()
+
+
+if __name__ == "__main__":
+    main()

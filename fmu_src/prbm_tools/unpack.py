@@ -1,0 +1,44 @@
+"""An FMU unpacked where it can be read: what FMPy and pythonfmu do not agree upon by themselves."""
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+from urllib.parse import unquote
+
+import fmpy  # type: ignore[import-untyped]
+
+
+@contextmanager
+def unpacked(fmu: Path | BinaryIO) -> Iterator[Path]:
+    """Unpack an FMU to a folder that pythonfmu can read, and remove it afterwards.
+
+    Raises
+    ------
+    RuntimeError
+        If every candidate has characters that a URI encodes.
+    """
+    candidates = (tempfile.gettempdir(), "/tmp", "/var/tmp", r"C:\Users\Public", ".")
+    for candidate in map(Path, candidates):
+        if candidate.is_dir() and plain(candidate.resolve()):
+            with tempfile.TemporaryDirectory(prefix="prbm_", dir=candidate.resolve()) as folder:
+                fmpy.extract(fmu, unzipdir=folder)
+                yield Path(folder)
+            return
+    raise RuntimeError(
+        f"no folder for temporary files has a path of plain ASCII letters (tried {candidates[0]}); "
+        "set the environment variable TMPDIR to one that has"
+    )
+
+
+def plain(path: Path) -> bool:
+    """Whether pythonfmu can read a path: its URI encodes nothing but spaces.
+
+    Examples
+    --------
+    >>> plain(Path("/tmp/my model")), plain(Path("/tmp/modèle")), plain(Path("/tmp/100%"))
+    (True, False, False)
+    """
+    uri = path.absolute().as_uri().replace("%20", " ")
+    return unquote(uri) == uri and "%" not in uri

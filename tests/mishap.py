@@ -1,0 +1,52 @@
+"""An FMU that writes down its runs, and in which things go wrong as its parameters say."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+
+FINE, RAISES, CRASHES, EXITS, HANGS, CRASHES_ONCE, KILLS_WORKER = range(7)
+
+
+class Mishap(Fmi2Slave):
+    """y = x t, or trouble after the first step; each run adds x to the file MISHAP_LOG."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.x, self.trouble, self.pause, self.y = 1.0, FINE, 0.0, 0.0
+        settable = {
+            "causality": Fmi2Causality.parameter,
+            "variability": Fmi2Variability.tunable,
+        }
+        self.register_variable(Real("x", **settable))
+        self.register_variable(Real("pause", **settable))
+        self.register_variable(Integer("trouble", **settable))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def exit_initialization_mode(self):
+        """Write the run down."""
+        with open(os.environ["MISHAP_LOG"], "a") as log:
+            log.write(f"{self.x!r}\n")
+        time.sleep(self.pause)
+
+    def do_step(self, current_time, step_size):
+        """Step, or do what is asked for."""
+        if self.trouble == RAISES:
+            raise ArithmeticError("the spring is broken")
+        if self.trouble == CRASHES:
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if self.trouble == EXITS:
+            os._exit(3)
+        if self.trouble == HANGS:
+            time.sleep(1e6)
+        if self.trouble == KILLS_WORKER:
+            os.kill(os.getppid(), signal.SIGKILL)
+            time.sleep(1e6)
+        mark = Path(os.environ["MISHAP_LOG"]).with_suffix(".mark")
+        if self.trouble == CRASHES_ONCE and not mark.exists():
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGSEGV)
+        self.y = self.x * (current_time + step_size)
+        return True
