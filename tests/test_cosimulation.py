@@ -10,6 +10,8 @@ from coupled import guide, integrator
 from prbm import ParameterError
 from prbm_tools import cosimulation
 from prbm_tools.cosimulation import GAUSS_SEIDEL, JACOBI, CouplingError, System, simulate
+from prbm_tools.scalar_guide import ScalarGuide
+from support import mechanism
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
@@ -119,6 +121,37 @@ def test_without_events_rows_are_the_communication_points():
     fmus = {"guide": guide(3)}
     found = simulate(fmus, {}, 0.1, 0.01, record=["guide.stop.impact_count"])
     np.testing.assert_allclose(found["time"], 0.01 * np.arange(11), rtol=1e-15)
+
+
+STILL = {"guide.gravity.x": 0.0, "guide.release.displacement": 0.0, "guide.stop.position": 0.1}
+STRUCK = "guide.force.impulse.x"
+
+
+@pytest.mark.parametrize("events", [False, True])
+def test_a_discrete_input_may_be_given_at_any_step(events):
+    """A blow on a guide at rest brings in P^2 / 2 M; in event mode, where there is one."""
+    found = simulate(
+        {"guide": guide(3)}, {}, 0.011, 1e-3, STILL, ["guide.shuttle.vx", "guide.energy.work"],
+        events=events, source=lambda t: {STRUCK: 0.0 if t < 0.0095 else 0.01},
+    )  # fmt: skip
+    mass = ScalarGuide.of(mechanism("PRBDM").values()).mass
+    assert (found["guide.shuttle.vx"][found["time"] < 0.0105] == 0.0).all()
+    assert found["guide.energy.work"][-1] == pytest.approx(0.01**2 / 2 / mass, rel=1e-9)
+
+
+@pytest.mark.parametrize("events", [False, True])
+def test_a_discrete_input_may_be_connected(events):
+    """An impulse that grows with the time is a force: of 0.2 N, in blows of a step."""
+    fmus = {"sum": integrator(), "guide": guide(3)}
+    values = STILL | {"sum.rate": 0.2}
+    found = simulate(
+        fmus, {STRUCK: "sum.value"}, 0.02, 1e-4, values, ["guide.shuttle.vx"], events=events
+    )
+    pushed = simulate(
+        {"guide": guide(3)}, {}, 0.02, 1e-4, STILL | {"guide.force.x": 0.2}, ["guide.shuttle.vx"]
+    )
+    expected = pushed["guide.shuttle.vx"][-1]
+    assert found["guide.shuttle.vx"][-1] == pytest.approx(expected, rel=0.01)  # half a step, 0.5 %
 
 
 @pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])

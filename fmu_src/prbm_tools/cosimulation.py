@@ -83,6 +83,7 @@ class Instance:
         self.events = events and self.version > 2 and bool(interface.hasEventMode)
         self.restorable = bool(interface.canGetAndSetFMUstate)
         self.updating = False
+        self.stepping = False  # in step mode, where events may be had: no discrete inputs then
         self.given: dict[str, Value] = {}
         self.fmu: Any = (FMU2Slave if self.version == 2 else FMU3Slave)(
             guid=description.guid,
@@ -191,7 +192,7 @@ class Instance:
         """Go into event mode, if there is one."""
         if self.events and not self.updating:
             self._call("enterEventMode")
-            self.updating = True
+            self.updating, self.stepping = True, False
 
     def update(self) -> bool:
         """Let happen what is due; return whether there is more of it."""
@@ -201,7 +202,11 @@ class Instance:
         """Go back to steps."""
         if self.updating:
             self._call("enterStepMode")
-            self.updating = False
+            self.updating, self.stepping = False, True
+
+    def at_events(self, name: str) -> bool:
+        """Return whether a variable may be set now only after :meth:`enter_events`."""
+        return self.stepping and self.variable(name).variability != "continuous"
 
     @contextmanager
     def kept(self, needed: bool) -> Iterator[Callable[[], None]]:
@@ -353,7 +358,11 @@ class System:
             instance, name = self.parted(full)
             if instance.variable(name).causality not in causalities:
                 raise CouplingError(f"{full} = {value:g} cannot be given: it is no input")
+            if instance.at_events(name):
+                instance.enter_events()
             instance.set({name: value})
+        if any(instance.updating for instance in self.instances.values()):
+            self.happen()
 
     # -- exchange --
 
@@ -363,12 +372,17 @@ class System:
         self.values |= {f"{instance.name}.{name}": value for name, value in found.items()}
 
     def wire(self, instance: Instance) -> bool:
-        """Set the connected inputs of an instance; return whether one of them has changed."""
+        """Set the connected inputs of an instance; return whether one of them has changed.
+
+        If a discrete one has, the instance is in event mode then.
+        """
         given = {to: self.values[source] for to, source in self.wires[instance.name].items()}
-        changed = given != instance.given
-        instance.set(given)
+        changed = {to: x for to, x in given.items() if x != instance.given.get(to)}
+        if any(instance.at_events(to) for to in changed):
+            instance.enter_events()
+        instance.set({to: x for to, x in given.items() if not instance.at_events(to)})
         instance.given = given
-        return changed
+        return bool(changed)
 
     def exchange(self) -> bool:
         """Read all outputs, set all connected inputs; return whether one of them has changed."""
@@ -409,6 +423,8 @@ class System:
         first = leaders + others if self.scheme == JACOBI else leaders
         for instance in first:
             self.wire(instance)
+        if any(instance.updating for instance in leaders):  # a discrete input has changed
+            self.happen()
         end, happens = self._lead(leaders, end)
         for instance in leaders:
             self.look(instance)
