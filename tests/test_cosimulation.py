@@ -155,6 +155,30 @@ def test_a_discrete_input_may_be_connected(events):
 
 
 @pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
+def test_an_impulse_reaches_the_partner_at_the_time_of_the_impact(scheme):
+    """Two equal guides: momentum is kept to rounding, and the speeds part by Newton's law."""
+    wires = {
+        "b.stop.displacement": "a.shuttle.x",
+        "b.stop.velocity": "a.shuttle.vx",
+        "b.stop.mobility": "a.stop.point.mobility",
+        "a.force.impulse.x": "b.stop.impulse_sum",
+    }
+    values = {f"{name}.gravity.x": 0.0 for name in "ab"} | {
+        "a.release.displacement": 0.0, "a.stop.position": 0.1,
+        "b.release.displacement": -5e-3, "b.stop.restitution": 0.8,
+    }  # fmt: skip
+    fmus = {"a": guide(3), "b": guide(3)}
+    record = ["b.shuttle.vx", "b.stop.impact_count"]
+    found = simulate(fmus, wires, 0.06, 1e-3, values, record, scheme, events=True)
+    (after,) = np.flatnonzero(np.diff(found["b.stop.impact_count"])) + 1
+    a, b = found["a.shuttle.vx"], found["b.shuttle.vx"]
+    assert found["time"][after] == found["time"][after - 1]
+    assert b[after - 1] > 0.1
+    assert a[after] + b[after] == pytest.approx(a[after - 1] + b[after - 1], rel=1e-12)
+    assert a[after] - b[after] == pytest.approx(0.8 * (b[after - 1] - a[after - 1]), rel=1e-9)
+
+
+@pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
 def test_two_with_events_do_what_each_does_alone(scheme):
     """One ends its step, the other is put back and follows: to the tolerance of the FMUs."""
     fmus = {"one": guide(3), "other": guide(3)}

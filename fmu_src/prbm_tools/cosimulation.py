@@ -462,9 +462,10 @@ class System:
         self._update()
 
     def _update(self) -> None:
+        self.exchange()
         for _ in range(MOST_UPDATES):
-            changed = self.exchange()
             more = [instance.update() for instance in self.instances.values()]
+            changed = self.exchange()
             if not (changed or any(more)):
                 break
         else:
@@ -472,7 +473,6 @@ class System:
                 f"at {self.time:g} s the instances have exchanged {MOST_UPDATES} times what "
                 "happens, without an end: break the loop of connections between their events"
             )
-        self.exchange()
         for instance in self.instances.values():
             instance.leave_events()
 
