@@ -375,7 +375,7 @@ def cluster(**options) -> LocalCluster:
 def test_a_scheduler_that_does_not_answer_is_told(mishap, log, monkeypatch):
     monkeypatch.setattr(sweeps, "CONNECT", 0.5)
     table = pd.DataFrame({"x": [1.0]})
-    with pytest.raises(SweepError, match="no scheduler answers at tcp://127.*dask scheduler"):
+    with pytest.raises(SweepError, match=r"no scheduler answers at tcp://127.*dask scheduler"):
         sweep(mishap, table, scheduler="tcp://127.0.0.1:1")
     with pytest.raises(SweepError, match="no scheduler answers at nonsense://a"):
         sweep(mishap, table, scheduler="nonsense://a")
