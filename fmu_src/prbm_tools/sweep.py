@@ -372,7 +372,8 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
                 n_workers=1,
                 threads_per_worker=workers or CPU_COUNT,
                 processes=False,
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",  # None would take a port of all interfaces
+                worker_dashboard_address="127.0.0.1:0",
                 memory_limit=0,
                 silence_logs=logging.CRITICAL,
             ) as cluster,
