@@ -6,8 +6,9 @@ Counted by valgrind are the instructions of the native right-hand side; the expo
 of a least-squares line through the logarithms of the upper half of the sizes.
 
 links   the guide with two chains of n links each, 4 to 50: one loop, blocks of mass that grow
-loops   a shuttle on k two-rotation flexures, 2 to 12: k - 1 loops, blocks of mass that do not
 axial   the same chains, whose links stretch: twice the coordinates
+loops   a shuttle on k two-rotation flexures that stretch, 2 to 12: k - 1 loops, blocks of mass
+        that do not grow (rigid links side by side would be over-constrained)
 """
 
 import argparse
@@ -24,16 +25,19 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from native import inclusive
+from native import RIGHT_HAND_SIDE, inclusive
 
 from c_importer import Job, execute, kernel_library, unpack, write
 from prbm import Flexure, Mechanism, assemble
 from prbm_fmu import native_fmu
+from prbm_fmu.reference import steps
+from prbm_tools.simulate import Experiment
 from support import mechanism
 
 LINKS = (4, 8, 12, 18, 25, 35, 50)  # a flexure
 LEAVES = (2, 3, 4, 6, 8, 10, 12)
 UNTIL = 2e-5  # s: enough steps for a mean
+STEPS = 20  # are enough, too, where they are short
 
 
 def chains(n: int, axial: bool = False) -> Mechanism:
@@ -45,7 +49,7 @@ def chains(n: int, axial: bool = False) -> Mechanism:
 
 def leaves(k: int) -> Mechanism:
     """Return a shuttle on k flexures side by side, of which the first and last are the guide's."""
-    guide = mechanism("PRBDM2R")
+    guide = mechanism("PRBDM2RAxial")
     shuttle, x = guide.bodies[0], [f"{i / (k - 1):.17g}*shuttle.width" for i in range(k)]
     body = dataclasses.replace(
         shuttle, points={f"p{i}": (x[i], "flexure.length") for i in range(k)}
@@ -64,6 +68,7 @@ def leaves(k: int) -> Mechanism:
 
 def instructions(given: Mechanism) -> float:
     """Return the instructions of a right-hand side of a mechanism, on average."""
+    until = min(UNTIL, STEPS / steps(given, {}, Experiment(1.0)))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         with patch.object(native_fmu, "reference", lambda *_: {}):  # else a second in the engine
@@ -71,13 +76,13 @@ def instructions(given: Mechanism) -> float:
         unpack(folder / "model.fmu", folder / "model")
         library = kernel_library("profiled", ("-g",))
         job = Job(
-            folder / "model", points=np.array([0.0, UNTIL]), records=("shuttle.x",), library=library
+            folder / "model", points=np.array([0.0, until]), records=("shuttle.x",), library=library
         )
         counted = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")
         done = execute(job, before=counted)
         if done.status:
             raise RuntimeError(done.errors)
-        calls, total = inclusive(folder / "profile", "solve_motion")
+        calls, total = inclusive(folder / "profile", RIGHT_HAND_SIDE)
     return total / calls
 
 
@@ -94,13 +99,14 @@ def rows(sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Iterator[t
         yield size, cost
 
 
-def grows(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> None:
-    """Print costs and with which exponent they grow."""
+def grows(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> float:
+    """Print costs and with which exponent they grow; return that."""
     print(f"\n{title}")
     size, cost = np.array([*rows(sizes, make)]).T
     half = len(size) // 2
     slope = np.polyfit(np.log(size[half:]), np.log(cost[half:]), 1)[0]
-    print(f"  exponent {slope:.2f} over the upper half of the sizes")
+    print(f"  exponent {slope:.2f} over the upper half of the sizes", flush=True)
+    return float(slope)
 
 
 def main() -> None:
@@ -113,7 +119,7 @@ def main() -> None:
     sizes = tuple(n for n in LINKS if n <= most)
     grows("Links: two chains of n links", sizes, chains)
     grows("Axial: two chains of n links that stretch", sizes, lambda n: chains(n, axial=True))
-    grows("Loops: k two-rotation flexures side by side", LEAVES, leaves)
+    grows("Loops: k two-rotation flexures that stretch, side by side", LEAVES, leaves)
 
 
 if __name__ == "__main__":

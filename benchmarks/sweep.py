@@ -1,7 +1,8 @@
 """What a sweep costs beside its FMU, and what a second worker brings.
 
     python build_fmu.py --model PRBDM2R
-    python benchmarks/sweep.py --runs 10000
+    python benchmarks/sweep.py
+    python benchmarks/sweep.py --stop-time 0.001
 
 Each run is a second of the 2R guide in a thousand steps, its restitution and the offset of its wall
 drawn at random; two final values and two reductions of one output are kept.  Beside the sweep stand
@@ -28,7 +29,7 @@ import pandas as pd
 from prbm_tools.simulate import reporter
 from prbm_tools.sweep import samples, sweep
 
-STOP_TIME, STEP, TOLERANCE = 1.0, 1e-3, 1e-8
+STEP, TOLERANCE = 1e-3, 1e-8
 READ = "shuttle.vx"
 OUTPUTS = ["stop.impact_count", "stop.impact_time", "max(shuttle.vx)", "mean(shuttle.vx)"]
 RANGES = {"stop.restitution": (0.4, 0.8), "stop.offset": (-4e-3, 4e-3)}
@@ -42,13 +43,13 @@ class Cost:
     processor: float
 
 
-def swept(fmu: Path, table: pd.DataFrame, workers: int) -> Cost:
+def swept(fmu: Path, table: pd.DataFrame, stop_time: float, workers: int) -> Cost:
     """Return what a run of a sweep costs, start of the workers included."""
     with tempfile.TemporaryDirectory() as folder:
         wall, processor = time.perf_counter(), _processor()
         results = sweep(
             fmu, table, Path(folder) / "results.parquet", outputs=OUTPUTS,
-            stop_time=STOP_TIME, step=STEP, tolerance=TOLERANCE, workers=workers,
+            stop_time=stop_time, step=STEP, tolerance=TOLERANCE, workers=workers,
             progress=reporter(),
         )  # fmt: skip
         wall, processor = time.perf_counter() - wall, _processor() - processor
@@ -62,7 +63,7 @@ def _processor() -> float:
     return sum(os.times()[:4])
 
 
-def bare(fmu: Path, table: pd.DataFrame) -> Cost:
+def bare(fmu: Path, table: pd.DataFrame, stop_time: float) -> Cost:
     """Return what a run costs in a loop that does nothing but move the FMU."""
     description = fmpy.read_model_description(fmu)
     reference = {v.name: v.valueReference for v in description.modelVariables}
@@ -72,11 +73,11 @@ def bare(fmu: Path, table: pd.DataFrame) -> Cost:
 
         def run(row: dict[str, float]) -> None:
             instance.reset()
-            instance.setupExperiment(tolerance=TOLERANCE, startTime=0.0, stopTime=STOP_TIME)
+            instance.setupExperiment(tolerance=TOLERANCE, startTime=0.0, stopTime=stop_time)
             instance.setReal([reference[name] for name in row], [*row.values()])
             instance.enterInitializationMode()
             instance.exitInitializationMode()
-            for k in range(round(STOP_TIME / STEP)):
+            for k in range(round(stop_time / STEP)):
                 instance.doStep(currentCommunicationPoint=k * STEP, communicationStepSize=STEP)
                 instance.getReal([reference[READ]])
             instance.terminate()
@@ -86,14 +87,14 @@ def bare(fmu: Path, table: pd.DataFrame) -> Cost:
     return cost
 
 
-def one_by_one(fmu: Path, table: pd.DataFrame) -> Cost:
+def one_by_one(fmu: Path, table: pd.DataFrame, stop_time: float) -> Cost:
     """Return what a run costs with FMPy's simulate_fmu, the FMU unpacked."""
     names = ["stop.impact_count", "stop.impact_time", READ]
     with tempfile.TemporaryDirectory() as folder:
         fmpy.extract(fmu, unzipdir=folder)
         return _each(
             lambda row: fmpy.simulate_fmu(
-                folder, stop_time=STOP_TIME, output_interval=STEP, relative_tolerance=TOLERANCE,
+                folder, stop_time=stop_time, output_interval=STEP, relative_tolerance=TOLERANCE,
                 start_values=row, output=names,
             ),
             table,
@@ -117,21 +118,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--runs", type=int, default=10000, help="rows of the table")
     parser.add_argument("--loops", type=int, default=200, help="rows for the loops beside it")
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
+    parser.add_argument("--stop-time", type=float, default=1.0, help="of a run [s]; of one step, "
+                        "0.001, what a sweep costs beside the steps is all there is")  # fmt: skip
     options = parser.parse_args(arguments)
     if not options.fmu.is_file():
         sys.exit(f"{options.fmu} does not exist; `python build_fmu.py` builds it.")
 
-    table = samples(RANGES, options.runs, method="latin")
+    table, stop_time = samples(RANGES, options.runs, method="latin"), options.stop_time
     few = table[: options.loops]
-    rows = {"FMU alone (before)": bare(options.fmu, few)}
-    rows["simulate_fmu"] = one_by_one(options.fmu, few)
+    rows = {"FMU alone (before)": bare(options.fmu, few, stop_time)}
+    rows["simulate_fmu"] = one_by_one(options.fmu, few, stop_time)
     for workers in options.workers:
-        rows[f"sweep, {workers} worker{'s' if workers > 1 else ''}"] = swept(
-            options.fmu, table, workers
-        )
-    rows["FMU alone (after)"] = bare(options.fmu, few)
+        name = f"sweep, {workers} worker{'s' if workers > 1 else ''}"
+        rows[name] = swept(options.fmu, table, stop_time, workers)
+    rows["FMU alone (after)"] = bare(options.fmu, few, stop_time)
 
-    print(f"{options.runs} runs of {STOP_TIME:g} s; load of the machine {os.getloadavg()[0]:.1f}")
+    print(f"{options.runs} runs of {stop_time:g} s; load of the machine {os.getloadavg()[0]:.1f}")
     print(f"{'a run costs':<20}{'wall [ms]':>11}{'CPU [ms]':>11}{'runs/s':>9}")
     for name, cost in rows.items():
         wall, processor = 1e3 * cost.wall, 1e3 * cost.processor

@@ -471,15 +471,15 @@ class Problem:
     def gap(self, t: float, y: Real) -> float:
         """Return the gap of the first stop [m]."""
         n = self.simulation.system.n
-        return float(self.simulation.equations.gaps(t, np.exp(1j * y[:n]))[0])
+        return float(self.simulation.equations.gaps(t, self.simulation.system.directions(y[:n]))[0])
 
     def rebound(self, y: Real) -> Real:
         """Return the state after an impact at the first stop."""
         system, n = self.simulation.system, self.simulation.system.n
-        e, v = np.exp(1j * y[:n]), y[n : 2 * n]
+        e, v = system.directions(y[:n]), y[n : 2 * n]
         M, _ = inertia(system.H, self.simulation.equations.J, e)
-        G = constraints.jacobian(system.gaps[:1], e)
-        X = contact.response(M, constraints.jacobian(system.loops, e), G)
+        G = constraints.gap_rows(system).jacobian(e)[:1]
+        X = contact.response(M, constraints.jacobian(system.spread(system.loops), e), G)
         P = contact.newton(G @ X, G @ v, np.array([self.simulation.values["stop.restitution"]]))
         result = y.copy()
         result[n : 2 * n] = v + X @ P

@@ -254,6 +254,16 @@ CHANGES = {
     "part with a name of Python": ('name = "anvil"', 'name = "lambda"', "a word of Python"),
     "part with a name too long": ('name = "rub"', f'name = "{"x" * 300}"', "write a shorter name"),
     "point with spaces": ("side = [0", '"my side" = [0', "ground.my side = 'my side': use letters"),
+    "place far away": (
+        '"50 mm"]',
+        '"5e12 m"]',
+        "ground.far is drawn at (0.06 m, 5e+12 m): draw the mechanism within 1000 m",
+    ),
+    "point of a body far away": (
+        'root = ["20 mm"',
+        "root = [1e300",
+        "arm.root is drawn at (1e+300",
+    ),
     # references
     "missing point": (
         'end = "anvil.hook"',

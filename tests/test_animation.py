@@ -468,7 +468,7 @@ def test_a_result_without_the_links_leads_to_a_command_that_records_them(
         (["out.gif"], "name what to show: RESULT.csv, --model or --mechanism"),
         (["--model", "PRBDN", "out.gif"], "there is no model 'PRBDN'; did you mean PRBDM"),
         (["--model", "PRBDM", "out.bmp"], "end the name in .gif or .mp4"),
-        (["--model", "PRBDM", "--set", "stop.restitution", "out.gif"], "write a name and a number"),
+        (["--model", "PRBDM", "--set", "stop.restitution", "out.gif"], "write NAME=VALUE"),
         (["--model", "PRBDM", "--set", "stop.restitution=2", "out.gif"], "must be at most 1"),
         (["--model", "PRBDM", "--set", "stop.restitutoin=1", "out.gif"], "did you mean stop.rest"),
         (["--model", "PRBDM", "--stop-time", "-1", "out.gif"], "stop_time = -1 s must be positive"),

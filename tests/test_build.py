@@ -197,7 +197,7 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch, failure):
     def fails(*_: object) -> None:
         raise failure
 
-    monkeypatch.setattr(archive.os, "replace", fails)
+    monkeypatch.setattr(os, "replace", fails)
     with pytest.raises(type(failure)):
         archive.write(path, b"new")
     assert path.read_bytes() == b"old"

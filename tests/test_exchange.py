@@ -83,7 +83,7 @@ def assert_directional(guide, parameters, inputs, discrete):
     rng = np.random.default_rng(0)
     kernel, x = moving(guide, parameters, inputs, discrete, rng)
     count = (len(x) - 2) // 2
-    names, given = list(kernel.slots), np.array([inputs[n] for n in input_names(guide)])
+    names, given = list(kernel.slots), np.array([inputs.get(n, 0.0) for n in input_names(guide)])
 
     def values(step):
         moved = dict(zip(input_names(guide), given + step * du, strict=True))

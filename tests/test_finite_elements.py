@@ -384,3 +384,35 @@ def test_first_impact_converges_with_the_step():
     assert found[0].time == pytest.approx(found[1].time, abs=1e-6)
     restitution = [i.latched.modal_restitution for i in found]
     assert restitution[0] == pytest.approx(restitution[1], abs=1e-3)
+
+
+def test_a_step_that_fails_is_divided_where_an_impact_is_located(monkeypatch):
+    """The whole step to the wall never converges: the impact is found by shorter ones."""
+    from prbm_tools.finite_elements import _StepError, _Transient
+
+    values = {"stop.position": -5e-3}
+    plain = guide(values, elements=4).transient(0.1, 1e-4, impacts=1).impacts[0]
+    integrate, failed = _Transient._integrate, []
+
+    def sometimes(self, t, q, v, end, steps, look):
+        if steps == 1 and end - t < 0.9999e-4:
+            failed.append(t)
+            raise _StepError("did not converge")
+        return integrate(self, t, q, v, end, steps, look)
+
+    monkeypatch.setattr(_Transient, "_integrate", sometimes)
+    divided = guide(values, elements=4).transient(0.1, 1e-4, impacts=1).impacts[0]
+    assert failed
+    assert divided.time == pytest.approx(plain.time, abs=1e-7)  # shorter steps, smaller errors
+
+
+@pytest.mark.parametrize("end", [0.0028, 0.0123, 0.0201, 0.0283])
+def test_a_transient_ends_at_its_end(end):
+    """Whatever rounding leaves of the last step."""
+    fe = guide({"stop.position": 0.03}, elements=2)
+    run = fe.transient(end, 1e-4)
+    assert run["time"][-1] == pytest.approx(end, abs=1e-9)
+    interrupted = finite_elements._Transient(fe, 1e-4, 0.9)
+    q, v = fe.release()
+    t, *_ = interrupted._fly(end * (1 - 1e-13), q, v, end)  # nothing is left to do
+    assert t == pytest.approx(end, rel=1e-12)

@@ -15,6 +15,7 @@ from scipy.integrate import solve_bvp
 
 import finite_elements
 from prbm import EquilibriumError, ParameterError, assemble, equilibrium, modal_restitution, modes
+from prbm.flexure import MODELS, segments
 from prbm.forces import elastic_energy
 from prbm_tools.beams import end_force, end_moment, wavenumber
 from support import mechanism
@@ -303,6 +304,21 @@ def test_axial_compliance_leaves_bounce_and_pitch_to_the_model():
         assert ratios == pytest.approx(errors, abs=1e-3)
     rigid, axial = (models.guide_figures("2R", axial=axial)[[0, 1, 6]] for axial in (False, True))
     np.testing.assert_allclose(axial, rigid, rtol=1e-5)
+
+
+# --- masses ---
+
+
+@pytest.mark.parametrize("name", ["1R", "2R", "3R", "nR"])
+def test_what_a_flexure_weighs(name):
+    """All of itself, but for the 1R: 0.73, half of it at each pivot, as the page tells."""
+    model = replace(MODELS[name], links=4 if name == "nR" else 0)
+    gamma, K_theta = ([c.value for c in part] for part in (model.gamma, model.K_theta))
+    found = segments(model, gamma, K_theta, ("clamp", "clamp"), 0.2, 1.0, 1.0)
+    lumped = 1 / 4 + 1 / (12 * 0.8517**2) if name == "1R" else 0.0
+    assert max(found.lumps) == pytest.approx(lumped)
+    assert round(lumped, 3) in (0.0, 0.365)
+    assert sum(found.rods) + sum(found.lumps) == pytest.approx(2 * lumped or 1.0)
 
 
 # --- the page -----------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ import sys
 import tomllib
 import zipfile
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -20,10 +21,12 @@ import prbm_fmu
 from fmu_host import OK, Instance
 from prbm_fmu.description import Heading, model_description
 from prbm_fmu.documentation import page
+from prbm_fmu.native_fmu import described
 from prbm_fmu.python_fmu import interface, start_sample
 from prbm_fmu.slaves.resolved import mechanism_from, resolved
 from prbm_fmu.units import UNITS
 from prbm_fmu.variables import variables, with_starts
+from prbm_tools.simulate import Experiment
 from support import GUIDES, case, each_shipped
 
 ROOT = Path(__file__).parents[1]
@@ -63,12 +66,14 @@ NAMES = {
     "friction.normal_stiffness stop.position stop.offset stop.restitution stop.friction "
     "stop.rest_speed",
     "input continuous": "force.x force.y force.moment stop.displacement stop.velocity "
-    "base.acceleration.x base.acceleration.y",
+    "base.acceleration.x base.acceleration.y stop.mobility",
+    "input discrete": "force.impulse.x force.impulse.y force.impulse.moment",
     "output continuous": "shuttle.x shuttle.y shuttle.angle shuttle.vx shuttle.vy shuttle.omega "
-    "stop.gap stop.gap_rate stop.force base.force.x base.force.y base.moment energy.kinetic "
+    "stop.gap stop.gap_rate stop.force stop.point.displacement stop.point.velocity "
+    "stop.point.mobility base.force.x base.force.y base.moment energy.kinetic "
     "energy.elastic energy.gravitational energy.dissipated energy.work",
     "output discrete": "stop.contact stop.impact_count stop.impact_time stop.approach_speed "
-    "stop.rebound_speed stop.impulse stop.energy_lost stop.modal_restitution",
+    "stop.rebound_speed stop.impulse stop.energy_lost stop.modal_restitution stop.impulse_sum",
     "local fixed": "mode.frequency",
 }
 FLEXURES = {
@@ -124,10 +129,13 @@ def test_display_units_are_scaled_as_their_prefixes_say():
 @each_shipped
 def test_velocities_are_declared_as_derivatives(fmus, model):
     listed = {v.name: v for v in read_model_description(str(fmus[model])).modelVariables}
-    rates = {"vx": "x", "vy": "y", "omega": "angle", "gap_rate": "gap", "strain_rate": "strain"}
+    rates = {"vx": "x", "vy": "y", "omega": "angle", "gap_rate": "gap", "strain_rate": "strain",
+             "point.velocity": "point.displacement"}  # fmt: skip
     declared = set()
     for name, v in listed.items():
         owner, _, what = name.rpartition(".")
+        if owner.endswith(".point"):
+            owner, what = owner.removesuffix(".point"), f"point.{what}"
         if what in rates:
             assert v.derivative is listed[f"{owner}.{rates[what]}"], name
             declared.add(what)
@@ -159,7 +167,7 @@ def test_no_output_depends_at_once_on_an_input(fmus, model):
         instance.set(dict.fromkeys(inputs, 1e-3))
         after = instance.values()
     outputs = [n for n, v in instance.variables.items() if v.causality == "output"]
-    assert len(inputs) == 3 * len(guide.forces) + 2 * len(guide.stops) + 2
+    assert len(inputs) == 6 * len(guide.forces) + 3 * len(guide.stops) + 2
     assert {n: after[n] for n in outputs} == {n: before[n] for n in outputs}
 
 
@@ -201,10 +209,27 @@ def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
         with_starts(listed, {"stop.restitutoin": 1.0})
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "shuttle.x", "stop.gap", "stop.displacement", "force.x", "energy.work", "link[1].angle",
+        "mode.frequency", "time", "flexure.gamma0", "stop.slip_indicator", "stop.impact",
+    ],
+)  # fmt: skip
+def test_a_parameter_cannot_have_the_name_of_another_variable(mechanisms, name):
+    """Of none that is in any of the FMUs of a mechanism."""
+    guide = mechanisms["PRBDM2R"]
+    named = replace(guide, geometry=(*guide.geometry, prbm.Parameter(name, 1.0)))
+    with pytest.raises(prbm.MechanismError, match=f"have the name {re.escape(name)}: rename"):
+        described(named, {}, 3, clock=True)
+    harmless = replace(guide, geometry=(*guide.geometry, prbm.Parameter("shuttle.depth", 1.0)))
+    assert {v.name for v in interface(harmless, {})} > {"shuttle.depth", "shuttle.x"}
+
+
 @each_shipped
 def test_the_page_names_every_variable_and_the_limits(mechanisms, model):
     listed = interface(mechanisms[model], {})
-    html = page(mechanisms[model], listed)
+    html = page(mechanisms[model], listed, Experiment())
     for v in listed:
         assert f"<code>{v.name}</code>" in html
     for limit in ("no duration", "Stronge", "NumPy", "percent-encoded", "End moments", "retreats"):

@@ -521,6 +521,20 @@ def test_a_release_velocity_that_the_loops_forbid_is_refused():
         Simulation(upwards, values)
 
 
+def test_discrete_changes_leave_what_is_watched_alone_and_new_geometry_does_not():
+    """A wall is hit at the same place as in a simulation that began with its offset."""
+    sim = simulation("PRBDM2R")
+    rows = sim.equations.gap_rows
+    sim.advance(0.05)
+    assert len(sim.record) >= 1
+    assert sim.equations.gap_rows is rows
+    sim.set({"stop.offset": 2e-3})
+    sim.advance(0.051)
+    fresh = simulation("PRBDM2R", {"stop.offset": 2e-3})
+    np.testing.assert_array_equal(sim.equations.gap_rows.B, fresh.equations.gap_rows.B)
+    assert not np.array_equal(sim.equations.gap_rows.B, rows.B)
+
+
 def test_a_step_that_is_far_too_long_for_stretching_links_is_taken_again():
     """The axial modes of a chain are a thousand times faster than what chooses the first step."""
     from dataclasses import replace

@@ -13,9 +13,11 @@ from prbm.kinetics import inertia
 from prbm.modal import modes_at
 from prbm_tools import impact_map
 from prbm_tools.figures import png
+from prbm_tools.records import RecordError
 from support import mechanism
 
 WEIGHTLESS = {"gravity.x": 0.0}
+TIMES = np.linspace(0.0, 0.1, 20)
 CORNERS = {"heights": (-10e-3, 0.0, 10e-3), "offsets": (-4e-3, 0.0, 4e-3)}
 
 
@@ -119,19 +121,28 @@ def test_modes_at_a_static_shape_are_those_of_the_shape():
 
 
 def test_a_1r_is_recovered_from_its_own_response():
-    truth = {"stop.restitution": 0.47, "flexure.K_theta": 2.7, "stop.position": -2e-3}
+    """What it was given: 0.47 and 2.7; and the map by fits of a 1R is its own restitution."""
+    truth = {"stop.restitution": 0.47, "flexure.K_theta": 2.7}
+    wall = WEIGHTLESS | {"stop.position": -2e-3}
     times = np.linspace(0.0, 0.12, 60)
-    wanted = impact_map.response(guide("1R"), WEIGHTLESS | truth, times)
-    fit = impact_map.fit_response(
-        guide("1R"),
-        ["stop.restitution", "flexure.K_theta"],
-        times,
-        wanted,
-        WEIGHTLESS | {"stop.position": -2e-3},
-    )
-    assert fit.values["stop.restitution"] == pytest.approx(0.47, abs=1e-4)
-    assert fit.values["flexure.K_theta"] == pytest.approx(2.7, rel=1e-4)
-    assert fit.rmse < 1e-7
+    wanted = impact_map.response(guide("1R"), wall | truth, times)
+    found = impact_map.fit_response(guide("1R"), [*truth], times, wanted, wall)
+    assert [found.values[name] for name in truth] == pytest.approx([0.47, 2.7], rel=1e-5)
+    assert found.identifiable
+    start = WEIGHTLESS | truth | {"release.displacement": -8e-3}
+    of_map = impact_map.fitted(guide("1R"), [-2e-3], [0.0], start).restitution
+    assert of_map.item() == pytest.approx(0.47, abs=1e-4)
+
+
+def test_a_response_goes_along_the_release():
+    """A cantilever is released upwards: nearly its y, and where it starts is where it was put."""
+    leaf = mechanism("Cantilever")
+    start = {"release.displacement": 6e-3}
+    seen = impact_map.response(leaf, start, np.linspace(0.0, 0.04, 20))
+    assert seen[0] == pytest.approx(6e-3, abs=1e-9)
+    simulation = Simulation(leaf, start, tolerance=1e-7)
+    simulation.advance(0.04)
+    assert seen[-1] == pytest.approx(simulation.outputs()["tip.y"], abs=1e-7)
 
 
 def test_the_fit_finds_the_simulated_restitution():
@@ -162,6 +173,15 @@ def test_a_map_is_written_and_drawn(tmp_path):
         impact_map.heat_map([one, one]), impact_map.surface([one, one]), impact_map.energies(one),
     ):  # fmt: skip
         assert png(figure).startswith(b"\x89PNG")
+    point = impact_map.algebraic(guide(), [-5e-3], [0.0], WEIGHTLESS)
+    assert png(impact_map.heat_map([point])).startswith(b"\x89PNG")
+
+
+def test_every_way_tells_how_much_of_it_is_done():
+    for way in (impact_map.algebraic, impact_map.closed_form, impact_map.simulated):
+        told = []
+        way(guide("1R"), [-2e-3, 0.0], [0.0], WEIGHTLESS, progress=told.append)
+        assert told == [0.5, 1.0]
 
 
 def test_walls_out_of_reach_and_unknown_stops_are_told():
@@ -171,8 +191,12 @@ def test_walls_out_of_reach_and_unknown_stops_are_told():
         )
     with pytest.raises(ParameterError, match="no stop bumper"):
         impact_map.algebraic(guide(), stop="bumper")
-    with pytest.raises(ParameterError, match="no parameter"):
-        impact_map.fit_response(guide(), ["stop.bounce"], np.zeros(2), np.zeros(2))
+    with pytest.raises(ParameterError, match="no variable"):
+        impact_map.fit_response(guide(), ["stop.bounce"], TIMES, TIMES)
+    with pytest.raises(RecordError, match="too few"):
+        impact_map.fit_response(guide(), ["stop.restitution"], TIMES[:9], TIMES[:9])
+    with pytest.raises(ParameterError, match="position of impact is an expression"):
+        impact_map.algebraic(mechanism("ImpactOscillator"))
 
 
 def test_the_first_impact_is_that_of_the_stop_that_was_asked_for():

@@ -299,6 +299,17 @@ def test_the_arrays_of_a_mechanism_are_the_same(name):
         assert not (outside * np.abs(system.H)).any()
 
 
+def test_the_size_is_the_same_where_all_centres_are_at_one_place():
+    guide = mechanism("Cantilever")
+    (root,), (tip,) = guide.ground.values(), guide.bodies
+    balanced = replace(guide, bodies=(replace(tip, centre=root),))
+    system = assembly.assemble(balanced, balanced.values())
+    ours = KernelSystem(balanced, system.n)
+    ours.assemble(balanced.values())
+    assert_same(ours.length, system.length)
+    assert system.length > 0.0
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -591,6 +602,7 @@ def test_what_cannot_be_closed_is_told_in_the_same_words():
     springs=forces.springs, elastic_energy=forces.elastic_energy, field_row=forces.field_row,
     force_row=forces.force_row, generalised=forces.generalised,
     gravitational_energy=forces.gravitational_energy, normal_force=forces.normal_force,
+    load_rows=forces.load_rows,
 )  # fmt: skip
 @each_mechanism
 def test_forces_and_energies_are_the_same(name):
@@ -617,6 +629,10 @@ def test_forces_and_energies_are_the_same(name):
         for lift in (-1.0, 1.0):
             found = kernel().normal_force(lift, 2.0, 3.0)
             assert found == forces.normal_force(lift, 2.0, 3.0)
+        for i, frame in enumerate(system.pushed):
+            rows = np.zeros((3, n))
+            kernel().load_rows(ours.structure, ours.structure.pushed[i], e, rows)
+            assert_same(rows, forces.load_rows(system, frame, e))
 
 
 # --- contact.c -----------------------------------------------------------------------------------
@@ -874,13 +890,13 @@ class KernelEquations:
         )
         given = [(f.real, f.imag, m) for f, m in zip(inputs.forces, inputs.moments, strict=True)]
         walls = [(wall.position, wall.rate, wall.since) for wall in inputs.walls]
-        self.arrays = [np.array(part, float) for part in (given, walls)]
+        self.arrays = [np.array(part, float) for part in (given, walls, inputs.mobilities)]
         self.states = [
             np.array(part, np.int32) for part in (discrete.holds, discrete.slides, discrete.rubs)
         ]
         base = structures()["Complex"](inputs.base.real, inputs.base.imag)
         self.inputs = structures()["Inputs"](
-            self.arrays[0].ctypes.data, base, self.arrays[1].ctypes.data
+            self.arrays[0].ctypes.data, base, *(part.ctypes.data for part in self.arrays[1:])
         )
         known = structures()["Discrete"](*(state.ctypes.data for state in self.states))
         kernel().set_equations(self.structure, self.inputs, known, omega)
@@ -917,6 +933,7 @@ def random_inputs(system, e, rng, driven):
             dynamics.Wall(x + 1e-5 * rng.normal(), driven * 0.01 * rng.normal(), rng.normal())
             for x in touched
         ),
+        tuple(driven * rng.uniform(size=len(touched))),
     )
 
 
@@ -1130,8 +1147,8 @@ ELSEWHERE = {
     "constraints": {"carried_convective", "first"},
     "contact": set(),
     "dynamics": {
-        "check_input", "input_names", "mass_accelerations", "offsets", "stop_forces", "torques",
-        "without_hold",
+        "check_input", "impulse_names", "input_names", "mass_accelerations", "offsets",
+        "stop_forces", "torques", "without_hold",
     },
     "flexure": set(),
     "forces": set(),

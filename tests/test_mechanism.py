@@ -9,8 +9,11 @@ import pytest
 
 from prbm import (
     Body,
+    EquilibriumError,
     Flexure,
     FlexureType,
+    Force,
+    Joint,
     Mechanism,
     MechanismError,
     Parameter,
@@ -184,6 +187,71 @@ def test_a_flexure_without_length_is_refused():
     short = changed(flexures=(LEFT, RIGHT), ground={"left": (0, "flexure.length"), "right": (0, 0)})
     with pytest.raises(ParameterError, match=r"left_flexure from ground\.left to shuttle\.left"):
         assemble(short, short.values())
+
+
+def around(n: int = 8) -> Mechanism:
+    """Return a wheel on two chains that meet where it is fixed, under its centre of mass."""
+    return Mechanism(
+        name="Wheel",
+        title="A wheel about the one point that holds it",
+        ground={"hub": (0.0, 0.0)},
+        bodies=(Body("rim", 0.02, 1e-5, (0.0, 0.0), {"right": (0.04, 0.0), "top": (0.0, 0.04)}),),
+        flexure_types=(FlexureType("leaf", "nR", 1e-4, 8e-3, 2e11, 7800.0, n=n),),
+        flexures=(
+            Flexure("along", "leaf", "ground.hub", "rim.right"),
+            Flexure("across", "leaf", "ground.hub", "rim.top"),
+        ),
+        release=Release("rim"),
+        forces=(Force("push", "rim"),),
+    )
+
+
+def test_a_mechanism_has_a_size_even_if_all_its_centres_are_at_one_place():
+    """Each leaf resists a turn about its root with 4 EI/L; tolerances go with the size."""
+    wheel = around(60)
+    system = assemble(wheel, wheel.values())
+    assert system.length == pytest.approx(0.04)
+    shape = equilibrium(system, loads={"push.moment": 1e-6})
+    turn = shape.q[system.bodies["rim"].j]
+    assert 1e-6 / turn == pytest.approx(2 * 4 * (2e11 * 8e-3 * 1e-4**3 / 12) / 0.04, rel=2e-3)
+
+
+def truss() -> Mechanism:
+    """Return a body on three bars that do not meet in a point."""
+    pins = ("pin", "pin")
+    return Mechanism(
+        name="Truss",
+        title="Three bars",
+        ground={"a": (0.0, 0.0), "b": (0.06, 0.0), "c": (0.1, 0.03)},
+        bodies=(Body("arm", 0.03, 1e-5, (0.03, 0.05), {"p": (0.0, 0.04), "q": (0.06, 0.04)}),),
+        flexure_types=(FlexureType("bar", "2R", 1e-4, 8e-3, 2e11, 7800.0),),
+        flexures=(
+            Flexure("first", "bar", "ground.a", "arm.p", pins),
+            Flexure("second", "bar", "ground.b", "arm.q", pins),
+            Flexure("third", "bar", "ground.c", "arm.q", pins),
+        ),
+        release=Release("arm"),
+    )
+
+
+def test_a_mechanism_that_cannot_move_is_refused_by_the_names_of_its_loops():
+    held = truss()
+    with pytest.raises(MechanismError, match="closed by second, third leave the mechanism no mot"):
+        assemble(held, held.values())
+
+
+def test_a_release_along_which_a_body_cannot_move_is_refused_for_that():
+    """A pinned wheel turns about its centre of mass, which stays where it is."""
+    wheel = dataclasses.replace(
+        around(),
+        ground={"hub": (0.0, 0.0), "side": (0.06, 0.01)},
+        bodies=(Body("rim", 0.02, 1e-5, (0, 0), {"hub": (0.0, 0.0), "right": (0.02, 0.0)}),),
+        flexures=(Flexure("leaf_1", "leaf", "ground.side", "rim.right"),),
+        joints=(Joint("pin", "ground.hub", "rim.hub"),),
+        gravity=(0.0, -9.81),
+    )
+    with pytest.raises(EquilibriumError, match=r"= 0 m: the body rim cannot move along the direc"):
+        Simulation(wheel)
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])

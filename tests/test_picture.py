@@ -261,7 +261,7 @@ def test_a_file_is_found_as_well_as_a_name() -> None:
         (["Bistabel"], "there is no model 'Bistabel'; did you mean Bistable?"),
         (["none.toml"], "none.toml: cannot be read"),
         (["PRBDM", "--set", "shuttle.mas=1"], "did you mean shuttle.mass"),
-        (["PRBDM", "--set", "shuttle.mass"], "write a name and a number"),
+        (["PRBDM", "--set", "shuttle.mass"], "write NAME=VALUE"),
         (["PRBDM", "--modes", "5"], "PRBDM has 1 modes, 5 are asked for"),
         (["PRBDM", "--out", "nowhere/a.png"], "nowhere/a.png: cannot be written"),
     ],

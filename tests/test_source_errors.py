@@ -1,21 +1,18 @@
-"""The source's errors, shown on its own algorithm (`source_model`), and that the cures cure."""
+"""The source's errors, shown on its own algorithm, and that the cures cure."""
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 from prbm import assemble, equilibrium
-from source_model import (
-    EI,
-    FLEXURE_MASS,
+from prbm_tools.source_model import (
     GAMMA_1R,
     GAMMA_2R,
     GRAVITY,
     K_THETA_1R,
     K_THETA_2R,
-    LENGTH,
     PROJECTION_TOLERANCE,
-    SHUTTLE_MASS,
+    STEEL,
     Chain,
     Link,
     Run,
@@ -29,6 +26,9 @@ from source_model import (
 )
 from support import energy_balance, mechanism, simulation
 
+EI, LENGTH, FLEXURE_MASS, SHUTTLE_MASS = (
+    STEEL.EI, STEEL.length, STEEL.flexure_mass, STEEL.shuttle_mass,
+)  # fmt: skip
 REFITTED_K_THETA_2R = np.array([8.7614, 4.0104])
 FIXED_GUIDED_PAIR = 24 * EI / LENGTH**3  # Euler-Bernoulli stiffness of the guide [N/m]
 SPAN = 0.25  # more than a period [s]

@@ -5,7 +5,8 @@ import pytest
 
 from prbm import ParameterError
 from prbm_tools.figures import png
-from prbm_tools.spectrum import after_impact, figure, peaks, spectrum
+from prbm_tools.simulate import simulate
+from prbm_tools.spectrum import after_impact, after_last_impact, figure, peaks, spectrum
 from support import mechanism
 
 
@@ -68,3 +69,24 @@ def test_too_few_or_unequal_samples_are_refused():
 def test_the_figure_is_drawn(small_motion):
     assert png(figure(small_motion, highest=400.0)).startswith(b"\x89PNG")
     assert len(figure(small_motion, ("along",)).axes) == 1
+
+
+def test_after_the_last_impact_a_1r_rings_at_its_one_frequency():
+    """The hammer bounces off once, and vibrates at small amplitude in 20 periods of a record."""
+    values = {"release.displacement": -3e-3, "impact.restitution": 0.5, "damping.beta": 0.0}
+    result = simulate(mechanism("ImpactOscillator"), values, 1.0)
+    heard = after_last_impact(result)
+    assert heard.time[0] > 0.0
+    assert heard.impact is result.impacts[-1]
+    (hammer,) = peaks(*spectrum(heard.time, heard.along), share=0.3)
+    assert hammer == pytest.approx(heard.modes[1], rel=0.01)  # nearly linear
+
+
+def test_there_is_nothing_to_hear_at_rest_or_without_an_impact():
+    guide = mechanism("PRBDM")
+    with pytest.raises(ParameterError, match="shuttle rests on stop"):
+        after_last_impact(simulate(guide, {"stop.restitution": 0.0}, 0.2))
+    with pytest.raises(ParameterError, match="has no impact"):
+        after_last_impact(simulate(guide, stop_time=0.01))
+    with pytest.raises(ParameterError, match="samples follow the last impact"):
+        after_last_impact(simulate(guide, stop_time=0.05))

@@ -515,6 +515,10 @@ def test_the_command_sums_up(native, capsys):
         "2 runs, 1 failed: r",
         "row 1 failed: stop.restitution = 2 must be at most 1",
     ]
+    assert main(["a.fmu", "t.csv", "--set", "gravity.x=down"]) == 2
+    assert capsys.readouterr().err == (
+        "--set gravity.x=down: write a name and a number, as name=0.5\n"
+    )
     assert main(["--workers", "two"]) == 2
     assert capsys.readouterr().err.startswith("argument --workers: invalid int value: 'two'")
 

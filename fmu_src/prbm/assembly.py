@@ -21,6 +21,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from .errors import MechanismError, ParameterError
 from .flexure import Segments, segments, stub
 from .mechanism import (
     GROUND,
+    TINY_LENGTH,
     Flexure,
     FlexureType,
     Joint,
@@ -41,6 +43,9 @@ from .mechanism import (
     body_of,
     value,
 )
+
+if TYPE_CHECKING:
+    from .constraints import Watched
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -198,6 +203,13 @@ class System:
         return result
 
     @cached_property
+    def watched(self) -> "Watched":
+        """The rows of all gaps, slides and rubs, made once: discrete changes do not touch them."""
+        from .constraints import Watched  # which is about systems
+
+        return Watched.of(self)
+
+    @cached_property
     def stretches(self) -> Whole:
         """The coordinates that are stretches."""
         result: Whole = np.flatnonzero(self.arm != np.arange(self.n))
@@ -327,6 +339,10 @@ class _Assembler:
         """Return where an end of a part is drawn."""
         return self.at(self.mechanism.point(reference, part.name))
 
+    def length(self, flexure: Flexure) -> float:
+        """Return the length of a flexure as drawn [m]."""
+        return abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
+
     def coordinate(self, start: float, arm: int | None = None) -> int:
         """Add an angle, or the stretch of an arm."""
         j = len(self.q0)
@@ -358,7 +374,7 @@ class _Assembler:
             else:
                 names = ", ".join(part.name for part in waiting)
                 raise MechanismError(
-                    f"{names} have no connection to the ground: the mechanism falls apart"
+                    f"nothing connects {names} to the ground: the mechanism falls apart"
                 )
             waiting.remove(part)
             if isinstance(part, Joint):
@@ -369,7 +385,11 @@ class _Assembler:
             if body.name not in self.origin:
                 raise MechanismError(f"the body {body.name} is not held by any flexure or joint")
             self.body(body.name)
-        return self.arrays()
+        result = self.arrays()
+        e = result.directions(result.q0)
+        check_loops(result.spread(result.loops), e, [name for name, _ in self.loops])
+        check_masses((e.conj()[:, None] * result.H * e).real, self.J)
+        return result
 
     def body(self, name: str) -> None:
         body = next(b for b in self.mechanism.bodies if b.name == name)
@@ -460,8 +480,8 @@ class _Assembler:
 
     def segments(self, flexure: Flexure) -> Segments:
         kind = next(k for k in self.mechanism.flexure_types if k.name == flexure.type)
-        L = abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
-        if L < 1e-9:
+        L = self.length(flexure)
+        if L < TINY_LENGTH:
             raise ParameterError(
                 f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
                 f"{L:g} m: move its ends apart"
@@ -474,10 +494,15 @@ class _Assembler:
         return segments(model, gamma, K_theta, flexure.ends, L, EI, mass, EA if kind.axial else 0.0)
 
     def size(self) -> float:
-        """Return the size of the mechanism as drawn [m]."""
+        """Return the size of the mechanism as drawn [m].
+
+        The largest distance between points of the ground and centres of mass, or the length of the
+        longest flexure, where all of these are at one place.
+        """
         points = [self.at(p) for p in self.mechanism.ground.values()]
         points += [self.at(body.centre) for body in self.mechanism.bodies]
-        return max(abs(a - b) for a in points for b in points)
+        lengths = [self.length(flexure) for flexure in self.mechanism.flexures]
+        return max(*lengths, *(abs(a - b) for a in points for b in points))
 
     # -- arrays --
 
@@ -486,16 +511,12 @@ class _Assembler:
         arm = np.array(self.arm)
         A = np.array([place.row(n) for place, _ in self.masses])
         m = np.array([mass for _, mass in self.masses])
-        e0 = np.exp(1j * np.array(self.q0))[arm]
+        e0 = np.exp(1j * np.array(self.q0))  # of arms: no place depends on stretches, which are 0
         closures = [place for _, place in self.loops]
         loops = np.array([r for p in closures for r in (p.row(n), -1j * p.row(n))])
         loops_c = np.array([x for p in closures for x in (p.c.real, p.c.imag)])
         loops = loops.reshape(-1, n)
-        e = np.where(arm == np.arange(n), e0, -1j * e0)
         spread = A[:, arm]
-        H = spread.conj().T @ (m[:, None] * spread)
-        check_loops(loops[:, arm], e, [name for name, _ in self.loops])
-        check_masses((e.conj()[:, None] * H * e).real, self.J)
 
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
         self.lines += [(body, "body", self.corners(body)) for body in frames]
@@ -511,7 +532,7 @@ class _Assembler:
             values=dict(self.values),
             q0=np.array(self.q0),
             arm=arm,
-            H=H,
+            H=spread.conj().T @ (m[:, None] * spread),
             J=np.array(self.J),
             K=self.stiffness(),
             A=A,
@@ -702,4 +723,8 @@ def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
             "away, move it out of line, or let flexures stretch (axial = true)"
         )
     if len(loops) >= len(e):
-        raise MechanismError("the loops leave the mechanism no motion")
+        raise MechanismError(
+            f"the loops closed by {', '.join(names)} leave the mechanism no motion: rigid links "
+            "hold every body; take a part away, or let flexures bend (clamp their ends) or stretch "
+            "(axial = true)"
+        )

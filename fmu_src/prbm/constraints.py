@@ -12,6 +12,8 @@ Sources
 .. [1] E. Eich, SIAM J. Numer. Anal. 30 (1993) 1467 (coordinate projection).
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesv, dgetrs
@@ -141,6 +143,20 @@ def slide_rows(system: System) -> Rows:
 def rub_rows(system: System) -> Rows:
     """Return the displacements of all friction points, but for a constant."""
     return Rows(system, system.rubs, np.zeros(len(system.rubs)))
+
+
+@dataclass(frozen=True)
+class Watched:
+    """What is watched of a system in all of its discrete states: its gaps, slides and rubs."""
+
+    gaps: Rows
+    slides: Rows
+    rubs: Rows
+
+    @classmethod
+    def of(cls, system: System) -> "Watched":
+        """Return the rows of a system."""
+        return cls(gap_rows(system), slide_rows(system), rub_rows(system))
 
 
 def saddle(M: Real, columns: Real, rows: Real) -> Real:

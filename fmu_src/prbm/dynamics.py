@@ -16,12 +16,14 @@ import numpy as np
 
 from . import constraints, forces
 from .assembly import FIXED, Complex, Real, System
-from .constraints import Rows, gap_rows, rub_rows, slide_rows
+from .constraints import Rows
 from .errors import ParameterError
 from .kinetics import inertia, kinetic_energy, mass_accelerations
 from .mechanism import Mechanism, finite, unknown, value
 
 STICKS = 0  # and +1, -1: slides along, against the direction
+LOADS = ("x", "y", "moment")  # of a force, and of an impulse
+MOBILITY = "mobility"  # of a wall: an input of its stop
 IDLE = 2  # no friction acts: open, frictionless, or the stop carries everything
 
 
@@ -80,19 +82,29 @@ class Inputs:
         Acceleration of the base [m/s^2].
     walls : (s,) tuple of Wall
         The walls of the stops.
+    mobilities : (s,) tuple of float
+        Their inverse effective masses, by which impacts move them; 0: immovable [1/kg].
     """
 
     forces: tuple[complex, ...]
     moments: tuple[float, ...]
     base: complex
     walls: tuple[Wall, ...]
+    mobilities: tuple[float, ...]
 
 
 def input_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the inputs in the order of the interface."""
-    names = [f"{f.name}.{axis}" for f in mechanism.forces for axis in ("x", "y", "moment")]
+    names = [f"{f.name}.{axis}" for f in mechanism.forces for axis in LOADS]
     names += [f"{s.name}.{what}" for s in mechanism.stops for what in ("displacement", "velocity")]
+    names += impulse_names(mechanism)
+    names += [f"{s.name}.{MOBILITY}" for s in mechanism.stops]
     return (*names, "base.acceleration.x", "base.acceleration.y")
+
+
+def impulse_names(mechanism: Mechanism) -> list[str]:
+    """Return the names of the inputs that are impulses: what they grow by acts at once."""
+    return [f"{f.name}.impulse.{axis}" for f in mechanism.forces for axis in LOADS]
 
 
 def check_input(name: str, number: float, known: Mapping[str, float]) -> float:
@@ -101,11 +113,17 @@ def check_input(name: str, number: float, known: Mapping[str, float]) -> float:
     Raises
     ------
     ParameterError
-        If there is no such input or the value is not finite.
+        If there is no such input, or the value is not finite or out of bounds.
     """
     if name not in known:
         raise ParameterError(unknown(name, known))
-    return finite(name, number)
+    x = finite(name, number)
+    if x < 0.0 and name.endswith(f".{MOBILITY}"):
+        raise ParameterError(
+            f"{name} = {x:g} 1/kg must not be negative: it is the inverse effective mass of the "
+            "wall, 0 for a wall that does not move when it is hit"
+        )
+    return x
 
 
 class Equations:
@@ -173,8 +191,8 @@ class Equations:
         on[loops : len(B) - rubs] = [*system.on[held], *system.on[stuck]]
         self.rows = Rows(system, B, c, z, on)
         self.positions = self.rows.first(self.first_stick)
-        self.gap_rows, self.slide_rows = gap_rows(system), slide_rows(system)
-        self.rub_rows = rub_rows(system)
+        self.gap_rows, self.slide_rows = system.watched.gaps, system.watched.slides
+        self.rub_rows = system.watched.rubs
 
         # one product with e serves loads, inertia and constraints: see accelerations
         self.stack: Complex = np.vstack([self.w, system.H, 1j * self.rows.spread])

@@ -6,7 +6,7 @@ the stretches: forces enter through one complex row w, Q = Re(w e) with w = i su
 
 import numpy as np
 
-from .assembly import Complex, Real, System
+from .assembly import BodyFrame, Complex, Real, System
 
 
 def springs(K: Real, deflection: Real) -> Real:
@@ -57,6 +57,18 @@ def force_row(A: Complex, force: complex) -> Complex:
     -6.0
     """
     return 1j * force.conjugate() * A
+
+
+def load_rows(system: System, frame: BodyFrame, e: Complex) -> Real:
+    """Return the generalised forces of a unit force along x, along y and of a unit moment, (3, n).
+
+    They are the gradients of the point's place [m/rad] and of the angle [rad/rad], too.
+    """
+    rows = np.zeros((3, system.n))
+    for k, force in enumerate((1.0 + 0.0j, 1.0j)):
+        rows[k] = generalised(system.spread(force_row(frame.A, force)), e)
+    rows[2, frame.j] = 1.0
+    return rows
 
 
 def generalised(w: Complex, e: Complex) -> Real:

@@ -24,7 +24,18 @@ from scipy.optimize import brentq
 
 from . import constraints, contact, forces
 from .assembly import Complex, Real, System, assemble, calculated
-from .dynamics import IDLE, STICKS, Discrete, Equations, Inputs, Wall, check_input, input_names
+from .dynamics import (
+    IDLE,
+    MOBILITY,
+    STICKS,
+    Discrete,
+    Equations,
+    Inputs,
+    Wall,
+    check_input,
+    impulse_names,
+    input_names,
+)  # fmt: skip
 from .errors import ParameterError, SimulationError
 from .kinetics import inertia, kinetic_energy
 from .mechanism import Mechanism, unknown, value
@@ -69,6 +80,7 @@ class Latched:
     impulse: float = 0.0
     energy_lost: float = 0.0
     modal_restitution: float = 0.0
+    impulse_sum: float = 0.0  # of all impulses so far, those that were captured too
 
 
 @dataclass(frozen=True)
@@ -161,6 +173,7 @@ class Simulation:
             if name not in self.given:
                 raise ParameterError(unknown(name, {**defaults, **self.given}))
             self.given[name] = check_input(name, changes[name], self.given)
+        self.received = [self.given[name] for name in impulse_names(mechanism)]
         self.tolerance = _tolerance(
             self.values["solver.tolerance"] if tolerance is None else tolerance
         )
@@ -276,6 +289,7 @@ class Simulation:
             tuple(given[f"{f.name}.moment"] for f in mechanism.forces),
             complex(given["base.acceleration.x"], given["base.acceleration.y"]),
             walls,
+            tuple(given[f"{stop.name}.{MOBILITY}"] for stop in mechanism.stops),
         )
 
     def _set_equations(self, inputs: Inputs) -> None:
@@ -359,28 +373,51 @@ class Simulation:
         self.arc, self.k1, self.changed = None, None, False
         self.system = self.prepared
         self._set_equations(self._inputs(self.inputs.walls))
-        struck = self._unsettled_by_walls()
+        self._receive_impulses()
+        struck = self._unsettled()
         if struck is not None:
             self._impact(struck)
         else:
             self.front = self.equations.project(self.time, self.front)
             self._settle()
 
-    def _unsettled_by_walls(self) -> int | None:
-        """Let go of what rested on a wall that has changed its velocity.
+    def _receive_impulses(self) -> None:
+        """Change the velocities by what the impulses have grown by since the last restart.
+
+        Each component P at the point of a force changes the rate u of the point along it, and its
+        work is P (u- + u+)/2.  The loops take part, stops follow: see :meth:`_unsettled`.
+        """
+        given = [self.given[name] for name in impulse_names(self.mechanism)]
+        grown = np.array(given) - np.array(self.received)
+        self.received = given
+        if not grown.any():
+            return
+        n = self.system.n
+        q, v = self.front[:n], self.front[n : 2 * n]
+        e, M, loops = self._mass_and_loops(q)
+        rows = np.vstack([forces.load_rows(self.system, frame, e) for frame in self.system.pushed])
+        after = v + contact.response(M, loops, rows) @ grown
+        self.front = self.front.copy()
+        self.front[n : 2 * n] = after
+        self.front[2 * n + 1] += float(grown @ (rows @ (v + after))) / 2
+
+    def _unsettled(self) -> int | None:
+        """Let go of what rested on a wall and moves, by the wall's velocity or an impulse.
 
         A wall that retreats leaves the body behind; gravity or whatever pressed it closes the
-        gap again and, below ``rest_speed``, captures it.  A wall that advances strikes: one such
-        stop is returned.
+        gap again and, below ``rest_speed``, captures it.  A wall that advances strikes, as does a
+        body that is thrown against a wall that it touches: one such stop is returned.
         """
         n = self.system.n
         e, v = self.system.directions(self.front[:n]), self.front[n : 2 * n]
-        rates = self.equations.gap_rates(e, v)
+        gaps, rates = self.equations.gaps(self.time, e), self.equations.gap_rates(e, v)
         struck = None
-        for i in list(self.equations.held):
-            if abs(rates[i]) > self._still():
+        for i, holds in enumerate(self.discrete.holds):
+            if holds and abs(rates[i]) > self._still():
                 self._set_discrete(self.discrete.without_hold(i))
-                struck = i if rates[i] < 0.0 else struck
+            elif holds or gaps[i] > TOUCHING * self.system.length:
+                continue
+            struck = i if rates[i] < -self._still() else struck
         return struck
 
     def state(self) -> Real:
@@ -761,13 +798,15 @@ class Simulation:
         e, M, loops = self._mass_and_loops(q)
         gaps = self.equations.gap_rows.jacobian(e)
         u = self.equations.gap_rates(e, v)
+        mobilities = np.array(self.inputs.mobilities)
         mu = np.array([self._field(i, "friction") for i in struck])
         if not mu.any():
             partners = struck + held
             G = gaps[partners]
             X = contact.response(M, loops, G)
+            W = G @ X + np.diag(mobilities[partners])
             eps = np.concatenate([restitution, np.zeros(len(held))])
-            P = contact.newton(G @ X, np.minimum(u[partners], 0.0), eps)
+            P = contact.newton(W, np.minimum(u[partners], 0.0), eps)
             return v + X @ P, dict(zip(partners, P.tolist(), strict=True)), {}
         kept = list(held)
         while True:
@@ -775,6 +814,7 @@ class Simulation:
             G, T = gaps[struck], self.equations.slide_rows.jacobian(e)[struck]
             X = contact.response(M, rows, np.vstack([G, T]))
             W = np.vstack([G, T]) @ X
+            W[range(k), range(k)] += mobilities[struck]
             rates = np.concatenate([u[struck], T @ v])
             if k == 1:
                 P = np.array(contact.stronge(W, rates, float(mu[0]), float(restitution[0])))
@@ -802,20 +842,28 @@ class Simulation:
     ) -> None:
         """Put an impact into the state, the energies and the latched outputs.
 
-        At each stop -P (u- + u+)/2 is lost, and as much along the wall; the wall does -P w.
+        At each stop -P (u- + u+)/2 is lost, and as much along the wall; the wall does
+        -P (w- + w+)/2, where an impulse changes the velocity w of a wall by its mobility times P.
         """
         n = self.system.n
         e = self.system.directions(q)
-        u = [self.equations.gap_rates(e, rates) for rates in (v, after)]
+        before = [wall.rate for wall in self.inputs.walls]
+        u = [self.equations.gap_rates(e, v)]
+        self._push_walls(normal)
+        u.append(self.equations.gap_rates(e, after))
         slides = self.equations.slide_rows.jacobian(e)
         lost = {i: -P * float(u[0][i] + u[1][i]) / 2 for i, P in normal.items()}
         for i, P in tangential.items():
             lost[i] -= P * float(slides[i] @ (v + after)) / 2
-        work = -sum(P * self.inputs.walls[i].rate for i, P in normal.items())
+        walls = self.inputs.walls
+        work = -sum(P * (before[i] + walls[i].rate) / 2 for i, P in normal.items())
         self.front = self.front.copy()
         self.front[n : 2 * n] = after
         self.front[2 * n] += sum(lost.values())
         self.front[2 * n + 1] += work
+        for i, P in normal.items():
+            total = self.latched[i].impulse_sum + P
+            self.latched[i] = replace(self.latched[i], impulse_sum=total)
         if not counted:
             return
         phi, M = fundamental_at(self.system, q)
@@ -829,12 +877,23 @@ class Simulation:
                 normal[i],
                 lost[i],
                 modal,
+                self.latched[i].impulse_sum,
             )
             if self.record is not None:
                 stop = self.mechanism.stops[i].name
                 self.record.append(
                     Impact(stop, self.front_time, q, v, after, normal[i], self.latched[i])
                 )
+
+    def _push_walls(self, normal: Mapping[int, float]) -> None:
+        """Give the walls the velocities that impulses leave them with, until the next restart."""
+        t, walls = self.front_time, list(self.inputs.walls)
+        for i, P in normal.items():
+            change = self.inputs.mobilities[i] * P
+            if change:
+                walls[i] = Wall(walls[i].at(t), walls[i].rate + change, t)
+        if tuple(walls) != self.inputs.walls:
+            self._set_equations(replace(self.inputs, walls=tuple(walls)))
 
     def _holding(self, candidates: list[int], q: Real, v: Real) -> list[int]:
         """Return which of the stops at rest hold: pressed together, while the others open.
@@ -1017,11 +1076,17 @@ class Simulation:
             out[f"{frame.name}.x"], out[f"{frame.name}.y"] = place.real, place.imag
             out[f"{frame.name}.vx"], out[f"{frame.name}.vy"] = velocity.real, velocity.imag
         gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
+        G, loops = equations.gap_rows.jacobian(e), equations.rows.jacobian(e)[: len(system.loops)]
         pressed = equations.stop_forces(lam)
         for i, stop in enumerate(self.mechanism.stops):
             out[f"{stop.name}.gap"] = float(gaps[i])
             out[f"{stop.name}.gap_rate"] = float(rates[i])
             out[f"{stop.name}.force"] = float(pressed[i])
+            wall = equations.inputs.walls[i]
+            moved = wall.at(t) - value(stop, "position", system.values)
+            out[f"{stop.name}.point.displacement"] = moved - float(gaps[i])
+            out[f"{stop.name}.point.velocity"] = wall.rate - float(rates[i])
+            out[f"{stop.name}.point.mobility"] = _mobility(M, loops, G[[i]])
         force, moment = equations.base_reaction(q, v, a)
         out["base.force.x"], out["base.force.y"] = force.real, force.imag
         out["base.moment"] = moment
@@ -1059,10 +1124,12 @@ class Simulation:
                 "forces": [[f.real, f.imag] for f in self.inputs.forces],
                 "moments": list(self.inputs.moments),
                 "base": [self.inputs.base.real, self.inputs.base.imag],
+                "mobilities": list(self.inputs.mobilities),
             },
             "tolerance": self.tolerance,
             "step": self.step,
             "time": self.time,
+            "received": list(self.received),
             "walls": [asdict(wall) for wall in self.inputs.walls],
             "discrete": asdict(self.discrete),
             "latched": [asdict(latched) for latched in self.latched],
@@ -1117,9 +1184,11 @@ class Simulation:
                 tuple(acting["moments"]),
                 complex(*acting["base"]),
                 tuple(Wall(**wall) for wall in s["walls"]),
+                tuple(acting["mobilities"]),
             )
         )
         self.latched = [Latched(**latched) for latched in s["latched"]]
+        self.received = list(s["received"])
         self._window = (s["window"][0], s["window"][1])
         self.h, self.last_error, self.changed = s["h"], s["last_error"], s["changed"]
         self.front_time, self.front = s["front_time"], np.array(s["front"])

@@ -22,6 +22,7 @@ from .mechanism import finite, unknown
 NEWTON_STEPS = 30
 LARGEST_TURN = 0.5  # rad per Newton step and per step of the load: further is another shape
 SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
+RIGID = 1e-9  # of the size: a row of the release no longer than that follows from the loops
 IMMOBILE = 1e-12  # share of a body's mobility that the loops leave it: below, it cannot move
 BALANCED = 1e-12  # of the largest spring rate times one radian, or without springs of the load
 CONVERGED = 1e-8  # rad of the last Newton step; what is left after it is its square
@@ -141,7 +142,7 @@ def equilibrium(
         else:
             fraction /= 2
             if fraction < SMALLEST_FRACTION:
-                raise EquilibriumError(_unreachable(displacement, bool(loads), done))
+                raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
     n, r = system.n, len(system.loops)
     force = float(state[n + r]) if displacement is not None else 0.0
     return Equilibrium(state[:n], state[n : n + r], force, w)
@@ -211,7 +212,7 @@ def _newton(
     return None
 
 
-def _unreachable(displacement: float | None, loaded: bool, done: float) -> str:
+def _unreachable(system: System, displacement: float | None, loaded: bool, done: float) -> str:
     if loaded:
         return (
             f"no static equilibrium was found beyond {100 * done:.3g} % of gravity and the loads, "
@@ -222,10 +223,28 @@ def _unreachable(displacement: float | None, loaded: bool, done: float) -> str:
             "no static equilibrium under gravity was found: the flexures are too weak for this "
             "load; reduce gravity or the masses, or stiffen the flexures"
         )
+    if _held_by_loops(system):
+        return f"release.displacement = {displacement:g} m: {_immobile(system)}"
     return (
         f"release.displacement = {displacement:g} m cannot be reached: no equilibrium was found "
         f"beyond {done * displacement:.4g} m (gravity raised in proportion); release closer to "
         "the straight shape, or reduce gravity across the motion"
+    )
+
+
+def _held_by_loops(system: System) -> bool:
+    """Tell whether the loops keep the released body, as drawn, from moving along the release."""
+    e = system.directions(system.q0)
+    rows = constraints.jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    loops, along = rows[:-1], rows[-1]
+    left = along - loops.T @ np.linalg.lstsq(loops.T, along)[0]
+    return float(np.abs(left).max()) <= RIGID * system.length
+
+
+def _immobile(system: System) -> str:
+    return (
+        f"the body {system.mechanism.release.body} cannot move along the direction of the release; "
+        "choose another direction or body, or let flexures stretch (axial = true)"
     )
 
 
@@ -257,11 +276,7 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     loops, row = rows[:-1], rows[-1:]
     left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
     if left <= IMMOBILE * free:
-        raise ParameterError(
-            f"release.velocity = {speed:g} m/s: the body {system.mechanism.release.body} cannot "
-            "move along the direction of the release; choose another direction, or let flexures "
-            "stretch (axial = true)"
-        )
+        raise ParameterError(f"release.velocity = {speed:g} m/s: {_immobile(system)}")
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     return constraints.project_velocities(M, rows, rates, np.zeros(system.n))

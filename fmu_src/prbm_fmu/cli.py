@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from prbm import Mechanism, PrbmError
 from prbm.dynamics import input_names
+from prbm_tools.files import check_no_folder, check_writable
 from prbm_tools.mechanism_file import load, schema, shipped
 
 from . import __version__, native_fmu, python_fmu
@@ -222,12 +223,12 @@ def _order(options: argparse.Namespace) -> Order:
     )
     _check_names(order.mechanisms, order.changes)
     for flavour in order.flavours:
-        _check_writable(order.out / flavour.folder)
+        check_writable(order.out / flavour.folder)
         for mechanism in order.mechanisms:
             path = order.path(flavour, mechanism.name)
-            _check_no_folder(path)
+            check_no_folder(path)
             if options.simulate:
-                _check_no_folder(path.with_suffix(".png"))
+                check_no_folder(path.with_suffix(".png"))
     return order
 
 
@@ -340,28 +341,6 @@ def _check_names(chosen: Sequence[Mechanism], changes: Mapping[str, float]) -> N
 
 def _progress(name: str) -> Callable[[str], None]:
     return lambda step: print(f"{name}: {step} ...", flush=True)
-
-
-def _check_writable(folder: Path) -> None:
-    """Find out before the work whether its result can be kept."""
-    existing = folder
-    while not existing.exists() and existing != existing.parent:
-        existing = existing.parent
-    if not existing.is_dir():
-        raise UserMistake(
-            f"cannot write to {folder}: {existing} is a file; choose a folder with --out"
-        )
-    if not os.access(existing, os.W_OK):
-        raise UserMistake(
-            f"cannot write to {folder}: no permission in {existing}; choose a folder with --out"
-        )
-
-
-def _check_no_folder(path: Path) -> None:
-    if path.is_dir():
-        raise UserMistake(
-            f"cannot write {path}: it is a folder; remove it, or choose another place with --out"
-        )
 
 
 def _simulate(fmus: Sequence[Path]) -> int:

@@ -2,16 +2,17 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
+
+from prbm_tools.simulate import Experiment
 
 from . import __version__
 from .date import date
 from .units import QUANTITIES, UNITS
 from .variables import Variable
 
-START_TIME, STOP_TIME, STEP_SIZE = 0.0, 1.0, 1e-3  # s, of the default experiment
 TOLERANCE = "solver.tolerance"
 GENERATION_TOOL = f"prbm-impact {__version__}"
 
@@ -24,6 +25,7 @@ class Heading:
     description: str
     guid: str
     log_categories: Mapping[str, str]
+    experiment: Experiment = field(default_factory=Experiment)
 
     def attributes(self) -> dict[str, str]:
         """Return the attributes of the model description that every version of FMI has."""
@@ -45,7 +47,7 @@ def model_description(heading: Heading, variables: tuple[Variable, ...]) -> byte
     add_units(root, variables)
     add_types(root, variables)
     add_log_categories(root, heading)
-    add_experiment(root, variables)
+    add_experiment(root, heading, variables)
     index = {v.name: str(i) for i, v in enumerate(variables, start=1)}
     add_variables(root, variables, index)
     root.append(_structure(variables, index))
@@ -99,14 +101,14 @@ def add_log_categories(root: Element, heading: Heading) -> None:
         SubElement(categories, "Category", {"name": name, "description": description})
 
 
-def add_experiment(root: Element, variables: Iterable[Variable]) -> None:
+def add_experiment(root: Element, heading: Heading, variables: Iterable[Variable]) -> None:
     """Add the default experiment."""
     starts = {v.name: v.start for v in variables}
     experiment = {
-        "startTime": number(START_TIME),
-        "stopTime": number(STOP_TIME),
+        "startTime": number(0.0),
+        "stopTime": number(heading.experiment.stop_time),
         "tolerance": number(starts[TOLERANCE]),
-        "stepSize": number(STEP_SIZE),
+        "stepSize": number(heading.experiment.step),
     }
     SubElement(root, "DefaultExperiment", experiment)
 

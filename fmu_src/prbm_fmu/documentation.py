@@ -5,8 +5,9 @@ import math
 from collections.abc import Iterable, Sequence
 
 from prbm import FlexureType, Mechanism
+from prbm_tools.simulate import Experiment
 
-from .description import GENERATION_TOOL, STOP_TIME, plain
+from .description import GENERATION_TOOL, plain
 from .variables import NativeInterface, Variable
 
 STYLE = """
@@ -30,6 +31,7 @@ KINDS = {
     ("parameter", "tunable"): "Parameters that may change while the simulation runs",
     ("calculatedParameter", "fixed"): "Calculated parameters",
     ("input", "continuous"): "Inputs",
+    ("input", "discrete"): "Inputs that act when they change",
     ("output", "continuous"): "Outputs",
     ("output", "discrete"): "Outputs that an impact changes (latched)",
     ("local", "continuous"): "Local variables",
@@ -60,12 +62,12 @@ def escape(text: str) -> str:
     return "\n".join(html.escape(plain(line)) for line in text.splitlines())
 
 
-def page(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
+def page(mechanism: Mechanism, variables: tuple[Variable, ...], experiment: Experiment) -> str:
     """Return the HTML page of the Python FMU of a mechanism."""
     return _page(
         mechanism,
         _what(mechanism, "FMI 2.0 co-simulation"),
-        _use(mechanism),
+        _use(mechanism, experiment),
         _equations(mechanism),
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_STEPS),
@@ -75,14 +77,33 @@ def page(mechanism: Mechanism, variables: tuple[Variable, ...]) -> str:
 
 
 def native_page(
-    mechanism: Mechanism, interface: NativeInterface, version: int, platforms: Sequence[str]
+    mechanism: Mechanism,
+    interface: NativeInterface,
+    version: int,
+    platforms: Sequence[str],
+    experiment: Experiment,
+    with_reference: bool,
 ) -> str:
-    """Return the HTML page of a native FMU, for a version of FMI and the platforms inside."""
+    """Return the HTML page of a native FMU.
+
+    Parameters
+    ----------
+    mechanism, interface
+        What was exported.
+    version : {2, 3}
+        Of FMI.
+    platforms : sequence of str
+        Where it runs.
+    experiment : Experiment
+        The default experiment.
+    with_reference : bool
+        Whether its results are inside.
+    """
     variables = interface.variables
     return _page(
         mechanism,
         _what(mechanism, f"FMI {version}.0 model exchange and co-simulation"),
-        _native_use(mechanism, interface, version, platforms),
+        _native_use(mechanism, interface, version, platforms, experiment, with_reference),
         _equations(mechanism),
         _exchange(interface, version),
         _events(mechanism, interface, version),
@@ -125,7 +146,7 @@ def _what(mechanism: Mechanism, flavour: str) -> str:
     )
 
 
-def _example(mechanism: Mechanism, options: str = "") -> str:
+def _example(mechanism: Mechanism, experiment: Experiment, options: str = "") -> str:
     """Return what simulates an FMU with FMPy."""
     stops = [stop.name for stop in mechanism.stops]
     start = f'    start_values={{"{stops[0]}.restitution": 0.4}},\n' if stops else ""
@@ -133,15 +154,16 @@ def _example(mechanism: Mechanism, options: str = "") -> str:
     output = f'"{body}.x"' + "".join(f', "{stop}.impact_count"' for stop in stops)
     code = (
         "from fmpy import plot_result, simulate_fmu\n\n"
-        f'result = simulate_fmu(\n    "{mechanism.name}.fmu",\n    stop_time={STOP_TIME:g},\n'
+        f'result = simulate_fmu(\n    "{mechanism.name}.fmu",\n'
+        f"    stop_time={experiment.stop_time:g},\n"
         f"{start}    output=[{output}],\n{options})\nplot_result(result)"
     )
     return f"<pre><code>{escape(code)}</code></pre>\n"
 
 
-def _use(mechanism: Mechanism) -> str:
+def _use(mechanism: Mechanism, experiment: Experiment) -> str:
     return (
-        f"<h2>Use</h2>\n{_example(mechanism)}"
+        f"<h2>Use</h2>\n{_example(mechanism, experiment)}"
         "<p>Where it runs it needs <strong>Python 3.11 or later with NumPy and SciPy</strong>: "
         "inside a Python process (FMPy, PyFMI) nothing else; a tool that is not written in "
         "Python must find the Python library when it loads the FMU (on Linux for instance "
@@ -280,8 +302,8 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
     straight = "kilohertz" if _stretches(mechanism) else "infinite stiffness"
     if "2R" in models:
         items.append(
-            "Without damping the motion of a 2R guide through its straight shape is chaotic: "
-            f"two of its modes go from about a hundred hertz to {straight} there. A "
+            "Without damping the motion of a guide on 2R flexures through its straight shape is "
+            f"chaotic: two of its modes go from about a hundred hertz to {straight} there. A "
             "little damping in proportion to stiffness cures that, hence the default of "
             f"<code>damping.beta</code> ({_default('damping.beta', variables)} s). With none, "
             "single impacts mean little after a few bounces."
@@ -304,6 +326,12 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
             "moving wall, each impact counted, until one below <code>rest_speed</code> captures "
             "it, and then goes with the wall. A wall that advances strikes what rests on it."
         )
+        items.append(
+            "A wall that is part of another model takes part in impacts by its "
+            "<code>mobility</code>: the impulse is that between two masses, the wall changes its "
+            "velocity within the step, and <code>impulse_sum</code> is what the other model has to "
+            "receive. With <code>mobility</code> 0 the wall is immovable."
+        )
     items.append(inputs)
     return _list("Limits", items)
 
@@ -324,20 +352,29 @@ def _licenses() -> str:
 
 
 def _native_use(
-    mechanism: Mechanism, interface: NativeInterface, version: int, platforms: Sequence[str]
+    mechanism: Mechanism,
+    interface: NativeInterface,
+    version: int,
+    platforms: Sequence[str],
+    experiment: Experiment,
+    with_reference: bool,
 ) -> str:
+    reference = (
+        " The folder <code>extra</code> holds the outputs of the default experiment as the Python "
+        "engine computes them, to compare with."
+        if with_reference
+        else ""
+    )
     event_mode = "    use_event_mode=True,\n    early_return_allowed=True,\n"
     options = event_mode if interface.clocks else ""
     parts = [
-        f"<h2>Use</h2>\n{_example(mechanism, options)}",
+        f"<h2>Use</h2>\n{_example(mechanism, experiment, options)}",
         "<p>It needs <strong>nothing where it runs</strong>: no Python, no library but that of "
         f"the C language. Inside are libraries for {', '.join(platforms)}, and the C source with "
         "the mechanism as a constant array, for other platforms and for targets without a file "
         f"system (<code>fmpy compile {mechanism.name}.fmu</code>). The same library serves every "
         "mechanism; <code>resources/mechanism.bin</code> is the mechanism, which it reads when an "
-        "instance is made and checks against the token of this FMU. The folder <code>extra</code> "
-        "holds the outputs of the default experiment as the Python engine computes them, to "
-        "compare with.</p>",
+        f"instance is made and checks against the token of this FMU.{reference}</p>",
         "<p>For model exchange give FMPy <code>fmi_type=&quot;ModelExchange&quot;</code>. The "
         "solver of the importer should make steps that are short beside the time between two "
         "bounces, or it may step over a touch that is over before the step ends (CVode in FMPy "

@@ -95,7 +95,7 @@ def _fmi2(heading: Heading, mechanism: Mechanism, interface: NativeInterface, so
     add_units(root, interface.variables)
     add_types(root, interface.variables)
     add_log_categories(root, heading)
-    add_experiment(root, interface.variables)
+    add_experiment(root, heading, interface.variables)
     index = {v.name: str(i) for i, v in enumerate(interface.variables, start=1)}
     add_variables(root, interface.variables, index)
     structure = SubElement(root, "ModelStructure")
@@ -143,7 +143,7 @@ def _fmi3(heading: Heading, mechanism: Mechanism, interface: NativeInterface) ->
     for name, attributes in used_types(interface.variables):
         SubElement(types, "Float64Type", {"name": name} | attributes)
     add_log_categories(root, heading)
-    add_experiment(root, interface.variables)
+    add_experiment(root, heading, interface.variables)
     listed = SubElement(root, "ModelVariables")
     reference = {v.name: str(v.reference) for v in interface.variables}
     for v in interface.variables:
@@ -194,8 +194,11 @@ def _attributes(v: Variable, reference: Mapping[str, str]) -> dict[str, str]:
 
 # --- terminals ------------------------------------------------------------------------------------
 
-STOP_MEMBERS = ("displacement", "velocity", "gap", "gap_rate", "force", "contact")
-FORCE_MEMBERS = ("x", "y", "moment")
+STOP_MEMBERS = (
+    "displacement", "velocity", "mobility", "gap", "gap_rate", "force", "contact", "impulse_sum",
+    "point.displacement", "point.velocity", "point.mobility",
+)  # fmt: skip
+FORCE_MEMBERS = ("x", "y", "moment", "impulse.x", "impulse.y", "impulse.moment")
 MOTION_MEMBERS = ("x", "y", "angle", "vx", "vy", "omega")
 BASE_MEMBERS = ("acceleration.x", "acceleration.y", "force.x", "force.y", "moment")
 

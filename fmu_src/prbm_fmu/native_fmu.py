@@ -4,10 +4,12 @@ import hashlib
 import json
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from importlib.resources import files
 
 from prbm import Mechanism, MechanismError
 from prbm.exchange import independent
+from prbm_tools.simulate import experiment
 
 from . import documentation
 from .archive import zipped
@@ -66,8 +68,10 @@ def build(
     compiled = libraries(platforms, progress)
     progress(f"collecting {len(native.variables)} variables and the tables")
     name, source = mechanism.name, f"{mechanism.name}.c"
-    token = f"{{{uuid.uuid5(NAMESPACE, _digest(mechanism, native, fmi, source))}}}"
-    heading = Heading(name, mechanism.title, token, LOG_CATEGORIES)
+    run = experiment(mechanism, changes)
+    heading = Heading(name, mechanism.title, "", LOG_CATEGORIES, run)
+    token = f"{{{uuid.uuid5(NAMESPACE, _digest(mechanism, native, fmi, source, heading))}}}"
+    heading = replace(heading, guid=token)
     table = tables(mechanism, native.variables, token, native.independent)
     contents = {
         "modelDescription.xml": description(fmi, heading, mechanism, native, source),
@@ -81,9 +85,7 @@ def build(
         contents["sources/buildDescription.xml"] = build_description(name, source)
     contents |= dict(_binaries(name, fmi, compiled))
     progress("computing the reference results")
-    results = reference(mechanism, changes, native.variables)
-    if not results:
-        progress("no reference results: the default experiment does not come to its end")
+    results = reference(mechanism, changes, native.variables, run, progress)
     contents |= results
     progress("drawing the icon and writing the documentation")
     icon = picture.icon(mechanism, start_sample(mechanism, changes))
@@ -92,7 +94,7 @@ def build(
         contents["model.png"] = icon
     names = sorted(platform.name for platform in compiled)
     contents["documentation/index.html"] = documentation.native_page(
-        mechanism, native, fmi, names
+        mechanism, native, fmi, names, run, bool(results)
     ).encode()
     contents |= dict(_licenses(any(platform.system == "windows" for platform in compiled)))
     progress("packing")
@@ -126,9 +128,10 @@ def described(
     )
 
 
-def _digest(mechanism: Mechanism, native: NativeInterface, fmi: int, source: str) -> str:
-    """Return a hash of all that decides what the FMU is and does."""
-    heading = Heading(mechanism.name, mechanism.title, "", LOG_CATEGORIES)
+def _digest(
+    mechanism: Mechanism, native: NativeInterface, fmi: int, source: str, heading: Heading
+) -> str:
+    """Return a hash of all that decides what the FMU is and does; the heading has no token."""
     parts = kernel() | {
         "modelDescription.xml": description(fmi, heading, mechanism, native, source),
         FILE: tables(mechanism, native.variables, "", native.independent),

@@ -9,6 +9,7 @@ from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 
 from prbm import Mechanism, MechanismError
+from prbm_tools.simulate import experiment
 
 from . import documentation
 from .archive import zipped
@@ -96,11 +97,12 @@ def build(
     contents = {f"resources/{path}": text for path, text in _named(mechanism, token, sources)}
     contents |= dict(_binaries(mechanism.name))
     contents |= dict(_licenses())
-    heading = Heading(mechanism.name, mechanism.title, "", MechanismSlave.log_categories)
+    run = experiment(mechanism, changes)
+    heading = Heading(mechanism.name, mechanism.title, "", MechanismSlave.log_categories, run)
     anonymous = _digest(sources | {"": model_description(heading, listed)})
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
-    contents["documentation/index.html"] = documentation.page(mechanism, listed).encode()
+    contents["documentation/index.html"] = documentation.page(mechanism, listed, run).encode()
     contents["model.png"] = picture.icon(mechanism, start_sample(mechanism, changes))
     progress("packing")
     return zipped(contents)

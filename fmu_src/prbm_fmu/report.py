@@ -14,19 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import prbm
-from prbm import Mechanism, assemble, free_displacement
-from prbm.assembly import unit
+from prbm import Mechanism
 from prbm_tools.figures import png, response
-from prbm_tools.motion import marks
-from prbm_tools.simulate import Progress, reporter, rest_time
+from prbm_tools.headline import FREQUENCY, told
+from prbm_tools.simulate import Progress, reporter
 from prbm_tools.unpack import unpacked
 
 from .archive import write
 from .cli import FAILED, INTERRUPTED, MISTAKE, OK
 from .slaves.resolved import read
 from .variables import CLOCK
-
-FREQUENCY = "mode.frequency"
 
 
 @dataclass(frozen=True)
@@ -115,73 +112,18 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def millimetres(x: float) -> str:
-    """Return a length in mm to a hundredth, without a negative zero.
-
-    Examples
-    --------
-    >>> millimetres(-1.8e-3), millimetres(-1e-9)
-    ('-1.80 mm', '0.00 mm')
-    """
-    return f"{round(1e3 * x, 2) + 0.0:.2f} mm"
-
-
 def headline(run: Run) -> list[str]:
     """Return what happened, line by line."""
     record = run.record
-    lines = [f"simulated            {record['time'][-1]:g} s in {run.seconds:.2f} s", *_free(run)]
-    seen = marks(record, run.mechanism)
-    for i, stop in enumerate(s.name for s in run.mechanism.stops):
-        count = int(record[f"{stop}.impact_count"][-1])
-        first = next((mark for mark in seen if mark.stop == i), None)
-        told = ""
-        if first is not None:
-            which = "the first" if first.count == 1 else f"number {first.count}"
-            told = f", {which} at t = {first.time:.5f} s with {first.speed:.3f} m/s"
-        lines.append(f"impacts at {stop:9} {count}{told}")
-        since = rest_time(record, stop)
-        if since is not None:
-            lines.append(
-                f"came to rest         at t = {since:.3f} s on {stop}, {_place(run)}, pressed with "
-                f"{record[f'{stop}.force'][-1]:.4g} N"
-            )
+    lines = [
+        f"simulated            {record['time'][-1]:g} s in {run.seconds:.2f} s",
+        *told(record, run.mechanism, run.values),
+    ]
     if not run.finished:
         lines.append(
             f"ended early          at t = {record['time'][-1]:g} s instead of {run.stop_time:g} s"
         )
     return lines
-
-
-def _free(run: Run) -> list[str]:
-    """Tell about the equilibrium without stops, if it is one that lasts."""
-    frequency = run.record[FREQUENCY][0]
-    if frequency == 0.0:
-        return [
-            "fundamental          none: without stops, the equilibrium under gravity is unstable"
-        ]
-    parameters = {p.name for p in run.mechanism.parameters}
-    values = {name: x for name, x in run.values.items() if name in parameters}
-    rest = free_displacement(assemble(run.mechanism, values))
-    release = run.mechanism.release
-    return [
-        f"fundamental          {frequency:.4g} Hz",
-        f"free rest position   {release.body} {millimetres(rest)} from straight"
-        f"{_along(release.direction)}, under gravity, without stops",
-    ]
-
-
-def _along(direction: float) -> str:
-    return "" if direction == 0.0 else f" along {direction:g} degrees"
-
-
-def _place(run: Run) -> str:
-    """Tell where the released body is at the end."""
-    body, direction = run.mechanism.release.body, run.mechanism.release.direction
-    x, y = (float(run.record[f"{body}.{axis}"][-1]) for axis in "xy")
-    u = unit(direction)
-    if direction == 0.0:
-        return f"{body}.x = {millimetres(x)}"
-    return f"{body} {millimetres(x * u.real + y * u.imag)} from straight{_along(direction)}"
 
 
 def main(arguments: Sequence[str]) -> int:

@@ -8,7 +8,7 @@ one for some mechanism of this kind or in some discrete state, even if it vanish
 from collections.abc import Mapping
 
 from prbm import Mechanism
-from prbm.dynamics import input_names
+from prbm.dynamics import MOBILITY, impulse_names, input_names
 
 from .variables import BASE_OUTPUTS, INDICATORS, LATCHED, STORED, NativeInterface
 
@@ -26,7 +26,9 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
     count = len(interface.independent)
     shape, rates = interface.states[:count], interface.states[count : 2 * count]
     moving = shape + rates
-    everything = moving + input_names(mechanism)
+    # impulses and mobilities act at events alone
+    acting = tuple(name for name in input_names(mechanism) if not _at_events(mechanism, name))
+    everything = moving + acting
     found: dict[str, tuple[str, ...]] = {name: everything for name in BASE_OUTPUTS}
     for body in (b.name for b in mechanism.bodies):
         found |= {f"{body}.{what}": shape for what in ("x", "y", "angle")}
@@ -41,6 +43,8 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
         found[f"{stop}.gap"] = shape + walls[:1]
         found[f"{stop}.gap_rate"] = moving + walls[1:]
         found[f"{stop}.force"] = everything
+        found |= {f"{stop}.point.{what}": shape for what in ("displacement", "mobility")}
+        found[f"{stop}.point.velocity"] = moving
         found[f"{stop}.impact"] = moving + walls
     found |= {name: everything for name in interface.indicators}
     found |= {"energy.kinetic": moving, "energy.elastic": shape, "energy.gravitational": shape}
@@ -48,3 +52,7 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
     found |= {name: (name,) for name in (*moving, *STORED)}  # a state is what it is
     order = {v.name: i for i, v in enumerate(interface.variables)}
     return {name: tuple(sorted(known, key=order.__getitem__)) for name, known in found.items()}
+
+
+def _at_events(mechanism: Mechanism, name: str) -> bool:
+    return name in impulse_names(mechanism) or name.endswith(f".{MOBILITY}")

@@ -36,6 +36,8 @@ UNITS = {
     "N/m": Unit({"kg": 1, "s": -2}, {"N/mm": 1e-3}),
     "N.m": Unit({"kg": 1, "m": 2, "s": -2}, {"mN.m": 1e3}),
     "N.s": Unit({"kg": 1, "m": 1, "s": -1}, {"mN.s": 1e3}),
+    "N.m.s": Unit({"kg": 1, "m": 2, "s": -1}, {"mN.m.s": 1e3}),
+    "1/kg": Unit({"kg": -1}),
     "J": Unit({"kg": 1, "m": 2, "s": -2}, {"mJ": 1e3}),
     "W": Unit({"kg": 1, "m": 2, "s": -3}, {"mW": 1e3}),
 }
@@ -72,6 +74,8 @@ QUANTITIES = {
         Quantity("Stiffness", "N/m"),
         Quantity("Torque", "N.m", "mN.m"),
         Quantity("Impulse", "N.s", "mN.s"),
+        Quantity("AngularImpulse", "N.m.s", "mN.m.s"),
+        Quantity("Mobility", "1/kg"),
         Quantity("Energy", "J", "mJ"),
         Quantity("Power", "W", "mW"),
     )

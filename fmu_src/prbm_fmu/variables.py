@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from prbm import Force, Mechanism, MechanismError, Parameter, ParameterError, Stop, assemble
+from prbm.dynamics import MOBILITY
 from prbm.mechanism import GROUND, affine, unknown
 
 from .units import QUANTITIES, Quantity
@@ -24,13 +25,15 @@ CLOCK = "Clock"
 # what is computed, in the order in which the C kernel keeps it
 BODY_OUTPUTS = ("x", "y", "angle", "vx", "vy", "omega")
 PROBE_OUTPUTS = ("x", "y", "vx", "vy")
-STOP_OUTPUTS = ("gap", "gap_rate", "force")
+STOP_OUTPUTS = (
+    "gap", "gap_rate", "force", "point.displacement", "point.velocity", "point.mobility",
+)  # fmt: skip
 BASE_OUTPUTS = (f"{BASE}.force.x", f"{BASE}.force.y", f"{BASE}.moment")
 STORED = ("energy.dissipated", "energy.work")  # energies that are states
 ENERGIES = ("energy.kinetic", "energy.elastic", "energy.gravitational", *STORED)
 LATCHED = (
     "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
-    "energy_lost", "modal_restitution",
+    "energy_lost", "modal_restitution", "impulse_sum",
 )  # fmt: skip
 LINK_ANGLE = re.compile(r"^link\[\d+\]\.angle$")
 LINK_STRAIN = re.compile(r"^link\[\d+\]\.strain$")
@@ -123,6 +126,8 @@ def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
         "N": mass * x * omega**2,
         "N.m": mass * x * omega**2 * span,
         "N.s": mass * x * omega,
+        "N.m.s": mass * x * omega * span,
+        "1/kg": 1 / mass,
         "J": mass * (x * omega) ** 2,
         "W": mass * (x * omega) ** 2 * omega,
     }
@@ -167,8 +172,8 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
     Raises
     ------
     MechanismError
-        If two names share a value reference or one is none of FMI, or if a parameter has a unit
-        that is not known or a nominal value that is none.
+        If two variables share a name or a value reference, a name is none of FMI, or a parameter
+        has a unit that is not known or a nominal value that is none.
     """
     nominal = scales(mechanism, sample)
     result = tuple(_variables(mechanism, sample, nominal))
@@ -180,7 +185,7 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
 
 
 def check_names(variables: Sequence[Variable]) -> None:
-    """Refuse names that FMI does not have, and two with the same value reference.
+    """Refuse names that FMI does not have, that are taken, or of the same value reference.
 
     Raises
     ------
@@ -189,6 +194,13 @@ def check_names(variables: Sequence[Variable]) -> None:
     """
     seen: dict[int, str] = {}
     for variable in variables:
+        if seen.get(variable.reference) == variable.name or (
+            variable.name == TIME.name and variable is not TIME
+        ):
+            raise MechanismError(
+                f"two variables of the FMU would have the name {variable.name}: rename the "
+                "parameter or the part that it comes from"
+            )
         if not variable.name.isascii():
             raise MechanismError(
                 f"{variable.name}: names of FMI are of the letters a to z, digits and _, without "
@@ -241,9 +253,8 @@ def _variables(
                 f"{parameter.name}: nominal = {nominal_value} must be positive and finite"
             )
         yield _parameter(parameter)
-    known = {p.name for p in mechanism.parameters}
     for name in sample:
-        if name.endswith(".gamma0") and name not in known:
+        if name.endswith(".gamma0"):
             yield Variable(
                 name,
                 "Length of the stubs at the clamps in units of the length of the cantilever: "
@@ -311,6 +322,27 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
             "m/s",
             f"Velocity of the {wall(stop)}, rate of {stop.name}.displacement",
         )
+    for force in mechanism.forces:
+        for axis, unit, what in (
+            ("x", "N.s", "Impulses along x"),
+            ("y", "N.s", "Impulses along y"),
+            ("moment", "N.m.s", "Angular impulses"),
+        ):
+            point = f"the {force.body}" if axis == "moment" else pushed(force)
+            total = given(
+                f"{force.name}.impulse.{axis}",
+                unit,
+                f"{what} on {point}, all so far: what it grows by acts at once",
+            )
+            yield replace(total, variability="discrete")
+    for stop in mechanism.stops:
+        mobility = given(
+            f"{stop.name}.{MOBILITY}",
+            "1/kg",
+            f"Inverse of the effective mass of the {wall(stop)}: an impulse changes its velocity "
+            "by so much times itself, 0 if it is immovable",
+        )
+        yield replace(mobility, minimum=0.0)
     for axis in "xy":
         yield given(
             f"{BASE}.acceleration.{axis}", "m/s2",
@@ -384,6 +416,18 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
         f"{stop}.force", "N", "Force of the wall while the stop holds; an impact is an impulse, "
         "not a force", nominal, minimum=0.0,
     )  # fmt: skip
+    yield _output(
+        f"{stop}.point.displacement", "m", "Displacement of the hit point, in the direction of the "
+        "wall's: the gap is closed where both are equal", nominal,
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.point.velocity", "m/s", "Velocity of the hit point in that direction", nominal,
+        derivative_of=f"{stop}.point.displacement",
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.point.mobility", "1/kg", "Inverse of the effective mass of the hit point in that "
+        "direction, as if no stop held", nominal, minimum=0.0,
+    )  # fmt: skip
     latched = Variable(
         f"{stop}.contact", "Whether the stop holds the body in resting contact",
         "output", "discrete", "calculated", type="Boolean",
@@ -410,6 +454,7 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
         "modal_restitution", "1",
         "Velocity of the fundamental mode after over before the last impact, sign changed",
     )  # fmt: skip
+    yield last("impulse_sum", "N.s", "Impulses of the wall, all so far, those of captures too", 0.0)
 
 
 def _base(nominal: Scales) -> Iterator[Variable]:
@@ -531,7 +576,7 @@ def native_interface(
     Raises
     ------
     MechanismError
-        If two names share a value reference.
+        If two variables share a name or a value reference.
     """
     nominal = scales(mechanism, sample)
     names = coordinate_variables(mechanism)

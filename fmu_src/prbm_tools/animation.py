@@ -23,15 +23,16 @@ from prbm import Mechanism, ParameterError, assemble
 from prbm.errors import PrbmError
 from prbm.mechanism import unknown
 
-from .mechanism_file import load, shipped
+from .arguments import ANIMATION_USAGE, animation_arguments
+from .mechanism_file import find, load, shipped
 from .motion import FPS, film, fmpy_command, motion, needed
 from .scene import COLOURS, DPI, SIZE, Scene, pictures
+from .settings import quantity, settings, span
 from .simulate import (
     Columns,
     Progress,
     Result,
     ResultError,
-    assignment,
     names,
     read_csv,
     reporter,
@@ -293,61 +294,71 @@ def main(arguments: list[str] | None = None) -> int:
     """Animate a result, or a mechanism simulated now."""
     parser = argparse.ArgumentParser(
         prog="python -m prbm_tools.animation",
-        usage="%(prog)s [options] (RESULT.csv | --model NAME | --mechanism FILE) OUT.gif",
+        usage=f"%(prog)s {ANIMATION_USAGE}",
         description="Write a GIF or MP4 film of a result, or of a mechanism simulated now.",
     )
-    add = parser.add_argument
-    add("files", nargs="+", metavar="FILE", help="RESULT.csv to show; OUT.gif or OUT.mp4 to write")
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument("--model", metavar="NAME", help="a mechanism that comes with the package")
-    which.add_argument("--mechanism", metavar="FILE.toml", help="one of your own")
-    add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter or input")
-    add("--stop-time", type=float, default=1.0, help="of the simulation [s]; %(default)s")
-    add("--slow", type=float, help="factor of slow motion; a round one for about ten seconds")
-    add("--fps", type=float, default=FPS, help="frames per second; %(default)g")
-    add("--from", dest="start", type=float, help="first time shown [s]")
-    add("--to", dest="stop", type=float, help="last time shown [s]")
+    animation_arguments(parser)
     options = parser.parse_args(arguments)
     try:
-        path = animate(
-            _result(options),
-            options.files[-1],
-            slow=options.slow,
-            fps=options.fps,
-            start=options.start,
-            stop=options.stop,
-            progress=reporter(),
-        )
+        print(run(options))
     except PrbmError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")
-    print(path)
     return 0
+
+
+def run(options: argparse.Namespace) -> Path:
+    """Write the film that a command line says; return the file.
+
+    Raises
+    ------
+    PrbmError
+        If there is nothing to show, or it cannot be written.
+    """
+    return animate(
+        _result(options),
+        options.files[-1],
+        slow=options.slow,
+        fps=FPS if options.fps is None else options.fps,
+        start=_seconds(options.start, "--from"),
+        stop=_seconds(options.stop, "--to"),
+        progress=reporter(),
+    )
+
+
+def _seconds(text: str | None, option: str) -> float | None:
+    return None if text is None else quantity(text, "s", option)
 
 
 def _result(options: argparse.Namespace) -> Result:
     """Return the result that was asked for: read, or simulated."""
     _writer(Path(options.files[-1]))
-    changes = dict(assignment(text) for text in options.set)
-    mechanism = None
-    if options.mechanism is not None:
-        mechanism = load(options.mechanism)
-    elif options.model is not None:
-        if options.model not in shipped():
-            raise ParameterError(unknown(options.model, shipped()).replace("variable", "model"))
-        mechanism = load(shipped()[options.model])
-    if len(options.files) == 1:
+    mechanism, files = _named(options)
+    if len(files) == 1:
         if mechanism is None:
             raise ParameterError("name what to show: RESULT.csv, --model or --mechanism")
-        return simulate(mechanism, changes, options.stop_time)
-    if len(options.files) > 2:
-        raise ParameterError(f"{len(options.files)} files are given: RESULT.csv OUT, or OUT")
-    columns = read_csv(options.files[0])
+        changes = settings(mechanism, options.set)
+        return simulate(mechanism, changes, *span(mechanism, changes, options.stop_time))
+    if len(files) > 2:
+        raise ParameterError(f"{len(files)} files are given: RESULT.csv OUT, or OUT")
+    columns = read_csv(files[0])
     mechanism = mechanism or _owner(columns)
-    known = mechanism.values()
+    changes, known = settings(mechanism, options.set), mechanism.values()
     for name in changes:
         if name not in known:
             raise ParameterError(unknown(name, known))
     return Result(mechanism, mechanism.values(changes), columns)
+
+
+def _named(options: argparse.Namespace) -> tuple[Mechanism | None, list[str]]:
+    """Return the mechanism that was named, if one was, and the files that are left."""
+    if options.mechanism is not None:
+        return load(options.mechanism), options.files
+    if options.model is not None:
+        return find(options.model), options.files
+    first = options.files[0]
+    if len(options.files) == 2 and (first in shipped() or first.endswith(".toml")):
+        return find(first), options.files[1:]
+    return None, options.files
 
 
 def _owner(columns: Columns) -> Mechanism:

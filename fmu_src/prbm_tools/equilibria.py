@@ -55,7 +55,9 @@ def force_curve(system: System, displacements: Sequence[float] | Real) -> Real:
     return np.array([holding_force(system, float(d)) for d in displacements])
 
 
-def rests(system: System, displacements: Sequence[float] | Real) -> list[Rest]:
+def rests(
+    system: System, displacements: Sequence[float] | Real, forces: Real | None = None
+) -> list[Rest]:
     """Return the places of rest within displacements, in order.
 
     Parameters
@@ -65,13 +67,16 @@ def rests(system: System, displacements: Sequence[float] | Real) -> list[Rest]:
     displacements : (k,)
         Increasing [m], so close together that the force changes its sign at most once between two.
         At the first and the last it may not be zero.
+    forces : (k,) or None
+        The holding forces there, if they are known [N].
 
     Raises
     ------
     EquilibriumError
         If there is no shape with one of the displacements.
     """
-    forces = force_curve(system, displacements)
+    if forces is None:
+        forces = force_curve(system, displacements)
     found = []
     for (a, b), (low, high) in zip(pairwise(displacements), pairwise(forces), strict=True):
         if (low > 0.0) != (high > 0.0):

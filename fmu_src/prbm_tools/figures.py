@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from prbm import Mechanism
 from prbm.assembly import Real, unit
 
+from .files import write
 from .motion import Mark, marks
 from .scene import GRID, IMPACT, PAST, REST, length_unit, own_style, time_unit
 from .simulate import Columns, Result, ResultError, column, names
@@ -119,7 +120,7 @@ def png(figure: Figure) -> bytes:
 
 
 def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure to a PNG file; return its path.
+    """Write a figure to a PNG file, whole or not at all; return its path.
 
     Raises
     ------
@@ -127,7 +128,7 @@ def save(figure: Figure, path: str | Path) -> Path:
         If the file cannot be written.
     """
     path = Path(path)
-    path.write_bytes(png(figure))
+    write(path, png(figure))
     return path
 
 

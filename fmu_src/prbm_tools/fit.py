@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from prbm import Mechanism, Simulation, assemble, equilibrium, modes
-from prbm.assembly import Real, Whole
+from prbm.assembly import Real, Whole, unit
 from prbm.errors import ParameterError, PrbmError
 from prbm.mechanism import unknown
 
@@ -31,6 +31,7 @@ from .vibration import impacts
 
 STEP = 1e-4  # of a parameter's size, of the central differences: the integration's noise is 1e-8
 LOOSE = 0.5  # relative standard uncertainty; twice that includes zero: the data know nothing
+EXACT = 1e-9  # of the data: a model that is nearer to them is as near as it is computed
 NOISE = 1e-6  # of the largest singular value: what rounding leaves of none
 PART = 0.1  # share of a direction in which a parameter takes part
 AT_BOUND = 1e-6  # of the range
@@ -42,8 +43,9 @@ MOST_STARTS = 400
 RECORD_SHIFT, RECORD_ZERO = "record.shift", "record.zero"
 OWN = (RECORD_SHIFT, RECORD_ZERO)  # parameters of a record, not of the mechanism
 OWN_UNITS = {RECORD_SHIFT: "s", RECORD_ZERO: "m"}
+DISPLACEMENT = "displacement"  # of the released body along the direction of its release
 
-Progress = Callable[[float], None]
+Progress = Callable[[float], object]
 
 
 @dataclass(frozen=True)
@@ -157,7 +159,8 @@ class Response:
     series : Series
         The record; its times are counted from the release.
     output : str
-        Name of the output, for instance ``shuttle.x``.
+        Name of the output, for instance ``shuttle.x``; or ``displacement``, that of the released
+        body along the direction of its release.
     uncertainty : float or None
         Standard uncertainty of a sample; None: estimated from the residuals.
     tolerance : float or None
@@ -199,11 +202,21 @@ class Response:
         for i, t in enumerate(times):
             if t > simulation.time:
                 simulation.advance(float(t))
-            outputs = simulation.outputs()
-            if self.output not in outputs:
-                raise EvaluationError(unknown(self.output, outputs))
-            result[i] = outputs[self.output]
+            result[i] = _output(simulation, self.output)
         return result + values.get(RECORD_ZERO, 0.0)
+
+
+def _output(simulation: Simulation, name: str) -> float:
+    """Return an output by its name, or the displacement of the released body [m]."""
+    outputs = simulation.outputs()
+    if name == DISPLACEMENT:
+        release = simulation.mechanism.release
+        x, y = (outputs[f"{release.body}.{axis}"] for axis in "xy")
+        u = unit(release.direction)
+        return float(u.real * x + u.imag * y)
+    if name not in outputs:
+        raise EvaluationError(unknown(name, {DISPLACEMENT: 0.0, **outputs}))
+    return float(outputs[name])
 
 
 @dataclass(frozen=True)
@@ -579,7 +592,8 @@ def _assessed(problem: Problem, p: Real, evaluations: int) -> Fit:
             f"{m} data cannot give {k} parameters and their own scatter: give their uncertainty"
         )
     noise *= widening(serial_correlation(rest), m) if m > k else 1.0
-    s = s / noise if noise > 0.0 else s
+    least = EXACT * float(np.abs(problem.data / problem.uncertainty).max())
+    s = s / max(noise, least, 1e-300)
     s[s <= NOISE * s.max(initial=0.0)] = 0.0
     valleys = []
     for row, known in zip(V, s, strict=True):
@@ -731,7 +745,11 @@ class Valley:
 
 
 def valley(
-    found: Fit, along: str | None = None, span: tuple[float, float] | None = None, points: int = 11
+    found: Fit,
+    along: str | None = None,
+    span: tuple[float, float] | None = None,
+    points: int = 11,
+    progress: Progress | None = None,
 ) -> Valley:
     """Return the profile of a fit along one of its parameters, all others fitted again.
 
@@ -745,6 +763,8 @@ def valley(
         Its values; None: a factor of two to both sides, within the bounds.
     points : int
         Number of values.
+    progress : callable or None
+        Told the fraction of the values that is done, from 0 to 1.
 
     Raises
     ------
@@ -772,6 +792,8 @@ def valley(
         near = found.p
         for j in order:
             rows[j] = near = problem.minimised(_replaced(near, i, values[j]), others)[0]
+            if progress is not None:
+                progress(len(rows) / len(values))
     ordered = np.array([rows[j] for j in sorted(rows)])
     misfit = np.array([float(np.sum(problem.residuals(p) ** 2)) for p in ordered])
     return Valley(problem.names, along, ordered, misfit, found.p)
@@ -813,7 +835,7 @@ def fitted_restitution(
     values : mapping
         Parameters that differ from the mechanism's: release, position of the stop, stiffness.
     output : str
-        What was recorded.
+        What was recorded; as :class:`Response` has it.
     stop : str
         Name of the stop.
     uncertainty : float or None

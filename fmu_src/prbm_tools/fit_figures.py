@@ -1,17 +1,23 @@
-"""Figures of evaluated measurements: a bent beam, a fitted response, a valley."""
+"""Figures of evaluated measurements: a bent beam, a sensor, a vibration, a fit, a valley."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from prbm.assembly import Real
+
 from .figures import WIDTH
-from .fit import Fit, Response, Valley
-from .measurement import YoungsModulus
+from .fit import Fit, ForceDeflection, Response, Valley
+from .measurement import Calibration, YoungsModulus
+from .records import Series
 from .scene import GRID, IMPACT, LINK, PAST, length_unit, own_style, time_unit
+from .spectrum import spectrum
 from .uncertainty import EvaluationError
+from .vibration import FreeVibration
 
 HEIGHT = 3.6  # inches
+HARMONICS = 8.0  # times the frequency of a vibration: as far as its spectrum is drawn
 
 
 def _figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure, list[Axes]]:
@@ -23,6 +29,12 @@ def _figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure, li
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
     return figure, every
+
+
+def _title(found: Fit) -> str:
+    """Return the parameters that were fitted, two in a line."""
+    words = [f"{name} = {x}" for name, x in found.estimates.items()]
+    return "\n".join(", ".join(words[i : i + 2]) for i in range(0, len(words), 2))
 
 
 @own_style()
@@ -71,9 +83,7 @@ def response_figure(found: Fit) -> Figure:
     upper.plot(t, factor * series.values, ".", color=PAST, markersize=3, label="measured")
     upper.plot(t, factor * model, color=IMPACT, linewidth=1.0, label="model")
     upper.set_ylabel(f"{target.output} [{unit}]")
-    upper.set_title(
-        ", ".join(f"{name} = {x}" for name, x in found.estimates.items()), fontsize=10, loc="left"
-    )
+    upper.set_title(_title(found), fontsize=10, loc="left")
     upper.legend(fontsize=9, frameon=False)
     lower.plot(t, factor * (model - series.values), ".", color=LINK, markersize=3)
     lower.set_ylabel(f"model - measured [{unit}]")
@@ -102,4 +112,103 @@ def valley_figure(valley: Valley) -> Figure:
     for axes in (left, right):
         axes.set_xlabel(valley.along)
         axes.axvline(valley.best[i], color=PAST, linewidth=0.8)
+    return figure
+
+
+@own_style()
+def force_figure(found: Fit) -> Figure:
+    """Plot a measured force over the deflection with the model that was fitted.
+
+    Raises
+    ------
+    EvaluationError
+        If the fit was not to such a curve.
+    """
+    start = 0
+    for target in found.problem.targets:
+        if isinstance(target, ForceDeflection):
+            break
+        start += len(target.data)
+    else:
+        raise EvaluationError("the fit was not to forces over deflections: nothing to plot")
+    model = found.model[start : start + len(target.data)]
+    figure, (upper, lower) = _figure(2, 1, 1.5 * HEIGHT)
+    factor, unit = length_unit(float(np.abs(target.displacement).max()) or 1.0)
+    order = np.argsort(target.displacement)
+    x = factor * target.displacement[order]
+    upper.plot(x, 1e3 * target.force[order], ".", color=PAST, markersize=4, label="measured")
+    upper.plot(x, 1e3 * model[order], color=IMPACT, linewidth=1.2, label="model")
+    upper.set_ylabel("holding force [mN]")
+    upper.set_title(_title(found), fontsize=10, loc="left")
+    upper.legend(fontsize=9, frameon=False)
+    lower.plot(x, 1e3 * (model - target.force)[order], ".", color=LINK, markersize=4)
+    lower.set_ylabel("model - measured [mN]")
+    lower.set_xlabel(f"displacement [{unit}]")
+    return figure
+
+
+@own_style()
+def calibration_figure(sensor: Calibration, quantity: Real, reading: Real) -> Figure:
+    """Plot readings over the quantity with the line, and what is left, below.
+
+    Parameters
+    ----------
+    sensor : Calibration
+        Of these data.
+    quantity, reading : (n,)
+        What was calibrated, in their units.
+    """
+    figure, (upper, lower) = _figure(2, 1, 1.5 * HEIGHT)
+    factor, unit = 1.0, sensor.unit
+    if unit == "m":
+        factor, unit = length_unit(float(np.abs(quantity).max()) or 1.0)
+    x = factor * quantity
+    ends = np.array([quantity.min(), quantity.max()])
+    upper.plot(x, reading, ".", color=PAST, markersize=4, label="reading")
+    upper.plot(
+        factor * ends, [sensor.fit.at(end) for end in ends], color=IMPACT, linewidth=1.2,
+        label=f"{sensor.sensitivity}",
+    )  # fmt: skip
+    upper.set_ylabel(f"reading [{sensor.reading_unit}]")
+    upper.legend(fontsize=9, frameon=False)
+    rest = sensor(reading) - quantity
+    small, name = length_unit(float(np.abs(rest).max()) or 1.0) if sensor.unit == "m" else (
+        1.0, sensor.unit,
+    )  # fmt: skip
+    lower.plot(x, small * rest, ".", color=LINK, markersize=4)
+    lower.set_ylabel(f"calibrated - true [{name}]")
+    lower.set_xlabel(f"quantity [{unit}]")
+    return figure
+
+
+@own_style()
+def vibration_figure(series: Series, found: FreeVibration) -> Figure:
+    """Plot a free vibration with the envelope that was fitted, and its spectrum, below."""
+    figure, (upper, lower) = _figure(2, 1, 1.5 * HEIGHT)
+    by_time, time_name = time_unit(float(np.ptp(series.time)))
+    factor, unit = 1.0, series.unit
+    if unit == "m":
+        factor, unit = length_unit(float(np.abs(series.values - found.rest).max()) or 1.0)
+    since = series.time - series.time[0]
+    decay = 2.0 * np.pi * found.frequency.value * found.zeta.value
+    envelope = found.amplitude * np.exp(-decay * since)
+    upper.plot(by_time * series.time, factor * series.values, color=PAST, linewidth=0.8)
+    for side in (-1.0, 1.0):
+        upper.plot(
+            by_time * series.time, factor * (found.rest + side * envelope), color=IMPACT,
+            linewidth=1.2, label="envelope of the fit" if side > 0 else None,
+        )  # fmt: skip
+    upper.set_ylabel(f"{series.name} [{unit}]")
+    upper.set_xlabel(f"time [{time_name}]")
+    upper.set_title(f"{found.frequency}, damping ratio {found.damping}", fontsize=10, loc="left")
+    upper.margins(y=0.2)  # room for the legend
+    upper.legend(loc="upper right", fontsize=9, frameon=False)
+    grid: Real = np.linspace(0.0, since[-1], len(since))
+    even: Real = np.interp(grid, since, series.values)
+    frequency, amplitude = spectrum(grid, even)
+    shown = (frequency > 0.0) & (frequency <= HARMONICS * found.frequency.value)
+    lower.semilogy(frequency[shown], factor * amplitude[shown], color=PAST, linewidth=1.0)
+    lower.axvline(found.frequency.value, color=IMPACT, linewidth=1.0, linestyle="--")
+    lower.set_ylabel(f"amplitude [{unit}]")
+    lower.set_xlabel("frequency [Hz]")
     return figure

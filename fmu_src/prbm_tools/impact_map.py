@@ -37,7 +37,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from scipy.optimize import least_squares
 
 from prbm import Impact, Mechanism, ParameterError, Simulation, assemble, equilibrium, modes
 from prbm.assembly import Real, System, unit
@@ -48,6 +47,8 @@ from prbm.modal import Modes, modes_at
 from prbm.statics import Equilibrium
 
 from .finite_elements import FiniteElements, Shape
+from .fit import DISPLACEMENT, Fit, Response, fit
+from .records import Series
 from .scene import GRID, own_style
 from .simulate import Progress
 
@@ -58,6 +59,7 @@ SECANTS = 20
 PATIENCE = 1.5  # periods of the fundamental mode in which a wall must be reached
 SAMPLES = 200  # of a response that is fitted
 REBOUND = 0.4  # periods after the first impact that a fit looks at
+LOOSE = 1e-7  # tolerance of simulations for a fit; its differences are of 1e-4
 MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 12))
 FUNDAMENTAL, LOST = "#0072b2", "#bbbbbb"
 HIGHER = ("#e69f00", "#d55e00", "#cc79a7", "#009e73")
@@ -220,7 +222,14 @@ class _Stop:
         if not names or (name is not None and name not in names):
             known = ", ".join(names) or "none"
             raise ParameterError(f"{mechanism.name} has no stop {name or 'to hit'}; it has {known}")
-        return cls(names.index(name) if name is not None else 0, name or names[0])
+        found = cls(names.index(name) if name is not None else 0, name or names[0])
+        for what in ("position", "offset"):
+            if f"{found.name}.{what}" not in mechanism.values():
+                raise ParameterError(
+                    f"{mechanism.name}: the {what} of {found.name} is an expression in other "
+                    f"parameters, and a map moves it: write a number there"
+                )
+        return found
 
     def at(
         self, values: Mapping[str, float] | None, height: float, offset: float
@@ -322,6 +331,19 @@ def _map(label: str, rows: Sequence[Sequence[Hit]]) -> ImpactMap:
     )
 
 
+def _counted(progress: Progress | None, count: int) -> Callable[[], None]:
+    """Return what tells, when it is called for one of so many points, which fraction is done."""
+    done = 0
+
+    def told() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done / count)
+
+    return told
+
+
 def algebraic(
     mechanism: Mechanism,
     heights: Sequence[float] = HEIGHTS,
@@ -330,6 +352,7 @@ def algebraic(
     *,
     stop: str | None = None,
     label: str = "algebraic",
+    progress: Progress | None = None,
 ) -> ImpactMap:
     """Return the map of a pure fundamental mode that arrives at the held shape.
 
@@ -345,6 +368,8 @@ def algebraic(
         Which stop; None: the first.
     label : str
         What to call it.
+    progress : callable or None
+        Told the fraction that is done, from 0 to 1.
 
     Raises
     ------
@@ -355,6 +380,8 @@ def algebraic(
     """
     which = _Stop.of(mechanism, stop)
 
+    told = _counted(progress, len(heights) * len(offsets))
+
     def hits(offset: float) -> Iterator[Hit]:
         system = assemble(mechanism, mechanism.values(which.at(values, 0.0, offset)))
         eps = value(mechanism.stops[which.index], "restitution", system.values)
@@ -362,6 +389,7 @@ def algebraic(
             shape = impact_shape(system, which.index, h)
             G = gap_rows(system).jacobian(system.directions(shape.q))[which.index]
             yield _hit(h, offset, modes(system, shape), G, eps)
+            told()
 
     return _map(label, [list(hits(d)) for d in offsets])
 
@@ -375,6 +403,7 @@ def by_elements(
     stop: str | None = None,
     elements: int = 16,
     label: str = "finite elements",
+    progress: Progress | None = None,
 ) -> ImpactMap:
     """Return the algebraic map of finite elements; parameters as :func:`algebraic` has them.
 
@@ -390,6 +419,8 @@ def by_elements(
     """
     which = _Stop.of(mechanism, stop)
 
+    told = _counted(progress, len(heights) * len(offsets))
+
     def hits(offset: float) -> Iterator[Hit]:
         fe = FiniteElements(mechanism, which.at(values, 0.0, offset), elements=elements)
         eps = value(mechanism.stops[which.index], "restitution", fe.values)
@@ -402,6 +433,7 @@ def by_elements(
 
             shape = _touching(fe.equilibrium, gap, h, size, shape)
             yield _hit(h, offset, fe.modes(shape), fe.gap_row(which.index, shape.q), eps)
+            told()
 
     return _map(label, [list(hits(d)) for d in offsets])
 
@@ -414,6 +446,7 @@ def closed_form(
     *,
     stop: str | None = None,
     label: str = "closed form",
+    progress: Progress | None = None,
 ) -> ImpactMap:
     """Return (1 + eps)/((1 + y'^2)(1 + m d^2/J)) - 1, y(x) the path of the body that hits.
 
@@ -432,6 +465,7 @@ def closed_form(
     point = complex(*(affine(coordinate)(system.values) for coordinate in s.point))
     lever = (u.conjugate() * (point - frame.drawn)).imag
     step = 1e-4 * system.length
+    told = _counted(progress, len(heights))
     for j, h in enumerate(heights):
         x = impact_shape(system, which.index, h).q
         held = float((system.release @ system.directions(x)).real) + system.release_c
@@ -440,6 +474,7 @@ def closed_form(
         slope = moved.imag / moved.real
         for i, d in enumerate(offsets):
             result[i, j] = (1 + eps) / ((1 + slope**2) * (1 + m * (lever + d) ** 2 / J)) - 1
+        told()
     return ImpactMap(label, np.array(heights), np.array(offsets), result)
 
 
@@ -526,50 +561,27 @@ def simulated(
         If a wall is not reached: release further away.
     """
     which = _Stop.of(mechanism, stop)
-    count = len(heights) * len(offsets)
+    told = _counted(progress, len(heights) * len(offsets))
 
-    def hits(i: int, offset: float) -> Iterator[Hit]:
-        for j, h in enumerate(heights):
+    def hits(offset: float) -> Iterator[Hit]:
+        for h in heights:
             simulation = Simulation(mechanism, which.at(values, h, offset), tolerance=tolerance)
             impact = first_impact(simulation, which.index)
             yield mode_energies(simulation.system, impact)
-            if progress is not None:
-                progress((i * len(heights) + j + 1) / count)
+            told()
 
-    return _map(label, [list(hits(i, d)) for i, d in enumerate(offsets)])
+    return _map(label, [list(hits(d)) for d in offsets])
 
 
 # --- fitted -----------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Fit:
-    """Parameters that bring a model nearest to a response.
-
-    Parameters
-    ----------
-    values : mapping
-        By name.
-    rmse : float
-        What is left between the two, root mean square [m].
-    """
-
-    values: Mapping[str, float]
-    rmse: float
-
-
 def response(
-    mechanism: Mechanism, values: Mapping[str, float], times: Real, tolerance: float = 1e-7
+    mechanism: Mechanism, values: Mapping[str, float], times: Real, tolerance: float = LOOSE
 ) -> Real:
     """Return the displacement of the released body along its release at times, (m,) [m]."""
-    simulation = Simulation(mechanism, values, tolerance=tolerance)
-    u, body = unit(mechanism.release.direction), mechanism.release.body
-    found = np.zeros(len(times))
-    for i, t in enumerate(times):
-        simulation.advance(float(t))
-        out = simulation.outputs()
-        found[i] = u.real * out[f"{body}.x"] + u.imag * out[f"{body}.y"]
-    return found
+    seen = Response(Series(times, np.zeros(len(times))), DISPLACEMENT, tolerance=tolerance)
+    return seen.model(mechanism, values)
 
 
 def fit_response(
@@ -579,7 +591,7 @@ def fit_response(
     wanted: Real,
     values: Mapping[str, float] | None = None,
 ) -> Fit:
-    """Fit parameters of a mechanism to a response by least squares, within their bounds.
+    """Fit parameters of a mechanism to a computed response, from their values on.
 
     Parameters
     ----------
@@ -598,29 +610,11 @@ def fit_response(
     ------
     ParameterError
         If a name is unknown.
+    RecordError
+        If the times have gaps or are fewer than 16.
     """
-    known = mechanism.values(values)
-    parameters = {p.name: p for p in mechanism.parameters}
-    for name in names:
-        if name not in parameters:
-            raise ParameterError(f"there is no parameter {name!r} to fit in {mechanism.name}")
-    start = np.array([known[name] for name in names])
-    size = np.where(start != 0.0, np.abs(start), 1.0)
-    scale = float(np.abs(wanted).max()) or 1.0
-    low, high = (
-        np.array([getattr(parameters[name], bound) for name in names]) / size
-        for bound in ("minimum", "maximum")
-    )
-
-    def difference(x: Real) -> Real:
-        tried = {**(values or {}), **dict(zip(names, (x * size).tolist(), strict=True))}
-        result: Real = (response(mechanism, tried, times) - wanted) / scale
-        return result
-
-    inside = np.clip(start / size, low + 1e-9, high - 1e-9)
-    found = least_squares(difference, inside, bounds=(low, high), diff_step=[1e-4], xtol=1e-8)
-    rmse = scale * math.sqrt(float(found.fun @ found.fun) / len(times))
-    return Fit(dict(zip(names, (found.x * size).tolist(), strict=True)), rmse)
+    target = Response(Series(times, wanted, DISPLACEMENT), DISPLACEMENT, tolerance=LOOSE)
+    return fit(mechanism, names, target, values, starts=1)
 
 
 def fitted(
@@ -650,12 +644,13 @@ def fitted(
     """
     which = _Stop.of(mechanism, stop)
     model = with_flexures(mechanism, "1R")
-    stiffness = [f"{kind.name}.K_theta" for kind in model.flexure_types
-                 if not isinstance(kind.coefficients.get("K_theta", 0.0), str)]  # fmt: skip
     eps = f"{which.name}.restitution"
     result = np.zeros((len(offsets), len(heights)))
-    own = {p.name for p in model.parameters}
-    shared = {name: x for name, x in (values or {}).items() if name in own}
+    told = _counted(progress, result.size)
+    known = model.values()
+    shared = {name: x for name, x in (values or {}).items() if name in known}
+    kinds = (f"{kind.name}.K_theta" for kind in model.flexure_types)
+    stiffness = [name for name in kinds if name in known]
     for i, d in enumerate(offsets):
         for j, h in enumerate(heights):
             simulation = Simulation(mechanism, which.at(values, h, d), tolerance=1e-6)
@@ -663,10 +658,9 @@ def fitted(
             end = hit + REBOUND / simulation.frequency
             times = np.linspace(0.0, end, SAMPLES)
             wanted = response(mechanism, which.at(values, h, d), times)
-            fit = fit_response(model, [eps, *stiffness], times, wanted, which.at(shared, h, 0.0))
-            result[i, j] = fit.values[eps]
-            if progress is not None:
-                progress((i * len(heights) + j + 1) / result.size)
+            found = fit_response(model, [eps, *stiffness], times, wanted, which.at(shared, h, 0.0))
+            result[i, j] = found.values[eps]
+            told()
     return ImpactMap(label, np.array(heights), np.array(offsets), result)
 
 
@@ -674,6 +668,16 @@ def fitted(
 
 
 def _edges(x: Real) -> Real:
+    """Return the edges of cells about points in order.
+
+    Examples
+    --------
+    >>> _edges(np.array([0.0, 2.0, 4.0])), _edges(np.array([5.0]))
+    (array([-1.,  1.,  3.,  5.]), array([4.5, 5.5]))
+    """
+    if len(x) == 1:
+        single: Real = x + np.array([-0.5, 0.5])
+        return single
     middle = (x[1:] + x[:-1]) / 2
     return np.concatenate([[2 * x[0] - middle[0]], middle, [2 * x[-1] - middle[-1]]])
 

@@ -15,8 +15,8 @@ from pydantic import ValidationError
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import DictSchema, NullableSchema, TupleSchema, WithDefaultSchema
 
-from prbm.errors import MechanismError, PrbmError
-from prbm.mechanism import Mechanism
+from prbm.errors import MechanismError, ParameterError, PrbmError
+from prbm.mechanism import Mechanism, proposal
 
 from .mechanism_tables import LONGEST_NAME, TAGS, MechanismTable, Table, mechanism
 from .toml_lines import line_of, lines
@@ -112,6 +112,31 @@ def shipped() -> dict[str, Path]:
     """Return the files of the mechanisms that come with the package, by name."""
     folder = Path(str(resources.files("mechanisms")))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def find(name: str) -> Mechanism:
+    """Return the mechanism of a file, or the shipped one of a name.
+
+    Raises
+    ------
+    ParameterError
+        If there is no shipped mechanism of that name.
+    MechanismError
+        If the file describes none.
+
+    Examples
+    --------
+    >>> find("Bistable").name
+    'Bistable'
+    """
+    files = shipped()
+    if name in files:
+        return load(files[name])
+    if not Path(name).suffix and not Path(name).is_file():
+        raise ParameterError(
+            f"there is no model {name!r}; {proposal(name, files)}; a file of your own ends in .toml"
+        )
+    return load(name)
 
 
 # --- what is wrong ----------------------------------------------------------------------------

@@ -32,7 +32,17 @@ from pydantic_core import CoreSchema, core_schema
 from prbm import mechanism as engine
 from prbm.errors import MechanismError
 from prbm.flexure import CLAMP, ENDS, MODELS, MOST_LINKS
-from prbm.mechanism import FIELDS, GROUND, NAME, RESERVED, TINY_LENGTH, Mechanism, Quantity, affine
+from prbm.mechanism import (
+    FIELDS,
+    GROUND,
+    LARGE,
+    NAME,
+    RESERVED,
+    TINY_LENGTH,
+    Mechanism,
+    Quantity,
+    affine,
+)
 
 from .units import check_coherent, number, quantity, si_unit
 
@@ -496,6 +506,13 @@ def _attached(
 def _check_drawn(mechanism: Mechanism) -> None:
     """Refuse, for the defaults, what cannot be drawn, and expressions out of bounds."""
     values = mechanism.values()
+    for name, point in _places(mechanism):
+        x, y = (affine(coordinate)(values) for coordinate in point)
+        if not math.hypot(x, y) <= LARGE:
+            raise MechanismError(
+                f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within {LARGE:g} m "
+                "of the origin"
+            )
     for flexure in mechanism.flexures:
         if _distance(mechanism, flexure, values) < TINY_LENGTH:
             raise MechanismError(
@@ -509,6 +526,14 @@ def _check_drawn(mechanism: Mechanism) -> None:
                 f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
                 "draw them at the same place"
             )
+
+
+def _places(mechanism: Mechanism) -> Iterator[tuple[str, engine.Point]]:
+    """Yield all drawn points with their names."""
+    yield from ((f"{GROUND}.{name}", point) for name, point in mechanism.ground.items())
+    for body in mechanism.bodies:
+        yield f"{body.name}.centre", body.centre
+        yield from ((f"{body.name}.{name}", point) for name, point in body.points.items())
 
 
 def _distance(

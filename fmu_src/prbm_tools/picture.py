@@ -21,11 +21,12 @@ from matplotlib.patheffects import withStroke
 from prbm import Mechanism, ParameterError, assemble, equilibrium, modes
 from prbm.assembly import Complex
 from prbm.errors import PrbmError
-from prbm.mechanism import unknown, value
+from prbm.mechanism import value
 from prbm.modal import Modes
 
+from .arguments import picture_arguments
 from .figures import save
-from .mechanism_file import load, shipped
+from .mechanism_file import find
 from .scene import (
     BODY,
     CHAIN,
@@ -35,12 +36,13 @@ from .scene import (
     PROBE,
     STRAIGHT,
     WALL,
+    frequency_unit,
     length_unit,
     own_style,
     quiet,
 )  # fmt: skip
+from .settings import settings
 from .shapes import Shapes, corners, curve
-from .simulate import assignment
 
 SHOWN = 0.12  # of the size: the largest displacement in the picture of a mode
 ARROW = 0.14  # of the size: length of the arrows of forces
@@ -54,7 +56,10 @@ WIDTH, LEAST_HEIGHT, LARGEST_HEIGHT, FRAME = 7.2, 2.4, 6.4, 0.9  # inches, of th
 
 @own_style()
 def picture(
-    mechanism: Mechanism, values: Mapping[str, float] | None = None, shown: int = 0
+    mechanism: Mechanism,
+    values: Mapping[str, float] | None = None,
+    shown: int = 0,
+    held: float | None = None,
 ) -> Figure:
     """Draw the straight shape with the names of its parts, and modes about the equilibrium.
 
@@ -66,6 +71,8 @@ def picture(
         Parameters that differ from their defaults.
     shown : int
         How many modes are drawn, about the static equilibrium under gravity, without stops.
+    held : float or None
+        Displacement at which the released body is held [m]; None: it rests by itself.
 
     Returns
     -------
@@ -94,13 +101,15 @@ def picture(
     _Drawing(axes, shapes).parts()
     axes.set_title(mechanism.title, fontsize=10, loc="left")
     if shown:
-        _draw_modes(figure, [grid[1 + k // COLUMNS, k % COLUMNS] for k in range(shown)], shapes)
+        _draw_modes(
+            figure, [grid[1 + k // COLUMNS, k % COLUMNS] for k in range(shown)], shapes, held
+        )
     return figure
 
 
-def _draw_modes(figure: Figure, places: list[object], shapes: Shapes) -> None:
+def _draw_modes(figure: Figure, places: list[object], shapes: Shapes, held: float | None) -> None:
     system = shapes.system
-    rest = equilibrium(system)
+    rest = equilibrium(system, held)
     found, E = modes(system, rest), shapes.arms(rest.q)
     if len(places) > len(found.frequency):
         raise ParameterError(
@@ -120,12 +129,13 @@ def _frequency(frequency: float) -> str:
 
     Examples
     --------
-    >>> _frequency(4.8899), _frequency(-2.0)
-    ('4.890 Hz', 'unstable')
+    >>> _frequency(4.8899), _frequency(92086.3), _frequency(-2.0)
+    ('4.890 Hz', '92.09 kHz', 'unstable')
     """
     if frequency <= 0.0:
         return "unstable"
-    return f"{frequency:#.4g} Hz".replace(". Hz", " Hz")
+    factor, unit = frequency_unit(frequency)
+    return f"{frequency * factor:#.4g} {unit}".replace(". ", " ")
 
 
 def moved(shapes: Shapes, E: Complex, found: Modes, k: int) -> Complex:
@@ -308,21 +318,19 @@ class _Drawing:
 # --- command ----------------------------------------------------------------------------------
 
 
-def find(name: str) -> Mechanism:
-    """Return the mechanism of a file, or the shipped one of a name.
+def run(options: argparse.Namespace) -> Path:
+    """Draw what a command line says; return the file.
 
     Raises
     ------
-    ParameterError
-        If there is no shipped mechanism of that name.
-    MechanismError
-        If the file describes none.
+    PrbmError
+        If there is no such mechanism, parameter or mode.
+    OSError
+        If the file cannot be written.
     """
-    if name in shipped():
-        return load(shipped()[name])
-    if not Path(name).suffix:
-        raise ParameterError(unknown(name, shipped()).replace("variable", "model"))
-    return load(name)
+    mechanism = find(options.mechanism)
+    drawn = picture(mechanism, settings(mechanism, options.set), options.modes)
+    return save(drawn, options.out or Path(f"{mechanism.name}.png"))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -331,21 +339,14 @@ def main(arguments: list[str] | None = None) -> int:
         prog="python -m prbm_tools.picture",
         description="Draw a mechanism with the names of its parts, and its modes, to a PNG file.",
     )
-    add = parser.add_argument
-    add("mechanism", metavar="FILE.toml", help="a mechanism file, or the name of a shipped one")
-    add("--modes", type=int, default=0, metavar="N", help="how many modes to draw, too")
-    add("--out", type=Path, metavar="FILE.png", help="default: the name of the mechanism, .png")
-    add("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter")
+    picture_arguments(parser)
     options = parser.parse_args(arguments)
     try:
-        mechanism = find(options.mechanism)
-        drawn = picture(mechanism, dict(assignment(x) for x in options.set), options.modes)
-        path = save(drawn, options.out or Path(f"{mechanism.name}.png"))
+        print(run(options))
     except PrbmError as error:
         parser.exit(2, f"{parser.prog}: {error}\n")
     except OSError as error:
         parser.exit(2, f"{parser.prog}: {error.filename}: cannot be written ({error.strerror})\n")
-    print(path)
     return 0
 
 

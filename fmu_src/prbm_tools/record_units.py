@@ -6,28 +6,18 @@ from decimal import Decimal
 from functools import cache
 from typing import Any
 
-from .units import PREFIXES
+from .units import MECHANICAL
 
-DEFINITIONS = f"""{PREFIXES}metre = [length] = m = meter
+DEFINITIONS = f"""{MECHANICAL}@alias second = sec
 inch = 0.0254 * metre = in = inches
-gram = [mass] = g
-second = [time] = s = sec
 minute = 60 * second = min
 hour = 3600 * second = hr
 ampere = [current] = A = amp
 kelvin = [temperature] = K
 degree_Celsius = kelvin; offset: 273.15 = degC
-radian = [angle] = rad
-degree = 0.017453292519943295769236907685 * radian = deg = °
-newton = kilogram * metre / second ** 2 = N
-newton_metre = newton * metre = Nm
 gram_force = 0.00980665 * newton = gf
 pound_force = 4.4482216152605 * newton = lbf
-pascal = newton / metre ** 2 = Pa
 bar = 100000 * pascal
-joule = newton * metre = J
-watt = joule / second = W
-hertz = 1 / second = Hz
 volt = watt / ampere = V
 ohm = volt / ampere = Ω
 percent = 0.01 = pct

@@ -69,6 +69,20 @@ def length_unit(size: float) -> tuple[float, str]:
     return 1e9, "nm"
 
 
+def frequency_unit(frequency: float) -> tuple[float, str]:
+    """Return a unit in which a frequency has a handy number, as its factor and name.
+
+    Examples
+    --------
+    >>> frequency_unit(1298.0), frequency_unit(92086.0)
+    ((1.0, 'Hz'), (0.001, 'kHz'))
+    """
+    for factor, name in ((1.0, "Hz"), (1e-3, "kHz"), (1e-6, "MHz")):
+        if abs(frequency) * factor < 1e4:
+            return factor, name
+    return 1e-9, "GHz"
+
+
 def time_unit(span: float) -> tuple[float, str]:
     """Return a unit in which a duration has a handy number, as its factor and name.
 

@@ -21,12 +21,13 @@ from matplotlib.figure import Figure
 from scipy.signal import detrend, find_peaks
 from scipy.signal.windows import hann
 
-from prbm import Impact, Mechanism, ParameterError, Simulation
+from prbm import Impact, Mechanism, ParameterError, Simulation, assemble
 from prbm.assembly import Real, unit
 from prbm.modal import modes_at
 
 from .impact_map import first_impact
 from .scene import GRID, IMPACT, PAST, own_style
+from .simulate import Result
 
 FAR = 10.0  # sizes of the mechanism, to which a wall is taken away
 FEWEST = 16  # samples of a spectrum
@@ -122,6 +123,44 @@ def after_impact(
     return AfterImpact(mechanism.title, impact, since, along, across, turning, found)
 
 
+def after_last_impact(result: Result) -> AfterImpact:
+    """Return what a result holds of the motion after its last impact, in its equal steps.
+
+    The wall is where it is: nothing but the mechanism is heard for as long as it is not touched.
+
+    Raises
+    ------
+    ParameterError
+        If there is no impact, too little is recorded after it, or the body rests on the stop.
+    """
+    if not result.impacts:
+        raise ParameterError("the result has no impact: simulate longer, or move the stop")
+    impact, columns = result.impacts[-1], result.columns
+    s = next(stop for stop in result.mechanism.stops if stop.name == impact.stop)
+    later = columns[columns["time"] > impact.time]
+    if len(later) and (later[f"{s.name}.contact"] != 0).any():
+        raise ParameterError(
+            f"after the last impact, at t = {impact.time:.6g} s, {s.body} rests on {s.name}: there "
+            "is nothing to hear; listen after the first one, or simulate less long"
+        )
+    steps = np.diff(later["time"])
+    if len(steps) and abs(steps[-1] - steps[0]) > 1e-6 * steps[0]:
+        later = later[:-1]  # the last step may be shorter
+    if len(later) < FEWEST:
+        raise ParameterError(
+            f"{len(later)} samples follow the last impact, at t = {impact.time:.6g} s; a spectrum "
+            f"needs at least {FEWEST}: simulate longer, or in smaller steps"
+        )
+    v = unit(s.direction).conjugate() * (later[f"{s.body}.vx"] + 1j * later[f"{s.body}.vy"])
+    own = {p.name for p in result.mechanism.parameters}
+    values = {name: x for name, x in result.values.items() if name in own}
+    found = modes_at(assemble(result.mechanism, values), impact.q).frequency
+    return AfterImpact(
+        result.mechanism.title, impact, later["time"] - impact.time, v.real, v.imag,
+        later[f"{s.body}.omega"], found,
+    )  # fmt: skip
+
+
 def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
     """Return frequencies and amplitudes of a signal.
 
@@ -192,6 +231,18 @@ def peaks(frequency: Real, amplitude: Real, share: float = 0.02) -> Real:
     return result
 
 
+def numbered(modes: Real) -> list[tuple[int, float]]:
+    """Return the first modes with their numbers, those that vibrate.
+
+    Examples
+    --------
+    >>> numbered(np.array([-1.6, 116.0]))
+    [(2, 116.0)]
+    """
+    first = enumerate(map(float, modes[:MODES_SHOWN]), start=1)
+    return [(i, f) for i, f in first if f > 0.0]
+
+
 @own_style()
 def figure(
     response: AfterImpact,
@@ -212,13 +263,13 @@ def figure(
     drawn = Figure((8.0, 0.9 + 2.0 * len(signals)), dpi=120, layout="constrained")
     FigureCanvasAgg(drawn)
     every = np.atleast_1d(drawn.subplots(len(signals), 1, sharex=True))
-    shown = [f for f in response.modes[:MODES_SHOWN] if f > 0.0]
+    shown = numbered(response.modes)
     for axes, name in zip(every, signals, strict=True):
         frequency, amplitude = spectrum(response.time, getattr(response, name))
         end = highest or float(frequency[-1])
         inside = (frequency <= end) & (frequency > 0.0)
         axes.semilogy(frequency[inside], amplitude[inside], color=PAST, linewidth=1.1)
-        for f in shown:
+        for _, f in shown:
             if f < end:
                 axes.axvline(f, color=IMPACT, linewidth=1.0, linestyle="--")
         top = float(amplitude[inside].max())
@@ -229,7 +280,7 @@ def figure(
         axes.set_axisbelow(True)
         axes.spines[["top", "right"]].set_visible(False)
     last = -np.inf
-    for i, f in enumerate(shown, start=1):
+    for i, f in shown:
         if f < end and f - last > 0.035 * end:  # labels do not overlap
             every[0].annotate(
                 f"{i}", (f, 1.0), (0, 3), xycoords=("data", "axes fraction"),

@@ -32,7 +32,7 @@ import fmpy  # type: ignore[import-untyped]
 from prbm import ParameterError
 from prbm.errors import PrbmError
 
-from .simulate import MOST_ROWS, Progress, assignment, reporter
+from .simulate import MOST_ROWS, Progress, reporter
 from .sweep_run import CRASHED, GOOD, Job, Outcome, Output, SpecificationError, parsed
 
 if TYPE_CHECKING:
@@ -567,11 +567,20 @@ def _parser() -> argparse.ArgumentParser:
     return p
 
 
+def _assignment(text: str) -> tuple[str, float]:
+    """Return the name and the number of a text name=number; units are the FMU's."""
+    name, _, number = text.partition("=")
+    try:
+        return name.strip(), float(number)
+    except ValueError:
+        raise ParameterError(f"--set {text}: write a name and a number, as name=0.5") from None
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     try:
         options = vars(_parser().parse_args(arguments))
-        options["values"] = dict(assignment(text) for text in options["values"])
+        options["values"] = dict(_assignment(text) for text in options["values"])
         found = sweep(**options, progress=reporter())
     except PrbmError as error:
         print(error, file=sys.stderr)

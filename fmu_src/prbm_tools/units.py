@@ -31,8 +31,7 @@ kilo- = 1e3 = k-
 mega- = 1e6 = M-
 giga- = 1e9 = G-
 """
-DEFINITIONS = f"""{PREFIXES}tera- = 1e12 = T-
-metre = [length] = m = meter
+MECHANICAL = f"""{PREFIXES}metre = [length] = m = meter
 gram = [mass] = g
 second = [time] = s
 radian = [angle] = rad
@@ -43,6 +42,8 @@ pascal = newton / metre ** 2 = Pa
 joule = newton * metre = J
 watt = joule / second = W
 hertz = 1 / second = Hz
+"""
+DEFINITIONS = f"""{MECHANICAL}tera- = 1e12 = T-
 """  # an engineer's mechanism needs no more, and pint's own list makes a metre of a misprint
 KNOWN = "m, g, s, N, Nm, Pa, J, W, Hz, rad, deg, with SI prefixes, joined as in kg/m3 or N.m"
 

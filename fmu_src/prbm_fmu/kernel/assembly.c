@@ -586,13 +586,19 @@ static void add_moments(System *system) {
     pack_blocks(system);
 }
 
-/* The size of the mechanism as drawn. */
+/* The size of the mechanism as drawn: the largest distance between points of the ground and centres
+   of mass, or the length of the longest flexure, where all of these are at one place. */
 static double size_of(const System *system, Scratch *scratch) {
     const Mechanism *m = system->mechanism;
     size_t mark = scratch->used;
     int count = m->ground_count + m->body_count;
     Complex *points = take_complex(scratch, count, 1);
     double longest = 0.0;
+    for (int i = 0; i < m->flexure_count; i++) {
+        const Connection *c = &m->flexures[i].between;
+        Complex along = minus(at_point(system, c->end_point), at_point(system, c->start_point));
+        longest = greater(modulus(along), longest);
+    }
     for (int i = 0; i < count; i++) {
         points[i] = at_point(system, i < m->ground_count ? m->ground[i]
                                                          : m->bodies[i - m->ground_count].centre);

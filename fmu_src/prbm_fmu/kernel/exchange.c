@@ -451,7 +451,7 @@ static bool follow(Simulation *sim, bool *followed, Problem *problem) {
 
 /* Let go of what rests on walls that have changed their velocity, or have them strike. */
 static bool break_away(Simulation *sim, Problem *problem) {
-    int struck = unsettled_by_walls(sim);
+    int struck = unsettled(sim);
     if (struck >= 0) {
         return impact(sim, struck, problem);
     }
@@ -569,7 +569,15 @@ static void arm(Simulation *sim) {
 static bool let_all_happen(Simulation *sim, Problem *problem) {
     enum { MOST_AT_ONCE = 16 };
     bool struck[MOST_STOPS] = {false};
-    if (!evaluate_motion(sim, problem) || !follow_walls(sim, problem)) {
+    bool thrown;
+    if (!evaluate_motion(sim, problem) || !receive_impulses(sim, &thrown, problem)) {
+        return false;
+    }
+    if (thrown) {
+        changed_front(sim);
+    }
+    if (!(thrown ? evaluate_motion(sim, problem) && break_away(sim, problem)
+                 : follow_walls(sim, problem))) {
         return false;
     }
     for (int i = 0; i < MOST_AT_ONCE; i++) {
@@ -999,6 +1007,11 @@ static void stop_changes(const Tangent *t, double *out) {
     for (int k = 0; k < t->q->held_count; k++) {
         out[PER_STOP * t->q->held[k] + 2] = multiplier_change(t, t->q->first_hold + k);
     }
+    for (int i = 0; i < t->q->system->s; i++) {
+        const double *wall = t->du + 3 * t->q->system->mechanism->force_count + 2 * i;
+        out[PER_STOP * i + 3] = wall[0] - out[PER_STOP * i];
+        out[PER_STOP * i + 4] = wall[1] - out[PER_STOP * i + 1];
+    }
 }
 
 /* dbend, complete with the change of the accelerations. */
@@ -1065,6 +1078,54 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
     out[2] = -product(conjugate(system->gravity), along_arms(n, system->S, t->dE)).re;
     out[3] = dx[2 * count];
     out[4] = dx[2 * count + 1];
+}
+
+/* The same arms, which move at the rates x (n,) that do not change. */
+static Tangent at_rates(const Tangent *t, const double *x) {
+    Scratch *scratch = &t->sim->scratch;
+    int n = t->q->system->n;
+    Tangent u = *t;
+    Complex **arrays[] = {&u.w, &u.dw, &u.swing, &u.dswing};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        *arrays[i] = take_complex(scratch, n, 1);
+    }
+    u.v = x;
+    u.dv = take(scratch, (size_t)n);
+    zeros(n, u.dv);
+    turning(t->q->system, x, u.w);
+    turning(t->q->system, u.dv, u.dw);
+    for (int j = 0; j < n; j++) {
+        Arm arm = arm_at(&u, j);
+        u.swing[j] = product(arm.E, arm.w);
+        u.dswing[j] = swing_change(&arm);
+    }
+    return u;
+}
+
+/* Change of the mobility G X of a hit point, M X + R^T mu = G^T, R X = 0 with the rows R of the
+ * loops: 2 dG X - X^T dM X - 2 mu^T dR X. */
+static bool mobility_change(const Tangent *t, int i, double *result, Problem *problem) {
+    Simulation *sim = t->sim;
+    const System *system = &sim->system;
+    size_t mark = sim->scratch.used;
+    int n = system->n, r = system->r, size = n + r;
+    double *kkt = take_matrix(&sim->scratch, size, size), *x = take(&sim->scratch, (size_t)size);
+    Rows gaps = gap_rows(system), loops = plain_rows(system, r, system->loops, system->loops_c);
+    Here here = mass_and_loops(sim, t->y);
+    row_jacobian(&gaps, i, here.e, x);
+    zeros(r, x + n);
+    saddle(n, r, here.M, here.loops, here.loops, kkt);
+    bool right = solve(size, kkt, x, &sim->scratch, problem);
+    if (right) {
+        Tangent u = at_rates(t, x);
+        double change = rate_change(&u, &gaps, i) - kinetic_change(&u);
+        for (int k = 0; k < r; k++) {
+            change -= x[n + k] * rate_change(&u, &loops, k);
+        }
+        *result = 2.0 * change;
+    }
+    sim->scratch.used = mark;
+    return right;
 }
 
 static double dissipation_change(const Tangent *t) {
@@ -1222,6 +1283,10 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
         solve_again(&t.q->factors, t.dx, t.dlam);
         bend_arms(&t);
         all_changes(&t, dx, dw, dmoment, dvalues);
+    }
+    for (int i = 0; right && i < sim->system.s; i++) {
+        right = mobility_change(&t, i, dvalues + sim->mechanism->slots.stops + PER_STOP * i + 5,
+                                problem);
     }
     sim->scratch.used = mark;
     return right;

@@ -603,6 +603,18 @@ static bool not_fixed(const Instance *instance, int slot, double x, double prese
     return false;
 }
 
+/* What a variable is that may change in event mode alone, now that events have one; or NULL. */
+static const char *waits_for_event(const Instance *instance, int slot) {
+    const Mechanism *m = instance->mechanism;
+    int impulses = m->slots.inputs + LOADS * m->force_count + 2 * m->stop_count;
+    bool exchange = instance->mode == MODE_CONTINUOUS;
+    bool impulse = slot >= impulses && slot < impulses + LOADS * m->force_count;
+    if (impulse && (exchange || (instance->mode == MODE_STEP && instance->event_mode))) {
+        return "an impulse";
+    }
+    return exchange && is_parameter(m, slot) ? "a parameter" : NULL;
+}
+
 PRBM int write_value(Instance *instance, uint32_t reference, int type, double x) {
     const Variable *variable = writable(instance, reference, type);
     Problem problem;
@@ -619,10 +631,11 @@ PRBM int write_value(Instance *instance, uint32_t reference, int type, double x)
         instance->refused[slot] = 0;
         return FMU_OK;
     }
-    if (instance->mode == MODE_CONTINUOUS && is_parameter(instance->mechanism, slot)) {
-        refuse(instance, FMU_ERROR, "%s is a parameter: it can be set in %s, not in %s",
-               variable->name, instance->standard->modes[MODE_EVENT],
-               instance->standard->modes[MODE_CONTINUOUS]);
+    const char *discrete = waits_for_event(instance, slot);
+    if (discrete) {
+        refuse(instance, FMU_ERROR, "%s is %s: it can be set in %s, not in %s", variable->name,
+               discrete, instance->standard->modes[MODE_EVENT],
+               instance->standard->modes[instance->mode]);
         return refuse_set(instance, slot);
     }
     if (instance->mode == MODE_INITIALIZATION) {

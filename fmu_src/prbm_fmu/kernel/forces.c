@@ -32,6 +32,21 @@ PRBM void force_row(int n, const Complex *A, Complex force, Complex *w) {
     }
 }
 
+PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex *e, double *rows,
+                    Scratch *scratch) {
+    size_t mark = scratch->used;
+    int n = system->n;
+    Complex *w = take_complex(scratch, n, 1);
+    for (int k = 0; k < 2; k++) {
+        force_row(n, frame->A, complex_of(k == 0, k == 1), w);
+        spread(system, 1, w, w);
+        generalised(n, w, e, rows + k * n);
+    }
+    zeros(n, rows + 2 * n);
+    rows[2 * n + frame->j] = 1.0;
+    scratch->used = mark;
+}
+
 PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q) {
     for (int j = 0; j < n; j++) {
         Q[j] = product(w[j], e[j]).re;

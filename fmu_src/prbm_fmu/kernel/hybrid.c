@@ -49,8 +49,9 @@ static void place_state(Simulation *sim, Memory *memory) {
     size_t ny = (size_t)state_size(sim), s = (size_t)m->stop_count, d = sizeof(double);
     size_t np = (size_t)m->parameter_count, nu = (size_t)m->input_count;
     size_t nx = 2 * (size_t)m->independent_count + 2;
+    size_t nf = LOADS * (size_t)m->force_count;
     size_t counts[] = {sizeof(Scalars) / d, np, nu, np, nu, 3 * s, s, s, (size_t)m->friction_count,
-                       sizeof(Latched) / d * s, ny, ny, ny, STAGES * ny, nx, s, s, s};
+                       sizeof(Latched) / d * s, ny, ny, ny, STAGES * ny, nx, s, s, s, nf};
     enum { GROUPS = sizeof counts / sizeof counts[0] };
     double *parts[GROUPS];
     size_t count = 0;
@@ -84,6 +85,7 @@ static void place_state(Simulation *sim, Memory *memory) {
         sim->floors = parts[15];
         sim->held_rates = parts[16];
         sim->held_times = parts[17];
+        sim->received = parts[18];
     }
 }
 
@@ -254,8 +256,8 @@ PRBM void read_discrete(Simulation *sim) {
 
 static Inputs inputs_of(const Simulation *sim) {
     const Mechanism *m = sim->mechanism;
-    const double *given = sim->acting_given + m->input_count - 2;
-    Inputs inputs = {sim->forces, {given[0], given[1]}, sim->walls};
+    const double *base = sim->acting_given + m->input_count - 2;
+    Inputs inputs = {sim->forces, {base[0], base[1]}, sim->walls, base - m->stop_count};
     return inputs;
 }
 
@@ -335,6 +337,13 @@ PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *pr
         if (!finite_number(x)) {
             return fail(problem, "%s = %g must be a finite number", m->input_names[i], x);
         }
+        bool mobility = i < m->input_count - 2 && i >= m->input_count - 2 - m->stop_count;
+        if (mobility && x < 0.0) {
+            return fail(problem,
+                        "%s = %g 1/kg must not be negative: it is the inverse effective mass of "
+                        "the wall, 0 for a wall that does not move when it is hit",
+                        m->input_names[i], x);
+        }
         sim->given[i] = x;
     }
     if (sim->now->exchange != 0.0) {
@@ -342,6 +351,16 @@ PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *pr
         sim->fresh = NOTHING;
     }
     return true;
+}
+
+/* The impulses so far, of each force (b, 3). */
+static const double *impulses(const Simulation *sim) {
+    return sim->given + LOADS * sim->mechanism->force_count + 2 * sim->mechanism->stop_count;
+}
+
+static bool impulses_changed(const Simulation *sim) {
+    size_t count = LOADS * (size_t)sim->mechanism->force_count;
+    return memcmp(impulses(sim), sim->received, count * sizeof *sim->received) != 0;
 }
 
 PRBM double wall_target(const Simulation *sim, int i, double h) {
@@ -411,6 +430,7 @@ static void start_discrete(Simulation *sim) {
         sim->rubs[i] = IDLE;
     }
     memset(sim->latched, 0, (size_t)sim->system.s * sizeof *sim->latched);
+    copy(LOADS * sim->mechanism->force_count, impulses(sim), sim->received);
 }
 
 static bool set_off(Simulation *sim, Problem *problem) {
@@ -497,21 +517,25 @@ static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
     return changed;
 }
 
-/* Let go of what rested on a wall that has changed its velocity: one that retreats leaves the body
- * behind, one that advances strikes; such a stop is returned, or -1. */
-PRBM int unsettled_by_walls(Simulation *sim) {
-    int n = sim->system.n, struck = -1, held[MOST_STOPS], count = sim->equations.held_count;
-    double rates[MOST_STOPS], bound = still(sim);
+/* Let go of what rested on a wall and moves, by the wall's velocity or an impulse: a wall that
+ * retreats leaves the body behind; one that advances strikes, as does a body that is thrown against
+ * a wall that it touches.  Such a stop is returned, or -1. */
+PRBM int unsettled(Simulation *sim) {
+    int n = sim->system.n, struck = -1;
+    double gaps[MOST_STOPS], rates[MOST_STOPS], bound = still(sim);
     directions(&sim->system, sim->front, sim->e);
-    for (int k = 0; k < count; k++) {
-        held[k] = sim->equations.held[k];
-        rates[k] = gap_rate(&sim->equations, held[k], sim->e, sim->front + n);
+    for (int i = 0; i < sim->system.s; i++) {
+        gaps[i] = gap(&sim->equations, i, sim->now->time, sim->e);
+        rates[i] = gap_rate(&sim->equations, i, sim->e, sim->front + n);
     }
-    for (int k = 0; k < count; k++) {
-        if (fabs(rates[k]) > bound) {
-            without_hold(sim, held[k]);
-            struck = rates[k] < 0.0 ? held[k] : struck;
+    for (int i = 0; i < sim->system.s; i++) {
+        bool holds = sim->holds[i] != 0.0;
+        if (holds && fabs(rates[i]) > bound) {
+            without_hold(sim, i);
+        } else if (holds || gaps[i] > TOUCHING * sim->system.length) {
+            continue;
         }
+        struck = rates[i] < -bound ? i : struck;
     }
     return struck;
 }
@@ -548,7 +572,11 @@ static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
     }
     copy(sim->mechanism->input_count, sim->given, sim->acting_given);
     set_inputs(sim);
-    int struck = unsettled_by_walls(sim);
+    bool any;
+    if (!receive_impulses(sim, &any, problem)) {
+        return false;
+    }
+    int struck = unsettled(sim);
     if (struck >= 0) {
         return impact(sim, struck, problem);
     }
@@ -1529,6 +1557,11 @@ typedef struct {
     bool with_normal[MOST_STOPS];                   /* whether the stop took part */
 } Hits;
 
+/* The a-th of the stops that take part: those that are struck, then those that hold. */
+static int partner(const Hits *hits, int a) {
+    return a < hits->struck_count ? hits->struck[a] : hits->held[a - hits->struck_count];
+}
+
 /* The inverse mass in contact space, W = rows X (k, k), of rows (k, n) and their response X. */
 static void contact_mobility(int k, int n, const double *rows, const double *X, double *W) {
     for (int a = 0; a < k; a++) {
@@ -1562,7 +1595,7 @@ static bool hits_without_friction(Simulation *sim, const Here *here, const doubl
     Rows gaps = gap_rows(system);
     for (int a = 0; a < k; a++) {
         bool struck = a < hits->struck_count;
-        int i = struck ? hits->struck[a] : hits->held[a - hits->struck_count];
+        int i = partner(hits, a);
         row_jacobian(&gaps, i, here->e, G + a * n);
         rates[a] = lesser(u[i], 0.0);
         eps[a] = struck ? hits->restitution[a] : 0.0;
@@ -1571,10 +1604,13 @@ static bool hits_without_friction(Simulation *sim, const Here *here, const doubl
         return false;
     }
     contact_mobility(k, n, G, X, W);
+    for (int a = 0; a < k; a++) {
+        W[a * k + a] += sim->equations.inputs.mobilities[partner(hits, a)];
+    }
     newton(k, W, rates, eps, P, &sim->scratch);
     add_impulses(k, n, v, X, P, hits->after);
     for (int a = 0; a < k; a++) {
-        int i = a < hits->struck_count ? hits->struck[a] : hits->held[a - hits->struck_count];
+        int i = partner(hits, a);
         hits->normal[i] = P[a];
         hits->with_normal[i] = true;
     }
@@ -1634,6 +1670,9 @@ static bool hits_with_friction(Simulation *sim, const Here *here, const double *
         return false;
     }
     contact_mobility(2 * k, n, GT, X, W);
+    for (int a = 0; a < k; a++) {
+        W[a * 2 * k + a] += sim->equations.inputs.mobilities[hits->struck[a]];
+    }
     if (k == 1) {
         stronge(W, rates, mu[0], hits->restitution[0], &P[0], &P[1]);
     } else if (!several(k, W, rates, mu, hits->restitution, P, &sim->scratch, problem)) {
@@ -1761,8 +1800,18 @@ static void report_impact(const Simulation *sim, int i) {
     }
 }
 
+/* Give a wall the velocity that an impulse leaves it with, until the next restart. */
+static void push_wall(Simulation *sim, int i, double P) {
+    double change = sim->equations.inputs.mobilities[i] * P, t = sim->now->front_time;
+    if (change != 0.0) {
+        Wall wall = {wall_at(&sim->walls[i], t), sim->walls[i].rate + change, t};
+        sim->walls[i] = wall;
+    }
+}
+
 /* Put an impact into the state, the energies and the latched outputs.  At each stop -P (u- + u+)/2
- * is lost, and as much along the wall; the wall does -P w. */
+ * is lost, and as much along the wall; the wall does -P (w- + w+)/2, where an impulse changes the
+ * velocity w of a wall by its mobility times P. */
 static bool book(Simulation *sim, const Hits *hits, const bool *counted, const double *q,
                  const double *v, Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -1773,12 +1822,17 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
     double lost[MOST_STOPS], before[MOST_STOPS], after[MOST_STOPS], all_lost = 0.0, work = 0.0, modal = 0.0;
     directions(&sim->system, q, sim->e);
     for (int i = 0; i < s; i++) {
+        double wall = sim->walls[i].rate;
         before[i] = gap_rate(&sim->equations, i, sim->e, v);
+        if (hits->with_normal[i]) {
+            push_wall(sim, i, hits->normal[i]);
+            sim->latched[i].impulse_sum += hits->normal[i];
+        }
         after[i] = gap_rate(&sim->equations, i, sim->e, hits->after);
         double slid = row_rate(&walls, i, sim->e, v) + row_rate(&walls, i, sim->e, hits->after);
         lost[i] = -hits->normal[i] * (before[i] + after[i]) / 2 - hits->tangential[i] * slid / 2;
         all_lost += hits->with_normal[i] ? lost[i] : 0.0;
-        work -= hits->with_normal[i] ? hits->normal[i] * sim->walls[i].rate : 0.0;
+        work -= hits->with_normal[i] ? hits->normal[i] * (wall + sim->walls[i].rate) / 2 : 0.0;
         any = any || counted[i];
     }
     if (any) {
@@ -1847,7 +1901,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     if (right) {
         directions(&sim->system, q, sim->e);
         for (int k = 0; k < hits.struck_count + hits.held_count; k++) {
-            int i = k < hits.struck_count ? hits.struck[k] : hits.held[k - hits.struck_count];
+            int i = partner(&hits, k);
             if (gap_rate(&sim->equations, i, sim->e, hits.after) <= bound) {
                 resting[resting_count++] = i;
             }
@@ -1857,6 +1911,43 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     }
     sim->scratch.used = mark;
     return right && settle(sim, resting, resting_count, NULL, problem);
+}
+
+/* Change the velocities by what the impulses have grown by since they were received: each component P
+ * at the point of a force changes the rate u of the point along it, and its work is P (u- + u+)/2.
+ * The loops take part, stops follow: see unsettled. */
+PRBM bool receive_impulses(Simulation *sim, bool *any, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = sim->system.n, count = LOADS * sim->mechanism->force_count;
+    const double *given = impulses(sim);
+    double grown[LOADS], *v = sim->front + n;
+    *any = impulses_changed(sim);
+    if (!*any) {
+        return true;
+    }
+    double *rows = take_matrix(&sim->scratch, LOADS, n), *X = take_matrix(&sim->scratch, n, LOADS);
+    double *after = take(&sim->scratch, (size_t)n);
+    Here here = mass_and_loops(sim, sim->front);
+    bool right = true;
+    for (int i = 0; right && i < sim->mechanism->force_count; i++) {
+        load_rows(&sim->system, &sim->system.pushed[i], here.e, rows, &sim->scratch);
+        right = response(n, sim->system.r, LOADS, here.M, here.loops, rows, X, &sim->scratch,
+                         problem);
+        for (int k = 0; k < LOADS; k++) {
+            grown[k] = given[LOADS * i + k] - sim->received[LOADS * i + k];
+        }
+        if (right) {
+            add_impulses(LOADS, n, v, X, grown, after);
+            for (int k = 0; k < LOADS; k++) {
+                sim->front[2 * n + 1] +=
+                    grown[k] * (dot(n, rows + k * n, v) + dot(n, rows + k * n, after)) / 2;
+            }
+            copy(n, after, v);
+        }
+    }
+    copy(count, given, sim->received);
+    sim->scratch.used = mark;
+    return right;
 }
 
 /* --- going on --------------------------------------------------------------------------------- */
@@ -1977,12 +2068,20 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     Simulation *sim = simulation;
-    if (!due(sim, sim->now->time)) {
+    bool event = due(sim, sim->now->time), thrown = impulses_changed(sim);
+    if (!event && !thrown) {
         return true;
     }
     keep_backup(sim);
     sim->fresh = NOTHING;
-    return attempt(sim, let_happen(sim, problem), problem);
+    bool right = !event || let_happen(sim, problem);
+    if (right && thrown) {
+        Wall walls[MOST_STOPS];
+        memcpy(walls, sim->walls, (size_t)sim->system.s * sizeof *walls);
+        right = restart(sim, walls, problem);
+        sim->now->underway = 0.0; /* the walls may go elsewhere, too */
+    }
+    return attempt(sim, right, problem);
 }
 
 /* --- outputs ---------------------------------------------------------------------------------- */
@@ -2017,6 +2116,9 @@ static void output_places(Simulation *sim) {
         double *values = out + slots->stops + PER_STOP * i;
         values[0] = gap(&sim->equations, i, sim->now->time, sim->e);
         values[1] = gap_rate(&sim->equations, i, sim->e, v);
+        double moved = wall_at(&sim->walls[i], sim->now->time);
+        values[3] = moved - stop_field(sim, sim->mechanism->stops[i].position) - values[0];
+        values[4] = sim->walls[i].rate - values[1];
         double *last = out + slots->latched + PER_LATCHED * i;
         last[0] = sim->holds[i];
         memcpy(last + 1, &sim->latched[i], sizeof(Latched));
@@ -2076,6 +2178,21 @@ static void output_energies(Simulation *sim) {
     out[2] = gravitational_energy(system, sim->e);
 }
 
+static bool output_mobilities(Simulation *sim, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    double *out = sim->outputs + sim->mechanism->slots.stops;
+    double *G = take(&sim->scratch, (size_t)sim->system.n);
+    Here here = mass_and_loops(sim, sim->y);
+    Rows gaps = gap_rows(&sim->system);
+    bool right = true;
+    for (int i = 0; right && i < sim->system.s; i++) {
+        row_jacobian(&gaps, i, here.e, G);
+        right = mobility(sim, here.M, sim->system.r, here.loops, G, out + PER_STOP * i + 5, problem);
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
 /* y and e at the present time, and what follows from them alone. */
 static bool output_state(Simulation *sim, Problem *problem) {
     int n = sim->system.n;
@@ -2110,6 +2227,9 @@ PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem) {
     if (missing & ENERGIES) {
         output_energies(sim);
     }
+    if ((missing & MOBILITIES) && !output_mobilities(sim, problem)) {
+        return false;
+    }
     sim->fresh |= groups;
     return true;
 }
@@ -2121,6 +2241,9 @@ static int groups_of(const Simulation *sim, int slot) {
     bool force = of_stop && (slot - slots->stops) % PER_STOP == 2;
     if (force || slot == slots->energies) {
         return PLACES | MOTION;
+    }
+    if (of_stop && (slot - slots->stops) % PER_STOP == 5) {
+        return PLACES | MOBILITIES;
     }
     if (slot >= slots->base && slot < slots->energies) {
         return PLACES | MOTION | BASE;

@@ -21,6 +21,7 @@ typedef struct {
 
 typedef struct {
     double count, time, approach_speed, rebound_speed, impulse, energy_lost, modal_restitution;
+    double impulse_sum; /* of all impulses so far, those that were captured too */
 } Latched;
 
 typedef struct {
@@ -28,7 +29,7 @@ typedef struct {
     double time;
 } Event;
 
-enum { NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8 }; /* groups of outputs */
+enum { NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8, MOBILITIES = 16 }; /* outputs */
 
 struct Simulation {
     const Mechanism *mechanism;
@@ -44,6 +45,7 @@ struct Simulation {
     Scalars *now;
     double *values, *given;               /* as they were set */
     double *acting_values, *acting_given; /* since the last restart */
+    double *received;                     /* (3 b,): impulses that have acted */
     Wall *walls;                          /* (s,) */
     double *holds, *slides, *rubs;        /* the discrete state */
     Latched *latched;                     /* (s,) */
@@ -81,7 +83,8 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, const E
 PRBM bool impact(Simulation *sim, int hit, Problem *problem);
 PRBM bool count_event(Simulation *sim, double time, int kind, Problem *problem);
 PRBM void without_hold(Simulation *sim, int stop);
-PRBM int unsettled_by_walls(Simulation *sim);
+PRBM bool receive_impulses(Simulation *sim, bool *any, Problem *problem);
+PRBM int unsettled(Simulation *sim);
 PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem);
 PRBM double margin_release(const Simulation *sim, int k);
 PRBM double margin_stick(const Simulation *sim, int k);

@@ -259,11 +259,12 @@ typedef struct {
 
 enum {
     PER_BODY = 6,    /* x, y, angle, vx, vy, omega */
-    PER_STOP = 3,    /* gap, gap_rate, force */
+    PER_STOP = 6,    /* gap, gap_rate, force, point.displacement, point.velocity, point.mobility */
     PER_BASE = 3,    /* force.x, force.y, moment */
     PER_ENERGY = 5,  /* kinetic, elastic, gravitational, dissipated, work */
-    PER_LATCHED = 8, /* contact, impact_count, impact_time, approach_speed, rebound_speed, impulse,
-                        energy_lost, modal_restitution */
+    PER_LATCHED = 9, /* contact, impact_count, impact_time, approach_speed, rebound_speed, impulse,
+                        energy_lost, modal_restitution, impulse_sum */
+    LOADS = 3,       /* of a force, and of an impulse: x, y, moment */
     PER_LINK = 2,    /* angle, omega */
     PER_STRETCH = 2, /* strain, strain_rate */
     PER_PROBE = 4,   /* x, y, vx, vy */
@@ -501,6 +502,9 @@ PRBM void springs(int n, const double *K, const double *deflection, double *torq
 PRBM double elastic_energy(int n, const double *K, const double *deflection);
 PRBM void field_row(int n, const Complex *S, Complex acceleration, Complex *w);
 PRBM void force_row(int n, const Complex *A, Complex force, Complex *w);
+/* The generalised forces (3, n) of a unit force along x, along y and of a unit moment. */
+PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex *e, double *rows,
+                    Scratch *scratch);
 PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q);
 PRBM double gravitational_energy(const System *system, const Complex *e);
 PRBM double normal_force(double lift, double preload, double stiffness);
@@ -523,6 +527,7 @@ typedef struct {
     const double *forces;  /* (3 b,): x, y, moment of each force */
     Complex base;          /* acceleration */
     const Wall *walls;     /* (s,) */
+    const double *mobilities; /* (s,) inverse effective masses of the walls; 0: immovable */
 } Inputs;
 
 /* Accelerations, multipliers and powers of a system in one discrete state. */

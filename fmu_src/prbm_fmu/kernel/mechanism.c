@@ -568,7 +568,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     m->variable_count = read_count(reader, 16);
     m->independent_count = read_count(reader, 4);
     m->input_count = read_count(reader, 12);
-    if (!reader->wrong && m->input_count != 3LL * m->force_count + 2LL * m->stop_count + 2) {
+    if (!reader->wrong && m->input_count != 6LL * m->force_count + 3LL * m->stop_count + 2) {
         reader->wrong = "another number of inputs than the mechanism has";
     }
     read_parameters(reader, m);

@@ -224,7 +224,8 @@ static bool releasable(const System *system, const double *M, int r, const doubl
         const Mechanism *m = system->mechanism;
         return fail(problem,
                     "release.velocity = %g m/s: the body %s cannot move along the direction of the "
-                    "release; choose another direction, or let flexures stretch (axial = true)",
+                    "release; choose another direction or body, or let flexures stretch "
+                    "(axial = true)",
                     speed, m->bodies[m->release.body - 1].name);
     }
     return right;

@@ -27,23 +27,55 @@ thesis, TU Delft 2015, appendix A.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.floating[Any]]
-Complex = NDArray[np.complexfloating[Any, Any]]
+from prbm.assembly import Complex, Real
 
-LENGTH, THICKNESS, WIDTH = 40e-3, 0.1e-3, 8e-3  # of a steel flexure [m]
-YOUNGS_MODULUS, DENSITY = 181.5e9, 7800.0  # [Pa], [kg/m^3]
-SHUTTLE_WIDTH, SHUTTLE_MASS = 80e-3, 53.187e-3  # [m], [kg]
-COM_HEIGHT = 17.77e-3  # of the shuttle's centre of mass above the flexures' ends [m]
 GRAVITY = 9.81  # along +x [m/s^2]
 RESTITUTION = 0.6
 
-EI = YOUNGS_MODULUS * WIDTH * THICKNESS**3 / 12  # bending stiffness of a flexure [N m^2]
-FLEXURE_MASS = DENSITY * LENGTH * THICKNESS * WIDTH  # [kg]
+
+@dataclass(frozen=True)
+class Structure:
+    """Dimensions and masses of a parallel guide.
+
+    Parameters
+    ----------
+    length, thickness, width : float
+        Of a flexure [m].
+    youngs_modulus, density : float
+        Of its material [Pa], [kg/m^3].
+    shuttle_width, shuttle_mass : float
+        Distance of the flexures [m], mass [kg]; the inertia is m W^2/12.
+    com_height : float
+        Of the shuttle's centre of mass above the flexures' ends [m].
+    """
+
+    length: float
+    thickness: float
+    width: float
+    youngs_modulus: float
+    density: float
+    shuttle_width: float
+    shuttle_mass: float
+    com_height: float
+
+    @property
+    def EI(self) -> float:
+        """Bending stiffness of a flexure [N m^2]."""
+        return self.youngs_modulus * self.width * self.thickness**3 / 12
+
+    @property
+    def flexure_mass(self) -> float:
+        """[kg]."""
+        return self.density * self.length * self.thickness * self.width
+
+
+STEEL = Structure(40e-3, 0.1e-3, 8e-3, 181.5e9, 7800.0, 80e-3, 53.187e-3, 17.77e-3)
+"""The guide that was measured."""
+PMMA = Structure(0.2, 2e-3, 1e-2, 3.21e9, 1190.0, 0.2, 1190 * 0.2 * 0.02 * 0.01, 0.0)
+"""The guide of the source's chapter 4 and of its listing A.1."""
 
 GAMMA_1R, K_THETA_1R = 0.8517, 2.65
 GAMMA_2R = np.array([0.44, 0.46])
@@ -115,7 +147,7 @@ class Chain:
         self.loop = length.astype(complex)
         self.distance = complex(length @ np.exp(1j * self.straight))
         self.H = A.conj().T * mass @ A
-        self.J = np.diag([link.inertia for link in links])
+        self.J: Real = np.diag(np.array([link.inertia for link in links], float))
         self.K = stretch.T * np.array(rates) @ stretch
         self.weight = gravity * mass @ A
         self.com = A[shuttle]
@@ -162,7 +194,8 @@ class Chain:
         if convective:
             closing = le @ vv
             right[n:] = closing.real, closing.imag
-        return np.linalg.solve(bordered(M, np.array([-le.imag, le.real])), right)[:n]
+        a = np.linalg.solve(bordered(M, np.array([-le.imag, le.real])), right)
+        return np.asarray(a, float)[:n]
 
     def project(self, q: Real) -> Real:
         """Close the loop: Gauss-Newton steps with the pseudo-inverse, q of shape (n,) [rad]."""
@@ -197,20 +230,23 @@ def bordered(M: Real, rows: Real) -> Real:
 
 
 def guide_1R(
-    K_theta: float = K_THETA_1R, gravity: float = GRAVITY, hit_offset: float = 0.0
+    K_theta: float = K_THETA_1R,
+    gravity: float = GRAVITY,
+    hit_offset: float = 0.0,
+    of: Structure = STEEL,
 ) -> Chain:
-    r"""Return the steel guide with one pivot a half flexure: k = 2 gamma K_theta EI/L.
+    r"""Return a guide with one pivot a half flexure: k = 2 gamma K_theta EI/L.
 
     The flexures' masses are lumped, at the moving pivots only: m/4 + (m L^2/12)/(gamma L)^2.
     """
-    length = GAMMA_1R * LENGTH
-    lumped = FLEXURE_MASS / 4 + FLEXURE_MASS * LENGTH**2 / 12 / length**2
+    length, m = GAMMA_1R * of.length, of.flexure_mass
+    lumped = m / 4 + m * of.length**2 / 12 / length**2
     links = [
         Link(length, lumped, length, 0.0, np.pi / 2),
-        shuttle(stub=(LENGTH - length) / 2),
+        shuttle((of.length - length) / 2, of),
         Link(length, lumped, 0.0, 0.0, -np.pi / 2),
     ]
-    rates = [2 * GAMMA_1R * K_theta * EI / LENGTH] * 4
+    rates = [2 * GAMMA_1R * K_theta * of.EI / of.length] * 4
     return Chain(links, rates, 1, gravity, hit_offset)
 
 
@@ -219,30 +255,31 @@ def guide_2R(
     K_theta: Real = K_THETA_2R,
     gravity: float = GRAVITY,
     hit_offset: float = 0.0,
+    of: Structure = STEEL,
 ) -> Chain:
-    """Return the steel guide with two pivots a half flexure (see `rates_2R` for the switch).
+    """Return a guide with two pivots a half flexure (see `rates_2R` for the switch).
 
     The links are slender rods; the stubs' mass, a tenth of the flexures', is left out.
     """
-    h = LENGTH / 2
+    h = of.length / 2
     lengths = h * GAMMA_2R[[0, 1, 0]] * [1, 2, 1]
-    masses = FLEXURE_MASS * lengths / LENGTH
+    masses = of.flexure_mass * lengths / of.length
 
     def rods(straight: float) -> list[Link]:
         rod = zip(lengths, masses, strict=True)
         return [Link(length, m, length / 2, m * length**2 / 12, straight) for length, m in rod]
 
-    body = shuttle(stub=h * (1 - GAMMA_2R.sum()))
-    K1, K2 = EI / h * rates_2R(stiffness_factor, K_theta)
+    body = shuttle(h * (1 - float(GAMMA_2R.sum())), of)
+    K1, K2 = of.EI / h * rates_2R(stiffness_factor, K_theta)
     links = [*rods(np.pi / 2), body, *rods(-np.pi / 2)]
     return Chain(links, [K1, K2, K2, K1] * 2, 3, gravity, hit_offset)
 
 
-def shuttle(stub: float) -> Link:
+def shuttle(stub: float, of: Structure = STEEL) -> Link:
     """Return the shuttle between the upper pivots, `stub` [m] below the flexures' ends."""
-    centre = SHUTTLE_WIDTH / 2 + 1j * (stub + COM_HEIGHT)
-    inertia = SHUTTLE_MASS * SHUTTLE_WIDTH**2 / 12
-    return Link(SHUTTLE_WIDTH, SHUTTLE_MASS, centre, inertia, 0.0)
+    centre = of.shuttle_width / 2 + 1j * (stub + of.com_height)
+    inertia = of.shuttle_mass * of.shuttle_width**2 / 12
+    return Link(of.shuttle_width, of.shuttle_mass, centre, inertia, 0.0)
 
 
 def rates_2R(stiffness_factor: bool, K_theta: Real = K_THETA_2R) -> Real:
@@ -302,9 +339,9 @@ def held_shape(chain: Chain, displacement: float) -> tuple[Real, float]:
     return q, float(-lam[2])
 
 
-def stiffness(chain: Chain) -> float:
+def stiffness(chain: Chain, of: Structure = STEEL) -> float:
     """Force over displacement of the shuttle near the straight shape, without gravity [N/m]."""
-    x = LENGTH / 1e5
+    x = of.length / 1e5
     return held_shape(chain, x)[1] / x
 
 
@@ -395,7 +432,7 @@ def simulate(
         trajectory = np.array(states)
         energy = np.array([chain.energy(*state) for state in states])
     return Run(
-        t=step * np.arange(len(states)),
+        t=step * np.arange(len(states), dtype=float),
         q=trajectory[:, 0],
         v=trajectory[:, 1],
         x=chain.displacement(chain.com, trajectory[:, 0]),

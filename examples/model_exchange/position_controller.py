@@ -1,0 +1,43 @@
+"""A controller of a position with a slow actuator, as an FMU: runs inside pythonfmu.
+
+    force' = (command - force) / lag,       command = gain (wanted - position) - damping velocity
+
+Position and velocity are held within a step; then the force is an exponential.
+"""
+
+import math
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+VARIABLES = (
+    ("gain", "parameter", "Force for a missing distance [N/m]"),
+    ("damping", "parameter", "Force against a velocity [N s/m]"),
+    ("wanted", "parameter", "Position that is wanted [m]"),
+    ("lag", "parameter", "Time constant of the actuator [s]"),
+    ("position", "input", "Measured [m]"),
+    ("velocity", "input", "Measured [m/s]"),
+    ("force", "output", "At the end of the step [N]"),
+)
+
+
+class PositionController(Fmi2Slave):
+    """PD with an actuator of the first order."""
+
+    author = "the prbm-impact examples"
+    description = "Position controller with a slow actuator"
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.gain, self.damping, self.wanted, self.lag = 20.0, 0.5, 1e-3, 5e-3
+        self.position = self.velocity = self.force = 0.0
+        for name, causality, text in VARIABLES:
+            kind = Fmi2Variability.fixed if causality == "parameter" else Fmi2Variability.continuous
+            self.register_variable(
+                Real(name, causality=Fmi2Causality[causality], variability=kind, description=text)
+            )
+
+    def do_step(self, current_time, step_size):
+        """Let the force go towards the command."""
+        command = self.gain * (self.wanted - self.position) - self.damping * self.velocity
+        self.force = command + (self.force - command) * math.exp(-step_size / self.lag)
+        return True

@@ -1,0 +1,55 @@
+"""``prbm validate``: the source's results again, or one mechanism beside its referees."""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from ..files import check_writable
+from ..mechanism_file import find
+from ..settings import UserMistake, settings
+from ..simulate import reporter
+from .output import Output
+from .words import measured
+
+
+def validated(options: argparse.Namespace) -> None:
+    """Print how the models compare."""
+    if options.mechanism is None:
+        _source(options)
+    else:
+        _mechanism(options)
+
+
+def _source(options: argparse.Namespace) -> None:
+    """Reproduce the source's results."""
+    for option in ("measured", "set"):
+        if getattr(options, option):
+            raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
+    from ..validation import PAGE, reproduce  # type: ignore[import-untyped, unused-ignore]
+
+    if options.out is not None:
+        check_writable(options.out)
+    with tempfile.TemporaryDirectory(prefix="prbm_") as folder:
+        results = reproduce(options.out or Path(folder), options.only, reporter())
+    for result in results:
+        print(f"{result.where}: {result.verdict}")
+    if options.out is not None:
+        print(options.out / PAGE)
+
+
+def _mechanism(options: argparse.Namespace) -> None:
+    """Compare a mechanism with finite elements and measurements."""
+    if options.only:
+        raise UserMistake("--only chooses among the source's results: leave MECHANISM out")
+    mechanism = find(options.mechanism)
+    values, output = settings(mechanism, options.set), Output(options.out)
+    known = dict(map(measured, options.measured))
+    from ..comparison import compare  # type: ignore[import-untyped, unused-ignore]
+
+    found = compare(
+        mechanism, values, elements=options.elements, measured=known, progress=reporter()
+    )
+    print(found)
+    output.text(f"{mechanism.name}-comparison.csv", found.csv())
+    output.figure(f"{mechanism.name}-comparison.png", found.figure)
+    output.write()

@@ -1,0 +1,153 @@
+"""A system of FMUs inside one FMU, by FMPy's container: for a tool that takes a single one."""
+
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+from uuid import NAMESPACE_URL, uuid5
+
+import attrs
+from fmpy import read_model_description  # type: ignore[import-untyped]
+from fmpy.container_fmu import config  # type: ignore[import-untyped]
+from fmpy.container_fmu.cli import create_container_fmu  # type: ignore[import-untyped]
+from fmpy.model_description import (  # type: ignore[import-untyped]
+    CoSimulation,
+    DefaultExperiment,
+    ModelDescription,
+    ModelVariable,
+    Unknown,
+)
+
+from .cosimulation import CouplingError, Value
+
+NAMES3 = {"Real": "Float64", "Integer": "Int32"}  # of types, which the container takes throughout
+KINDS = ("parameter", "input", "output")
+
+
+def container(
+    path: str | Path,
+    fmus: Mapping[str, str | Path],
+    connections: Mapping[str, str],
+    step: float,
+    values: Mapping[str, Value] | None = None,
+    shown: Sequence[str] = (),
+    fmi: int = 3,
+    stop_time: float = 1.0,
+) -> None:
+    """Write an FMU for co-simulation that has others inside and couples them.
+
+    Parameters
+    ----------
+    path : str or Path
+        The FMU, ``.fmu``.
+    fmus, connections
+        FMUs by the names of their instances, and for inputs, ``name.variable``, the outputs that
+        they get their values from.
+    step : float
+        Communication step of those inside [s]; that of the container is to be a multiple of it.
+    values : mapping
+        Start values, ``name.variable``: these are parameters and inputs of the container.
+    shown : sequence of str
+        Further variables of the container, ``name.variable``.
+    fmi : {2, 3}
+        Version of FMI of the container; those inside may have the other one.
+    stop_time : float
+        Of the default experiment [s].
+
+    Notes
+    -----
+    The scheme is Jacobi's.  No event mode, no state that can be saved, and the platforms that both
+    FMPy's library and the FMUs inside are made for.
+
+    Raises
+    ------
+    CouplingError
+        If a name does not fit.
+    """
+    values = dict(values or {})
+    with tempfile.TemporaryDirectory(prefix="prbm_container_") as temporary:
+        folder = Path(temporary)
+        inside = {name: _inside(name, fmu, folder) for name, fmu in fmus.items()}
+        own = {full: values.get(full) for full in dict.fromkeys([*values, *shown])}
+        mapped = {_shown(full, value, inside, fmi): full for full, value in own.items()}
+        time = ModelVariable(
+            name="time",
+            valueReference=0,
+            type=_type("Float64", fmi),
+            causality="independent",
+            variability="continuous",
+        )
+        system = config.Configuration(
+            parallelDoStep=False,
+            modelDescription=ModelDescription(
+                fmiVersion=f"{fmi}.0",
+                modelName=Path(path).stem,
+                instantiationToken=f"{{{uuid5(NAMESPACE_URL, repr((connections, values)))}}}",
+                generationTool="prbm-impact, FMPy",
+                coSimulation=CoSimulation(modelIdentifier="", fixedInternalStepSize=step),
+                modelVariables=[time, *mapped],  # the container counts from the time, which is 0
+                defaultExperiment=DefaultExperiment(
+                    startTime="0", stopTime=repr(stop_time), stepSize=repr(step)
+                ),
+                outputs=[Unknown(variable=v) for v in mapped if v.causality == "output"],
+            ),
+            components=list(inside.values()),
+            connections=[_wire(inside, *pair) for pair in connections.items()],
+            variableMappings={v: [_found(inside, full)] for v, full in mapped.items()},
+        )
+        (folder / "unzipped").mkdir()
+        create_container_fmu(system, folder / "unzipped", folder / "container.fmu")
+        shutil.copyfile(folder / "container.fmu", path)
+
+
+def _inside(name: str, fmu: str | Path, folder: Path) -> Any:
+    """Return an FMU under the name of its instance, after which its folder is called."""
+    own = folder / f"{name}.fmu"
+    shutil.copyfile(fmu, own)
+    return config.Component(name, own, read_model_description(str(own)))
+
+
+def _found(inside: Mapping[str, Any], full: str) -> tuple[Any, Any]:
+    name, _, variable = full.partition(".")
+    component = inside.get(name)
+    for candidate in component.modelDescription.modelVariables if component else ():
+        if candidate.name == variable:
+            return component, candidate
+    raise CouplingError(f"{full}: there is no such variable; write name.variable")
+
+
+def _type(kind: str, fmi: int) -> str:
+    three = NAMES3.get(kind, kind)
+    two = {name: other for other, name in NAMES3.items()}
+    return three if fmi == 3 else two.get(three, three)
+
+
+def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) -> Any:
+    """Return a variable of the container for one of those inside."""
+    _, variable = _found(inside, full)
+    if variable.causality not in KINDS:
+        raise CouplingError(f"{full} is neither parameter nor input nor output")
+    start = variable.start if value is None else value
+    output = variable.causality == "output"
+    return ModelVariable(
+        name=full,
+        valueReference=0,
+        type=_type(variable.type, fmi),
+        description=variable.description,
+        causality=variable.causality,
+        variability=variable.variability,
+        initial="calculated" if output else None,
+        start=None if output else _text(start),
+    )
+
+
+def _text(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _wire(inside: Mapping[str, Any], to: str, source: str) -> Any:
+    """Return a connection; FMPy's library knows the names of types of FMI 3.0 alone."""
+    (giver, output), (taker, given) = _found(inside, source), _found(inside, to)
+    renamed = [attrs.evolve(v, type=_type(v.type, 3)) for v in (output, given)]
+    return config.Connection(giver, renamed[:1], taker, renamed[1:])

@@ -1,0 +1,337 @@
+"""An FMU for model exchange and a partner in one solver, the partner being a Python function.
+
+Model exchange gives away the equations and no solver: derivatives of the states, and indicators
+whose change of sign is an event.  So all that is coupled can be integrated at once, without
+communication steps; what co-simulation does is compared with this.
+"""
+
+import tempfile
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from ctypes import c_double
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from fmpy import extract, read_model_description  # type: ignore[import-untyped]
+from fmpy.fmi1 import FMICallException  # type: ignore[import-untyped]
+from fmpy.fmi2 import FMU2Model  # type: ignore[import-untyped]
+from fmpy.fmi3 import FMU3Model  # type: ignore[import-untyped]
+from numpy.typing import NDArray
+from scipy.integrate import DOP853
+from scipy.optimize import brentq
+
+from .cosimulation import CouplingError, Value
+from .simulate import Columns, communication_points, structured
+
+Real = NDArray[np.float64]
+Partner = Callable[[float, Mapping[str, Value], Real], tuple[Mapping[str, float], Sequence[float]]]
+LOCATED = 1e-14  # s, to which events are located
+ABSOLUTE = 1e-3  # of the relative tolerance times a nominal value: the absolute tolerance
+NAMES2 = {
+    "updateDiscreteStates": "newDiscreteStates",
+    "getContinuousStateDerivatives": "getDerivatives",
+}
+"""What FMPy calls differently in FMI 2.0."""
+
+
+class Model:
+    """An FMU for model exchange, its variables by name.
+
+    Parameters
+    ----------
+    fmu : str or Path
+        Of FMI 2.0 or 3.0.
+    folder : str or Path
+        An empty folder, where it is unpacked.
+
+    Raises
+    ------
+    CouplingError
+        If it has no model exchange.
+    """
+
+    def __init__(self, fmu: str | Path, folder: str | Path) -> None:
+        unpacked = extract(str(fmu), str(folder))
+        description = read_model_description(unpacked)
+        interface, self.version = description.modelExchange, int(description.fmiVersion[0])
+        if interface is None or self.version < 2:
+            raise CouplingError(f"{fmu} has no model exchange of FMI 2.0 or 3.0")
+        self.references = {v.name: (v.type, v.valueReference) for v in description.modelVariables}
+        self.states = description.numberOfContinuousStates
+        self.indicators = description.numberOfEventIndicators
+        self.fmu: Any = (FMU2Model if self.version == 2 else FMU3Model)(
+            guid=description.guid,
+            unzipDirectory=str(unpacked),
+            modelIdentifier=interface.modelIdentifier,
+            instanceName=description.modelName,
+        )
+        self.fmu.instantiate()
+
+    def _method(self, name: str) -> Callable[..., Any]:
+        method: Callable[..., Any] = getattr(
+            self.fmu, NAMES2.get(name, name) if self.version == 2 else name
+        )
+        return method
+
+    def _filled(self, getter: str, count: int) -> Real:
+        values = (c_double * count)()
+        self._method(getter)(values, count)
+        return np.array(values)
+
+    def _reference(self, name: str) -> tuple[str, int]:
+        if name not in self.references:
+            raise CouplingError(f"there is no variable {name!r} in the FMU")
+        kind, reference = self.references[name]
+        return kind, reference
+
+    def get(self, names: Sequence[str]) -> dict[str, Value]:
+        """Return variables by name."""
+        found = [self._reference(name) for name in names]
+        return {
+            name: self._method(f"get{kind}")([reference])[0]
+            for name, (kind, reference) in zip(names, found, strict=True)
+        }
+
+    def set(self, values: Mapping[str, Value]) -> None:
+        """Give values to variables."""
+        for name, value in values.items():
+            kind, reference = self._reference(name)
+            self._method(f"set{kind}")([reference], [value])
+
+    def start(self, values: Mapping[str, Value], stop_time: float) -> None:
+        """Initialize with start values, at time 0."""
+        self.set(values)
+        if self.version == 2:
+            self.fmu.setupExperiment(startTime=0.0, stopTime=stop_time)
+            self.fmu.enterInitializationMode()
+        else:
+            self.fmu.enterInitializationMode(startTime=0.0, stopTime=stop_time)
+        self.fmu.exitInitializationMode()
+
+    def update(self) -> None:
+        """Let happen what is due in event mode, and leave it."""
+        while self._method("updateDiscreteStates")()[0]:
+            pass
+        self.fmu.enterContinuousTimeMode()
+
+    def put(self, time: float, x: Real) -> None:
+        """Set time and states."""
+        self.fmu.setTime(time)
+        self.fmu.setContinuousStates((c_double * self.states)(*x), self.states)
+
+    @property
+    def x(self) -> Real:
+        """Continuous states."""
+        return self._filled("getContinuousStates", self.states)
+
+    @property
+    def rates(self) -> Real:
+        """Their derivatives."""
+        return self._filled("getContinuousStateDerivatives", self.states)
+
+    @property
+    def z(self) -> Real:
+        """Event indicators."""
+        return self._filled("getEventIndicators", self.indicators)
+
+    @property
+    def nominals(self) -> Real:
+        """Magnitudes of the states."""
+        return self._filled("getNominalsOfContinuousStates", self.states)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.fmu.freeInstance()
+
+
+class OneSolver:
+    """A model and a partner, integrated together.
+
+    Parameters
+    ----------
+    model : Model
+        Initialized.
+    partner : callable
+        ``partner(t, outputs, z)`` returns the inputs that it gives to the model, by name, and
+        the derivatives of its own states z.  Its inputs must not act on these outputs at once.
+    z : sequence of float
+        Its states at the start.
+    sees : sequence of str
+        The outputs that it is shown.
+    tolerance, largest : float
+        Relative tolerance, and largest step [s]: what begins and ends within a step is not seen.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        partner: Partner,
+        z: Sequence[float],
+        sees: Sequence[str],
+        tolerance: float,
+        largest: float,
+    ) -> None:
+        self.model, self.partner, self.sees = model, partner, tuple(sees)
+        self.tolerance, self.largest = tolerance, largest
+        self.time, self.happens = 0.0, False
+        self.z = np.array(z, float)
+        model.update()
+
+    def put(self, time: float, y: Real) -> Sequence[float]:
+        """Bring the model and its inputs to a time and all states; return the partner's rates."""
+        n = self.model.states
+        self.model.put(time, y[:n])
+        inputs, rates = self.partner(time, self.model.get(self.sees), y[n:])
+        self.model.set(inputs)
+        return rates
+
+    def slope(self, time: float, y: Real) -> Real:
+        """Return the derivatives of all states."""
+        rates = self.put(time, y)
+        return np.concatenate([self.model.rates, rates])
+
+    def indicators(self, time: float, y: Real) -> Real:
+        """Return the event indicators."""
+        self.put(time, y)
+        return self.model.z
+
+    def steps(self, end: float) -> Iterator[Callable[[float], Real] | None]:
+        """Go to a time [s], step by step; ``time`` is where one ends.
+
+        Yields the states within the step as a function of time; where it ends with an event,
+        which ``happens`` tells, None after the event.
+        """
+        nominal = np.concatenate([self.model.nominals, np.ones(len(self.z))])
+        absolute: Any = ABSOLUTE * self.tolerance * nominal
+        while self.time < end:
+            y = np.concatenate([self.model.x, self.z])
+            sign, self.happens = self.indicators(self.time, y) > 0.0, False
+            solver: Any = DOP853(
+                self.slope, self.time, y, end, self.largest, self.tolerance, absolute
+            )
+            while solver.status == "running" and not self.happens:
+                message = solver.step()
+                if solver.status == "failed":
+                    raise CouplingError(f"the solver fails at {self.time:g} s: {message}")
+                inside = solver.dense_output()
+                y = self._end(inside, sign)
+                yield inside
+                self.put(self.time, y)
+            if self.happens:
+                self.model.fmu.enterEventMode()
+                self.model.update()
+                yield None
+
+    def _end(self, inside: Any, sign: NDArray[np.bool_]) -> Real:
+        """Go to the end of a step, or to the first event in it; return the states there."""
+        crossed = (self.indicators(inside.t, inside(inside.t)) > 0.0) != sign
+        self.time = self._root(inside, sign, crossed) if crossed.any() else inside.t
+        y: Real = inside(self.time)
+        self.put(self.time, y)
+        self.z = y[self.model.states :]
+        asked, _ = self.model.fmu.completedIntegratorStep()
+        self.happens = bool(asked) or bool(crossed.any())
+        return y
+
+    def _root(self, inside: Any, sign: NDArray[np.bool_], crossed: NDArray[np.bool_]) -> float:
+        """Return the time of the first event of a step, on its far side."""
+        roots = []
+        for k in map(int, np.flatnonzero(crossed)):
+
+            def indicator(t: float, k: int = k) -> float:
+                return float(self.indicators(t, inside(t))[k])
+
+            root = brentq(indicator, inside.t_old, inside.t, xtol=LOCATED)
+            beyond = LOCATED
+            while (indicator(root) > 0.0) == sign[k]:
+                root, beyond = min(root + beyond, inside.t), 2 * beyond
+            roots.append(root)
+        return float(min(roots))
+
+
+def simulate(
+    fmu: str | Path,
+    partner: Partner,
+    z: Sequence[float],
+    stop_time: float,
+    step: float,
+    values: Mapping[str, Value] | None = None,
+    sees: Sequence[str] = (),
+    record: Sequence[str] = (),
+    tolerance: float = 1e-10,
+    largest: float = 1e-3,
+) -> Columns:
+    """Simulate a model and a partner in one solver, Dormand and Prince's of order 8.
+
+    Parameters
+    ----------
+    fmu, partner, z, sees, tolerance, largest
+        As of :class:`Model` and :class:`OneSolver`.
+    stop_time, step : float
+        Duration and distance of the rows of the result [s]; they do not bound a step.
+    values : mapping
+        Start values of parameters and inputs, by name.
+    record : sequence of str
+        Variables that the result has.
+
+    Returns
+    -------
+    structured array
+        ``time``, the variables by name, and the partner's states ``z[0]``, ``z[1]``, ...; at an
+        event there are two rows, before it and after it.
+
+    Raises
+    ------
+    CouplingError
+        If a name does not fit, or the solver fails.
+    ParameterError
+        If there is no step to take.
+    """
+    try:
+        return _simulate(
+            fmu, partner, z, communication_points(stop_time, step), values or {}, sees, record,
+            tolerance, largest,
+        )  # fmt: skip
+    except FMICallException as error:
+        raise CouplingError(
+            f"{fmu}: {error.function} returned the status {error.status}; what the FMU has written "
+            "above tells why"
+        ) from None
+
+
+def _simulate(
+    fmu: str | Path,
+    partner: Partner,
+    z: Sequence[float],
+    times: list[float],
+    values: Mapping[str, Value],
+    sees: Sequence[str],
+    record: Sequence[str],
+    tolerance: float,
+    largest: float,
+) -> Columns:
+    rows: list[dict[str, Value]] = []
+    with tempfile.TemporaryDirectory(prefix="prbm_model_") as folder, Model(fmu, folder) as model:
+        model.start(values, times[-1])
+        one = OneSolver(model, partner, z, sees, tolerance, largest)
+
+        def note(time: float, own: Real) -> None:
+            states = {f"z[{k}]": float(x) for k, x in enumerate(own)}
+            rows.append({"time": time, **model.get(record), **states})
+
+        note(0.0, one.z)
+        due = times[1:]
+        for inside in one.steps(times[-1]):
+            if inside is None:
+                note(one.time, one.z)
+                continue
+            while due and due[0] <= one.time:
+                y = inside(due[0])
+                one.put(due[0], y)
+                note(due.pop(0), y[model.states :])
+            if one.happens:
+                one.put(one.time, inside(one.time))
+                note(one.time, one.z)
+    return structured(rows)

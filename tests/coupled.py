@@ -1,0 +1,59 @@
+"""What the tests about coupling share: FMUs that are known in closed form, and the guides."""
+
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pythonfmu import FmuBuilder
+
+from c_importer import native
+
+_folder = TemporaryDirectory(prefix="prbm_coupled_")
+
+INTEGRATOR = '''
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+
+
+class Integrator(Fmi2Slave):
+    """value' = gain * rate, the rate being held."""
+
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.gain, self.value, self.rate, self.again = 1.0, 0.0, 0.0, 0.0
+        self.start, self.skipped, self.off = 0.0, 0, False
+        for kind, name, causality, variability in (
+            (Real, "gain", "parameter", "fixed"),
+            (Real, "start", "parameter", "fixed"),
+            (Integer, "skipped", "parameter", "fixed"),
+            (Boolean, "off", "parameter", "fixed"),
+            (Real, "rate", "input", "continuous"),
+            (Real, "value", "output", "continuous"),
+        ):
+            self.register_variable(
+                kind(name, causality=Fmi2Causality[causality],
+                     variability=Fmi2Variability[variability])
+            )
+
+    def exit_initialization_mode(self):
+        self.value = self.start
+
+    def do_step(self, current_time, step_size):
+        if self.skipped > 0 or self.off:
+            self.skipped -= 1
+        else:
+            self.value += self.gain * self.rate * step_size
+        return True
+'''
+
+
+@cache
+def integrator() -> Path:
+    """Return an FMU that integrates, by Euler's explicit steps."""
+    source = Path(_folder.name) / "integrator.py"
+    source.write_text(INTEGRATOR)
+    return Path(_folder.name) / FmuBuilder.build_FMU(source, dest=_folder.name)
+
+
+def guide(fmi: int, model: str = "PRBDM") -> Path:
+    """Return a native FMU of a guide."""
+    return native(model, fmi).with_suffix(".fmu")

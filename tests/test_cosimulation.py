@@ -1,0 +1,193 @@
+"""Our master: schemes against closed forms, events against FMUs alone, mistakes as sentences."""
+
+import re
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+
+from coupled import guide, integrator
+from prbm import ParameterError
+from prbm_tools import cosimulation
+from prbm_tools.cosimulation import GAUSS_SEIDEL, JACOBI, CouplingError, System, simulate
+
+pytestmark = [pytest.mark.fmu, pytest.mark.native]
+
+H, STEPS = 1 / 64, 500
+CIRCLE = {"b.rate": "a.value", "a.rate": "b.value"}
+START = {"a.start": 1.0, "a.gain": 1.0, "b.gain": -1.0}
+IMPACTS = ("stop.impact_count", "stop.impact_time", "stop.approach_speed")
+
+
+def circle(scheme):
+    """Return a' = b, b' = -a from (1, 0)."""
+    fmus = {"a": integrator(), "b": integrator()}
+    found = simulate(fmus, CIRCLE, STEPS * H, H, START, scheme=scheme)
+    return found["time"], found["a.value"], found["b.value"]
+
+
+def test_jacobi_is_explicit_euler():
+    """(a + i b) -> (1 - i h)(a + i b), so that the circle grows by (1 + h^2)^(n/2)."""
+    time, a, b = circle(JACOBI)
+    np.testing.assert_allclose(time, H * np.arange(STEPS + 1), rtol=1e-15)
+    np.testing.assert_allclose(a + 1j * b, (1 - 1j * H) ** np.arange(STEPS + 1), rtol=1e-12)
+
+
+def test_gauss_seidel_is_symplectic_euler():
+    """The first goes by what the second was: a^2 + b^2 + h a b is kept."""
+    _, a, b = circle(GAUSS_SEIDEL)
+    np.testing.assert_allclose(a**2 + b**2 + H * a * b, 1.0, rtol=1e-12)
+    assert a[1] == 1.0
+    assert b[1] == -H  # of the new a
+
+
+def test_outputs_reach_inputs_before_the_first_step():
+    """Along a chain: the second is told of the first's start value within initialization mode."""
+    fmus = {"b": integrator(), "a": integrator()}
+    with System(fmus, {"b.rate": "a.value"}) as system:
+        system.start({"a.start": 3.0})
+        system.advance(0.5)
+        assert system.values["a.value"] == 3.0
+        assert system.instances["b"].get(["value"]) == {"value": 1.5}
+
+
+def test_a_last_step_may_be_shorter():
+    found = simulate({"a": integrator()}, {}, 1.0, 0.3, {"a.rate": 1.0}, ["a.value"])
+    np.testing.assert_allclose(found["a.value"], found["time"], rtol=1e-15)
+    assert found["time"][-1] == 1.0
+
+
+def test_integers_and_booleans_are_given_as_what_they_are():
+    values = {"a.rate": 1.0, "a.skipped": 2, "b.rate": 1.0, "b.off": True}
+    fmus = {"a": integrator(), "b": integrator()}
+    found = simulate(fmus, {}, 4.0, 1.0, values, ["a.value", "b.value"])
+    assert found["a.value"].tolist() == [0.0, 0.0, 0.0, 1.0, 2.0]
+    assert not found["b.value"].any()
+
+
+def test_a_source_acts_in_the_step_that_begins():
+    seen = []
+    found = simulate(
+        {"a": integrator()}, {}, 3.0, 1.0, record=["a.value"],
+        source=lambda t: {"a.rate": 1.0 + t}, progress=seen.append,
+    )  # fmt: skip
+    assert found["a.value"].tolist() == [0.0, 1.0, 3.0, 6.0]
+    assert seen == [1 / 3, 2 / 3, 1.0]
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_accelerated_base_is_a_gravity(fmi):
+    """-a of the base adds to gravity, the same to rounding."""
+    values = {"guide.gravity.x": 0.0, "guide.release.displacement": 0.0}
+    by_base = simulate(
+        {"guide": guide(fmi)}, {}, 0.1, 1e-3, values, ["guide.shuttle.x"],
+        source=lambda t: {"guide.base.acceleration.x": -2.0},
+    )  # fmt: skip
+    values["guide.gravity.x"] = 2.0
+    found = simulate({"guide": guide(fmi)}, {}, 0.1, 1e-3, values, ["guide.shuttle.x"])
+    # gravity acts on the shape at release, which a force holds; both are straight here
+    np.testing.assert_allclose(by_base["guide.shuttle.x"], found["guide.shuttle.x"], atol=1e-12)
+
+
+def alone(**values):
+    """Return the impacts of the guide by FMPy, shape (n, 2): time and closing speed."""
+    start = {name.replace("__", "."): x for name, x in values.items()}
+    found = simulate_fmu(guide(2), stop_time=0.2, output_interval=1e-4,
+                         start_values=start, output=IMPACTS)  # fmt: skip
+    return impacts(found, "")
+
+
+def impacts(found, prefix):
+    new = np.flatnonzero(np.diff(found[f"{prefix}stop.impact_count"], prepend=0))
+    return np.column_stack([found[f"{prefix}{name}"][new] for name in IMPACTS[1:]])
+
+
+def test_partners_come_to_the_time_of_an_event():
+    """Steps that are cut at impacts add up to the time, and the rows are at the impacts."""
+    fmus = {"clock": integrator(), "guide": guide(3)}
+    record = ["clock.value", *(f"guide.{name}" for name in IMPACTS)]
+    found = simulate(fmus, {}, 0.2, 0.01, {"clock.rate": 1.0}, record, events=True)
+    np.testing.assert_allclose(found["clock.value"], found["time"], rtol=1e-14)
+    new = np.flatnonzero(np.diff(found["guide.stop.impact_count"], prepend=0))
+    assert len(new) >= 2
+    assert (found["time"][new] == found["guide.stop.impact_time"][new]).all()
+    assert (found["time"][new] == found["time"][new - 1]).all()  # a row before, a row after
+    assert (
+        found["guide.stop.impact_count"][new - 1] == found["guide.stop.impact_count"][new] - 1
+    ).all()
+
+
+def test_without_events_rows_are_the_communication_points():
+    fmus = {"guide": guide(3)}
+    found = simulate(fmus, {}, 0.1, 0.01, record=["guide.stop.impact_count"])
+    np.testing.assert_allclose(found["time"], 0.01 * np.arange(11), rtol=1e-15)
+
+
+@pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
+def test_two_with_events_do_what_each_does_alone(scheme):
+    """One ends its step, the other is put back and follows: to the tolerance of the FMUs."""
+    fmus = {"one": guide(3), "other": guide(3)}
+    values = {"one.stop.restitution": 0.6, "other.stop.restitution": 0.5}
+    record = [f"{name}.{x}" for name in fmus for x in IMPACTS]
+    found = simulate(fmus, {}, 0.2, 0.02, values, record, scheme, events=True)
+    for name in fmus:
+        expected = alone(stop__restitution=values[f"{name}.stop.restitution"])
+        np.testing.assert_allclose(impacts(found, f"{name}."), expected, atol=2e-7)
+    assert (np.diff(found["time"]) >= 0.0).all()
+
+
+def test_a_follower_sees_the_leader_at_the_end_of_the_step():
+    """Gauss and Seidel: those without events go by what those with events have become."""
+    fmus = {"sum": integrator(), "guide": guide(3)}
+    wires = {"sum.rate": "guide.shuttle.vx"}
+    found = simulate(fmus, wires, 0.03, 1e-3, record=["sum.value"], events=True)
+    expected = np.concatenate([[0.0], 1e-3 * np.cumsum(found["guide.shuttle.vx"][1:])])
+    np.testing.assert_allclose(found["sum.value"], expected, atol=1e-15)
+
+
+def test_one_that_cannot_be_put_back_is_told(monkeypatch):
+    with System({"a": guide(3), "b": guide(3)}, {}, events=True) as system:
+        system.start()
+        system.instances["b"].restorable = False
+        with pytest.raises(CouplingError, match="b cannot return to a state that it has left"):
+            system.advance(0.01)
+
+
+def test_events_without_an_end_are_told(monkeypatch):
+    monkeypatch.setattr(cosimulation.Instance, "update", lambda self: True)
+    with (
+        pytest.raises(CouplingError, match=r"at 0 s the instances have exchanged 100 times"),
+        System({"a": guide(3)}, {}, events=True) as system,
+    ):
+        system.start()
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"connections": {"a.rate": "x.value"}}, "'x.value' belongs to none of a, guide"),
+        ({"connections": {"a.rat": "guide.shuttle.x"}}, "a has no variable 'rat'; near it are ra"),
+        ({"connections": {"a.rate": "guide.shuttle"}}, "guide has no variable 'shuttle'"),
+        ({"connections": {"a.value": "guide.shuttle.x"}}, "a.value is no input: connect guide"),
+        ({"record": ["guide.nothing"]}, "guide has no variable 'nothing'"),
+        ({"values": {"a.value": 1.0}}, "a.value = 1 cannot be given: it is no input"),
+        ({"scheme": "newton"}, "scheme = 'newton' must be 'gauss-seidel' or 'jacobi'"),
+        ({"values": {"guide.flexure.length": -1.0}}, "guide: fmi2.* returned the status 3"),
+        ({"fmus": {"a.b": "x.fmu"}}, "'a.b' is no name for an instance: leave out dots"),
+        ({"fmus": {"a": "missing.fmu"}}, "a: missing.fmu is no FMU that can be read"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_sentences(changes, sentence):
+    system = {"fmus": {"a": integrator(), "guide": guide(2)}, "connections": {}} | changes
+    with pytest.raises(CouplingError, match=sentence):
+        simulate(stop_time=0.01, step=1e-3, **system)
+
+
+def test_what_the_fmu_says_is_in_the_sentence():
+    with pytest.raises(CouplingError, match=r"status 3: flexure\.length = -1 m must be at least"):
+        simulate({"guide": guide(3)}, {}, 0.1, 0.01, {"guide.flexure.length": -1.0})
+
+
+def test_a_step_that_is_none_is_refused():
+    with pytest.raises(ParameterError, match=re.escape("step = 0 s must be positive and finite")):
+        simulate({"a": integrator()}, {}, 1.0, 0.0)

@@ -1,0 +1,173 @@
+"""Packages and containers: valid by the standard's schemas, the same in all masters."""
+
+import hashlib
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from lxml import etree
+
+from coupled import guide, integrator
+from prbm_tools import cosimulation, ssp
+from prbm_tools.container import container
+from prbm_tools.cosimulation import JACOBI, CouplingError
+
+pytestmark = [pytest.mark.fmu, pytest.mark.native]
+
+SCHEMAS = Path(fmpy.__file__).parent / "ssp" / "schema"
+STOP, STEP = 0.3, 1e-3
+WIRES = {
+    "follower.stop.displacement": "carrier.shuttle.x",
+    "follower.stop.velocity": "carrier.shuttle.vx",
+    "sum.rate": "carrier.shuttle.vx",
+    "carrier.force.x": "sum.value",
+}
+VALUES = {
+    "carrier.release.displacement": 0.0, "carrier.stop.position": 0.05,
+    "follower.release.displacement": -5e-3, "follower.stop.position": 1e-3,
+    "follower.stop.restitution": 0.8, "sum.gain": -4.0, "sum.skipped": 3, "sum.off": False,
+}  # fmt: skip
+"""All outputs that are connected are zero at the start, as FMPy's master takes them to be."""
+
+
+def fmus(fmi: int = 2) -> dict[str, Path]:
+    """Return a guide that a spring of its own holds, and one whose stop is on the first."""
+    return {"sum": integrator(), "carrier": guide(fmi), "follower": guide(fmi)}
+
+
+@pytest.fixture(scope="module")
+def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("ssp") / "walls.ssp"
+    ssp.package(path, fmus(), WIRES, VALUES, STOP, "Walls")
+    return path
+
+
+@pytest.fixture(scope="module")
+def ours() -> np.ndarray:
+    watched = ["follower.stop.impact_count", "follower.shuttle.x"]
+    return cosimulation.simulate(fmus(), WIRES, STOP, STEP, VALUES, watched, JACOBI)
+
+
+def test_description_is_valid(package):
+    """By the schema of SSP 1.0; the parameter sets in it by theirs."""
+    with zipfile.ZipFile(package) as archive:
+        root = etree.fromstring(archive.read("SystemStructure.ssd"))
+    etree.XMLSchema(etree.parse(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(
+        etree.ElementTree(root)
+    )
+    schema = etree.XMLSchema(etree.parse(SCHEMAS / "SystemStructureParameterValues.xsd"))
+    sets = root.findall(f".//{{{ssp.SSV}}}ParameterSet")
+    assert len(sets) == 3
+    for parameters in sets:
+        schema.assertValid(etree.ElementTree(parameters))
+    names = [
+        f"{x.get('name')}.{p.get('name')}" for x in sets for p in x.iter(f"{{{ssp.SSV}}}Parameter")
+    ]
+    assert sorted(names) == sorted(VALUES)
+
+
+def test_package_holds_the_fmus_as_they_are(package):
+    with zipfile.ZipFile(package) as archive:
+        for name, fmu in fmus().items():
+            assert archive.read(f"resources/{name}.fmu") == fmu.read_bytes()
+
+
+def test_equal_systems_are_equal_bytes(package, tmp_path):
+    again = tmp_path / "again.ssp"
+    ssp.package(again, fmus(), WIRES, VALUES, STOP, "Walls")
+    digests = {hashlib.sha256(path.read_bytes()).digest() for path in (package, again)}
+    assert len(digests) == 1
+
+
+def test_fmpy_runs_the_package_as_our_master_does(package, ours):
+    """To rounding: FMPy adds its steps up to the time."""
+    found = ssp.simulate(package, STOP, STEP)
+    assert ours["follower.stop.impact_count"][-1] >= 2
+    np.testing.assert_allclose(found["time"], ours["time"][1:], rtol=1e-12)
+    for name in WIRES.values():
+        np.testing.assert_allclose(found[name], ours[name][1:], rtol=1e-9, atol=1e-12)
+
+
+def test_libcosim_runs_the_package_as_our_master_does(package, ours):
+    pytest.importorskip("libcosimpy", reason="libcosimpy is not installed (PyPI: libcosimpy)")
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimObserver import CosimObserver
+
+    log_output_level(CosimLogLevel.ERROR)
+    execution = CosimExecution.from_ssp_file(str(package), step_size=round(STEP * 1e9))
+    observer = CosimObserver.create_last_value()
+    assert execution.add_observer(observer)
+    variables = read_model_description(guide(2)).modelVariables
+    reference = next(v.valueReference for v in variables if v.name == "shuttle.x")
+    slave = execution.slave_index_from_instance_name("follower")
+    rows = []
+    for _ in range(round(STOP / STEP)):
+        assert execution.step()
+        rows += observer.last_real_values(slave, [reference])
+    np.testing.assert_allclose(rows, ours["follower.shuttle.x"][1:], rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(("outer", "inner"), [(2, 2), (3, 2), (3, 3), (2, 3)])
+def test_container_does_as_our_master_does(outer, inner, ours, tmp_path):
+    """An FMU of either version, validated, with either inside."""
+    path = tmp_path / "walls.fmu"
+    shown = ["follower.shuttle.x", "follower.stop.impact_count"]
+    container(path, fmus(inner), WIRES, STEP, VALUES, shown, outer, STOP)
+    assert read_model_description(path, validate=True).fmiVersion == f"{outer}.0"
+    found = simulate_fmu(path, stop_time=STOP, output_interval=STEP)
+    assert set(found.dtype.names) == {"time", *shown}
+    np.testing.assert_allclose(
+        found["follower.shuttle.x"], ours["follower.shuttle.x"], rtol=1e-9, atol=1e-12
+    )
+    assert (found["follower.stop.impact_count"] == ours["follower.stop.impact_count"]).all()
+
+
+def test_a_start_value_of_the_container_reaches_what_is_inside(ours, tmp_path):
+    path = tmp_path / "walls.fmu"
+    container(path, fmus(), WIRES, STEP, VALUES, ["follower.stop.impact_count"])
+    found = simulate_fmu(
+        path, stop_time=STOP, output_interval=STEP, start_values={"follower.stop.position": 1.0}
+    )
+    assert ours["follower.stop.impact_count"][-1] > 0
+    assert not found["follower.stop.impact_count"].any()
+
+
+@pytest.mark.parametrize(
+    ("wires", "values"),
+    [
+        ({"sum.rate": "nobody.x"}, {}),
+        ({"sum.nothing": "carrier.shuttle.x"}, {}),
+        ({}, {"carrier.nothing": 1.0}),
+        ({}, {"nobody.x": 1.0}),
+    ],
+)
+def test_names_that_do_not_fit_are_told(wires, values, tmp_path):
+    sentence = "there is no such variable; write name.variable"
+    with pytest.raises(CouplingError, match=sentence):
+        ssp.package(tmp_path / "x.ssp", fmus(), wires, values)
+    with pytest.raises(CouplingError, match=sentence):
+        container(tmp_path / "x.fmu", fmus(), wires, 1e-3, values)
+
+
+def test_what_a_container_cannot_show_is_told(tmp_path):
+    with pytest.raises(CouplingError, match=r"link\[1\]\.angle is neither parameter nor input"):
+        container(tmp_path / "x.fmu", fmus(), {}, 1e-3, shown=["carrier.link[1].angle"])
+
+
+def test_what_is_no_package_is_told(tmp_path):
+    path = tmp_path / "x.ssp"
+    path.write_bytes(b"nothing")
+    with pytest.raises(CouplingError, match=r"x\.ssp: FMPy cannot simulate it \(File is not"):
+        ssp.simulate(path, 1.0, 0.1)
+
+
+def test_fmpy_does_not_run_packages_of_fmi_3(tmp_path):
+    """Told in a sentence, whatever FMPy stumbles over."""
+    path = tmp_path / "three.ssp"
+    ssp.package(path, {"guide": guide(3)}, {})
+    with pytest.raises(CouplingError, match=r"three\.ssp: FMPy cannot simulate it"):
+        ssp.simulate(path, 0.01, 1e-3)
