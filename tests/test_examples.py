@@ -126,8 +126,9 @@ def test_sweep_spreads_as_the_first_order_says(capsys: pytest.CaptureFixture[str
     main = example("sweep/run.py").main
     main(["--runs", "40"])
     printed = capsys.readouterr().out
-    found, first_order = map(float, re.findall(r"([\d.]+) ms", printed.splitlines()[1]))
+    found, first_order = map(float, re.findall(r"([\d.]+) ms", printed.splitlines()[2]))
     assert found == pytest.approx(first_order, rel=4 / np.sqrt(2 * 40))
+    assert "at rest in the end: 40 of 40" in printed
     assert is_picture("settling.png")
     main(["--runs", "40"])  # which finds it done
     assert capsys.readouterr().out == printed
