@@ -1,6 +1,7 @@
 """Every example runs, and its headline agrees with the independent value beside it."""
 
 import functools
+import re
 import runpy
 from pathlib import Path
 from types import SimpleNamespace
@@ -117,6 +118,20 @@ def test_parameter_study_writes_its_table_and_figure(
     main()
     assert "largest difference" in capsys.readouterr().out
     assert is_picture("parameter_study.png")
+
+
+@pytest.mark.native
+def test_sweep_spreads_as_the_first_order_says(capsys: pytest.CaptureFixture[str]) -> None:
+    """Within four standard errors of a standard deviation, s / sqrt(2 n) each."""
+    main = example("sweep/run.py").main
+    main(["--runs", "40"])
+    printed = capsys.readouterr().out
+    found, first_order = map(float, re.findall(r"([\d.]+) ms", printed.splitlines()[2]))
+    assert found == pytest.approx(first_order, rel=4 / np.sqrt(2 * 40))
+    assert "at rest in the end: 40 of 40" in printed
+    assert is_picture("settling.png")
+    main(["--runs", "40"])  # which finds it done
+    assert capsys.readouterr().out == printed
 
 
 def test_stroke_controller_keeps_the_books_and_the_stroke(

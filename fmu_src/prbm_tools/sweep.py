@@ -20,7 +20,8 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from concurrent.futures import CancelledError
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -48,6 +49,8 @@ ENOUGH = 20  # runs a process from which on it is worth finding out whether rese
 POINTS = 1000  # communication points where the FMU proposes no step
 CONNECT = 10.0  # s for a scheduler and its workers to answer
 RECENT = 50  # runs whose median duration sizes the next batch
+
+ABSENT = "No module named"  # what Python says of a package that is not installed
 
 Outputs = Sequence[str] | Mapping[str, str]
 
@@ -359,27 +362,23 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
 
     In this process a worker with threads is enough: the FMU runs in processes of its own.
     """
-    import dask
+    from dask.system import CPU_COUNT
     from distributed import Client, LocalCluster
 
-    level = logging.getLogger("distributed").level
     if scheduler is None:
-        from dask.system import CPU_COUNT
-
         with (
-            dask.config.set({"distributed.worker.use-file-locking": False}),
             LocalCluster(  # type: ignore[no-untyped-call]
                 n_workers=1,
                 threads_per_worker=workers or CPU_COUNT,
                 processes=False,
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",  # None would take a port of all interfaces
+                worker_dashboard_address="127.0.0.1:0",
                 memory_limit=0,
                 silence_logs=logging.CRITICAL,
             ) as cluster,
             Client(cluster, set_as_default=False) as client,  # type: ignore[no-untyped-call]
         ):
             yield client
-        logging.getLogger("distributed").setLevel(level)
         return
     try:
         client = Client(  # type: ignore[no-untyped-call]
@@ -424,7 +423,8 @@ class _Sweep:
                 f"{self.results.folder}, and the same call does the rest"
             ) from None
         finally:
-            self.client.unregister_worker_plugin(self.plugin)
+            with suppress(OSError, KeyError):  # of a scheduler that is gone, a worker without it
+                self.client.unregister_worker_plugin(self.plugin)
 
     def _install(self, rows: Sequence[int], retries: int, timeout: float | None) -> None:
         """Bring the FMU to the workers."""
@@ -432,15 +432,18 @@ class _Sweep:
 
         from .sweep_worker import FmuPlugin
 
-        reuse = len(rows) >= ENOUGH * self._threads()
+        # to find out takes a run twice as long, which a timeout might end
+        reuse = timeout is None and len(rows) >= ENOUGH * self._threads()
         job = replace(self.plan.job, reuse=reuse)
         try:
             self.client.register_plugin(
                 FmuPlugin(self.plan.fmu, job, retries, timeout), name=self.plugin
             )
-        except ModuleNotFoundError as error:
+        except Exception as error:  # distributed wraps what a worker raises
+            if ABSENT not in str(error):
+                raise
             raise SweepError(
-                f"a worker lacks the package {error.name}; install there what is installed here: "
+                "a worker cannot import prbm_tools; install there what is installed here: "
                 "python -m pip install 'prbm-impact[sweep]'"
             ) from None
 
@@ -523,6 +526,11 @@ class _Sweep:
             return None
         except Unusable as error:
             raise SweepError(f"{self.plan.name}: {error}") from None
+        except CancelledError:
+            raise SweepError(
+                f"the scheduler is gone; {len(self.results.read())} of {len(self.plan.rows)} runs "
+                f"are kept in {self.results.folder}, and the same call does the rest"
+            ) from None
 
 
 # --- the command --------------------------------------------------------------------------------
@@ -565,7 +573,7 @@ def _assignment(text: str) -> tuple[str, float]:
     try:
         return name.strip(), float(number)
     except ValueError:
-        raise SpecificationError(f"--set {text}: write a name and a number, as name=0.5") from None
+        raise ParameterError(f"--set {text}: write a name and a number, as name=0.5") from None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

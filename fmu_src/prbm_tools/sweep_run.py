@@ -13,7 +13,7 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Container, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from ctypes import (
     c_bool,
     c_double,
@@ -265,7 +265,6 @@ class Runner:
         self.resets: bool | None = None if job.reuse else False
         self.used, self.logging, self.heard = False, True, 0
         self.points = communication_points(job.start, job.stop, job.step)
-        self.every = any(output.reduction != "final" for output in job.outputs)
         self.fmu = instantiate_fmu(
             str(folder),
             self.description,
@@ -275,10 +274,11 @@ class Runner:
             logger=self._log2 if self.two else self._log3,
             require_functions=False,
         )
-        groups = _grouped(variables, {output.variable for output in job.outputs}, self.two)
-        self.readers = [_Reader(self.fmu, kind, group, self.two) for kind, group in groups.items()]
-        listed = [variable.name for group in groups.values() for variable in group]
-        self.place = {name: k for k, name in enumerate(listed)}
+        named = {variable.name: variable for variable in variables}
+        along = {o.variable: named[o.variable] for o in job.outputs if o.reduction != "final"}
+        final = {o.variable: named[o.variable] for o in job.outputs if o.reduction == "final"}
+        self.along = _Recorder(self.fmu, along.values(), self.two)
+        self.final = _Recorder(self.fmu, final.values(), self.two)
 
     def run(self, values: Mapping[str, float]) -> Outcome:
         """Do a run with start values; return its outcome, whatever happens."""
@@ -357,23 +357,29 @@ class Runner:
 
     def _simulate(self, values: dict[str, float]) -> tuple[str, str, tuple[float, ...]]:
         self._initialize(values)
-        times, rows = [self.points[0]], [self._sample()] if self.every else []
+        times, rows = [self.points[0]], [self.along.read()]
         status, message = OK, ""
         for begin, end in pairwise(self.points):
             ended = self._step(begin, end - begin)
             times.append(end if ended is None else ended)
-            if self.every:
-                rows.append(self._sample())
+            rows.append(self.along.read())
             if ended is not None:
                 status, message = ENDED, f"the FMU ended the run at t = {ended:.9g} s"
                 break
-        if not self.every:
-            times, rows = times[-1:], [self._sample()]
+        last = self.final.named(self.final.read())
         self.fmu.terminate()
-        t, table = np.array(times), np.array(rows, dtype=np.float64)
-        return status, message, tuple(
-            reduced(output, t, table[:, self.place[output.variable]]) for output in self.job.outputs
-        )  # fmt: skip
+        t, table = np.array(times), np.array(rows, dtype=np.float64).T
+        history = self.along.named(table)
+        return (
+            status,
+            message,
+            tuple(
+                float(last[output.variable])
+                if output.reduction == "final"
+                else reduced(output, t, history[output.variable])
+                for output in self.job.outputs
+            ),
+        )
 
     def _initialize(self, values: dict[str, float]) -> None:
         """Set start values and pass through initialization, in FMPy's order."""
@@ -420,39 +426,36 @@ class Runner:
             self.fmu.enterStepMode()
         return bool(ended)
 
-    def _sample(self) -> list[float]:
-        """Return the recorded variables, type by type."""
-        row: list[float] = []
-        for reader in self.readers:
-            row += reader.read(self.fmu.component)
-        return row
 
+class _Recorder:
+    """Reads variables into memory that is kept, which FMPy's getters make each time."""
 
-class _Reader:
-    """Reads variables of one type into memory that is kept, which FMPy's getters make each time."""
-
-    def __init__(self, fmu: Any, kind: str, variables: Sequence[Any], two: bool) -> None:
-        n = len(variables)
-        self.values = ((C_TYPES_2 if two else C_TYPES_3)[kind] * n)()
-        references = (c_uint * n)(*(variable.valueReference for variable in variables))
-        self.function = getattr(fmu, f"fmi{2 if two else 3}Get{kind}")
-        self.arguments = (references, n, self.values) + (() if two else (n,))
-
-    def read(self, component: Any) -> list[float]:
-        """Return their values."""
-        self.function(component, *self.arguments)
-        return list(self.values)
-
-
-def _grouped(variables: Sequence[Any], names: set[str], two: bool) -> dict[str, list[Any]]:
-    """Return the named variables by the type whose function reads them."""
-    groups: dict[str, list[Any]] = {}
-    for variable in variables:
-        if variable.name in names:
+    def __init__(self, fmu: Any, variables: Iterable[Any], two: bool) -> None:
+        groups: dict[str, list[Any]] = {}  # a function of FMI reads variables of one type
+        for variable in variables:
             whole = "Integer" if two else "Int64"
             kind = whole if variable.type == "Enumeration" else variable.type
             groups.setdefault(kind, []).append(variable)
-    return groups
+        self.fmu, self.calls = fmu, list[tuple[Any, tuple[Any, ...], Any]]()
+        self.names = [variable.name for group in groups.values() for variable in group]
+        for kind, group in groups.items():
+            n = len(group)
+            values = ((C_TYPES_2 if two else C_TYPES_3)[kind] * n)()
+            references = (c_uint * n)(*(variable.valueReference for variable in group))
+            function = getattr(fmu, f"fmi{2 if two else 3}Get{kind}")
+            self.calls.append((function, (references, n, values) + (() if two else (n,)), values))
+
+    def read(self) -> list[float]:
+        """Return the values, type by type."""
+        row: list[float] = []
+        for function, arguments, values in self.calls:
+            function(self.fmu.component, *arguments)
+            row += values
+        return row
+
+    def named(self, columns: Sequence[Any] | NDArray[np.float64]) -> dict[str, Any]:
+        """Return what was read by the names of the variables."""
+        return dict(zip(self.names, columns, strict=True))
 
 
 def _bits(outcome: Outcome) -> tuple[str, bytes]:

@@ -182,21 +182,23 @@ class Processes:
         return outcomes
 
     def _child(self) -> Child:
-        while True:
-            with self.lock:
-                if self.closed:
-                    raise Unusable(STOPPED)
-                child = self.idle.pop() if self.idle else None
-            if child is None:
-                child = Child(self.folder, self.job)
-                with self.lock:
-                    self.all.add(child)
-                if not self.closed:
-                    return child
-            if child.alive:
-                child.said.truncate(0)
-                return child
+        """Return a process that is idle, or a new one."""
+        with self.lock:
+            if self.closed:
+                raise Unusable(STOPPED)
+            child = self.idle.pop() if self.idle else None
+        if child is not None and child.alive:
+            child.said.truncate(0)
+            return child
+        if child is not None:  # it waited too long for work
             self._drop(child)
+        child = Child(self.folder, self.job)
+        with self.lock:
+            self.all.add(child)
+        if self.closed:
+            self._drop(child)
+            raise Unusable(STOPPED)
+        return child
 
     def _keep(self, child: Child) -> None:
         with self.lock:
