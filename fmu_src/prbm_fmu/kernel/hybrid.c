@@ -500,12 +500,17 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
 
 /* --- time ------------------------------------------------------------------------------------- */
 
-/* Turn the inputs of the walls into uniform motions up to a time; whether one changes. */
+/* Turn the inputs of the walls into uniform motions up to a time; whether one changes.  What is left
+ * of a step after an event may be short: a wall that is a little elsewhere than it is said to be goes
+ * on with its velocity, and gets there in the next step. */
 static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
     bool changed = false;
     double now = sim->now->time;
     for (int i = 0; i < sim->system.s; i++) {
         double target = wall_target(sim, i, time - now);
+        if (sim->now->adrift != 0.0) {
+            target += wall_at(&sim->walls[i], now) - wall_target(sim, i, 0.0);
+        }
         planned[i] = sim->walls[i];
         if (fabs(wall_at(&sim->walls[i], time) - target) > 1e-13 * sim->system.length) {
             double here = wall_at(&sim->walls[i], now);
@@ -2008,6 +2013,7 @@ static bool advance(Simulation *sim, double time, bool each, bool events, bool *
             !restart(sim, planned, problem)) {
             return false;
         }
+        now->adrift = 0.0;
     }
     now->underway = 0.0;
     for (bool stepped = false;; stepped = true) {
@@ -2066,6 +2072,24 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
     return attempt(sim, advance(sim, time, false, false, &event, problem), problem);
 }
 
+/* Inputs that were set where an event waits act in it: so a wall hits with the velocity that it has
+ * there, not with its mean over the communication step. */
+static void take_inputs(Simulation *sim) {
+    const Mechanism *m = sim->mechanism;
+    for (int i = 0; i < sim->system.s; i++) {
+        int velocity = LOADS * m->force_count + 2 * i + 1;
+        if (sim->given[velocity] != sim->acting_given[velocity]) {
+            double t = sim->now->time;
+            Wall wall = {wall_at(&sim->walls[i], t), sim->given[velocity], t};
+            sim->walls[i] = wall;
+        }
+    }
+    copy(m->input_count, sim->given, sim->acting_given);
+    set_inputs(sim);
+    sim->now->underway = 0.0;
+    sim->now->adrift = 1.0;
+}
+
 PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     Simulation *sim = simulation;
     bool event = due(sim, sim->now->time), thrown = impulses_changed(sim);
@@ -2074,12 +2098,16 @@ PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     }
     keep_backup(sim);
     sim->fresh = NOTHING;
+    if (event && given_changed(sim)) {
+        take_inputs(sim);
+    }
     bool right = !event || let_happen(sim, problem);
     if (right && thrown) {
         Wall walls[MOST_STOPS];
         memcpy(walls, sim->walls, (size_t)sim->system.s * sizeof *walls);
         right = restart(sim, walls, problem);
-        sim->now->underway = 0.0; /* the walls may go elsewhere, too */
+        sim->now->underway = 0.0;
+        sim->now->adrift = 1.0;
     }
     return attempt(sim, right, problem);
 }
@@ -2317,6 +2345,7 @@ static bool sound_state(const Simulation *sim) {
     bool sound = all_finite(sim) && whole_number(now->started, 0, 1) &&
                  whole_number(now->exchange, 0, 1) && whole_number(now->has_k1, 0, 1) &&
                  whole_number(now->has_arc, 0, 1) && whole_number(now->underway, 0, 1) &&
+                 whole_number(now->adrift, 0, 1) &&
                  whole_number(now->event_kind, 0, (int)RUB) && now->h >= 0.0 &&
                  whole_number(now->event_index, 0, MOST_STOPS) && now->window_count >= 0.0 &&
                  now->window_count <= CHATTER && sound_event(sim);

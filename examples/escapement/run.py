@@ -1,0 +1,180 @@
+"""An escape wheel hits an oscillator: two FMUs that exchange momentum in event mode.
+
+    python examples/escapement/run.py
+
+The tooth of the wheel hits the pallet of the oscillator.  The wheel carries the stop; its wall is the
+pallet, which the oscillator moves:
+
+    wheel.tooth.displacement, .velocity   <-  oscillator.shuttle.x, .vx
+    wheel.tooth.mobility                  <-  oscillator.pallet.point.mobility
+    oscillator.force.impulse.x            <-  wheel.tooth.impulse_sum
+    oscillator.force.x                    <-  wheel.tooth.force
+
+With event mode a step ends where the tooth touches.  There the wheel hits what has the pallet's present
+velocity and effective mass, and the oscillator receives the impulse before time goes on: what one
+gains in momentum the other has lost.  The same two mechanisms in one file are computed beside.
+"""
+
+import argparse
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from parts import both, oscillator, wheel
+
+from prbm import Impact, PrbmError, Simulation
+from prbm_fmu.native_fmu import build
+from prbm_tools.cosimulation import simulate as cosimulate
+from prbm_tools.simulate import Progress, reporter
+from prbm_tools.simulate import simulate as simulate_one
+
+MOMENT, STOP_TIME, TOLERANCE = -1e-4, 0.3, 1e-9  # N m on the wheel, s
+STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # s
+CONNECTIONS = {
+    "wheel.tooth.displacement": "oscillator.shuttle.x",
+    "wheel.tooth.velocity": "oscillator.shuttle.vx",
+    "wheel.tooth.mobility": "oscillator.pallet.point.mobility",
+    "oscillator.force.impulse.x": "wheel.tooth.impulse_sum",
+    "oscillator.force.x": "wheel.tooth.force",
+}
+KINDS = ("kinetic", "elastic", "gravitational", "dissipated", "work")
+RECORD = (
+    "wheel.tooth.impact_count", "wheel.tooth.impact_time", "wheel.tooth.approach_speed",
+    "wheel.tooth.impulse", "wheel.tooth.point.displacement", "wheel.tooth.point.velocity",
+    "wheel.tooth.point.mobility", "oscillator.shuttle.x", "oscillator.shuttle.vx",
+    "oscillator.pallet.point.mobility",
+    *(f"{part}.energy.{kind}" for part in ("wheel", "oscillator") for kind in KINDS),
+)  # fmt: skip
+
+
+def coupled(step: float, stop_time: float = STOP_TIME) -> np.ndarray:
+    """Return what the two FMUs do, exchanged every ``step`` [s] and at each impact.
+
+    Returns
+    -------
+    structured array
+        Time [s] and outputs by ``wheel.name`` and ``oscillator.name``; two rows at an impact.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        fmus = {}
+        for name, mechanism in (("oscillator", oscillator), ("wheel", wheel)):
+            fmus[name] = Path(folder) / f"{name}.fmu"
+            fmus[name].write_bytes(build(mechanism, fmi=3))
+        values = {"wheel.drive.moment": MOMENT}
+        return cosimulate(
+            fmus, CONNECTIONS, stop_time, step, values, RECORD, scheme="jacobi", events=True,
+            tolerance=TOLERANCE,
+        )  # fmt: skip
+
+
+def monolith(stop_time: float = STOP_TIME) -> tuple[Impact, ...]:
+    """Return the impacts of wheel and oscillator as one mechanism."""
+    given = {"drive.moment": MOMENT}
+    return simulate_one(both(), given, stop_time, tolerance=TOLERANCE).impacts
+
+
+def impacts(result: np.ndarray) -> np.ndarray:
+    """Return the rows right after each impact; those before them are right before it."""
+    count = result["wheel.tooth.impact_count"]
+    return np.flatnonzero(np.diff(count) > 0) + 1
+
+
+def exchanged(result: np.ndarray) -> np.ndarray:
+    """Return what is lost of the momentum at each impact, over its impulse.
+
+    Both effective masses times the changes of the velocities: of the tooth and of the pallet.
+    """
+    after = impacts(result)
+    lost = np.zeros(len(after))
+    for point, mobility in (
+        ("wheel.tooth.point.velocity", "wheel.tooth.point.mobility"),
+        ("oscillator.shuttle.vx", "oscillator.pallet.point.mobility"),
+    ):
+        change = result[point][after] - result[point][after - 1]
+        lost += change / result[mobility][after]
+    return np.abs(lost) / result["wheel.tooth.impulse"][after]
+
+
+def energy(result: np.ndarray) -> np.ndarray:
+    """Return the energy of both and of what they have lost, less the work of the moment [J].
+
+    The work on the pallet is in the books of both, with opposite signs.
+    """
+    total = np.zeros(len(result))
+    for part in ("wheel", "oscillator"):
+        for kind in KINDS:
+            total += (-1 if kind == "work" else 1) * result[f"{part}.energy.{kind}"]
+    return total
+
+
+def errors(result: np.ndarray, reference: Sequence[Impact]) -> tuple[float, float]:
+    """Return the largest errors of the impacts' times [s] and closing speeds [m/s]."""
+    rows = result[impacts(result)]
+    if len(rows) != len(reference):
+        return np.inf, np.inf
+    pairs = list(zip(rows, reference, strict=True))
+    return (
+        max(abs(row["wheel.tooth.impact_time"] - i.time) for row, i in pairs),
+        max(abs(row["wheel.tooth.approach_speed"] - i.latched.approach_speed) for row, i in pairs),
+    )
+
+
+def draw(
+    result: np.ndarray, found: Sequence[tuple[float, float]], steps: Sequence[float]
+) -> Figure:
+    """Draw the motion, and how the errors fall with the communication step."""
+    figure = Figure(figsize=(8.0, 3.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    motion, error = figure.subplots(1, 2, width_ratios=(2, 1))
+    after = impacts(result)
+    motion.plot(result["time"], 1e3 * result["oscillator.shuttle.x"] + 1.0, label="pallet")
+    tooth = 1e3 * result["wheel.tooth.point.displacement"] + 1.0
+    motion.plot(result["time"], tooth, label="tooth")
+    motion.plot(result["time"][after], tooth[after], "k.", label="impacts")
+    motion.set(xlabel="time [s]", ylabel="position [mm]")
+    motion.legend(loc="upper right", frameon=False)
+    error.loglog(steps, [speed for _, speed in found], "o-", label="closing speed [m/s]")
+    error.loglog(steps, [time for time, _ in found], "s-", label="time of impact [s]")
+    slope = found[0][0] * (np.array(steps) / steps[0]) ** 2
+    error.loglog(steps, slope, "k:", label="second order")
+    error.set(xlabel="communication step [s]", ylabel="largest error")
+    error.legend(frameon=False, fontsize="small")
+    return figure
+
+
+def main(arguments: Sequence[str] | None = None, progress: Progress | None = None) -> int:
+    """Print momentum, energy and errors, and draw."""
+    parser = argparse.ArgumentParser(description="An escape wheel hits an oscillator.")
+    parser.add_argument("--out", type=Path, default=Path("escapement.png"))
+    options = parser.parse_args(arguments)
+    told = progress or reporter()
+    try:
+        reference = monolith()
+        results = []
+        for k, step in enumerate(STEPS):
+            results.append(coupled(step))
+            told((k + 1) / len(STEPS))
+    except PrbmError as error:
+        print(error, file=sys.stderr)
+        return 1
+    last, found = results[-1], [errors(result, reference) for result in results]
+    books = energy(last)
+    print(f"impacts              {len(impacts(last))}, as one mechanism {len(reference)}")
+    print(f"momentum             exchanged to {exchanged(last).max():.1e} of each impulse")
+    print(f"energy               balanced to {np.abs(books - books[0]).max() / books[0]:.1e}")
+    for step, (time, speed) in zip(STEPS, found, strict=True):
+        print(f"step {step:7g} s       impacts off by {time:.1e} s and {speed:.1e} m/s")
+    draw(last, found, STEPS).savefig(options.out, dpi=110)
+    print(f"drawn                {options.out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
