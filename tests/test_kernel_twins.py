@@ -630,8 +630,9 @@ def test_forces_and_energies_are_the_same(name):
             found = kernel().normal_force(lift, 2.0, 3.0)
             assert found == forces.normal_force(lift, 2.0, 3.0)
         for i, frame in enumerate(system.pushed):
-            rows = np.zeros((3, n))
-            kernel().load_rows(ours.structure, ours.structure.pushed[i], e, rows)
+            rows, kind = np.zeros((3, n)), structures()["BodyFrame"]
+            at = ours.structure.pushed + i * ctypes.sizeof(kind)
+            kernel().load_rows(ours.structure, at, e, rows)
             assert_same(rows, forces.load_rows(system, frame, e))
 
 
