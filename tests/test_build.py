@@ -64,6 +64,7 @@ def test_from_an_empty_folder_it_builds_simulates_tells_and_plots(tmp_path):
 
 
 @pytest.mark.native
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_bytes_in_every_process(tmp_path):
     for seed in ("1", "2"):
         done = build(tmp_path, "--model", "PRBDM2R", "--out", seed, PYTHONHASHSEED=seed)
@@ -289,6 +290,7 @@ def test_a_mechanism_of_ones_own_is_built_under_its_own_name(tmp_path):
         assert validate_fmu(str(fmu)) == []
 
 
+@pytest.mark.slow
 def test_a_path_that_pythonfmu_cannot_read_is_no_obstacle_to_our_own_simulation(tmp_path):
     """It crashes on percent-encoded paths; the temporary folder is chosen around them."""
     awkward = tmp_path / "modèle 100%"

@@ -13,7 +13,7 @@ from prbm import Mechanism
 from prbm_fmu import native_fmu
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
-NAMES = ("voice_coil", "energy_harvester", "drop_test", "model_exchange")
+NAMES = ("voice_coil", "energy_harvester", "drop_test", "escapement", "model_exchange")
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
@@ -206,3 +206,29 @@ def test_cosimulation_is_of_the_first_order_and_event_mode_tells_in_time(capsys,
     printed = capsys.readouterr().out
     assert "heard of it late by" in printed
     assert is_picture("model_exchange.png")
+
+
+def test_escapement_exchanges_momentum_and_is_the_one_mechanism():
+    """Momentum to rounding, energy to the tolerance, times with the square of the step."""
+    run = example("escapement")
+    reference = run.monolith()
+    found = []
+    for step in (2e-3, 1e-3, 5e-4):
+        result = run.coupled(step)
+        assert len(run.impacts(result)) == len(reference) == 6
+        assert run.exchanged(result).max() < 1e-9
+        books = run.energy(result)
+        assert np.abs(books - books[0]).max() < 1e-7 * books[0]
+        found.append(run.errors(result, reference))
+    time, speed = np.array(found).T
+    assert time[2] < 3e-5
+    assert speed[2] < 3e-5
+    assert math.log2(time[0] / time[2]) / 2 == pytest.approx(2.0, abs=0.5)
+
+
+def test_escapement_prints_and_plots(capsys, monkeypatch):
+    run = example("escapement")
+    run.main.__globals__["STEPS"] = (2e-3, 1e-3)
+    assert run.main([]) == 0
+    assert "momentum             exchanged to" in capsys.readouterr().out
+    assert is_picture("escapement.png")

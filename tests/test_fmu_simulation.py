@@ -62,10 +62,17 @@ def assert_equal(found: dict, expected: dict, listed: dict) -> None:
         assert abs(found[name] - value) <= 1e-9 * scale, name
 
 
+LONG = ("3000 steps",)
+
+
 def on_grids() -> list:
     """Return each mechanism with each grid; what is slow anyway with the hardest one alone."""
     return [
-        pytest.param(*getattr(p, "values", (p,)), grid, marks=getattr(p, "marks", ()))
+        pytest.param(
+            *getattr(p, "values", (p,)),
+            grid,
+            marks=[*getattr(p, "marks", ()), *([pytest.mark.slow] if grid in LONG else [])],
+        )
         for p in SHIPPED
         for grid in GRIDS
         if isinstance(p, str) or grid == "uneven"
@@ -178,6 +185,7 @@ def in_a_process_of_its_own(fmu: Path) -> list[bytes]:
     return [bytes.fromhex(line) for line in done.stdout.split()]
 
 
+@pytest.mark.slow
 def test_instances_of_both_models_in_one_process_do_not_disturb_each_other(fmus):
     alone = {model: in_a_process_of_its_own(fmus[model]) for model in GUIDES}
     times = points(2e-3, 0.06)
@@ -205,6 +213,7 @@ def test_two_builds_of_one_model_in_one_process_keep_their_own_content(fmus, mec
         )  # round-off
 
 
+@pytest.mark.slow
 def test_hundreds_of_instances_one_after_the_other(fmus):
     """The wrapper library releases a reference too many at each; the slave makes up for it."""
     script = f"""

@@ -106,7 +106,9 @@ COMPILERS = {
 }
 
 
-@pytest.mark.parametrize("how", COMPILERS)
+@pytest.mark.parametrize(
+    "how", ["cc -O0", *(pytest.param(x, marks=pytest.mark.slow) for x in ("cc -O3", "zig cc"))]
+)
 def test_every_compiler_gives_the_same_bits(how):
     if how == "zig cc":
         pytest.importorskip("ziglang")

@@ -244,7 +244,7 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshado
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="calls cc and nm as they are on Linux")
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
 def test_the_source_makes_a_library_that_needs_no_resources(native, tmp_path, fmi):
     """As a receiver compiles it who takes headers and flags of his own."""
     with zipfile.ZipFile(native["PRBDM", fmi]) as archive:

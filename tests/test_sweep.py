@@ -371,7 +371,7 @@ def test_a_run_that_kills_its_worker_costs_one_row(mishap, log):
 
 def cluster(**options) -> LocalCluster:
     return LocalCluster(
-        n_workers=1, processes=True, dashboard_address=None, silence_logs=100, **options
+        n_workers=1, processes=True, dashboard_address="127.0.0.1:0", silence_logs=100, **options
     )
 
 
@@ -383,7 +383,7 @@ def test_a_scheduler_that_does_not_answer_is_told(mishap, log, monkeypatch):
     with pytest.raises(SweepError, match="no scheduler answers at nonsense://a"):
         sweep(mishap, table, scheduler="nonsense://a")
     with (
-        LocalCluster(n_workers=0, processes=False, dashboard_address=None) as empty,
+        LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as empty,
         pytest.raises(SweepError, match=r"has no workers; start one with: dask worker inproc:"),
     ):
         sweep(mishap, table, scheduler=empty.scheduler_address)

@@ -2,17 +2,17 @@
 
     python examples/escapement/run.py
 
-The tooth of the wheel hits the pallet of the oscillator.  The wheel carries the stop; its wall is the
-pallet, which the oscillator moves:
+The tooth of the wheel hits the pallet of the oscillator.  The wheel carries the stop; its wall is
+the pallet, which the oscillator moves:
 
     wheel.tooth.displacement, .velocity   <-  oscillator.shuttle.x, .vx
     wheel.tooth.mobility                  <-  oscillator.pallet.point.mobility
     oscillator.force.impulse.x            <-  wheel.tooth.impulse_sum
     oscillator.force.x                    <-  wheel.tooth.force
 
-With event mode a step ends where the tooth touches.  There the wheel hits what has the pallet's present
-velocity and effective mass, and the oscillator receives the impulse before time goes on: what one
-gains in momentum the other has lost.  The same two mechanisms in one file are computed beside.
+With event mode a step ends where the tooth touches.  There the wheel hits what has the pallet's
+present velocity and effective mass, and the oscillator receives the impulse before time goes on:
+what one gains in momentum the other has lost.  Both parts as one mechanism are computed beside.
 """
 
 import argparse
@@ -29,7 +29,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from parts import both, oscillator, wheel
 
-from prbm import Impact, PrbmError, Simulation
+from prbm import Impact, PrbmError
 from prbm_fmu.native_fmu import build
 from prbm_tools.cosimulation import simulate as cosimulate
 from prbm_tools.simulate import Progress, reporter
@@ -139,12 +139,14 @@ def draw(
     motion.plot(result["time"], tooth, label="tooth")
     motion.plot(result["time"][after], tooth[after], "k.", label="impacts")
     motion.set(xlabel="time [s]", ylabel="position [mm]")
-    motion.legend(loc="upper right", frameon=False)
+    motion.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, frameon=False)
     error.loglog(steps, [speed for _, speed in found], "o-", label="closing speed [m/s]")
     error.loglog(steps, [time for time, _ in found], "s-", label="time of impact [s]")
     slope = found[0][0] * (np.array(steps) / steps[0]) ** 2
     error.loglog(steps, slope, "k:", label="second order")
-    error.set(xlabel="communication step [s]", ylabel="largest error")
+    error.set_xticks(steps, [f"{1e3 * step:g}" for step in steps])
+    error.minorticks_off()
+    error.set(xlabel="communication step [ms]", ylabel="largest error")
     error.legend(frameon=False, fontsize="small")
     return figure
 
