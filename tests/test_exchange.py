@@ -20,7 +20,7 @@ FRICTION = {
     "stop.friction": 0.3, "friction.coefficient": 0.4, "friction.normal_force": 0.5,
     "friction.normal_stiffness": 30.0, "damping.zeta": 0.05,
 }  # fmt: skip
-SCALARS = 20  # numbers before the values in the array of the state
+SCALARS = 21  # numbers before the values in the array of the state
 
 
 @each_shipped
@@ -67,7 +67,7 @@ def moving(guide, parameters, inputs, discrete, rng):
     x[count : 2 * count] = np.where(stretches, 0.3, 3.0) * rng.standard_normal(count)
     put(kernel, 0.0, x, inputs)
     state = kernel.state
-    at = SCALARS + 2 * (len(guide.parameters) + len(inputs)) + 3 * len(guide.stops)
+    at = SCALARS + 2 * (len(guide.parameters) + len(input_names(guide))) + 3 * len(guide.stops)
     state[at : at + len(discrete)] = discrete
     kernel.restore(state)
     put(kernel, 0.0, x, inputs)
