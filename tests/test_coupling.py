@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 
+from kernel_simulation import KernelSimulation
 from prbm import ParameterError, Simulation, contact
 from prbm.hybrid import RELEASE_GAP
 from prbm.mechanism import value
@@ -107,6 +108,30 @@ def test_the_work_of_an_impulse_is_what_the_energy_gains(name):
     after = total(simulation), simulation.outputs()["energy.kinetic"]
     assert after[0] == pytest.approx(before[0], abs=1e-9 * before[1])
     assert abs(after[1] - before[1]) > 0.1 * before[1]
+
+
+STUCK = {"friction.coefficient": 0.5, "friction.normal_force": 20.0, "stop.position": 1.0,
+         "release.displacement": 0.0}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R"])
+@pytest.mark.parametrize(
+    "kind", [Simulation, pytest.param(KernelSimulation, marks=pytest.mark.native)]
+)
+def test_friction_that_sticks_bears_no_impulse(name, kind):
+    """The body leaves with the impulse times its mobility, and slows down by friction from then."""
+    simulation = kind(mechanism(name), STUCK)
+    simulation.advance(0.01)
+    before = simulation.outputs()
+    assert before["shuttle.vx"] == pytest.approx(0.0, abs=1e-12)
+    simulation.set({"force.impulse.x": 1e-3})
+    start = total(simulation)
+    simulation.advance(0.01 + 1e-9)
+    after = simulation.outputs()
+    # the force acts on the centre of mass, level with the hit point
+    expected = 1e-3 * after["stop.point.mobility"]
+    assert after["shuttle.vx"] == pytest.approx(expected, rel=1e-4)
+    assert total(simulation) == pytest.approx(start, abs=1e-9 * after["energy.kinetic"])
 
 
 def resting(name):

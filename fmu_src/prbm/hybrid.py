@@ -385,7 +385,8 @@ class Simulation:
         """Change the velocities by what the impulses have grown by since the last restart.
 
         Each component P at the point of a force changes the rate u of the point along it, and its
-        work is P (u- + u+)/2.  The loops take part, stops follow: see :meth:`_unsettled`.
+        work is P (u- + u+)/2.  The loops take part, stops follow: see :meth:`_unsettled`.  Friction
+        is finite and bears no impulse: what stuck is free, to slide or to stick again.
         """
         given = [self.given[name] for name in impulse_names(self.mechanism)]
         grown = np.array(given) - np.array(self.received)
@@ -400,6 +401,11 @@ class Simulation:
         self.front = self.front.copy()
         self.front[n : 2 * n] = after
         self.front[2 * n + 1] += float(grown @ (rows @ (v + after))) / 2
+        slides, rubs = (
+            tuple(IDLE if state == STICKS else state for state in states)
+            for states in (self.discrete.slides, self.discrete.rubs)
+        )
+        self._set_discrete(replace(self.discrete, slides=slides, rubs=rubs))
 
     def _unsettled(self) -> int | None:
         """Let go of what rested on a wall and moves, by the wall's velocity or an impulse.

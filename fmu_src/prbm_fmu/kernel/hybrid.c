@@ -1918,9 +1918,21 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     return right && settle(sim, resting, resting_count, NULL, problem);
 }
 
+static void free_stuck(Simulation *sim) {
+    read_discrete(sim);
+    for (int i = 0; i < sim->system.s; i++) {
+        sim->discrete.slides[i] = sim->discrete.slides[i] == STICKS ? IDLE : sim->discrete.slides[i];
+    }
+    for (int i = 0; i < sim->system.f; i++) {
+        sim->discrete.rubs[i] = sim->discrete.rubs[i] == STICKS ? IDLE : sim->discrete.rubs[i];
+    }
+    set_discrete(sim, &sim->discrete);
+}
+
 /* Change the velocities by what the impulses have grown by since they were received: each component P
  * at the point of a force changes the rate u of the point along it, and its work is P (u- + u+)/2.
- * The loops take part, stops follow: see unsettled. */
+ * The loops take part, stops follow: see unsettled.  Friction is finite and bears no impulse: what
+ * stuck is free, to slide or to stick again. */
 PRBM bool receive_impulses(Simulation *sim, bool *any, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = sim->system.n, count = LOADS * sim->mechanism->force_count;
@@ -1952,6 +1964,7 @@ PRBM bool receive_impulses(Simulation *sim, bool *any, Problem *problem) {
     }
     copy(count, given, sim->received);
     sim->scratch.used = mark;
+    free_stuck(sim);
     return right;
 }
 
