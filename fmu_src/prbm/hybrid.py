@@ -1082,16 +1082,16 @@ class Simulation:
             out[f"{frame.name}.x"], out[f"{frame.name}.y"] = place.real, place.imag
             out[f"{frame.name}.vx"], out[f"{frame.name}.vy"] = velocity.real, velocity.imag
         gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
+        places, speeds = equations.gap_rows.values(e), equations.gap_rows.rates(e, v)
         G, loops = equations.gap_rows.jacobian(e), equations.rows.jacobian(e)[: len(system.loops)]
         pressed = equations.stop_forces(lam)
         for i, stop in enumerate(self.mechanism.stops):
             out[f"{stop.name}.gap"] = float(gaps[i])
             out[f"{stop.name}.gap_rate"] = float(rates[i])
             out[f"{stop.name}.force"] = float(pressed[i])
-            wall = equations.inputs.walls[i]
-            moved = wall.at(t) - value(stop, "position", system.values)
-            out[f"{stop.name}.point.displacement"] = moved - float(gaps[i])
-            out[f"{stop.name}.point.velocity"] = wall.rate - float(rates[i])
+            drawn = value(stop, "position", system.values)
+            out[f"{stop.name}.point.displacement"] = -float(places[i]) - drawn
+            out[f"{stop.name}.point.velocity"] = -float(speeds[i])
             out[f"{stop.name}.point.mobility"] = _mobility(M, loops, G[[i]])
         force, moment = equations.base_reaction(q, v, a)
         out["base.force.x"], out["base.force.y"] = force.real, force.imag

@@ -2131,6 +2131,7 @@ static void output_places(Simulation *sim) {
     const System *system = &sim->system;
     const Slots *slots = &sim->mechanism->slots;
     int n = system->n;
+    Rows gaps = gap_rows(system);
     double *out = sim->outputs, *v = sim->y + n;
     for (int i = 0; i < system->b; i++) {
         const BodyFrame *frame = &system->bodies[i];
@@ -2157,9 +2158,9 @@ static void output_places(Simulation *sim) {
         double *values = out + slots->stops + PER_STOP * i;
         values[0] = gap(&sim->equations, i, sim->now->time, sim->e);
         values[1] = gap_rate(&sim->equations, i, sim->e, v);
-        double moved = wall_at(&sim->walls[i], sim->now->time);
-        values[3] = moved - stop_field(sim, sim->mechanism->stops[i].position) - values[0];
-        values[4] = sim->walls[i].rate - values[1];
+        values[3] = -(row_value(&gaps, i, sim->e) + gaps.c[i]) -
+                    stop_field(sim, sim->mechanism->stops[i].position);
+        values[4] = -row_rate(&gaps, i, sim->e, v);
         double *last = out + slots->latched + PER_LATCHED * i;
         last[0] = sim->holds[i];
         memcpy(last + 1, &sim->latched[i], sizeof(Latched));

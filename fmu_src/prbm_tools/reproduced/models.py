@@ -95,7 +95,7 @@ SPAN = 0.5  # s
 def swing_of_elements() -> tuple[Real, Real, float]:
     """Return time, displacement of the PMMA guide by elements, and its small-motion frequency."""
     fe = FiniteElements(guide("PRBDM"), PMMA, elements=16)
-    run = fe.transient(SPAN, 1e-4)
+    run = fe.transient(SPAN, 1e-4, spectral_radius=0.9)  # nothing hits it
     return run["time"], run["shuttle.x"], float(fe.modes(fe.equilibrium()).frequency[0])
 
 
