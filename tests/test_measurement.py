@@ -339,3 +339,18 @@ def test_estimates_are_finite(wrong):
 )
 def test_estimates_print_with_two_digits_of_uncertainty(estimate, text):
     assert str(estimate) == text
+
+
+def test_a_beam_as_thick_as_long_is_a_mistake_of_units():
+    """0.1 meant in mm, beside a length in mm: E would be a billion times too small."""
+    with pytest.raises(
+        EvaluationError, match=r"thickness = 0\.1 m is not less than length = 0\.04 m"
+    ):
+        Beam("1", Estimate(40e-3, 0.0), Estimate(8e-3, 0.0), Estimate(0.1, 0.0))
+
+
+@pytest.mark.parametrize("gain", [0.0, -1.0])
+def test_a_force_gain_that_is_not_positive_is_refused(gain):
+    d, F = bent(np.random.default_rng(0))
+    with pytest.raises(EvaluationError, match=r"force_gain = .* must be positive"):
+        youngs_modulus(d, F, beam(), force_gain=Estimate(gain, 0.0))

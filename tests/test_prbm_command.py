@@ -566,3 +566,9 @@ def test_the_page_is_named_where_users_look():
     assert "docs/command-line.md" in (ROOT / "README.md").read_text(encoding="utf-8")
     for command in COMMANDS:
         assert f"prbm {command}" in PAGE
+
+
+def test_the_help_of_validate_measures_what_is_compared(capsys):
+    """The rows of a comparison are named in full, "frequency 1 at rest"."""
+    assert run("validate --help") == cli.OK
+    assert '--measured "frequency 1 at rest=4.82 Hz +- 0.06"' in capsys.readouterr().out

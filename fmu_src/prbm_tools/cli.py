@@ -328,7 +328,7 @@ def _validate(commands: Commands) -> None:
         "measurements",
         _examples(
             "prbm validate --out validation",
-            'prbm validate my_mechanism.toml --measured "frequency=4.82 Hz +- 0.06"',
+            'prbm validate my_mechanism.toml --measured "frequency 1 at rest=4.82 Hz +- 0.06"',
         ),
     )  # fmt: skip
     add = parser.add_argument

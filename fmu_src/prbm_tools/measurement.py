@@ -181,6 +181,11 @@ class Beam:
             x = getattr(self, what)
             if x.value <= 0.0:
                 raise EvaluationError(f"beam {self.name}: {what} = {x.value:g} m must be positive")
+        if self.thickness.value >= self.length.value:
+            raise EvaluationError(
+                f"beam {self.name}: thickness = {self.thickness.value:g} m is not less than "
+                f"length = {self.length.value:g} m, which no beam is: check the units of both"
+            )
 
 
 @dataclass(frozen=True)
@@ -329,6 +334,11 @@ def youngs_modulus(
         raise EvaluationError(
             f"sensor_angle = {angle.value:g} deg: a sensor feels nothing of a force across it; "
             f"give an angle of at most {LARGEST_ANGLE:g} deg"
+        )
+    if force_gain is not None and force_gain.value <= 0.0:
+        raise EvaluationError(
+            f"force_gain = {force_gain.value:g} must be positive: the sign of the force is "
+            "found without it"
         )
     turned = math.radians(angle.value)
     force = force / math.cos(turned)

@@ -133,7 +133,9 @@ def measured(text: str) -> tuple[str, Estimate]:
     """
     name, equals, value = (part.strip() for part in text.partition("="))
     if not (name and equals and value):
-        raise UserMistake(f"--measured {text}: write NAME=VALUE+-U, as frequency=4.82 Hz +- 0.06")
+        raise UserMistake(
+            f'--measured {text}: write NAME=VALUE+-U, as "frequency 1 at rest=4.82 Hz +- 0.06"'
+        )
     unit = ""
     for part in reversed(PLUS_MINUS.split(value)):
         unit = _si(part, f"--measured {text}") or unit
