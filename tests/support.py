@@ -1,7 +1,7 @@
 """What the tests share: the shipped mechanisms, and the 1R guide as one scalar equation."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from unittest.mock import patch
 
@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from prbm import Mechanism, Simulation, assemble, equilibrium, modes
 from prbm.hybrid import Impact
 from prbm_fmu import native_fmu
+from prbm_tools import scalar_guide
 from prbm_tools.mechanism_file import load, shipped
 
 
@@ -192,29 +193,23 @@ PMMA = {
 """The PMMA guide of the thesis (A.1), its wall out of reach."""
 
 
+ELASTIC = {"damping.beta": 0.0, "stop.restitution": 0.6, "stop.rest_speed": 1e-3}
+
+
 @dataclass(frozen=True)
-class ScalarGuide:
+class ScalarGuide(scalar_guide.ScalarGuide):
     """The 1R guide as a pendulum of one angle phi from straight: x = r sin(phi).
 
     A parallelogram does not rotate its shuttle, so that M r^2 phi'' = -4 k phi + M g r cos(phi)
     with r = gamma L, k = 2 gamma K_theta EI/L and M the shuttle and two lumped masses.
     """
 
-    r: float
-    k: float
-    mass: float
-    g: float
+    g: float = 0.0
 
     @classmethod
-    def of(cls, values) -> "ScalarGuide":
-        v = values
-        L, h, b = (v[f"flexure.{name}"] for name in ("length", "thickness", "width"))
-        r = v["flexure.gamma"] * L
-        flexure = v["flexure.density"] * b * h * L
-        lump = flexure / 4 + flexure * L**2 / 12 / r**2
-        EI = v["flexure.youngs_modulus"] * b * h**3 / 12
-        k = 2 * v["flexure.gamma"] * v["flexure.K_theta"] * EI / L
-        return cls(r, k, v["shuttle.mass"] + 2 * lump, v["gravity.x"])
+    def of(cls, values, stops=()) -> "ScalarGuide":
+        g = values["gravity.x"]
+        return replace(super().of(ELASTIC | values, stops), g=g)
 
     def potential(self, phi: float) -> float:
         return 2 * self.k * phi**2 - self.mass * self.g * self.r * math.sin(phi)

@@ -13,7 +13,6 @@ wheel, oscillator = (load(FOLDER / name) for name in ("Wheel.toml", "Oscillator.
 def both() -> Mechanism:
     """Return wheel and oscillator as one mechanism: the wall of the tooth is on the shuttle."""
     [tooth] = wheel.stops
-    own = {p.name for p in oscillator.geometry}
     return replace(
         oscillator,
         name="Escapement",
@@ -23,5 +22,5 @@ def both() -> Mechanism:
         flexures=wheel.flexures + oscillator.flexures,
         stops=(replace(tooth, on="shuttle"),),
         forces=wheel.forces,
-        geometry=(*oscillator.geometry, *(p for p in wheel.geometry if p.name not in own)),
+        geometry=wheel.geometry + oscillator.geometry,
     )

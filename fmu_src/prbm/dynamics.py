@@ -22,7 +22,7 @@ from .kinetics import inertia, kinetic_energy, mass_accelerations
 from .mechanism import Mechanism, finite, unknown, value
 
 STICKS = 0  # and +1, -1: slides along, against the direction
-LOADS = ("x", "y", "moment")  # of a force, and of an impulse
+LOADS = {"x": "N", "y": "N", "moment": "N.m"}  # of a force; times s, of an impulse
 MOBILITY = "mobility"  # of a wall: an input of its stop
 IDLE = 2  # no friction acts: open, frictionless, or the stop carries everything
 
@@ -93,18 +93,32 @@ class Inputs:
     mobilities: tuple[float, ...]
 
 
+def input_units(mechanism: Mechanism) -> dict[str, str]:
+    """Return the inputs in the order of the interface, with their units."""
+    units = {f"{f.name}.{axis}": unit for f in mechanism.forces for axis, unit in LOADS.items()}
+    for stop in mechanism.stops:
+        units |= {f"{stop.name}.displacement": "m", f"{stop.name}.velocity": "m/s"}
+    units |= _impulse_units(mechanism)
+    units |= {f"{stop.name}.{MOBILITY}": "1/kg" for stop in mechanism.stops}
+    return units | {f"base.acceleration.{axis}": "m/s2" for axis in "xy"}
+
+
 def input_names(mechanism: Mechanism) -> tuple[str, ...]:
     """Return the names of the inputs in the order of the interface."""
-    names = [f"{f.name}.{axis}" for f in mechanism.forces for axis in LOADS]
-    names += [f"{s.name}.{what}" for s in mechanism.stops for what in ("displacement", "velocity")]
-    names += impulse_names(mechanism)
-    names += [f"{s.name}.{MOBILITY}" for s in mechanism.stops]
-    return (*names, "base.acceleration.x", "base.acceleration.y")
+    return tuple(input_units(mechanism))
 
 
 def impulse_names(mechanism: Mechanism) -> list[str]:
     """Return the names of the inputs that are impulses: what they grow by acts at once."""
-    return [f"{f.name}.impulse.{axis}" for f in mechanism.forces for axis in LOADS]
+    return list(_impulse_units(mechanism))
+
+
+def _impulse_units(mechanism: Mechanism) -> dict[str, str]:
+    return {
+        f"{force.name}.impulse.{axis}": f"{unit}.s"
+        for force in mechanism.forces
+        for axis, unit in LOADS.items()
+    }
 
 
 def check_input(name: str, number: float, known: Mapping[str, float]) -> float:

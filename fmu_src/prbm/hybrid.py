@@ -35,7 +35,7 @@ from .dynamics import (
     check_input,
     impulse_names,
     input_names,
-)  # fmt: skip
+)
 from .errors import ParameterError, SimulationError
 from .kinetics import inertia, kinetic_energy
 from .mechanism import Mechanism, unknown, value
@@ -1085,6 +1085,7 @@ class Simulation:
         places, speeds = equations.gap_rows.values(e), equations.gap_rows.rates(e, v)
         G, loops = equations.gap_rows.jacobian(e), equations.rows.jacobian(e)[: len(system.loops)]
         pressed = equations.stop_forces(lam)
+        mobilities = np.diag(G @ contact.response(M, loops, G))
         for i, stop in enumerate(self.mechanism.stops):
             out[f"{stop.name}.gap"] = float(gaps[i])
             out[f"{stop.name}.gap_rate"] = float(rates[i])
@@ -1092,7 +1093,7 @@ class Simulation:
             drawn = value(stop, "position", system.values)
             out[f"{stop.name}.point.displacement"] = -float(places[i]) - drawn
             out[f"{stop.name}.point.velocity"] = -float(speeds[i])
-            out[f"{stop.name}.point.mobility"] = _mobility(M, loops, G[[i]])
+            out[f"{stop.name}.point.mobility"] = float(mobilities[i])
         force, moment = equations.base_reaction(q, v, a)
         out["base.force.x"], out["base.force.y"] = force.real, force.imag
         out["base.moment"] = moment

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from prbm import Force, Mechanism, MechanismError, Parameter, ParameterError, Stop, assemble
-from prbm.dynamics import MOBILITY
+from prbm.dynamics import MOBILITY, input_units
 from prbm.mechanism import GROUND, affine, unknown
 
 from .units import QUANTITIES, Quantity
@@ -301,51 +301,50 @@ def _parameter(p: Parameter) -> Variable:
 
 
 def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
-    def given(name: str, unit: str, description: str) -> Variable:
+    units = input_units(mechanism)
+
+    def given(name: str, description: str) -> Variable:
+        unit = units[name]
         return Variable(
             name, description, "input", "continuous", "", unit, start=0.0, nominal=nominal(unit)
         )
 
     for force in mechanism.forces:
-        yield given(f"{force.name}.x", "N", f"Force on {pushed(force)} along x")
-        yield given(f"{force.name}.y", "N", f"Force on {pushed(force)} along y")
-        yield given(f"{force.name}.moment", "N.m", f"Moment on the {force.body}")
+        yield given(f"{force.name}.x", f"Force on {pushed(force)} along x")
+        yield given(f"{force.name}.y", f"Force on {pushed(force)} along y")
+        yield given(f"{force.name}.moment", f"Moment on the {force.body}")
     for stop in mechanism.stops:
         yield given(
             f"{stop.name}.displacement",
-            "m",
             f"Displacement of the {wall(stop)}, added to {stop.name}.position; the wall moves "
             "there uniformly within a communication step",
         )
         yield given(
             f"{stop.name}.velocity",
-            "m/s",
             f"Velocity of the {wall(stop)}, rate of {stop.name}.displacement",
         )
     for force in mechanism.forces:
-        for axis, unit, what in (
-            ("x", "N.s", "Impulses along x"),
-            ("y", "N.s", "Impulses along y"),
-            ("moment", "N.m.s", "Angular impulses"),
+        for axis, what in (
+            ("x", "Impulses along x"),
+            ("y", "Impulses along y"),
+            ("moment", "Angular impulses"),
         ):
             point = f"the {force.body}" if axis == "moment" else pushed(force)
             total = given(
                 f"{force.name}.impulse.{axis}",
-                unit,
                 f"{what} on {point}, all so far: what it grows by acts at once",
             )
             yield replace(total, variability="discrete")
     for stop in mechanism.stops:
         mobility = given(
             f"{stop.name}.{MOBILITY}",
-            "1/kg",
             f"Inverse of the effective mass of the {wall(stop)}: an impulse changes its velocity "
             "by so much times itself, 0 if it is immovable",
         )
         yield replace(mobility, minimum=0.0)
     for axis in "xy":
         yield given(
-            f"{BASE}.acceleration.{axis}", "m/s2",
+            f"{BASE}.acceleration.{axis}",
             f"Acceleration of the base along {axis}; all motion is relative to the base",
         )  # fmt: skip
 

@@ -31,7 +31,7 @@ from prbm.modal import Modes
 
 from .finite_elements import FiniteElements
 from .impact_map import algebraic, by_elements
-from .scene import GRID, IMPACT, LINK, REST, own_style
+from .scene import IMPACT, LINK, REST, own_style, plain
 from .simulate import Progress
 from .uncertainty import Estimate
 
@@ -166,9 +166,7 @@ class Comparison:
         axes.set_ylim(-0.7, len(rows) - 0.3)
         axes.set_xlabel("difference from finite elements [%]")
         axes.set_title(self.title, fontsize=11, loc="left")
-        axes.grid(color=GRID, linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        plain(axes)
         axes.legend(fontsize=9, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         return figure
 

@@ -14,7 +14,7 @@ from prbm.assembly import Real, unit
 
 from .files import write
 from .motion import Mark, marks
-from .scene import GRID, IMPACT, PAST, REST, length_unit, own_style, time_unit
+from .scene import IMPACT, PAST, REST, length_unit, own_style, plain, time_unit
 from .simulate import Columns, Result, ResultError, column, names
 
 ENERGIES = {  # one colour each, also for those who see colours differently
@@ -27,6 +27,18 @@ ENERGIES = {  # one colour each, also for those who see colours differently
 PANEL_HEIGHT, WIDTH = 1.9, 8.0  # inches
 
 Panel = Callable[[Axes, "_Plot"], None]
+
+
+def panels(
+    rows: int, columns: int, size: tuple[float, float], dpi: float = 120
+) -> tuple[Figure, list[Axes]]:
+    """Return a new figure of a size [inch], and its axes, row by row."""
+    figure = Figure(size, dpi=dpi, layout="constrained")
+    FigureCanvasAgg(figure)
+    every = [*np.atleast_1d(figure.subplots(rows, columns)).flat]
+    for axes in every:
+        plain(axes)
+    return figure, every
 
 
 class _Plot:
@@ -81,29 +93,27 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
         raise ResultError("whose result is it? give the mechanism: response(result, mechanism)")
     plot = _Plot(result, mechanism)
     body = mechanism.release.body
-    panels: list[Panel] = []
+    drawn: list[Panel] = []
     if plot.has(f"{body}.x", f"{body}.y"):
-        panels.append(_displacement)
+        drawn.append(_displacement)
     if plot.has(f"{body}.vx", f"{body}.vy"):
-        panels.append(_velocity)
+        drawn.append(_velocity)
     if plot.marks:
-        panels.append(_speeds)
+        drawn.append(_speeds)
     if plot.has(*(f"energy.{name}" for name in ENERGIES)):
-        panels.append(_energies)
-    if not panels:
+        drawn.append(_energies)
+    if not drawn:
         raise ResultError(
             f"the result has nothing to plot: record {body}.x, {body}.y and the like, with FMPy "
             "as in simulate_fmu(...), which records all outputs by itself"
         )
-    figure = Figure((WIDTH, 0.7 + PANEL_HEIGHT * len(panels)), dpi=120, layout="constrained")
+    figure = Figure((WIDTH, 0.7 + PANEL_HEIGHT * len(drawn)), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    every = np.atleast_1d(figure.subplots(len(panels), 1, sharex=True))
-    for axes, panel in zip(every, panels, strict=True):
+    every = np.atleast_1d(figure.subplots(len(drawn), 1, sharex=True))
+    for axes, panel in zip(every, drawn, strict=True):
         _shade_rest(axes, plot)
         panel(axes, plot)
-        axes.grid(color=GRID, linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        plain(axes)
     every[0].set_title(mechanism.title, fontsize=11, loc="left")
     every[-1].set_xlabel(f"time [{plot.unit}]")
     every[-1].set_xlim(plot.time[0], plot.time[-1])

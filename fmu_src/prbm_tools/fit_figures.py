@@ -2,16 +2,15 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from prbm.assembly import Real
 
-from .figures import WIDTH
+from .figures import WIDTH, panels
 from .fit import Fit, ForceDeflection, Response, Valley
 from .measurement import Calibration, YoungsModulus
 from .records import Series
-from .scene import GRID, IMPACT, LINK, PAST, length_unit, own_style, time_unit
+from .scene import IMPACT, LINK, PAST, length_unit, own_style, time_unit
 from .spectrum import spectrum
 from .uncertainty import EvaluationError
 from .vibration import FreeVibration
@@ -21,14 +20,7 @@ HARMONICS = 8.0  # times the frequency of a vibration: as far as its spectrum is
 
 
 def _figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure, list[Axes]]:
-    figure = Figure((WIDTH, height), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
-    every = [*np.atleast_1d(figure.subplots(rows, columns)).flat]
-    for axes in every:
-        axes.grid(color=GRID, linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
-    return figure, every
+    return panels(rows, columns, (WIDTH, height))
 
 
 def _title(found: Fit) -> str:

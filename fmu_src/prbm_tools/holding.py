@@ -22,7 +22,7 @@ from prbm.assembly import Real, unit
 from prbm.statics import Equilibrium
 
 from .equilibria import Rest, holding_force, rests, snap
-from .scene import GRID, IMPACT, PAST, REST, length_unit, own_style
+from .scene import IMPACT, PAST, REST, length_unit, own_style, plain
 from .simulate import Progress
 
 ROUNDING = 1e-9  # of its scale: what a computation leaves of zero
@@ -195,9 +195,7 @@ def figure(curve: Curve, title: str) -> Figure:
     frequency.set_ylabel("fundamental [Hz]")
     frequency.set_xlabel(f"displacement [{name}]")
     for axes in every:
-        axes.grid(color=GRID, linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        plain(axes)
     drawn.align_ylabels(every)
     return drawn
 

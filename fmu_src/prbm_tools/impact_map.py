@@ -49,7 +49,7 @@ from prbm.statics import Equilibrium
 from .finite_elements import FiniteElements, Shape
 from .fit import DISPLACEMENT, Fit, Response, fit
 from .records import Series
-from .scene import GRID, own_style
+from .scene import own_style, plain
 from .simulate import Progress
 
 HEIGHTS = (-10e-3, -5e-3, 0.0, 5e-3, 10e-3)  # m; the source's walls
@@ -776,6 +776,4 @@ def _bars(axes: Axes, x: Real, parts: Real, names: Sequence[str], colours: Seque
         bottom += part
     axes.set_ylim(0.0, 1.05)
     axes.set_xticks(x)
-    axes.grid(axis="y", color=GRID, linewidth=0.7)
-    axes.set_axisbelow(True)
-    axes.spines[["top", "right"]].set_visible(False)
+    plain(axes, axis="y")

@@ -4,7 +4,7 @@ import itertools
 import math
 from collections.abc import Iterable, Iterator
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib.style
 import numpy as np
@@ -53,6 +53,13 @@ def quiet(axes: Axes) -> None:
     axes.grid(color=GRID, linewidth=0.6)
     for spine in axes.spines.values():
         spine.set_color("#c0c0c0")
+
+
+def plain(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
+    """Draw a grid behind the curves of a plot, and only the frame's left and lower side."""
+    axes.grid(axis=axis, color=GRID, linewidth=0.7)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
 
 
 def length_unit(size: float) -> tuple[float, str]:

@@ -5,18 +5,13 @@ import re
 from collections.abc import Mapping, Sequence
 
 from prbm import Mechanism, ParameterError
-from prbm.dynamics import input_names
+from prbm.dynamics import input_units
 from prbm.errors import MechanismError, PrbmError
 from prbm.mechanism import unknown
 
 from .simulate import Experiment, experiment
 from .units import number
 
-INPUT_UNITS = {
-    "x": "N", "y": "N", "moment": "N.m", "impulse.x": "N.s", "impulse.y": "N.s",
-    "impulse.moment": "N.m.s", "displacement": "m", "velocity": "m/s", "mobility": "1/kg",
-    "acceleration.x": "m/s2", "acceleration.y": "m/s2",
-}  # fmt: skip
 PERCENT = re.compile(r"(.*\d)\s*%")
 UNIT_ALONE = re.compile(r"[A-Za-zµμ°][^=]*|1/.*")
 
@@ -152,8 +147,7 @@ def units_of(mechanism: Mechanism) -> dict[str, str]:
     >>> units["flexure.length"], units["force.moment"], units["base.acceleration.x"]
     ('m', 'N.m', 'm/s2')
     """
-    inputs = {name: INPUT_UNITS[name.partition(".")[2]] for name in input_names(mechanism)}
-    return inputs | {p.name: p.unit for p in mechanism.parameters}
+    return input_units(mechanism) | {p.name: p.unit for p in mechanism.parameters}
 
 
 def settings(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, float]:

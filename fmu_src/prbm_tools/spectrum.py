@@ -26,7 +26,7 @@ from prbm.assembly import Real, unit
 from prbm.modal import modes_at
 
 from .impact_map import first_impact
-from .scene import GRID, IMPACT, PAST, own_style
+from .scene import IMPACT, PAST, own_style, plain
 from .simulate import Result
 
 FAR = 10.0  # sizes of the mechanism, to which a wall is taken away
@@ -276,9 +276,7 @@ def figure(
         axes.set_ylim(max(1e-6 * top, 0.3 * float(amplitude[inside].min())), 3.0 * top)
         axes.set_xlim(0.0, end)
         axes.set_ylabel(SIGNALS[name].replace(" [", "\n["), fontsize=9)
-        axes.grid(color=GRID, linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
+        plain(axes)
     last = -np.inf
     for i, f in shown:
         if f < end and f - last > 0.035 * end:  # labels do not overlap

@@ -178,7 +178,7 @@ static void set_loads(Equations *q) {
     field_row(n, system->S, scaled(-1.0, q->inputs.base), q->w_input);
     for (int i = 0; i < m->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
-        const double *given = q->inputs.forces + 3 * i;
+        const double *given = q->inputs.forces + LOADS * i;
         force_row(n, frame->A, complex_of(given[0], given[1]), q->w);
         for (int j = 0; j < n; j++) {
             q->w_input[j] = plus(q->w_input[j], q->w[j]);
@@ -867,7 +867,7 @@ PRBM void base_reaction(const Equations *equations, const Complex *e, const doub
     }
     for (int i = 0; i < system->mechanism->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
-        const double *given = equations->inputs.forces + 3 * i;
+        const double *given = equations->inputs.forces + LOADS * i;
         Complex f = complex_of(given[0], given[1]);
         Complex z = plus(along_arms(n, frame->A, e), minus(frame->c, system->anchor));
         *force = plus(*force, f);

@@ -167,8 +167,7 @@ static void states_of(const Simulation *sim, const double *y, double *x) {
 static void place_walls(Simulation *sim) {
     const Mechanism *m = sim->mechanism;
     for (int i = 0; i < m->stop_count; i++) {
-        Wall wall = {wall_target(sim, i, 0.0), sim->given[3 * m->force_count + 2 * i + 1],
-                     sim->now->time};
+        Wall wall = {wall_target(sim, i, 0.0), wall_inputs(m, sim->given, i)[1], sim->now->time};
         sim->walls[i] = wall;
     }
 }
@@ -569,8 +568,8 @@ static void arm(Simulation *sim) {
 static bool let_all_happen(Simulation *sim, Problem *problem) {
     enum { MOST_AT_ONCE = 16 };
     bool struck[MOST_STOPS] = {false};
-    bool thrown;
-    if (!evaluate_motion(sim, problem) || !receive_impulses(sim, &thrown, problem)) {
+    bool thrown = impulses_changed(sim);
+    if (!evaluate_motion(sim, problem) || !receive_impulses(sim, problem)) {
         return false;
     }
     if (thrown) {
@@ -827,7 +826,7 @@ static Complex through_mass(const Tangent *t, int i, const Complex *x) {
 static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     const System *system = t->q->system;
     const Mechanism *m = system->mechanism;
-    const double *base = t->du + m->input_count - 2;
+    const double *base = t->du + m->input.base;
     int n = system->n;
     size_t mark = t->sim->scratch.used;
     Complex *one = take_complex(&t->sim->scratch, n, 1);
@@ -835,7 +834,7 @@ static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     zeros(n, dmoment);
     for (int i = 0; i < m->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
-        const double *given = t->du + 3 * i;
+        const double *given = t->du + LOADS * i;
         force_row(n, frame->A, complex_of(given[0], given[1]), one);
         for (int j = 0; j < n; j++) {
             dw[j] = plus(dw[j], one[j]);
@@ -985,18 +984,21 @@ static void link_changes(const Tangent *t, double *links, double *stretches_out)
     }
 }
 
+/* Changes of displacement and velocity of a wall. */
+static const double *wall_change(const Tangent *t, int i) {
+    return wall_inputs(t->q->system->mechanism, t->du, i);
+}
+
 static double gap_change(const Tangent *t, int i) {
     const System *system = t->q->system;
     Rows gaps = gap_rows(system);
-    double displacement = t->du[3 * system->mechanism->force_count + 2 * i];
-    return value_change(t, &gaps, i) + displacement;
+    return value_change(t, &gaps, i) + wall_change(t, i)[0];
 }
 
 static double gap_rate_change(const Tangent *t, int i) {
     const System *system = t->q->system;
     Rows gaps = gap_rows(system);
-    double velocity = t->du[3 * system->mechanism->force_count + 2 * i + 1];
-    return rate_change(t, &gaps, i) + velocity;
+    return rate_change(t, &gaps, i) + wall_change(t, i)[1];
 }
 
 static void stop_changes(const Tangent *t, double *out) {
@@ -1008,7 +1010,7 @@ static void stop_changes(const Tangent *t, double *out) {
         out[PER_STOP * t->q->held[k] + 2] = multiplier_change(t, t->q->first_hold + k);
     }
     for (int i = 0; i < t->q->system->s; i++) {
-        const double *wall = t->du + 3 * t->q->system->mechanism->force_count + 2 * i;
+        const double *wall = wall_change(t, i);
         out[PER_STOP * i + 3] = wall[0] - out[PER_STOP * i];
         out[PER_STOP * i + 4] = wall[1] - out[PER_STOP * i + 1];
     }
@@ -1027,7 +1029,7 @@ static void base_changes(const Tangent *t, double *out) {
     const System *system = t->q->system;
     const Mechanism *m = system->mechanism;
     int n = system->n;
-    const double *base = t->du + m->input_count - 2, *given = t->q->inputs.forces;
+    const double *base = t->du + m->input.base, *given = t->q->inputs.forces;
     Complex field = minus(system->gravity, t->q->inputs.base), force = {0.0, 0.0};
     double moment = 0.0;
     for (int i = 0; i < system->p; i++) {
@@ -1044,7 +1046,7 @@ static void base_changes(const Tangent *t, double *out) {
     }
     for (int i = 0; i < m->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
-        const double *df = t->du + 3 * i, *f = given + 3 * i;
+        const double *df = t->du + LOADS * i, *f = given + LOADS * i;
         Complex z = plus(along_arms(n, frame->A, t->e), minus(frame->c, system->anchor));
         Complex dz = along_arms(n, frame->A, t->dE);
         force = plus(force, complex_of(df[0], df[1]));
@@ -1163,7 +1165,7 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
     }
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k], h = q->first_hold + k;
-        double velocity = t->du[3 * system->mechanism->force_count + 2 * i + 1];
+        double velocity = wall_change(t, i)[1];
         sum -= multiplier_change(t, h) * q->inputs.walls[i].rate + multiplier(t, h) * velocity;
     }
     return sum;
@@ -1189,7 +1191,7 @@ static void indicator_changes(const Tangent *t, double *out) {
     }
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k];
-        double velocity = t->du[3 * system->mechanism->force_count + 2 * i + 1];
+        double velocity = wall_change(t, i)[1];
         bool pressed = margin_release(sim, k) / force_scale(sim) <= release_indicator(sim, k);
         out[STOP_INDICATORS * i + 1] =
             pressed ? multiplier_change(t, q->first_hold + k) / force_scale(sim)

@@ -606,7 +606,7 @@ static bool not_fixed(const Instance *instance, int slot, double x, double prese
 /* What a variable is that may change in event mode alone, now that events have one; or NULL. */
 static const char *waits_for_event(const Instance *instance, int slot) {
     const Mechanism *m = instance->mechanism;
-    int impulses = m->slots.inputs + LOADS * m->force_count + 2 * m->stop_count;
+    int impulses = m->slots.inputs + m->input.impulses;
     bool exchange = instance->mode == MODE_CONTINUOUS;
     bool impulse = slot >= impulses && slot < impulses + LOADS * m->force_count;
     if (impulse && (exchange || (instance->mode == MODE_STEP && instance->event_mode))) {

@@ -256,14 +256,14 @@ PRBM void read_discrete(Simulation *sim) {
 
 static Inputs inputs_of(const Simulation *sim) {
     const Mechanism *m = sim->mechanism;
-    const double *base = sim->acting_given + m->input_count - 2;
-    Inputs inputs = {sim->forces, {base[0], base[1]}, sim->walls, base - m->stop_count};
+    const double *base = sim->acting_given + m->input.base;
+    Inputs inputs = {sim->forces, {base[0], base[1]}, sim->walls,
+                     sim->acting_given + m->input.mobilities};
     return inputs;
 }
 
 PRBM void set_inputs(Simulation *sim) {
-    int count = 3 * sim->mechanism->force_count;
-    copy(count, sim->acting_given, sim->forces);
+    copy(LOADS * sim->mechanism->force_count, sim->acting_given, sim->forces);
     Inputs inputs = inputs_of(sim);
     read_discrete(sim);
     set_equations(&sim->equations, &inputs, &sim->discrete, sim->omega);
@@ -337,7 +337,7 @@ PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *pr
         if (!finite_number(x)) {
             return fail(problem, "%s = %g must be a finite number", m->input_names[i], x);
         }
-        bool mobility = i < m->input_count - 2 && i >= m->input_count - 2 - m->stop_count;
+        bool mobility = i >= m->input.mobilities && i < m->input.base;
         if (mobility && x < 0.0) {
             return fail(problem,
                         "%s = %g 1/kg must not be negative: it is the inverse effective mass of "
@@ -355,18 +355,18 @@ PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *pr
 
 /* The impulses so far, of each force (b, 3). */
 static const double *impulses(const Simulation *sim) {
-    return sim->given + LOADS * sim->mechanism->force_count + 2 * sim->mechanism->stop_count;
+    return sim->given + sim->mechanism->input.impulses;
 }
 
-static bool impulses_changed(const Simulation *sim) {
+PRBM bool impulses_changed(const Simulation *sim) {
     size_t count = LOADS * (size_t)sim->mechanism->force_count;
     return memcmp(impulses(sim), sim->received, count * sizeof *sim->received) != 0;
 }
 
 PRBM double wall_target(const Simulation *sim, int i, double h) {
     const Mechanism *m = sim->mechanism;
-    const double *given = sim->given + 3 * m->force_count + 2 * i;
-    return evaluate(m->stops[i].position, sim->values) + given[0] + given[1] * h;
+    const double *wall = wall_inputs(m, sim->given, i);
+    return evaluate(m->stops[i].position, sim->values) + wall[0] + wall[1] * h;
 }
 
 /* --- start ------------------------------------------------------------------------------------ */
@@ -577,8 +577,7 @@ static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
     }
     copy(sim->mechanism->input_count, sim->given, sim->acting_given);
     set_inputs(sim);
-    bool any;
-    if (!receive_impulses(sim, &any, problem)) {
+    if (!receive_impulses(sim, problem)) {
         return false;
     }
     int struck = unsettled(sim);
@@ -1933,13 +1932,12 @@ static void free_stuck(Simulation *sim) {
  * at the point of a force changes the rate u of the point along it, and its work is P (u- + u+)/2.
  * The loops take part, stops follow: see unsettled.  Friction is finite and bears no impulse: what
  * stuck is free, to slide or to stick again. */
-PRBM bool receive_impulses(Simulation *sim, bool *any, Problem *problem) {
+PRBM bool receive_impulses(Simulation *sim, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = sim->system.n, count = LOADS * sim->mechanism->force_count;
     const double *given = impulses(sim);
     double grown[LOADS], *v = sim->front + n;
-    *any = impulses_changed(sim);
-    if (!*any) {
+    if (!impulses_changed(sim)) {
         return true;
     }
     double *rows = take_matrix(&sim->scratch, LOADS, n), *X = take_matrix(&sim->scratch, n, LOADS);
@@ -2090,10 +2088,10 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 static void take_inputs(Simulation *sim) {
     const Mechanism *m = sim->mechanism;
     for (int i = 0; i < sim->system.s; i++) {
-        int velocity = LOADS * m->force_count + 2 * i + 1;
-        if (sim->given[velocity] != sim->acting_given[velocity]) {
+        double velocity = wall_inputs(m, sim->given, i)[1];
+        if (velocity != wall_inputs(m, sim->acting_given, i)[1]) {
             double t = sim->now->time;
-            Wall wall = {wall_at(&sim->walls[i], t), sim->given[velocity], t};
+            Wall wall = {wall_at(&sim->walls[i], t), velocity, t};
             sim->walls[i] = wall;
         }
     }

@@ -84,7 +84,8 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, const E
 PRBM bool impact(Simulation *sim, int hit, Problem *problem);
 PRBM bool count_event(Simulation *sim, double time, int kind, Problem *problem);
 PRBM void without_hold(Simulation *sim, int stop);
-PRBM bool receive_impulses(Simulation *sim, bool *any, Problem *problem);
+PRBM bool impulses_changed(const Simulation *sim);
+PRBM bool receive_impulses(Simulation *sim, Problem *problem);
 PRBM int unsettled(Simulation *sim);
 PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem);
 PRBM double margin_release(const Simulation *sim, int k);

@@ -265,11 +265,18 @@ enum {
     PER_LATCHED = 9, /* contact, impact_count, impact_time, approach_speed, rebound_speed, impulse,
                         energy_lost, modal_restitution, impulse_sum */
     LOADS = 3,       /* of a force, and of an impulse: x, y, moment */
+    PER_WALL = 2,    /* displacement, velocity */
+    AXES = 2,        /* of the base's acceleration: x, y */
     PER_LINK = 2,    /* angle, omega */
     PER_STRETCH = 2, /* strain, strain_rate */
     PER_PROBE = 4,   /* x, y, vx, vy */
     STOP_INDICATORS = 3, /* impact, release, slip; then one slip for each friction point */
 };
+
+/* Where the groups of inputs begin; the forces are the first. */
+typedef struct {
+    int walls, impulses, mobilities, base;
+} InputGroups;
 
 /* A part that the assembly walks along, from what is held already. */
 typedef struct {
@@ -306,6 +313,7 @@ typedef struct {
     const Variable *variables; /* in rising order of their references */
     const char *const *input_names;
     const double *input_starts; /* (input_count,) */
+    InputGroups input;
     const Step *steps;             /* flexures and joints in the order of the assembly */
     const Coordinate *coordinates; /* (coordinate_count,) */
     const int *links, *stretches;  /* coordinates that are angles and stretches of links */
@@ -326,6 +334,8 @@ PRBM double evaluate(Expression quantity, const double *values); /* twin: mechan
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */
 PRBM bool check_values(const Mechanism *mechanism, const double *values, Problem *problem);
+/* Displacement and velocity of a wall, among some inputs (input_count,). */
+PRBM const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop);
 PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t reference);
 
 /* --- flexure.c ------------------------------------------------------------------------------------ */

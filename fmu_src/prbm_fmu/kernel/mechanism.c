@@ -480,6 +480,14 @@ static void read_independents(Reader *reader, Mechanism *m) {
     m->independent = independent;
 }
 
+static void lay_out_inputs(Mechanism *m) {
+    InputGroups *input = &m->input;
+    input->walls = LOADS * m->force_count;
+    input->impulses = input->walls + PER_WALL * m->stop_count;
+    input->mobilities = input->impulses + LOADS * m->force_count;
+    input->base = input->mobilities + m->stop_count;
+}
+
 static void lay_out_slots(Mechanism *m) {
     Slots *s = &m->slots;
     s->parameters = 0;
@@ -568,7 +576,8 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     m->variable_count = read_count(reader, 16);
     m->independent_count = read_count(reader, 4);
     m->input_count = read_count(reader, 12);
-    if (!reader->wrong && m->input_count != 6LL * m->force_count + 3LL * m->stop_count + 2) {
+    if (!reader->wrong && m->input_count != 2LL * LOADS * m->force_count +
+                                                   (PER_WALL + 1LL) * m->stop_count + AXES) {
         reader->wrong = "another number of inputs than the mechanism has";
     }
     read_parameters(reader, m);
@@ -590,6 +599,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     if (reader->wrong) {
         return; /* with counts of parts that may not be there */
     }
+    lay_out_inputs(m);
     lay_out_slots(m);
     read_variables(reader, m);
     if (!reader->wrong && reader->left > 0) {
@@ -626,6 +636,10 @@ PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem 
 
 PRBM void mechanism_close(Mechanism *mechanism) {
     free(mechanism);
+}
+
+PRBM const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop) {
+    return inputs + mechanism->input.walls + PER_WALL * stop;
 }
 
 /* --- values ----------------------------------------------------------------------------------- */

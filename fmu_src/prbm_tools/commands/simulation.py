@@ -20,9 +20,6 @@ from .systems import ROUNDING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-if TYPE_CHECKING:
-    pass
-
 IMPACT_HEAD = (
     "number", "stop", "time [s]", "approach speed [m/s]", "rebound speed [m/s]", "impulse [N.s]",
     "energy lost [J]", "modal restitution [-]",

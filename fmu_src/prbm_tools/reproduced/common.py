@@ -7,15 +7,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from prbm import Mechanism, assemble, equilibrium, modes
 from prbm.assembly import Real
 
-from .. import source_model
+from .. import figures, source_model
 from ..mechanism_file import load, shipped
-from ..scene import GRID
 
 K = "flexure.K_theta"
 K_HOWELL, K_SOURCE = 2.65, 2.5449
@@ -97,14 +95,7 @@ def repeated(t: Real, x: Real) -> float:
 
 def panels(rows: int, columns: int = 1, size: tuple[float, float] = (7.0, 3.0)) -> list[Axes]:
     """Return the axes of a new figure, row by row."""
-    figure = Figure(size, dpi=100, layout="constrained")
-    FigureCanvasAgg(figure)
-    every = [*np.atleast_1d(figure.subplots(rows, columns)).flat]
-    for axes in every:
-        axes.grid(color=GRID, linewidth=0.7)
-        axes.set_axisbelow(True)
-        axes.spines[["top", "right"]].set_visible(False)
-    return every
+    return figures.panels(rows, columns, size, dpi=100)[1]
 
 
 def figure_of(axes: Axes) -> Figure:
