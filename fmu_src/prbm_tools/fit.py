@@ -40,6 +40,12 @@ SHARE = 0.1  # of the range of the bounds: the size of a parameter near zero
 DOUBTFUL = 3.0  # residual over stated uncertainty: then the model is what is wrong
 SCAN = {1: 9, 2: 5}  # starts along each parameter of a response, whose misfit has several valleys
 MOST_STARTS = 400
+MOST_STEPS = 50  # of the minimiser
+HALF_WAY = 4.0  # steps of the minimiser, for the progress told
+SEARCH = 0.5  # of the progress told: the starts
+NEAR_LEAST = (
+    1e-9  # of the misfit: with m data, sqrt(m/1e9) of a standard uncertainty from the least
+)
 RECORD_SHIFT, RECORD_ZERO = "record.shift", "record.zero"
 OWN = (RECORD_SHIFT, RECORD_ZERO)  # parameters of a record, not of the mechanism
 OWN_UNITS = {RECORD_SHIFT: "s", RECORD_ZERO: "m"}
@@ -208,12 +214,13 @@ class Response:
 
 def _output(simulation: Simulation, name: str) -> float:
     """Return an output by its name, or the displacement of the released body [m]."""
-    outputs = simulation.outputs()
+    motions = simulation.motions()
     if name == DISPLACEMENT:
         release = simulation.mechanism.release
-        x, y = (outputs[f"{release.body}.{axis}"] for axis in "xy")
+        x, y = (motions[f"{release.body}.{axis}"] for axis in "xy")
         u = unit(release.direction)
         return float(u.real * x + u.imag * y)
+    outputs = motions if name in motions else simulation.outputs()
     if name not in outputs:
         raise EvaluationError(unknown(name, {DISPLACEMENT: 0.0, **outputs}))
     return float(outputs[name])
@@ -331,8 +338,10 @@ class Problem:
             columns.append(change * scale[i] / (ahead[i] - behind[i]))
         return np.column_stack(columns)
 
-    def minimised(self, start: Real, moved: Whole) -> tuple[Real, int]:
-        """Return the parameters of least misfit, and how often the model was evaluated.
+    def minimised(
+        self, start: Real, moved: Whole, progress: Progress | None = None
+    ) -> tuple[Real, int, bool]:
+        """Return the parameters of least misfit, model evaluations, whether it converged.
 
         Parameters
         ----------
@@ -340,6 +349,8 @@ class Problem:
             All parameters.
         moved : (j,) int
             Those that are fitted; the others stay.
+        progress : callable or None
+            Told a fraction that comes nearer to 1, how many steps there will be is not known.
         """
         scale, evaluations = self.size(start), 0
 
@@ -351,6 +362,9 @@ class Problem:
         def residuals(z: Real) -> Real:
             nonlocal evaluations
             evaluations += 1
+            if progress is not None:
+                steps = evaluations / (2 * len(moved) + 1)
+                progress(1.0 - 0.5 ** (steps / HALF_WAY))
             return self.residuals(all_of(z))
 
         def derivatives(z: Real) -> Real:
@@ -361,9 +375,9 @@ class Problem:
         bounds = (self.lower[moved] / scale[moved], self.upper[moved] / scale[moved])
         found = least_squares(
             residuals, start[moved] / scale[moved], derivatives, bounds,
-            xtol=1e-10, ftol=1e-12, gtol=1e-12,
+            xtol=1e-10, ftol=NEAR_LEAST, gtol=1e-12, max_nfev=MOST_STEPS,
         )  # fmt: skip
-        return all_of(found.x), evaluations
+        return all_of(found.x), evaluations, found.status > 0
 
 
 @dataclass(frozen=True)
@@ -419,6 +433,8 @@ class Fit:
         What the model says in place of the data.
     evaluations : int
         How often the model was evaluated.
+    converged : bool
+        Whether the misfit is the least near there.
     """
 
     problem: Problem
@@ -429,12 +445,19 @@ class Fit:
     valleys: tuple[Direction, ...]
     model: Real
     evaluations: int
+    converged: bool
 
     @property
     def estimates(self) -> dict[str, Estimate]:
-        """The parameters with their standard uncertainties."""
+        """The parameters with their standard uncertainties.
+
+        What a bound that was given held back is not determined.
+        """
         units = {x.name: x.unit for x in self.problem.mechanism.parameters} | OWN_UNITS
         u = np.sqrt(np.diag(self.covariance))
+        u[[name in self.at_bounds and not self._ends(name) for name in self.problem.names]] = (
+            math.inf
+        )
         freedom = math.inf if self.problem.known else float(self.freedom)
         return {
             name: Estimate(float(x), float(ux), units[name], freedom)
@@ -486,6 +509,13 @@ class Fit:
         stuck = (self.p - lower <= near) | (upper - self.p <= near)
         return tuple(name for name, at in zip(self.problem.names, stuck, strict=True) if at)
 
+    def _ends(self, name: str) -> bool:
+        """Tell whether a parameter ended where what is possible ends."""
+        i = self.problem.names.index(name)
+        near = AT_BOUND * (self.problem.upper[i] - self.problem.lower[i])
+        ends = _own_bounds(self.problem.mechanism, name)
+        return any(abs(self.p[i] - end) <= near for end in ends)
+
     @property
     def correlation(self) -> Real:
         """Correlation of the parameters, (k, k) [-]; not a number where not determined."""
@@ -498,9 +528,14 @@ class Fit:
     def notes(self) -> tuple[str, ...]:
         """What a reader of the numbers must know."""
         notes = [str(valley) for valley in self.valleys]
+        if not self.converged:
+            notes.append(
+                f"{MOST_STEPS} steps did not lead to a least misfit: the model cannot follow these "
+                "data, or starts too far away; give bounds near the values, or look at the figure"
+            )
         for name in self.at_bounds:
             limit = self.problem.values(self.p)[name]
-            if limit in _own_bounds(self.problem.mechanism, name):
+            if self._ends(name):
                 notes.append(f"{name} ended at {limit:g}, the end of what is possible")
             else:
                 notes.append(f"{name} ended at its bound {limit:.6g}: widen the bounds")
@@ -550,7 +585,7 @@ def fit(
         Number of starts along each parameter; None: several if there is a response, whose misfit
         has several valleys, else one.
     progress : callable or None
-        Told the fraction of the starts that is done, from 0 to 1.
+        Told the fraction that is done, from 0 to 1: of the starts, then of the fit from the best.
 
     Raises
     ------
@@ -570,12 +605,21 @@ def fit(
     """
     several = (targets,) if not isinstance(targets, Sequence) else tuple(targets)
     problem = _problem(mechanism, free, several, values or {})
-    best = _best_start(problem, several, starts, progress)
-    p, evaluations = problem.minimised(best, np.arange(len(best)))
-    return _assessed(problem, p, evaluations)
+    told = progress or _unheard
+    best = _best_start(problem, several, starts, lambda done: told(SEARCH * done))
+    p, evaluations, converged = problem.minimised(
+        best, np.arange(len(best)), lambda done: told(SEARCH + (1.0 - SEARCH) * done)
+    )
+    found = _assessed(problem, p, evaluations, converged)
+    told(1.0)
+    return found
 
 
-def _assessed(problem: Problem, p: Real, evaluations: int) -> Fit:
+def _unheard(done: float) -> None:
+    pass
+
+
+def _assessed(problem: Problem, p: Real, evaluations: int, converged: bool) -> Fit:
     """Return a fit with what the data know about its parameters."""
     model = problem.model(p)
     rest = (model - problem.data) / problem.uncertainty
@@ -602,7 +646,7 @@ def _assessed(problem: Problem, p: Real, evaluations: int) -> Fit:
             shares = dict(zip(problem.names, map(float, row), strict=True))
             valleys.append(Direction(shares, 1.0 / known if known > 0.0 else math.inf))
     return Fit(
-        problem, p, _covariance(s, V, size), s, V, tuple(valleys), model, evaluations
+        problem, p, _covariance(s, V, size), s, V, tuple(valleys), model, evaluations, converged
     )  # fmt: skip
 
 
@@ -674,7 +718,7 @@ def _bounds(mechanism: Mechanism, one: Free, default: float) -> tuple[float, flo
 
 
 def _best_start(
-    problem: Problem, targets: tuple[Target, ...], starts: int | None, progress: Progress | None
+    problem: Problem, targets: tuple[Target, ...], starts: int | None, progress: Progress
 ) -> Real:
     """Return the best of the starts on a grid within the bounds, the given one among them."""
     k = len(problem.names)
@@ -700,8 +744,7 @@ def _best_start(
         except EvaluationError as error:  # a corner where there is no motion
             costs.append(math.inf)
             failure = error
-        if progress is not None:
-            progress((i + 1) / len(grid))
+        progress((i + 1) / len(grid))
     best = int(np.argmin(costs))
     if failure is not None and math.isinf(costs[best]):
         raise failure
