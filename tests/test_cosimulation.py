@@ -9,7 +9,8 @@ from fmpy import simulate_fmu
 from coupled import guide, integrator
 from prbm import ParameterError
 from prbm_tools import cosimulation
-from prbm_tools.cosimulation import GAUSS_SEIDEL, JACOBI, CouplingError, System, simulate
+from prbm_tools.components import CouplingError
+from prbm_tools.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
 from prbm_tools.scalar_guide import ScalarGuide
 from support import mechanism
 
@@ -227,7 +228,8 @@ def test_events_without_an_end_are_told(monkeypatch):
         ({"connections": {"a.rate": "guide.shuttle"}}, "guide has no variable 'shuttle'"),
         ({"connections": {"a.value": "guide.shuttle.x"}}, "a.value is no input: connect guide"),
         ({"record": ["guide.nothing"]}, "guide has no variable 'nothing'"),
-        ({"values": {"a.value": 1.0}}, "a.value = 1 cannot be given: it is no input"),
+        ({"values": {"a.value": 1.0}}, "a.value = 1.0 cannot be given: it is neither"),
+        ({"values": {"guide.force.x": "much"}}, "guide.force.x = 'much' must be a number"),
         ({"scheme": "newton"}, "scheme = 'newton' must be 'gauss-seidel' or 'jacobi'"),
         ({"values": {"guide.flexure.length": -1.0}}, "guide: fmi2.* returned the status 3"),
         ({"fmus": {"a.b": "x.fmu"}}, "'a.b' is no name for an instance: leave out dots"),

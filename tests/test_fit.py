@@ -351,14 +351,16 @@ def test_the_starts_are_tried_and_told():
     told = []
     found = fit(mechanism("PRBDM"), [K], F5, starts=5, progress=told.append)
     assert told[:6] == pytest.approx([1 / 12, 2 / 12, 3 / 12, 4 / 12, 5 / 12, 6 / 12])
-    assert told == sorted(told) and told[-1] == 1.0, "then the fit from the best, to the end"
+    assert told == sorted(told), "then the fit from the best"
+    assert told[-1] == 1.0
     assert found[K].value == pytest.approx(fit(mechanism("PRBDM"), [K], F5)[K].value, rel=1e-8)
 
 
 def test_a_fit_that_does_not_arrive_says_so(monkeypatch):
     monkeypatch.setattr("prbm_tools.fit.MOST_STEPS", 1)
     found = fit(mechanism("PRBDM"), [K], F5)
-    assert not found.converged and "did not lead to a least misfit" in str(found)
+    assert not found.converged
+    assert "did not lead to a least misfit" in str(found)
     monkeypatch.undo()
     assert fit(mechanism("PRBDM"), [K], F5).converged
 

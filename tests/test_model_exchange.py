@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from coupled import guide, integrator
-from prbm_tools.cosimulation import CouplingError
+from prbm_tools.components import CouplingError
 from prbm_tools.model_exchange import simulate
 from prbm_tools.scalar_guide import Monolith, ScalarGuide
 from support import ScalarGuide as Quadrature
@@ -88,14 +88,19 @@ def test_one_solver_comes_to_rest_at_the_stop():
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"record": ["nothing"]}, "there is no variable 'nothing' in the FMU"),
-        ({"values": {"flexure.length": -1.0}}, "returned the status 3; what the FMU has written"),
+        ({"record": ["nothing"]}, "has no variable 'nothing'"),
+        ({"values": {"flexure.length": -1.0}}, "returned the status 3: what the FMU has written"),
     ],
 )
 def test_mistakes_are_sentences(changes, sentence):
     options = {"stop_time": 0.01, "step": 1e-3} | changes
     with pytest.raises(CouplingError, match=sentence):
         simulate(guide(2), lambda t, outputs, z: ({}, []), [], **options)
+
+
+def test_what_an_fmu_of_fmi_3_says_is_in_the_sentence():
+    with pytest.raises(CouplingError, match=r"flexure\.length = -1 m must be at least"):
+        simulate(guide(3), lambda t, outputs, z: ({}, []), [], 0.01, 1e-3, {"flexure.length": -1.0})
 
 
 def test_what_has_no_model_exchange_is_told():

@@ -12,8 +12,9 @@ from lxml import etree
 
 from coupled import guide, integrator
 from prbm_tools import cosimulation, ssp
+from prbm_tools.components import CouplingError
 from prbm_tools.container import container
-from prbm_tools.cosimulation import JACOBI, CouplingError
+from prbm_tools.cosimulation import JACOBI
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
@@ -164,6 +165,27 @@ def test_names_that_do_not_fit_are_told(wires, values, tmp_path):
         ssp.package(tmp_path / "x.ssp", fmus(), wires, values)
     with pytest.raises(CouplingError, match=sentence):
         container(tmp_path / "x.fmu", fmus(), wires, 1e-3, values)
+
+
+@pytest.mark.parametrize(
+    ("wires", "values", "sentence"),
+    [
+        ({"carrier.shuttle.x": "sum.value"}, {}, "carrier.shuttle.x is no input: connect sum"),
+        ({}, {"carrier.shuttle.x": 1.0}, "carrier.shuttle.x = 1.0 cannot be given"),
+        ({}, {"carrier.force.x": "1 N"}, "carrier.force.x = '1 N' must be a number"),
+    ],
+)
+def test_causalities_that_do_not_fit_are_told(wires, values, sentence, tmp_path):
+    with pytest.raises(CouplingError, match=sentence):
+        ssp.package(tmp_path / "x.ssp", fmus(), wires, values)
+    with pytest.raises(CouplingError, match=sentence):
+        container(tmp_path / "x.fmu", fmus(), wires, 1e-3, values)
+    assert not any(tmp_path.iterdir())
+
+
+def test_a_package_connects_outputs_alone(tmp_path):
+    with pytest.raises(CouplingError, match=r"carrier\.flexure\.length is no output"):
+        ssp.package(tmp_path / "x.ssp", fmus(), {"sum.rate": "carrier.flexure.length"})
 
 
 def test_what_a_container_cannot_show_is_told(tmp_path):

@@ -19,7 +19,7 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
     Unknown,
 )
 
-from .cosimulation import CouplingError, Value
+from .components import CouplingError, Value, check_value, check_wire
 
 NAMES3 = {"Real": "Float64", "Integer": "Int32"}  # of types, which the container takes throughout
 KINDS = ("parameter", "input", "output")
@@ -63,7 +63,7 @@ def container(
     Raises
     ------
     CouplingError
-        If a name does not fit.
+        If a name or a causality does not fit.
     """
     values = dict(values or {})
     with tempfile.TemporaryDirectory(prefix="prbm_container_") as temporary:
@@ -128,6 +128,8 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
     _, variable = _found(inside, full)
     if variable.causality not in KINDS:
         raise CouplingError(f"{full} is neither parameter nor input nor output")
+    if value is not None:
+        check_value(full, value, variable)
     start = variable.start if value is None else value
     output = variable.causality == "output"
     return ModelVariable(
@@ -149,6 +151,7 @@ def _text(value: Any) -> str:
 def _wire(inside: Mapping[str, Any], to: str, source: str) -> Any:
     """Return a connection; FMPy's library knows the names of types of FMI 3.0 alone."""
     (giver, output), (taker, given) = _found(inside, source), _found(inside, to)
+    check_wire(to, given, source)
     renamed = [copy(v) for v in (output, given)]
     for variable in renamed:
         variable.type = _type(variable.type, 3)

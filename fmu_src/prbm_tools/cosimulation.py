@@ -20,34 +20,26 @@ event mode is repeated until no input changes any more.
 
 import math
 import tempfile
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
-from fmpy import extract, read_model_description  # type: ignore[import-untyped]
-from fmpy.fmi1 import FMICallException  # type: ignore[import-untyped]
-from fmpy.fmi2 import FMU2Slave  # type: ignore[import-untyped]
-from fmpy.fmi3 import FMU3Slave  # type: ignore[import-untyped]
-
-from prbm.errors import PrbmError
-
+from .components import (
+    CO_SIMULATION,
+    Component,
+    CouplingError,
+    Value,
+    check_value,
+    check_wire,
+)
 from .simulate import Columns, Progress, Source, communication_points, structured
 
 GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
 MOST_UPDATES = 100  # of discrete states at one time; more than this is a loop without end
-INPUTS = ("input", "parameter", "structuralParameter")  # what may be given a start value
-
-Value = float | int | bool
 
 
-class CouplingError(PrbmError, ValueError):
-    """FMUs cannot be coupled as they are asked to be, or one of them fails."""
-
-
-class Instance:
+class Instance(Component):
     """An FMU in a co-simulation, its variables by name.
 
     Parameters
@@ -70,86 +62,13 @@ class Instance:
     def __init__(
         self, name: str, fmu: str | Path, folder: str | Path, events: bool = False
     ) -> None:
-        self.name, self.time = name, 0.0
-        try:
-            unpacked = extract(str(fmu), str(folder))
-            description = read_model_description(unpacked)
-        except Exception as error:
-            raise CouplingError(f"{name}: {fmu} is no FMU that can be read ({error})") from None
-        interface, self.version = description.coSimulation, int(description.fmiVersion[0])
-        if interface is None or self.version < 2:
-            raise CouplingError(f"{name}: {fmu} has no co-simulation of FMI 2.0 or 3.0")
-        self.variables = {v.name: v for v in description.modelVariables}
-        self.events = events and self.version > 2 and bool(interface.hasEventMode)
-        self.restorable = bool(interface.canGetAndSetFMUstate)
+        super().__init__(name, fmu, folder, CO_SIMULATION)
+        self.events = events and self.version > 2 and bool(self.interface.hasEventMode)
+        self.restorable = bool(self.interface.canGetAndSetFMUstate)
         self.updating = False
         self.stepping = False  # in step mode, where events may be had: no discrete inputs then
         self.given: dict[str, Value] = {}
-        self.fmu: Any = (FMU2Slave if self.version == 2 else FMU3Slave)(
-            guid=description.guid,
-            unzipDirectory=str(unpacked),
-            modelIdentifier=interface.modelIdentifier,
-            instanceName=name,
-        )
-        self.said = ""  # by the FMU, about what is wrong
-        options: dict[str, Any] = {}
-        if self.version > 2:
-            options = {"eventModeUsed": self.events, "earlyReturnAllowed": self.events,
-                       "loggingOn": True, "logMessage": self._note}  # fmt: skip
-        self._call("instantiate", **options)
-
-    def _note(self, _: Any, status: int, category: bytes, message: bytes) -> None:
-        """Keep what is wrong, not what happens; in FMI 2.0 FMPy prints it."""
-        if status > 0:
-            self.said = message.decode(errors="replace")
-
-    def _call(self, function: str, *arguments: Any, **options: Any) -> Any:
-        try:
-            return getattr(self.fmu, function)(*arguments, **options)
-        except FMICallException as error:
-            why = self.said or "what the FMU has written above tells why"
-            raise CouplingError(
-                f"{self.name}: {error.function} at {self.time:g} s returned the status "
-                f"{error.status}: {why}"
-            ) from None
-        except Exception as error:
-            raise CouplingError(f"{self.name}: {function} failed ({error})") from None
-
-    # -- variables --
-
-    def variable(self, name: str) -> Any:
-        """Return what FMPy knows of a variable.
-
-        Raises
-        ------
-        CouplingError
-            If there is none of that name; the message lists similar ones.
-        """
-        if name not in self.variables:
-            near = get_close_matches(name, self.variables)
-            hint = f"; near it are {', '.join(near)}" if near else ""
-            raise CouplingError(f"{self.name} has no variable {name!r}{hint}")
-        return self.variables[name]
-
-    def get(self, names: Sequence[str]) -> dict[str, Value]:
-        """Return variables by name, those of a type with one call."""
-        result: dict[str, Value] = {}
-        for kind, some in self._kinds(names).items():
-            references = [self.variables[name].valueReference for name in some]
-            result |= dict(zip(some, self._call(f"get{kind}", references), strict=True))
-        return result
-
-    def set(self, values: Mapping[str, Value]) -> None:
-        """Give values to variables."""
-        for kind, some in self._kinds(values).items():
-            references = [self.variables[name].valueReference for name in some]
-            self._call(f"set{kind}", references, [values[name] for name in some])
-
-    def _kinds(self, names: Sequence[str] | Mapping[str, Value]) -> dict[str, list[str]]:
-        kinds = defaultdict(list)
-        for name in names:
-            kinds[self.variable(name).type].append(name)
-        return kinds
+        self.instantiate(eventModeUsed=self.events, earlyReturnAllowed=self.events)
 
     # -- life --
 
@@ -158,14 +77,14 @@ class Instance:
         self.time = time
         experiment = {"tolerance": tolerance, "startTime": time, "stopTime": stop_time}
         if self.version == 2:
-            self._call("setupExperiment", **experiment)
-            self._call("enterInitializationMode")
+            self.call("setupExperiment", **experiment)
+            self.call("enterInitializationMode")
         else:
-            self._call("enterInitializationMode", **experiment)
+            self.call("enterInitializationMode", **experiment)
 
     def begin(self) -> None:
         """Leave initialization mode; with events, one is in event mode then."""
-        self._call("exitInitializationMode")
+        self.call("exitInitializationMode")
         self.updating = self.events
 
     def close(self) -> None:
@@ -178,7 +97,7 @@ class Instance:
 
     def step(self, end: float) -> bool:
         """Go to a time [s]; return whether something happens where it got to, ``time``."""
-        result = self._call("doStep", self.time, end - self.time)
+        result = self.call("doStep", self.time, end - self.time)
         if self.version == 2:
             self.time = end
             return False
@@ -191,17 +110,17 @@ class Instance:
     def enter_events(self) -> None:
         """Go into event mode, if there is one."""
         if self.events and not self.updating:
-            self._call("enterEventMode")
+            self.call("enterEventMode")
             self.updating, self.stepping = True, False
 
     def update(self) -> bool:
         """Let happen what is due; return whether there is more of it."""
-        return self.updating and bool(self._call("updateDiscreteStates")[0])
+        return self.updating and bool(self.call("updateDiscreteStates")[0])
 
     def leave_events(self) -> None:
         """Go back to steps."""
         if self.updating:
-            self._call("enterStepMode")
+            self.call("enterStepMode")
             self.updating, self.stepping = False, True
 
     def at_events(self, name: str) -> bool:
@@ -219,16 +138,16 @@ class Instance:
                 f"{self.name} cannot return to a state that it has left, which a system with "
                 "several FMUs with events takes: use one of them only, or events=False"
             )
-        state, time = self._call("getFMUState"), self.time
+        state, time = self.call("getFMUState"), self.time
 
         def back() -> None:
-            self._call("setFMUState", state)
+            self.call("setFMUState", state)
             self.time = time
 
         try:
             yield back
         finally:
-            self._call("freeFMUState", state)
+            self.call("freeFMUState", state)
 
 
 class System:
@@ -285,8 +204,7 @@ class System:
         wires: dict[str, dict[str, str]] = {name: {} for name in self.instances}
         for to, source in self.connections.items():
             instance, name = self.parted(to)
-            if instance.variable(name).causality != "input":
-                raise CouplingError(f"{to} is no input: connect {source} to one")
+            check_wire(to, instance.variable(name), source)
             giver, output = self.parted(source)
             giver.variable(output)
             wires[instance.name][name] = source
@@ -341,7 +259,7 @@ class System:
 
         Outputs reach the inputs within initialization mode, along chains as long as the system.
         """
-        self.give(values or {}, INPUTS)
+        self.give(values or {})
         stop = None if math.isinf(stop_time) else stop_time
         self.time = time
         for instance in self.instances.values():
@@ -352,12 +270,11 @@ class System:
             instance.begin()
         self._update()
 
-    def give(self, values: Mapping[str, Value], causalities: Sequence[str] = INPUTS) -> None:
+    def give(self, values: Mapping[str, Value]) -> None:
         """Give values to inputs and parameters, ``name.variable``."""
         for full, value in values.items():
             instance, name = self.parted(full)
-            if instance.variable(name).causality not in causalities:
-                raise CouplingError(f"{full} = {value:g} cannot be given: it is no input")
+            check_value(full, value, instance.variable(name))
             if instance.at_events(name):
                 instance.enter_events()
             instance.set({name: value})

@@ -12,15 +12,11 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from fmpy import extract, read_model_description  # type: ignore[import-untyped]
-from fmpy.fmi1 import FMICallException  # type: ignore[import-untyped]
-from fmpy.fmi2 import FMU2Model  # type: ignore[import-untyped]
-from fmpy.fmi3 import FMU3Model  # type: ignore[import-untyped]
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from .cosimulation import CouplingError, Value
+from .components import MODEL_EXCHANGE, Component, CouplingError, Value, check_value
 from .simulate import Columns, communication_points, structured
 
 Real = NDArray[np.float64]
@@ -34,7 +30,7 @@ NAMES2 = {
 """What FMPy calls differently in FMI 2.0."""
 
 
-class Model:
+class Model(Component):
     """An FMU for model exchange, its variables by name.
 
     Parameters
@@ -47,77 +43,48 @@ class Model:
     Raises
     ------
     CouplingError
-        If it has no model exchange.
+        If it has no model exchange, or one of its functions fails.
     """
 
     def __init__(self, fmu: str | Path, folder: str | Path) -> None:
-        unpacked = extract(str(fmu), str(folder))
-        description = read_model_description(unpacked)
-        interface, self.version = description.modelExchange, int(description.fmiVersion[0])
-        if interface is None or self.version < 2:
-            raise CouplingError(f"{fmu} has no model exchange of FMI 2.0 or 3.0")
-        self.references = {v.name: (v.type, v.valueReference) for v in description.modelVariables}
-        self.states = description.numberOfContinuousStates
-        self.indicators = description.numberOfEventIndicators
-        self.fmu: Any = (FMU2Model if self.version == 2 else FMU3Model)(
-            guid=description.guid,
-            unzipDirectory=str(unpacked),
-            modelIdentifier=interface.modelIdentifier,
-            instanceName=description.modelName,
-        )
-        self.fmu.instantiate()
+        super().__init__(Path(fmu).stem, fmu, folder, MODEL_EXCHANGE)
+        self.states = self.description.numberOfContinuousStates
+        self.indicators = self.description.numberOfEventIndicators
+        self.instantiate()
 
-    def _method(self, name: str) -> Callable[..., Any]:
-        method: Callable[..., Any] = getattr(
-            self.fmu, NAMES2.get(name, name) if self.version == 2 else name
-        )
-        return method
+    def call(self, function: str, *arguments: Any, **options: Any) -> Any:
+        """Call a function of the FMU by its name in FMI 3.0."""
+        own = NAMES2.get(function, function) if self.version == 2 else function
+        return super().call(own, *arguments, **options)
 
     def _filled(self, getter: str, count: int) -> Real:
         values = (c_double * count)()
-        self._method(getter)(values, count)
+        self.call(getter, values, count)
         return np.array(values)
-
-    def _reference(self, name: str) -> tuple[str, int]:
-        if name not in self.references:
-            raise CouplingError(f"there is no variable {name!r} in the FMU")
-        kind, reference = self.references[name]
-        return kind, reference
-
-    def get(self, names: Sequence[str]) -> dict[str, Value]:
-        """Return variables by name."""
-        found = [self._reference(name) for name in names]
-        return {
-            name: self._method(f"get{kind}")([reference])[0]
-            for name, (kind, reference) in zip(names, found, strict=True)
-        }
-
-    def set(self, values: Mapping[str, Value]) -> None:
-        """Give values to variables."""
-        for name, value in values.items():
-            kind, reference = self._reference(name)
-            self._method(f"set{kind}")([reference], [value])
 
     def start(self, values: Mapping[str, Value], stop_time: float) -> None:
         """Initialize with start values, at time 0."""
+        for name, value in values.items():
+            check_value(name, value, self.variable(name))
         self.set(values)
         if self.version == 2:
-            self.fmu.setupExperiment(startTime=0.0, stopTime=stop_time)
-            self.fmu.enterInitializationMode()
+            self.call("setupExperiment", startTime=0.0, stopTime=stop_time)
+            self.call("enterInitializationMode")
         else:
-            self.fmu.enterInitializationMode(startTime=0.0, stopTime=stop_time)
-        self.fmu.exitInitializationMode()
+            self.call("enterInitializationMode", startTime=0.0, stopTime=stop_time)
+        self.call("exitInitializationMode")
 
     def update(self) -> None:
         """Let happen what is due in event mode, and leave it."""
-        while self._method("updateDiscreteStates")()[0]:
+        while self.call("updateDiscreteStates")[0]:
             pass
-        self.fmu.enterContinuousTimeMode()
+        self.call("enterContinuousTimeMode")
 
     def put(self, time: float, x: Real) -> None:
         """Set time and states."""
-        self.fmu.setTime(time)
-        self.fmu.setContinuousStates((c_double * self.states)(*x), self.states)
+        self.time = time
+        self.call("setTime", time)
+        self.call("setContinuousStates", (c_double * self.states)(*x), self.states)
 
     @property
     def x(self) -> Real:
@@ -220,7 +187,7 @@ class OneSolver:
                 yield inside
                 self.put(self.time, y)
             if self.happens:
-                self.model.fmu.enterEventMode()
+                self.model.call("enterEventMode")
                 self.model.update()
                 yield None
 
@@ -231,7 +198,7 @@ class OneSolver:
         y: Real = inside(self.time)
         self.put(self.time, y)
         self.z = y[self.model.states :]
-        asked, _ = self.model.fmu.completedIntegratorStep()
+        asked, _ = self.model.call("completedIntegratorStep")
         self.happens = bool(asked) or bool(crossed.any())
         return y
 
@@ -289,32 +256,10 @@ def simulate(
     ParameterError
         If there is no step to take.
     """
-    try:
-        return _simulate(
-            fmu, partner, z, communication_points(stop_time, step), values or {}, sees, record,
-            tolerance, largest,
-        )  # fmt: skip
-    except FMICallException as error:
-        raise CouplingError(
-            f"{fmu}: {error.function} returned the status {error.status}; what the FMU has written "
-            "above tells why"
-        ) from None
-
-
-def _simulate(
-    fmu: str | Path,
-    partner: Partner,
-    z: Sequence[float],
-    times: list[float],
-    values: Mapping[str, Value],
-    sees: Sequence[str],
-    record: Sequence[str],
-    tolerance: float,
-    largest: float,
-) -> Columns:
+    times = communication_points(stop_time, step)
     rows: list[dict[str, Value]] = []
     with tempfile.TemporaryDirectory(prefix="prbm_model_") as folder, Model(fmu, folder) as model:
-        model.start(values, times[-1])
+        model.start(values or {}, times[-1])
         one = OneSolver(model, partner, z, sees, tolerance, largest)
 
         def note(time: float, own: Real) -> None:

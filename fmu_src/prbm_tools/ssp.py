@@ -15,7 +15,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from fmpy import read_model_description  # type: ignore[import-untyped]
 
-from .cosimulation import CouplingError, Value
+from .components import CouplingError, Value, check_value, check_wire
 from .simulate import Columns, communication_points
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
@@ -56,13 +56,16 @@ def package(
     Raises
     ------
     CouplingError
-        If a name does not fit, or a type has no counterpart in SSP.
+        If a name or a causality does not fit, or a type has no counterpart in SSP.
     """
     path, values = Path(path), dict(values or {})
     variables = {
         name: {v.name: v for v in read_model_description(str(fmu)).modelVariables}
         for name, fmu in fmus.items()
     }
+    for full, value in values.items():
+        name, variable = _found(variables, full)
+        check_value(full, value, variables[name][variable])
     root = ET.Element(f"{{{SSD}}}SystemStructureDescription")
     root.attrib.update(version="1.0", name=title or path.stem)
     system = _add(root, SSD, "System", name="system")
@@ -72,10 +75,11 @@ def package(
     wires = _add(system, SSD, "Connections") if connections else system
     for to, source in connections.items():
         (start, output), (end, given) = _found(variables, source), _found(variables, to)
+        check_wire(to, variables[end][given], source)
+        if variables[start][output].causality != "output":
+            raise CouplingError(f"{source} is no output: {to} cannot be connected to it")
         _add(wires, SSD, "Connection", startElement=start, startConnector=output,
              endElement=end, endConnector=given)  # fmt: skip
-    for full in values:
-        _found(variables, full)
     _add(root, SSD, "DefaultExperiment", startTime="0.0", stopTime=repr(float(stop_time)))
     contents = {DESCRIPTION: _text(root)}
     contents |= {f"resources/{name}.fmu": Path(fmu).read_bytes() for name, fmu in fmus.items()}
