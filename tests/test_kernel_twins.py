@@ -990,6 +990,28 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         assert_same(energy, kinetics.kinetic_energy(M, y[n : 2 * n]))
 
 
+HEAVY = ("density", "youngs_modulus", "shuttle.mass", "shuttle.inertia")
+
+
+@pytest.mark.parametrize("factor", [1e-60, 1e-33, 1e30, 1e60])
+def test_accelerations_do_not_depend_on_the_size_of_masses_and_stiffnesses(factor):
+    """Although products of eight of them are beyond what doubles hold."""
+    guide, ours = both("PRBDM2R")
+    found, rng = [], np.random.default_rng(3)
+    values, nothing = guide.values({"release.displacement": 0.0}), np.zeros(2)
+    state = random_state(assembly.assemble(guide, values), rng)
+    for s in (1.0, factor):
+        scaled = {k: x * (s if k.endswith(HEAVY) else 1.0) for k, x in values.items()}
+        ours.assemble(scaled)
+        inputs = dynamics.Inputs((0j,), (0.0,), 0j, (dynamics.Wall(1.0),), (0.0,))
+        mine = KernelEquations(ours, inputs, dynamics.Discrete((False,), (2,), (2,)), 80.0)
+        a = np.full(len(state[0]), np.nan)
+        kernel().accelerations(mine.structure, *state, a, nothing)
+        found.append(a)
+    assert np.all(np.isfinite(found[0]))
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+
+
 @twin(
     gap=dynamics.Equations.gaps, gap_rate=dynamics.Equations.gap_rates, wall_at=dynamics.Wall.at,
 )  # fmt: skip
@@ -1148,8 +1170,8 @@ ELSEWHERE = {
     "constraints": {"carried_convective", "first"},
     "contact": set(),
     "dynamics": {
-        "check_input", "impulse_names", "input_names", "mass_accelerations", "offsets",
-        "stop_forces", "torques", "without_hold",
+        "check_input", "impulse_names", "input_names", "input_units", "mass_accelerations",
+        "offsets", "stop_forces", "torques", "without_hold",
     },
     "flexure": set(),
     "forces": set(),

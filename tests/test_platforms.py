@@ -1,6 +1,7 @@
 """The libraries for other platforms: what they need, what they show, and the bytes they compute."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import lief
@@ -16,6 +17,7 @@ from c_importer import (
     WINE,
     Job,
     compile_c,
+    kernel_library,
     native,
     needs,
     run,
@@ -135,6 +137,7 @@ WARNED = {
     "Linux": ("x86_64-linux-gnu.2.17", "-O0"),
     "Windows": ("x86_64-windows-gnu", "-O0"),
     "macOS": ("aarch64-macos.11.0", "-O0"),
+    "without vectors": ("", "-O2", "-DPRBM_PLAIN"),
     "FMI 2.0 alone": ("", "-O0", "-DPRBM_FMI=2"),
     "FMI 3.0 alone": ("", "-O0", "-DPRBM_FMI=3"),
 }
@@ -166,6 +169,14 @@ def test_every_compiler_computes_the_same_bytes(model):
     """The system's compiler and ziglang's."""
     host = run(Job(native(model, 2), "cs", POINTS))
     assert output(NATIVE, model, 2, "cs") == host.output
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R", TWO_STOPS])
+def test_a_compiler_or_processor_without_vectors_computes_the_same_bytes(model):
+    """As others than GCC and Clang compile it: one number at a time, no AVX."""
+    job = Job(native(model, 2), "cs", POINTS)
+    plain = kernel_library("plain", ("-O2", "-DPRBM_PLAIN"))
+    assert run(replace(job, library=plain)).output == run(job).output
 
 
 PLACES = ("with spaces", "Prüfstand µ", "a#b+c 100%20 %")

@@ -317,6 +317,7 @@ MISTAKES = [
     ("animate PRBDM out.txt", "end the name in .gif or .mp4"),
     ("measure", "required: QUANTITY"),
     ("validate --measured f=1", "--measured goes with a mechanism"),
+    ("validate --only steps --elements 4", "--elements goes with a mechanism"),
     ("validate PRBDM --only table", "leave MECHANISM out"),
     ("validate PRBDM --measured frequency", "write NAME=VALUE+-U"),
 ]  # fmt: skip

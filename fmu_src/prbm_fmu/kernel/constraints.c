@@ -165,30 +165,20 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
 
 /* M = L D L^T of the lower triangle of M, L with ones on its diagonal, and the inverse of D; false
  * if M is not positive definite. */
-SIZED bool block_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
-    UNROLLED
+RARE bool factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     for (int i = 0; i < size; i++) {
         double pivot = M[i * size + i];
-        const int columns = size <= SMALL ? size : i;
-        UNROLLED
-        for (int j = 0; j < columns; j++) {
-            if (j < i) {
-                double sum = M[i * size + j];
-                const int before = size <= SMALL ? size : j;
-                UNROLLED
-                for (int k = 0; k < before; k++) {
-                    sum = k < j ? sum - L[i * size + k] * L[j * size + k] : sum;
-                }
-                L[i * size + j] = sum; /* L_ij D_j so far */
+        for (int j = 0; j < i; j++) {
+            double sum = M[i * size + j];
+            for (int k = 0; k < j; k++) {
+                sum -= L[i * size + k] * L[j * size + k];
             }
+            L[i * size + j] = sum; /* L_ij D_j so far */
         }
-        UNROLLED
-        for (int j = 0; j < columns; j++) {
-            if (j < i) {
-                double share = L[i * size + j] * inverse[j];
-                pivot -= share * L[i * size + j];
-                L[i * size + j] = share;
-            }
+        for (int j = 0; j < i; j++) {
+            double share = L[i * size + j] * inverse[j];
+            pivot -= share * L[i * size + j];
+            L[i * size + j] = share;
         }
         if (!(pivot > 0.0)) {
             return false;
@@ -198,8 +188,72 @@ SIZED bool block_factor(int size, const double *ALONE M, double *ALONE L, double
     return true;
 }
 
+#define LEAST_MULTIPLE 1e-280 /* below and above, it is near what doubles can hold */
+#define LARGEST_MULTIPLE 1e280
+
+/* The same of a small M without waiting for one division after the other: elimination without
+ * divisions leaves w_0 = M_00, w_1 = M_00 D_1, w_2 = w_0 w_1 D_2, ..., and all w_k L_ik. */
+SIZED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
+    double w[SMALL][SMALL], multiple = 1.0;
+    bool safe;
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            w[i][j] = j <= i ? M[i * size + j] : 0.0;
+        }
+    }
+    UNROLLED
+    for (int k = 0; k < size; k++) {
+        UNROLLED
+        for (int i = 0; i < size; i++) {
+            UNROLLED
+            for (int j = 0; j < size; j++) {
+                if (k < j && j <= i) {
+                    w[i][j] = w[k][k] * w[i][j] - w[i][k] * w[j][k];
+                }
+            }
+        }
+    }
+    safe = w[size - 1][size - 1] < LARGEST_MULTIPLE;
+    UNROLLED
+    for (int k = 0; k < size; k++) {
+        double share = 1.0 / w[k][k];
+        safe = safe && w[k][k] > LEAST_MULTIPLE;
+        inverse[k] = multiple * share;
+        multiple *= w[k][k];
+        UNROLLED
+        for (int i = 0; i < size; i++) {
+            if (i > k) {
+                L[i * size + k] = w[i][k] * share;
+            }
+        }
+    }
+    return safe;
+}
+
+/* Put what belongs to a block, by pairs if it begins at an even place. */
+SIZED void put_block(int size, int start, const double *from, double *to) {
+    to += start;
+    if (start % PAIR != 0) {
+        UNROLLED
+        for (int i = 0; i < size; i++) {
+            to[i] = from[i];
+        }
+        return;
+    }
+    UNROLLED
+    for (int i = 0; i + 1 < size; i += PAIR) {
+        put_pair(to + i, from[i], from[i + 1]);
+    }
+    if (size % PAIR != 0) {
+        put_pair(to + size - 1, from[size - 1], to[size]);
+    }
+}
+
+
 /* b := L^-1 b and b := L^-T b within a block. */
-SIZED void block_forward(int size, const double *ALONE L, double *ALONE b) {
+SIZED void block_forward(int size, const double *L, double *b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
         double sum = b[i];
@@ -212,7 +266,7 @@ SIZED void block_forward(int size, const double *ALONE L, double *ALONE b) {
     }
 }
 
-SIZED void block_backward(int size, const double *ALONE L, double *ALONE b) {
+SIZED void block_backward(int size, const double *L, double *b) {
     UNROLLED
     for (int k = 1; k < size; k++) {
         int i = size - 1 - k;
@@ -226,36 +280,49 @@ SIZED void block_backward(int size, const double *ALONE L, double *ALONE b) {
     }
 }
 
-static void forward_all(const Factors *factors, double *b) {
-    const double *L = factors->L;
-    for (int k = 0; k < factors->block_count; k++) {
-        int size = factors->blocks[k].size;
-        switch (size) {
-        case 1: block_forward(1, L, b); break;
-        case 2: block_forward(2, L, b); break;
-        case 3: block_forward(3, L, b); break;
-        case 4: block_forward(4, L, b); break;
-        default: block_forward(size, L, b);
-        }
-        L += size * size;
-        b += size;
+typedef enum { BACKWARD, FORWARD } Substitution;
+
+SIZED void block_solve(int size, const double *ALONE L, double *ALONE b, Substitution way) {
+    if (way == FORWARD) {
+        block_forward(size, L, b);
+    } else {
+        block_backward(size, L, b);
     }
 }
 
-static void backward_all(const Factors *factors, double *b) {
+/* The same with a small block, of the coordinates from start. */
+SIZED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
+                       Substitution way) {
+    double b[SMALL];
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        b[i] = x[start + i];
+    }
+    block_solve(size, L, b, way);
+    put_block(size, start, b, x);
+}
+
+SIZED void solve_blocks(const Factors *factors, double *x, Substitution way) {
     const double *L = factors->L;
     for (int k = 0; k < factors->block_count; k++) {
-        int size = factors->blocks[k].size;
+        int start = factors->blocks[k].start, size = factors->blocks[k].size;
         switch (size) {
-        case 1: block_backward(1, L, b); break;
-        case 2: block_backward(2, L, b); break;
-        case 3: block_backward(3, L, b); break;
-        case 4: block_backward(4, L, b); break;
-        default: block_backward(size, L, b);
+        case 1: solve_small(1, start, L, x, way); break;
+        case 2: solve_small(2, start, L, x, way); break;
+        case 3: solve_small(3, start, L, x, way); break;
+        case 4: solve_small(4, start, L, x, way); break;
+        default: block_solve(size, L, x + start, way);
         }
         L += size * size;
-        b += size;
     }
+}
+
+static void forward_all(const Factors *factors, double *x) {
+    solve_blocks(factors, x, FORWARD);
+}
+
+static void backward_all(const Factors *factors, double *x) {
+    solve_blocks(factors, x, BACKWARD);
 }
 
 /* The lower triangle of S = Z D^-1 Z^T, and its factor with the inverse of its D behind it. */
@@ -281,7 +348,7 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
     for (int i = 0; i < r * r; i++) {
         S[i] = total(sum[i]);
     }
-    return block_factor(r, S, L, L + r * r);
+    return small_factor(r, S, L, L + r * r) || factor(r, S, L, L + r * r);
 }
 
 /* A stop that slides has a column that is not its row. */

@@ -53,6 +53,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.block = place(memory, n * n, sizeof(double));
     q.least = place(memory, s, sizeof(double));
     q.most = place(memory, s, sizeof(double));
+    q.avx = avx_here();
     q.factors.even = (int)even;
     q.factors.blocks = system->blocks;
     q.factors.L = place(memory, n * n, sizeof(double));
@@ -408,43 +409,79 @@ SIZED void block_inertia(int size, const Complex *ALONE H, const double *ALONE o
     }
 }
 
-/* A block of M, factored into L, and L^-1 of the loads and rows, of the coordinates from start. */
-SIZED bool block_motion(Equations *q, int size, int start, const Complex *H, double *L) {
-    const int even = q->system->even, r = q->r;
-    double local[SMALL * SMALL], *M = size <= SMALL ? local : q->block;
-    double *x = q->x + start, *Z = q->factors.Z + start;
+/* M in its block of the coordinates from start, and what its inertia and damping add to x. */
+SIZED void block_mass(Equations *q, int size, int start, const Complex *H, double *M) {
+    double *x = q->x + start;
     block_inertia(size, H, q->own + start, parts_from(q->e_parts, start),
                   q->squares + start, M, x);
     if (q->mass_damping != 0.0) {
         damp_mass(size, q->mass_damping, M, q->speed + start, x);
     }
-    if (!block_factor(size, M, L, q->factors.inverse + start)) {
+}
+
+/* The block of M in q->block, factored into L, and L^-1 of the loads and rows. */
+RARE bool factor_block(Equations *q, int size, int start, double *L) {
+    const Factors *factors = &q->factors;
+    if (!factor(size, q->block, L, factors->inverse + start)) {
         return false;
     }
-    block_forward(size, L, x);
-    for (int k = 0; k < r; k++) {
-        block_forward(size, L, Z + k * even);
+    block_forward(size, L, q->x + start);
+    for (int k = 0; k < q->r; k++) {
+        block_forward(size, L, factors->Z + k * q->system->even + start);
     }
     return true;
 }
 
-static bool blocks_motion(Equations *q) {
+static bool block_motion(Equations *q, int size, int start, const Complex *H, double *L) {
+    block_mass(q, size, start, H, q->block);
+    return factor_block(q, size, start, L);
+}
+
+/* The same of a small block; one of tiny numbers takes the longer way. */
+SIZED bool small_block_motion(Equations *q, int size, int start, const Complex *H, double *L) {
+    const int even = q->system->even, r = q->r;
+    double M[SMALL * SMALL], D[SMALL];
+    block_mass(q, size, start, H, M);
+    if (!small_factor(size, M, L, D)) {
+        UNROLLED
+        for (int i = 0; i < size * size; i++) {
+            q->block[i] = i % size <= i / size ? M[i] : 0.0;
+        }
+        return factor_block(q, size, start, L);
+    }
+    put_block(size, start, D, q->factors.inverse);
+    solve_small(size, start, L, q->x, FORWARD);
+    for (int k = 0; k < r; k++) {
+        solve_small(size, start, L, q->factors.Z + k * even, FORWARD);
+    }
+    return true;
+}
+
+SIZED bool all_blocks_motion(Equations *q) {
     bool regular = true;
     const Complex *H = q->system->coupling;
     double *L = q->factors.L;
     for (int k = 0; k < q->factors.block_count; k++) {
         int start = q->factors.blocks[k].start, size = q->factors.blocks[k].size;
         switch (size) {
-        case 1: regular = block_motion(q, 1, start, H, L) && regular; break;
-        case 2: regular = block_motion(q, 2, start, H, L) && regular; break;
-        case 3: regular = block_motion(q, 3, start, H, L) && regular; break;
-        case 4: regular = block_motion(q, 4, start, H, L) && regular; break;
+        case 1: regular = small_block_motion(q, 1, start, H, L) && regular; break;
+        case 2: regular = small_block_motion(q, 2, start, H, L) && regular; break;
+        case 3: regular = small_block_motion(q, 3, start, H, L) && regular; break;
+        case 4: regular = small_block_motion(q, 4, start, H, L) && regular; break;
         default: regular = block_motion(q, size, start, H, L) && regular;
         }
         H += size * size;
         L += size * size;
     }
     return regular;
+}
+
+static bool blocks_motion(Equations *q) {
+    return all_blocks_motion(q);
+}
+
+BY_AVX static bool blocks_motion_by_avx(Equations *q) {
+    return all_blocks_motion(q);
 }
 
 /* v^T diag(e)^H H diag(e) v / 2 */
@@ -512,10 +549,10 @@ static void set_columns(Equations *q) {
 }
 
 /* The factors, and x := L^-1 x, from the rows in Z. */
-SIZED bool factor_motion(int even, Equations *q) {
+SIZED bool factor_motion(int even, Equations *q, bool avx) {
     q->factors.r = q->r;
     q->factors.block_count = q->system->block_count;
-    if (!blocks_motion(q)) {
+    if (!(avx ? blocks_motion_by_avx(q) : blocks_motion(q))) {
         return false;
     }
     set_columns(q);
@@ -529,29 +566,27 @@ RARE void add_coriolis(Equations *q) {
     }
 }
 
-/* Solve for x = a and lam; turned: near the start. */
-SIZED bool motion_of_length(int even, Equations *q, const double *angle, const double *v,
-                            bool turned) {
-    const System *system = q->system;
-    pad_of(even, system->n, angle, q->angle);
-    pad_of(even, system->n, v, q->speed);
+/* Solve for x = a and lam at angle and speed; turned: near the start. */
+SIZED bool motion_of_length(int even, Equations *q, bool turned, bool avx) {
     directions_of(even, q, turned);
     find_loads(even, q);
     add_springs(even, q);
     rows_of_length(even, q, q->factors.Z);
     add_rubs(q);
-    if (!factor_motion(even, q)) {
+    if (!factor_motion(even, q, avx)) {
         return false;
     }
     finish_of_length(even, &q->factors, q->x, q->lam);
-    if (system->stretch_count > 0) {
+    if (q->system->stretch_count > 0) {
         add_coriolis(q);
     }
     return true;
 }
 
 static bool solve_motion(Equations *q, const double *angle, const double *v, bool turned) {
-    return motion_of_length(q->system->even, q, angle, v, turned);
+    pad(q->system->n, angle, q->angle);
+    pad(q->system->n, v, q->speed);
+    return motion_of_length(q->system->even, q, turned, false);
 }
 
 /* Only the factors, at a state that is then a start. */
@@ -562,7 +597,7 @@ static bool factor_start(Equations *q, const double *angle, const double *v) {
     find_directions(q, true);
     find_loads(q->system->even, q);
     rows_and_convection(q, q->factors.Z);
-    return factor_motion(q->system->even, q);
+    return factor_motion(q->system->even, q, false);
 }
 
 PRBM bool accelerations(Equations *equations, const double *q, const double *v, double *a,
@@ -620,31 +655,43 @@ PRBM void begin_trace(Equations *q) {
     }
 }
 
-SIZED bool rates_of_length(int even, Equations *q, const double *y, bool turned, double *dy) {
+SIZED bool rates_of_length(int even, Equations *q, const double *y, bool turned, bool avx,
+                           double *dy) {
     int n = q->system->n;
-    if (!motion_of_length(even, q, y, y + n, turned)) {
+    pad_of(even, n, y, q->angle);
+    pad_second(even, n, y, q->speed);
+    if (!motion_of_length(even, q, turned, avx)) {
         return false;
     }
-    copy_of(even, n, q->speed, dy);
-    copy_of(even, n, q->x, dy + n);
+    join(even, n, q->speed, q->x, dy);
     return true;
 }
 
 /* The lengths of the guides' vectors are known where they are compiled, so that loops unroll. */
-static bool rates_of_motion(Equations *q, const double *y, bool turned, double *dy) {
+SIZED bool rates_to_length(Equations *q, const double *y, bool turned, bool avx, double *dy) {
     int even = q->system->even;
     switch (even) {
-    case 4: return rates_of_length(4, q, y, turned, dy);
-    case 8: return rates_of_length(8, q, y, turned, dy);
-    default: return rates_of_length(even, q, y, turned, dy);
+    case 4: return rates_of_length(4, q, y, turned, avx, dy);
+    case 8: return rates_of_length(8, q, y, turned, avx, dy);
+    default: return rates_of_length(even, q, y, turned, avx, dy);
     }
+}
+
+static bool rates_of_motion(Equations *q, const double *y, bool turned, double *dy) {
+    return rates_to_length(q, y, turned, false, dy);
+}
+
+BY_AVX static bool rates_of_motion_by_avx(Equations *q, const double *y, bool turned,
+                                            double *dy) {
+    return rates_to_length(q, y, turned, true, dy);
 }
 
 /* The rates of y; turned: near the start. */
 static bool rates_at(Equations *q, const double *y, bool turned, double *dy, Problem *problem) {
     int n = q->system->n;
     const double *v = y + n;
-    if (!rates_of_motion(q, y, turned, dy)) {
+    if (!(q->avx ? rates_of_motion_by_avx(q, y, turned, dy)
+                 : rates_of_motion(q, y, turned, dy))) {
         return fail(problem, "%s", SINGULAR);
     }
     trace_forces(q);
@@ -766,19 +813,27 @@ SIZED bool corrected_of_length(int even, Equations *q, double t, double *y, bool
     if (!(ask_positions(even, q, t) <= CLOSED * q->system->length)) {
         return false;
     }
-    pad_of(even, n, y + n, q->speed);
+    pad_second(even, n, y, q->speed);
     ask_velocities(even, q);
     correct(even, q, y + n);
     return true;
 }
 
-static bool corrected(Equations *q, double t, double *y, bool turned) {
+SIZED bool corrected_to_length(Equations *q, double t, double *y, bool turned) {
     int even = q->system->even;
     switch (even) {
     case 4: return corrected_of_length(4, q, t, y, turned);
     case 8: return corrected_of_length(8, q, t, y, turned);
     default: return corrected_of_length(even, q, t, y, turned);
     }
+}
+
+static bool corrected(Equations *q, double t, double *y, bool turned) {
+    return corrected_to_length(q, t, y, turned);
+}
+
+BY_AVX static bool corrected_by_avx(Equations *q, double t, double *y, bool turned) {
+    return corrected_to_length(q, t, y, turned);
 }
 
 static bool project_near(Equations *q, double t, double *y, bool turned, Scratch *scratch,
@@ -788,7 +843,8 @@ static bool project_near(Equations *q, double t, double *y, bool turned, Scratch
     double *kept = take(scratch, (size_t)n);
     copy(n, y, kept);
     scratch->used = mark;
-    if (q->sliding_count == 0 && corrected(q, t, y, turned)) {
+    if (q->sliding_count == 0 &&
+        (q->avx ? corrected_by_avx(q, t, y, turned) : corrected(q, t, y, turned))) {
         return true;
     }
     copy(n, kept, y); /* as if nothing had been tried */

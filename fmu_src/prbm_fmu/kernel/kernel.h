@@ -51,6 +51,21 @@
 #define UNROLLED
 #define UNROLLED_BY_LANES
 #endif
+/* What takes most of the time is compiled twice: for every x86-64, and for those with AVX, whose
+ * instructions do not overwrite their operands, so that an eighth of them is not needed.  The
+ * operations are the same, without fused ones: so are all bits. */
+#if defined(__GNUC__) && !defined(PRBM_PLAIN)
+#define VECTORS 1 /* of the compiler */
+#else
+#define VECTORS 0
+#endif
+#if VECTORS && defined(__x86_64__)
+#define AVX_TOO 1
+#define BY_AVX __attribute__((target("avx")))
+#else
+#define AVX_TOO 0
+#define BY_AVX
+#endif
 /* Whether the compiler knows a length where a function is inlined; loops over unknown ones are
  * compiled once. */
 #if defined(__GNUC__)
@@ -334,8 +349,6 @@ PRBM double evaluate(Expression quantity, const double *values); /* twin: mechan
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */
 PRBM bool check_values(const Mechanism *mechanism, const double *values, Problem *problem);
-/* Displacement and velocity of a wall, among some inputs (input_count,). */
-PRBM const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop);
 PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t reference);
 
 /* --- flexure.c ------------------------------------------------------------------------------------ */
@@ -561,6 +574,7 @@ typedef struct {
     bool driven, walls_push;
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
+    bool avx;               /* which of two compiled versions is run */
     double *own;            /* (n,) the diagonal of M now */
     /* where the present step began, or something else that others are near */
     double *start;          /* (even,) its angles */

@@ -638,7 +638,8 @@ PRBM void mechanism_close(Mechanism *mechanism) {
     free(mechanism);
 }
 
-PRBM const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop) {
+/* Displacement and velocity of a wall, among some inputs (input_count,). */
+static const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop) {
     return inputs + mechanism->input.walls + PER_WALL * stop;
 }
 

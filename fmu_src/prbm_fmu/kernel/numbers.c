@@ -11,10 +11,31 @@
 
 #include "kernel.h"
 
+/* --- the processor ---------------------------------------------------------------------------- */
+
+#if AVX_TOO
+#include <cpuid.h>
+
+/* Whether the processor has AVX, and the system keeps its registers. */
+static bool avx_here(void) {
+    enum { SSE_AND_AVX_STATE = 6 };
+    unsigned a, b, c, d, kept = 0, more;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_OSXSAVE) || !(c & bit_AVX)) {
+        return false;
+    }
+    __asm__ volatile("xgetbv" : "=a"(kept), "=d"(more) : "c"(0));
+    return (kept & SSE_AND_AVX_STATE) == SSE_AND_AVX_STATE;
+}
+#else
+static bool avx_here(void) {
+    return false;
+}
+#endif
+
 /* --- pairs of numbers ------------------------------------------------------------------------- */
 
 /* Two numbers at a time where the compiler has vectors, else one: the same operations on each. */
-#if defined(__GNUC__)
+#if VECTORS
 typedef double Lanes __attribute__((vector_size(16)));
 typedef uint64_t LaneBits __attribute__((vector_size(16)));
 typedef double LanesInMemory __attribute__((vector_size(16), aligned(8)));
@@ -54,21 +75,64 @@ static int even_length(int n) {
     return n + n % PAIR;
 }
 
-/* Copy n numbers, which are even if a padding counts. */
-SIZED void copy_of(int even, int n, const double *from, double *to) {
+/* What is loaded as a pair is stored as one, at the same even place: a load that finds its numbers
+ * in two stores waits until both are in the cache. */
+SIZED void put_pair(double *x, double a, double b) {
+#if VECTORS
+    Lanes pair = {a, b};
+    set_lanes(x, pair);
+#else
+    x[0] = a;
+    x[1] = b;
+#endif
+}
+
+SIZED void copy_pairs(int even, const double *from, double *to) {
     UNROLLED_BY_LANES
-    for (int i = 0; i + PAIR < even; i += LANES) {
+    for (int i = 0; i < even; i += LANES) {
         set_lanes(to + i, lanes_at(from + i));
     }
-    for (int i = even - PAIR; i < n; i++) {
-        to[i] = from[i];
+}
+
+/* to = what begins behind the first number of from. */
+SIZED void copy_shifted(int even, const double *from, double *to) {
+    UNROLLED_BY_LANES
+    for (int i = 0; i < even; i += LANES) {
+#if VECTORS
+        Lanes here = lanes_at(from + i), next = lanes_at(from + i + PAIR);
+        put_pair(to + i, here[1], next[0]);
+#else
+        to[i] = from[i + 1];
+#endif
     }
 }
 
 /* A vector padded with a zero to an even length. */
 SIZED void pad_of(int even, int n, const double *x, double *padded) {
-    padded[even - 1] = 0.0;
-    copy_of(even, n, x, padded);
+    copy_pairs(even - PAIR, x, padded);
+    put_pair(padded + even - PAIR, x[even - PAIR], n == even ? x[even - 1] : 0.0);
+}
+
+/* The second of two vectors of n, one behind the other. */
+SIZED void pad_second(int even, int n, const double *both, double *padded) {
+    if (n == even) {
+        pad_of(even, n, both + n, padded);
+    } else {
+        copy_shifted(even - PAIR, both + n - 1, padded);
+        put_pair(padded + even - PAIR, both[2 * n - 1], 0.0);
+    }
+}
+
+/* Two padded vectors of n, one behind the other without their paddings. */
+SIZED void join(int even, int n, const double *first, const double *second, double *both) {
+    copy_pairs(even - PAIR, first, both);
+    if (n == even) {
+        copy_pairs(PAIR, first + n - PAIR, both + n - PAIR);
+        copy_pairs(n, second, both + n);
+    } else {
+        put_pair(both + n - 1, first[n - 1], second[0]);
+        copy_shifted(even - PAIR, second, both + even);
+    }
 }
 
 static void pad(int n, const double *x, double *padded) {
@@ -202,10 +266,10 @@ PRBM void unit_vectors(int n, const double *q, Complex *e) {
 #define SMALL_TURN 0.0625 /* rad: below, Taylor's four terms are exact to rounding */
 
 /* sin d = d - d^3/6 + ..., cos d - 1 = -d^2/2 + ... */
-static void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
-    Lanes z = d * d;
-    Lanes odd = -1.0 / 6 + z * (1.0 / 120 + z * (-1.0 / 5040 + z * (1.0 / 362880)));
-    Lanes even = -1.0 / 2 + z * (1.0 / 24 + z * (-1.0 / 720 + z * (1.0 / 40320)));
+SIZED void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
+    Lanes z = d * d, zz = z * z;
+    Lanes odd = (-1.0 / 6 + z * (1.0 / 120)) + zz * (-1.0 / 5040 + z * (1.0 / 362880));
+    Lanes even = (-1.0 / 2 + z * (1.0 / 24)) + zz * (-1.0 / 720 + z * (1.0 / 40320));
     *s = d + d * z * odd;
     *c_less_1 = z * even;
 }

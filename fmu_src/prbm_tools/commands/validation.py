@@ -22,7 +22,7 @@ def validated(options: argparse.Namespace) -> None:
 
 def _source(options: argparse.Namespace) -> None:
     """Reproduce the source's results."""
-    for option in ("measured", "set"):
+    for option in ("measured", "set", "elements"):
         if getattr(options, option):
             raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
     from ..validation import PAGE, reproduce  # type: ignore[import-untyped, unused-ignore]
@@ -46,9 +46,8 @@ def _mechanism(options: argparse.Namespace) -> None:
     known = dict(map(measured, options.measured))
     from ..comparison import compare  # type: ignore[import-untyped, unused-ignore]
 
-    found = compare(
-        mechanism, values, elements=options.elements, measured=known, progress=reporter()
-    )
+    elements = FINE if options.elements is None else options.elements
+    found = compare(mechanism, values, elements=elements, measured=known, progress=reporter())
     print(found)
     output.text(f"{mechanism.name}-comparison.csv", found.csv())
     output.figure(f"{mechanism.name}-comparison.png", found.figure)
