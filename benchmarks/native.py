@@ -52,7 +52,7 @@ POINTS = 1e-3 * np.arange(1001)
 READ = ("shuttle.x", "shuttle.y", "stop.gap", "stop.force", "energy.kinetic")
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 TIGHT = 1e-12
-RIGHT_HAND_SIDE = "rates_of_motion"  # the kernel's function of one, in dynamics.c
+RIGHT_HAND_SIDE = ("rates_of_motion", "rates_of_motion_by_avx")  # of the kernel, in dynamics.c
 FREE = {"stop.position": 1.0}  # m: out of reach
 EXUDYN_STEPS = (1e-3, 2.5e-4, 1e-4, 2.5e-5, 1e-5)  # s, whole parts of a millisecond
 TARGETS = (1e-5, 1e-6, 1e-7)  # m
@@ -336,14 +336,14 @@ def _blocks(coupled: Any) -> list[list[int]]:
     return [[*np.flatnonzero(label == k)] for k in range(count)]
 
 
-def inclusive(profile: Path, function: str) -> tuple[int, int]:
+def inclusive(profile: Path, functions: Sequence[str]) -> tuple[int, int]:
     """Return how often a function was called and the instructions below it, from callgrind."""
     names: dict[str, str] = {}
     calls = total = 0
     callee, pending = "", 0
     for line in profile.read_text().splitlines():
         if pending:
-            if callee.split(".")[0] == function:
+            if callee.split(".")[0] in functions:
                 calls, total = calls + pending, total + int(line.split()[-1])
             pending = 0
         elif line.startswith(("fn=", "cfn=")):
@@ -354,7 +354,7 @@ def inclusive(profile: Path, function: str) -> tuple[int, int]:
         elif line.startswith("calls="):
             pending = int(line.removeprefix("calls=").split()[0])
     if not calls:
-        raise RuntimeError(f"{function} was not called, or the compiler has no function of its own")
+        raise RuntimeError(f"{functions[0]} was not called, or is no function of the compiler's")
     return calls, total
 
 
@@ -376,7 +376,7 @@ def profile(runs: int) -> None:
                 print(done.errors)
                 return
             calls, total = inclusive(file, RIGHT_HAND_SIDE)
-            _, whole = inclusive(file, "fmi2DoStep")
+            _, whole = inclusive(file, ("fmi2DoStep",))
         needed = operations(model)
         print(
             f"{name:4s}{total / calls:8.0f} instructions, {sum(needed.values())} operations needed "

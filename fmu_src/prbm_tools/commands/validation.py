@@ -12,6 +12,9 @@ from .output import Output
 from .words import measured
 
 
+ELEMENTS = 32  # a flexure
+
+
 def validated(options: argparse.Namespace) -> None:
     """Print how the models compare."""
     if options.mechanism is None:
@@ -46,7 +49,7 @@ def _mechanism(options: argparse.Namespace) -> None:
     known = dict(map(measured, options.measured))
     from ..comparison import compare  # type: ignore[import-untyped, unused-ignore]
 
-    elements = FINE if options.elements is None else options.elements
+    elements = ELEMENTS if options.elements is None else options.elements
     found = compare(mechanism, values, elements=elements, measured=known, progress=reporter())
     print(found)
     output.text(f"{mechanism.name}-comparison.csv", found.csv())
