@@ -11,7 +11,6 @@ from ..simulate import reporter
 from .output import Output
 from .words import measured
 
-
 ELEMENTS = 32  # a flexure
 
 
