@@ -2,9 +2,10 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 from fmpy import extract, read_model_description  # type: ignore[import-untyped]
 from fmpy.fmi1 import FMICallException  # type: ignore[import-untyped]
@@ -20,6 +21,8 @@ CLASSES = {
     (CO_SIMULATION, 2): FMU2Slave, (CO_SIMULATION, 3): FMU3Slave,
     (MODEL_EXCHANGE, 2): FMU2Model, (MODEL_EXCHANGE, 3): FMU3Model,
 }  # fmt: skip
+TEXTS = {"String": str, "Binary": bytes}  # types that are no numbers
+ENUMERATED = {2: "Integer", 3: "Int64"}  # as which enumerations are read and given
 DESCRIBED = {CO_SIMULATION: "coSimulation", MODEL_EXCHANGE: "modelExchange"}
 
 
@@ -137,22 +140,44 @@ class Component:
     def _kinds(self, names: Sequence[str] | Mapping[str, Value]) -> dict[str, list[str]]:
         kinds = defaultdict(list)
         for name in names:
-            kinds[self.variable(name).type].append(name)
+            kind = self.variable(name).type
+            kinds[ENUMERATED[self.version] if kind == "Enumeration" else kind].append(name)
         return kinds
 
 
-def check_value(full: str, value: object, variable: Any) -> None:
-    """Check that a variable may be given a start value, and that it is a number.
+def start_value(full: str, value: object, variable: Any) -> Any:
+    """Return a value as Python's own of the variable's type; numbers of NumPy are numbers, too.
 
     Raises
     ------
     CouplingError
-        If not.
+        If the variable may not be given a start value, or not this one.
     """
     if variable.causality not in INPUTS:
         raise CouplingError(f"{full} = {value} cannot be given: it is neither input nor parameter")
-    if not isinstance(value, float | int):
-        raise CouplingError(f"{full} = {value!r} must be a number, in the unit of the variable")
+    if variable.type in TEXTS:
+        if not isinstance(value, TEXTS[variable.type]):
+            kind = TEXTS[variable.type].__name__
+            raise CouplingError(f"{full} = {value!r} must be of Python's type {kind}")
+        return value
+    if isinstance(value, SupportsFloat):  # which a string is not
+        with suppress(TypeError, OverflowError):  # an array, a number beyond all floats
+            return _of_type(full, value, variable.type)
+    raise CouplingError(f"{full} = {value!r} must be a number, in the unit of the variable")
+
+
+def _of_type(full: str, value: Any, kind: str) -> Value:
+    """Return a number as one of a type of FMI."""
+    number = float(value)
+    if kind.startswith(("Real", "Float")):
+        return number
+    if kind == "Boolean":
+        if number not in (0.0, 1.0):
+            raise CouplingError(f"{full} = {value} must be True or False")
+        return bool(number)
+    if not number.is_integer():
+        raise CouplingError(f"{full} = {value} must be a whole number")
+    return int(value)
 
 
 def check_wire(to: str, given: Any, source: str) -> None:

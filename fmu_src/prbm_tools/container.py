@@ -19,7 +19,7 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
     Unknown,
 )
 
-from .components import CouplingError, Value, check_value, check_wire
+from .components import CouplingError, Value, check_wire, start_value
 
 NAMES3 = {"Real": "Float64", "Integer": "Int32"}  # of types, which the container takes throughout
 KINDS = ("parameter", "input", "output")
@@ -128,9 +128,7 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
     _, variable = _found(inside, full)
     if variable.causality not in KINDS:
         raise CouplingError(f"{full} is neither parameter nor input nor output")
-    if value is not None:
-        check_value(full, value, variable)
-    start = variable.start if value is None else value
+    start = variable.start if value is None else start_value(full, value, variable)
     output = variable.causality == "output"
     return ModelVariable(
         name=full,

@@ -15,7 +15,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 from fmpy import read_model_description  # type: ignore[import-untyped]
 
-from .components import CouplingError, Value, check_value, check_wire
+from .components import CouplingError, Value, check_wire, start_value
 from .simulate import Columns, communication_points
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
@@ -65,7 +65,7 @@ def package(
     }
     for full, value in values.items():
         name, variable = _found(variables, full)
-        check_value(full, value, variables[name][variable])
+        values[full] = start_value(full, value, variables[name][variable])
     root = ET.Element(f"{{{SSD}}}SystemStructureDescription")
     root.attrib.update(version="1.0", name=title or path.stem)
     system = _add(root, SSD, "System", name="system")
