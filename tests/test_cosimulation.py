@@ -1,6 +1,8 @@
 """Our master: schemes against closed forms, events against FMUs alone, mistakes as sentences."""
 
 import re
+import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -265,6 +267,20 @@ def test_enumerations_are_whole_numbers_and_strings_are_strings(tmp_path):
     assert start_value("a.skipped", "two", skipped) == "two"
     with pytest.raises(CouplingError, match=r"a\.skipped = 2 must be of Python's type str"):
         start_value("a.skipped", 2, skipped)
+
+
+@pytest.mark.parametrize("library", [None, b"damaged"])
+def test_an_fmu_that_cannot_be_loaded_is_told(library, tmp_path):
+    """Made for other platforms, or damaged; the working directory stays."""
+    here, path = Path.cwd(), tmp_path / "x.fmu"
+    with zipfile.ZipFile(guide(3)) as whole, zipfile.ZipFile(path, "w") as part:
+        for name in whole.namelist():
+            content = library if name.startswith("binaries/") else whole.read(name)
+            if content is not None:
+                part.writestr(name, content)
+    with pytest.raises(CouplingError, match=r"a: .*x\.fmu cannot be loaded here \(.* library"):
+        System({"a": path}, {})
+    assert Path.cwd() == here
 
 
 def test_what_the_fmu_says_is_in_the_sentence():

@@ -195,6 +195,15 @@ def test_every_number_may_be_a_start_value(number, tmp_path):
     assert found[0] == found[1]
 
 
+@pytest.mark.parametrize("name", ["text.fmu", "missing.fmu"])
+def test_what_is_no_fmu_is_told(name, tmp_path):
+    (tmp_path / "text.fmu").write_text("no FMU")
+    with pytest.raises(CouplingError, match=rf"a: .*{name} is no FMU that can be read"):
+        ssp.package(tmp_path / "x.ssp", {"a": tmp_path / name}, {})
+    with pytest.raises(CouplingError, match=rf"a: .*{name} is no FMU that can be read"):
+        container(tmp_path / "x.fmu", {"a": tmp_path / name}, {}, 1e-3)
+
+
 def test_a_package_connects_outputs_alone(tmp_path):
     with pytest.raises(CouplingError, match=r"carrier\.flexure\.length is no output"):
         ssp.package(tmp_path / "x.ssp", fmus(), {"sum.rate": "carrier.flexure.length"})

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from contextlib import chdir, suppress
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -59,23 +59,26 @@ class Component:
 
     def __init__(self, name: str, fmu: str | Path, folder: str | Path, kind: str) -> None:
         self.name, self.time = name, 0.0
-        try:
-            unpacked = extract(str(fmu), str(folder))
-            self.description = read_model_description(unpacked)
-        except Exception as error:
-            raise CouplingError(f"{name}: {fmu} is no FMU that can be read ({error})") from None
+        self.description = described(name, fmu)
         self.interface = getattr(self.description, DESCRIBED[kind])
         self.version = int(self.description.fmiVersion[0])
         if self.interface is None or self.version < 2:
             raise CouplingError(f"{name}: {fmu} has no {kind} of FMI 2.0 or 3.0")
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.said = ""  # by the FMU, about what is wrong
-        self.fmu: Any = CLASSES[kind, self.version](
-            guid=self.description.guid,
-            unzipDirectory=str(unpacked),
-            modelIdentifier=self.interface.modelIdentifier,
-            instanceName=name,
-        )
+        self.fmu: Any = self._loaded(CLASSES[kind, self.version], fmu, folder)
+
+    def _loaded(self, of: Any, fmu: str | Path, folder: str | Path) -> Any:
+        try:
+            with chdir("."):  # back to it: FMPy stays in the folder of what it cannot load
+                return of(
+                    guid=self.description.guid,
+                    unzipDirectory=str(extract(str(fmu), str(folder))),
+                    modelIdentifier=self.interface.modelIdentifier,
+                    instanceName=self.name,
+                )
+        except Exception as error:
+            raise CouplingError(f"{self.name}: {fmu} cannot be loaded here ({error})") from None
 
     def instantiate(self, **options: Any) -> None:
         """Instantiate it; in FMI 3.0 what it says is kept, in FMI 2.0 FMPy prints it."""
@@ -143,6 +146,20 @@ class Component:
             kind = self.variable(name).type
             kinds[ENUMERATED[self.version] if kind == "Enumeration" else kind].append(name)
         return kinds
+
+
+def described(name: str, fmu: str | Path) -> Any:
+    """Return what FMPy knows of an FMU, the name being that of its instance.
+
+    Raises
+    ------
+    CouplingError
+        If there is no FMU that can be read.
+    """
+    try:
+        return read_model_description(str(fmu))
+    except Exception as error:
+        raise CouplingError(f"{name}: {fmu} is no FMU that can be read ({error})") from None
 
 
 def start_value(full: str, value: object, variable: Any) -> Any:
