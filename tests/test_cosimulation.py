@@ -1,6 +1,8 @@
 """Our master: schemes against closed forms, events against FMUs alone, mistakes as sentences."""
 
 import re
+import zipfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from fmpy import simulate_fmu
 from coupled import guide, integrator
 from prbm import ParameterError
 from prbm_tools import cosimulation
-from prbm_tools.components import CouplingError
+from prbm_tools.components import CO_SIMULATION, Component, CouplingError, start_value
 from prbm_tools.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
 from prbm_tools.scalar_guide import ScalarGuide
 from support import mechanism
@@ -230,6 +232,9 @@ def test_events_without_an_end_are_told(monkeypatch):
         ({"record": ["guide.nothing"]}, "guide has no variable 'nothing'"),
         ({"values": {"a.value": 1.0}}, "a.value = 1.0 cannot be given: it is neither"),
         ({"values": {"guide.force.x": "much"}}, "guide.force.x = 'much' must be a number"),
+        ({"values": {"guide.force.x": np.ones(2)}}, "guide.force.x = array.* must be a number"),
+        ({"values": {"a.skipped": 1.5}}, "a.skipped = 1.5 must be a whole number"),
+        ({"values": {"a.off": 2}}, "a.off = 2 must be True or False"),
         ({"scheme": "newton"}, "scheme = 'newton' must be 'gauss-seidel' or 'jacobi'"),
         ({"values": {"guide.flexure.length": -1.0}}, "guide: fmi2.* returned the status 3"),
         ({"fmus": {"a.b": "x.fmu"}}, "'a.b' is no name for an instance: leave out dots"),
@@ -240,6 +245,42 @@ def test_mistakes_are_sentences(changes, sentence):
     system = {"fmus": {"a": integrator(), "guide": guide(2)}, "connections": {}} | changes
     with pytest.raises(CouplingError, match=sentence):
         simulate(stop_time=0.01, step=1e-3, **system)
+
+
+@pytest.mark.parametrize("kind", [float, int, bool, np.float32, np.int64, np.bool_, np.array])
+@pytest.mark.parametrize("name", ["gain", "skipped", "off"])
+def test_every_number_is_taken_as_the_type_of_its_variable(name, kind):
+    values = {"a.gain": 3.0, "a.rate": 2.0} | {f"a.{name}": kind(1)}
+    found = simulate({"a": integrator()}, {}, 0.5, 0.25, values, ["a.value"])["a.value"]
+    end = {"gain": 0.5 * 2.0, "skipped": 0.25 * 3.0 * 2.0, "off": 0.0}[name]
+    assert found[-1] == pytest.approx(end)
+
+
+def test_enumerations_are_whole_numbers_and_strings_are_strings(tmp_path):
+    one = Component("a", integrator(), tmp_path, CO_SIMULATION)
+    one.instantiate()
+    skipped = one.variable("skipped")
+    skipped.type = "Enumeration"
+    one.set({"skipped": start_value("a.skipped", 2.0, skipped)})
+    assert one.get(["skipped"]) == {"skipped": 2}
+    skipped.type = "String"
+    assert start_value("a.skipped", "two", skipped) == "two"
+    with pytest.raises(CouplingError, match=r"a\.skipped = 2 must be of Python's type str"):
+        start_value("a.skipped", 2, skipped)
+
+
+@pytest.mark.parametrize("library", [None, b"damaged"])
+def test_an_fmu_that_cannot_be_loaded_is_told(library, tmp_path):
+    """Made for other platforms, or damaged; the working directory stays."""
+    here, path = Path.cwd(), tmp_path / "x.fmu"
+    with zipfile.ZipFile(guide(3)) as whole, zipfile.ZipFile(path, "w") as part:
+        for name in whole.namelist():
+            content = library if name.startswith("binaries/") else whole.read(name)
+            if content is not None:
+                part.writestr(name, content)
+    with pytest.raises(CouplingError, match=r"a: .*x\.fmu cannot be loaded here \(.* library"):
+        System({"a": path}, {})
+    assert Path.cwd() == here
 
 
 def test_what_the_fmu_says_is_in_the_sentence():

@@ -318,6 +318,7 @@ MISTAKES = [
     ("measure", "required: QUANTITY"),
     ("validate --measured f=1", "--measured goes with a mechanism"),
     ("validate --only steps --elements 4", "--elements goes with a mechanism"),
+    ("validate --only steps --elements 0", "--elements goes with a mechanism"),
     ("validate PRBDM --only table", "leave MECHANISM out"),
     ("validate PRBDM --measured frequency", "write NAME=VALUE+-U"),
 ]  # fmt: skip

@@ -183,6 +183,27 @@ def test_causalities_that_do_not_fit_are_told(wires, values, sentence, tmp_path)
     assert not any(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("number", [np.float32(1.0), np.int64(1), np.bool_(True), True])
+def test_every_number_may_be_a_start_value(number, tmp_path):
+    """Packages and containers are the same as with Python's float."""
+    found = []
+    for value in (1.0, number):
+        ssp.package(tmp_path / "x.ssp", fmus(), {}, {"carrier.force.x": value})
+        container(tmp_path / "x.fmu", fmus(), {}, 1e-3, {"carrier.force.x": value})
+        [shown] = read_model_description(tmp_path / "x.fmu").modelVariables[1:]
+        found.append(((tmp_path / "x.ssp").read_bytes(), shown.start))
+    assert found[0] == found[1]
+
+
+@pytest.mark.parametrize("name", ["text.fmu", "missing.fmu"])
+def test_what_is_no_fmu_is_told(name, tmp_path):
+    (tmp_path / "text.fmu").write_text("no FMU")
+    with pytest.raises(CouplingError, match=rf"a: .*{name} is no FMU that can be read"):
+        ssp.package(tmp_path / "x.ssp", {"a": tmp_path / name}, {})
+    with pytest.raises(CouplingError, match=rf"a: .*{name} is no FMU that can be read"):
+        container(tmp_path / "x.fmu", {"a": tmp_path / name}, {}, 1e-3)
+
+
 def test_a_package_connects_outputs_alone(tmp_path):
     with pytest.raises(CouplingError, match=r"carrier\.flexure\.length is no output"):
         ssp.package(tmp_path / "x.ssp", fmus(), {"sum.rate": "carrier.flexure.length"})

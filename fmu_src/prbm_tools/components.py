@@ -2,9 +2,10 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from contextlib import chdir, suppress
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import Any, SupportsFloat
 
 from fmpy import extract, read_model_description  # type: ignore[import-untyped]
 from fmpy.fmi1 import FMICallException  # type: ignore[import-untyped]
@@ -20,6 +21,8 @@ CLASSES = {
     (CO_SIMULATION, 2): FMU2Slave, (CO_SIMULATION, 3): FMU3Slave,
     (MODEL_EXCHANGE, 2): FMU2Model, (MODEL_EXCHANGE, 3): FMU3Model,
 }  # fmt: skip
+TEXTS = {"String": str, "Binary": bytes}  # types that are no numbers
+ENUMERATED = {2: "Integer", 3: "Int64"}  # as which enumerations are read and given
 DESCRIBED = {CO_SIMULATION: "coSimulation", MODEL_EXCHANGE: "modelExchange"}
 
 
@@ -56,23 +59,26 @@ class Component:
 
     def __init__(self, name: str, fmu: str | Path, folder: str | Path, kind: str) -> None:
         self.name, self.time = name, 0.0
-        try:
-            unpacked = extract(str(fmu), str(folder))
-            self.description = read_model_description(unpacked)
-        except Exception as error:
-            raise CouplingError(f"{name}: {fmu} is no FMU that can be read ({error})") from None
+        self.description = described(name, fmu)
         self.interface = getattr(self.description, DESCRIBED[kind])
         self.version = int(self.description.fmiVersion[0])
         if self.interface is None or self.version < 2:
             raise CouplingError(f"{name}: {fmu} has no {kind} of FMI 2.0 or 3.0")
         self.variables = {v.name: v for v in self.description.modelVariables}
         self.said = ""  # by the FMU, about what is wrong
-        self.fmu: Any = CLASSES[kind, self.version](
-            guid=self.description.guid,
-            unzipDirectory=str(unpacked),
-            modelIdentifier=self.interface.modelIdentifier,
-            instanceName=name,
-        )
+        self.fmu: Any = self._loaded(CLASSES[kind, self.version], fmu, folder)
+
+    def _loaded(self, of: Any, fmu: str | Path, folder: str | Path) -> Any:
+        try:
+            with chdir("."):  # back to it: FMPy stays in the folder of what it cannot load
+                return of(
+                    guid=self.description.guid,
+                    unzipDirectory=str(extract(str(fmu), str(folder))),
+                    modelIdentifier=self.interface.modelIdentifier,
+                    instanceName=self.name,
+                )
+        except Exception as error:
+            raise CouplingError(f"{self.name}: {fmu} cannot be loaded here ({error})") from None
 
     def instantiate(self, **options: Any) -> None:
         """Instantiate it; in FMI 3.0 what it says is kept, in FMI 2.0 FMPy prints it."""
@@ -137,22 +143,58 @@ class Component:
     def _kinds(self, names: Sequence[str] | Mapping[str, Value]) -> dict[str, list[str]]:
         kinds = defaultdict(list)
         for name in names:
-            kinds[self.variable(name).type].append(name)
+            kind = self.variable(name).type
+            kinds[ENUMERATED[self.version] if kind == "Enumeration" else kind].append(name)
         return kinds
 
 
-def check_value(full: str, value: object, variable: Any) -> None:
-    """Check that a variable may be given a start value, and that it is a number.
+def described(name: str, fmu: str | Path) -> Any:
+    """Return what FMPy knows of an FMU, the name being that of its instance.
 
     Raises
     ------
     CouplingError
-        If not.
+        If there is no FMU that can be read.
+    """
+    try:
+        return read_model_description(str(fmu))
+    except Exception as error:
+        raise CouplingError(f"{name}: {fmu} is no FMU that can be read ({error})") from None
+
+
+def start_value(full: str, value: object, variable: Any) -> Any:
+    """Return a value as Python's own of the variable's type; numbers of NumPy are numbers, too.
+
+    Raises
+    ------
+    CouplingError
+        If the variable may not be given a start value, or not this one.
     """
     if variable.causality not in INPUTS:
         raise CouplingError(f"{full} = {value} cannot be given: it is neither input nor parameter")
-    if not isinstance(value, float | int):
-        raise CouplingError(f"{full} = {value!r} must be a number, in the unit of the variable")
+    if variable.type in TEXTS:
+        if not isinstance(value, TEXTS[variable.type]):
+            kind = TEXTS[variable.type].__name__
+            raise CouplingError(f"{full} = {value!r} must be of Python's type {kind}")
+        return value
+    if isinstance(value, SupportsFloat):  # which a string is not
+        with suppress(TypeError, OverflowError):  # an array, a number beyond all floats
+            return _of_type(full, value, variable.type)
+    raise CouplingError(f"{full} = {value!r} must be a number, in the unit of the variable")
+
+
+def _of_type(full: str, value: Any, kind: str) -> Value:
+    """Return a number as one of a type of FMI."""
+    number = float(value)
+    if kind.startswith(("Real", "Float")):
+        return number
+    if kind == "Boolean":
+        if number not in (0.0, 1.0):
+            raise CouplingError(f"{full} = {value} must be True or False")
+        return bool(number)
+    if not number.is_integer():
+        raise CouplingError(f"{full} = {value} must be a whole number")
+    return int(value)
 
 
 def check_wire(to: str, given: Any, source: str) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
-from fmpy import read_model_description  # type: ignore[import-untyped]
 from fmpy.container_fmu import config  # type: ignore[import-untyped]
 from fmpy.container_fmu.cli import create_container_fmu  # type: ignore[import-untyped]
 from fmpy.model_description import (  # type: ignore[import-untyped]
@@ -19,7 +18,7 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
     Unknown,
 )
 
-from .components import CouplingError, Value, check_value, check_wire
+from .components import CouplingError, Value, check_wire, described, start_value
 
 NAMES3 = {"Real": "Float64", "Integer": "Int32"}  # of types, which the container takes throughout
 KINDS = ("parameter", "input", "output")
@@ -63,7 +62,7 @@ def container(
     Raises
     ------
     CouplingError
-        If a name or a causality does not fit.
+        If an FMU cannot be read, or a name or a causality does not fit.
     """
     values = dict(values or {})
     with tempfile.TemporaryDirectory(prefix="prbm_container_") as temporary:
@@ -103,9 +102,9 @@ def container(
 
 def _inside(name: str, fmu: str | Path, folder: Path) -> Any:
     """Return an FMU under the name of its instance, after which its folder is called."""
-    own = folder / f"{name}.fmu"
+    description, own = described(name, fmu), folder / f"{name}.fmu"
     shutil.copyfile(fmu, own)
-    return config.Component(name, own, read_model_description(str(own)))
+    return config.Component(name, own, description)
 
 
 def _found(inside: Mapping[str, Any], full: str) -> tuple[Any, Any]:
@@ -128,9 +127,7 @@ def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) 
     _, variable = _found(inside, full)
     if variable.causality not in KINDS:
         raise CouplingError(f"{full} is neither parameter nor input nor output")
-    if value is not None:
-        check_value(full, value, variable)
-    start = variable.start if value is None else value
+    start = variable.start if value is None else start_value(full, value, variable)
     output = variable.causality == "output"
     return ModelVariable(
         name=full,

@@ -30,8 +30,8 @@ from .components import (
     Component,
     CouplingError,
     Value,
-    check_value,
     check_wire,
+    start_value,
 )
 from .simulate import Columns, Progress, Source, communication_points, structured
 
@@ -274,10 +274,10 @@ class System:
         """Give values to inputs and parameters, ``name.variable``."""
         for full, value in values.items():
             instance, name = self.parted(full)
-            check_value(full, value, instance.variable(name))
+            own = start_value(full, value, instance.variable(name))
             if instance.at_events(name):
                 instance.enter_events()
-            instance.set({name: value})
+            instance.set({name: own})
         if any(instance.updating for instance in self.instances.values()):
             self.happen()
 

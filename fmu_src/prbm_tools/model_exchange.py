@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from .components import MODEL_EXCHANGE, Component, CouplingError, Value, check_value
+from .components import MODEL_EXCHANGE, Component, CouplingError, Value, start_value
 from .simulate import Columns, communication_points, structured
 
 Real = NDArray[np.float64]
@@ -64,9 +64,7 @@ class Model(Component):
 
     def start(self, values: Mapping[str, Value], stop_time: float) -> None:
         """Initialize with start values, at time 0."""
-        for name, value in values.items():
-            check_value(name, value, self.variable(name))
-        self.set(values)
+        self.set({name: start_value(name, x, self.variable(name)) for name, x in values.items()})
         if self.version == 2:
             self.call("setupExperiment", startTime=0.0, stopTime=stop_time)
             self.call("enterInitializationMode")

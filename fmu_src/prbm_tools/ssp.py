@@ -13,9 +13,8 @@ from typing import Any, NoReturn
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from fmpy import read_model_description  # type: ignore[import-untyped]
 
-from .components import CouplingError, Value, check_value, check_wire
+from .components import CouplingError, Value, check_wire, described, start_value
 from .simulate import Columns, communication_points
 
 SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
@@ -56,16 +55,16 @@ def package(
     Raises
     ------
     CouplingError
-        If a name or a causality does not fit, or a type has no counterpart in SSP.
+        If an FMU cannot be read, a name or a causality does not fit, or a type has no counterpart
+        in SSP.
     """
     path, values = Path(path), dict(values or {})
     variables = {
-        name: {v.name: v for v in read_model_description(str(fmu)).modelVariables}
-        for name, fmu in fmus.items()
+        name: {v.name: v for v in described(name, fmu).modelVariables} for name, fmu in fmus.items()
     }
     for full, value in values.items():
         name, variable = _found(variables, full)
-        check_value(full, value, variables[name][variable])
+        values[full] = start_value(full, value, variables[name][variable])
     root = ET.Element(f"{{{SSD}}}SystemStructureDescription")
     root.attrib.update(version="1.0", name=title or path.stem)
     system = _add(root, SSD, "System", name="system")

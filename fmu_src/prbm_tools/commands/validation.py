@@ -25,7 +25,7 @@ def validated(options: argparse.Namespace) -> None:
 def _source(options: argparse.Namespace) -> None:
     """Reproduce the source's results."""
     for option in ("measured", "set", "elements"):
-        if getattr(options, option):
+        if getattr(options, option) not in (None, []):
             raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
     from ..validation import PAGE, reproduce  # type: ignore[import-untyped, unused-ignore]
 
