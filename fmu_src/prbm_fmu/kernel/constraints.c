@@ -192,7 +192,8 @@ RARE bool factor(int size, const double *ALONE M, double *ALONE L, double *ALONE
 #define LARGEST_MULTIPLE 1e280
 
 /* The same of a small M without waiting for one division after the other: elimination without
- * divisions leaves w_0 = M_00, w_1 = M_00 D_1, w_2 = w_0 w_1 D_2, ..., and all w_k L_ik. */
+ * divisions leaves w_0 = M_00, w_1 = M_00 D_1, w_2 = w_0 w_1 D_2, ..., and all w_k L_ik.  False,
+ * too, where doubles hardly hold these multiples: factor may still succeed, then. */
 SIZED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     double w[SMALL][SMALL], multiple = 1.0;
     bool safe;
@@ -220,6 +221,7 @@ SIZED bool small_factor(int size, const double *ALONE M, double *ALONE L, double
     for (int k = 0; k < size; k++) {
         double share = 1.0 / w[k][k];
         safe = safe && w[k][k] > LEAST_MULTIPLE;
+        safe = safe && multiple > LEAST_MULTIPLE && multiple < LARGEST_MULTIPLE;
         inverse[k] = multiple * share;
         multiple *= w[k][k];
         UNROLLED
@@ -250,7 +252,6 @@ SIZED void put_block(int size, int start, const double *from, double *to) {
         put_pair(to + size - 1, from[size - 1], to[size]);
     }
 }
-
 
 /* b := L^-1 b and b := L^-T b within a block. */
 SIZED void block_forward(int size, const double *L, double *b) {

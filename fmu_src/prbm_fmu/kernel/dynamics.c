@@ -437,7 +437,7 @@ static bool block_motion(Equations *q, int size, int start, const Complex *H, do
     return factor_block(q, size, start, L);
 }
 
-/* The same of a small block; one of tiny numbers takes the longer way. */
+/* The same of a small block; one of tiny or huge numbers takes the longer way. */
 SIZED bool small_block_motion(Equations *q, int size, int start, const Complex *H, double *L) {
     const int even = q->system->even, r = q->r;
     double M[SMALL * SMALL], D[SMALL];
