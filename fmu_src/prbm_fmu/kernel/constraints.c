@@ -165,16 +165,18 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
 
 /* M = L D L^T of the lower triangle of M, L with ones on its diagonal, and the inverse of D; false
  * if M is not positive definite. */
-RARE bool factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
+SIZED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     for (int i = 0; i < size; i++) {
         double pivot = M[i * size + i];
         for (int j = 0; j < i; j++) {
             double sum = M[i * size + j];
+            UNROLLED
             for (int k = 0; k < j; k++) {
                 sum -= L[i * size + k] * L[j * size + k];
             }
             L[i * size + j] = sum; /* L_ij D_j so far */
         }
+        UNROLLED
         for (int j = 0; j < i; j++) {
             double share = L[i * size + j] * inverse[j];
             pivot -= share * L[i * size + j];
@@ -186,6 +188,10 @@ RARE bool factor(int size, const double *ALONE M, double *ALONE L, double *ALONE
         inverse[i] = 1.0 / pivot;
     }
     return true;
+}
+
+RARE bool factor(int size, const double *M, double *L, double *inverse) {
+    return factor_any(size, M, L, inverse);
 }
 
 #define LEAST_MULTIPLE 1e-280 /* below and above, it is near what doubles can hold */
@@ -254,7 +260,7 @@ SIZED void put_block(int size, int start, const double *from, double *to) {
 }
 
 /* b := L^-1 b and b := L^-T b within a block. */
-SIZED void block_forward(int size, const double *L, double *b) {
+SIZED void block_forward(int size, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
         double sum = b[i];
@@ -267,7 +273,7 @@ SIZED void block_forward(int size, const double *L, double *b) {
     }
 }
 
-SIZED void block_backward(int size, const double *L, double *b) {
+SIZED void block_backward(int size, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int k = 1; k < size; k++) {
         int i = size - 1 - k;

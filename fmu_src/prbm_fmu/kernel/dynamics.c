@@ -420,9 +420,9 @@ SIZED void block_mass(Equations *q, int size, int start, const Complex *H, doubl
 }
 
 /* The block of M in q->block, factored into L, and L^-1 of the loads and rows. */
-RARE bool factor_block(Equations *q, int size, int start, double *L) {
+SIZED bool factor_any_block(Equations *q, int size, int start, double *L) {
     const Factors *factors = &q->factors;
-    if (!factor(size, q->block, L, factors->inverse + start)) {
+    if (!factor_any(size, q->block, L, factors->inverse + start)) {
         return false;
     }
     block_forward(size, L, q->x + start);
@@ -432,9 +432,13 @@ RARE bool factor_block(Equations *q, int size, int start, double *L) {
     return true;
 }
 
-static bool block_motion(Equations *q, int size, int start, const Complex *H, double *L) {
+RARE bool factor_block(Equations *q, int size, int start, double *L) {
+    return factor_any_block(q, size, start, L);
+}
+
+SIZED bool block_motion(Equations *q, int size, int start, const Complex *H, double *L) {
     block_mass(q, size, start, H, q->block);
-    return factor_block(q, size, start, L);
+    return factor_any_block(q, size, start, L);
 }
 
 /* The same of a small block; one of tiny or huge numbers takes the longer way. */
