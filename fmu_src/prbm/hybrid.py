@@ -1067,7 +1067,7 @@ class Simulation:
     def motions(self) -> dict[str, float]:
         """Return those of the outputs that tell where bodies and probes are and how they move.
 
-        They cost a third of what all :meth:`outputs` do.
+        They cost a third to a half of what all :meth:`outputs` do.
         """
         n, y = self.system.n, self.state()
         return self._motions(y[:n], y[n : 2 * n])

@@ -43,9 +43,7 @@ MOST_STARTS = 400
 MOST_STEPS = 50  # of the minimiser
 HALF_WAY = 4.0  # steps of the minimiser, for the progress told
 SEARCH = 0.5  # of the progress told: the starts
-NEAR_LEAST = (
-    1e-9  # of the misfit: with m data, sqrt(m/1e9) of a standard uncertainty from the least
-)
+NEAR_LEAST = 1e-9  # of the misfit: with m data, sqrt(m/1e9) of a standard uncertainty away
 RECORD_SHIFT, RECORD_ZERO = "record.shift", "record.zero"
 OWN = (RECORD_SHIFT, RECORD_ZERO)  # parameters of a record, not of the mechanism
 OWN_UNITS = {RECORD_SHIFT: "s", RECORD_ZERO: "m"}

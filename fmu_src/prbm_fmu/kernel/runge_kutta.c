@@ -84,7 +84,7 @@ static void combine(int n, int count, double h, const double *a, const double *k
 }
 
 BY_AVX static void combine_by_avx(int n, int count, double h, const double *a, const double *k,
-                                    const double *y, double *result) {
+                                  const double *y, double *result) {
     combine_any(n, count, h, a, k, y, result);
 }
 
