@@ -1070,11 +1070,12 @@ class Simulation:
         They cost a third to a half of what all :meth:`outputs` do.
         """
         n, y = self.system.n, self.state()
-        return self._motions(y[:n], y[n : 2 * n])
+        q, v = y[:n], y[n : 2 * n]
+        return self._motions(q, v, self.system.directions(q))
 
-    def _motions(self, q: Real, v: Real) -> dict[str, float]:
+    def _motions(self, q: Real, v: Real, e: Complex) -> dict[str, float]:
         system = self.system
-        e, out = system.directions(q), {}
+        out = {}
         for name, frame in system.bodies.items():
             place, velocity = system.motion(frame, e, v)
             out[f"{name}.x"], out[f"{name}.y"] = place.real, place.imag
@@ -1093,7 +1094,7 @@ class Simulation:
         q, v = y[:n], y[n : 2 * n]
         e = system.directions(q)
         a, lam, M = equations.accelerations(q, v)
-        out: dict[str, float | int | bool] = {**self._motions(q, v)}
+        out: dict[str, float | int | bool] = {**self._motions(q, v, e)}
         gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
         places, speeds = equations.gap_rows.values(e), equations.gap_rows.rates(e, v)
         G, loops = equations.gap_rows.jacobian(e), equations.rows.jacobian(e)[: len(system.loops)]
