@@ -19,7 +19,6 @@ from pathlib import Path
 
 import fmpy
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -106,7 +105,6 @@ def exact_rest_time(restitution: float, release: float = -0.018, K_theta: float 
 def figure(table: np.ndarray) -> Figure:
     """Plot time of coming to rest and number of impacts over the restitution."""
     result = Figure((7.0, 4.2), dpi=120, layout="constrained")
-    FigureCanvasAgg(result)
     axes = result.subplots()
     axes.plot(table["restitution"], table["exact"], color="#8fb4d8", label="scalar equation")
     axes.plot(table["restitution"], table["rest_time"], "o", color="#1f4e79", label="FMU")

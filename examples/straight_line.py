@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from prbm import Mechanism, assemble, equilibrium
@@ -90,7 +89,6 @@ def simulate(strokes: np.ndarray = STROKES) -> dict[str, np.ndarray]:
 def plot(errors: dict[str, np.ndarray], beam: np.ndarray) -> Figure:
     """Plot the lateral errors over the stroke."""
     figure = Figure((7.0, 4.2), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots()
     axes.plot(1e3 * STROKES[1:], 1e3 * beam[1:], "k--", linewidth=1.0, label="3 x² / (5 L)")
     for (name, error), marker in zip(errors.items(), "osd^", strict=True):

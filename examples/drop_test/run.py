@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
@@ -161,7 +160,6 @@ def linear(height: float) -> float:
 def figure(table: np.ndarray) -> Figure:
     """Plot the speed of the hit over the height."""
     result = Figure((7.0, 4.2), dpi=100, layout="constrained")
-    FigureCanvasAgg(result)
     axes = result.subplots()
     heights = np.geomspace(table["height"].min(), table["height"].max(), 300)
     lines = (

@@ -19,7 +19,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
@@ -146,7 +145,6 @@ def monolith(frequencies: Sequence[float], stops: bool = True) -> list[float]:
 def figure(up: np.ndarray, down: np.ndarray, checked: dict[float, float]) -> Figure:
     """Plot the power over the frequency."""
     result = Figure((7.0, 4.2), dpi=100, layout="constrained")
-    FigureCanvasAgg(result)
     axes = result.subplots()
     f = np.linspace(up["frequency"].min(), up["frequency"].max(), 300)
     axes.plot(f, 1e3 * linear(f), "k--", linewidth=1.0, label="without stops, linear")

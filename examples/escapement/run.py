@@ -22,7 +22,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -131,7 +130,6 @@ def draw(
 ) -> Figure:
     """Draw the motion, and how the errors fall with the communication step."""
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")
-    FigureCanvasAgg(figure)
     motion, error = figure.subplots(1, 2, width_ratios=(2, 1))
     after = impacts(result)
     motion.plot(result["time"], 1e3 * result["oscillator.shuttle.x"] + 1.0, label="pallet")

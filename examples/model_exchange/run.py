@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
@@ -154,7 +153,6 @@ def order(steps: Sequence[float], error: np.ndarray) -> float:
 def figure(found: Study) -> Figure:
     """Plot the errors over the step."""
     result = Figure((9.6, 4.4), dpi=100, layout="constrained")
-    FigureCanvasAgg(result)
     left, right = result.subplots(1, 2)
     steps = 1e3 * np.array(found.steps)
     styles = dict(zip(WAYS, (("#d55e00", "v"), ("#1f4e79", "o"), ("#009e73", "s")), strict=True))

@@ -18,7 +18,6 @@ from pathlib import Path
 import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
@@ -168,7 +167,6 @@ def expected_speed(stroke: float) -> float:
 def figure(record: np.ndarray) -> Figure:
     """Plot motion, force and energies."""
     result = Figure((8.0, 6.6), dpi=120, layout="constrained")
-    FigureCanvasAgg(result)
     motion, force, energy = result.subplots(3, 1, sharex=True)
     t = record["time"]
     motion.plot(t, 1e3 * record["shuttle.x"], color="#1f4e79", linewidth=1.0)

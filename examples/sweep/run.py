@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy import stats
@@ -69,7 +68,6 @@ def propagated(fmu: Path, out: Path) -> float:
 def figure(results: pd.DataFrame, spread: float) -> Figure:
     """Plot the distribution of T beside the normal one, and T over the restitution."""
     result = Figure((9.0, 3.8), dpi=120, layout="constrained")
-    FigureCanvasAgg(result)
     left, right = result.subplots(1, 2)
     T = 1e3 * results["T"]
     left.hist(T, bins="auto", density=True, color="#8fb4d8", label=f"{len(T)} runs")

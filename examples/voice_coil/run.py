@@ -15,7 +15,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
@@ -130,7 +129,6 @@ def books(record: np.ndarray) -> np.ndarray:
 def figure(record: np.ndarray, reference: Monolith) -> Figure:
     """Plot motion, current and energies."""
     result = Figure((8.0, 6.4), dpi=100, layout="constrained")
-    FigureCanvasAgg(result)
     motion, current, energy = result.subplots(3, 1, sharex=True)
     t = 1e3 * record["time"]
     motion.plot(t, 1e3 * record["guide.shuttle.x"], color="#1f4e79", linewidth=1.2)

@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from prbm import Mechanism, ParameterError, assemble, equilibrium, modes
@@ -146,7 +145,6 @@ class Comparison:
         """Draw model and measurement over the elements' values, in percent."""
         rows = [r for r in self.rows if r.elements and math.isfinite(r.elements)][::-1]
         figure = Figure((7.0, 1.1 + 0.36 * len(rows)), dpi=110, layout="constrained")
-        FigureCanvasAgg(figure)
         axes = figure.subplots()
         places = np.arange(len(rows))
         axes.axvline(0.0, color=LINK, linewidth=1.2, label="finite elements")

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from prbm import Mechanism
@@ -34,7 +33,6 @@ def panels(
 ) -> tuple[Figure, list[Axes]]:
     """Return a new figure of a size [inch], and its axes, row by row."""
     figure = Figure(size, dpi=dpi, layout="constrained")
-    FigureCanvasAgg(figure)
     every = [*np.atleast_1d(figure.subplots(rows, columns)).flat]
     for axes in every:
         plain(axes)
@@ -108,7 +106,6 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
             "as in simulate_fmu(...), which records all outputs by itself"
         )
     figure = Figure((WIDTH, 0.7 + PANEL_HEIGHT * len(drawn)), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
     every = np.atleast_1d(figure.subplots(len(drawn), 1, sharex=True))
     for axes, panel in zip(every, drawn, strict=True):
         _shade_rest(axes, plot)

@@ -14,7 +14,6 @@ from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from prbm import System, equilibrium, free_displacement, modes
@@ -152,7 +151,6 @@ def figure(curve: Curve, title: str) -> Figure:
     x = np.array([point.displacement for point in curve.points])
     factor, name = length_unit(float(np.abs(x).max()) or 1.0)
     drawn = Figure((8.0, 6.6), dpi=120, layout="constrained")
-    FigureCanvasAgg(drawn)
     every: list[Axes] = list(
         drawn.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [2, 1, 1]})
     )

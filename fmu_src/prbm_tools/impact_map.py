@@ -35,7 +35,6 @@ from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from prbm import Impact, Mechanism, ParameterError, Simulation, assemble, equilibrium, modes
@@ -688,7 +687,6 @@ def heat_map(maps: Sequence[ImpactMap], columns: int = 3) -> Figure:
     rows = math.ceil(len(maps) / columns)
     columns = min(columns, len(maps))
     figure = Figure((0.6 + 3.4 * columns, 0.5 + 2.9 * rows), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
     every = np.atleast_1d(figure.subplots(rows, columns, sharex=True, sharey=True)).ravel()
     low = min(float(m.restitution.min()) for m in maps)
     high = max(float(m.restitution.max()) for m in maps)
@@ -721,7 +719,6 @@ def heat_map(maps: Sequence[ImpactMap], columns: int = 3) -> Figure:
 def surface(maps: Sequence[ImpactMap]) -> Figure:
     """Draw maps as surfaces over walls and offsets, the first filled, the others as wires."""
     figure = Figure((7.0, 5.4), dpi=120)
-    FigureCanvasAgg(figure)
     axes: Any = figure.add_axes((0.0, 0.02, 0.9, 0.94), projection="3d")
     colours = ("#1f4e79", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#000000")
     for k, one in enumerate(maps):
@@ -750,7 +747,6 @@ def energies(one: ImpactMap) -> Figure:
     """Draw where the energy of each impact of a map goes: modes, contact; a panel an offset."""
     count = len(one.offsets)
     figure = Figure((8.0, 0.8 + 1.45 * count), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
     every = np.atleast_1d(figure.subplots(count, 1, sharex=True, sharey=True))
     names = ["mode 1", "mode 2", "mode 3", "higher modes", "contact"]
     colours = [FUNDAMENTAL, *HIGHER[:3], LOST]

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
@@ -95,7 +94,6 @@ def picture(
     row = min(max(aspect, 0.5), 1.6) * WIDTH / COLUMNS
     rows = -(-shown // COLUMNS)
     figure = Figure((WIDTH, height + rows * row), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
     grid = figure.add_gridspec(1 + rows, COLUMNS, height_ratios=[height, *[row] * rows])
     axes = figure.add_subplot(grid[0, :])
     _Drawing(axes, shapes).parts()

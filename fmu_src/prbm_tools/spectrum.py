@@ -16,7 +16,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from scipy.signal import detrend, find_peaks
 from scipy.signal.windows import hann
@@ -261,7 +260,6 @@ def figure(
         Frequency up to which to draw [Hz]; None: what the samples show.
     """
     drawn = Figure((8.0, 0.9 + 2.0 * len(signals)), dpi=120, layout="constrained")
-    FigureCanvasAgg(drawn)
     every = np.atleast_1d(drawn.subplots(len(signals), 1, sharex=True))
     shown = numbered(response.modes)
     for axes, name in zip(every, signals, strict=True):
