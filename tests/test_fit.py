@@ -266,6 +266,8 @@ def test_bounds_hold_and_are_said():
     assert found[K].value == pytest.approx(2.6, rel=1e-6)
     assert any("ended at its bound 2.6" in note for note in found.notes)
     assert "2.6 (not determined)" in str(found), "the data would have it below"
+    assert not found.identifiable
+    assert found.valleys == (), "it is the bound that holds it, not the data that say nothing"
     wide = fit(mechanism("PRBDM"), [K, Free("stop.restitution", -1.0, 5.0)], F5).problem
     assert (wide.lower[1], wide.upper[1]) == (0.0, 1.0), "the mechanism's own bounds hold, too"
 

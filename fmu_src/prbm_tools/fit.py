@@ -18,6 +18,7 @@ from itertools import product
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from prbm import Mechanism, Simulation, assemble, equilibrium, modes
@@ -325,6 +326,20 @@ class Problem:
         result: Real = np.maximum(np.abs(p), SHARE * (self.upper - self.lower))
         return result
 
+    def at_bounds(self, p: Real) -> NDArray[np.bool_]:
+        """Return which parameters are at a bound, (k,)."""
+        return self._near(p, np.column_stack([self.lower, self.upper]))
+
+    def at_ends(self, p: Real) -> NDArray[np.bool_]:
+        """Return which parameters are where what is possible ends, (k,)."""
+        ends = [_own_bounds(self.mechanism, name) for name in self.names]
+        return self._near(p, np.array(ends))
+
+    def _near(self, p: Real, places: Real) -> NDArray[np.bool_]:
+        near = AT_BOUND * (self.upper - self.lower)[:, None]
+        result: NDArray[np.bool_] = np.any(np.abs(p[:, None] - places) <= near, axis=1)
+        return result
+
     def jacobian(self, p: Real, scale: Real, moved: Whole) -> Real:
         """Return the derivatives of the residuals by some p/scale, (m, j), central differences."""
         columns = []
@@ -420,7 +435,7 @@ class Fit:
         Parameters in the order of ``problem.names``.
     covariance : (k, k)
         Of the parameters; infinite on the diagonal, else not a number, where the data do not
-        determine them.
+        determine them, or a bound that was given holds them back.
     singular : (k,)
         Singular values of the Jacobian scaled by the sizes of the parameters [-].
     directions : (k, k)
@@ -447,15 +462,9 @@ class Fit:
 
     @property
     def estimates(self) -> dict[str, Estimate]:
-        """The parameters with their standard uncertainties.
-
-        What a bound that was given held back is not determined.
-        """
+        """The parameters with their standard uncertainties."""
         units = {x.name: x.unit for x in self.problem.mechanism.parameters} | OWN_UNITS
         u = np.sqrt(np.diag(self.covariance))
-        u[[name in self.at_bounds and not self._ends(name) for name in self.problem.names]] = (
-            math.inf
-        )
         freedom = math.inf if self.problem.known else float(self.freedom)
         return {
             name: Estimate(float(x), float(ux), units[name], freedom)
@@ -473,7 +482,7 @@ class Fit:
     @property
     def identifiable(self) -> bool:
         """Whether the data determine all parameters."""
-        return not self.valleys
+        return bool(np.isfinite(np.diag(self.covariance)).all())
 
     @property
     def freedom(self) -> int:
@@ -502,17 +511,10 @@ class Fit:
     @property
     def at_bounds(self) -> tuple[str, ...]:
         """Parameters that ended at a bound."""
-        lower, upper = self.problem.lower, self.problem.upper
-        near = AT_BOUND * (upper - lower)
-        stuck = (self.p - lower <= near) | (upper - self.p <= near)
-        return tuple(name for name, at in zip(self.problem.names, stuck, strict=True) if at)
+        return self._those(self.problem.at_bounds(self.p))
 
-    def _ends(self, name: str) -> bool:
-        """Tell whether a parameter ended where what is possible ends."""
-        i = self.problem.names.index(name)
-        near = AT_BOUND * (self.problem.upper[i] - self.problem.lower[i])
-        ends = _own_bounds(self.problem.mechanism, name)
-        return any(abs(self.p[i] - end) <= near for end in ends)
+    def _those(self, which: NDArray[np.bool_]) -> tuple[str, ...]:
+        return tuple(name for name, it in zip(self.problem.names, which, strict=True) if it)
 
     @property
     def correlation(self) -> Real:
@@ -531,9 +533,10 @@ class Fit:
                 f"{MOST_STEPS} steps did not lead to a least misfit: the model cannot follow these "
                 "data, or starts too far away; give bounds near the values, or look at the figure"
             )
+        ends = self._those(self.problem.at_ends(self.p))
         for name in self.at_bounds:
             limit = self.problem.values(self.p)[name]
-            if self._ends(name):
+            if name in ends:
                 notes.append(f"{name} ended at {limit:g}, the end of what is possible")
             else:
                 notes.append(f"{name} ended at its bound {limit:.6g}: widen the bounds")
@@ -643,17 +646,20 @@ def _assessed(problem: Problem, p: Real, evaluations: int, converged: bool) -> F
             row = row * np.sign(row[np.argmax(np.abs(row))])
             shares = dict(zip(problem.names, map(float, row), strict=True))
             valleys.append(Direction(shares, 1.0 / known if known > 0.0 else math.inf))
-    return Fit(
-        problem, p, _covariance(s, V, size), s, V, tuple(valleys), model, evaluations, converged
-    )  # fmt: skip
+    held = problem.at_bounds(p) & ~problem.at_ends(p)
+    covariance = _covariance(s, V, size, held)
+    return Fit(problem, p, covariance, s, V, tuple(valleys), model, evaluations, converged)
 
 
-def _covariance(s: Real, V: Real, size: Real) -> Real:
-    """Return diag(size) V^T diag(1/s^2) V diag(size), infinite where a direction is lost."""
+def _covariance(s: Real, V: Real, size: Real, held: NDArray[np.bool_]) -> Real:
+    """Return diag(size) V^T diag(1/s^2) V diag(size), infinite where a direction is lost.
+
+    And where a parameter is held at a bound that was given.
+    """
     kept = s * LOOSE >= 1.0
     W = V[kept] / s[kept, None]
     result: Real = (W.T @ W) * np.outer(size, size)
-    lost = np.any(np.abs(V[~kept]) >= PART, axis=0)
+    lost = held | np.any(np.abs(V[~kept]) >= PART, axis=0)
     result[lost] = result[:, lost] = math.nan
     result[lost, lost] = math.inf
     return result

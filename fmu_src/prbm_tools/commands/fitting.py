@@ -109,7 +109,7 @@ def tell(found: Fit, output: Output, name: str) -> None:
                 zip(target.displacement, target.data, found.model[part], strict=True),
             )
             output.figure(f"{name}-force.png", lambda: fit_figures.force_figure(found))
-    if not found.identifiable and len(problem.names) > 1:
+    if found.valleys and len(problem.names) > 1:
         _tell_valley(found, output, name)
 
 
