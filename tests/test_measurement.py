@@ -67,6 +67,22 @@ def test_youngs_modulus_is_exact_without_noise():
     )
 
 
+def test_sizes_in_mm_that_pass_for_metres_are_noticed():
+    """E goes with l^3/(b h^3): a thousandth of the true one, which may be that of a rubber."""
+    d, F = bent(np.random.default_rng(0))
+    sizes = (Estimate(1e3 * x, 0.0) for x in (LENGTH, WIDTH, THICKNESS))
+    found = youngs_modulus(d, F, Beam("1", *sizes))
+    assert found.modulus.value == pytest.approx(1e-3 * E, rel=0.05)
+    assert any("40 m long" in note and "give 40 mm" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-9])
+def test_a_modulus_that_no_solid_has_is_noticed(factor):
+    """As with forces in mN that pass for N."""
+    d, F = bent(np.random.default_rng(0))
+    assert any("no solid" in note for note in youngs_modulus(d, factor * F, beam()).notes)
+
+
 def test_stated_uncertainty_of_the_fit_covers_the_truth():
     """68.3 % of 200 draws, -+ 3 standard deviations of a count of them: 0.585 to 0.781."""
     rng = np.random.default_rng(2)

@@ -33,6 +33,8 @@ STIFFENING = 36 / 35  # of the elastica under a force that keeps its direction, 
 LINEAR = 0.01  # the share by which the theory of small deflections may be wrong unannounced
 LOSSY = 0.03  # of the work of a cycle: more makes the branches different springs
 LONGEST = 1.0  # of the length of a beam: a larger deflection is a mistake of units
+LARGE = 1.0  # m: a longer beam is more likely one whose sizes are in mm
+SOLID = (1e5, 2e12)  # Pa: from gels to diamond and carbon nanotubes
 TURNS = 0.2  # of the range of the deflection: less is noise, not a change of direction
 LARGEST_ANGLE = 85.0  # deg between the sensor and the direction of the force
 
@@ -252,6 +254,17 @@ class YoungsModulus:
     def notes(self) -> tuple[str, ...]:
         """What a reader of the number must know."""
         notes = []
+        length, E = self.beam.length.value, self.modulus.value
+        if length > LARGE:
+            notes.append(
+                f"the beam is {length:g} m long: if its sizes are in mm, this E is a thousandth of "
+                f"the true one; give {length:g} mm, and the others alike"
+            )
+        elif not SOLID[0] < E < SOLID[1]:
+            notes.append(
+                f"no solid has E = {E:.2g} Pa: check the units of the beam, the deflection and "
+                "the force"
+            )
         if self.stiffening > LINEAR:
             notes.append(
                 f"the deflection reaches {self.deflection / self.beam.length.value:.2f} of the "
