@@ -1,5 +1,6 @@
 """Our master: schemes against closed forms, events against FMUs alone, mistakes as sentences."""
 
+import math
 import re
 import zipfile
 from pathlib import Path
@@ -232,6 +233,7 @@ def test_events_without_an_end_are_told(monkeypatch):
         ({"record": ["guide.nothing"]}, "guide has no variable 'nothing'"),
         ({"values": {"a.value": 1.0}}, "a.value = 1.0 cannot be given: it is neither"),
         ({"values": {"guide.force.x": "much"}}, "guide.force.x = 'much' must be a number"),
+        ({"values": {"guide.force.x": math.nan}}, "guide.force.x = nan is no number"),
         ({"values": {"guide.force.x": np.ones(2)}}, "guide.force.x = array.* must be a number"),
         ({"values": {"a.skipped": 1.5}}, "a.skipped = 1.5 must be a whole number"),
         ({"values": {"a.off": 2}}, "a.off = 2 must be True or False"),

@@ -1,5 +1,6 @@
 """An FMU as a component of a system, on FMPy's classes: variables by name, mistakes told."""
 
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from contextlib import chdir, suppress
@@ -186,6 +187,8 @@ def start_value(full: str, value: object, variable: Any) -> Any:
 def _of_type(full: str, value: Any, kind: str) -> Value:
     """Return a number as one of a type of FMI."""
     number = float(value)
+    if math.isnan(number):
+        raise CouplingError(f"{full} = {value} is no number")
     if kind.startswith(("Real", "Float")):
         return number
     if kind == "Boolean":
