@@ -23,7 +23,7 @@ from test_measurements_page import records, write
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
-    "list", "modes", "equilibrium", "simulate", "fit", "impact-map", "picture", "animate",
+    "list", "modes", "equilibrium", "simulate", "fit", "impact-map", "sweep", "picture", "animate",
     "validate", "measure youngs-modulus", "measure calibration", "measure frequency",
     "measure restitution",
 )  # fmt: skip

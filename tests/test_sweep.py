@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import signal
 import subprocess
@@ -24,7 +25,8 @@ from mishap import CRASHES, CRASHES_ONCE, EXITS, FINE, HANGS, KILLS_WORKER, RAIS
 from native_host import clocked
 from prbm import ParameterError
 from prbm_tools import sweep as sweeps
-from prbm_tools.sweep import SweepError, main, samples, sweep
+from prbm_tools.cli import main
+from prbm_tools.sweep import SweepError, samples, sweep
 from prbm_tools.sweep_results import OWN
 from prbm_tools.sweep_run import Job, Output, Runner, parsed, reduced
 
@@ -224,8 +226,8 @@ def test_what_failed_is_done_again_when_asked_for(mishap, log):
 LONG = pd.DataFrame({"x": np.arange(24.0), "pause": 0.15})
 SCRIPT = """
 import sys
-from prbm_tools.sweep import main
-sys.exit(main([{!r}, "table.csv", "--workers", "2", "--step", "0.5"]))
+from prbm_tools.cli import main
+sys.exit(main(["sweep", {!r}, "table.csv", "--workers", "2", "--step", "0.5"]))
 """
 
 
@@ -433,7 +435,7 @@ def test_a_malformed_file_is_refused_with_a_sentence(native, capsys, case):
     name, content, sentence = FILES[case]
     if content is not None:
         Path(name).write_bytes(content)
-    assert main([str(native["PRBDM2R", 2]), name]) == 2
+    assert main(["sweep", str(native["PRBDM2R", 2]), name]) == 2
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1
@@ -490,7 +492,7 @@ def test_what_is_no_fmu_is_told(native, tmp_path, capsys):
         ("none.fmu", "none.fmu cannot be read (No such file or directory); give an FMU"),
         ("text.fmu", "text.fmu is no FMU that can be read"),
     ):
-        assert main([name, "t.csv"]) == 2
+        assert main(["sweep", name, "t.csv"]) == 2
         assert sentence in capsys.readouterr().err
 
 
@@ -511,19 +513,41 @@ def test_a_missing_package_is_told(mishap, monkeypatch):
 def test_the_command_sums_up(native, capsys):
     table = pd.DataFrame({"stop.restitution": [0.5, 2.0]})
     table.to_csv("t.csv", index=False)
-    assert main([str(native["PRBDM", 2]), "t.csv", "--out", "r", "--output", "shuttle.x",
-                 "--set", "release.displacement=-0.01", "--stop-time", "0.01"]) == 0  # fmt: skip
+    assert main(["sweep", str(native["PRBDM", 2]), "t.csv", "--out", "r", "--output", "shuttle.x",
+                 "--set", "release.displacement=-10 mm", "--stop-time", "10ms"]) == 0  # fmt: skip
     printed = capsys.readouterr().out.splitlines()
     assert printed == [
         "2 runs, 1 failed: r",
         "row 1 failed: stop.restitution = 2 must be at most 1",
     ]
-    assert main(["a.fmu", "t.csv", "--set", "gravity.x=down"]) == 2
-    assert capsys.readouterr().err == (
-        "--set gravity.x=down: write a name and a number, as name=0.5\n"
-    )
-    assert main(["--workers", "two"]) == 2
-    assert capsys.readouterr().err.startswith("argument --workers: invalid int value: 'two'")
+    found = pd.read_parquet("r")
+    assert len(found) == 2
+    first = found["shuttle.x"][0]
+    alone = fmpy.simulate_fmu(
+        str(native["PRBDM", 2]), stop_time=0.01, output=["shuttle.x"],
+        start_values={"release.displacement": -0.01, "stop.restitution": 0.5},
+    )  # fmt: skip
+    assert first == alone["shuttle.x"][-1]
+
+
+WORDS = {
+    "no number": ("--set gravity.x=down", "--set gravity.x= down: "),
+    "no variable": ("--set gravity.X=1", "--set gravity.X=1: "),
+    "another unit": ("--set 'gravity.x=1 kg'", "'kg' is the unit of something else"),
+    "no time": ("--stop-time 3mm", "--stop-time 3mm: 'mm' is the unit of something else"),
+    "no count": ("--workers two", "argument --workers: invalid int value: 'two'"),
+}
+
+
+@pytest.mark.parametrize("case", WORDS)
+def test_words_of_the_command_that_make_no_sense_are_told(native, capsys, case):
+    GRID.to_csv("t.csv", index=False)
+    words, sentence = WORDS[case]
+    assert main(["sweep", str(native["PRBDM", 2]), "t.csv", *shlex.split(words)]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("prbm sweep: ")
+    assert sentence in said
+    assert said.count("\n") == 1
 
 
 # --- samples ------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from prbm_tools.sweep import main
+from prbm_tools.cli import main
 
 PAGE = (Path(__file__).parents[1] / "docs" / "sweeps.md").read_text(encoding="utf-8")
 
@@ -29,8 +29,8 @@ def test_the_page_and_its_command_give_the_same(native, tmp_path, monkeypatch, c
     found["table"].to_csv("table.csv", index=False)
     (command,) = re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)
     words = shlex.split(command.replace("\\\n", " ").replace("settling", "command"))
-    assert words[:3] == ["python", "-m", "prbm_tools.sweep"]
-    assert main(words[3:]) == 0
+    assert words[0] == "prbm"
+    assert main(words[1:]) == 0
     again = pd.read_parquet("command.parquet").sort_values("row", ignore_index=True)
     for name in ("stop.impact_count", "since(stop.contact)"):
         assert again[name].equals(results[name])

@@ -89,6 +89,7 @@ def parser() -> argparse.ArgumentParser:
     _simulate(commands)
     _fit(commands)
     _impact_map(commands)
+    _sweep(commands)
     _measure(commands)
     _picture(commands)
     _animate(commands)
@@ -299,6 +300,39 @@ def _impact_map(commands: Commands) -> None:
     _out(parser)
 
 
+def _sweep(commands: Commands) -> None:
+    parser = _command(
+        commands, "sweep", "sweeps:swept",
+        "one run of an FMU for each row of a table: parameter studies, Monte Carlo",
+        _examples(
+            "prbm sweep dist/fmi2/PRBDM2R.fmu table.csv --output stop.impact_count \\\n"
+            '      --output "max(shuttle.x)" --stop-time 500ms --out settling.parquet'
+        ),
+    )  # fmt: skip
+    add = parser.add_argument
+    add("fmu", metavar="FMU", help="of FMI 2.0 or 3.0, with co-simulation")
+    add("table", metavar="TABLE", help="CSV or Parquet: a column a variable, a row a run; in SI")
+    add("--out", default="results.parquet", metavar="DIR", help="of the results; %(default)s")
+    add(
+        "--output", action="append", metavar="OUTPUT",
+        help="a variable, for its final value, or max, min, mean, first or since of one, as "
+        "'max(shuttle.x)', 'first(shuttle.x > 0)'; may be repeated; default: all outputs",
+    )  # fmt: skip
+    set_argument(parser, "start value of all runs")
+    add("--stop-time", metavar="T", help="end of the runs [s]; default: the FMU's")
+    add("--step", metavar="T", help="communication step [s]; default: the FMU's")
+    add("--tolerance", metavar="X", help="relative, of the integration; default: the FMU's")
+    add("--workers", type=int, metavar="N", help="runs at a time; default: one a core")
+    add("--scheduler", metavar="ADDRESS", help="Dask scheduler, tcp://host:8786, for its workers")
+    add(
+        "--retries", type=int, default=1, metavar="N",
+        help="how often a run that crashed is tried again; %(default)s",
+    )  # fmt: skip
+    add("--timeout", metavar="T", help="give a run up after so long [s]; default: never")
+    add("--anew", action="store_true", help="forget what is in the results")
+    add("--failed", action="store_true", help="do again what failed before")
+
+
 def _picture(commands: Commands) -> None:
     parser = _command(
         commands, "picture", "pictures:drawn",
@@ -476,8 +510,8 @@ def _run(words: Sequence[str]) -> int:
         return OK
     except _ArgumentError as error:
         return _told(str(error), MISTAKE)
-    except KeyboardInterrupt:
-        return _told(f"{name}: interrupted", INTERRUPTED)
+    except KeyboardInterrupt as stop:
+        return _told(f"{name}: {str(stop) or 'interrupted'}", INTERRUPTED)
     except Exception as error:
         status = _status(error)
         if status is None:

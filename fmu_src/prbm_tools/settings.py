@@ -166,7 +166,25 @@ def settings(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, float]:
     >>> settings(find("PRBDM"), ["stop.restitution=0.5", "release.displacement = -10 mm"])
     {'stop.restitution': 0.5, 'release.displacement': -0.01}
     """
-    units, found = units_of(mechanism), {}
+    return assigned(units_of(mechanism), texts)
+
+
+def assigned(units: Mapping[str, str], texts: Sequence[str]) -> dict[str, float]:
+    """Read NAME=VALUE pairs of variables with these units.
+
+    Raises
+    ------
+    UserMistake
+        If a text is no such pair.
+    ParameterError
+        If there is no such variable.
+
+    Examples
+    --------
+    >>> assigned({"angle": "rad", "gain": ""}, ["angle=180 deg", "gain=50 %"])
+    {'angle': 3.141592653589793, 'gain': 0.5}
+    """
+    found = {}
     for text in texts:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):

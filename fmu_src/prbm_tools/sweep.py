@@ -1,6 +1,6 @@
 """Parameter sweeps and Monte Carlo: from a table of parameters to a table of results.
 
-    python -m prbm_tools.sweep PRBDM2R.fmu table.csv --output "max(shuttle.x)" --stop-time 1
+    prbm sweep PRBDM2R.fmu table.csv --output "max(shuttle.x)" --stop-time 1
 
 A row of the table is a run of the FMU, a column a variable that it is started with.  The runs are
 spread over the cores of this machine, or over the workers of a ``distributed`` scheduler by its
@@ -8,7 +8,6 @@ address.  What is done is on disk: a sweep that was killed goes on where it was.
 is a row with its message.
 """
 
-import argparse
 import hashlib
 import importlib.util
 import io
@@ -25,14 +24,14 @@ from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import fmpy  # type: ignore[import-untyped]
 
 from prbm import ParameterError
 from prbm.errors import PrbmError
 
-from .simulate import MOST_ROWS, Progress, reporter
+from .simulate import MOST_ROWS, Progress
 from .sweep_run import CRASHED, GOOD, Job, Outcome, Output, SpecificationError, parsed
 
 if TYPE_CHECKING:
@@ -206,7 +205,7 @@ def _planned(
 ) -> Plan:
     from .sweep_table import check_settable, checked, read_table
 
-    data, description = _read_fmu(Path(fmu))
+    data, description = read_fmu(Path(fmu))
     variables = {v.name: v for v in description.modelVariables}
     frame = checked(read_table(table), variables)
     fixed = {name: float(x) for name, x in (values or {}).items()}
@@ -227,8 +226,14 @@ def _planned(
     )  # fmt: skip
 
 
-def _read_fmu(path: Path) -> tuple[bytes, Any]:
-    """Return an FMU as bytes, with its description."""
+def read_fmu(path: Path) -> tuple[bytes, Any]:
+    """Return an FMU as bytes, with its description by FMPy.
+
+    Raises
+    ------
+    SweepError
+        If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
+    """
     try:
         data = path.read_bytes()
     except OSError as error:
@@ -535,62 +540,6 @@ class _Sweep:
 
 # --- the command --------------------------------------------------------------------------------
 
-SUCCESS, MISTAKE, INTERRUPTED = 0, 2, 130
-
-
-class _Parser(argparse.ArgumentParser):
-    """A parser that answers a mistake with one sentence."""
-
-    def error(self, message: str) -> NoReturn:
-        raise ParameterError(f"{message}; see --help")
-
-
-def _parser() -> argparse.ArgumentParser:
-    p = _Parser(prog="prbm_tools.sweep", description=__doc__.partition("\n")[0])
-    p.add_argument("fmu", help="FMU of FMI 2.0 or 3.0 with co-simulation")
-    p.add_argument("table", help="CSV or Parquet file: a column a parameter, a row a run")
-    p.add_argument("--out", default="results.parquet", help="folder of the results")
-    p.add_argument("--output", action="append", metavar="OUTPUT", dest="outputs",
-                   help="variable, or max, min, mean, first or since of one: 'max(shuttle.x)', "
-                        "'first(shuttle.x > 0)'; repeat for more; default: all")  # fmt: skip
-    p.add_argument("--set", action="append", default=[], metavar="NAME=NUMBER", dest="values",
-                   help="start value of all runs")  # fmt: skip
-    p.add_argument("--stop-time", type=float, metavar="S", help="end of the runs [s]")
-    p.add_argument("--step", type=float, metavar="S", help="communication step [s]")
-    p.add_argument("--tolerance", type=float, help="relative tolerance")
-    p.add_argument("--scheduler", metavar="ADDRESS", help="Dask scheduler, as tcp://host:8786")
-    p.add_argument("--workers", type=int, metavar="N", help="runs at a time on this machine")
-    p.add_argument("--retries", type=int, default=1, metavar="N", help="for runs that crash")
-    p.add_argument("--timeout", type=float, metavar="S", help="give a run up after so long [s]")
-    p.add_argument("--anew", action="store_true", help="forget what is in the results")
-    p.add_argument("--failed", action="store_true", help="do again what failed before")
-    return p
-
-
-def _assignment(text: str) -> tuple[str, float]:
-    """Return the name and the number of a text name=number; units are the FMU's."""
-    name, _, number = text.partition("=")
-    try:
-        return name.strip(), float(number)
-    except ValueError:
-        raise ParameterError(f"--set {text}: write a name and a number, as name=0.5") from None
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
-    try:
-        options = vars(_parser().parse_args(arguments))
-        options["values"] = dict(_assignment(text) for text in options["values"])
-        found = sweep(**options, progress=reporter())
-    except PrbmError as error:
-        print(error, file=sys.stderr)
-        return MISTAKE
-    except KeyboardInterrupt as stop:
-        print(stop if str(stop) else "interrupted", file=sys.stderr)
-        return INTERRUPTED
-    print(summary(found, options["out"]))
-    return SUCCESS
-
 
 def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
     """Return in a few lines how the runs of a sweep went."""
@@ -604,4 +553,6 @@ def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    from .cli import main
+
+    sys.exit(main(["sweep", *sys.argv[1:]]))
