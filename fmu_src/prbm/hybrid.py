@@ -610,11 +610,14 @@ class Simulation:
                 b = _falls(self._gap_rate_at(arc, i, sign=-1.0), a, b)
                 if gap_at(b) > 0.0:
                     continue
-            return self._polished(arc, i, _falls(gap_at, a, b))
+            return self._polished(arc, i, _falls(gap_at, a, b), a)
         return None
 
-    def _polished(self, arc: Arc, i: int, t: float) -> float:
-        """Move the time of a closing gap to where the projected state closes it."""
+    def _polished(self, arc: Arc, i: int, t: float, opens: float) -> float:
+        """Move the time of a closing gap to where the projected state closes it.
+
+        Not to where it still opens: there nothing would happen, again and again.
+        """
         n = self.system.n
         for _ in range(3):
             y = self.equations.project(t, arc.at(t))
@@ -626,7 +629,7 @@ class Simulation:
             change = -gap / rate
             if abs(change) > 1e-2 * arc.h:  # grazing: the dense output has the better root
                 break
-            t = max(arc.start, t + change)
+            t = max(opens, t + change)
         return t
 
     def _turning(

@@ -902,8 +902,9 @@ static double look_time(const Simulation *sim, int k) {
     return sim->now->arc_start + sim->now->arc_h * (k / 8.0);
 }
 
-/* Move the time of a closing gap to where the projected state closes it. */
-static bool polished(Simulation *sim, int i, double *time, Problem *problem) {
+/* Move the time of a closing gap to where the projected state closes it; not to where it still
+ * opens: there nothing would happen, again and again. */
+static bool polished(Simulation *sim, int i, double opens, double *time, Problem *problem) {
     int n = sim->system.n;
     double t = *time;
     for (int step = 0; step < 3; step++) {
@@ -919,7 +920,7 @@ static bool polished(Simulation *sim, int i, double *time, Problem *problem) {
             fabs(change) > 1e-2 * sim->now->arc_h) {
             break; /* grazing: the dense output has the better root */
         }
-        t = greater(sim->now->arc_start, t + change);
+        t = greater(opens, t + change);
     }
     *time = t;
     return true;
@@ -976,7 +977,7 @@ static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
             }
         }
         double t = falls(&guard, GAP_FALLS, a, b);
-        if (!polished(sim, i, &t, problem)) {
+        if (!polished(sim, i, a, &t, problem)) {
             return false;
         }
         note(first, IMPACT, i, t);
