@@ -500,21 +500,47 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
 
 /* --- time ------------------------------------------------------------------------------------- */
 
-/* Turn the inputs of the walls into uniform motions up to a time; whether one changes.  What is left
- * of a step after an event may be short: a wall that is a little elsewhere than it is said to be goes
- * on with its velocity, and gets there in the next step. */
+static double stop_field(const Simulation *sim, Expression field) {
+    return evaluate(field, sim->acting_values);
+}
+
+static double given_velocity(const Simulation *sim, int i) {
+    return wall_inputs(sim->mechanism, sim->given, i)[1];
+}
+
+static double *acting_velocity(const Simulation *sim, int i) {
+    return sim->acting_given + sim->mechanism->input.walls + PER_WALL * i + 1;
+}
+
+/* Whether a wall is given a velocity that is another one beyond what its stop calls rest. */
+static bool given_another(const Simulation *sim, int i, double acting) {
+    double velocity = given_velocity(sim, i);
+    double least = stop_field(sim, sim->mechanism->stops[i].rest_speed);
+    return velocity != acting && fabs(velocity - sim->walls[i].rate) >= least;
+}
+
+/* Whether a time is within the communication step in which an event was handled. */
+static bool within_step(const Simulation *sim, double time) {
+    const Scalars *now = sim->now;
+    double rounding = ROUNDED * (fabs(time) + fabs(now->time));
+    return now->adrift != 0.0 && time <= now->underway_until + rounding;
+}
+
+/* Turn the inputs of the walls into uniform motions up to a time; whether one changes.  A wall that is
+ * a little elsewhere than it is said to be gets there within the step.  What is left of a step after
+ * an event may be too short for that: for the rest of it the walls go on as they do, but for one
+ * whose velocity has changed at once. */
 static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
-    bool changed = false;
+    bool changed = false, rest = within_step(sim, time);
     double now = sim->now->time;
     for (int i = 0; i < sim->system.s; i++) {
-        double target = wall_target(sim, i, time - now);
-        if (sim->now->adrift != 0.0) {
-            target += wall_at(&sim->walls[i], now) - wall_target(sim, i, 0.0);
-        }
+        double here = wall_at(&sim->walls[i], now), target = wall_target(sim, i, time - now);
+        double velocity = rest ? given_velocity(sim, i) : (target - here) / (time - now);
+        bool other = rest ? given_another(sim, i, *acting_velocity(sim, i))
+                          : fabs(wall_at(&sim->walls[i], time) - target) > 1e-13 * sim->system.length;
         planned[i] = sim->walls[i];
-        if (fabs(wall_at(&sim->walls[i], time) - target) > 1e-13 * sim->system.length) {
-            double here = wall_at(&sim->walls[i], now);
-            Wall wall = {here, (target - here) / (time - now), now};
+        if (other) {
+            Wall wall = {here, velocity, now};
             planned[i] = wall;
             changed = true;
         }
@@ -1115,10 +1141,6 @@ static bool happen(Simulation *sim, const Event *event, Problem *problem) {
     default:
         return settle(sim, NULL, 0, event, problem);
     }
-}
-
-static double stop_field(const Simulation *sim, Expression field) {
-    return evaluate(field, sim->acting_values);
 }
 
 /* e, the mass matrix and the Jacobian of the loops at a position. */
@@ -2085,41 +2107,59 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 }
 
 /* Inputs that were set where an event waits act in it: so a wall hits with the velocity that it has
- * there, not with its mean over the communication step. */
-static void take_inputs(Simulation *sim) {
-    const Mechanism *m = sim->mechanism;
+ * there, not with its mean over the communication step.  Where that is a matter of less than the
+ * stop calls rest, the wall goes on with its mean, and what it carries rests on.  A wall that holds
+ * something is given another velocity after the event, as at the start of any step.  acted: the
+ * velocities that act. */
+static void take_inputs(Simulation *sim, double *acted) {
+    directions(&sim->system, sim->front, sim->e);
     for (int i = 0; i < sim->system.s; i++) {
-        double velocity = wall_inputs(m, sim->given, i)[1];
-        if (velocity != wall_inputs(m, sim->acting_given, i)[1]) {
+        double speed = -gap_rate(&sim->equations, i, sim->e, sim->front + sim->system.n);
+        double distance = gap(&sim->equations, i, sim->now->time, sim->e);
+        bool hits = distance <= TOUCHING * sim->system.length &&
+                    speed >= stop_field(sim, sim->mechanism->stops[i].rest_speed);
+        if (sim->holds[i] == 0.0 && (hits || given_another(sim, i, acted[i]))) {
             double t = sim->now->time;
-            Wall wall = {wall_at(&sim->walls[i], t), velocity, t};
-            sim->walls[i] = wall;
+            Wall wall = {wall_at(&sim->walls[i], t), given_velocity(sim, i), t};
+            if (acted[i] != wall.rate) {
+                sim->walls[i] = wall;
+            }
+            acted[i] = wall.rate;
         }
     }
-    copy(m->input_count, sim->given, sim->acting_given);
+    copy(sim->mechanism->input_count, sim->given, sim->acting_given);
     set_inputs(sim);
-    sim->now->underway = 0.0;
-    sim->now->adrift = 1.0;
 }
 
 PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     Simulation *sim = simulation;
-    bool event = due(sim, sim->now->time), thrown = impulses_changed(sim);
+    Scalars *now = sim->now;
+    bool event = due(sim, now->time), thrown = impulses_changed(sim);
+    bool taken = event && given_changed(sim);
     if (!event && !thrown) {
         return true;
     }
     keep_backup(sim);
     sim->fresh = NOTHING;
-    if (event && given_changed(sim)) {
-        take_inputs(sim);
+    double acted[MOST_STOPS];
+    for (int i = 0; i < sim->system.s; i++) {
+        acted[i] = *acting_velocity(sim, i);
+    }
+    if (taken) {
+        take_inputs(sim, acted);
     }
     bool right = !event || let_happen(sim, problem);
     if (right && thrown) {
         Wall walls[MOST_STOPS];
         memcpy(walls, sim->walls, (size_t)sim->system.s * sizeof *walls);
         right = restart(sim, walls, problem);
-        sim->now->underway = 0.0;
-        sim->now->adrift = 1.0;
+    }
+    if (taken || thrown) {
+        for (int i = 0; i < sim->system.s; i++) {
+            *acting_velocity(sim, i) = acted[i];
+        }
+        now->adrift = now->underway;
+        now->underway = 0.0;
     }
     return attempt(sim, right, problem);
 }

@@ -17,7 +17,7 @@ typedef struct {
     double has_arc, arc_start, arc_h, arc_end;
     double event_kind, event_index, event_time;
     double underway, underway_until; /* a communication step that was left in its middle */
-    double adrift; /* walls have been given velocities in an event: until the next step they drift */
+    double adrift; /* an event was handled in its middle, with inputs: the walls go on till its end */
 } Scalars;
 
 typedef struct {
