@@ -51,6 +51,14 @@ class Discrete:
         changed[stop] = False
         return replace(self, holds=tuple(changed))
 
+    def with_slide(self, kind: str, i: int, state: int) -> "Discrete":
+        """Return the state in which a held stop ("slide") or a friction point ("rub") slides so."""
+        states = list(self.rubs if kind == "rub" else self.slides)
+        states[i] = state
+        if kind == "rub":
+            return replace(self, rubs=tuple(states))
+        return replace(self, slides=tuple(states))
+
 
 T = TypeVar("T", float, Real, float | Real)
 

@@ -16,7 +16,7 @@ spring and not a series of small bounces.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import combinations, pairwise
+from itertools import combinations, pairwise, product
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,7 @@ TOUCHING = 1e-10  # of the size: gaps that close together with one that is being
 RELEASE_GAP = 1e-9  # m; a wall may be touched at release by no more than this
 SHORTEST_FLIGHT = 5e-7  # of the period: the arc of a shorter bounce is lost in rounding
 DEPENDENT = 1e-4  # share of a row's mobility that the stops leave; below, the stop carries all
+MOST_AT_REST = 6  # things with friction whose combinations are tried
 ALIGNED = 1e-9  # the same for stops among each other; below, one of them holds for all
 AT_EASE = 1e-7  # of the highest frequency: a lower one is what rounding leaves of none
 NO_SPRING = 2 * math.pi  # rad/s; the scale of rates of a linkage without springs
@@ -635,10 +636,15 @@ class Simulation:
     def _turning(
         self, arc: Arc, kind: str, i: int, times: Real, e: Complex, v: Real
     ) -> list[Event]:
-        """Return when a sliding velocity changes its sign."""
+        """Return when a sliding velocity changes its sign.
+
+        What begins to slide is at rest up to a rounding of either sign: it goes the other way if
+        it does so at the end.
+        """
         sign, rows, n = self._sliding(kind, i), self._slide_rows(kind), self.system.n
         z = sign * rows.rates(e, v)[:, i]
-        for j in range(WATCHED):
+        begins = z[0] <= self._still()
+        for j in range(int(begins), WATCHED):
             if z[j] > 0.0 >= z[j + 1]:
 
                 def speed(t: float) -> float:
@@ -647,8 +653,8 @@ class Simulation:
                     return sign * float(rows.rates(e, y[n : 2 * n])[i])
 
                 return [Event(_falls(speed, times[j], times[j + 1]), kind, i)]
-        if z[-1] < 0.0 and z[0] <= 0.0:
-            return [Event(float(times[1]), kind, i)]  # went the other way from the start
+        if begins and z[-1] < 0.0:
+            return [Event(float(times[1]), kind, i)]
         return []
 
     def _sliding(self, kind: str, i: int) -> int:
@@ -996,9 +1002,16 @@ class Simulation:
             for kind, i in rubbing:
                 stops = slow if turns == (kind, i) else 0.0
                 state = self._slide_state(kind, i, q, v, yields == (kind, i), stops)
-                self._set_discrete(self._with_slide(kind, i, state))
+                self._set_discrete(self.discrete.with_slide(kind, i, state))
             if self.discrete == before:
                 break
+        else:
+            at_rest = [
+                (kind, i)
+                for kind, i in rubbing
+                if self._slides(kind, i, q, v, slow if turns == (kind, i) else 0.0) == IDLE
+            ]
+            self._settle_together(at_rest, q, v, yields)
         if holding:
             self.front = self.equations.project(t, self.front)
 
@@ -1019,41 +1032,83 @@ class Simulation:
         friction nothing.  Else it sticks as far as Coulomb's law allows, and beyond slides in the
         direction in which sliding accelerates it.
         """
-        e, M, loops = self._mass_and_loops(q)
-        rows = self._slide_rows(kind)
-        row = rows.jacobian(e)[[i]]
-        speed = float((row @ v).item())
-        moving = self._sign(speed)
-        if moving != IDLE and abs(speed) > slow:
+        moving = self._slides(kind, i, q, v, slow)
+        if moving != IDLE:
             return moving
-        others = self._equations(self._with_slide(kind, i, IDLE))
-        held = others.rows.jacobian(e)
-        if _mobility(M, held, row) <= DEPENDENT * _mobility(M, loops, row):
+        if not self._mobile(self.discrete, kind, i, q):
             return IDLE
-        equations = self._equations(self._with_slide(kind, i, STICKS))
+        e, rows = self.system.directions(q), self._slide_rows(kind)
+        row = rows.jacobian(e)[i]
+        equations = self._equations(self.discrete.with_slide(kind, i, STICKS))
         _, lam, _ = equations.accelerations(q, v)
-        if kind == "rub":
-            friction = float(lam[equations.first_rub + equations.rubbing.index(i)])
-            limit = equations.rub_limit(i, e)
-        else:
-            friction = float(lam[equations.first_stick + equations.stuck.index(i)])
-            normal = float(lam[equations.first_hold + equations.held.index(i)])
-            limit = equations.stop_friction[i] * normal
+        friction, limit = _stick_force(equations, kind, i, lam, e)
         if abs(friction) <= limit and not yields:
             return STICKS
         gives = -1 if friction > 0.0 else 1
         for sign in (gives, -gives):
-            trial = self._equations(self._with_slide(kind, i, sign))
+            trial = self._equations(self.discrete.with_slide(kind, i, sign))
             a, _, _ = trial.accelerations(q, v)
-            if sign * float((row @ a).item() - rows.convective(e, v)[i]) > 0.0:
+            if sign * float(row @ a - rows.convective(e, v)[i]) > 0.0:
                 return sign
         return STICKS if not yields else IDLE
 
-    def _with_slide(self, kind: str, i: int, state: int) -> Discrete:
-        name = "rubs" if kind == "rub" else "slides"
-        states = list(getattr(self.discrete, name))
-        states[i] = state
-        return replace(self.discrete, **{name: tuple(states)})
+    def _slides(self, kind: str, i: int, q: Real, v: Real, slow: float) -> int:
+        """Return the direction in which something slides faster than ``slow``, or IDLE."""
+        row = self._slide_rows(kind).jacobian(self.system.directions(q))[i]
+        speed = float(row @ v)
+        return self._sign(speed) if abs(speed) > slow else IDLE
+
+    def _mobile(self, discrete: Discrete, kind: str, i: int, q: Real) -> bool:
+        """Tell whether something has a mobility of its own beside what else holds and sticks."""
+        e, M, loops = self._mass_and_loops(q)
+        row = self._slide_rows(kind).jacobian(e)[[i]]
+        held = self._equations(discrete.with_slide(kind, i, IDLE)).rows.jacobian(e)
+        return _mobility(M, held, row) > DEPENDENT * _mobility(M, loops, row)
+
+    def _settle_together(
+        self, at_rest: Sequence[tuple[str, int]], q: Real, v: Real, yields: tuple[str, int] | None
+    ) -> None:
+        """Choose together what those at rest do, who one by one find no end.
+
+        It is the first combination in which what sticks needs no more than its friction, what
+        slides begins to slide in its direction, and what holds is pressed.  Without one, or with
+        too many at rest, all stays as it is.
+        """
+        alone = self.discrete
+        for kind, i in at_rest:
+            alone = alone.with_slide(kind, i, IDLE)
+        free = [one for one in at_rest if self._mobile(alone, *one, q)]
+        if len(free) > MOST_AT_REST:
+            return
+        for states in product((STICKS, 1, -1), repeat=len(free)):
+            together, chosen = alone, dict(zip(free, states, strict=True))
+            for (kind, i), state in chosen.items():
+                together = together.with_slide(kind, i, state)
+            if (yields, STICKS) not in chosen.items() and self._agree(together, chosen, q, v):
+                self._set_discrete(together)
+                return
+
+    def _agree(
+        self, discrete: Discrete, chosen: Mapping[tuple[str, int], int], q: Real, v: Real
+    ) -> bool:
+        """Tell whether the forces and accelerations of a discrete state are what it says."""
+        sticks = [one for one, state in chosen.items() if state == STICKS]
+        if not all(self._mobile(discrete, *one, q) for one in sticks):
+            return False
+        e, equations = self.system.directions(q), self._equations(discrete)
+        a, lam, _ = equations.accelerations(q, v)
+        if not all(equations.stop_forces(lam)[i] > 0.0 for i in equations.held):
+            return False
+        for (kind, i), state in chosen.items():
+            if state == STICKS:
+                friction, limit = _stick_force(equations, kind, i, lam, e)
+                if abs(friction) > limit:
+                    return False
+            else:
+                rows = self._slide_rows(kind)
+                if state * float(rows.jacobian(e)[i] @ a - rows.convective(e, v)[i]) <= 0.0:
+                    return False
+        return True
 
     # -- outputs --
 
@@ -1235,6 +1290,18 @@ def _falls(f: Callable[[float], float], a: float, b: float) -> float:
     if f(b) > 0.0:
         return float(b)
     return float(brentq(f, a, b, xtol=TIME_RESOLUTION))
+
+
+def _stick_force(
+    equations: Equations, kind: str, i: int, lam: Real, e: Complex
+) -> tuple[float, float]:
+    """Return the friction of what sticks, and its limit [N]."""
+    if kind == "rub":
+        friction = float(lam[equations.first_rub + equations.rubbing.index(i)])
+        return friction, equations.rub_limit(i, e)
+    friction = float(lam[equations.first_stick + equations.stuck.index(i)])
+    normal = float(lam[equations.first_hold + equations.held.index(i)])
+    return friction, equations.stop_friction[i] * normal
 
 
 def _mobility(M: Real, held: Real, row: Real) -> float:

@@ -11,6 +11,7 @@
 #define SHORTEST_FLIGHT 5e-7  /* of the period: the arc of a shorter bounce is lost in rounding */
 #define LOWEST_BOUNCE 1e-10   /* of the size, in model exchange: gaps close a little late there */
 #define DEPENDENT 1e-4        /* share of a row's mobility that the stops leave */
+#define MOST_AT_REST 6        /* things with friction whose combinations are tried */
 #define ALIGNED 1e-9          /* the same for stops among each other */
 #define NO_SPRING TWO_PI      /* rad/s; the scale of rates of a linkage without springs */
 #define STILL 1e-9            /* of the velocity scale: what rounding leaves of none */
@@ -1012,7 +1013,8 @@ static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
     return true;
 }
 
-/* When a sliding velocity changes its sign. */
+/* When a sliding velocity changes its sign.  What begins to slide is at rest up to a rounding of
+ * either sign: it goes the other way if it does so at the end. */
 static void turning_back(Simulation *sim, int kind, int i, int sign, Event *first) {
     int n = sim->system.n;
     double z[WATCHED + 1];
@@ -1021,15 +1023,16 @@ static void turning_back(Simulation *sim, int kind, int i, int sign, Event *firs
     for (int k = 0; k <= WATCHED; k++) {
         z[k] = sign * row_rate(&rows, i, sim->look_e + k * n, sim->look_y + k * 2 * n + n);
     }
-    for (int k = 0; k < WATCHED; k++) {
+    bool begins = z[0] <= still(sim);
+    for (int k = begins; k < WATCHED; k++) {
         if (z[k] > 0.0 && z[k + 1] <= 0.0) {
             note(first, kind, i,
                  falls(&guard, SPEED_FALLS, look_time(sim, k), look_time(sim, k + 1)));
             return;
         }
     }
-    if (z[WATCHED] < 0.0 && z[0] <= 0.0) {
-        note(first, kind, i, look_time(sim, 1)); /* went the other way from the start */
+    if (begins && z[WATCHED] < 0.0) {
+        note(first, kind, i, look_time(sim, 1));
     }
 }
 
@@ -1336,6 +1339,11 @@ static void with_slide(Simulation *sim, int kind, int i, int state) {
     (kind == RUB ? sim->other.rubs : sim->other.slides)[i] = state;
 }
 
+static void set_slide(Simulation *sim, int kind, int i, int state) {
+    with_slide(sim, kind, i, state);
+    set_discrete(sim, &sim->other);
+}
+
 /* Friction and its limit of what sticks in sim->trial. */
 static void stick_force(const Simulation *sim, int kind, int i, const double *lam,
                         const Complex *e, double *friction, double *limit) {
@@ -1437,15 +1445,24 @@ typedef struct {
     double slow;
 } Turn;
 
-static bool settle_one(Simulation *sim, int kind, int i, const Turn *turn, Problem *problem) {
+/* What has friction, and what it does. */
+typedef struct {
+    int kind, index, state;
+} Rubbing;
+
+static bool turns(const Turn *turn, const Rubbing *one) {
+    return turn->kind == one->kind && turn->index == one->index;
+}
+
+static bool settle_one(Simulation *sim, const Rubbing *one, const Turn *turn, Problem *problem) {
     int state, n = sim->system.n;
-    bool this_one = turn->kind == kind && turn->index == i, yields = this_one && turn->yields;
+    bool this_one = turns(turn, one), yields = this_one && turn->yields;
     double slow = this_one ? turn->slow : 0.0;
-    if (!slide_state(sim, kind, i, sim->front, sim->front + n, yields, slow, &state, problem)) {
+    if (!slide_state(sim, one->kind, one->index, sim->front, sim->front + n, yields, slow, &state,
+                     problem)) {
         return false;
     }
-    with_slide(sim, kind, i, state);
-    set_discrete(sim, &sim->other);
+    set_slide(sim, one->kind, one->index, state);
     return true;
 }
 
@@ -1455,38 +1472,161 @@ static bool same_discrete(const Simulation *sim, const double *before) {
            memcmp(before + s, sim->rubs, f * sizeof(double)) == 0;
 }
 
+static void keep_friction(const Simulation *sim, double *slides_and_rubs) {
+    copy(sim->system.s, sim->slides, slides_and_rubs);
+    copy(sim->system.f, sim->rubs, slides_and_rubs + sim->system.s);
+}
+
+/* Whether something at rest has a mobility of its own beside what else holds and sticks now. */
+static bool is_mobile(Simulation *sim, const Rubbing *one, bool *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    Here here = mass_and_loops(sim, sim->front);
+    double *row = take(&sim->scratch, (size_t)sim->system.n);
+    Rows rows = rows_of(sim, one->kind);
+    row_jacobian(&rows, one->index, here.e, row);
+    bool right = has_mobility(sim, one->kind, one->index, &here, row, result, problem);
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* Whether the forces and accelerations of the present discrete state are what it says. */
+static bool agree(Simulation *sim, int count, const Rubbing *chosen, bool *result,
+                  Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = sim->system.n;
+    const double *q = sim->front, *v = sim->front + n;
+    *result = true;
+    for (int k = 0; *result && k < count; k++) {
+        if (chosen[k].state == STICKS && !is_mobile(sim, &chosen[k], result, problem)) {
+            return false;
+        }
+    }
+    if (!*result) {
+        return true;
+    }
+    Here here = mass_and_loops(sim, q);
+    size_t rows = (size_t)(sim->system.r + 2 * sim->system.s + sim->system.f);
+    double *a = take(&sim->scratch, (size_t)n), *lam = take(&sim->scratch, rows);
+    double *row = take(&sim->scratch, (size_t)n), friction, limit;
+    read_discrete(sim);
+    try_equations(sim, &sim->discrete);
+    bool right = accelerations(&sim->trial, q, v, a, lam, problem);
+    for (int k = 0; right && *result && k < sim->trial.held_count; k++) {
+        *result = lam[sim->trial.first_hold + k] > 0.0;
+    }
+    for (int k = 0; right && *result && k < count; k++) {
+        int i = chosen[k].index, state = chosen[k].state;
+        if (state == STICKS) {
+            stick_force(sim, chosen[k].kind, i, lam, here.e, &friction, &limit);
+            *result = fabs(friction) <= limit;
+        } else {
+            Rows of = rows_of(sim, chosen[k].kind);
+            row_jacobian(&of, i, here.e, row);
+            *result = state * (dot(n, row, a) - row_convective(&of, i, here.e, v)) > 0.0;
+        }
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* Those at rest that have a mobility beside what holds; all at rest are left idle. */
+static bool free_at_rest(Simulation *sim, int count, const Rubbing *rubbing, const Turn *turn,
+                         int *free_count, Rubbing *free_ones, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = sim->system.n, resting = 0;
+    bool right = true, mobile = false;
+    double *row = take(&sim->scratch, (size_t)n);
+    Rubbing at_rest[2 * MOST_STOPS];
+    directions(&sim->system, sim->front, sim->e);
+    for (int k = 0; k < count; k++) {
+        Rows rows = rows_of(sim, rubbing[k].kind);
+        row_jacobian(&rows, rubbing[k].index, sim->e, row);
+        double speed = dot(n, row, sim->front + n), slow = turns(turn, &rubbing[k]) ? turn->slow : 0.0;
+        if (fabs(speed) <= slow || sign_of_speed(sim, speed) == IDLE) {
+            at_rest[resting++] = rubbing[k];
+        }
+    }
+    for (int k = 0; k < resting; k++) {
+        set_slide(sim, at_rest[k].kind, at_rest[k].index, IDLE);
+    }
+    *free_count = 0;
+    for (int k = 0; right && k < resting; k++) {
+        right = is_mobile(sim, &at_rest[k], &mobile, problem);
+        if (right && mobile) {
+            free_ones[(*free_count)++] = at_rest[k];
+        }
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* Choose together what those at rest do, who one by one find no end.  It is the first combination in
+ * which what sticks needs no more than its friction, what slides begins to slide in its direction,
+ * and what holds is pressed.  Without one, or with too many at rest, all stays as it is. */
+static bool settle_together(Simulation *sim, int count, const Rubbing *rubbing, const Turn *turn,
+                            Problem *problem) {
+    static const int states[3] = {STICKS, SLIDES, SLIDES_BACK};
+    double kept[2 * MOST_STOPS];
+    Rubbing chosen[2 * MOST_STOPS];
+    int many, combinations = 1;
+    bool found = false;
+    keep_friction(sim, kept);
+    if (!free_at_rest(sim, count, rubbing, turn, &many, chosen, problem)) {
+        return false;
+    }
+    for (int k = 0; k < many && many <= MOST_AT_REST; k++) {
+        combinations *= 3;
+    }
+    for (int c = 0; many <= MOST_AT_REST && !found && c < combinations; c++) {
+        bool may = true;
+        for (int k = many - 1, rest = c; k >= 0; k--, rest /= 3) {
+            chosen[k].state = states[rest % 3];
+            set_slide(sim, chosen[k].kind, chosen[k].index, chosen[k].state);
+            may = may && !(turn->yields && turns(turn, &chosen[k]) && chosen[k].state == STICKS);
+        }
+        if (may && !agree(sim, many, chosen, &found, problem)) {
+            return false;
+        }
+    }
+    if (!found) {
+        copy(sim->system.s, kept, sim->slides);
+        copy(sim->system.f, kept + sim->system.s, sim->rubs);
+        read_discrete(sim);
+        set_discrete(sim, &sim->discrete);
+    }
+    return true;
+}
+
 /* Choose what sticks and slides; what one does may change what another must do. */
 static bool settle_friction(Simulation *sim, const Holding *holding, const Turn *turn,
                             Problem *problem) {
-    int s = sim->system.s, f = sim->system.f, rubbing = 0;
+    int count = 0;
     double before[2 * MOST_STOPS];
+    Rubbing rubbing[2 * MOST_STOPS];
     for (int k = 0; k < holding->count; k++) {
-        rubbing += sim->equations.stop_friction[holding->stops[k]] > 0.0;
-    }
-    for (int i = 0; i < f; i++) {
-        rubbing += sim->equations.rub_law[3 * i] > 0.0;
-    }
-    for (int round = 0; round <= rubbing; round++) {
-        copy(s, sim->slides, before);
-        copy(f, sim->rubs, before + s);
-        for (int k = 0; k < holding->count; k++) {
-            int i = holding->stops[k];
-            if (sim->equations.stop_friction[i] > 0.0 &&
-                !settle_one(sim, SLIDE, i, turn, problem)) {
-                return false;
-            }
+        if (sim->equations.stop_friction[holding->stops[k]] > 0.0) {
+            Rubbing one = {SLIDE, holding->stops[k], IDLE};
+            rubbing[count++] = one;
         }
-        for (int i = 0; i < f; i++) {
-            if (sim->equations.rub_law[3 * i] > 0.0 &&
-                !settle_one(sim, RUB, i, turn, problem)) {
+    }
+    for (int i = 0; i < sim->system.f; i++) {
+        if (sim->equations.rub_law[3 * i] > 0.0) {
+            Rubbing one = {RUB, i, IDLE};
+            rubbing[count++] = one;
+        }
+    }
+    for (int round = 0; round <= count; round++) {
+        keep_friction(sim, before);
+        for (int k = 0; k < count; k++) {
+            if (!settle_one(sim, &rubbing[k], turn, problem)) {
                 return false;
             }
         }
         if (same_discrete(sim, before)) {
-            break;
+            return true;
         }
     }
-    return true;
+    return settle_together(sim, count, rubbing, turn, problem);
 }
 
 /* The spacing of the numbers around x. */
