@@ -24,6 +24,7 @@ from .mechanism import Mechanism, finite, unknown, value
 STICKS = 0  # and +1, -1: slides along, against the direction
 LOADS = {"x": "N", "y": "N", "moment": "N.m"}  # of a force; times s, of an impulse
 MOBILITY = "mobility"  # of a wall: an input of its stop
+LARGEST_MOBILITY = 1e100  # 1/kg; beyond, impulses are lost to underflow
 IDLE = 2  # no friction acts: open, frictionless, or the stop carries everything
 
 
@@ -140,6 +141,8 @@ def check_input(name: str, number: float, known: Mapping[str, float]) -> float:
     if name not in known:
         raise ParameterError(unknown(name, known))
     x = finite(name, number)
+    if x > LARGEST_MOBILITY and name.endswith(f".{MOBILITY}"):
+        raise ParameterError(f"{name} = {x:g} 1/kg must be at most {LARGEST_MOBILITY:g} 1/kg")
     if x < 0.0 and name.endswith(f".{MOBILITY}"):
         raise ParameterError(
             f"{name} = {x:g} 1/kg must not be negative: it is the inverse effective mass of the "

@@ -449,8 +449,8 @@ class Simulation:
             if h < SMALLEST_STEP:
                 raise SimulationError(
                     f"the step size fell below {SMALLEST_STEP:g} s at t = {t:.9g} s: the motion "
-                    "is too violent for the model; check the inputs and parameters, or add "
-                    "damping.beta"
+                    "is too violent for the model, or its links lie flat, where it ends; check the "
+                    "inputs and parameters, or add damping.beta"
                 )
             if t + h == t:
                 raise SimulationError(

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from prbm import Force, Mechanism, MechanismError, Parameter, ParameterError, Stop, assemble
-from prbm.dynamics import MOBILITY, input_units
+from prbm.dynamics import LARGEST_MOBILITY, MOBILITY, input_units
 from prbm.mechanism import GROUND, affine, unknown
 
 from .units import QUANTITIES, Quantity
@@ -341,7 +341,7 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
             f"Inverse of the effective mass of the {wall(stop)}: an impulse changes its velocity "
             "by so much times itself, 0 if it is immovable",
         )
-        yield replace(mobility, minimum=0.0)
+        yield replace(mobility, minimum=0.0, maximum=LARGEST_MOBILITY)
     for axis in "xy":
         yield given(
             f"{BASE}.acceleration.{axis}",

@@ -13,6 +13,7 @@
 
 #define DRIFT 1e-8        /* of the size, and with the frequency of the velocity: worth an event */
 #define UNDRIFTED 1e-12   /* of these: left alone in an event */
+#define DEEP 1e-2         /* of the size: a solver that overshoots takes nothing so far into a wall */
 #define FLOOR 1e-12       /* of the size: how far below zero a gap closes, more than a rounding */
 #define FORESIGHT 0.01    /* of the period: an opening rate keeps the indicator off zero by so much */
 #define DEFINITE 1e-7     /* of the largest pivot: a smaller one says that the choice is singular */
@@ -617,6 +618,25 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     right = attempt(sim, right, problem);
     sim->stale = !right;
     return right;
+}
+
+/* The stop that the state is deepest in, if it is more than a mark of a solver's; or NULL. */
+PRBM const char *exchange_deepest(Simulation *simulation, double *depth) {
+    Simulation *sim = simulation;
+    const char *found = NULL;
+    Problem ignored;
+    *depth = DEEP * sim->system.length;
+    if (!evaluate_motion(sim, &ignored)) {
+        return NULL;
+    }
+    for (int i = 0; i < sim->system.s; i++) {
+        double inside = -gap(&sim->equations, i, sim->now->time, sim->equations.e);
+        if (inside > *depth) {
+            *depth = inside;
+            found = sim->mechanism->stops[i].name;
+        }
+    }
+    return found;
 }
 
 PRBM void exchange_begin(Simulation *sim) {

@@ -108,9 +108,10 @@ const char *fmi2GetVersion(void) {
     return fmi2Version;
 }
 
+/* The text itself is the format, so that loggers that take no further arguments show it, too. */
 static void send2(const Journal *journal, int status, const char *category, const char *text) {
     fmi2CallbackLogger logger = (fmi2CallbackLogger)journal->callback;
-    logger(journal->environment, journal->instance, (fmi2Status)status, category, "%s", text);
+    logger(journal->environment, journal->instance, (fmi2Status)status, category, text);
 }
 
 fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
@@ -137,6 +138,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     request.resources = fmuResourceLocation;
     request.journal.instance = instanceName ? instanceName : "";
     request.journal.send = send2;
+    request.journal.special = "#%";
     request.journal.categories = loggingOn ? LOG_EVERYTHING : LOG_ERROR | LOG_FATAL;
     if (functions) {
         request.journal.callback = (Callback *)functions->logger;

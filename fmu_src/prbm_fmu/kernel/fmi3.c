@@ -203,6 +203,7 @@ static Request request3(Kind kind, fmi3String instanceName, fmi3String instantia
     request.journal.environment = environment;
     request.journal.callback = (Callback *)logMessage;
     request.journal.send = send3;
+    request.journal.special = "#";
     request.journal.categories = loggingOn ? LOG_EVERYTHING : LOG_NOTHING;
     return request;
 }

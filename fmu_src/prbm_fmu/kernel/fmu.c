@@ -8,6 +8,7 @@
 
 static const double TIME_SLACK = 1e-6;  /* of a step: round-off that importers gather */
 static const double TIME_ROUND = 1e-12; /* of the time itself */
+static const double END_SLACK = 1e-3;   /* of a step: the same of the end, which they add up to */
 #define TO_RESET "reset the instance to start again"
 
 /* --- messages --------------------------------------------------------------------------------- */
@@ -31,11 +32,11 @@ static void cut_text(char *text, size_t length) {
     text[length] = '\0';
 }
 
-/* Double every #, which would begin the reference of a variable, as far as there is room. */
-static void escape(const char *text, char *out, size_t room) {
+/* Double what would begin something, as # the reference of a variable, as far as there is room. */
+static void escape(const char *text, const char *special, char *out, size_t room) {
     for (; *text && room > 2; text++, room--) {
-        if (*text == '#') {
-            *out++ = '#';
+        if (strchr(special, *text)) {
+            *out++ = *text;
             room--;
         }
         *out++ = *text;
@@ -53,7 +54,7 @@ static void send(const Journal *journal, int status, const char *format, va_list
     if (length >= MESSAGE_LENGTH) {
         cut_text(text, MESSAGE_LENGTH - 1);
     }
-    escape(text, escaped, sizeof escaped);
+    escape(text, journal->special, escaped, sizeof escaped);
     journal->send(journal, status, CATEGORIES[status].name, escaped);
 }
 
@@ -447,6 +448,7 @@ PRBM int exit_initialization(Instance *instance) {
     bool event_mode = instance->kind == MODEL_EXCHANGE || instance->event_mode;
     instance->mode = event_mode ? MODE_EVENT : MODE_STEP;
     instance->updated = instance->event_due = false;
+    instance->depth_told = 0.0;
     return FMU_OK;
 }
 
@@ -684,6 +686,7 @@ static void go_back(Instance *instance) {
 static int check_step(const Instance *instance, double time, double size) {
     double now = simulation_time(instance->simulation), target = time + size;
     double slack = TIME_SLACK * size + TIME_ROUND * (now < 0.0 ? -now : now);
+    double sums = slack + END_SLACK * size;
     if (stands(instance, FMU_DISCARD)) {
         return FMU_DISCARD;
     }
@@ -712,7 +715,7 @@ static int check_step(const Instance *instance, double time, double size) {
                                              "at t = %.12g s: make a longer step",
                       size, now);
     }
-    if (instance->stop_defined && target - instance->stop_time > slack) {
+    if (instance->stop_defined && target - instance->stop_time > sums) {
         return refuse(instance, FMU_ERROR,
                       "the step would end at t = %.12g s, but stopTime = %.12g s: make a shorter "
                       "step, or set the experiment up without stopTime",
@@ -794,6 +797,20 @@ static bool any_tick(const Instance *instance) {
     return false;
 }
 
+/* A wall that was put deep into a body, or a body that was taken through it, is told once a depth. */
+static int warn_of_depth(Instance *instance) {
+    double depth;
+    const char *stop = exchange_deepest(instance->simulation, &depth);
+    if (!stop || depth <= 2.0 * instance->depth_told) {
+        return FMU_OK;
+    }
+    instance->depth_told = depth;
+    return refuse(instance, FMU_WARNING,
+                  "%s.gap = %.6g m: the wall is inside the body, which is not pushed out; move it "
+                  "continuously, with %s.displacement and %s.velocity, or integrate in shorter steps",
+                  stop, -depth, stop, stop);
+}
+
 /* Let happen what is due.  A clock that ticks because of it does so in a super-dense instant of
  * its own, in which its variables have the values after the impact; the next call ends it. */
 PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed) {
@@ -811,7 +828,7 @@ PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed) 
     *again = instance->clocks && any_tick(instance);
     instance->event_due = false;
     instance->updated = !*again;
-    return FMU_OK;
+    return exchange ? warn_of_depth(instance) : FMU_OK;
 }
 
 PRBM int leave_event_mode(Instance *instance, const Rule *rule, Mode next) {

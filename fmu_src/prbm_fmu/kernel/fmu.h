@@ -72,6 +72,7 @@ struct Journal {
     void *environment;
     Callback *callback; /* NULL: nobody listens */
     Send *send;
+    const char *special; /* what is doubled in a message, because it would begin something */
     unsigned categories; /* which are wanted, by their bits */
 };
 
@@ -125,6 +126,7 @@ struct Instance {
     bool event_due; /* an event waits for the end of Event Mode */
     bool updated;   /* the discrete states were, since Event Mode was entered */
     int last_step;  /* status of the last step */
+    double depth_told; /* m in a wall, of the last warning */
     bool unknown_refused;
     uint32_t unknown;       /* a reference that was set and is none */
     unsigned char *refused; /* (slots.count,): a set of it was refused and not yet put right */

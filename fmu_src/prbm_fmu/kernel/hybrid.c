@@ -659,7 +659,8 @@ static bool find_step(Simulation *sim, double *step, Problem *problem) {
         if (h < SMALLEST_STEP) {
             return fail(problem,
                         "the step size fell below %g s at t = %.9g s: the motion is too violent "
-                        "for the model; check the inputs and parameters, or add damping.beta",
+                        "for the model, or its links lie flat, where it ends; check the inputs and "
+                        "parameters, or add damping.beta",
                         SMALLEST_STEP, now->front_time);
         }
         if (now->front_time + h == now->front_time) {

@@ -76,6 +76,7 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
 PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *problem);
 /* Event mode: let what is due happen.  *changed: the states have new values. */
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem);
+PRBM const char *exchange_deepest(Simulation *simulation, double *depth);
 /* Derivative of all values (slots.count) along a change of states dx and of inputs du, by exact
  * differentiation, at the present time; discrete and constant values have none. */
 PRBM bool exchange_directional(Simulation *simulation, const double *dx, const double *du,
