@@ -10,6 +10,7 @@
 #define RELEASE_GAP 1e-9      /* m; a wall may be touched at release by no more than this */
 #define SHORTEST_FLIGHT 5e-7  /* of the period: the arc of a shorter bounce is lost in rounding */
 #define LOWEST_BOUNCE 1e-10   /* of the size, in model exchange: gaps close a little late there */
+#define LARGEST_MOBILITY 1e100 /* 1/kg; beyond, impulses are lost to underflow */
 #define DEPENDENT 1e-4        /* share of a row's mobility that the stops leave */
 #define MOST_AT_REST 6        /* things with friction whose combinations are tried */
 #define ALIGNED 1e-9          /* the same for stops among each other */
@@ -339,6 +340,10 @@ PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *pr
             return fail(problem, "%s = %g must be a finite number", m->input_names[i], x);
         }
         bool mobility = i >= m->input.mobilities && i < m->input.base;
+        if (mobility && x > LARGEST_MOBILITY) {
+            return fail(problem, "%s = %g 1/kg must be at most %g 1/kg", m->input_names[i], x,
+                        LARGEST_MOBILITY);
+        }
         if (mobility && x < 0.0) {
             return fail(problem,
                         "%s = %g 1/kg must not be negative: it is the inverse effective mass of "
