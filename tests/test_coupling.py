@@ -6,7 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from kernel_simulation import KernelSimulation
+from kernel_simulation import KernelMistake, KernelSimulation
 from prbm import ParameterError, Simulation, contact
 from prbm.hybrid import RELEASE_GAP
 from prbm.mechanism import value
@@ -207,6 +207,11 @@ def test_impulses_before_the_start_are_past():
     assert one.front.tolist() == other.front.tolist()
 
 
-def test_a_negative_mobility_is_refused():
-    with pytest.raises(ParameterError, match=r"stop.mobility = -1 1/kg must not be negative"):
-        Simulation(mechanism("PRBDM"), {"stop.mobility": -1.0})
+@pytest.mark.parametrize("twin", [Simulation, KernelSimulation])
+@pytest.mark.parametrize(
+    ("mobility", "words"),
+    [(-1.0, r"= -1 1/kg must not be negative"), (1e200, r"= 1e\+200 1/kg must be at most 1e\+100")],
+)
+def test_a_mobility_that_is_none_is_refused(twin, mobility, words):
+    with pytest.raises((ParameterError, KernelMistake), match=f"stop.mobility {words}"):
+        twin(mechanism("PRBDM"), {"stop.mobility": mobility})

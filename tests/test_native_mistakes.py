@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
+from fmpy import fmi2, simulate_fmu
 from fmpy.fmi1 import FMICallException
 
 from native_host import (
@@ -117,6 +117,17 @@ def test_a_step_beyond_the_stop_time_is_refused(native, fmi, kind):
         assert instance.step(0.01, 1e-3) == ERROR
         assert instance.said("the step would end at t = 0.011 s, but stopTime = 0.01 s")
         assert instance.bytes() == here
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_steps_whose_sum_is_a_rounding_past_the_stop_time_are_made(native, fmi):
+    """An importer that adds up 1e5 steps ends 2e-12 s late, a part of 2e-7 of its step."""
+    with Instance(native["PRBDM", fmi], "cs").initialize(stop=0.1) as instance:
+        instance.advance(0.1 - 1e-6)
+        late = 0.1 - 1e-6 + 1e-10
+        assert instance.step(late, 1e-6) == DISCARD, "it does not begin where the last one ended"
+        assert instance.step(0.1 - 1e-6, 1e-6 + 5e-10) == OK
+        assert instance.step(0.1 + 5e-10, 1e-6) == ERROR
 
 
 @pytest.mark.parametrize("case", LATER)
@@ -659,6 +670,31 @@ def test_log_categories_are_honoured_and_others_are_refused(native, fmi, kind):
         for category in declared:
             assert status(categories, True, [category]) == OK
         assert {"logEvents", "logStatusError", "logStatusDiscard"} <= declared
+
+
+def test_a_logger_that_formats_nothing_shows_messages_whole(native):
+    """As those written in languages without C's variable arguments, in FMI 2.0."""
+    told = []
+
+    def log(_, name, status, category, text):
+        told.append(text.decode())
+
+    listening = fmi2.fmi2CallbackFunctions()
+    listening.logger = fmi2.fmi2CallbackLoggerTYPE(log)  # which FMPy's proxy does not format
+    listening.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+    listening.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+    folder, description = unpacked(native["PRBDM", 2])
+    slave = fmi2.FMU2Slave(
+        guid=description.guid, unzipDirectory=str(folder), modelIdentifier="PRBDM",
+        instanceName="alone",
+    )  # fmt: skip
+    slave.instantiate(callbacks=listening, loggingOn=True)
+    slave.setupExperiment()
+    slave.enterInitializationMode()
+    slave.exitInitializationMode()
+    slave.doStep(0.0, 0.05)
+    slave.freeInstance()
+    assert told[-1].startswith("impact 1 at stop, t = 0.041")
 
 
 @ways
