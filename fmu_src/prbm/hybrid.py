@@ -208,6 +208,8 @@ class Simulation:
         self.latched = [Latched() for _ in walls]
         self.record: list[Impact] | None = None
         self._window = (self.time, 0)
+        self._planned = self._due = self.time  # when walls were planned, by when they are there
+        self._told = self._wall_velocities()
         self.arc: Arc | None = None
         self.h, self.last_error = 0.0, LEAST_ERROR
         self.changed = False
@@ -283,6 +285,9 @@ class Simulation:
             + self.given[f"{stop.name}.velocity"] * h
         )
 
+    def _wall_velocities(self) -> tuple[float, ...]:
+        return tuple(self.given[f"{stop.name}.velocity"] for stop in self.mechanism.stops)
+
     def _inputs(self, walls: tuple[Wall, ...]) -> Inputs:
         given, mechanism = self.given, self.mechanism
         return Inputs(
@@ -356,13 +361,27 @@ class Simulation:
         self._output_cache = None
 
     def _move_walls(self, time: float) -> None:
-        """Turn the inputs of the walls into uniform motions up to a time."""
-        walls = list(self.inputs.walls)
-        for i, wall in enumerate(walls):
-            target = self._wall_target(i, time - self.time)
-            if abs(wall.at(time) - target) > 1e-13 * self.system.length:
-                here = wall.at(self.time)
-                walls[i] = Wall(here, (target - here) / (time - self.time), self.time)
+        """Turn the inputs of the walls into uniform motions up to a time.
+
+        A wall that is a little elsewhere than it is said to be gets there within the step.  One
+        with a velocity does not hurry in a step that is shorter than the last one: it takes as
+        long as that, or goes by what its velocity has changed, or by half of ``rest_speed``.
+        """
+        now, span, velocities = self.time, time - self.time, self._wall_velocities()
+        due, walls = max(self._due, 2 * now - self._planned), list(self.inputs.walls)
+        for i, (wall, velocity) in enumerate(zip(walls, velocities, strict=True)):
+            here = wall.at(now)
+            off = self._wall_target(i, 0.0) - here
+            mends = off / span
+            if velocity and due > time:
+                most = max(
+                    abs(off) / (due - now), abs(velocity - self._told[i]),
+                    0.5 * self._field(i, "rest_speed"),
+                )  # fmt: skip
+                mends = min(max(mends, -most), most)
+            if abs(wall.at(time) - here - (velocity + mends) * span) > 1e-13 * self.system.length:
+                walls[i] = Wall(here, velocity + mends, now)
+        self._planned, self._due, self._told = now, due, velocities
         if tuple(walls) != self.inputs.walls:
             self.inputs = replace(self.inputs, walls=tuple(walls))
             self.changed = True
@@ -1213,6 +1232,9 @@ class Simulation:
             "discrete": asdict(self.discrete),
             "latched": [asdict(latched) for latched in self.latched],
             "window": list(self._window),
+            "planned": self._planned,
+            "due": self._due,
+            "told": list(self._told),
             "h": self.h,
             "last_error": self.last_error,
             "changed": self.changed,
@@ -1269,6 +1291,7 @@ class Simulation:
         self.latched = [Latched(**latched) for latched in s["latched"]]
         self.received = list(s["received"])
         self._window = (s["window"][0], s["window"][1])
+        self._planned, self._due, self._told = s["planned"], s["due"], tuple(s["told"])
         self.h, self.last_error, self.changed = s["h"], s["last_error"], s["changed"]
         self.front_time, self.front = s["front_time"], np.array(s["front"])
         self.k1 = None if s["k1"] is None else np.array(s["k1"])

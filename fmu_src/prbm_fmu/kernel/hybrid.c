@@ -486,6 +486,7 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
     Scalars fresh = {0};
     *sim->now = fresh;
     sim->now->time = sim->now->front_time = sim->now->window_since = start_time;
+    sim->now->planned = sim->now->due = start_time;
     sim->now->tolerance = wanted;
     sim->now->exchange = exchange;
     sim->now->log_of_error = natural_log(LEAST_ERROR);
@@ -532,21 +533,42 @@ static bool within_step(const Simulation *sim, double time) {
     return now->adrift != 0.0 && time <= now->underway_until + rounding;
 }
 
-/* Turn the inputs of the walls into uniform motions up to a time; whether one changes.  A wall that is
- * a little elsewhere than it is said to be gets there within the step.  What is left of a step after
- * an event may be too short for that: for the rest of it the walls go on as they do, but for one
- * whose velocity has changed at once. */
+/* By when the walls are to be where they are said to be: in as long as the last step took. */
+static double due_walls(const Simulation *sim) {
+    return greater(sim->now->due, 2.0 * sim->now->time - sim->now->planned);
+}
+
+/* The rate of a wall in a step.  If it is a little elsewhere than it is said to be it gets there within
+ * the step.  One with a velocity does not hurry in a step that is shorter than the last one: it takes
+ * as long as that, or goes by what its velocity has changed, or by half of rest_speed. */
+static double wall_rate(const Simulation *sim, int i, double time) {
+    double now = sim->now->time, due = due_walls(sim), velocity = given_velocity(sim, i);
+    double off = wall_target(sim, i, 0.0) - wall_at(&sim->walls[i], now);
+    double mends = off / (time - now);
+    if (velocity != 0.0 && due > time) {
+        double rest_speed = stop_field(sim, sim->mechanism->stops[i].rest_speed);
+        double most = greater(fabs(off) / (due - now), fabs(velocity - *acting_velocity(sim, i)));
+        most = greater(most, 0.5 * rest_speed);
+        mends = lesser(greater(mends, -most), most);
+    }
+    return velocity + mends;
+}
+
+/* Turn the inputs of the walls into uniform motions up to a time; whether one changes.  For the rest
+ * of a step after an event the walls go on as they do, but for one whose velocity has changed at
+ * once. */
 static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
     bool changed = false, rest = within_step(sim, time);
-    double now = sim->now->time;
+    double now = sim->now->time, span = time - now;
     for (int i = 0; i < sim->system.s; i++) {
-        double here = wall_at(&sim->walls[i], now), target = wall_target(sim, i, time - now);
-        double velocity = rest ? given_velocity(sim, i) : (target - here) / (time - now);
+        double here = wall_at(&sim->walls[i], now);
+        double rate = rest ? given_velocity(sim, i) : wall_rate(sim, i, time);
+        double off = fabs(wall_at(&sim->walls[i], time) - here - rate * span);
         bool other = rest ? given_another(sim, i, *acting_velocity(sim, i))
-                          : fabs(wall_at(&sim->walls[i], time) - target) > 1e-13 * sim->system.length;
+                          : off > 1e-13 * sim->system.length;
         planned[i] = sim->walls[i];
         if (other) {
-            Wall wall = {here, velocity, now};
+            Wall wall = {here, rate, now};
             planned[i] = wall;
             changed = true;
         }
@@ -2188,10 +2210,15 @@ static bool advance(Simulation *sim, double time, bool each, bool events, bool *
     *event = false;
     if (!continues(sim, time)) {
         Wall planned[MOST_STOPS];
-        bool walls = plan_walls(sim, time, planned);
+        bool walls = plan_walls(sim, time, planned), rest = within_step(sim, time);
+        double begins = now->time, due = due_walls(sim);
         if ((walls || values_changed(sim) || given_changed(sim)) &&
             !restart(sim, planned, problem)) {
             return false;
+        }
+        if (!rest) {
+            now->due = due;
+            now->planned = begins;
         }
         now->adrift = 0.0;
     }

@@ -17,6 +17,7 @@ typedef struct {
     double has_arc, arc_start, arc_h, arc_end;
     double event_kind, event_index, event_time;
     double underway, underway_until; /* a communication step that was left in its middle */
+    double planned, due; /* when the motions of the walls were, and by when they are to be there */
     double adrift; /* an event was handled in its middle, with inputs: the walls go on till its end */
 } Scalars;
 
