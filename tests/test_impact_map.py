@@ -72,6 +72,60 @@ def test_the_closed_form_is_near_the_model_that_stretches():
     assert centre == pytest.approx(0.6, abs=1e-6)  # straight and centred: nothing is in the way
 
 
+@pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R", "PRBDM2RAxial", "PRBDM3R"])
+def test_the_closed_form_fits_every_guide(name):
+    """A straight guide hit off its centre: (1 + eps)/(1 + m d^2/J) - 1, J = m (a^2 + b^2)/12."""
+    m = mechanism(name)
+    known = m.values()
+    ratio = known["shuttle.mass"] * 3e-3**2 / known["shuttle.inertia"]
+    found = impact_map.closed_form(m, [0.0, -17e-3], [3e-3], WEIGHTLESS).restitution
+    assert found[0, 0] == pytest.approx(1.6 / (1 + ratio) - 1, abs=1e-6)
+    assert found[0, 1] < found[0, 0]  # its path is no longer along the direction of the stop
+
+
+@pytest.mark.parametrize(
+    ("name", "height", "offset", "said"),
+    [
+        ("Cantilever", 3e-3, 0.0, "tip turns"),  # by 3/2 of its path over its length
+        (
+            "FoldedSuspension",
+            1e-7,
+            0.0,
+            r"shuttle along its path is 8\d",
+        ),  # 200 g of 230 and leaves
+    ],
+)
+def test_the_closed_form_is_refused_where_the_body_turns_or_others_move(name, height, offset, said):
+    m = mechanism(name)
+    with pytest.raises(ParameterError, match=said) as error:
+        impact_map.closed_form(m, [height], [offset])
+    assert "choose another way" in str(error.value)
+
+
+def test_the_closed_form_is_refused_where_a_lever_makes_a_little_turning_much():
+    """Far aside of the centre of mass the little that a deflected guide turns is a motion."""
+    impact_map.closed_form(guide(), [-15e-3], [10e-3], WEIGHTLESS)
+    with pytest.raises(ParameterError, match="shuttle turns"):
+        impact_map.closed_form(guide(), [-15e-3], [0.2], WEIGHTLESS)
+
+
+def test_the_closed_form_is_refused_at_a_stop_that_moves():
+    two = guide()
+    other = replace(two.bodies[0], name="other")
+    on = replace(two.stops[0], on="other")
+    moving = replace(
+        two,
+        bodies=(*two.bodies, other),
+        stops=(on,),
+        flexures=(
+            *two.flexures,
+            *(replace(f, name=f"{f.name}_other", end=f.end) for f in two.flexures),
+        ),
+    )
+    with pytest.raises(ParameterError, match="stop is on other, which moves"):
+        impact_map.closed_form(moving)
+
+
 def test_the_stretching_2r_agrees_with_finite_elements_everywhere():
     """To 0.005 at the source's 25 points, nothing fitted; without stretching it does not."""
     pytest.importorskip(
