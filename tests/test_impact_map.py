@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from prbm import EquilibriumError, ParameterError, Simulation, assemble, constra
 from prbm.contact import response as impulse_response
 from prbm.kinetics import inertia
 from prbm.modal import modes_at
-from prbm_tools import impact_map
+from prbm_tools import impact_map, stretching
 from prbm_tools.figures import png
 from prbm_tools.records import RecordError
 from support import mechanism
@@ -270,3 +271,29 @@ def test_own_coefficients_stay_where_the_model_does():
     parts = replace(guide("1R"), flexure_types=(own,))
     assert impact_map.with_flexures(parts, "1R", axial=True).values()["flexure.K_theta"] == 2.5449
     assert impact_map.with_flexures(parts, "2R").values()["flexure.K_theta1"] == 3.4710
+
+
+def test_a_note_tells_what_flexures_that_do_not_stretch_hide():
+    """Off the centre of mass, C of the free body that the flexures leave: 1.6/(1 + m d^2/J) - 1."""
+    values = WEIGHTLESS | {"stop.offset": 4e-3, "stop.position": 0.0}
+    known = guide().values()
+    free = 1.6 / (1 + known["shuttle.mass"] * 4e-3**2 / known["shuttle.inertia"]) - 1
+    told = stretching.note(guide(), values, 0)
+    assert "stop hits 4 mm off the centre of mass of shuttle" in told
+    rigid, stretched = map(float, re.search(r"is ([-\d.]+), and would be ([-\d.]+)", told).groups())
+    assert rigid == pytest.approx(0.6, abs=0.005)
+    assert stretched == pytest.approx(free, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("model", "values"),
+    [
+        (guide(), {}),  # in the middle
+        (guide(), {"stop.offset": 0.5e-3}),  # nearly
+        (guide(axial=True), {"stop.offset": 4e-3}),  # stretches
+        (mechanism("Cantilever"), {"stop.offset": 4e-3}),  # off the centre, but nothing to give way
+        (guide(), {"stop.offset": 4e-3, "stop.position": 1.0}),  # out of reach
+    ],
+)
+def test_no_note_where_stretching_does_not_matter(model, values):
+    assert stretching.notes(model, values) == []

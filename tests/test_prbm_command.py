@@ -253,6 +253,23 @@ def test_a_map_of_one_point_is_written_without_a_surface(capsys):
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("impact-map PRBDM2R --heights 0 --offsets 0 3 mm", 1),
+        ("impact-map PRBDM2R --heights 0 --offsets 0 3 mm --model 1R 2R", 2),
+        ("impact-map PRBDM2R --heights 0 --offsets 0", 0),
+        ("impact-map PRBDM2R --heights 0 --offsets 3mm --model 2R --axial", 0),
+        ("impact-map PRBDM2R --heights 0 --offsets 3mm --way closed-form", 0),
+        ("simulate PRBDM --stop-time 1ms --set stop.offset=3mm --set force.x=1", 1),
+        ("simulate PRBDM --stop-time 1ms", 0),
+    ],
+)
+def test_what_flexures_hide_of_an_impact_off_the_centre_is_told(line, told, capsys):
+    assert run(line) == cli.OK
+    assert capsys.readouterr().out.count("hits 3 mm off the centre of mass of shuttle") == told
+
+
 def test_a_mechanism_of_ones_own_is_named_by_its_file(capsys):
     Path("mine.toml").write_bytes(shipped()["Bistable"].read_bytes())
     assert run("equilibrium mine.toml") == run("equilibrium Bistable") == cli.OK
@@ -308,6 +325,8 @@ MISTAKES = [
     ("impact-map PRBDM --stop bumper", "no stop bumper; it has stop"),
     ("impact-map ImpactOscillator", "position of impact is an expression"),
     ("impact-map PRBDM --heights 1 1 mm", "a place stands there twice"),
+    ("impact-map PRBDM --set release.displacement=0", "no default heights: give --heights"),
+    ("impact-map Cantilever --heights 3mm --way closed-form", "choose another way"),
     ("impact-map PRBDM --way magic", "invalid choice: 'magic'"),
     ("impact-map PRBDM --axial", "--axial goes with --model"),
     ("impact-map PRBDM --model nR --links 0", "a chain has one link or more"),

@@ -32,7 +32,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -42,7 +42,7 @@ from prbm import Impact, Mechanism, ParameterError, Simulation, assemble, equili
 from prbm.assembly import Real, System, unit
 from prbm.constraints import gap_rows
 from prbm.errors import EquilibriumError
-from prbm.mechanism import GROUND, affine, value
+from prbm.mechanism import GROUND, value
 from prbm.modal import Modes, modes_at
 from prbm.statics import Equilibrium
 
@@ -51,11 +51,10 @@ from .fit import DISPLACEMENT, Fit, Response, fit
 from .records import Series
 from .scene import own_style, plain
 from .simulate import Progress
+from .touching import impact_shape, lever, touching
 
 HEIGHTS = (-10e-3, -5e-3, 0.0, 5e-3, 10e-3)  # m; the source's walls
 OFFSETS = (-4e-3, -2e-3, 0.0, 2e-3, 4e-3)  # m; and offsets
-TOUCHES = 1e-9  # of the size: gap at which a held shape touches the wall
-SECANTS = 20
 PATIENCE = 1.5  # periods of the fundamental mode in which a wall must be reached
 SAMPLES = 200  # of a response that is fitted
 REBOUND = 0.4  # periods after the first impact that a fit looks at
@@ -276,49 +275,6 @@ def shares(G: Real, restitution: float) -> tuple[float, Real, float]:
     return C, after, (1.0 - restitution**2) * float(mu[0])
 
 
-S = TypeVar("S", Equilibrium, Shape)
-
-
-def _touching(
-    hold: Callable[[float, S | None], S],
-    gap: Callable[[S], float],
-    height: float,
-    size: float,
-    near: S | None = None,
-) -> S:
-    """Return the shape, held by a force on the released body, that touches the wall (secant)."""
-    x, shape = height, hold(height, near)
-    g = gap(shape)
-    last_x, last_g = x - g, math.nan
-    for _ in range(SECANTS):
-        if abs(g) <= TOUCHES * size:
-            return shape
-        slope = (g - last_g) / (x - last_x) if math.isfinite(last_g) else -1.0
-        last_x, last_g = x, g
-        x -= g / slope
-        shape = hold(x, shape)
-        g = gap(shape)
-    raise EquilibriumError(
-        f"no shape held by a force on the released body touches the wall at {height:g} m"
-    )
-
-
-def impact_shape(system: System, stop: int, height: float) -> Equilibrium:
-    """Return the shape at which a stop touches its wall at a height, held by a force.
-
-    Raises
-    ------
-    EquilibriumError
-        If there is none.
-    """
-    rows = gap_rows(system)
-
-    def gap(shape: Equilibrium) -> float:
-        return float(rows.values(system.directions(shape.q))[stop]) + height
-
-    return _touching(lambda x, _: equilibrium(system, x), gap, height, system.length)
-
-
 def _hit(height: float, offset: float, found: Modes, G: Real, restitution: float) -> Hit:
     C, after, lost = shares(G @ found.shape, restitution)
     before = np.zeros(len(after))
@@ -436,7 +392,7 @@ def by_elements(
             def gap(shape: Shape, h: float = h) -> float:
                 return fe.gap(which.index, shape.q) + h
 
-            shape = _touching(fe.equilibrium, gap, h, size, shape)
+            shape = touching(fe.equilibrium, gap, h, size, shape)
             yield _hit(h, offset, fe.modes(shape), fe.gap_row(which.index, shape.q), eps)
             told()
 
@@ -490,18 +446,6 @@ def closed_form(
         result[:, j] = (1 + eps) / ((1 + slope**2) * (1 + m * levers**2 / J)) - 1
         told()
     return ImpactMap(label, np.array(heights), np.array(offsets), result)
-
-
-def lever(system: System, stop: int) -> float:
-    """Return how far the line of an impact passes the centre of mass of the body that hits [m].
-
-    In the drawn shape, positive to the left of the direction of the stop.
-    """
-    s = system.mechanism.stops[stop]
-    known = system.values
-    point = complex(*(affine(coordinate)(known) for coordinate in s.point))
-    across = unit(s.direction).conjugate() * (point - system.bodies[s.body].drawn)
-    return float(across.imag) + value(s, "offset", known)
 
 
 def _path(system: System, body: str, shape: Equilibrium) -> tuple[complex, float]:
