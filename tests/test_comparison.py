@@ -138,6 +138,7 @@ def test_without_exudyn_a_sentence_says_how_to_install_it(monkeypatch):
     [
         (Row("frequency 1 at rest", "Hz", 5.05, 5.0), "+1.00 %"),
         (Row("modal restitution, stop", "", 0.5, -0.05), "+0.55"),  # not -1100 %
+        (Row("modal restitution, stop", "", 0.6, 0.5), "+0.1"),
         (Row("rest position", "m", 3e-6, 1e-6), "+2e-06"),  # nor +200 %
         (Row("rest position", "m", 0.0, 0.0), " 0"),
     ],
