@@ -301,7 +301,7 @@ def test_gravity_is_told_of_where_there_is_any(line, with_weight, without, capsy
 
 def test_what_cannot_be_reached_without_gravity_is_not_its_fault(capsys):
     for more, blamed in (("", True), (WEIGHTLESS, False)):
-        assert run(f"modes PRBDM --held 79mm {more}") == cli.MISTAKE
+        assert run(f"modes PRBDM --held 79mm {more}") == cli.FAILED
         told = capsys.readouterr().err
         assert "cannot be reached" in told
         assert ("gravity" in told) is blamed
