@@ -68,7 +68,7 @@ def note(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> str | 
         stretched = restitution(stretching(mechanism), values, stop)
     except (EquilibriumError, ParameterError):
         return None
-    if abs(as_it_is - stretched) <= MATTERS:
+    if not abs(as_it_is - stretched) > MATTERS:  # or not a number
         return None
     place = value(s, "position", system.values)
     return (
