@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from prbm import assemble
+from prbm_tools import holding
 from prbm_tools.equilibria import force_curve, holding_force, rests, snap
 from support import mechanism, run
 
@@ -116,3 +117,13 @@ def test_released_before_the_half_it_goes_back_to_where_it_was_drawn() -> None:
     result = run(BISTABLE, {"release.displacement": 0.0115, "damping.beta": 2e-3}, stop_time=0.5)
     assert abs(result.outputs[-1]["shuttle.y"]) < 1e-4
     assert result.outputs[-1]["far_stop.impact_count"] == 0
+
+
+def test_the_curve_of_the_fundamental_lies_within_its_panel() -> None:
+    """Even one that hardly changes; where nothing is stable there is none."""
+    for low, high in ((-1e-3, 1e-3), (10e-3, 14e-3)):
+        force = holding.curve(SYSTEM, np.linspace(low, high, 5))
+        panel = holding.figure(force, "").axes[-1]
+        bottom, top = panel.get_ylim()
+        assert bottom == 0.0 < top
+        assert not any(point.frequency > 0.9 * top for point in force.points)

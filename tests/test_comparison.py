@@ -10,7 +10,7 @@ import pytest
 
 from prbm import ParameterError, assemble, equilibrium, modes
 from prbm_tools import finite_elements
-from prbm_tools.comparison import Row, compare
+from prbm_tools.comparison import Comparison, Row, compare
 from prbm_tools.figures import png
 from prbm_tools.finite_elements import FiniteElementError
 from prbm_tools.uncertainty import Estimate
@@ -131,3 +131,19 @@ def test_without_exudyn_a_sentence_says_how_to_install_it(monkeypatch):
     monkeypatch.setattr(finite_elements.importlib, "import_module", missing)
     with pytest.raises(FiniteElementError, match="pip install"):
         compare(mechanism("PRBDM"))
+
+
+@pytest.mark.parametrize(
+    ("row", "last"),
+    [
+        (Row("frequency 1 at rest", "Hz", 5.05, 5.0), "+1.00 %"),
+        (Row("modal restitution, stop", "", 0.5, -0.05), "+0.55"),  # not -1100 %
+        (Row("modal restitution, stop", "", 0.6, 0.5), "+0.1"),
+        (Row("rest position", "m", 3e-6, 1e-6), "+2e-06"),  # nor +200 %
+        (Row("rest position", "m", 0.0, 0.0), " 0"),
+    ],
+)
+def test_percents_are_told_where_they_have_a_meaning(row, last):
+    told = str(Comparison("some", 8, (row,)))
+    assert told.endswith(last)
+    assert png(Comparison("some", 8, (row,)).figure()).startswith(b"\x89PNG")

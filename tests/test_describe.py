@@ -11,6 +11,7 @@ import pytest
 from PIL import Image
 
 from prbm_tools.mechanism_file import load
+from prbm_tools.stretching import notes, restitution, stretching
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "describe-your-mechanism.md").read_text()
@@ -37,6 +38,17 @@ def test_the_pieces_are_a_mechanism_file(tmp_path: Path) -> None:
     outputs = {"lever.toml", "lever.x", "lever.angle", "stop.contact", "stop.impact_count"}
     assert named - outputs <= set(lever.values())
     assert len(named - outputs) >= 5
+
+
+def test_stretching_matters_to_the_impact_of_the_lever_as_the_page_says(tmp_path: Path) -> None:
+    lever = load(write_file(tmp_path))
+    said = re.search(r"lever of this page goes from ([\d.]+) to ([\d.]+):", PAGE)
+    assert said is not None
+    as_it_is, stretched = map(float, said.groups())
+    (told,) = notes(lever, {})
+    assert "off the centre of mass of lever" in told
+    assert restitution(lever, {}, 0) == pytest.approx(as_it_is, abs=0.005)
+    assert restitution(stretching(lever), {}, 0) == pytest.approx(stretched, abs=0.005)
 
 
 @pytest.mark.fmu

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -21,7 +22,7 @@ from prbm_tools.fit import (
     fitted_restitution,
     valley,
 )
-from prbm_tools.fit_figures import response_figure, valley_figure
+from prbm_tools.fit_figures import force_figure, response_figure, valley_figure
 from prbm_tools.records import Series
 from prbm_tools.uncertainty import Estimate, EvaluationError
 from support import PMMA, ScalarGuide, mechanism
@@ -270,6 +271,21 @@ def test_bounds_hold_and_are_said():
     assert found.valleys == (), "it is the bound that holds it, not the data that say nothing"
     wide = fit(mechanism("PRBDM"), [K, Free("stop.restitution", -1.0, 5.0)], F5).problem
     assert (wide.lower[1], wide.upper[1]) == (0.0, 1.0), "the mechanism's own bounds hold, too"
+
+
+def test_the_title_of_a_fit_is_not_wider_than_its_figure():
+    """What is known to twelve digits takes a line a parameter, what is short shares one."""
+    m = mechanism("PRBDM")
+    d = np.array([-0.01, 0.005, 0.01])
+    system = assemble(m, m.values())
+    curve = ForceDeflection(d, np.array([equilibrium(system, x).force for x in d]))
+    found = fit(m, ["flexure.youngs_modulus", "shuttle.mass"], curve)
+    figure = force_figure(found)
+    figure.draw_without_rendering()
+    title = figure.axes[0].get_title(loc="left")
+    assert len(title.splitlines()) == 2
+    (drawn,) = (text for text in figure.findobj(Text) if text.get_text() == title)
+    assert drawn.get_window_extent().x1 <= figure.bbox.x1
 
 
 # --- responses ----------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from prbm import EquilibriumError, ParameterError, Simulation, assemble, constra
 from prbm.contact import response as impulse_response
 from prbm.kinetics import inertia
 from prbm.modal import modes_at
-from prbm_tools import impact_map
+from prbm_tools import impact_map, stretching
 from prbm_tools.figures import png
 from prbm_tools.records import RecordError
 from support import mechanism
@@ -70,6 +71,60 @@ def test_the_closed_form_is_near_the_model_that_stretches():
     np.testing.assert_allclose(closed.restitution, model.restitution, atol=0.0064)
     centre = closed.restitution[2, 2]
     assert centre == pytest.approx(0.6, abs=1e-6)  # straight and centred: nothing is in the way
+
+
+@pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R", "PRBDM2RAxial", "PRBDM3R"])
+def test_the_closed_form_fits_every_guide(name):
+    """A straight guide hit off its centre: (1 + eps)/(1 + m d^2/J) - 1, J = m (a^2 + b^2)/12."""
+    m = mechanism(name)
+    known = m.values()
+    ratio = known["shuttle.mass"] * 3e-3**2 / known["shuttle.inertia"]
+    found = impact_map.closed_form(m, [0.0, -17e-3], [3e-3], WEIGHTLESS).restitution
+    assert found[0, 0] == pytest.approx(1.6 / (1 + ratio) - 1, abs=1e-6)
+    assert found[0, 1] < found[0, 0]  # its path is no longer along the direction of the stop
+
+
+@pytest.mark.parametrize(
+    ("name", "height", "offset", "said"),
+    [
+        ("Cantilever", 3e-3, 0.0, "tip turns"),  # by 3/2 of its path over its length
+        (
+            "FoldedSuspension",
+            1e-7,
+            0.0,
+            r"shuttle along its path is 8\d",
+        ),  # 200 g of 230 and leaves
+    ],
+)
+def test_the_closed_form_is_refused_where_the_body_turns_or_others_move(name, height, offset, said):
+    m = mechanism(name)
+    with pytest.raises(ParameterError, match=said) as error:
+        impact_map.closed_form(m, [height], [offset])
+    assert "choose another way" in str(error.value)
+
+
+def test_the_closed_form_is_refused_where_a_lever_makes_a_little_turning_much():
+    """Far aside of the centre of mass the little that a deflected guide turns is a motion."""
+    impact_map.closed_form(guide(), [-15e-3], [10e-3], WEIGHTLESS)
+    with pytest.raises(ParameterError, match="shuttle turns"):
+        impact_map.closed_form(guide(), [-15e-3], [0.2], WEIGHTLESS)
+
+
+def test_the_closed_form_is_refused_at_a_stop_that_moves():
+    two = guide()
+    other = replace(two.bodies[0], name="other")
+    on = replace(two.stops[0], on="other")
+    moving = replace(
+        two,
+        bodies=(*two.bodies, other),
+        stops=(on,),
+        flexures=(
+            *two.flexures,
+            *(replace(f, name=f"{f.name}_other", end=f.end) for f in two.flexures),
+        ),
+    )
+    with pytest.raises(ParameterError, match="stop is on other, which moves"):
+        impact_map.closed_form(moving)
 
 
 def test_the_stretching_2r_agrees_with_finite_elements_everywhere():
@@ -216,3 +271,29 @@ def test_own_coefficients_stay_where_the_model_does():
     parts = replace(guide("1R"), flexure_types=(own,))
     assert impact_map.with_flexures(parts, "1R", axial=True).values()["flexure.K_theta"] == 2.5449
     assert impact_map.with_flexures(parts, "2R").values()["flexure.K_theta1"] == 3.4710
+
+
+def test_a_note_tells_what_flexures_that_do_not_stretch_hide():
+    """Off the centre of mass, C of the free body that the flexures leave: 1.6/(1 + m d^2/J) - 1."""
+    values = WEIGHTLESS | {"stop.offset": 4e-3, "stop.position": 0.0}
+    known = guide().values()
+    free = 1.6 / (1 + known["shuttle.mass"] * 4e-3**2 / known["shuttle.inertia"]) - 1
+    told = stretching.note(guide(), values, 0)
+    assert "stop hits 4 mm off the centre of mass of shuttle" in told
+    rigid, stretched = map(float, re.search(r"is ([-\d.]+), and would be ([-\d.]+)", told).groups())
+    assert rigid == pytest.approx(0.6, abs=0.005)
+    assert stretched == pytest.approx(free, abs=0.005)
+
+
+@pytest.mark.parametrize(
+    ("model", "values"),
+    [
+        (guide(), {}),  # in the middle
+        (guide(), {"stop.offset": 0.5e-3}),  # nearly
+        (guide(axial=True), {"stop.offset": 4e-3}),  # stretches
+        (mechanism("Cantilever"), {"stop.offset": 4e-3}),  # off the centre, but nothing to give way
+        (guide(), {"stop.offset": 4e-3, "stop.position": 1.0}),  # out of reach
+    ],
+)
+def test_no_note_where_stretching_does_not_matter(model, values):
+    assert stretching.notes(model, values) == []

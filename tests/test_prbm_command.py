@@ -17,6 +17,7 @@ from PIL import Image
 from prbm import assemble, free_displacement
 from prbm_tools import cli, files
 from prbm_tools.__main__ import main as started
+from prbm_tools.commands import systems
 from prbm_tools.mechanism_file import find, shipped
 from test_measurements_page import records, write
 
@@ -253,6 +254,64 @@ def test_a_map_of_one_point_is_written_without_a_surface(capsys):
     }  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("impact-map PRBDM2R --heights 0 --offsets 0 3 mm", 1),
+        ("impact-map PRBDM2R --heights 0 --offsets 0 3 mm --model 1R 2R", 2),
+        ("impact-map PRBDM2R --heights 0 --offsets 0", 0),
+        ("impact-map PRBDM2R --heights 0 --offsets 3mm --model 2R --axial", 0),
+        ("impact-map PRBDM2R --heights 0 --offsets 3mm --way closed-form", 0),
+        ("simulate PRBDM --stop-time 1ms --set stop.offset=3mm --set force.x=1", 1),
+        ("simulate PRBDM --stop-time 1ms", 0),
+    ],
+)
+def test_what_flexures_hide_of_an_impact_off_the_centre_is_told(line, told, capsys):
+    assert run(line) == cli.OK
+    assert capsys.readouterr().out.count("hits 3 mm off the centre of mass of shuttle") == told
+
+
+WEIGHTLESS = "--set gravity.x=0"
+
+
+@pytest.mark.parametrize(
+    ("line", "with_weight", "without"),
+    [
+        (
+            "modes PRBDM",
+            "at rest under gravity, shuttle 10.4",
+            "at rest without gravity, shuttle 0 ",
+        ),
+        ("equilibrium PRBDM", "straight; gravity acts", "straight; no gravity acts"),
+        (
+            "simulate PRBDM --stop-time 1ms",
+            "shuttle 10.42 mm from straight, under gravity, without stops",
+            "shuttle 0.00 mm from straight, without gravity, without stops",
+        ),
+    ],
+)
+def test_gravity_is_told_of_where_there_is_any(line, with_weight, without, capsys):
+    assert run(line) == cli.OK
+    assert with_weight in capsys.readouterr().out
+    assert run(f"{line} {WEIGHTLESS}") == cli.OK
+    told = capsys.readouterr().out
+    assert without in told
+    assert "under gravity" not in told
+
+
+def test_what_cannot_be_reached_without_gravity_is_not_its_fault(capsys):
+    for more, blamed in (("", True), (WEIGHTLESS, False)):
+        assert run(f"modes PRBDM --held 79mm {more}") == cli.FAILED
+        told = capsys.readouterr().err
+        assert "cannot be reached" in told
+        assert ("gravity" in told) is blamed
+
+
+def test_what_rounding_leaves_of_a_place_of_rest_is_zero():
+    assert systems.tiny(6.9e-15, 80.0) == systems.tiny(-6.9e-15, 80.0, ".5g") == "0"
+    assert systems.tiny(-1.2345678, 80.0, ".5g") == "-1.2346"
+
+
 def test_a_mechanism_of_ones_own_is_named_by_its_file(capsys):
     Path("mine.toml").write_bytes(shipped()["Bistable"].read_bytes())
     assert run("equilibrium mine.toml") == run("equilibrium Bistable") == cli.OK
@@ -308,6 +367,8 @@ MISTAKES = [
     ("impact-map PRBDM --stop bumper", "no stop bumper; it has stop"),
     ("impact-map ImpactOscillator", "position of impact is an expression"),
     ("impact-map PRBDM --heights 1 1 mm", "a place stands there twice"),
+    ("impact-map PRBDM --set release.displacement=0", "no default heights: give --heights"),
+    ("impact-map Cantilever --heights 3mm --way closed-form", "choose another way"),
     ("impact-map PRBDM --way magic", "invalid choice: 'magic'"),
     ("impact-map PRBDM --axial", "--axial goes with --model"),
     ("impact-map PRBDM --model nR --links 0", "a chain has one link or more"),

@@ -12,6 +12,7 @@ from PIL import Image
 
 from prbm import Mechanism, ParameterError, Simulation
 from prbm_tools.figures import png, response
+from prbm_tools.mechanism_file import load, shipped
 from prbm_tools.simulate import Result, ResultError, read_csv, reporter, rest_time, simulate
 
 
@@ -182,6 +183,18 @@ def test_the_response_shows_all_impacts_and_a_constant_balance(
     figure.savefig(tmp_path / "response.png")
     with Image.open(tmp_path / "response.png") as image:
         assert image.format == "PNG"
+
+
+def test_legends_lie_beside_what_the_response_shows() -> None:
+    """Of a leaf that falls from the upper left to the lower right, with curves everywhere."""
+    figure = response(simulate(load(shipped()["Cantilever"]), {}, 0.06, 1e-4))
+    figure.draw_without_rendering()
+    displacement, _, speeds, energies = figure.axes
+    for axes in (displacement, speeds, energies):
+        legend = axes.get_legend().get_window_extent()
+        for line in axes.lines:
+            points = axes.transData.transform(line.get_xydata())
+            assert legend.count_contains(points) == 0, line.get_label()
 
 
 def test_the_response_has_a_panel_for_what_was_recorded(result: Result) -> None:

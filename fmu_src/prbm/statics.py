@@ -213,22 +213,33 @@ def _newton(
 
 
 def _unreachable(system: System, displacement: float | None, loaded: bool, done: float) -> str:
+    weight = "gravity and " if system.gravity else ""
     if loaded:
         return (
-            f"no static equilibrium was found beyond {100 * done:.3g} % of gravity and the loads, "
+            f"no static equilibrium was found beyond {100 * done:.3g} % of {weight}the loads, "
             "raised in proportion: reduce the loads, or stiffen the flexures"
         )
     if displacement is None:
+        if not system.gravity:
+            return (
+                "no static equilibrium was found: the drawn shape is none, or the flexures are too "
+                "weak to hold it"
+            )
         return (
             "no static equilibrium under gravity was found: the flexures are too weak for this "
             "load; reduce gravity or the masses, or stiffen the flexures"
         )
     if _held_by_loops(system):
         return f"release.displacement = {displacement:g} m: {_immobile(system)}"
-    return (
+    where = (
         f"release.displacement = {displacement:g} m cannot be reached: no equilibrium was found "
-        f"beyond {done * displacement:.4g} m (gravity raised in proportion); release closer to "
-        "the straight shape, or reduce gravity across the motion"
+        f"beyond {done * displacement:.4g} m"
+    )
+    if not system.gravity:
+        return f"{where}; release closer to the straight shape"
+    return (
+        f"{where} (gravity raised in proportion); release closer to the straight shape, or reduce "
+        "gravity across the motion"
     )
 
 

@@ -286,7 +286,8 @@ def _impact_map(commands: Commands) -> None:
         choices=("algebraic", "simulated", "fitted", "elements", "closed-form"),
         help="algebraic: a pure mode arrives; simulated: the first impact after the release; "
         "fitted: the restitution of a 1R model with the same motion, minutes; elements: finite "
-        "elements; closed-form: a free body on the same path.  Default: algebraic",
+        "elements; closed-form: a free body on the same path, of a mechanism in which one body "
+        "moves and does not turn.  Default: algebraic",
     )  # fmt: skip
     add(
         "--model", nargs="+", default=[], metavar="M", choices=("1R", "2R", "3R", "nR"),

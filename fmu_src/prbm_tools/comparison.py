@@ -32,6 +32,7 @@ from .finite_elements import FiniteElements
 from .impact_map import algebraic, by_elements
 from .scene import IMPACT, LINK, REST, own_style, plain
 from .simulate import Progress
+from .stretching import notes as stretching_notes
 from .uncertainty import Estimate
 
 FREQUENCIES = 3  # the lowest that are compared
@@ -70,6 +71,11 @@ class Row:
         """The same over the elements' value [-]; NaN where that is 0."""
         return self.error / abs(self.elements) if self.elements else math.nan
 
+    @property
+    def scale(self) -> float:
+        """What differences are told in: the elements' magnitude, 1 for a ratio."""
+        return abs(self.elements) if self.unit else 1.0
+
     def away(self, found: float) -> float:
         """Return how far a value is from the measured one, in its standard uncertainties [-]."""
         if self.measured is None or not 0.0 < self.measured.uncertainty < math.inf:
@@ -90,7 +96,7 @@ class Comparison:
     rows : tuple of Row
         Of what both the model and the elements can say, and of all that was measured.
     notes : tuple of str
-        What could not be compared, and why.
+        What could not be compared, and why; what the model hides.
     """
 
     title: str
@@ -142,27 +148,35 @@ class Comparison:
 
     @own_style()
     def figure(self) -> Figure:
-        """Draw model and measurement over the elements' values, in percent."""
+        """Draw model and measurement over the elements' values [%], ratios in 0.01."""
         rows = [r for r in self.rows if r.elements and math.isfinite(r.elements)][::-1]
         figure = Figure((7.0, 1.1 + 0.36 * len(rows)), dpi=110, layout="constrained")
         axes = figure.subplots()
         places = np.arange(len(rows))
         axes.axvline(0.0, color=LINK, linewidth=1.2, label="finite elements")
         axes.plot(
-            [100 * r.relative for r in rows], places, "o", color=IMPACT, markersize=6, label="model"
+            [100 * r.error / r.scale for r in rows],
+            places,
+            "o",
+            color=IMPACT,
+            markersize=6,
+            label="model",
         )
-        known = [(y, r.measured, r.elements) for y, r in zip(places, rows, strict=True)
+        known = [(y, r, r.measured) for y, r in zip(places, rows, strict=True)
                  if r.measured is not None]  # fmt: skip
         if known:
-            off = [100 * (m.value / fe - 1) for _, m, fe in known]
-            bars = [100 * m.uncertainty / abs(fe) for _, m, fe in known]
+            off = [100 * (m.value - r.elements) / r.scale for _, r, m in known]
+            bars = [100 * m.uncertainty / r.scale for _, r, m in known]
             axes.errorbar(
                 off, [y for y, *_ in known], xerr=bars, fmt="s", color=REST, capsize=3,
                 markersize=4, label="measured",
             )  # fmt: skip
-        axes.set_yticks(places, [r.name for r in rows], fontsize=9)
+        axes.set_yticks(
+            places, [r.name if r.unit else f"{r.name} [0.01]" for r in rows], fontsize=9
+        )
         axes.set_ylim(-0.7, len(rows) - 0.3)
-        axes.set_xlabel("difference from finite elements [%]")
+        ratios = "" if all(r.unit for r in rows) else ", or 0.01"
+        axes.set_xlabel(f"difference from finite elements [%{ratios}]")
         axes.set_title(self.title, fontsize=11, loc="left")
         plain(axes)
         axes.legend(fontsize=9, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
@@ -174,8 +188,16 @@ def _shown(x: float, form: str = ".5g") -> str:
 
 
 def _line(row: Row, measured: bool) -> str:
-    """Return a row as a line of the table: the difference in percent, where it has a meaning."""
-    off = _shown(row.error, ".2g") if math.isnan(row.relative) else f"{100 * row.relative:+.2f} %"
+    """Return a row as a line of the table: the difference in percent, where it has a meaning.
+
+    It has none for ratios, nor where it is more than the quantity itself.
+    """
+    percent = row.unit and abs(row.relative) <= 1.0
+    off = (
+        f"{100 * row.relative:+.2f} %"
+        if percent
+        else _shown(row.error, "+.3g" if row.error else "g")
+    )
     name = f"{row.name} [{row.unit}]" if row.unit else row.name
     line = f"{name:<34}{_shown(row.model):>12}{_shown(row.elements):>12}"
     line += f"{'-' if math.isnan(row.error) else off:>12}"
@@ -275,6 +297,7 @@ def compare(
     for i, (name, pair) in enumerate(_restitutions(mechanism, given, elements, notes)):
         model[name], found[name] = pair
         tell(0.5 + 0.5 * (i + 1) / len(mechanism.stops))
+    notes += stretching_notes(mechanism, given)
     known = dict(measured or {})
     for name in known:
         if name not in model:

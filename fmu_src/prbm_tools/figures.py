@@ -111,7 +111,8 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
         _shade_rest(axes, plot)
         panel(axes, plot)
         plain(axes)
-    every[0].set_title(mechanism.title, fontsize=11, loc="left")
+    above = 20.0 if drawn[0] is _energies else None  # points; its legend is there
+    every[0].set_title(mechanism.title, fontsize=11, loc="left", pad=above)
     every[-1].set_xlabel(f"time [{plot.unit}]")
     every[-1].set_xlim(plot.time[0], plot.time[-1])
     figure.align_ylabels(list(every))
@@ -158,7 +159,7 @@ def _displacement(axes: Axes, plot: _Plot) -> None:
         when = plot.factor * np.array([mark.time for mark in plot.marks])
         at_hit = np.interp(when, plot.time, factor * x)
         axes.plot(when, at_hit, "v", color=IMPACT, markersize=5, label="impact")
-        axes.legend(loc="lower right", fontsize=9, frameon=False, ncols=2)
+        axes.legend(loc="best", fontsize=9, frameon=False, ncols=2)
     axes.set_ylabel(f"displacement [{unit_name}]")
 
 
@@ -179,7 +180,7 @@ def _speeds(axes: Axes, plot: _Plot) -> None:
             axes.plot(*zip(*seen, strict=True), marker, color=color, markersize=5, label=label)
     if axes.lines:
         axes.set_yscale("log")
-        axes.legend(loc="lower left", fontsize=9, frameon=False)
+        axes.legend(loc="best", fontsize=9, frameon=False)
     axes.set_ylabel("impact speed [m/s]")
 
 
@@ -192,4 +193,7 @@ def _energies(axes: Axes, plot: _Plot) -> None:
             axes.plot(plot.time, energy, color=color, linewidth=1.2, label=name)
     axes.plot(plot.time, total, "--", color="black", linewidth=1.0, label="sum - work")
     axes.set_ylabel("energy [mJ]")
-    axes.legend(loc="center right", fontsize=9, frameon=False)
+    axes.legend(  # above: six curves leave no room between them
+        loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, fontsize=9, frameon=False,
+        borderaxespad=0.0, columnspacing=1.4, handlelength=1.6,
+    )  # fmt: skip

@@ -16,6 +16,7 @@ from .uncertainty import EvaluationError
 from .vibration import FreeVibration
 
 HEIGHT = 3.6  # inches
+TITLE = 80  # characters that fit above a figure
 HARMONICS = 8.0  # times the frequency of a vibration: as far as its spectrum is drawn
 
 
@@ -24,9 +25,14 @@ def _figure(rows: int, columns: int, height: float = HEIGHT) -> tuple[Figure, li
 
 
 def _title(found: Fit) -> str:
-    """Return the parameters that were fitted, two in a line."""
-    words = [f"{name} = {x}" for name, x in found.estimates.items()]
-    return "\n".join(", ".join(words[i : i + 2]) for i in range(0, len(words), 2))
+    """Return the parameters that were fitted, in lines as long as the figure is wide."""
+    lines: list[str] = []
+    for word in (f"{name} = {x}" for name, x in found.estimates.items()):
+        if lines and len(lines[-1]) + len(word) < TITLE:
+            lines[-1] += f", {word}"
+        else:
+            lines.append(word)
+    return "\n".join(lines)
 
 
 @own_style()

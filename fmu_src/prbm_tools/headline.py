@@ -84,16 +84,16 @@ def _free(columns: Columns, system: System) -> list[str]:
     """Tell about the equilibrium without stops, if it is one that lasts."""
     frequency = column(columns, FREQUENCY)[0]
     if frequency == 0.0:
-        return [
-            "fundamental          none: without stops, the equilibrium under gravity is unstable"
-        ]
+        weight = " under gravity" if system.gravity else ""
+        return [f"fundamental          none: without stops, the equilibrium{weight} is unstable"]
     factor, hertz = frequency_unit(frequency)
     release = system.mechanism.release
+    weight = "under gravity" if system.gravity else "without gravity"
     rest = length(free_displacement(system), system.length)
     return [
         f"fundamental          {factor * frequency:.4g} {hertz}",
         f"free rest position   {release.body} {rest} from straight"
-        f"{_along(release.direction)}, under gravity, without stops",
+        f"{_along(release.direction)}, {weight}, without stops",
     ]
 
 

@@ -189,7 +189,7 @@ def figure(curve: Curve, title: str) -> Figure:
             "shaded: unstable when let go", (0.5, 0.06), xycoords="axes fraction", ha="center",
             fontsize=9, color=IMPACT,
         )  # fmt: skip
-    frequency.set_ylim(bottom=0.0)
+    frequency.set_ylim(0.0, 1.15 * max(float(hertz.max()), 0.0) or 1.0)
     frequency.set_ylabel("fundamental [Hz]")
     frequency.set_xlabel(f"displacement [{name}]")
     for axes in every:

@@ -15,7 +15,8 @@ response.  Here a map has three routes for any mechanism with a stop, and a four
 * **fitted**: the restitution of a 1R model whose motion is nearest to the simulated one
   (:func:`fitted`);
 * **closed form** for a free body that follows the guide's path y(x) without turning
-  (:func:`closed_form`), d the offset of the hit from the centre of mass:
+  (:func:`closed_form`), d the offset of the hit from the centre of mass; of a mechanism in which
+  the body turns, or does not carry nearly all of the fundamental, it is refused:
 
       C = (1 + eps) / ((1 + y'^2) (1 + m d^2/J)) - 1.
 
@@ -31,7 +32,7 @@ import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -41,7 +42,7 @@ from prbm import Impact, Mechanism, ParameterError, Simulation, assemble, equili
 from prbm.assembly import Real, System, unit
 from prbm.constraints import gap_rows
 from prbm.errors import EquilibriumError
-from prbm.mechanism import affine, value
+from prbm.mechanism import GROUND, value
 from prbm.modal import Modes, modes_at
 from prbm.statics import Equilibrium
 
@@ -50,17 +51,21 @@ from .fit import DISPLACEMENT, Fit, Response, fit
 from .records import Series
 from .scene import own_style, plain
 from .simulate import Progress
+from .touching import impact_shape, lever, touching
 
 HEIGHTS = (-10e-3, -5e-3, 0.0, 5e-3, 10e-3)  # m; the source's walls
 OFFSETS = (-4e-3, -2e-3, 0.0, 2e-3, 4e-3)  # m; and offsets
-TOUCHES = 1e-9  # of the size: gap at which a held shape touches the wall
-SECANTS = 20
 PATIENCE = 1.5  # periods of the fundamental mode in which a wall must be reached
 SAMPLES = 200  # of a response that is fitted
 REBOUND = 0.4  # periods after the first impact that a fit looks at
+PATH_STEP = 1e-4  # of the size: half the step along a body's path
+TURNS = 0.02  # of the path: turning, where it is hit, of a body in the closed form, at most
+CARRIED = 0.95  # of the fundamental's kinetic energy: what such a body carries at least
 LOOSE = 1e-7  # tolerance of simulations for a fit; its differences are of 1e-4
 MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 12))
 FUNDAMENTAL, LOST = "#0072b2", "#bbbbbb"
+_UNFIT = "the closed form is that of"
+_OTHER_WAYS = "choose another way: algebraic, simulated or elements"
 HIGHER = ("#e69f00", "#d55e00", "#cc79a7", "#009e73")
 
 
@@ -270,49 +275,6 @@ def shares(G: Real, restitution: float) -> tuple[float, Real, float]:
     return C, after, (1.0 - restitution**2) * float(mu[0])
 
 
-S = TypeVar("S", Equilibrium, Shape)
-
-
-def _touching(
-    hold: Callable[[float, S | None], S],
-    gap: Callable[[S], float],
-    height: float,
-    size: float,
-    near: S | None = None,
-) -> S:
-    """Return the shape, held by a force on the released body, that touches the wall (secant)."""
-    x, shape = height, hold(height, near)
-    g = gap(shape)
-    last_x, last_g = x - g, math.nan
-    for _ in range(SECANTS):
-        if abs(g) <= TOUCHES * size:
-            return shape
-        slope = (g - last_g) / (x - last_x) if math.isfinite(last_g) else -1.0
-        last_x, last_g = x, g
-        x -= g / slope
-        shape = hold(x, shape)
-        g = gap(shape)
-    raise EquilibriumError(
-        f"no shape held by a force on the released body touches the wall at {height:g} m"
-    )
-
-
-def impact_shape(system: System, stop: int, height: float) -> Equilibrium:
-    """Return the shape at which a stop touches its wall at a height, held by a force.
-
-    Raises
-    ------
-    EquilibriumError
-        If there is none.
-    """
-    rows = gap_rows(system)
-
-    def gap(shape: Equilibrium) -> float:
-        return float(rows.values(system.directions(shape.q))[stop]) + height
-
-    return _touching(lambda x, _: equilibrium(system, x), gap, height, system.length)
-
-
 def _hit(height: float, offset: float, found: Modes, G: Real, restitution: float) -> Hit:
     C, after, lost = shares(G @ found.shape, restitution)
     before = np.zeros(len(after))
@@ -430,7 +392,7 @@ def by_elements(
             def gap(shape: Shape, h: float = h) -> float:
                 return fe.gap(which.index, shape.q) + h
 
-            shape = _touching(fe.equilibrium, gap, h, size, shape)
+            shape = touching(fe.equilibrium, gap, h, size, shape)
             yield _hit(h, offset, fe.modes(shape), fe.gap_row(which.index, shape.q), eps)
             told()
 
@@ -451,30 +413,75 @@ def closed_form(
 
     The path is that of its centre of mass along the held shapes, x along the direction of the
     stop; d is the distance from the centre of mass to the line of the impact in the drawn shape.
-    Parameters as :func:`algebraic` has them.
+    The formula is that of one free body that does not turn on its path.  Parameters as
+    :func:`algebraic` has them.
+
+    Raises
+    ------
+    ParameterError
+        If the formula does not fit: the stop is on another body that moves; the body turns, on its
+        path, by so much that a point as far from its centre of mass as the hit or its radius of
+        gyration moves by more than :data:`TURNS` of its path; or less than :data:`CARRIED` of the
+        fundamental's kinetic energy is that of the body along the path.
     """
     which = _Stop.of(mechanism, stop)
     s = mechanism.stops[which.index]
-    body = next(b for b in mechanism.bodies if b.name == s.body)
+    if s.on != GROUND:
+        raise ParameterError(
+            f"{_UNFIT} a stop on the ground, but {s.name} is on {s.on}, which moves; {_OTHER_WAYS}"
+        )
     result = np.zeros((len(offsets), len(heights)))
     system = assemble(mechanism, mechanism.values(which.at(values, 0.0, 0.0)))
     eps = value(s, "restitution", system.values)
+    body = next(b for b in mechanism.bodies if b.name == s.body)
     m, J = (value(body, name, system.values) for name in ("mass", "inertia"))
-    frame, u = system.bodies[body.name], unit(s.direction)
-    point = complex(*(affine(coordinate)(system.values) for coordinate in s.point))
-    lever = (u.conjugate() * (point - frame.drawn)).imag
-    step = 1e-4 * system.length
+    levers = lever(system, which.index) + np.array(offsets)
+    reach = max(float(np.abs(levers).max()), math.sqrt(J / m))
     told = _counted(progress, len(heights))
     for j, h in enumerate(heights):
-        x = impact_shape(system, which.index, h).q
-        held = float((system.release @ system.directions(x)).real) + system.release_c
-        ends = [system.directions(equilibrium(system, held + k * step).q) for k in (-1, 1)]
-        moved = complex(frame.A @ (ends[1] - ends[0])) * u.conjugate()
-        slope = moved.imag / moved.real
-        for i, d in enumerate(offsets):
-            result[i, j] = (1 + eps) / ((1 + slope**2) * (1 + m * (lever + d) ** 2 / J)) - 1
+        shape = impact_shape(system, which.index, h)
+        path, turning = _path(system, s.body, shape)
+        _check_alone(system, s.body, shape, path, turning * reach, h)
+        slope = math.tan(np.angle(path * unit(s.direction).conjugate()))
+        result[:, j] = (1 + eps) / ((1 + slope**2) * (1 + m * levers**2 / J)) - 1
         told()
     return ImpactMap(label, np.array(heights), np.array(offsets), result)
+
+
+def _path(system: System, body: str, shape: Equilibrium) -> tuple[complex, float]:
+    """Return direction of a body's path along the held shapes, and its turning on it [rad/m]."""
+    frame, step = system.bodies[body], PATH_STEP * system.length
+    held = float((system.release @ system.directions(shape.q)).real) + system.release_c
+    behind, ahead = (equilibrium(system, held + k * step).q for k in (-1, 1))
+    moved = complex(frame.A @ (system.directions(ahead) - system.directions(behind)))
+    return moved / abs(moved), float(ahead[frame.j] - behind[frame.j]) / abs(moved)
+
+
+def _check_alone(
+    system: System, body: str, shape: Equilibrium, path: complex, turns: float, height: float
+) -> None:
+    """Refuse a body that turns on its path, or that is not nearly all that the fundamental moves.
+
+    ``turns`` is what it turns by where it is hit, over its path [-].
+    """
+    where = f"with the wall at {1e3 * height:g} mm"
+    if abs(turns) > TURNS:
+        raise ParameterError(
+            f"{_UNFIT} a body that does not turn, but {where} {body} turns: where it is hit, or at "
+            f"its radius of gyration, by {100 * abs(turns):.3g} % of its path (at most "
+            f"{100 * TURNS:g} %); {_OTHER_WAYS}"
+        )
+    _, velocity = system.motion(
+        system.bodies[body], system.directions(shape.q), modes(system, shape).shape[:, 0]
+    )
+    mass = next(value(b, "mass", system.values) for b in system.mechanism.bodies if b.name == body)
+    share = mass * (velocity * path.conjugate()).real ** 2  # modes have the mass 1
+    if share < CARRIED:
+        raise ParameterError(
+            f"{_UNFIT} a body that moves alone, but {where} the motion of {body} along its path is "
+            f"{100 * share:.3g} % of the fundamental's kinetic energy (at least "
+            f"{100 * CARRIED:g} %): other bodies or the flexures move with it; {_OTHER_WAYS}"
+        )
 
 
 # --- simulated --------------------------------------------------------------------------------

@@ -14,6 +14,8 @@ from ..impact_map import ImpactMap
 from ..mechanism_file import find
 from ..settings import UserMistake, quantities, settings
 from ..simulate import Progress, reporter
+from ..stretching import note
+from ..touching import lever
 from .output import Output
 from .systems import check_length
 
@@ -21,6 +23,8 @@ WALLS, OFFSETS = 5 / 9, 1 / 20  # of the release, of the size: the source's, wha
 STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 MOST_POINTS = 400  # points of a map; more are a mistake
 MODELS = ("1R", "2R", "3R", "nR")
+
+OF_MODELS = {"algebraic", "simulated", "fitted"}  # ways whose maps are of models of flexures
 
 Way = Callable[..., ImpactMap]
 Job = Callable[[Progress], ImpactMap]
@@ -45,6 +49,8 @@ def mapped(options: argparse.Namespace) -> None:
     print("modal restitution, over walls h and offsets d of the hit")
     for one in maps:
         print(one)
+    for sentence in _notes(options, mechanism, values, heights, offsets):
+        print(sentence)
     _keep(maps, output, mechanism.name)
     output.write()
 
@@ -71,6 +77,10 @@ def _points(
             quantities(texts, "m", f"--{name}") if texts
             else [float(f"{scale * step:.3g}") for step in STEPS]
         )  # fmt: skip
+        if scale == 0.0 and not texts:
+            raise UserMistake(
+                "release.displacement is 0, so there are no default heights: give --heights"
+            )
         if len(set(chosen)) < len(chosen):
             raise UserMistake(f"--{name} {' '.join(texts or [])}: a place stands there twice")
         result.append(sorted(check_length(x, system.length, f"--{name}") for x in chosen))
@@ -99,6 +109,32 @@ def _jobs(
                 yield partial(_told, one, "finite elements", elements=options.elements)
                 break  # which know nothing of the model
             yield partial(_told, one, f"{label}, {way}")
+
+
+def _notes(
+    options: argparse.Namespace,
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    heights: Sequence[float],
+    offsets: Sequence[float],
+) -> Iterator[str]:
+    """Give what models that do not stretch hide, where the hit is farthest off the centre."""
+    if not OF_MODELS.intersection(options.way):
+        return
+    names = [s.name for s in mechanism.stops]
+    name = options.stop or names[0]
+    stop, nearest = names.index(name), min(heights, key=abs)
+    for label, model in _models(options, mechanism):
+        known = {**values, f"{name}.position": nearest, f"{name}.offset": 0.0}
+        centred = lever(assemble(model, model.values(known)), stop)
+        farthest = max(offsets, key=partial(_off, centred))
+        sentence = note(model, {**known, f"{name}.offset": farthest}, stop)
+        if sentence is not None:
+            yield f"note, {label}: {sentence}"
+
+
+def _off(centred: float, offset: float) -> float:
+    return abs(centred + offset)
 
 
 def _told(way: Way, label: str, progress: Progress, **more: object) -> ImpactMap:

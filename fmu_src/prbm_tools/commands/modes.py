@@ -13,7 +13,7 @@ from prbm.statics import Equilibrium
 
 from ..settings import UserMistake, quantity
 from .output import Output, aligned
-from .systems import assembled, check_length
+from .systems import assembled, check_length, tiny
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -88,4 +88,6 @@ def _where(system: System, shape: Equilibrium, at: float | None) -> str:
         )
     e = system.directions(shape.q)
     rest = float((system.release @ e).real) + system.release_c
-    return f"{name} at rest under gravity, {release.body} {1e3 * rest:.6g} mm from straight{along}"
+    at_rest = "at rest under gravity" if system.gravity else "at rest without gravity"
+    place = tiny(1e3 * rest, 1e3 * system.length)
+    return f"{name} {at_rest}, {release.body} {place} mm from straight{along}"

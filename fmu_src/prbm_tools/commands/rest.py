@@ -32,17 +32,18 @@ def equilibria(options: argparse.Namespace) -> None:
         raise UserMistake("--held and --from, --to are two ways to say where: take one of them")
     body, direction = mechanism.release.body, mechanism.release.direction
     way = "x" if direction == 0.0 else f"{direction:g} degrees"
-    print(f"{mechanism.name}: displacement of {body} along {way}, from straight; gravity acts")
+    weight = "gravity acts" if system.gravity else "no gravity acts"
+    print(f"{mechanism.name}: displacement of {body} along {way}, from straight; {weight}")
     if ranged != (None, None):
         _range(options, mechanism, system, output)
     elif options.held:
         places = quantities(options.held, "m", "--held")
         points = [holding.held(system, check_length(x, system.length, "--held")) for x in places]
-        print(_table(points))
+        print(_table(points, system.length))
         output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows(points))
     else:
         rest = holding.free(system)
-        print(_table([rest]))
+        print(_table([rest], system.length))
         stable = rest.frequency > 0.0
         at = tiny(1e3 * rest.displacement, 1e3 * system.length)
         print(f"rests at {at} mm: {'stable' if stable else 'unstable'}")
@@ -63,7 +64,7 @@ def _range(
         raise UserMistake(f"--points {options.points}: choose a number from 3 to {MOST_POINTS}")
     curve = holding.curve(system, np.linspace(low, high, options.points), reporter())
     every = -(-options.points // 11)
-    print(_table(curve.points[::every]))
+    print(_table(curve.points[::every], system.length))
     if every > 1:
         print(f"every {every}th of {options.points} points; --out DIR writes all")
     for rest in curve.rests:
@@ -92,12 +93,12 @@ def _rows(points: Sequence[holding.Held]) -> list[list[float]]:
     return [[p.displacement, p.force, p.stiffness, p.across, p.angle, p.frequency] for p in points]
 
 
-def _table(points: Sequence[holding.Held]) -> str:
+def _table(points: Sequence[holding.Held], size: float) -> str:
     most = max(abs(p.force) for p in points)
     rows = [
         [
-            f"{1e3 * p.displacement:.5g}", tiny(p.force, most), f"{p.stiffness:.5g}",
-            tiny(1e6 * p.across, 1e3), tiny(1e3 * p.angle, 1e3),
+            tiny(1e3 * p.displacement, 1e3 * size, ".5g"), tiny(p.force, most),
+            f"{p.stiffness:.5g}", tiny(1e6 * p.across, 1e3), tiny(1e3 * p.angle, 1e3),
             f"{p.frequency:.5g}" if p.frequency > 0.0 else "unstable",
         ]
         for p in points

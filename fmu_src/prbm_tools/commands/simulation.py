@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from prbm import assemble
+from prbm import Mechanism, assemble
 from prbm.assembly import Real
 
 from ..headline import told
 from ..mechanism_file import find
 from ..settings import UserMistake, quantity, settings, span
 from ..simulate import Result, communication_points, names, reporter, simulate
+from ..stretching import notes
 from .output import Output
 from .systems import ROUNDING
 
@@ -43,6 +44,8 @@ def simulated(options: argparse.Namespace) -> None:
     print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")
     for line in told(result.columns, mechanism, result.values):
         print(line)
+    for sentence in _notes(mechanism, values):
+        print(sentence)
     columns = names(result.columns)
     output.table(f"{mechanism.name}.csv", columns, (list(row) for row in result.columns.tolist()))
     output.table(f"{mechanism.name}-impacts.csv", IMPACT_HEAD, _impacts(result))
@@ -59,6 +62,12 @@ def _tolerance(text: str | None) -> float | None:
     if not 0.0 < tolerance < 1.0:
         raise UserMistake(f"--tolerance {text}: choose a number between 0 and 1, as 1e-8")
     return tolerance
+
+
+def _notes(mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
+    """Return what flexures that do not stretch hide of the impacts."""
+    own = {p.name for p in mechanism.parameters}
+    return notes(mechanism, {name: x for name, x in values.items() if name in own})
 
 
 def _impacts(result: Result) -> Iterator[list[object]]:

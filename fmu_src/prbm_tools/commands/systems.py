@@ -40,7 +40,7 @@ def check_length(x: float, size: float, option: str) -> float:
     return x
 
 
-def tiny(x: float, scale: float) -> str:
+def tiny(x: float, scale: float, form: str = ".6g") -> str:
     """Return a number, what rounding leaves of zero as zero.
 
     Examples
@@ -48,4 +48,4 @@ def tiny(x: float, scale: float) -> str:
     >>> tiny(12.5, 1.0), tiny(-1e-14, 1.0)
     ('12.5', '0')
     """
-    return f"{x:.6g}" if abs(x) > ROUNDING * scale else "0"
+    return format(x, form) if abs(x) > ROUNDING * scale else "0"

@@ -1,0 +1,87 @@
+"""Shapes, held by a force on the released body, in which a stop touches its wall."""
+
+import math
+from collections.abc import Callable
+from typing import TypeVar
+
+from prbm import equilibrium
+from prbm.assembly import System, unit
+from prbm.constraints import gap_rows
+from prbm.errors import EquilibriumError
+from prbm.mechanism import affine, value
+from prbm.statics import Equilibrium
+
+TOUCHES = 1e-9  # of the size: gap at which a held shape touches the wall
+SECANTS = 20
+
+S = TypeVar("S")
+
+
+def touching(
+    hold: Callable[[float, S | None], S],
+    gap: Callable[[S], float],
+    height: float,
+    size: float,
+    near: S | None = None,
+) -> S:
+    """Return the shape, held by a force on the released body, that touches the wall (secant).
+
+    Parameters
+    ----------
+    hold : callable
+        Of a displacement [m] and a shape near by: the shape held there.
+    gap : callable
+        Of a shape: how far the stop is from its wall [m].
+    height : float
+        Position of the wall [m].
+    size : float
+        Of the mechanism [m].
+    near : shape or None
+        Where to begin.
+
+    Raises
+    ------
+    EquilibriumError
+        If there is none.
+    """
+    x, shape = height, hold(height, near)
+    g = gap(shape)
+    last_x, last_g = x - g, math.nan
+    for _ in range(SECANTS):
+        if abs(g) <= TOUCHES * size:
+            return shape
+        slope = (g - last_g) / (x - last_x) if math.isfinite(last_g) else -1.0
+        last_x, last_g = x, g
+        x -= g / slope
+        shape = hold(x, shape)
+        g = gap(shape)
+    raise EquilibriumError(
+        f"no shape held by a force on the released body touches the wall at {height:g} m"
+    )
+
+
+def impact_shape(system: System, stop: int, height: float) -> Equilibrium:
+    """Return the shape at which a stop touches its wall at a height, held by a force.
+
+    Raises
+    ------
+    EquilibriumError
+        If there is none.
+    """
+    rows = gap_rows(system)
+
+    def gap(shape: Equilibrium) -> float:
+        return float(rows.values(system.directions(shape.q))[stop]) + height
+
+    return touching(lambda x, _: equilibrium(system, x), gap, height, system.length)
+
+
+def lever(system: System, stop: int) -> float:
+    """Return how far the line of an impact passes the centre of mass of the body that hits [m].
+
+    In the drawn shape, positive to the left of the direction of the stop.
+    """
+    s = system.mechanism.stops[stop]
+    point = complex(*(affine(coordinate)(system.values) for coordinate in s.point))
+    across = unit(s.direction).conjugate() * (point - system.bodies[s.body].drawn)
+    return float(across.imag) + value(s, "offset", system.values)
