@@ -398,6 +398,9 @@ REFUSED = {
         lambda m: fit(m, [K], ForceDeflection(np.array([0.01]), np.array([0.1]))), "1 data cannot"
     ),
     "exact frequency": (lambda m: Frequency(Estimate(5.0, 0.0)), "standard uncertainty"),
+    "frequency without uncertainty": (lambda m: Frequency(5.0), "^frequency = 5.0 comes without"),
+    "frequency as text": (lambda m: Frequency("5 Hz"), r"give Frequency\(Estimate\(value, stand"),
+    "target that is none": (lambda m: fit(m, [K], 3.0), "3.0 is no target"),
     "mode 0": (lambda m: Frequency(Estimate(5.0, 0.1), 0), "the fundamental is 1"),
     "mode 2 of one": (lambda m: fit(m, [K], Frequency(Estimate(5.0, 0.1), 2)), "has 1 modes"),
     "pairs": (lambda m: ForceDeflection(np.zeros(2), np.zeros(3)), "give pairs"),
@@ -419,6 +422,37 @@ def test_fits_that_cannot_be_are_refused(name):
     attempt, says = REFUSED[name]
     with pytest.raises(EvaluationError, match=says):
         attempt(mechanism("PRBDM"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Own:
+    """A target of a user's, whose model says what it is told to."""
+
+    said: object
+    label: str = "rest position"
+    unit: str = "m"
+    uncertainty: float | None = 1e-5
+
+    @property
+    def data(self):
+        return np.array([0.01])
+
+    def model(self, mechanism, values):
+        return self.said
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ([1.0, 2.0], "an array of length 2, its data are an array of length 1"),
+        (np.ones((1, 1)), r"an array of shape \(1, 1\), its data are an array of length 1"),
+        (1.0, r"an array of shape \(\), its data are an array of length 1"),
+    ],
+)
+def test_a_model_of_another_length_than_its_data_is_refused(said, words):
+    """Not stretched to the data: a fit to that is none."""
+    with pytest.raises(EvaluationError, match=f"rest position: its model returns {words}"):
+        fit(mechanism("PRBDM"), [K], Own(said))
 
 
 def test_unknown_names_are_refused_with_the_nearest():

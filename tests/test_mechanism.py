@@ -146,6 +146,18 @@ def test_what_moves_must_have_mass():
         assemble(GUIDE, values)
 
 
+def test_values_that_are_not_all_are_refused():
+    """With the names of those that are missing, and where all of them are to be had."""
+    values = GUIDE.values()
+    del values["gravity.x"]
+    with pytest.raises(
+        ParameterError, match=r"lacks values of gravity\.x: .*mechanism\.values\(\)"
+    ):
+        assemble(GUIDE, values)
+    with pytest.raises(ParameterError, match=rf"and {len(values) - 4} more: give"):
+        assemble(GUIDE, {})
+
+
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_every_bound_of_every_parameter_works_or_says_why_not(model):
     """At each end of its range a value runs a moment or is refused with a sentence."""
