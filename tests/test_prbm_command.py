@@ -311,8 +311,10 @@ MISTAKES = [
     ("impact-map PRBDM --way magic", "invalid choice: 'magic'"),
     ("impact-map PRBDM --axial", "--axial goes with --model"),
     ("impact-map PRBDM --model nR --links 0", "a chain has one link or more"),
-    ("picture PRBDM --modes 5", "PRBDM has 1 modes, 5 are asked for"),
-    ("picture PRBDM --out nowhere/a.png", "nowhere/a.png: cannot be written"),
+    ("picture PRBDM --modes 13", "13 modes: choose a number from 0 to 12"),
+    ("picture PRBDM --out taken/a.png", "cannot write to taken: taken is a file; choose another"),
+    ("animate PRBDM taken/a.gif", "cannot write to taken: taken is a file; choose another folder"),
+    ("animate PRBDM new/a.gif --slow -1", "slow = -1 must be positive"),
     ("animate out.gif", "name what to show"),
     ("animate PRBDM out.txt", "end the name in .gif or .mp4"),
     ("measure", "required: QUANTITY"),
@@ -334,6 +336,25 @@ def test_mistakes_get_a_sentence_and_nothing_is_written(line, sentence, capsys):
     assert re.match(r"prbm[\w -]*: ", last)
     assert all("%" in line for line in progress)
     assert [path.name for path in Path().iterdir()] == ["taken"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "picture PRBDM --modes 5 --out new/deep/a.png",
+        "animate PRBDM new/deep/a.gif --stop-time 2ms --slow 200 --fps 10",
+    ],
+)
+def test_a_folder_that_is_not_there_is_made(line, capsys):
+    assert run(line) == cli.OK
+    (made,) = Path("new/deep").iterdir()
+    assert capsys.readouterr().out == f"{made}\n"
+
+
+def test_a_film_that_cannot_be_written_is_not_simulated_first(monkeypatch):
+    Path("taken").write_text("")
+    monkeypatch.setattr("prbm_tools.animation.simulate", pytest.fail)
+    assert run("animate PRBDM taken/a.gif") == cli.MISTAKE
 
 
 def test_a_computation_that_fails_has_another_status(capsys):
