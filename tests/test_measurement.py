@@ -47,7 +47,8 @@ def test_youngs_modulus_comes_back_within_a_percent():
     assert found.modulus.value == pytest.approx(E, rel=0.01)
     assert found.modulus.relative < 0.005
     assert found.stiffness.value == pytest.approx(STIFFNESS, rel=0.01)
-    assert found.notes == ()
+    (note,) = found.notes
+    assert "so that the ± is of the scatter of the fit only" in note, "the beam's sizes are exact"
     assert "E = (18" in str(found)
     assert len(bending_figure(found).axes) == 1
 
@@ -112,6 +113,20 @@ def test_stated_uncertainty_holds_the_dimensions():
     assert max(found.budget, key=found.budget.get) == "thickness"
     assert found.budget["thickness"] == pytest.approx(3 * 0.005, rel=0.02)
     assert found.budget["length"] == pytest.approx(3 * 0.05 / 40, rel=0.01)
+
+
+def test_sizes_without_uncertainty_are_noted():
+    """Whatever the ± holds is said, where a reader would take it for all there is."""
+    d, F = bent(np.random.default_rng(0), 12000, 10)
+    sizes = dict(zip(("u_length", "u_width", "u_thickness"), (5e-5, 2e-5, 5e-7), strict=True))
+    assert youngs_modulus(d, F, beam(**sizes), window=10).notes == ()
+    (note,) = youngs_modulus(d, F, beam(), window=10).notes
+    assert note.startswith("length, width and thickness were given without uncertainty")
+    (note,) = youngs_modulus(
+        d, F, beam(**sizes | {"u_width": 0.0}), window=10, force_gain=Estimate(1.0, 0.01)
+    ).notes
+    assert note.startswith("width was given without uncertainty, so that the ± is of the scatter")
+    assert "the fit, length, thickness and force gain only; give it of each" in note
 
 
 def test_uncertainty_of_the_sensors_angle_is_its_tangent():
