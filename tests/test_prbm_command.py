@@ -362,6 +362,55 @@ def test_a_computation_that_fails_has_another_status(capsys):
     assert "release.displacement = 0.05 m cannot be reached" in capsys.readouterr().err
 
 
+CROSS = """\
+name = "CrossPivot"
+title = "A wheel on two leaves that cross at its centre of mass"
+ground.left = ["-5 mm", "-5 mm"]
+ground.right = ["5 mm", "-5 mm"]
+release = { body = "wheel", direction = 90 }
+[[flexure_types]]
+name = "leaf"
+model = "3R"
+thickness = "0.05 mm"
+width = "2 mm"
+youngs_modulus = "200 GPa"
+density = 7800
+[[bodies]]
+name = "wheel"
+mass = "2 g"
+inertia = "200 g.mm2"
+centre = [0, 0]
+points.left = ["-5 mm", "5 mm"]
+points.right = ["5 mm", "5 mm"]
+[[flexures]]
+name = "rising"
+type = "leaf"
+start = "ground.left"
+end = "wheel.right"
+[[flexures]]
+name = "falling"
+type = "leaf"
+start = "ground.right"
+end = "wheel.left"
+"""
+
+
+def test_a_wheel_on_its_pivot_rests_where_it_is_drawn(capsys):
+    """No force on its centre of mass moves it: there is a place of rest and no stiffness."""
+    Path("cross.toml").write_text(CROSS)
+    assert run("equilibrium cross.toml --out .") == cli.OK
+    printed = capsys.readouterr().out
+    assert "rests at 0 mm: stable" in printed
+    assert "no stiffness: the centre of mass of the body wheel stays where it is" in printed
+    assert table("CrossPivot-equilibrium.csv")["stiffness [N/m]"] == ["nan"]
+    assert run("equilibrium cross.toml --held 1mm") == cli.FAILED
+    told = capsys.readouterr()
+    assert "= 0.001 m: the centre of mass of the body wheel stays where it is" in told.err
+    assert told.out == "", "no head of a table that does not come"
+    assert run("simulate cross.toml --set release.velocity=0.1") == cli.MISTAKE
+    assert "put the centre of mass off it, or release another body" in capsys.readouterr().err
+
+
 def test_no_command_gets_the_help(capsys):
     assert run("") == cli.MISTAKE
     assert "examples:" in capsys.readouterr().err
