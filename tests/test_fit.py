@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from functools import cache
 
 import numpy as np
@@ -17,6 +18,7 @@ from prbm_tools.fit import (
     Free,
     Frequency,
     Response,
+    Valley,
     fit,
     fitted_restitution,
     valley,
@@ -186,6 +188,16 @@ def test_the_valley_is_a_level_curve_and_a_figure(ambiguous):
     assert len(figure.axes) == 2
     assert png(figure).startswith(b"\x89PNG")
     assert valley(ambiguous, points=2).along in BOTH
+
+
+def test_the_head_of_a_valley_is_apart_as_its_columns_are(ambiguous):
+    """Names are longer than numbers: words of the head end where the numbers under them end."""
+    names = ("flexure.K_theta", "flexure_of_a_long_name.youngs_modulus", "release.displacement")
+    points = np.array([[2.65, 181.5e9, -0.01]])
+    head, row = str(Valley(names, names[0], points, np.zeros(1), points[0])).splitlines()
+    assert head.split() == [*names, "misfit"]
+    ends = [[m.end() for m in re.finditer(r"\S+", line)] for line in (head, row)]
+    assert ends[0] == ends[1]
 
 
 def test_three_coefficients_and_one_frequency_leave_two_valleys():

@@ -115,6 +115,16 @@ def test_stated_uncertainty_holds_the_dimensions():
     assert found.budget["length"] == pytest.approx(3 * 0.05 / 40, rel=0.01)
 
 
+def test_points_at_one_place_have_no_line():
+    """The mean of equal numbers may be another number, by rounding: their spread is no measure."""
+    x = 0.5e-3 + np.array([0.0, 1.0, 0.0, 1.0]) * np.spacing(0.5e-3)
+    for n in (3, 4, 7, 10):
+        with pytest.raises(EvaluationError, match=r"points are at x = 0\.0003: a line needs diff"):
+            line(np.full(n, 0.3e-3), np.arange(float(n)))
+    with pytest.raises(EvaluationError, match=r"does not change, it is 0\.0005 m"):
+        youngs_modulus(x, np.arange(4.0), beam())
+
+
 def test_sizes_without_uncertainty_are_noted():
     """Whatever the ± holds is said, where a reader would take it for all there is."""
     d, F = bent(np.random.default_rng(0), 12000, 10)

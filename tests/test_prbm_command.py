@@ -227,7 +227,8 @@ def test_a_calibrated_signal_has_the_frequency_of_the_raw_one(tmp_path, capsys):
     assert raw.splitlines()[0] == calibrated.splitlines()[0]
     frequency = re.match(r"frequency ([\d.]+) ± ([\d.]+) Hz", calibrated)
     assert abs(float(frequency[1]) - 4.9) < 4 * float(frequency[2]) + 1e-5
-    amplitude = float(re.search(r"amplitude ([\d.e-]+)", calibrated)[1])
+    assert re.search(r"amplitude [\d.e-]+ V, residual [\d.e-]+ V, ", raw)
+    amplitude = float(re.search(r"amplitude ([\d.e-]+) m, residual [\d.e-]+ m, ", calibrated)[1])
     assert amplitude == pytest.approx(1e-3, rel=0.01)
 
 
@@ -411,6 +412,20 @@ def test_a_wheel_on_its_pivot_rests_where_it_is_drawn(capsys):
     assert "put the centre of mass off it, or release another body" in capsys.readouterr().err
 
 
+def test_a_mechanism_without_a_stop_is_told_to_have_one(capsys):
+    Path("cross.toml").write_text(CROSS)
+    Path("data.csv").write_text(text(*GOOD))
+    restitution = "measure restitution data.csv --mechanism cross.toml"
+    for line in (
+        "impact-map cross.toml --heights 0 1 mm",
+        restitution,
+        f"{restitution} --stop wall",
+    ):
+        assert run(line) == cli.MISTAKE
+        said = "has no stop wall" if "wall" in line else "has no stop to hit"
+        assert f"CrossPivot {said}: describe one, [[stops]]" in capsys.readouterr().err
+
+
 def test_no_command_gets_the_help(capsys):
     assert run("") == cli.MISTAKE
     assert "examples:" in capsys.readouterr().err
@@ -470,6 +485,18 @@ MALFORMED = {
     ),
     "too short": (text("t [s],x [m]", TIME[:9], SWING[:9]), FREQUENCY, "are too few to evaluate"),
     "cut too short": (text(*GOOD), f"{FREQUENCY} --to 20ms", "are too few to evaluate"),
+    "cut away": (
+        text(*GOOD), f"{FREQUENCY} --from 20",
+        "nothing of x is left from 20 s on: the record is from 0 s to 1.995 s; choose a start",
+    ),
+    "cut away before": (text(*GOOD), f"{FREQUENCY} --to -1", "nothing of x is left up to -1 s: "),
+    "cut the wrong way": (
+        text(*GOOD), f"{FREQUENCY} --from 1.5 --to 1", "is left from 1.5 s to 1 s: the record is"
+    ),
+    "nothing is bent": (
+        text("d [mm],F [N]", 0 * TIME + 0.5, SWING), MODULUS,
+        "the deflection does not change, it is 0.0005 m throughout: take the column",
+    ),
     "nothing moves": (text("t [s],x [m]", TIME, 0 * TIME + 1), FREQUENCY, "nothing vibrates"),
     "one swing": (text("t [s],x [m]", TIME / 40, SWING), f"{FREQUENCY} --to 8ms", "or less in"),
     "another unit": (

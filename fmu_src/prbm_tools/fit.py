@@ -812,9 +812,11 @@ class Valley:
     best: Real
 
     def __str__(self) -> str:
-        head = "".join(f"{name:>22}" for name in self.names) + f"{'misfit':>14}"
+        widths = [max(22, 2 + len(name)) for name in self.names]
+        head = "".join(f"{name:>{w}}" for name, w in zip(self.names, widths, strict=True))
+        head += f"{'misfit':>14}"
         rows = [
-            "".join(f"{x:>22.6g}" for x in point) + f"{misfit:>14.4g}"
+            "".join(f"{x:>{w}.6g}" for x, w in zip(point, widths, strict=True)) + f"{misfit:>14.4g}"
             for point, misfit in zip(self.points, self.misfit, strict=True)
         ]
         return "\n".join([head, *rows])

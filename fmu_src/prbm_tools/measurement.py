@@ -37,6 +37,7 @@ LARGE = 1.0  # m: a longer beam is more likely one whose sizes are in mm
 SOLID = (1e5, 2e12)  # Pa: from gels to diamond and carbon nanotubes
 TURNS = 0.2  # of the range of the deflection: less is noise, not a change of direction
 SIZES = ("length", "width", "thickness")  # of a beam
+SAME = 1e-12  # of a deflection: rounding, not a change
 LARGEST_ANGLE = 85.0  # deg between the sensor and the direction of the force
 
 
@@ -425,6 +426,11 @@ def _check_options(
             f"window = {window} samples: give 1 to a third of the {len(deflection)} that there are"
         )
     reach = float(np.ptp(deflection))
+    if reach <= SAME * float(np.abs(deflection).max()):
+        raise EvaluationError(
+            f"beam {beam.name}: the deflection does not change, it is {deflection[0]:.4g} m "
+            "throughout: take the column of the deflection, or bend the beam"
+        )
     if reach > LONGEST * beam.length.value:
         raise EvaluationError(
             f"beam {beam.name}: a deflection of {reach:.4g} m is longer than the beam, "
