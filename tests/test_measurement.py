@@ -248,7 +248,7 @@ REFUSED = {
     "narrow": ({"fit_range": (0.5, 0.501)}, "three|3 points"),
     "angle": ({"sensor_angle": 90.0}, "sensor_angle"),
     "no stiffness": ({"force": np.tile([1e-3, -1e-3], 30)}, "no stiffness"),
-    "still": ({"deflection": np.zeros(60)}, "different x"),
+    "still": ({"deflection": np.zeros(60)}, "the deflection does not change"),
 }
 
 
