@@ -1206,7 +1206,7 @@ ELSEWHERE = {
     "kinetics": {"mass_accelerations"},
     "modal": {"modal_restitution", "modes_at"},
     "runge_kutta": {"rk4"},
-    "statics": {"free_displacement"},
+    "statics": {"free_displacement", "held_by_loops", "immobile"},
 }  # fmt: skip
 """What the package has beside the kernel's header: parts of ``assemble``, ``rate`` and of the
 inputs, which are compared as a whole, and what only Python users ask for."""
