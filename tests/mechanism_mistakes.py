@@ -409,6 +409,21 @@ CHANGES = {
         'foot = ["2 cm", 0]',
         "flexure left from ground.foot to arm",
     ),
+    "thickness in mm without its unit": (
+        'thickness = "0.1 mm"',
+        "thickness = 0.1",
+        "leaf.thickness = 0.1 m is not less than the length of the flexure left, 0.02 m: check the",
+    ),
+    "thickness in mm of a flexure's own section": (
+        "thickness = 1e-4",
+        "thickness = 0.1",
+        "hanger.thickness = 0.1 m is not less than the length of the flexure hanger, 0.03 m: check",
+    ),
+    "flexure as long as it is thick": (
+        'thickness = "0.1 mm"',
+        'thickness = "20 mm"',
+        "leaf.thickness = 0.02 m is not less than the length of the flexure left, 0.02 m",
+    ),
     "joint of points drawn apart": (
         'points.hook = ["arm.length", 0]',
         "points.hook = [0.041, 0]",

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from functools import cache
 
 import numpy as np
@@ -18,6 +19,7 @@ from prbm_tools.fit import (
     Free,
     Frequency,
     Response,
+    Valley,
     fit,
     fitted_restitution,
     valley,
@@ -187,6 +189,16 @@ def test_the_valley_is_a_level_curve_and_a_figure(ambiguous):
     assert len(figure.axes) == 2
     assert png(figure).startswith(b"\x89PNG")
     assert valley(ambiguous, points=2).along in BOTH
+
+
+def test_the_head_of_a_valley_is_apart_as_its_columns_are(ambiguous):
+    """Names are longer than numbers: words of the head end where the numbers under them end."""
+    names = ("flexure.K_theta", "flexure_of_a_long_name.youngs_modulus", "release.displacement")
+    points = np.array([[2.65, 181.5e9, -0.01]])
+    head, row = str(Valley(names, names[0], points, np.zeros(1), points[0])).splitlines()
+    assert head.split() == [*names, "misfit"]
+    ends = [[m.end() for m in re.finditer(r"\S+", line)] for line in (head, row)]
+    assert ends[0] == ends[1]
 
 
 def test_three_coefficients_and_one_frequency_leave_two_valleys():
@@ -414,6 +426,9 @@ REFUSED = {
         lambda m: fit(m, [K], ForceDeflection(np.array([0.01]), np.array([0.1]))), "1 data cannot"
     ),
     "exact frequency": (lambda m: Frequency(Estimate(5.0, 0.0)), "standard uncertainty"),
+    "frequency without uncertainty": (lambda m: Frequency(5.0), "^frequency = 5.0 comes without"),
+    "frequency as text": (lambda m: Frequency("5 Hz"), r"give Frequency\(Estimate\(value, stand"),
+    "target that is none": (lambda m: fit(m, [K], 3.0), "3.0 is no target"),
     "mode 0": (lambda m: Frequency(Estimate(5.0, 0.1), 0), "the fundamental is 1"),
     "mode 2 of one": (lambda m: fit(m, [K], Frequency(Estimate(5.0, 0.1), 2)), "has 1 modes"),
     "pairs": (lambda m: ForceDeflection(np.zeros(2), np.zeros(3)), "give pairs"),
@@ -435,6 +450,37 @@ def test_fits_that_cannot_be_are_refused(name):
     attempt, says = REFUSED[name]
     with pytest.raises(EvaluationError, match=says):
         attempt(mechanism("PRBDM"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Own:
+    """A target of a user's, whose model says what it is told to."""
+
+    said: object
+    label: str = "rest position"
+    unit: str = "m"
+    uncertainty: float | None = 1e-5
+
+    @property
+    def data(self):
+        return np.array([0.01])
+
+    def model(self, mechanism, values):
+        return self.said
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ([1.0, 2.0], "an array of length 2, its data are an array of length 1"),
+        (np.ones((1, 1)), r"an array of shape \(1, 1\), its data are an array of length 1"),
+        (1.0, r"an array of shape \(\), its data are an array of length 1"),
+    ],
+)
+def test_a_model_of_another_length_than_its_data_is_refused(said, words):
+    """Not stretched to the data: a fit to that is none."""
+    with pytest.raises(EvaluationError, match=f"rest position: its model returns {words}"):
+        fit(mechanism("PRBDM"), [K], Own(said))
 
 
 def test_unknown_names_are_refused_with_the_nearest():

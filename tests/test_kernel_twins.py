@@ -1199,14 +1199,14 @@ ELSEWHERE = {
     "contact": set(),
     "dynamics": {
         "check_input", "impulse_names", "input_names", "input_units", "mass_accelerations",
-        "offsets", "stop_forces", "torques", "without_hold",
+        "offsets", "stop_forces", "torques", "with_slide", "without_hold",
     },
     "flexure": set(),
     "forces": set(),
     "kinetics": {"mass_accelerations"},
     "modal": {"modal_restitution", "modes_at"},
     "runge_kutta": {"rk4"},
-    "statics": {"free_displacement"},
+    "statics": {"free_displacement", "held_by_loops", "immobile"},
 }  # fmt: skip
 """What the package has beside the kernel's header: parts of ``assemble``, ``rate`` and of the
 inputs, which are compared as a whole, and what only Python users ask for."""

@@ -47,7 +47,8 @@ def test_youngs_modulus_comes_back_within_a_percent():
     assert found.modulus.value == pytest.approx(E, rel=0.01)
     assert found.modulus.relative < 0.005
     assert found.stiffness.value == pytest.approx(STIFFNESS, rel=0.01)
-    assert found.notes == ()
+    (note,) = found.notes
+    assert "so that the ± is of the scatter of the fit only" in note, "the beam's sizes are exact"
     assert "E = (18" in str(found)
     assert len(bending_figure(found).axes) == 1
 
@@ -112,6 +113,30 @@ def test_stated_uncertainty_holds_the_dimensions():
     assert max(found.budget, key=found.budget.get) == "thickness"
     assert found.budget["thickness"] == pytest.approx(3 * 0.005, rel=0.02)
     assert found.budget["length"] == pytest.approx(3 * 0.05 / 40, rel=0.01)
+
+
+def test_points_at_one_place_have_no_line():
+    """The mean of equal numbers may be another number, by rounding: their spread is no measure."""
+    x = 0.5e-3 + np.array([0.0, 1.0, 0.0, 1.0]) * np.spacing(0.5e-3)
+    for n in (3, 4, 7, 10):
+        with pytest.raises(EvaluationError, match=r"points are at x = 0\.0003: a line needs diff"):
+            line(np.full(n, 0.3e-3), np.arange(float(n)))
+    with pytest.raises(EvaluationError, match=r"does not change, it is 0\.0005 m"):
+        youngs_modulus(x, np.arange(4.0), beam())
+
+
+def test_sizes_without_uncertainty_are_noted():
+    """Whatever the ± holds is said, where a reader would take it for all there is."""
+    d, F = bent(np.random.default_rng(0), 12000, 10)
+    sizes = dict(zip(("u_length", "u_width", "u_thickness"), (5e-5, 2e-5, 5e-7), strict=True))
+    assert youngs_modulus(d, F, beam(**sizes), window=10).notes == ()
+    (note,) = youngs_modulus(d, F, beam(), window=10).notes
+    assert note.startswith("length, width and thickness were given without uncertainty")
+    (note,) = youngs_modulus(
+        d, F, beam(**sizes | {"u_width": 0.0}), window=10, force_gain=Estimate(1.0, 0.01)
+    ).notes
+    assert note.startswith("width was given without uncertainty, so that the ± is of the scatter")
+    assert "the fit, length, thickness and force gain only; give it of each" in note
 
 
 def test_uncertainty_of_the_sensors_angle_is_its_tangent():
@@ -223,7 +248,7 @@ REFUSED = {
     "narrow": ({"fit_range": (0.5, 0.501)}, "three|3 points"),
     "angle": ({"sensor_angle": 90.0}, "sensor_angle"),
     "no stiffness": ({"force": np.tile([1e-3, -1e-3], 30)}, "no stiffness"),
-    "still": ({"deflection": np.zeros(60)}, "different x"),
+    "still": ({"deflection": np.zeros(60)}, "the deflection does not change"),
 }
 
 

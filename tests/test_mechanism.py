@@ -146,6 +146,18 @@ def test_what_moves_must_have_mass():
         assemble(GUIDE, values)
 
 
+def test_values_that_are_not_all_are_refused():
+    """With the names of those that are missing, and where all of them are to be had."""
+    values = GUIDE.values()
+    del values["gravity.x"]
+    with pytest.raises(
+        ParameterError, match=r"lacks values of gravity\.x: .*mechanism\.values\(\)"
+    ):
+        assemble(GUIDE, values)
+    with pytest.raises(ParameterError, match=rf"and {len(values) - 4} more: give"):
+        assemble(GUIDE, {})
+
+
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_every_bound_of_every_parameter_works_or_says_why_not(model):
     """At each end of its range a value runs a moment or is refused with a sentence."""
@@ -240,9 +252,9 @@ def test_a_mechanism_that_cannot_move_is_refused_by_the_names_of_its_loops():
         assemble(held, held.values())
 
 
-def test_a_release_along_which_a_body_cannot_move_is_refused_for_that():
-    """A pinned wheel turns about its centre of mass, which stays where it is."""
-    wheel = dataclasses.replace(
+def pinned() -> Mechanism:
+    """Return a wheel on a pin at its centre of mass, with a leaf to the ground."""
+    return dataclasses.replace(
         around(),
         ground={"hub": (0.0, 0.0), "side": (0.06, 0.01)},
         bodies=(Body("rim", 0.02, 1e-5, (0, 0), {"hub": (0.0, 0.0), "right": (0.02, 0.0)}),),
@@ -250,8 +262,20 @@ def test_a_release_along_which_a_body_cannot_move_is_refused_for_that():
         joints=(Joint("pin", "ground.hub", "rim.hub"),),
         gravity=(0.0, -9.81),
     )
-    with pytest.raises(EquilibriumError, match=r"= 0 m: the body rim cannot move along the direc"):
+
+
+def test_a_release_of_a_body_that_turns_about_its_centre_of_mass_is_refused_for_that():
+    """The leaf stretches, and so lets the wheel turn."""
+    leaf = dataclasses.replace(pinned().flexure_types[0], axial=True)
+    wheel = dataclasses.replace(pinned(), flexure_types=(leaf,))
+    with pytest.raises(EquilibriumError, match=r"= 0 m: the centre of mass of the body rim stays"):
         Simulation(wheel)
+
+
+def test_a_release_along_which_a_body_cannot_move_is_refused_for_that():
+    """The leaf, as drawn, does not let the pinned wheel turn."""
+    with pytest.raises(EquilibriumError, match=r"= 0 m: the body rim cannot move along the direc"):
+        Simulation(pinned())
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])

@@ -228,7 +228,8 @@ def test_a_calibrated_signal_has_the_frequency_of_the_raw_one(tmp_path, capsys):
     assert raw.splitlines()[0] == calibrated.splitlines()[0]
     frequency = re.match(r"frequency ([\d.]+) ± ([\d.]+) Hz", calibrated)
     assert abs(float(frequency[1]) - 4.9) < 4 * float(frequency[2]) + 1e-5
-    amplitude = float(re.search(r"amplitude ([\d.e-]+)", calibrated)[1])
+    assert re.search(r"amplitude [\d.e-]+ V, residual [\d.e-]+ V, ", raw)
+    amplitude = float(re.search(r"amplitude ([\d.e-]+) m, residual [\d.e-]+ m, ", calibrated)[1])
     assert amplitude == pytest.approx(1e-3, rel=0.01)
 
 
@@ -372,8 +373,10 @@ MISTAKES = [
     ("impact-map PRBDM --way magic", "invalid choice: 'magic'"),
     ("impact-map PRBDM --axial", "--axial goes with --model"),
     ("impact-map PRBDM --model nR --links 0", "a chain has one link or more"),
-    ("picture PRBDM --modes 5", "PRBDM has 1 modes, 5 are asked for"),
-    ("picture PRBDM --out nowhere/a.png", "nowhere/a.png: cannot be written"),
+    ("picture PRBDM --modes 13", "13 modes: choose a number from 0 to 12"),
+    ("picture PRBDM --out taken/a.png", "cannot write to taken: taken is a file; choose another"),
+    ("animate PRBDM taken/a.gif", "cannot write to taken: taken is a file; choose another folder"),
+    ("animate PRBDM new/a.gif --slow -1", "slow = -1 must be positive"),
     ("animate out.gif", "name what to show"),
     ("animate PRBDM out.txt", "end the name in .gif or .mp4"),
     ("measure", "required: QUANTITY"),
@@ -397,9 +400,91 @@ def test_mistakes_get_a_sentence_and_nothing_is_written(line, sentence, capsys):
     assert [path.name for path in Path().iterdir()] == ["taken"]
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        "picture PRBDM --modes 5 --out new/deep/a.png",
+        "animate PRBDM new/deep/a.gif --stop-time 2ms --slow 200 --fps 10",
+    ],
+)
+def test_a_folder_that_is_not_there_is_made(line, capsys):
+    assert run(line) == cli.OK
+    (made,) = Path("new/deep").iterdir()
+    assert capsys.readouterr().out == f"{made}\n"
+
+
+def test_a_film_that_cannot_be_written_is_not_simulated_first(monkeypatch):
+    Path("taken").write_text("")
+    monkeypatch.setattr("prbm_tools.animation.simulate", pytest.fail)
+    assert run("animate PRBDM taken/a.gif") == cli.MISTAKE
+
+
 def test_a_computation_that_fails_has_another_status(capsys):
     assert run("equilibrium PRBDM --held 50mm") == cli.FAILED
     assert "release.displacement = 0.05 m cannot be reached" in capsys.readouterr().err
+
+
+CROSS = """\
+name = "CrossPivot"
+title = "A wheel on two leaves that cross at its centre of mass"
+ground.left = ["-5 mm", "-5 mm"]
+ground.right = ["5 mm", "-5 mm"]
+release = { body = "wheel", direction = 90 }
+[[flexure_types]]
+name = "leaf"
+model = "3R"
+thickness = "0.05 mm"
+width = "2 mm"
+youngs_modulus = "200 GPa"
+density = 7800
+[[bodies]]
+name = "wheel"
+mass = "2 g"
+inertia = "200 g.mm2"
+centre = [0, 0]
+points.left = ["-5 mm", "5 mm"]
+points.right = ["5 mm", "5 mm"]
+[[flexures]]
+name = "rising"
+type = "leaf"
+start = "ground.left"
+end = "wheel.right"
+[[flexures]]
+name = "falling"
+type = "leaf"
+start = "ground.right"
+end = "wheel.left"
+"""
+
+
+def test_a_wheel_on_its_pivot_rests_where_it_is_drawn(capsys):
+    """No force on its centre of mass moves it: there is a place of rest and no stiffness."""
+    Path("cross.toml").write_text(CROSS)
+    assert run("equilibrium cross.toml --out .") == cli.OK
+    printed = capsys.readouterr().out
+    assert "rests at 0 mm: stable" in printed
+    assert "no stiffness: the centre of mass of the body wheel stays where it is" in printed
+    assert table("CrossPivot-equilibrium.csv")["stiffness [N/m]"] == ["nan"]
+    assert run("equilibrium cross.toml --held 1mm") == cli.FAILED
+    told = capsys.readouterr()
+    assert "= 0.001 m: the centre of mass of the body wheel stays where it is" in told.err
+    assert told.out == "", "no head of a table that does not come"
+    assert run("simulate cross.toml --set release.velocity=0.1") == cli.MISTAKE
+    assert "put the centre of mass off it, or release another body" in capsys.readouterr().err
+
+
+def test_a_mechanism_without_a_stop_is_told_to_have_one(capsys):
+    Path("cross.toml").write_text(CROSS)
+    Path("data.csv").write_text(text(*GOOD))
+    restitution = "measure restitution data.csv --mechanism cross.toml"
+    for line in (
+        "impact-map cross.toml --heights 0 1 mm",
+        restitution,
+        f"{restitution} --stop wall",
+    ):
+        assert run(line) == cli.MISTAKE
+        said = "has no stop wall" if "wall" in line else "has no stop to hit"
+        assert f"CrossPivot {said}: describe one, [[stops]]" in capsys.readouterr().err
 
 
 def test_no_command_gets_the_help(capsys):
@@ -461,6 +546,18 @@ MALFORMED = {
     ),
     "too short": (text("t [s],x [m]", TIME[:9], SWING[:9]), FREQUENCY, "are too few to evaluate"),
     "cut too short": (text(*GOOD), f"{FREQUENCY} --to 20ms", "are too few to evaluate"),
+    "cut away": (
+        text(*GOOD), f"{FREQUENCY} --from 20",
+        "nothing of x is left from 20 s on: the record is from 0 s to 1.995 s; choose a start",
+    ),
+    "cut away before": (text(*GOOD), f"{FREQUENCY} --to -1", "nothing of x is left up to -1 s: "),
+    "cut the wrong way": (
+        text(*GOOD), f"{FREQUENCY} --from 1.5 --to 1", "is left from 1.5 s to 1 s: the record is"
+    ),
+    "nothing is bent": (
+        text("d [mm],F [N]", 0 * TIME + 0.5, SWING), MODULUS,
+        "the deflection does not change, it is 0.0005 m throughout: take the column",
+    ),
     "nothing moves": (text("t [s],x [m]", TIME, 0 * TIME + 1), FREQUENCY, "nothing vibrates"),
     "one swing": (text("t [s],x [m]", TIME / 40, SWING), f"{FREQUENCY} --to 8ms", "or less in"),
     "another unit": (

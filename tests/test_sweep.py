@@ -403,6 +403,8 @@ TABLES = {
     "infinity": ({"stop.offset": [np.inf]}, "row 0 of the table has stop.offset = inf, which"),
     "a word": ({"stop.offset": [0.0, "wide"]}, "row 1 of the table has stop.offset = wide, which"),
     "no rows": ({"stop.offset": []}, "the table has 0 rows and 1 columns; give"),
+    "semicolons": ({"release.displacement;stop.offset": [0.5]}, "the table has the column "
+                   "'release.displacement;stop.offset': its columns seem to be separated by semi"),
     "no columns": ({}, "the table has 0 rows and 0 columns; give"),
     "a name of the results": ({"status": [1.0]}, "the FMU has no variable 'status'"),
 }  # fmt: skip
@@ -424,6 +426,9 @@ FILES = {
     "a header alone": ("t.csv", b"stop.offset\n", "t.csv has 0 rows and 1 columns"),
     "a missing cell": ("t.csv", b"stop.offset,gravity.x\n0,1\n0,\n", "row 1 of the table has "
                        "gravity.x = , which is no finite number"),
+    "semicolons": ("t.csv", b"gravity.x;stop.offset\n1;0,5\n", "separate them by commas, and write "
+                   "numbers with a decimal point"),
+    "tabs": ("t.csv", b"gravity.x\tstop.offset\n1\t0\n", "seem to be separated by tabs; separate"),
     "ragged": ("t.csv", b"stop.offset\n0,1\n0,1,2\n", "t.csv is no table that can be read"),
     "binary": ("t.csv", b"\xff\xfe\x00stop", "t.csv is no table that can be read"),
     "no Parquet": ("t.parquet", b"stop.offset\n0\n", "t.parquet is no table that can be read"),
@@ -439,6 +444,16 @@ def test_a_malformed_file_is_refused_with_a_sentence(native, capsys, case):
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["r.csv", "deep/r.XLSX", "r.json"])
+def test_a_name_of_one_file_is_refused_for_the_folder_of_the_results(native, capsys, name):
+    """Before anything is read: the FMU and the table need not be there."""
+    assert main(["sweep", "none.fmu", "none.csv", "--out", name]) == 2
+    said = capsys.readouterr().err
+    assert f"{name} is the name of a {Path(name).suffix} file, but the results are a folder" in said
+    assert f"choose a name such as {Path(name).with_suffix('.parquet')}" in said
+    assert list(Path().iterdir()) == []
 
 
 def test_whole_numbers_and_booleans_are_checked(mishap):

@@ -1,5 +1,6 @@
 """Frequency and damping come back from noisy records: 4 um at 750 Hz, as the source's laser."""
 
+import dataclasses
 import math
 
 import numpy as np
@@ -36,6 +37,14 @@ def test_frequency_and_damping_come_back(zeta):
     assert found.decrement_zeta.value == pytest.approx(zeta, rel=0.1)
     assert found.residual == pytest.approx(NOISE, rel=0.05)
     assert "damping ratio, fit" in str(found)
+
+
+@pytest.mark.parametrize(("unit", "said"), [("m", " m"), ("m/s2", " m/s2"), ("1", "")])
+def test_an_amplitude_has_the_unit_of_its_record(unit, said):
+    series = dataclasses.replace(vibration(1e-2, np.random.default_rng(0)), unit=unit)
+    found = free_vibration(series)
+    assert f"amplitude {found.amplitude:.4g}{said}, residual" in str(found)
+    assert f"residual {found.residual:.3g}{said}, correlation" in str(found)
 
 
 def test_a_motion_that_dies_at_once_has_no_decrement_but_a_fit():

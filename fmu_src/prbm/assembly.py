@@ -52,6 +52,7 @@ Complex = NDArray[np.complex128]
 Whole = NDArray[np.int64]
 
 FIXED = -1  # in place of a coordinate: to the ground
+MOST_NAMED = 5  # parameters that a message names
 TOGETHER = 1e-9  # of the size: points that a joint joins are drawn no further apart
 
 
@@ -294,9 +295,21 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
     MechanismError
         If a body is not held by anything, or a loop repeats what others ask for.
     ParameterError
-        If a flexure has no length, or its links are longer than itself.
+        If a value is missing, a flexure has no length, or its links are longer than itself.
     """
+    missing = [p.name for p in mechanism.parameters if p.name not in values]
+    if missing:
+        raise ParameterError(
+            f"{mechanism.name} lacks values of {_some(missing)}: give those of all parameters, as "
+            "mechanism.values() returns them, or mechanism.values(changes) with some changed"
+        )
     return _Assembler(mechanism, values).system()
+
+
+def _some(names: Sequence[str]) -> str:
+    """Return names in words, the first of them if they are many."""
+    rest = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {rest} more" if rest > 0 else "")
 
 
 @dataclass(frozen=True)

@@ -229,8 +229,8 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
             "no static equilibrium under gravity was found: the flexures are too weak for this "
             "load; reduce gravity or the masses, or stiffen the flexures"
         )
-    if _held_by_loops(system):
-        return f"release.displacement = {displacement:g} m: {_immobile(system)}"
+    if held_by_loops(system):
+        return f"release.displacement = {displacement:g} m: {immobile(system)}"
     where = (
         f"release.displacement = {displacement:g} m cannot be reached: no equilibrium was found "
         f"beyond {done * displacement:.4g} m"
@@ -243,20 +243,42 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
     )
 
 
-def _held_by_loops(system: System) -> bool:
+def held_by_loops(system: System) -> bool:
     """Tell whether the loops keep the released body, as drawn, from moving along the release."""
     e = system.directions(system.q0)
-    rows = constraints.jacobian(system.spread(np.vstack([system.loops, system.release])), e)
-    loops, along = rows[:-1], rows[-1]
-    left = along - loops.T @ np.linalg.lstsq(loops.T, along)[0]
-    return float(np.abs(left).max()) <= RIGID * system.length
+    along = constraints.jacobian(system.spread(system.release[None]), e)
+    return _left_by_loops(system, e, along) <= RIGID * system.length
 
 
-def _immobile(system: System) -> str:
+def immobile(system: System) -> str:
+    """Return why the released body, as drawn, cannot move along the release, and a remedy."""
+    name = system.mechanism.release.body
+    if _on_pivot(system, name):
+        return (
+            f"the centre of mass of the body {name} stays where it is, on the pivot that the body "
+            "turns about; put the centre of mass off it, or release another body"
+        )
     return (
-        f"the body {system.mechanism.release.body} cannot move along the direction of the release; "
-        "choose another direction or body, or let flexures stretch (axial = true)"
+        f"the body {name} cannot move along the direction of the release; choose another "
+        "direction or body, or let flexures stretch (axial = true)"
     )
+
+
+def _on_pivot(system: System, name: str) -> bool:
+    """Tell whether a body, as drawn, can turn and its centre of mass can move nowhere."""
+    e, frame = system.directions(system.q0), system.bodies[name]
+    both = constraints.jacobian(system.spread(np.vstack([frame.A, -1j * frame.A])), e)
+    turn = np.eye(system.n)[[frame.j]]
+    return _left_by_loops(system, e, both) <= RIGID * system.length and (
+        _left_by_loops(system, e, turn) > RIGID
+    )
+
+
+def _left_by_loops(system: System, e: Complex, rows: Real) -> float:
+    """Return the largest derivative in rows (k, n) that does not follow from the loops'."""
+    loops = constraints.jacobian(system.spread(system.loops), e)
+    left = rows - (loops.T @ np.linalg.lstsq(loops.T, rows.T)[0]).T
+    return float(np.abs(left).max())
 
 
 def release_velocity(system: System, q: Real, speed: float) -> Real:
@@ -287,7 +309,7 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     loops, row = rows[:-1], rows[-1:]
     left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
     if left <= IMMOBILE * free:
-        raise ParameterError(f"release.velocity = {speed:g} m/s: {_immobile(system)}")
+        raise ParameterError(f"release.velocity = {speed:g} m/s: {immobile(system)}")
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     return constraints.project_velocities(M, rows, rates, np.zeros(system.n))

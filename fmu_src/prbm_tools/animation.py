@@ -24,6 +24,7 @@ from prbm.errors import PrbmError
 from prbm.mechanism import unknown
 
 from .arguments import ANIMATION_USAGE, animation_arguments
+from .files import check_file
 from .mechanism_file import find, load, shipped
 from .motion import FPS, film, fmpy_command, motion, needed
 from .scene import COLOURS, DPI, SIZE, Scene, pictures
@@ -85,9 +86,7 @@ def animate(
     write = _writer(path)
     moved = motion(result, mechanism, values)
     scene = Scene(moved, film(moved, slow, fps, start, stop))
-    with _whole(path) as partial:
-        write(partial, scene, progress or (lambda fraction: None))
-    return path
+    return _written(path, write, scene, progress or (lambda fraction: None))
 
 
 def show(
@@ -162,6 +161,12 @@ def _writer(path: Path) -> Write:
     if kind == ".mp4":
         return functools.partial(_write_mp4, ffmpeg=_ffmpeg(path))
     raise AnimationError(f"{path}: cannot tell what to write; end the name in .gif or .mp4")
+
+
+def _written(path: Path, write: Write, scene: Scene, progress: Progress) -> Path:
+    with _whole(path) as partial:
+        write(partial, scene, progress)
+    return path
 
 
 @contextmanager
@@ -307,22 +312,25 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def run(options: argparse.Namespace) -> Path:
-    """Write the film that a command line says; return the file.
+    """Write the film that a command line says; return the file, whose folder is made.
 
     Raises
     ------
     PrbmError
         If there is nothing to show, or it cannot be written.
     """
-    return animate(
-        _result(options),
-        options.files[-1],
-        slow=options.slow,
-        fps=FPS if options.fps is None else options.fps,
-        start=_seconds(options.start, "--from"),
-        stop=_seconds(options.stop, "--to"),
-        progress=reporter(),
-    )
+    path = Path(options.files[-1])
+    write = _writer(path)
+    check_file(path)
+    start, stop = _seconds(options.start, "--from"), _seconds(options.stop, "--to")
+    moved = motion(_result(options))
+    fps = FPS if options.fps is None else options.fps
+    scene = Scene(moved, film(moved, options.slow, fps, start, stop))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AnimationError(f"{path}: cannot be written ({error.strerror})") from None
+    return _written(path, write, scene, reporter())
 
 
 def _seconds(text: str | None, option: str) -> float | None:
@@ -331,7 +339,6 @@ def _seconds(text: str | None, option: str) -> float | None:
 
 def _result(options: argparse.Namespace) -> Result:
     """Return the result that was asked for: read, or simulated."""
-    _writer(Path(options.files[-1]))
     mechanism, files = _named(options)
     if len(files) == 1:
         if mechanism is None:

@@ -54,7 +54,7 @@ def write_all(files: Mapping[Path, bytes]) -> None:
             Path(name).unlink(missing_ok=True)
 
 
-def check_writable(folder: Path) -> None:
+def check_writable(folder: Path, remedy: str = "choose a folder with --out") -> None:
     """Find out before the work whether its result can be kept in a folder, which may not exist.
 
     Raises
@@ -66,13 +66,22 @@ def check_writable(folder: Path) -> None:
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
     if not existing.is_dir():
-        raise FileError(
-            f"cannot write to {folder}: {existing} is a file; choose a folder with --out"
-        )
+        raise FileError(f"cannot write to {folder}: {existing} is a file; {remedy}")
     if not os.access(existing, os.W_OK):
-        raise FileError(
-            f"cannot write to {folder}: no permission in {existing}; choose a folder with --out"
-        )
+        raise FileError(f"cannot write to {folder}: no permission in {existing}; {remedy}")
+
+
+def check_file(path: Path) -> None:
+    """Find out before the work whether a file can be written, whose folder may not exist.
+
+    Raises
+    ------
+    FileError
+        If it is a folder, its folder is a file, or there is no permission.
+    """
+    if path.is_dir():
+        raise FileError(f"cannot write {path}: it is a folder; choose another name")
+    check_writable(path.parent, "choose another folder")
 
 
 def check_no_folder(path: Path) -> None:

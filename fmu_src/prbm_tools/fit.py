@@ -120,6 +120,11 @@ class Frequency:
     unit: str = field(default="Hz", init=False)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.frequency, Estimate):
+            raise EvaluationError(
+                f"frequency = {self.frequency!r} comes without its uncertainty, by which targets "
+                "are weighed: give Frequency(Estimate(value, standard uncertainty)), both in Hz"
+            )
         if not 0.0 < self.frequency.uncertainty < math.inf or self.frequency.value <= 0.0:
             raise EvaluationError(
                 f"frequency {self.frequency}: give a positive value and its standard uncertainty; "
@@ -267,6 +272,20 @@ def _of_mechanism(values: Mapping[str, float]) -> dict[str, float]:
     return {name: x for name, x in values.items() if name not in OWN}
 
 
+def _check_shape(target: Target, found: Real) -> None:
+    """Refuse what would be stretched to the data rather than compared with them."""
+    if np.shape(found) != np.shape(target.data):
+        raise EvaluationError(
+            f"{target.label}: its model returns {_counted(found)}, its data are "
+            f"{_counted(target.data)}: return one value for each of the data"
+        )
+
+
+def _counted(x: Real) -> str:
+    shape = np.shape(x)
+    return f"an array of length {shape[0]}" if len(shape) == 1 else f"an array of shape {shape}"
+
+
 @dataclass(frozen=True)
 class Problem:
     """A fit before it is made: parameters p with bounds, targets, and all other values."""
@@ -305,16 +324,20 @@ class Problem:
         Raises
         ------
         EvaluationError
-            If there is no such motion or shape; it names the parameters.
+            If there is no such motion or shape; it names the parameters.  Or if a target's model
+            gives another number of values than it has data.
         """
         values = self.values(p)
         try:
-            return np.concatenate([t.model(self.mechanism, values) for t in self.targets])
+            parts = [t.model(self.mechanism, values) for t in self.targets]
         except PrbmError as error:
             if isinstance(error, EvaluationError):
                 raise
             tried = ", ".join(f"{name} = {x:.6g}" for name, x in zip(self.names, p, strict=True))
             raise EvaluationError(f"{error} (tried {tried}; narrow the bounds)") from None
+        for target, part in zip(self.targets, parts, strict=True):
+            _check_shape(target, part)
+        return np.concatenate(parts)
 
     def residuals(self, p: Real) -> Real:
         """Return (model - data)/uncertainty."""
@@ -673,6 +696,12 @@ def _problem(
 ) -> Problem:
     if not free or not targets:
         raise EvaluationError("there is nothing to fit: give a parameter and a target")
+    for target in targets:
+        if not hasattr(target, "model"):
+            raise EvaluationError(
+                f"{target!r} is no target: give Frequency, Response, ForceDeflection, or what has "
+                "the attributes and methods of Target"
+            )
     if len({target.uncertainty is None for target in targets}) > 1:
         raise EvaluationError(
             "the uncertainty is given for some targets only, so that they cannot be weighed: give "
@@ -783,9 +812,11 @@ class Valley:
     best: Real
 
     def __str__(self) -> str:
-        head = "".join(f"{name:>22}" for name in self.names) + f"{'misfit':>14}"
+        widths = [max(22, 2 + len(name)) for name in self.names]
+        head = "".join(f"{name:>{w}}" for name, w in zip(self.names, widths, strict=True))
+        head += f"{'misfit':>14}"
         rows = [
-            "".join(f"{x:>22.6g}" for x in point) + f"{misfit:>14.4g}"
+            "".join(f"{x:>{w}.6g}" for x, w in zip(point, widths, strict=True)) + f"{misfit:>14.4g}"
             for point, misfit in zip(self.points, self.misfit, strict=True)
         ]
         return "\n".join([head, *rows])

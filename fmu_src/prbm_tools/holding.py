@@ -8,6 +8,7 @@ u that direction, z(d) the shape held at the displacement d and F(d) the force,
 the second being what a straight-line guide should not do.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -16,9 +17,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from prbm import System, equilibrium, free_displacement, modes
+from prbm import EquilibriumError, System, equilibrium, free_displacement, modes
 from prbm.assembly import Real, unit
-from prbm.statics import Equilibrium
+from prbm.statics import Equilibrium, held_by_loops
 
 from .equilibria import Rest, holding_force, rests, snap
 from .scene import IMPACT, PAST, REST, length_unit, own_style, plain
@@ -39,7 +40,8 @@ class Held:
     force : float
         On the body along that direction [N]; 0 if it rests there by itself.
     stiffness : float
-        Change of the force with the displacement [N/m].
+        Change of the force with the displacement [N/m]; NaN where the loops let the body move
+        no further along that direction.
     across : float
         Displacement of the body to the left of that direction [m].
     angle : float
@@ -62,12 +64,22 @@ def _described(system: System, displacement: float, shape: Equilibrium) -> Held:
     release = system.mechanism.release
     frame, e = system.bodies[release.body], system.directions(shape.q)
     moved = unit(release.direction).conjugate() * complex(frame.c + frame.A @ e - frame.drawn)
-    step = DIFFERENCE * system.length
-    behind, ahead = (holding_force(system, displacement + k * step) for k in (-1, 1))
     return Held(
-        displacement, shape.force, (ahead - behind) / (2 * step), moved.imag,
+        displacement, shape.force, _stiffness(system, displacement), moved.imag,
         float(shape.q[frame.j]), float(modes(system, shape).frequency[0]),
     )  # fmt: skip
+
+
+def _stiffness(system: System, displacement: float) -> float:
+    """Return the change of the holding force with the displacement [N/m]."""
+    step = DIFFERENCE * system.length
+    try:
+        behind, ahead = (holding_force(system, displacement + k * step) for k in (-1, 1))
+    except EquilibriumError:
+        if not held_by_loops(system):
+            raise
+        return math.nan
+    return (ahead - behind) / (2 * step)
 
 
 def held(system: System, displacement: float) -> Held:

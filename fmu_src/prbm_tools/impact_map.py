@@ -224,8 +224,8 @@ class _Stop:
     def of(cls, mechanism: Mechanism, name: str | None) -> "_Stop":
         names = [stop.name for stop in mechanism.stops]
         if not names or (name is not None and name not in names):
-            known = ", ".join(names) or "none"
-            raise ParameterError(f"{mechanism.name} has no stop {name or 'to hit'}; it has {known}")
+            known = f"; it has {', '.join(names)}" if names else ": describe one, [[stops]]"
+            raise ParameterError(f"{mechanism.name} has no stop {name or 'to hit'}{known}")
         found = cls(names.index(name) if name is not None else 0, name or names[0])
         for what in ("position", "offset"):
             if f"{found.name}.{what}" not in mechanism.values():

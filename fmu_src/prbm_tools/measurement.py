@@ -36,6 +36,8 @@ LONGEST = 1.0  # of the length of a beam: a larger deflection is a mistake of un
 LARGE = 1.0  # m: a longer beam is more likely one whose sizes are in mm
 SOLID = (1e5, 2e12)  # Pa: from gels to diamond and carbon nanotubes
 TURNS = 0.2  # of the range of the deflection: less is noise, not a change of direction
+SIZES = ("length", "width", "thickness")  # of a beam
+SAME = 1e-12  # of a deflection: rounding, not a change
 LARGEST_ANGLE = 85.0  # deg between the sensor and the direction of the force
 
 
@@ -179,7 +181,7 @@ class Beam:
     thickness: Estimate
 
     def __post_init__(self) -> None:
-        for what in ("length", "width", "thickness"):
+        for what in SIZES:
             x = getattr(self, what)
             if x.value <= 0.0:
                 raise EvaluationError(f"beam {self.name}: {what} = {x.value:g} m must be positive")
@@ -282,6 +284,14 @@ class YoungsModulus:
                 f"{100 * loss:.0f} % of the work is lost in a cycle: E is of both branches, "
                 "and their difference is not in its uncertainty; evaluate one alone to see it"
             )
+        exact = [what for what in SIZES if getattr(self.beam, what).uncertainty == 0.0]
+        if exact:
+            more = [what for what, share in self.budget.items() if share > 0.0 and what != "fit"]
+            notes.append(
+                f"{_listed(exact)} {'were' if exact[1:] else 'was'} given without uncertainty, so "
+                f"that the ± is of {_listed(['the scatter of the fit', *more])} only; give it of "
+                "each, as 40 mm +- 0.05 mm"
+            )
         return tuple(notes)
 
     @property
@@ -302,6 +312,17 @@ class YoungsModulus:
                 "  loss per cycle: " + ", ".join(f"{100 * x.fraction:.1f} %" for x in self.loops)
             )
         return "\n".join([*rows, *(f"  note: {note}" for note in self.notes)])
+
+
+def _listed(words: Sequence[str]) -> str:
+    """Return words as a list in a sentence.
+
+    Examples
+    --------
+    >>> _listed(["length"]), _listed(["length", "width", "thickness"])
+    ('length', 'length, width and thickness')
+    """
+    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
 
 
 def youngs_modulus(
@@ -405,6 +426,11 @@ def _check_options(
             f"window = {window} samples: give 1 to a third of the {len(deflection)} that there are"
         )
     reach = float(np.ptp(deflection))
+    if reach <= SAME * float(np.abs(deflection).max()):
+        raise EvaluationError(
+            f"beam {beam.name}: the deflection does not change, it is {deflection[0]:.4g} m "
+            "throughout: take the column of the deflection, or bend the beam"
+        )
     if reach > LONGEST * beam.length.value:
         raise EvaluationError(
             f"beam {beam.name}: a deflection of {reach:.4g} m is longer than the beam, "

@@ -514,11 +514,7 @@ def _check_drawn(mechanism: Mechanism) -> None:
                 "of the origin"
             )
     for flexure in mechanism.flexures:
-        if _distance(mechanism, flexure, values) < TINY_LENGTH:
-            raise MechanismError(
-                f"flexure {flexure.name} from {flexure.start} to {flexure.end} has no length: move "
-                "its ends apart"
-            )
+        _check_slender(mechanism, flexure, values)
     for joint in mechanism.joints:
         apart = _distance(mechanism, joint, values)
         if apart > TINY_LENGTH:
@@ -526,6 +522,25 @@ def _check_drawn(mechanism: Mechanism) -> None:
                 f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
                 "draw them at the same place"
             )
+
+
+def _check_slender(
+    mechanism: Mechanism, flexure: engine.Flexure, values: Mapping[str, float]
+) -> None:
+    """Refuse a flexure without length, or as thick as long: millimetres written as metres."""
+    length = _distance(mechanism, flexure, values)
+    if length < TINY_LENGTH:
+        raise MechanismError(
+            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has no length: move "
+            "its ends apart"
+        )
+    kind = next(kind for kind in mechanism.flexure_types if kind.name == flexure.type)
+    thickness = engine.value(kind, "thickness", values)
+    if thickness >= length:
+        raise MechanismError(
+            f"{kind.name}.thickness = {thickness:g} m is not less than the length of the flexure "
+            f"{flexure.name}, {length:g} m: check the units of both"
+        )
 
 
 def _places(mechanism: Mechanism) -> Iterator[tuple[str, engine.Point]]:

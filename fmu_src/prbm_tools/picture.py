@@ -8,7 +8,7 @@ import argparse
 import cmath
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +25,7 @@ from prbm.modal import Modes
 
 from .arguments import picture_arguments
 from .figures import save
+from .files import check_file
 from .mechanism_file import find
 from .scene import (
     BODY,
@@ -69,7 +70,8 @@ def picture(
     values : mapping or None
         Parameters that differ from their defaults.
     shown : int
-        How many modes are drawn, about the static equilibrium under gravity, without stops.
+        How many modes are drawn, about the static equilibrium under gravity, without stops; all
+        there are, if they are fewer.
     held : float or None
         Displacement at which the released body is held [m]; None: it rests by itself.
 
@@ -81,7 +83,7 @@ def picture(
     Raises
     ------
     ParameterError
-        If there are not so many modes, or a value makes no sense.
+        If so many modes are too many for a picture, or a value makes no sense.
     EquilibriumError
         If there is no equilibrium about which modes could be drawn.
     """
@@ -89,6 +91,9 @@ def picture(
     if not 0 <= shown <= MOST_MODES:
         raise ParameterError(f"{shown} modes: choose a number from 0 to {MOST_MODES}")
     z = np.concatenate([*_places(shapes, shapes.straight), *_walls(shapes)])
+    vibrating = _vibrating(shapes, held) if shown else None
+    if vibrating is not None:
+        shown = min(shown, len(vibrating[0].frequency))
     aspect = float(np.ptp(z.imag[np.isfinite(z)]) / np.ptp(z.real[np.isfinite(z)]))
     height = FRAME + min(max(aspect * WIDTH, LEAST_HEIGHT), LARGEST_HEIGHT)
     row = min(max(aspect, 0.5), 1.6) * WIDTH / COLUMNS
@@ -98,21 +103,21 @@ def picture(
     axes = figure.add_subplot(grid[0, :])
     _Drawing(axes, shapes).parts()
     axes.set_title(mechanism.title, fontsize=10, loc="left")
-    if shown:
-        _draw_modes(
-            figure, [grid[1 + k // COLUMNS, k % COLUMNS] for k in range(shown)], shapes, held
-        )
+    if vibrating is not None:
+        places = [grid[1 + k // COLUMNS, k % COLUMNS] for k in range(shown)]
+        _draw_modes(figure, places, shapes, *vibrating)
     return figure
 
 
-def _draw_modes(figure: Figure, places: list[object], shapes: Shapes, held: float | None) -> None:
-    system = shapes.system
-    rest = equilibrium(system, held)
-    found, E = modes(system, rest), shapes.arms(rest.q)
-    if len(places) > len(found.frequency):
-        raise ParameterError(
-            f"{system.mechanism.name} has {len(found.frequency)} modes, {len(places)} are asked for"
-        )
+def _vibrating(shapes: Shapes, held: float | None) -> tuple[Modes, Complex]:
+    """Return the modes, and the arms of the shape that they are about."""
+    rest = equilibrium(shapes.system, held)
+    return modes(shapes.system, rest), shapes.arms(rest.q)
+
+
+def _draw_modes(
+    figure: Figure, places: Sequence[object], shapes: Shapes, found: Modes, E: Complex
+) -> None:
     for k, place in enumerate(places):
         axes = figure.add_subplot(place)  # type: ignore[call-overload]
         drawing = _Drawing(axes, shapes)
@@ -317,18 +322,21 @@ class _Drawing:
 
 
 def run(options: argparse.Namespace) -> Path:
-    """Draw what a command line says; return the file.
+    """Draw what a command line says; return the file, whose folder is made.
 
     Raises
     ------
     PrbmError
-        If there is no such mechanism, parameter or mode.
+        If there is no such mechanism or parameter, or the file cannot be written.
     OSError
-        If the file cannot be written.
+        If it turns out later that it cannot.
     """
     mechanism = find(options.mechanism)
+    path = options.out or Path(f"{mechanism.name}.png")
+    check_file(path)
     drawn = picture(mechanism, settings(mechanism, options.set), options.modes)
-    return save(drawn, options.out or Path(f"{mechanism.name}.png"))
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return save(drawn, path)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -177,8 +177,20 @@ class Series:
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
     def between(self, start: float = -math.inf, end: float = math.inf) -> "Series":
-        """Return the part with start <= t <= end [s]; its times stay as they are."""
+        """Return the part with start <= t <= end [s]; its times stay as they are.
+
+        Raises
+        ------
+        RecordError
+            If there is nothing of the record in it, or too little.
+        """
         kept = (self.time >= start) & (self.time <= end)
+        if not kept.any():
+            low, high = (f"{t:.6g} s" for t in (self.time[0], self.time[-1]))
+            raise RecordError(
+                f"{self.source}: nothing of {self.name} is left {_span(start, end)}: the record is "
+                f"from {low} to {high}; choose a start and a later end within"
+            )
         lines = self.lines[kept] if len(self.lines) else self.lines
         return Series(self.time[kept], self.values[kept], self.name, self.unit, self.source, lines)
 
@@ -187,6 +199,19 @@ class Series:
         return Series(
             self.time - self.time[0], self.values, self.name, self.unit, self.source, self.lines
         )
+
+
+def _span(start: float, end: float) -> str:
+    """Return a span of time in words.
+
+    Examples
+    --------
+    >>> _span(-math.inf, 2.0), _span(3.0, 2.0), _span(20.0, math.inf)
+    ('up to 2 s', 'from 3 s to 2 s', 'from 20 s on')
+    """
+    if start == -math.inf:
+        return f"up to {end:g} s"
+    return f"from {start:g} s on" if end == math.inf else f"from {start:g} s to {end:g} s"
 
 
 @dataclass(frozen=True)

@@ -47,6 +47,8 @@ AHEAD = 2  # batches a thread that are under way, so that none waits for work
 ENOUGH = 20  # runs a process from which on it is worth finding out whether resets may be trusted
 POINTS = 1000  # communication points where the FMU proposes no step
 CONNECT = 10.0  # s for a scheduler and its workers to answer
+FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".xls", ".xlsx")
+"""Ends of names that say of the results what they are not: one file."""
 RECENT = 50  # runs whose median duration sizes the next batch
 
 ABSENT = "No module named"  # what Python says of a package that is not installed
@@ -134,6 +136,7 @@ def sweep(
         After Ctrl-C; it says what is done, which is kept.
     """
     _needed()
+    _check_name(Path(out))
     plan = _planned(fmu, table, outputs, values, stop_time, step, tolerance)
     _check_counts(workers, retries, timeout)
     results = _results(plan, Path(out))
@@ -317,6 +320,15 @@ def _times(
             "of one size only; choose one that divides it"
         )
     return {"start": start, "stop": stop, "step": size, "tolerance": tolerance}
+
+
+def _check_name(out: Path) -> None:
+    if out.suffix.lower() in FILES:
+        raise ParameterError(
+            f"{out} is the name of a {out.suffix} file, but the results are a folder of Parquet "
+            f"files: choose a name such as {out.with_suffix('.parquet')}; "
+            "pandas.read_parquet(name).to_csv(...) makes one file of them"
+        )
 
 
 def _check_counts(workers: int | None, retries: int, timeout: float | None) -> None:

@@ -19,6 +19,7 @@ from prbm.mechanism import proposal
 
 Table = pd.DataFrame | str | Path
 METHODS = ("random", "latin", "sobol")
+SEPARATORS = {";": "semicolons", "\t": "tabs"}  # of tables that are none of ours
 WORDS = {"true": 1.0, "false": 0.0}
 EDGE = 2.0**-53  # how near to 0 and 1 a probability may come, where distributions may have no end
 RANGES = {"Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31, "Int64": 53,
@@ -157,9 +158,19 @@ def checked(table: pd.DataFrame, variables: Mapping[str, Any]) -> pd.DataFrame:
     """
     columns = {}
     for name in table.columns:
+        _check_separator(name, variables)
         check_settable(name, variables)
         columns[name] = _numbers(name, table[name], variables[name].type)
     return pd.DataFrame(columns)
+
+
+def _check_separator(name: str, variables: Mapping[str, Any]) -> None:
+    for sign, word in SEPARATORS.items():
+        if sign in name and name not in variables:
+            raise ParameterError(
+                f"the table has the column {name!r}: its columns seem to be separated by {word}; "
+                "separate them by commas, and write numbers with a decimal point"
+            )
 
 
 def check_settable(name: str, variables: Mapping[str, Any]) -> None:

@@ -216,7 +216,7 @@ def line(x: Real, y: Real) -> Line:
         )
     centre_x, centre_y = float(x.mean()), float(y.mean())
     spread = float(((x - centre_x) ** 2).sum())
-    if spread <= 0.0:
+    if float(np.ptp(x)) == 0.0:  # the mean of equal numbers may be another one, by rounding
         raise EvaluationError(f"all {n} points are at x = {centre_x:.6g}: a line needs different x")
     slope = float((x - centre_x) @ (y - centre_y)) / spread
     rest = y - centre_y - slope * (x - centre_x)

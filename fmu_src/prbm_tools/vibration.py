@@ -99,15 +99,17 @@ class FreeVibration:
     decrement_zeta : Estimate or None
         Damping ratio from it [-].
     amplitude : float
-        At the start of the record [m].
+        At the start of the record, in its unit.
     rest : float
-        Where it comes to rest [m].
+        Where it comes to rest, in the unit of the record.
     residual : float
-        Standard deviation about the fit [m].
+        Standard deviation about the fit, in the unit of the record.
     serial : float
         Correlation of neighbouring residuals [-]; noise has none.
     peak : FourierPeak
         The spectrum's view.
+    unit : str
+        Of the record; 1 if it is dimensionless.
     """
 
     frequency: Estimate
@@ -120,6 +122,7 @@ class FreeVibration:
     residual: float
     serial: float
     peak: FourierPeak
+    unit: str = "m"
 
     @property
     def damping_measurable(self) -> bool:
@@ -140,9 +143,10 @@ class FreeVibration:
         ]
         if self.decrement_zeta is not None:
             rows.append(f"damping ratio, decrement: {damping_verdict(self.decrement_zeta)}")
+        unit = "" if self.unit == "1" else f" {self.unit}"
         rows.append(
-            f"amplitude {self.amplitude:.4g}, residual {self.residual:.3g}, correlation of "
-            f"residuals {self.serial:.2f}"
+            f"amplitude {self.amplitude:.4g}{unit}, residual {self.residual:.3g}{unit}, "
+            f"correlation of residuals {self.serial:.2f}"
         )
         return "\n".join(rows)
 
@@ -213,7 +217,7 @@ def free_vibration(series: Series) -> FreeVibration:
         estimate(omega / turn, 0.0, 1.0 / turn, "Hz"),
         estimate(decay / natural, omega**2 / natural**3, -decay * omega / natural**3),
         decrement, _decrement_zeta(decrement),
-        amplitude, float(c), residual, serial, peak,
+        amplitude, float(c), residual, serial, peak, series.unit,
     )  # fmt: skip
 
 

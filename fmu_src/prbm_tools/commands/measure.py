@@ -140,9 +140,8 @@ def restitution(options: argparse.Namespace) -> None:
     names = [stop.name for stop in mechanism.stops]
     stop = options.stop or (names[0] if names else "")
     if stop not in names:
-        raise UserMistake(
-            f"{mechanism.name} has no stop {stop or 'to hit'}; it has {', '.join(names) or 'none'}"
-        )
+        known = f"; it has {', '.join(names)}" if names else ": describe one, [[stops]]"
+        raise UserMistake(f"{mechanism.name} has no stop {stop or 'to hit'}{known}")
     found = fitted_restitution(
         mechanism, target.series, values, output=target.output, stop=stop,
         uncertainty=target.uncertainty, free=more, progress=reporter(),

@@ -1,11 +1,13 @@
 """``prbm equilibrium``: places of rest, holding forces, snaps."""
 
 import argparse
+import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from prbm import Mechanism, System
+from prbm.statics import immobile
 
 from .. import holding
 from ..settings import UserMistake, quantities, quantity
@@ -33,17 +35,17 @@ def equilibria(options: argparse.Namespace) -> None:
     body, direction = mechanism.release.body, mechanism.release.direction
     way = "x" if direction == 0.0 else f"{direction:g} degrees"
     weight = "gravity acts" if system.gravity else "no gravity acts"
-    print(f"{mechanism.name}: displacement of {body} along {way}, from straight; {weight}")
+    head = f"{mechanism.name}: displacement of {body} along {way}, from straight; {weight}"
     if ranged != (None, None):
-        _range(options, mechanism, system, output)
+        _range(options, mechanism, system, output, head)
     elif options.held:
         places = quantities(options.held, "m", "--held")
         points = [holding.held(system, check_length(x, system.length, "--held")) for x in places]
-        print(_table(points, system.length))
+        _tell(head, points, system)
         output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows(points))
     else:
         rest = holding.free(system)
-        print(_table([rest], system.length))
+        _tell(head, [rest], system)
         stable = rest.frequency > 0.0
         at = tiny(1e3 * rest.displacement, 1e3 * system.length)
         print(f"rests at {at} mm: {'stable' if stable else 'unstable'}")
@@ -52,7 +54,7 @@ def equilibria(options: argparse.Namespace) -> None:
 
 
 def _range(
-    options: argparse.Namespace, mechanism: Mechanism, system: System, output: Output
+    options: argparse.Namespace, mechanism: Mechanism, system: System, output: Output, head: str
 ) -> None:
     low, high = (
         check_length(quantity(text, "m", option), system.length, option)
@@ -64,7 +66,7 @@ def _range(
         raise UserMistake(f"--points {options.points}: choose a number from 3 to {MOST_POINTS}")
     curve = holding.curve(system, np.linspace(low, high, options.points), reporter())
     every = -(-options.points // 11)
-    print(_table(curve.points[::every], system.length))
+    _tell(head, curve.points[::every], system)
     if every > 1:
         print(f"every {every}th of {options.points} points; --out DIR writes all")
     for rest in curve.rests:
@@ -93,12 +95,20 @@ def _rows(points: Sequence[holding.Held]) -> list[list[float]]:
     return [[p.displacement, p.force, p.stiffness, p.across, p.angle, p.frequency] for p in points]
 
 
+def _tell(head: str, points: Sequence[holding.Held], system: System) -> None:
+    print(head)
+    print(_table(points, system.length))
+    if any(math.isnan(p.stiffness) for p in points):
+        print(f"no stiffness: {immobile(system)}")
+
+
 def _table(points: Sequence[holding.Held], size: float) -> str:
     most = max(abs(p.force) for p in points)
     rows = [
         [
             tiny(1e3 * p.displacement, 1e3 * size, ".5g"), tiny(p.force, most),
-            f"{p.stiffness:.5g}", tiny(1e6 * p.across, 1e3), tiny(1e3 * p.angle, 1e3),
+            "-" if math.isnan(p.stiffness) else f"{p.stiffness:.5g}",
+            tiny(1e6 * p.across, 1e3), tiny(1e3 * p.angle, 1e3),
             f"{p.frequency:.5g}" if p.frequency > 0.0 else "unstable",
         ]
         for p in points
