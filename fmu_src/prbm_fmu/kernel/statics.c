@@ -157,17 +157,22 @@ static double jump(const System *system, const double *from, const double *to) {
     return top;
 }
 
-static bool unreachable(bool held, double displacement, double done, Problem *problem) {
+static bool unreachable(const System *system, bool held, double displacement, double done,
+                        Problem *problem) {
+    bool heavy = system->gravity.re != 0.0 || system->gravity.im != 0.0;
     if (!held) {
-        return fail(problem,
-                    "no static equilibrium under gravity was found: the flexures are too weak for "
-                    "this load; reduce gravity or the masses, or stiffen the flexures");
+        return fail(problem, "%s",
+                    heavy ? "no static equilibrium under gravity was found: the flexures are too "
+                            "weak for this load; reduce gravity or the masses, or stiffen the "
+                            "flexures"
+                          : "no static equilibrium was found: the drawn shape is none, or the "
+                            "flexures are too weak to hold it");
     }
     return fail(problem,
                 "release.displacement = %g m cannot be reached: no equilibrium was found beyond "
-                "%.4g m (gravity raised in proportion); release closer to the straight shape, or "
-                "reduce gravity across the motion",
-                displacement, done * displacement);
+                "%.4g m%s; release closer to the straight shape%s",
+                displacement, done * displacement, heavy ? " (gravity raised in proportion)" : "",
+                heavy ? ", or reduce gravity across the motion" : "");
 }
 
 /* Raise the load and the displacement together from the straight, unloaded shape: state is
@@ -191,7 +196,7 @@ static bool load_slowly(const System *system, bool held, double displacement, do
         }
     }
     scratch->used = used;
-    return done >= 1.0 || unreachable(held, displacement, done, problem);
+    return done >= 1.0 || unreachable(system, held, displacement, done, problem);
 }
 
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
