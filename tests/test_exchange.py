@@ -20,7 +20,7 @@ FRICTION = {
     "stop.friction": 0.3, "friction.coefficient": 0.4, "friction.normal_force": 0.5,
     "friction.normal_stiffness": 30.0, "damping.zeta": 0.05,
 }  # fmt: skip
-SCALARS = 21  # numbers before the values in the array of the state
+SCALARS = 23  # numbers before the values in the array of the state
 
 
 @each_shipped

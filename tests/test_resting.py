@@ -219,6 +219,65 @@ def test_a_wall_gets_where_it_is_told_whatever_happens_on_the_way(native, impuls
 
 
 @events
+@pytest.mark.parametrize("order", ["set, update", "set, update, throw, update", "update, set",
+                                   "update, set, update"])  # fmt: skip
+def test_what_is_set_around_an_event_does_not_push_the_wall_in_the_rest_of_the_step(native, order):
+    """0.01 mm, made good in the 1 us that are left after the impact, would be 10 m/s."""
+    with Instance(native["PRBDM", 3], "events").initialize() as instance:
+        *_, hit = instance.fmu.doStep(0.0, 0.1)
+    with Instance(native["PRBDM", 3], "events").initialize() as instance:
+        doing = {
+            "set": lambda: instance.set({"stop.displacement": -1e-5}),
+            "throw": lambda: instance.set({"force.impulse.y": 1e-12}),
+        }
+        *_, time = instance.fmu.doStep(0.0, hit + 1e-6)
+        assert time == pytest.approx(hit, abs=1e-12)
+        instance.fmu.enterEventMode()
+        for word in order.split(", "):
+            if word == "update":
+                instance.function("newDiscreteStates", "updateDiscreteStates")()
+            else:
+                assert doing[word]() == OK
+        instance.fmu.enterStepMode()
+        event, *_ = instance.fmu.doStep(hit, 1e-6)
+        found = instance.values()
+        assert not event
+        assert found["stop.impact_count"] == 1
+        assert found["stop.gap_rate"] == pytest.approx(found["stop.rebound_speed"], rel=1e-3)
+        *_, end = instance.fmu.doStep(hit + 1e-6, 1e-3)
+        drawn = instance.values()
+        assert drawn["stop.gap"] == pytest.approx(-1e-5 - drawn["shuttle.x"], abs=1e-9)
+        assert end == pytest.approx(hit + 1e-6 + 1e-3)
+
+
+@pytest.mark.parametrize("twin", TWINS)
+def test_a_wall_that_has_come_to_a_stand_is_not_pushed_either(twin):
+    """It brakes from 10 mm/s; then a step of 0.1 us with no velocity, which would be at 5 m/s."""
+    moved = TWINS[twin](mechanism("PRBDM"), AT_REST)
+    for k in range(10):
+        left = 1.0 - 0.1 * k
+        moved.set(dict(zip(WALL, (5e-5 * (1 - left**2), 0.01 * left), strict=True)))
+        moved.advance((k + 1) * 1e-3)
+    moved.set(dict(zip(WALL, (5e-5, 0.0), strict=True)))
+    moved.advance(0.0100001)
+    out = moved.outputs()
+    assert out["stop.approach_speed"] < 0.01
+    assert abs(out["shuttle.vx"]) < 0.02
+
+
+@pytest.mark.parametrize("twin", TWINS)
+def test_a_rest_speed_that_is_set_with_the_wall_acts_on_it(twin):
+    """The wall may mend what it is off with half of it, 0.5 m/s for 10 us: 5 of 5.01 um."""
+    moved = TWINS[twin](mechanism("PRBDM"), {"release.displacement": -0.01})
+    moved.set({"stop.velocity": 0.01})
+    moved.advance(1e-3)
+    moved.set({"stop.displacement": 1.501e-5, "stop.rest_speed": 1.0})
+    moved.advance(1.01e-3)
+    out = moved.outputs()
+    assert out["stop.gap"] + out["shuttle.x"] == pytest.approx(1.51e-5, abs=2e-7)
+
+
+@events
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_slips_on_a_moving_wall_leave_the_books_balanced(native, model):
     """A slip is no impact: what the wall carries keeps its velocity through it."""

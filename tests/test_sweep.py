@@ -537,7 +537,7 @@ def test_the_command_sums_up(native, capsys):
     ]
     found = pd.read_parquet("r")
     assert len(found) == 2
-    first = found["shuttle.x"][0]
+    first = found.set_index("row")["shuttle.x"][0]
     alone = fmpy.simulate_fmu(
         str(native["PRBDM", 2]), stop_time=0.01, output=["shuttle.x"],
         start_values={"release.displacement": -0.01, "stop.restitution": 0.5},

@@ -210,6 +210,7 @@ class Simulation:
         self._window = (self.time, 0)
         self._planned = self._due = self.time  # when walls were planned, by when they are there
         self._told = self._wall_velocities()
+        self._swift = (False,) * len(walls)  # walls that were given a velocity
         self.arc: Arc | None = None
         self.h, self.last_error = 0.0, LEAST_ERROR
         self.changed = False
@@ -312,7 +313,8 @@ class Simulation:
         """Continue the motion to a time.
 
         The walls move uniformly from where they are to ``position + displacement + velocity *
-        (time - now)``.
+        (time - now)``; in a step shorter than one before those with a velocity take longer to
+        make good what they are off.
 
         Parameters
         ----------
@@ -364,8 +366,9 @@ class Simulation:
         """Turn the inputs of the walls into uniform motions up to a time.
 
         A wall that is a little elsewhere than it is said to be gets there within the step.  One
-        with a velocity does not hurry in a step that is shorter than the last one: it takes as
-        long as that, or goes by what its velocity has changed, or by half of ``rest_speed``.
+        that was given a velocity does not hurry in a step that is shorter than one before: it
+        takes as long as that, or goes by what its velocity has changed, or by half of
+        ``rest_speed``.
         """
         now, span, velocities = self.time, time - self.time, self._wall_velocities()
         due, walls = max(self._due, 2 * now - self._planned), list(self.inputs.walls)
@@ -373,7 +376,7 @@ class Simulation:
             here = wall.at(now)
             off = self._wall_target(i, 0.0) - here
             mends = off / span
-            if velocity and due > time:
+            if (velocity or self._swift[i]) and due > time:
                 most = max(
                     abs(off) / (due - now), abs(velocity - self._told[i]),
                     0.5 * self._field(i, "rest_speed"),
@@ -382,6 +385,10 @@ class Simulation:
             if abs(wall.at(time) - here - (velocity + mends) * span) > 1e-13 * self.system.length:
                 walls[i] = Wall(here, velocity + mends, now)
         self._planned, self._due, self._told = now, due, velocities
+        self._swift = tuple(
+            swift or velocity != 0.0
+            for swift, velocity in zip(self._swift, velocities, strict=True)
+        )
         if tuple(walls) != self.inputs.walls:
             self.inputs = replace(self.inputs, walls=tuple(walls))
             self.changed = True
@@ -1235,6 +1242,7 @@ class Simulation:
             "planned": self._planned,
             "due": self._due,
             "told": list(self._told),
+            "swift": list(self._swift),
             "h": self.h,
             "last_error": self.last_error,
             "changed": self.changed,
@@ -1292,6 +1300,7 @@ class Simulation:
         self.received = list(s["received"])
         self._window = (s["window"][0], s["window"][1])
         self._planned, self._due, self._told = s["planned"], s["due"], tuple(s["told"])
+        self._swift = tuple(s["swift"])
         self.h, self.last_error, self.changed = s["h"], s["last_error"], s["changed"]
         self.front_time, self.front = s["front_time"], np.array(s["front"])
         self.k1 = None if s["k1"] is None else np.array(s["k1"])

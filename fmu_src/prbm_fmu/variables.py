@@ -317,7 +317,7 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
         yield given(
             f"{stop.name}.displacement",
             f"Displacement of the {wall(stop)}, added to {stop.name}.position; the wall moves "
-            "there uniformly within a communication step",
+            "there uniformly within a communication step that is as long as those before",
         )
         yield given(
             f"{stop.name}.velocity",

@@ -8,7 +8,7 @@
 
 static const double TIME_SLACK = 1e-6;  /* of a step: round-off that importers gather */
 static const double TIME_ROUND = 1e-12; /* of the time itself */
-static const double END_SLACK = 1e-3;   /* of a step: the same of the end, which they add up to */
+static const double END_SLACK = 1e-3;   /* of a step: an end that steps were added up to */
 #define TO_RESET "reset the instance to start again"
 
 /* --- messages --------------------------------------------------------------------------------- */
@@ -797,7 +797,8 @@ static bool any_tick(const Instance *instance) {
     return false;
 }
 
-/* A wall that was put deep into a body, or a body that was taken through it, is told once a depth. */
+/* Tell of a wall that was put deep into a body, or a body that was taken through it; again when it is
+ * twice as deep. */
 static int warn_of_depth(Instance *instance) {
     double depth;
     const char *stop = exchange_deepest(instance->simulation, &depth);

@@ -53,7 +53,7 @@ static void place_state(Simulation *sim, Memory *memory) {
     size_t nx = 2 * (size_t)m->independent_count + 2;
     size_t nf = LOADS * (size_t)m->force_count;
     size_t counts[] = {sizeof(Scalars) / d, np, nu, np, nu, 3 * s, s, s, (size_t)m->friction_count,
-                       sizeof(Latched) / d * s, ny, ny, ny, STAGES * ny, nx, s, s, s, nf};
+                       sizeof(Latched) / d * s, ny, ny, ny, STAGES * ny, nx, s, s, s, nf, s};
     enum { GROUPS = sizeof counts / sizeof counts[0] };
     double *parts[GROUPS];
     size_t count = 0;
@@ -88,6 +88,7 @@ static void place_state(Simulation *sim, Memory *memory) {
         sim->held_rates = parts[16];
         sim->held_times = parts[17];
         sim->received = parts[18];
+        sim->swift = parts[19];
     }
 }
 
@@ -436,6 +437,7 @@ static void start_discrete(Simulation *sim) {
         sim->rubs[i] = IDLE;
     }
     memset(sim->latched, 0, (size_t)sim->system.s * sizeof *sim->latched);
+    zeros(sim->system.s, sim->swift);
     copy(LOADS * sim->mechanism->force_count, impulses(sim), sim->received);
 }
 
@@ -526,27 +528,28 @@ static bool given_another(const Simulation *sim, int i, double acting) {
     return velocity != acting && fabs(velocity - sim->walls[i].rate) >= least;
 }
 
-/* Whether a time is within the communication step in which an event was handled. */
+/* Whether a time is within a communication step that was left in its middle, by an event or the
+ * importer. */
 static bool within_step(const Simulation *sim, double time) {
     const Scalars *now = sim->now;
     double rounding = ROUNDED * (fabs(time) + fabs(now->time));
-    return now->adrift != 0.0 && time <= now->underway_until + rounding;
+    return (now->adrift != 0.0 || now->underway != 0.0) && time <= now->underway_until + rounding;
 }
 
-/* By when the walls are to be where they are said to be: in as long as the last step took. */
+/* By when the walls are to be where they are said to be: in as long as a step took before. */
 static double due_walls(const Simulation *sim) {
     return greater(sim->now->due, 2.0 * sim->now->time - sim->now->planned);
 }
 
 /* The rate of a wall in a step.  If it is a little elsewhere than it is said to be it gets there within
- * the step.  One with a velocity does not hurry in a step that is shorter than the last one: it takes
- * as long as that, or goes by what its velocity has changed, or by half of rest_speed. */
+ * the step.  One that was given a velocity does not hurry in a step that is shorter than one before:
+ * it takes as long as that, or goes by what its velocity has changed, or by half of rest_speed. */
 static double wall_rate(const Simulation *sim, int i, double time) {
     double now = sim->now->time, due = due_walls(sim), velocity = given_velocity(sim, i);
     double off = wall_target(sim, i, 0.0) - wall_at(&sim->walls[i], now);
     double mends = off / (time - now);
-    if (velocity != 0.0 && due > time) {
-        double rest_speed = stop_field(sim, sim->mechanism->stops[i].rest_speed);
+    if ((velocity != 0.0 || sim->swift[i] != 0.0) && due > time) {
+        double rest_speed = evaluate(sim->mechanism->stops[i].rest_speed, sim->values);
         double most = greater(fabs(off) / (due - now), fabs(velocity - *acting_velocity(sim, i)));
         most = greater(most, 0.5 * rest_speed);
         mends = lesser(greater(mends, -most), most);
@@ -2220,7 +2223,10 @@ static bool advance(Simulation *sim, double time, bool each, bool events, bool *
             now->due = due;
             now->planned = begins;
         }
-        now->adrift = 0.0;
+        for (int i = 0; i < sim->system.s; i++) {
+            sim->swift[i] = sim->swift[i] != 0.0 || given_velocity(sim, i) != 0.0;
+        }
+        now->adrift = rest && time < now->underway_until;
     }
     now->underway = 0.0;
     for (bool stepped = false;; stepped = true) {
@@ -2331,7 +2337,7 @@ PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
         for (int i = 0; i < sim->system.s; i++) {
             *acting_velocity(sim, i) = acted[i];
         }
-        now->adrift = now->underway;
+        now->adrift = now->adrift != 0.0 || now->underway != 0.0;
         now->underway = 0.0;
     }
     return attempt(sim, right, problem);

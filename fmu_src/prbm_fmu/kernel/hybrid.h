@@ -18,7 +18,7 @@ typedef struct {
     double event_kind, event_index, event_time;
     double underway, underway_until; /* a communication step that was left in its middle */
     double planned, due; /* when the motions of the walls were, and by when they are to be there */
-    double adrift; /* an event was handled in its middle, with inputs: the walls go on till its end */
+    double adrift; /* inputs came in an event in its middle: the walls go on to its end */
 } Scalars;
 
 typedef struct {
@@ -48,6 +48,7 @@ struct Simulation {
     double *values, *given;               /* as they were set */
     double *acting_values, *acting_given; /* since the last restart */
     double *received;                     /* (3 b,): impulses that have acted */
+    double *swift;                        /* (s,): 1 for a wall that was given a velocity */
     Wall *walls;                          /* (s,) */
     double *holds, *slides, *rubs;        /* the discrete state */
     Latched *latched;                     /* (s,) */
