@@ -317,8 +317,9 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
         items.append(
             "The wall never jumps: within a communication step it moves uniformly from where "
             "it was to <code>position + displacement + velocity h</code>, and that velocity "
-            "enters the impact law. Several impacts within one communication step are all "
-            "computed and counted; the latched outputs show the last one."
+            "enters the impact law; in a step shorter than one before, a wall with a velocity "
+            "takes longer to make good what it is off. Several impacts within one communication "
+            "step are all computed and counted; the latched outputs show the last one."
         )
         items.append(
             "A wall that retreats lets go of what rests on it: <code>contact</code> becomes false "

@@ -58,6 +58,7 @@ OFFSETS = (-4e-3, -2e-3, 0.0, 2e-3, 4e-3)  # m; and offsets
 PATIENCE = 1.5  # periods of the fundamental mode in which a wall must be reached
 SAMPLES = 200  # of a response that is fitted
 REBOUND = 0.4  # periods after the first impact that a fit looks at
+STANDS = 1e-9  # of the step: a shorter path is what rounding leaves of none
 PATH_STEP = 1e-4  # of the size: half the step along a body's path
 TURNS = 0.02  # of the path: turning, where it is hit, of a body in the closed form, at most
 CARRIED = 0.95  # of the fundamental's kinetic energy: what such a body carries at least
@@ -454,6 +455,11 @@ def _path(system: System, body: str, shape: Equilibrium) -> tuple[complex, float
     held = float((system.release @ system.directions(shape.q)).real) + system.release_c
     behind, ahead = (equilibrium(system, held + k * step).q for k in (-1, 1))
     moved = complex(frame.A @ (system.directions(ahead) - system.directions(behind)))
+    if abs(moved) <= STANDS * step:
+        raise ParameterError(
+            f"{_UNFIT} a body that moves along a path, but {body} stands, or turns on the spot; "
+            f"{_OTHER_WAYS}"
+        )
     return moved / abs(moved), float(ahead[frame.j] - behind[frame.j]) / abs(moved)
 
 

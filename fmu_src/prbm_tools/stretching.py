@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from prbm import Mechanism, assemble
-from prbm.errors import EquilibriumError, ParameterError
+from prbm.errors import PrbmError
 from prbm.mechanism import value
 from prbm.modal import modal_restitution
 
@@ -66,7 +66,7 @@ def note(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> str | 
     try:
         as_it_is = restitution(mechanism, values, stop)
         stretched = restitution(stretching(mechanism), values, stop)
-    except (EquilibriumError, ParameterError):
+    except PrbmError:
         return None
     if not abs(as_it_is - stretched) > MATTERS:  # or not a number
         return None

@@ -166,7 +166,7 @@ def checked(table: pd.DataFrame, variables: Mapping[str, Any]) -> pd.DataFrame:
 
 def _check_separator(name: str, variables: Mapping[str, Any]) -> None:
     for sign, word in SEPARATORS.items():
-        if sign in name and name not in variables:
+        if sign in str(name) and name not in variables:
             raise ParameterError(
                 f"the table has the column {name!r}: its columns seem to be separated by {word}; "
                 "separate them by commas, and write numbers with a decimal point"

@@ -44,13 +44,13 @@ def simulated(options: argparse.Namespace) -> None:
     print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")
     for line in told(result.columns, mechanism, result.values):
         print(line)
-    for sentence in _notes(mechanism, values):
-        print(sentence)
     columns = names(result.columns)
     output.table(f"{mechanism.name}.csv", columns, (list(row) for row in result.columns.tolist()))
     output.table(f"{mechanism.name}-impacts.csv", IMPACT_HEAD, _impacts(result))
     output.figure(f"{mechanism.name}.png", lambda: _figure(result))
     output.write()
+    for sentence in _notes(mechanism, values):
+        print(sentence)
     if options.spectrum is not None:
         _spectrum(options, result, values, duration)
 
