@@ -51,7 +51,7 @@ from .fit import DISPLACEMENT, Fit, Response, fit
 from .records import Series
 from .scene import own_style, plain
 from .simulate import Progress
-from .touching import impact_shape, lever, touching
+from .touching import impact_shape, lever, stop_index, touching
 
 HEIGHTS = (-10e-3, -5e-3, 0.0, 5e-3, 10e-3)  # m; the source's walls
 OFFSETS = (-4e-3, -2e-3, 0.0, 2e-3, 4e-3)  # m; and offsets
@@ -223,11 +223,8 @@ class _Stop:
 
     @classmethod
     def of(cls, mechanism: Mechanism, name: str | None) -> "_Stop":
-        names = [stop.name for stop in mechanism.stops]
-        if not names or (name is not None and name not in names):
-            known = f"; it has {', '.join(names)}" if names else ": describe one, [[stops]]"
-            raise ParameterError(f"{mechanism.name} has no stop {name or 'to hit'}{known}")
-        found = cls(names.index(name) if name is not None else 0, name or names[0])
+        index = stop_index(mechanism, name)
+        found = cls(index, mechanism.stops[index].name)
         for what in ("position", "offset"):
             if f"{found.name}.{what}" not in mechanism.values():
                 raise ParameterError(

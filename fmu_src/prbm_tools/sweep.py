@@ -550,9 +550,6 @@ class _Sweep:
             ) from None
 
 
-# --- the command --------------------------------------------------------------------------------
-
-
 def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
     """Return in a few lines how the runs of a sweep went."""
     good = results["status"].isin(GOOD)

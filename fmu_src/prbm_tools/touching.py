@@ -1,10 +1,10 @@
-"""Shapes, held by a force on the released body, in which a stop touches its wall."""
+"""Which stop is hit, and shapes, held by a force on the released body, in which it touches."""
 
 import math
 from collections.abc import Callable
 from typing import TypeVar
 
-from prbm import equilibrium
+from prbm import Mechanism, ParameterError, equilibrium
 from prbm.assembly import System, unit
 from prbm.constraints import gap_rows
 from prbm.errors import EquilibriumError
@@ -15,6 +15,21 @@ TOUCHES = 1e-9  # of the size: gap at which a held shape touches the wall
 SECANTS = 20
 
 S = TypeVar("S")
+
+
+def stop_index(mechanism: Mechanism, name: str | None) -> int:
+    """Return the index of a stop; None: the first.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or none of that name.
+    """
+    names = [stop.name for stop in mechanism.stops]
+    if not names or (name is not None and name not in names):
+        known = f"; it has {', '.join(names)}" if names else ": describe one, [[stops]]"
+        raise ParameterError(f"{mechanism.name} has no stop {name or 'to hit'}{known}")
+    return 0 if name is None else names.index(name)
 
 
 def touching(

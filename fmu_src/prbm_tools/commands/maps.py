@@ -15,7 +15,7 @@ from ..mechanism_file import find
 from ..settings import UserMistake, quantities, settings
 from ..simulate import Progress, reporter
 from ..stretching import note
-from ..touching import lever
+from ..touching import lever, stop_index
 from .output import Output
 from .systems import check_length
 
@@ -121,9 +121,8 @@ def _notes(
     """Give what models that do not stretch hide, where the hit is farthest off the centre."""
     if not OF_MODELS.intersection(options.way):
         return
-    names = [s.name for s in mechanism.stops]
-    name = options.stop or names[0]
-    stop, nearest = names.index(name), min(heights, key=abs)
+    stop, nearest = stop_index(mechanism, options.stop), min(heights, key=abs)
+    name = mechanism.stops[stop].name
     for label, model in _models(options, mechanism):
         known = {**values, f"{name}.position": nearest, f"{name}.offset": 0.0}
         centred = lever(assemble(model, model.values(known)), stop)

@@ -9,6 +9,7 @@ from ..measurement import Beam, YoungsModulus, beam_table, youngs_modulus
 from ..mechanism_file import find
 from ..settings import UserMistake, settings
 from ..simulate import reporter
+from ..touching import stop_index
 from ..uncertainty import Estimate
 from ..vibration import free_vibration
 from . import data, fitting
@@ -137,11 +138,7 @@ def restitution(options: argparse.Namespace) -> None:
     more = [free(mechanism, text) for text in options.free]
     output = Output(options.out)
     target = fitting.response(options, options.file, mechanism)
-    names = [stop.name for stop in mechanism.stops]
-    stop = options.stop or (names[0] if names else "")
-    if stop not in names:
-        known = f"; it has {', '.join(names)}" if names else ": describe one, [[stops]]"
-        raise UserMistake(f"{mechanism.name} has no stop {stop or 'to hit'}{known}")
+    stop = mechanism.stops[stop_index(mechanism, options.stop or None)].name
     found = fitted_restitution(
         mechanism, target.series, values, output=target.output, stop=stop,
         uncertainty=target.uncertainty, free=more, progress=reporter(),
