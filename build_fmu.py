@@ -9,6 +9,6 @@ from pathlib import Path
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).resolve().parent / "fmu_src"))
 
-    from prbm_fmu.__main__ import main
+    from prbm.commands.build_fmu import main
 
     sys.exit(main())

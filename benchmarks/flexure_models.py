@@ -22,23 +22,14 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from prbm import (
-    Body,
-    Flexure,
-    FlexureType,
-    Force,
-    Mechanism,
-    Release,
-    System,
-    assemble,
-    equilibrium,
-    free_displacement,
-    modal_restitution,
-    modes,
-)
-from prbm.mechanism import Probe
-from prbm_tools.beams import Tip, end_force, end_moment, wavenumber
-from prbm_tools.mechanism_file import load, shipped
+from prbm.files.mechanism_file import load, shipped
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modal_restitution, modes
+from prbm.mechanics.statics import equilibrium, free_displacement
+from prbm.mechanics.system import System
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Probe, Release
+from prbm.references.beams import Tip, end_force, end_moment, wavenumber
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

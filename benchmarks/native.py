@@ -42,7 +42,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 from speed import octave_cost
 
 from c_importer import Done, Job, compile_c, execute, kernel_library, native, run
-from prbm import assemble
+from prbm.mechanics.assembly import assemble
 from support import ScalarGuide, mechanism
 
 Real = NDArray[np.float64]

@@ -28,10 +28,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 from native import RIGHT_HAND_SIDE, inclusive
 
 from c_importer import Job, execute, kernel_library, unpack, write
-from prbm import Flexure, Mechanism, assemble
-from prbm_fmu import native_fmu
-from prbm_fmu.reference import steps
-from prbm_tools.simulate import Experiment
+from prbm.fmu import native_fmu
+from prbm.fmu.reference_results import steps
+from prbm.mechanics.assembly import assemble
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Flexure
+from prbm.runs.experiment import Experiment
 from support import mechanism
 
 LINKS = (4, 8, 12, 18, 25, 35, 50)  # a flexure

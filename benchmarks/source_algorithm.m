@@ -8,7 +8,7 @@
 %     octave-cli --no-gui --quiet benchmarks/source_algorithm.m [SPAN]
 %
 % SPAN is the time to simulate, 0.05 s by default; the first impact is at 0.04 s.
-% Method: S. Boersma, MSc thesis, TU Delft 2015, appendix A; in NumPy: fmu_src/prbm_tools/source_model.py.
+% Method: S. Boersma, MSc thesis, TU Delft 2015, appendix A; in NumPy: fmu_src/prbm/references/source_model.py.
 
 1;  % a script file, not a function file
 

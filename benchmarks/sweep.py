@@ -26,8 +26,8 @@ from pathlib import Path
 import fmpy
 import pandas as pd
 
-from prbm_tools.simulate import reporter
-from prbm_tools.sweep import samples, sweep
+from prbm.base.progress import reporter
+from prbm.sweeps.sweep import samples, sweep
 
 STEP, TOLERANCE = 1e-3, 1e-8
 READ = "shuttle.vx"

@@ -48,9 +48,11 @@ from scipy.optimize import brentq
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from prbm import Simulation, SimulationError, constraints, contact
-from prbm.kinetics import inertia
-from prbm_tools.mechanism_file import load, shipped
+from prbm.base.errors import SimulationError
+from prbm.files.mechanism_file import load, shipped
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics import constraints, contact
+from prbm.mechanics.kinetics import inertia
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -23,8 +23,8 @@ from matplotlib.figure import Figure
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from prbm_fmu.python_fmu import build
-from prbm_tools.mechanism_file import load, shipped
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu.python_fmu import build
 
 RESTITUTIONS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 REST_SPEED = 1e-5  # m/s; slower impacts end the bouncing, at most 0.1 ms early

@@ -13,12 +13,12 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
-from prbm import PrbmError
-from prbm_fmu.python_fmu import build
-from prbm_tools.animation import animate
-from prbm_tools.figures import response, save
-from prbm_tools.mechanism_file import load, shipped
-from prbm_tools.simulate import rest_time
+from prbm.base.errors import PrbmError
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu.python_fmu import build
+from prbm.plots.animation import animate
+from prbm.plots.figures import response, save
+from prbm.runs.result import rest_time
 
 MECHANISM = load(shipped()["PRBDM2R"])
 MEASURED = 4.82, 0.06  # Hz, of the steel structure, and its uncertainty

@@ -13,9 +13,11 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.figure import Figure
 
-from prbm import Mechanism, assemble, equilibrium
-from prbm_tools.figures import save
-from prbm_tools.mechanism_file import load, shipped
+from prbm.files.mechanism_file import load, shipped
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.statics import equilibrium
+from prbm.mechanism.description import Mechanism
+from prbm.plots.figures import save
 
 STROKES = np.linspace(0.0, 0.03, 16)  # m
 ROUNDING = 1e-12  # m; a lateral error below this is none

@@ -22,10 +22,11 @@ import pytest
 from fmpy import read_model_description
 
 from many_parts import anvil
-from prbm import Mechanism, Stop
-from prbm_fmu import native_fmu
-from prbm_fmu.archive import write
-from prbm_fmu.compiler import _locked, cache_folder
+from prbm.base.atomic import write
+from prbm.fmu import native_fmu
+from prbm.kernel.compiler import _locked, cache_folder
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Stop
 from support import built, mechanism
 
 SOURCES = Path(__file__).with_name("importer")

@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from prbm import Mechanism
-from prbm_fmu import python_fmu
-from prbm_fmu.archive import write
-from prbm_tools.mechanism_file import shipped
+from prbm.base.atomic import write
+from prbm.files.mechanism_file import shipped
+from prbm.fmu import python_fmu
+from prbm.mechanism.description import Mechanism
 from support import GUIDES, built, mechanism
 
 

@@ -30,8 +30,8 @@ from c_importer import (
     once,
 )
 from many_parts import elastic
-from prbm.exchange import independent
-from prbm_fmu.tables import tables
+from prbm.interface.tables import tables
+from prbm.mechanics.independent import independent
 
 SANITIZERS = (
     "-O0",  # which compiles in seconds what takes a minute else

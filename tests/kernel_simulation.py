@@ -10,10 +10,10 @@ from tempfile import mkdtemp
 import numpy as np
 
 from kernel_library import FLAGS, KERNEL
-from prbm import Mechanism
-from prbm.exchange import independent
-from prbm_fmu.python_fmu import interface
-from prbm_fmu.tables import slots, tables
+from prbm.fmu.python_fmu import interface
+from prbm.interface.tables import slots, tables
+from prbm.mechanics.independent import independent
+from prbm.mechanism.description import Mechanism
 
 DOUBLE, POINTER, BOOL, INT = ctypes.c_double, ctypes.c_void_p, ctypes.c_bool, ctypes.c_int
 SENTENCE = 640

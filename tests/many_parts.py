@@ -1,14 +1,14 @@
 """Mechanisms with some of everything, for tests that compare the kernel with the package."""
 
-from prbm import (
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parameters import Parameter
+from prbm.mechanism.parts import (
     Body,
     Flexure,
     FlexureType,
     Force,
     Friction,
     Joint,
-    Mechanism,
-    Parameter,
     Probe,
     Release,
     Stop,

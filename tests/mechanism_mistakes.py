@@ -1,7 +1,7 @@
 """A mechanism file that uses everything there is, and what can be wrong with one."""
 
-from prbm.flexure import MOST_LINKS
-from prbm_tools.mechanism_file import LARGEST_FILE
+from prbm.files.mechanism_file import LARGEST_FILE
+from prbm.mechanism.flexure import MOST_LINKS
 
 EXAMPLE = """\
 #:schema mechanism.schema.json

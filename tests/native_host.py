@@ -19,7 +19,7 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription
 
-from prbm_fmu.archive import write
+from prbm.base.atomic import write
 from support import built, mechanism
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3

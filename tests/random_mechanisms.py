@@ -18,26 +18,26 @@ import numpy as np
 from hypothesis import assume
 from hypothesis import strategies as st
 
-from prbm import (
+from prbm.base.errors import EquilibriumError, ParameterError, PrbmError
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.constraints import jacobian
+from prbm.mechanics.contact import response
+from prbm.mechanics.kinetics import inertia
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.flexure import CLAMP, FREE, PIN
+from prbm.mechanism.parts import (
+    GROUND,
     Body,
-    EquilibriumError,
     Flexure,
     FlexureType,
     Force,
     Friction,
-    Mechanism,
-    ParameterError,
-    PrbmError,
+    Joint,
+    Probe,
     Release,
-    Simulation,
     Stop,
-    assemble,
 )
-from prbm.constraints import jacobian
-from prbm.contact import response
-from prbm.flexure import CLAMP, FREE, PIN
-from prbm.kinetics import inertia
-from prbm.mechanism import GROUND, Joint, Probe
 
 Choose = Callable[[Sequence], object]
 """Picks one of a sequence; the first is the simplest."""

@@ -10,11 +10,14 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from prbm import Mechanism, Simulation, assemble, equilibrium, modes
-from prbm.hybrid import Impact
-from prbm_fmu import native_fmu
-from prbm_tools import scalar_guide
-from prbm_tools.mechanism_file import load, shipped
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu import native_fmu
+from prbm.hybrid.simulation import Impact, Simulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
+from prbm.mechanism.description import Mechanism
+from prbm.references import scalar_guide
 
 
 @cache

@@ -18,13 +18,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from PIL import Image
 
-from prbm import Mechanism, ParameterError
-from prbm_tools import animation
-from prbm_tools.animation import AnimationError, animate, main, show
-from prbm_tools.motion import film, marks, motion, needed
-from prbm_tools.scene import CHAIN, Scene, pictures
-from prbm_tools.shapes import curve
-from prbm_tools.simulate import Result, ResultError, simulate
+from prbm.base.errors import ParameterError
+from prbm.drawing.shapes import curve
+from prbm.drawing.style import CHAIN
+from prbm.mechanism.description import Mechanism
+from prbm.plots import animation
+from prbm.plots.animation import AnimationError, animate, main, show
+from prbm.plots.motion import film, motion, needed
+from prbm.plots.scene import Scene, pictures
+from prbm.runs.marks import marks
+from prbm.runs.result import Result, ResultError
+from prbm.runs.run import simulate
 
 matplotlib.use("Agg")
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from prbm import assemble
-from prbm_tools import holding
-from prbm_tools.equilibria import force_curve, holding_force, rests, snap
+from prbm.analysis import holding
+from prbm.analysis.equilibria import force_curve, holding_force, rests, snap
+from prbm.mechanics.assembly import assemble
 from support import mechanism, run
 
 BISTABLE = mechanism("Bistable")

@@ -17,12 +17,17 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
-from prbm import MechanismError
-from prbm_fmu import __main__ as command
-from prbm_fmu import archive, cli, compiler, picture, python_fmu, report
-from prbm_fmu.description import Heading, model_description
-from prbm_fmu.sources import kernel
-from prbm_tools.mechanism_file import load, shipped
+from prbm.base import atomic
+from prbm.base.errors import MechanismError
+from prbm.commands import build_fmu as command
+from prbm.commands import building as cli
+from prbm.commands import fmu_report as report
+from prbm.drawing import icon as picture
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu import python_fmu
+from prbm.fmu.description import Heading, model_description
+from prbm.kernel import compiler
+from prbm.kernel.sources import kernel
 
 ROOT = Path(__file__).parents[1]
 BUILD = ROOT / "build_fmu.py"
@@ -153,7 +158,16 @@ def test_what_is_installed_has_the_kernel_too(tmp_path):
         pytest.skip("no wheel of this package is installed")
     if {name: Path(path).read_bytes() for name, path in packed.items()} != kernel():
         pytest.skip("another version is installed")
-    command = [sys.executable, "-I", "-m", "prbm_fmu", "--flavour", "native", "--model", "PRBDM"]
+    command = [
+        sys.executable,
+        "-I",
+        "-m",
+        "prbm.commands.build_fmu",
+        "--flavour",
+        "native",
+        "--model",
+        "PRBDM",
+    ]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     for folder in ("fmi2", "fmi3"):
@@ -175,7 +189,7 @@ def test_another_content_has_another_guid_and_other_module_names(mechanisms, tmp
     names = []
     for changes in ({}, {"stop.restitution": 0.5}):
         path = tmp_path / "fmu"
-        archive.write(path, python_fmu.build(mechanisms["PRBDM"], changes))
+        atomic.write(path, python_fmu.build(mechanisms["PRBDM"], changes))
         with zipfile.ZipFile(path) as fmu:
             xml = fmu.read("modelDescription.xml").decode()
             guid = re.search(r'guid="([^"]+)"', xml).group(1)
@@ -193,14 +207,14 @@ def test_an_archive_has_sorted_names_and_the_date_of_no_build(fmus):
 @pytest.mark.parametrize("failure", [OSError("disk full"), KeyboardInterrupt()])
 def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch, failure):
     path = tmp_path / "model.fmu"
-    archive.write(path, b"old")
+    atomic.write(path, b"old")
 
     def fails(*_: object) -> None:
         raise failure
 
     monkeypatch.setattr(os, "replace", fails)
     with pytest.raises(type(failure)):
-        archive.write(path, b"new")
+        atomic.write(path, b"new")
     assert path.read_bytes() == b"old"
     assert [*tmp_path.iterdir()] == [path]
 
@@ -281,7 +295,7 @@ def test_the_list_names_what_is_shipped(capsys):
 
 
 def test_a_mechanism_of_ones_own_is_built_under_its_own_name(tmp_path):
-    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     (tmp_path / "mine.toml").write_text(text.replace('name = "PRBDM"', 'name = "Mine"'))
     done = build(tmp_path, "--mechanism", "mine.toml", "--set", "stop.position=1e-3")
     assert done.returncode == 0, done.stderr
@@ -359,7 +373,7 @@ def test_a_figure_that_cannot_be_written_is_a_sentence(fmus, tmp_path, capsys):
         ("/clone/build_fmu.py", "build_fmu.py"),
         ("/venv/bin/prbm-build-fmu", "prbm-build-fmu"),
         ("prbm-build-fmu.exe", "prbm-build-fmu"),
-        ("/site-packages/prbm_fmu/__main__.py", "python -m prbm_fmu"),
+        (command.__file__, "python -m prbm.commands.build_fmu"),
     ],
 )
 def test_the_command_answers_by_the_name_that_was_typed(typed, named, monkeypatch, capsys):
@@ -379,7 +393,7 @@ def headline(mechanisms, tmp_path, **changes: float) -> str:
     """Return what is told about a run with other start values, ``stop__position=...``."""
     fmu = tmp_path / "PRBDM.fmu"
     values = {name.replace("__", "."): value for name, value in changes.items()}
-    archive.write(fmu, python_fmu.build(mechanisms["PRBDM"], values))
+    atomic.write(fmu, python_fmu.build(mechanisms["PRBDM"], values))
     return "\n".join(report.headline(report.simulate(fmu, lambda fraction: None)))
 
 
@@ -409,7 +423,7 @@ def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
     fmu = tmp_path / "PRBDM2R.fmu"
     fmu.write_bytes(fmus["PRBDM2R"].read_bytes())
     code = (
-        "import sys; from pathlib import Path; from prbm_fmu import cli\n"
+        "import sys; from pathlib import Path; from prbm.commands import building as cli\n"
         "sys.argv = ['build_fmu.py']\n"
         "try: cli._simulate([Path(sys.stdin.read())])\n"
         "except KeyboardInterrupt: print('interrupted')"
@@ -439,7 +453,7 @@ def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
     ],
 )
 def test_what_no_fmu_can_have_is_a_sentence(tmp_path, old, new, sentence):
-    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(old, new, 1), "utf-8")
     with pytest.raises(MechanismError, match=sentence):
@@ -448,22 +462,22 @@ def test_what_no_fmu_can_have_is_a_sentence(tmp_path, old, new, sentence):
 
 def test_a_name_of_pythons_own_is_one_like_others(tmp_path):
     """The script is run twice, the second time beside the class of that name."""
-    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     path = tmp_path / "mine.toml"
     path.write_text(text.replace('name = "PRBDM"', 'name = "globals"'), "utf-8")
     fmu = tmp_path / "globals.fmu"
-    archive.write(fmu, python_fmu.build(load(path)))
+    atomic.write(fmu, python_fmu.build(load(path)))
     assert len(simulate_fmu(str(fmu), stop_time=0.01)) > 1
 
 
 def test_odd_texts_do_no_harm(tmp_path):
     """A title cannot leave the script's docstring, nor can control characters break the XML."""
-    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     odd = 'title = "{a} \\"\\"\\" \\\\ \\u0007 <b> %s é"'
     path = tmp_path / "mine.toml"
     path.write_text(re.sub(r"^title = .*$", lambda _: odd, text, flags=re.MULTILINE), "utf-8")
     fmu = tmp_path / "PRBDM.fmu"
-    archive.write(fmu, python_fmu.build(load(path)))
+    atomic.write(fmu, python_fmu.build(load(path)))
     assert validate_fmu(str(fmu)) == []
     assert read_model_description(str(fmu)).description == '{a} """ \\   <b> %s é'
 
@@ -486,11 +500,11 @@ def test_ctrl_c_while_it_imports_is_no_traceback(monkeypatch, capsys):
 
 
 def test_a_package_that_is_missing_is_named(monkeypatch, capsys):
-    monkeypatch.delitem(sys.modules, "prbm_fmu.cli")
-    monkeypatch.delattr(sys.modules["prbm_fmu"], "cli")
-    monkeypatch.setitem(sys.modules, "prbm.dynamics", None)
+    monkeypatch.delitem(sys.modules, "prbm.commands.building")
+    monkeypatch.delattr(sys.modules["prbm.commands"], "building")
+    monkeypatch.setitem(sys.modules, "prbm.mechanics.dynamics", None)
     assert command.main() == cli.MISTAKE
-    assert "needs the Python package prbm.dynamics" in capsys.readouterr().err
+    assert "needs the Python package prbm.mechanics.dynamics" in capsys.readouterr().err
 
 
 FILES = {
@@ -511,7 +525,7 @@ FILES = {
 
 @pytest.mark.parametrize("change", FILES, ids=lambda change: change[1] or "nothing")
 def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, change):
-    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     assert change[0] in text
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(*change, 1))
@@ -526,7 +540,7 @@ def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, chang
 
 def test_a_byte_order_mark_is_no_part_of_a_mechanism_file(mechanisms, tmp_path):
     """Editors on Windows write one."""
-    text = (ROOT / "fmu_src" / "mechanisms" / "PRBDM.toml").read_text()
+    text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8-sig")
     assert load(path) == mechanisms["PRBDM"]

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from prbm import assemble, equilibrium, modes
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
 from support import mechanism, run
 
 LEAF = mechanism("Cantilever")

@@ -8,12 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prbm import ParameterError, assemble, equilibrium, modes
-from prbm_tools import finite_elements
-from prbm_tools.comparison import Comparison, Row, compare
-from prbm_tools.figures import png
-from prbm_tools.finite_elements import FiniteElementError
-from prbm_tools.uncertainty import Estimate
+from prbm.analysis.comparison import Comparison, Row, compare
+from prbm.base.errors import ParameterError
+from prbm.data.uncertainty import Estimate
+from prbm.drawing.style import png
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
+from prbm.references import finite_elements
+from prbm.references.finite_elements import FiniteElementError
 from support import mechanism
 
 MEASURED = {"frequency 1 at rest": Estimate(4.82, 0.06, "Hz")}

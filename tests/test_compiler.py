@@ -16,8 +16,8 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from prbm_fmu import compiler
-from prbm_fmu.compiler import (
+from prbm.kernel import compiler
+from prbm.kernel.compiler import (
     ALL,
     HOST,
     PLATFORMS,
@@ -214,7 +214,7 @@ def test_two_exports_at_a_time_compile_once(cache, tmp_path):
         f'[ "$1" = --version ] || {{ echo one >> {log}; sleep 1; }}\nexec {SYSTEM} "$@"',
     )
     code = (
-        "from prbm_fmu import compiler\n"
+        "from prbm.kernel import compiler\n"
         f"compiler.kernel = lambda: {{'prbm_fmu.c': {STUB!r}}}\n"
         "import hashlib\n"
         "for made in compiler.libraries(['host']).values():\n"
@@ -235,7 +235,7 @@ def test_two_exports_at_a_time_compile_once(cache, tmp_path):
 
 def test_a_lock_that_a_dead_process_left_does_not_matter(cache):
     code = (
-        "import os, sys\nfrom pathlib import Path\nfrom prbm_fmu import compiler\n"
+        "import os, sys\nfrom pathlib import Path\nfrom prbm.kernel import compiler\n"
         "with compiler._locked(Path(sys.argv[1])): os._exit(9)"
     )
     environment = os.environ | {"PYTHONPATH": str(ROOT / "fmu_src")}
@@ -288,7 +288,7 @@ MACHINES = {
 @pytest.mark.slow
 def test_ziglang_makes_a_library_for_every_platform(native, mechanisms, tmp_path):
     """Each of its own format and machine; that for Linux needs nothing newer than glibc 2.17."""
-    from prbm_fmu import native_fmu
+    from prbm.fmu import native_fmu
 
     pytest.importorskip("ziglang")
     made = {platform.name: content for platform, content in libraries([ALL]).items()}

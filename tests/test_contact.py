@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from prbm import contact
+from prbm.mechanics import contact
 
 RNG = np.random.default_rng(0)
 

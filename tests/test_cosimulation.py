@@ -10,11 +10,11 @@ import pytest
 from fmpy import simulate_fmu
 
 from coupled import guide, integrator
-from prbm import ParameterError
-from prbm_tools import cosimulation
-from prbm_tools.components import CO_SIMULATION, Component, CouplingError, start_value
-from prbm_tools.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
-from prbm_tools.scalar_guide import ScalarGuide
+from prbm.base.errors import ParameterError
+from prbm.references.scalar_guide import ScalarGuide
+from prbm.systems import cosimulation
+from prbm.systems.components import CO_SIMULATION, Component, CouplingError, start_value
+from prbm.systems.cosimulation import GAUSS_SEIDEL, JACOBI, System, simulate
 from support import mechanism
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]

@@ -9,7 +9,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from c_importer import needs
-from prbm import assemble
+from prbm.mechanics.assembly import assemble
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation
-from prbm import ParameterError, Simulation, contact
-from prbm.hybrid import RELEASE_GAP
-from prbm.mechanism import value
+from prbm.base.errors import ParameterError
+from prbm.hybrid.simulation import RELEASE_GAP, Simulation
+from prbm.mechanics import contact
+from prbm.mechanism.parts import value
 from support import mechanism
 
 GUIDES = ("PRBDM", "PRBDM2R", "ImpactOscillator")

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from prbm_tools.mechanism_file import load
-from prbm_tools.stretching import notes, restitution, stretching
+from prbm.analysis.stretching import notes, restitution, stretching
+from prbm.files.mechanism_file import load
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "describe-your-mechanism.md").read_text()

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from prbm import Mechanism
-from prbm_fmu import native_fmu
+from prbm.fmu import native_fmu
+from prbm.mechanism.description import Mechanism
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 NAMES = ("voice_coil", "energy_harvester", "drop_test", "escapement", "model_exchange")

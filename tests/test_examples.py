@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from prbm_tools.animation import animate
+from prbm.plots.animation import animate
 
 EXAMPLES = Path(__file__).resolve().parent.parent / "examples"
 

@@ -5,11 +5,11 @@ import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation
 from many_parts import anvil, elastic
-from prbm import assemble
-from prbm.constraints import jacobian
-from prbm.dynamics import input_names
-from prbm.exchange import conditioning, independent
-from prbm.statics import equilibrium
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.constraints import jacobian
+from prbm.mechanics.independent import conditioning, independent
+from prbm.mechanics.inputs import input_names
+from prbm.mechanics.statics import equilibrium
 from support import GUIDES, case, each_shipped, energy_balance, fastest, mechanism
 
 INPUTS = {

@@ -5,13 +5,16 @@ import dataclasses
 import numpy as np
 import pytest
 
-from prbm import Body, Flexure, FlexureType, Mechanism, Release, Simulation, Stop
-from prbm_fmu import reference
-from prbm_fmu.documentation import native_page, page
-from prbm_fmu.native_fmu import described
-from prbm_fmu.python_fmu import interface
-from prbm_tools.mechanism_file import shipped
-from prbm_tools.simulate import Experiment, experiment, simulate
+from prbm.files.mechanism_file import shipped
+from prbm.fmu import reference_results as reference
+from prbm.fmu.documentation import native_page, page
+from prbm.fmu.native_fmu import described
+from prbm.fmu.python_fmu import interface
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Release, Stop
+from prbm.runs.experiment import Experiment, experiment
+from prbm.runs.run import simulate
 from support import COSTLY, mechanism
 
 

@@ -5,23 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from prbm import (
-    Body,
-    Flexure,
-    FlexureType,
-    Force,
-    Mechanism,
-    Release,
-    Simulation,
-    Stop,
-    assemble,
-    equilibrium,
-    modes,
-)
-from prbm.mechanism import Joint
-from prbm_tools import finite_elements
-from prbm_tools.finite_elements import FiniteElementError, FiniteElements
-from prbm_tools.mechanism_file import shipped
+from prbm.files.mechanism_file import shipped
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Joint, Release, Stop
+from prbm.references import finite_elements
+from prbm.references.finite_elements import FiniteElementError, FiniteElements
 from support import PMMA, mechanism
 
 pytest.importorskip(
@@ -388,7 +380,7 @@ def test_first_impact_converges_with_the_step():
 
 def test_a_step_that_fails_is_divided_where_an_impact_is_located(monkeypatch):
     """The whole step to the wall never converges: the impact is found by shorter ones."""
-    from prbm_tools.finite_elements import _StepError, _Transient
+    from prbm.references.finite_elements import _StepError, _Transient
 
     values = {"stop.position": -5e-3}
     plain = guide(values, elements=4).transient(0.1, 1e-4, impacts=1).impacts[0]

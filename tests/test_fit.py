@@ -11,9 +11,7 @@ from matplotlib.text import Text
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from prbm import ParameterError, assemble, equilibrium, modal_restitution, modes
-from prbm_tools.figures import png
-from prbm_tools.fit import (
+from prbm.analysis.fit import (
     Fit,
     ForceDeflection,
     Free,
@@ -24,9 +22,14 @@ from prbm_tools.fit import (
     fitted_restitution,
     valley,
 )
-from prbm_tools.fit_figures import force_figure, response_figure, valley_figure
-from prbm_tools.records import Series
-from prbm_tools.uncertainty import Estimate, EvaluationError
+from prbm.base.errors import ParameterError
+from prbm.data.records import Series
+from prbm.data.uncertainty import Estimate, EvaluationError
+from prbm.drawing.style import png
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modal_restitution, modes
+from prbm.mechanics.statics import equilibrium
+from prbm.plots.fit_figures import force_figure, response_figure, valley_figure
 from support import PMMA, ScalarGuide, mechanism
 
 RATE, NOISE = 750.0, 4e-6  # Hz, m: the source's laser
@@ -387,7 +390,7 @@ def test_the_starts_are_tried_and_told():
 
 
 def test_a_fit_that_does_not_arrive_says_so(monkeypatch):
-    monkeypatch.setattr("prbm_tools.fit.MOST_STEPS", 1)
+    monkeypatch.setattr("prbm.analysis.fit.MOST_STEPS", 1)
     found = fit(mechanism("PRBDM"), [K], F5)
     assert not found.converged
     assert "did not lead to a least misfit" in str(found)

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from prbm import ParameterError, Simulation, march
+from prbm.base.errors import ParameterError
+from prbm.hybrid.simulation import Simulation
+from prbm.references.fixed_step import march
 from support import ScalarGuide, mechanism
 
 FREE = {"stop.position": 0.05, "damping.beta": 0.0}

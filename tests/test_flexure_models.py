@@ -14,10 +14,13 @@ import pytest
 from scipy.integrate import solve_bvp
 
 import finite_elements
-from prbm import EquilibriumError, ParameterError, assemble, equilibrium, modal_restitution, modes
-from prbm.flexure import MODELS, segments
-from prbm.forces import elastic_energy
-from prbm_tools.beams import end_force, end_moment, wavenumber
+from prbm.base.errors import EquilibriumError, ParameterError
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.forces import elastic_energy
+from prbm.mechanics.modal import modal_restitution, modes
+from prbm.mechanics.statics import equilibrium
+from prbm.mechanism.flexure import MODELS, segments
+from prbm.references.beams import end_force, end_moment, wavenumber
 from support import mechanism
 
 ROOT = Path(__file__).parents[1]

@@ -17,16 +17,16 @@ from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
 import prbm
-import prbm_fmu
 from fmu_host import OK, Instance
-from prbm_fmu.description import Heading, model_description
-from prbm_fmu.documentation import page
-from prbm_fmu.native_fmu import described
-from prbm_fmu.python_fmu import interface, start_sample
-from prbm_fmu.slaves.resolved import mechanism_from, resolved
-from prbm_fmu.units import UNITS
-from prbm_fmu.variables import variables, with_starts
-from prbm_tools.simulate import Experiment
+from prbm.base.version import __version__
+from prbm.fmu.description import Heading, model_description
+from prbm.fmu.documentation import page
+from prbm.fmu.native_fmu import described
+from prbm.fmu.python_fmu import interface, start_sample
+from prbm.fmu.slave.resolved import mechanism_from, resolved
+from prbm.interface.units import UNITS
+from prbm.interface.variables import variables, with_starts
+from prbm.runs.experiment import Experiment
 from support import GUIDES, case, each_shipped
 
 ROOT = Path(__file__).parents[1]
@@ -187,7 +187,7 @@ def test_outputs_are_within_their_declared_bounds_through_a_run(fmus, model):
 def test_a_mechanism_survives_the_way_through_json(mechanisms, model):
     mechanism = mechanisms[model]
     data = json.loads(json.dumps(resolved(mechanism, ())))
-    assert mechanism_from(data["mechanism"], prbm) == mechanism
+    assert mechanism_from(data["mechanism"]) == mechanism
 
 
 @each_shipped
@@ -203,9 +203,9 @@ def test_start_values_that_were_set_are_the_defaults_of_the_fmu(mechanisms, mode
 def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
     mechanism = mechanisms["PRBDM"]
     listed = variables(mechanism, start_sample(mechanism, {}))
-    with pytest.raises(prbm.ParameterError, match=r"shuttle\.x is computed"):
+    with pytest.raises(prbm.base.errors.ParameterError, match=r"shuttle\.x is computed"):
         with_starts(listed, {"shuttle.x": 1.0})
-    with pytest.raises(prbm.ParameterError, match=r"did you mean stop\.restitution"):
+    with pytest.raises(prbm.base.errors.ParameterError, match=r"did you mean stop\.restitution"):
         with_starts(listed, {"stop.restitutoin": 1.0})
 
 
@@ -219,10 +219,16 @@ def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
 def test_a_parameter_cannot_have_the_name_of_another_variable(mechanisms, name):
     """Of none that is in any of the FMUs of a mechanism."""
     guide = mechanisms["PRBDM2R"]
-    named = replace(guide, geometry=(*guide.geometry, prbm.Parameter(name, 1.0)))
-    with pytest.raises(prbm.MechanismError, match=f"have the name {re.escape(name)}: rename"):
+    named = replace(
+        guide, geometry=(*guide.geometry, prbm.mechanism.parameters.Parameter(name, 1.0))
+    )
+    with pytest.raises(
+        prbm.base.errors.MechanismError, match=f"have the name {re.escape(name)}: rename"
+    ):
         described(named, {}, 3, clock=True)
-    harmless = replace(guide, geometry=(*guide.geometry, prbm.Parameter("shuttle.depth", 1.0)))
+    harmless = replace(
+        guide, geometry=(*guide.geometry, prbm.mechanism.parameters.Parameter("shuttle.depth", 1.0))
+    )
     assert {v.name for v in interface(harmless, {})} > {"shuttle.depth", "shuttle.x"}
 
 
@@ -272,4 +278,4 @@ def test_the_bundle_imports_nothing_but_itself_numpy_scipy_and_the_standard_libr
 
 def test_the_version_is_the_one_of_the_project():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert prbm_fmu.__version__ == project["version"]
+    assert __version__ == project["version"]

@@ -9,7 +9,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from fmu_host import DISCARD, OK, Instance
-from prbm_fmu.slaves.slave import MechanismSlave
+from prbm.fmu.slave.slave import MechanismSlave
 
 NAN, INF = float("nan"), float("inf")
 CYCLES = 50
@@ -221,7 +221,7 @@ SURVIVAL = """
 import sys
 from test_fmu_mistakes import AT_START, CYCLES, LATER, STEPS
 from fmu_host import DISCARD, OK, Instance
-from prbm_fmu.slaves.slave import MechanismSlave
+from prbm.fmu.slave.slave import MechanismSlave
 
 cases = [*AT_START.values()] + [*LATER.values()] + [*STEPS.values()]
 for cycle in range(CYCLES):

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from fmu_host import OK, Instance
-from prbm import Simulation
-from prbm_fmu import python_fmu
-from prbm_fmu.archive import write
-from prbm_fmu.python_fmu import interface
+from prbm.base.atomic import write
+from prbm.fmu import python_fmu
+from prbm.fmu.python_fmu import interface
+from prbm.hybrid.simulation import Simulation
 from support import GUIDES, SHIPPED, case, record, selected
 
 END = 0.3  # s; the default run of the guides bounces until 0.243 s, then it rests

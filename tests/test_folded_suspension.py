@@ -7,8 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from prbm import MechanismError, assemble, equilibrium, modes
-from prbm_tools.equilibria import force_curve, holding_force
+from prbm.analysis.equilibria import force_curve, holding_force
+from prbm.base.errors import MechanismError
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
 from support import mechanism, run
 from test_mechanisms import guided_rate
 

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from prbm import Simulation, assemble, equilibrium, modal_restitution, modes
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modal_restitution, modes
+from prbm.mechanics.statics import equilibrium
 from support import energy_balance, mechanism, simulation
 
 GUIDE = mechanism("PRBDM2R")

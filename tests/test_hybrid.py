@@ -7,20 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from prbm import (
-    Body,
-    EquilibriumError,
-    Flexure,
-    FlexureType,
-    Friction,
-    Mechanism,
-    ParameterError,
-    Release,
-    Simulation,
-    SimulationError,
-    Stop,
-)
-from prbm.hybrid import Event
+from prbm.base.errors import EquilibriumError, ParameterError, SimulationError
+from prbm.hybrid.simulation import Event, Simulation
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Friction, Release, Stop
 from support import ScalarGuide, energy_balance, mechanism, simulation
 
 QUIET = {"gravity.x": 0.0, "damping.beta": 0.0}

@@ -8,13 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prbm import EquilibriumError, ParameterError, Simulation, assemble, constraints, modes
-from prbm.contact import response as impulse_response
-from prbm.kinetics import inertia
-from prbm.modal import modes_at
-from prbm_tools import impact_map, stretching
-from prbm_tools.figures import png
-from prbm_tools.records import RecordError
+from prbm.analysis import impact_map, stretching
+from prbm.base.errors import EquilibriumError, ParameterError
+from prbm.data.records import RecordError
+from prbm.drawing.style import png
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics import constraints
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.contact import response as impulse_response
+from prbm.mechanics.kinetics import inertia
+from prbm.mechanics.modal import modes, modes_at
 from support import mechanism
 
 WEIGHTLESS = {"gravity.x": 0.0}

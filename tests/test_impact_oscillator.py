@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from prbm import Simulation
+from prbm.hybrid.simulation import Simulation
 from support import ScalarGuide, mechanism, run
 
 NAME = "ImpactOscillator"

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from c_importer import NATIVE, TWO_STOPS, Job, execute, given, native, run, unpack
-from prbm import Simulation
-from prbm_fmu.python_fmu import interface
+from prbm.fmu.python_fmu import interface
+from prbm.hybrid.simulation import Simulation
 from support import GUIDES, SHIPPED, case, each_shipped, mechanism, record
 
 pytestmark = pytest.mark.native

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelSimulation
-from prbm import Simulation
-from prbm_fmu.python_fmu import interface
+from prbm.fmu.python_fmu import interface
+from prbm.hybrid.simulation import Simulation
 from random_mechanisms import inputs, seeded
 
 SPAN, LOOKS = 4e-3, 4  # s; hits, rest and sticking come within it

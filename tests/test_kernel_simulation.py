@@ -8,8 +8,10 @@ import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation, library
 from many_parts import anvil, elastic
-from prbm import PrbmError, Simulation, assemble
-from prbm_fmu.python_fmu import interface
+from prbm.base.errors import PrbmError
+from prbm.fmu.python_fmu import interface
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.assembly import assemble
 from support import GUIDES, PMMA, case, each_shipped, mechanism, record
 from test_stops import two_stops
 

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import prbm_fmu.tables
+import prbm.interface.tables
 from kernel_library import (
     KernelError,
     KernelSystem,
@@ -29,24 +29,26 @@ from kernel_library import (
     structures,
 )
 from many_parts import elastic, rich
-from prbm import (
-    FlexureType,
-    Mechanism,
-    Parameter,
+from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, SimulationError
+from prbm.hybrid import runge_kutta
+from prbm.hybrid import simulation as hybrid
+from prbm.mechanics import (
     assembly,
     constraints,
     contact,
     dynamics,
-    flexure,
     forces,
-    hybrid,
     kinetics,
     modal,
-    runge_kutta,
     statics,
 )
-from prbm.errors import EquilibriumError, MechanismError, ParameterError, SimulationError
-from prbm.mechanism import Affine
+from prbm.mechanics import inputs as input_data
+from prbm.mechanics import system as system_arrays
+from prbm.mechanism import flexure
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.expressions import Affine
+from prbm.mechanism.parameters import Parameter
+from prbm.mechanism.parts import FlexureType
 from support import SHIPPED, mechanism
 
 TWINS = {}
@@ -259,10 +261,10 @@ def test_flexures_are_cut_into_the_same_segments(name, links, ends):
 # --- assembly.c ----------------------------------------------------------------------------------
 
 
-@twin(unit=assembly.unit)
+@twin(unit=system_arrays.unit)
 def test_unit_vectors_are_exact_along_the_axes():
     for degrees in (*range(-720, 721, 90), *np.random.default_rng(0).uniform(-720, 720, 200)):
-        found, expected = kernel().unit(float(degrees)), assembly.unit(float(degrees))
+        found, expected = kernel().unit(float(degrees)), system_arrays.unit(float(degrees))
         if degrees % 90 == 0:
             assert found == expected
         assert_same(found, expected)
@@ -329,8 +331,8 @@ def test_what_cannot_be_assembled_is_told_in_the_same_words(change):
 def refused(guide, count):
     """Return what package and kernel say of a mechanism that cannot be assembled."""
     with pytest.MonkeyPatch.context() as patch:  # which assemble it, too
-        patch.setattr(prbm_fmu.tables, "check_size", lambda mechanism: None)
-        patch.setattr(prbm_fmu.tables, "slots", lambda mechanism, independent: {})
+        patch.setattr(prbm.interface.tables, "check_size", lambda mechanism: None)
+        patch.setattr(prbm.interface.tables, "slots", lambda mechanism, independent: {})
         ours = KernelSystem(guide, count)
     said = sentence(MechanismError, assembly.assemble, guide, guide.values())
     return said, sentence(KernelError, ours.assemble, guide.values())
@@ -373,7 +375,7 @@ def test_inertia_is_the_same(name):
         assert_same(kernel().kinetic_energy(n, M, v), kinetics.kinetic_energy(M, v))
 
 
-@twin(motion=assembly.System.motion)
+@twin(motion=system_arrays.System.motion)
 @each_mechanism
 def test_points_move_alike(name):
     kind = structures()["BodyFrame"]
@@ -392,8 +394,8 @@ def test_points_move_alike(name):
 
 
 @twin(
-    directions=assembly.System.directions, turning=assembly.System.turning,
-    spread=assembly.System.spread,
+    directions=system_arrays.System.directions, turning=system_arrays.System.turning,
+    spread=system_arrays.System.spread,
 )  # fmt: skip
 @each_mechanism
 def test_arms_turn_and_stretch_alike(name):
@@ -415,7 +417,7 @@ class KernelRows:
 
     def __init__(self, ours, rows):
         self.rows, r = rows, len(rows)
-        z, on = np.zeros(r, complex), np.full(r, assembly.FIXED, np.int32)
+        z, on = np.zeros(r, complex), np.full(r, system_arrays.FIXED, np.int32)
         z[rows.carried], on[rows.carried] = rows.z, rows.on
         self.arrays = [rows.B.copy(), rows.c.copy(), z, on]
         self.structure = structures()["Rows"](
@@ -937,12 +939,12 @@ def random_inputs(system, e, rng, driven):
     """
     F = driven * rng.normal(size=(len(system.mechanism.forces), 3))
     touched = -constraints.gap_rows(system).values(e)
-    return dynamics.Inputs(
+    return input_data.Inputs(
         tuple(complex(x, y) for x, y, _ in F),
         tuple(F[:, 2] * 0.01),
         driven * complex(*rng.normal(size=2)),
         tuple(
-            dynamics.Wall(x + 1e-5 * rng.normal(), driven * 0.01 * rng.normal(), rng.normal())
+            input_data.Wall(x + 1e-5 * rng.normal(), driven * 0.01 * rng.normal(), rng.normal())
             for x in touched
         ),
         tuple(driven * rng.uniform(size=len(touched))),
@@ -1031,7 +1033,7 @@ def test_accelerations_do_not_depend_on_the_size_of_masses_and_stiffnesses(facto
     for s in (1.0, factor):
         scaled = {k: x * (s if k.endswith(HEAVY) else 1.0) for k, x in values.items()}
         ours.assemble(scaled)
-        inputs = dynamics.Inputs((0j,), (0.0,), 0j, (dynamics.Wall(1.0),), (0.0,))
+        inputs = input_data.Inputs((0j,), (0.0,), 0j, (input_data.Wall(1.0),), (0.0,))
         mine = KernelEquations(ours, inputs, dynamics.Discrete((False,), (2,), (2,)), 80.0)
         a = np.full(len(state[0]), np.nan)
         kernel().accelerations(mine.structure, *state, a, nothing)
@@ -1041,7 +1043,7 @@ def test_accelerations_do_not_depend_on_the_size_of_masses_and_stiffnesses(facto
 
 
 @twin(
-    gap=dynamics.Equations.gaps, gap_rate=dynamics.Equations.gap_rates, wall_at=dynamics.Wall.at,
+    gap=dynamics.Equations.gaps, gap_rate=dynamics.Equations.gap_rates, wall_at=input_data.Wall.at,
 )  # fmt: skip
 @each_mechanism
 def test_gaps_are_the_same(name):

@@ -4,16 +4,11 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from prbm import (
-    Body,
-    Flexure,
-    FlexureType,
-    Mechanism,
-    Release,
-    Simulation,
-    assemble,
-)
-from prbm.kinetics import inertia
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.kinetics import inertia
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Release
 from support import mechanism
 
 RNG = np.random.default_rng(3)
@@ -36,7 +31,7 @@ def cantilever(model="2R", **parts):
 
 
 def parameter(name, x):
-    from prbm import Parameter
+    from prbm.mechanism.parameters import Parameter
 
     return Parameter(name, x, "m", "A length", 1e-9, 1e3)
 
@@ -102,7 +97,7 @@ def test_centrifugal_terms_do_the_work_that_the_mass_matrix_takes():
 
 def test_fused_product_equals_the_separate_equations():
     """One product with e gives what inertia, jacobian and convective give each for itself."""
-    from prbm import constraints, forces
+    from prbm.mechanics import constraints, forces
 
     sim = Simulation(mechanism("PRBDM2R"), {"damping.zeta": 0.02})
     system, equations = sim.system, sim.equations
@@ -124,7 +119,7 @@ def test_fused_product_equals_the_separate_equations():
 
 def test_constraint_rows_are_the_derivatives_of_the_constraints():
     """Central differences, and the convective term by differencing the Jacobian."""
-    from prbm import constraints
+    from prbm.mechanics import constraints
 
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
     B, h = np.vstack([system.loops, system.gaps, system.slides, system.rubs]), 6e-6

@@ -12,10 +12,10 @@ from fmpy.validation import validate_fmu
 import prbm
 from kernel_simulation import KernelSimulation
 from many_parts import anvil, elastic
-from prbm import Simulation
-from prbm_fmu import native_fmu, python_fmu
-from prbm_fmu.native_description import terminals
-from prbm_fmu.slaves.resolved import mechanism_from, resolved
+from prbm.fmu import native_fmu, python_fmu
+from prbm.fmu.native_description import terminals
+from prbm.fmu.slave.resolved import mechanism_from, resolved
+from prbm.hybrid.simulation import Simulation
 from support import energy_balance
 
 END, STEP = 0.04, 1e-3

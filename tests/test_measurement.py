@@ -7,8 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from prbm_tools.fit_figures import bending_figure
-from prbm_tools.measurement import (
+from prbm.data.measurement import (
     STIFFENING,
     Beam,
     beam_table,
@@ -17,8 +16,9 @@ from prbm_tools.measurement import (
     turning_points,
     youngs_modulus,
 )
-from prbm_tools.records import Series
-from prbm_tools.uncertainty import Estimate, EvaluationError, line, power_law
+from prbm.data.records import Series
+from prbm.data.uncertainty import Estimate, EvaluationError, line, power_law
+from prbm.plots.fit_figures import bending_figure
 
 E, LENGTH, WIDTH, THICKNESS = 181.5e9, 40e-3, 8e-3, 0.1e-3  # the steel flexures of the source
 CELL = 1e-3  # N of noise of the load cell for 0 to 0.5 N, 0.2 % of its range

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from prbm import Simulation
+from prbm.hybrid.simulation import Simulation
 from support import mechanism
 
 PAGE = Path(__file__).parents[1] / "docs" / "measurements.md"

@@ -7,28 +7,16 @@ import re
 import numpy as np
 import pytest
 
-from prbm import (
-    Body,
-    EquilibriumError,
-    Flexure,
-    FlexureType,
-    Force,
-    Joint,
-    Mechanism,
-    MechanismError,
-    Parameter,
-    ParameterError,
-    PrbmError,
-    Release,
-    Simulation,
-    Stop,
-    assemble,
-    equilibrium,
-    free_displacement,
-    modes,
-)
-from prbm.mechanism import affine
-from prbm_tools.mechanism_file import load, shipped
+from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, PrbmError
+from prbm.files.mechanism_file import load, shipped
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium, free_displacement
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.expressions import affine
+from prbm.mechanism.parameters import Parameter
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Joint, Release, Stop
 from support import mechanism
 
 GUIDE = mechanism("PRBDM2R")
@@ -326,10 +314,10 @@ def test_files_that_are_no_mechanism_get_one_clear_message(tmp_path):
 
 def test_a_mechanism_is_data_to_the_last_digit():
     """Its representation is Python that makes it again: what an FMU carries."""
-    import prbm.mechanism
+    import prbm.mechanism.description
 
     for name in shipped():
-        same = eval(repr(mechanism(name)), vars(prbm.mechanism) | {"inf": math.inf})
+        same = eval(repr(mechanism(name)), vars(prbm.mechanism.description) | {"inf": math.inf})
         assert same == mechanism(name)
 
 

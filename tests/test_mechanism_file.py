@@ -16,14 +16,25 @@ import jsonschema
 import pytest
 
 from mechanism_mistakes import CHANGES, CONTENTS, EXAMPLE
-from prbm import Body, Force, MechanismError, PrbmError
-from prbm.mechanism import FIELDS, FlexureType, Friction, Joint, Mechanism, Probe, Release, Stop
-from prbm_fmu import cli
-from prbm_fmu.units import UNITS
-from prbm_tools import units
-from prbm_tools.mechanism_file import load, schema, shipped
-from prbm_tools.mechanism_tables import MechanismTable
-from prbm_tools.toml_lines import line_of, lines
+from prbm.base.errors import MechanismError, PrbmError
+from prbm.commands import building as cli
+from prbm.files import units
+from prbm.files.mechanism_file import load, schema, shipped
+from prbm.files.schema import MechanismTable
+from prbm.files.toml_lines import line_of, lines
+from prbm.interface.units import UNITS
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import (
+    FIELDS,
+    Body,
+    FlexureType,
+    Force,
+    Friction,
+    Joint,
+    Probe,
+    Release,
+    Stop,
+)
 from support import mechanism
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -478,7 +489,7 @@ def test_a_mechanism_without_units_needs_no_library_of_units(tmp_path):
     text = (ROOT / "tests" / "test_tables.py").read_text().split('"""')[3]
     (tmp_path / "plain.toml").write_text(text)
     code = (
-        "import sys; from prbm_tools.mechanism_file import load; load(sys.argv[1]); "
+        "import sys; from prbm.files.mechanism_file import load; load(sys.argv[1]); "
         "sys.exit('pint' in sys.modules)"
     )
     command = [sys.executable, "-c", code, str(tmp_path / "plain.toml")]

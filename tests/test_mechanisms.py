@@ -5,8 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from prbm import assemble, equilibrium, modes
-from prbm_tools.mechanism_file import shipped
+from prbm.files.mechanism_file import shipped
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
 from support import Run, mechanism, run
 
 LONG = ("FoldedSuspension", "PRBDM2RAxial", "PRBDM3R")

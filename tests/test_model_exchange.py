@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from coupled import guide, integrator
-from prbm_tools.components import CouplingError
-from prbm_tools.model_exchange import simulate
-from prbm_tools.scalar_guide import Monolith, ScalarGuide
+from prbm.references.scalar_guide import Monolith, ScalarGuide
+from prbm.systems.components import CouplingError
+from prbm.systems.model_exchange import simulate
 from support import ScalarGuide as Quadrature
 from support import mechanism
 

@@ -17,13 +17,16 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from prbm import MechanismError, Simulation, SimulationError
-from prbm_fmu import native_fmu, reference, report
-from prbm_fmu.archive import write
-from prbm_fmu.native_fmu import described
-from prbm_fmu.sources import TABLES, UNIT, amalgamation, kernel
-from prbm_fmu.structure import dependencies
-from prbm_tools.mechanism_file import load, shipped
+from prbm.base.atomic import write
+from prbm.base.errors import MechanismError, SimulationError
+from prbm.commands import fmu_report as report
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu import native_fmu
+from prbm.fmu import reference_results as reference
+from prbm.fmu.native_fmu import described
+from prbm.hybrid.simulation import Simulation
+from prbm.interface.structure import dependencies
+from prbm.kernel.sources import TABLES, UNIT, amalgamation, kernel
 from support import COSTLY, GUIDES, SHIPPED, case, each_shipped
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"

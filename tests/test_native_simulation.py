@@ -11,10 +11,10 @@ import pytest
 from fmpy import simulate_fmu
 
 from native_host import OK, WAYS, Instance, Integrator, clocked, unpacked
-from prbm import Simulation
-from prbm_fmu import native_fmu
-from prbm_fmu.archive import write
-from prbm_fmu.native_fmu import described
+from prbm.base.atomic import write
+from prbm.fmu import native_fmu
+from prbm.fmu.native_fmu import described
+from prbm.hybrid.simulation import Simulation
 from support import (
     COSTLY,
     GUIDES,

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from prbm import Simulation, SimulationError
-from prbm.runge_kutta import BOGACKI_SHAMPINE as PAIR
-from prbm.runge_kutta import Tableau, interpolate, stages
+from prbm.base.errors import SimulationError
+from prbm.hybrid.runge_kutta import BOGACKI_SHAMPINE as PAIR
+from prbm.hybrid.runge_kutta import Tableau, interpolate, stages
+from prbm.hybrid.simulation import Simulation
 from support import mechanism
 
 SMOOTH = {"stop.position": 0.05}

@@ -8,29 +8,22 @@ import pytest
 from matplotlib.text import Text
 from PIL import Image
 
-from prbm import (
-    Body,
-    Flexure,
-    FlexureType,
-    Mechanism,
-    ParameterError,
-    Release,
-    Simulation,
-    Stop,
-    assemble,
-    equilibrium,
-    modes,
-)
-from prbm.mechanism import Joint, Probe
-from prbm_fmu.picture import icon, shape
-from prbm_fmu.start import start_sample
-from prbm_tools.figures import png
-from prbm_tools.mechanism_file import shipped
-from prbm_tools.motion import film, motion, needed
-from prbm_tools.picture import SHOWN, find, main, moved, picture
-from prbm_tools.scene import Scene
-from prbm_tools.shapes import Shapes, box, corners, hull
-from prbm_tools.simulate import simulate
+from prbm.base.errors import ParameterError
+from prbm.drawing.icon import icon, shape
+from prbm.drawing.shapes import Shapes, box, corners, hull
+from prbm.drawing.style import png
+from prbm.files.mechanism_file import shipped
+from prbm.fmu.start import start_sample
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Joint, Probe, Release, Stop
+from prbm.plots.motion import film, motion, needed
+from prbm.plots.picture import SHOWN, find, main, moved, picture
+from prbm.plots.scene import Scene
+from prbm.runs.run import simulate
 from support import mechanism
 
 LEAF = FlexureType("leaf", "2R", 2e-4, 1e-2, 2e11, 7800.0, axial=True)

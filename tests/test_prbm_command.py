@@ -14,11 +14,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from prbm import assemble, free_displacement
-from prbm_tools import cli, files
-from prbm_tools.__main__ import main as started
-from prbm_tools.commands import systems
-from prbm_tools.mechanism_file import find, shipped
+from prbm.__main__ import main as started
+from prbm.base import atomic as files
+from prbm.commands import command_line as cli
+from prbm.commands import systems
+from prbm.files.mechanism_file import find, shipped
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.statics import free_displacement
 from test_measurements_page import records, write
 
 ROOT = Path(__file__).parents[1]
@@ -83,7 +85,7 @@ def test_help_of_every_command_has_an_example_that_is_read_without_a_mistake(com
 
 def test_help_comes_before_anything_slow_is_imported():
     code = (
-        "import sys; from prbm_tools import cli; cli.parser().format_help();"
+        "import sys; from prbm.commands import command_line; command_line.parser().format_help();"
         "sys.exit(bool({'numpy', 'scipy', 'matplotlib'} & set(sys.modules)))"
     )
     subprocess.run([sys.executable, "-c", code], check=True, env=environment())
@@ -236,7 +238,7 @@ def test_a_calibrated_signal_has_the_frequency_of_the_raw_one(tmp_path, capsys):
 def test_a_mechanism_is_put_beside_its_referees(capsys):
     """A cantilever of few elements: the table, its figure, and a measured value in it."""
     pytest.importorskip("exudyn", reason="the finite elements are Exudyn's: pip install exudyn")
-    pytest.importorskip("prbm_tools.comparison", reason="not there yet")
+    pytest.importorskip("prbm.analysis.comparison", reason="not there yet")
     measured = "'frequency 1 at rest=4.4 Hz +- 0.1'"
     assert run(f"validate Cantilever --elements 4 --measured {measured} --out .") == cli.OK
     rows = table("Cantilever-comparison.csv")
@@ -415,7 +417,7 @@ def test_a_folder_that_is_not_there_is_made(line, capsys):
 
 def test_a_film_that_cannot_be_written_is_not_simulated_first(monkeypatch):
     Path("taken").write_text("")
-    monkeypatch.setattr("prbm_tools.animation.simulate", pytest.fail)
+    monkeypatch.setattr("prbm.plots.animation.simulate", pytest.fail)
     assert run("animate PRBDM taken/a.gif") == cli.MISTAKE
 
 
@@ -667,7 +669,7 @@ def environment() -> dict[str, str]:
 @pytest.mark.skipif(os.name == "nt", reason="Ctrl-C is another thing on Windows")
 def test_ctrl_c_ends_a_simulation_without_a_traceback():
     """Once it has told its progress, so that it is under way."""
-    words = [sys.executable, "-m", "prbm_tools", "simulate", "PRBDM2R", "--stop-time", "1000"]
+    words = [sys.executable, "-m", "prbm", "simulate", "PRBDM2R", "--stop-time", "1000"]
     with subprocess.Popen(
         [*words, "--out", "."], stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=environment()
     ) as process:
@@ -710,7 +712,7 @@ def test_ctrl_c_names_the_command_that_it_ended(monkeypatch, capsys):
 
 @pytest.mark.parametrize(("command", "status"), [("--help", cli.OK), ("list", cli.FAILED)])
 def test_a_reader_that_has_seen_enough_is_no_failure_to_talk_about(command, status):
-    words = [sys.executable, "-m", "prbm_tools", command]
+    words = [sys.executable, "-m", "prbm", command]
     with subprocess.Popen(
         words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment()
     ) as process:

@@ -11,24 +11,25 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from prbm import (
+from prbm.base.errors import EquilibriumError
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics import constraints
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.dynamics import IDLE, Discrete, Equations
+from prbm.mechanics.kinetics import inertia
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium
+from prbm.mechanics.system import unit
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import (
+    GROUND,
     Body,
-    EquilibriumError,
     Flexure,
     FlexureType,
-    Mechanism,
     Release,
-    Simulation,
     Stop,
-    assemble,
-    constraints,
-    equilibrium,
-    modes,
+    value,
 )
-from prbm.assembly import unit
-from prbm.dynamics import IDLE, Discrete, Equations
-from prbm.kinetics import inertia
-from prbm.mechanism import GROUND, value
 from random_mechanisms import inputs, mechanisms, seeded
 from support import energy_balance
 

@@ -5,8 +5,8 @@ import contextlib
 import numpy as np
 import pytest
 
-from prbm import PrbmError
-from prbm_tools.records import RecordError, Series, read_record
+from prbm.base.errors import PrbmError
+from prbm.data.records import RecordError, Series, read_record
 
 TIME = np.arange(40) * 1e-3
 SIGNAL = 5e-3 * np.cos(30.0 * TIME)

@@ -7,8 +7,8 @@ import pytest
 
 from kernel_simulation import KernelSimulation
 from native_host import OK, WARNING, Instance
-from prbm import Simulation
-from prbm.dynamics import IDLE, STICKS
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.dynamics import IDLE, STICKS
 from support import energy_balance, mechanism, simulation
 
 AT_REST = {"release.displacement": 0.0}  # on the wall, by its weight

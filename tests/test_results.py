@@ -10,10 +10,15 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from prbm import Mechanism, ParameterError, Simulation
-from prbm_tools.figures import png, response
-from prbm_tools.mechanism_file import load, shipped
-from prbm_tools.simulate import Result, ResultError, read_csv, reporter, rest_time, simulate
+from prbm.base.errors import ParameterError
+from prbm.base.progress import reporter
+from prbm.drawing.style import png
+from prbm.files.mechanism_file import load, shipped
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanism.description import Mechanism
+from prbm.plots.figures import response
+from prbm.runs.result import Result, ResultError, read_csv, rest_time
+from prbm.runs.run import simulate
 
 
 @pytest.fixture(scope="module")

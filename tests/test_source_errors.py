@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from prbm import assemble, equilibrium
-from prbm_tools.source_model import (
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.statics import equilibrium
+from prbm.references.source_model import (
     GAMMA_1R,
     GAMMA_2R,
     GRAVITY,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from prbm import ParameterError
-from prbm_tools.figures import png
-from prbm_tools.simulate import simulate
-from prbm_tools.spectrum import after_impact, after_last_impact, figure, peaks, spectrum
+from prbm.analysis.spectrum import after_impact, after_last_impact, figure, peaks, spectrum
+from prbm.base.errors import ParameterError
+from prbm.drawing.style import png
+from prbm.runs.run import simulate
 from support import mechanism
 
 

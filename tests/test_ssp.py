@@ -11,10 +11,10 @@ from fmpy import read_model_description, simulate_fmu
 from lxml import etree
 
 from coupled import guide, integrator
-from prbm_tools import cosimulation, ssp
-from prbm_tools.components import CouplingError
-from prbm_tools.container import container
-from prbm_tools.cosimulation import JACOBI
+from prbm.systems import cosimulation, ssp
+from prbm.systems.components import CouplingError
+from prbm.systems.container import container
+from prbm.systems.cosimulation import JACOBI
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from prbm import EquilibriumError, assemble, constraints, equilibrium, modes
-from prbm.flexure import MODELS
-from prbm.forces import elastic_energy, gravitational_energy
-from prbm.statics import release_velocity
+from prbm.base.errors import EquilibriumError
+from prbm.mechanics import constraints
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.forces import elastic_energy, gravitational_energy
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium, release_velocity
+from prbm.mechanism.flexure import MODELS
 from support import mechanism
 from test_kinetics import cantilever
 
@@ -101,7 +104,7 @@ def test_modes_are_orthogonal_and_on_the_tangent_of_the_loops():
 
 def test_frequencies_are_those_of_the_linearised_motion():
     """The right-hand side, differenced about the equilibrium on the tangent space."""
-    from prbm import Simulation
+    from prbm.hybrid.simulation import Simulation
 
     guide = mechanism("PRBDM2R")
     sim = Simulation(guide, {"damping.beta": 0.0})

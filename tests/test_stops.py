@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import simpson
 
-from prbm import Simulation, Stop
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanism.parts import Stop
 from support import ScalarGuide, energy_balance, mechanism, simulation
 
 HIGH, LOW = (

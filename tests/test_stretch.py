@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 import sympy as sp
 
-from prbm import Body, Flexure, FlexureType, Force, Mechanism, Release, Simulation, Stop
-from prbm.dynamics import IDLE, Discrete, Equations
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.dynamics import IDLE, Discrete, Equations
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Release, Stop
 from support import mechanism
 
 EA, EI, ROD = 400.0, 2e-3, 3e-3  # N, N m^2, kg: a soft rubber cord, 0.1 m long

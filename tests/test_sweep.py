@@ -20,15 +20,15 @@ from distributed import LocalCluster
 from pythonfmu import FmuBuilder
 from scipy import stats
 
-import prbm_tools
+import prbm
 from mishap import CRASHES, CRASHES_ONCE, EXITS, FINE, HANGS, KILLS_WORKER, RAISES
 from native_host import clocked
-from prbm import ParameterError
-from prbm_tools import sweep as sweeps
-from prbm_tools.cli import main
-from prbm_tools.sweep import SweepError, samples, sweep
-from prbm_tools.sweep_results import OWN
-from prbm_tools.sweep_run import Job, Output, Runner, parsed, reduced
+from prbm.base.errors import ParameterError
+from prbm.commands.command_line import main
+from prbm.sweeps import sweep as sweeps
+from prbm.sweeps.results import OWN
+from prbm.sweeps.runs import Job, Output, Runner, parsed, reduced
+from prbm.sweeps.sweep import SweepError, samples, sweep
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
@@ -226,14 +226,14 @@ def test_what_failed_is_done_again_when_asked_for(mishap, log):
 LONG = pd.DataFrame({"x": np.arange(24.0), "pause": 0.15})
 SCRIPT = """
 import sys
-from prbm_tools.cli import main
+from prbm.commands.command_line import main
 sys.exit(main(["sweep", {!r}, "table.csv", "--workers", "2", "--step", "0.5"]))
 """
 
 
 def started(fmu: Path, wanted: int) -> subprocess.Popen[str]:
     """Start the sweep in another process; return it when so many runs are on disk."""
-    paths = [str(Path(prbm_tools.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
+    paths = [str(Path(prbm.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
     process = subprocess.Popen(
         [sys.executable, "-c", SCRIPT.format(str(fmu))],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(paths)},

@@ -8,14 +8,17 @@ import pytest
 
 from kernel_library import KernelError, kernel
 from many_parts import anvil, elastic
-from prbm import Mechanism, MechanismError, Simulation
-from prbm.dynamics import input_names
-from prbm.exchange import independent
-from prbm.mechanism import FIELDS, affine, value
-from prbm_fmu.native_fmu import described
-from prbm_fmu.tables import HEAD, slots, tables
-from prbm_fmu.variables import CLOCK
-from prbm_tools.mechanism_file import load, shipped
+from prbm.base.errors import MechanismError
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu.native_fmu import described
+from prbm.hybrid.simulation import Simulation
+from prbm.interface.tables import HEAD, slots, tables
+from prbm.interface.variables import CLOCK
+from prbm.mechanics.independent import independent
+from prbm.mechanics.inputs import input_names
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.expressions import affine
+from prbm.mechanism.parts import FIELDS, value
 from support import SHIPPED
 
 TOKEN = "{0}"

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from prbm_tools import finite_elements, validation
-from prbm_tools.reproduced import RESULTS
-from prbm_tools.side_by_side import Drawing, Number, Reproduction, Result
-from prbm_tools.validation import ValidationError, chosen, page, parts, reproduce
+from prbm.references import finite_elements
+from prbm.validation import page as validation
+from prbm.validation.page import ValidationError, chosen, page, parts, reproduce
+from prbm.validation.reproduced import RESULTS
+from prbm.validation.side_by_side import Drawing, Number, Reproduction, Result
 
 DOCS = Path(__file__).parents[1] / "docs"
 PAGE = (DOCS / "validation.md").read_text(encoding="utf-8")
@@ -46,7 +47,7 @@ def check(key):
     assert result.key == key
     assert all(0.0 <= fraction <= 1.0 for fraction in told)
     known = parts(PAGE, key)
-    assert known is not None, f"{key} is not on the page: python -m prbm_tools.validation"
+    assert known is not None, f"{key} is not on the page: python -m prbm.validation.page"
     row, section = known
     assert same(row, result.row()), f"{row}\n{result.row()}"
     for shown, found in zip(section.splitlines(), result.section().splitlines(), strict=True):

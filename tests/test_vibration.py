@@ -6,9 +6,9 @@ import math
 import numpy as np
 import pytest
 
-from prbm_tools.records import Series
-from prbm_tools.uncertainty import Estimate, EvaluationError
-from prbm_tools.vibration import damping_verdict, fourier_peak, free_vibration, impacts
+from prbm.data.records import Series
+from prbm.data.uncertainty import Estimate, EvaluationError
+from prbm.data.vibration import damping_verdict, fourier_peak, free_vibration, impacts
 
 RATE, NOISE, FREQUENCY = 750.0, 4e-6, 4.82  # Hz, m, Hz
 

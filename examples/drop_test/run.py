@@ -21,12 +21,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
-from prbm import PrbmError
-from prbm_fmu.native_fmu import build
-from prbm_tools.cosimulation import simulate as cosimulate
-from prbm_tools.mechanism_file import load, shipped
-from prbm_tools.scalar_guide import Monolith, ScalarGuide
-from prbm_tools.simulate import Progress, reporter
+from prbm.base.errors import PrbmError
+from prbm.base.progress import Progress, reporter
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu.native_fmu import build
+from prbm.references.scalar_guide import Monolith, ScalarGuide
+from prbm.systems.cosimulation import simulate as cosimulate
 
 GUIDE = load(shipped()["PRBDM"])
 TRAVEL = 1e-3  # m, to the stop

@@ -22,12 +22,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
-from prbm import PrbmError
-from prbm_fmu.native_fmu import build
-from prbm_tools.cosimulation import System
-from prbm_tools.mechanism_file import load
-from prbm_tools.scalar_guide import Monolith, ScalarGuide
-from prbm_tools.simulate import Progress, reporter
+from prbm.base.errors import PrbmError
+from prbm.base.progress import Progress, reporter
+from prbm.files.mechanism_file import load
+from prbm.fmu.native_fmu import build
+from prbm.references.scalar_guide import Monolith, ScalarGuide
+from prbm.systems.cosimulation import System
 
 HERE = Path(__file__).resolve().parent
 MECHANISM = load(HERE / "Harvester.toml")

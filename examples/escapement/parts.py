@@ -3,8 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from prbm import Mechanism
-from prbm_tools.mechanism_file import load
+from prbm.files.mechanism_file import load
+from prbm.mechanism.description import Mechanism
 
 FOLDER = Path(__file__).parent
 wheel, oscillator = (load(FOLDER / name) for name in ("Wheel.toml", "Oscillator.toml"))

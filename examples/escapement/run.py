@@ -28,11 +28,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from parts import both, oscillator, wheel
 
-from prbm import Impact, PrbmError
-from prbm_fmu.native_fmu import build
-from prbm_tools.cosimulation import simulate as cosimulate
-from prbm_tools.simulate import Progress, reporter
-from prbm_tools.simulate import simulate as simulate_one
+from prbm.base.errors import PrbmError
+from prbm.base.progress import Progress, reporter
+from prbm.fmu.native_fmu import build
+from prbm.hybrid.simulation import Impact
+from prbm.runs.run import simulate as simulate_one
+from prbm.systems.cosimulation import simulate as cosimulate
 
 MOMENT, STOP_TIME, TOLERANCE = -1e-4, 0.3, 1e-9  # N m on the wheel, s
 STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # s

@@ -21,8 +21,8 @@ from fmpy.fmi2 import FMU2Slave
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
-from prbm_fmu.python_fmu import build
-from prbm_tools.mechanism_file import load, shipped
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu.python_fmu import build
 
 STROKE = 0.008  # m
 RESTITUTION = 0.6

@@ -20,11 +20,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy import stats
 
-from prbm import PrbmError
-from prbm_fmu.native_fmu import build
-from prbm_tools.mechanism_file import load, shipped
-from prbm_tools.simulate import reporter
-from prbm_tools.sweep import samples, sweep
+from prbm.base.errors import PrbmError
+from prbm.base.progress import reporter
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu.native_fmu import build
+from prbm.sweeps.sweep import samples, sweep
 
 MEAN = {"stop.restitution": 0.6, "stop.position": 0.0}  # -, m
 SPREAD = {"stop.restitution": 0.03, "stop.position": 0.3e-3}  # standard deviations

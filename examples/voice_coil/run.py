@@ -18,12 +18,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
-from prbm import PrbmError
-from prbm_fmu.native_fmu import build
-from prbm_tools.cosimulation import simulate as cosimulate
-from prbm_tools.mechanism_file import load, shipped
-from prbm_tools.scalar_guide import Monolith, ScalarGuide
-from prbm_tools.simulate import reporter, rest_time
+from prbm.base.errors import PrbmError
+from prbm.base.progress import reporter
+from prbm.files.mechanism_file import load, shipped
+from prbm.fmu.native_fmu import build
+from prbm.references.scalar_guide import Monolith, ScalarGuide
+from prbm.runs.result import rest_time
+from prbm.systems.cosimulation import simulate as cosimulate
 
 HERE = Path(__file__).resolve().parent
 GUIDE = load(shipped()["PRBDM"])

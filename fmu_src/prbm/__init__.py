@@ -1,59 +1,49 @@
-"""Pseudo-rigid-body impact models of planar compliant mechanisms.
+"""Impact models of compliant mechanisms, as Python objects and Functional Mock-up Units.
 
-A mechanism is data (:mod:`prbm.mechanism`); :class:`Simulation` moves it; statics and modes are
-functions of its arrays (:mod:`prbm.assembly`).  NumPy and SciPy only, no files, no FMI.
+>>> import prbm
+>>> guide = prbm.load("PRBDM2R")
+>>> result = prbm.simulate(guide, {"stop.restitution": 0.5}, stop_time=0.05)
+>>> int(result["stop.impact_count"][-1])
+1
+
+The names below are the public interface; they are imported when they are first used, so that
+``import prbm`` costs nothing.  Everything else is in the packages that ``docs/architecture.md``
+describes.
 """
 
-from .assembly import System, assemble
-from .errors import (
-    EquilibriumError,
-    MechanismError,
-    ParameterError,
-    PrbmError,
-    SimulationError,
-)
-from .fixed_step import march
-from .hybrid import Impact, Simulation
-from .mechanism import (
-    Body,
-    Flexure,
-    FlexureType,
-    Force,
-    Friction,
-    Joint,
-    Mechanism,
-    Parameter,
-    Probe,
-    Release,
-    Stop,
-)
-from .modal import modal_restitution, modes
-from .statics import equilibrium, free_displacement
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-__all__ = [
-    "Body",
-    "EquilibriumError",
-    "Flexure",
-    "FlexureType",
-    "Force",
-    "Friction",
-    "Impact",
-    "Joint",
-    "Mechanism",
-    "MechanismError",
-    "Parameter",
-    "ParameterError",
-    "PrbmError",
-    "Probe",
-    "Release",
-    "Simulation",
-    "SimulationError",
-    "Stop",
-    "System",
-    "assemble",
-    "equilibrium",
-    "free_displacement",
-    "march",
-    "modal_restitution",
-    "modes",
-]
+if TYPE_CHECKING:
+    from .base.version import __version__ as __version__
+    from .files.mechanism_file import find as load
+    from .hybrid.simulation import Simulation
+    from .mechanism.description import Mechanism
+    from .runs.result import Result
+    from .runs.run import simulate
+
+__all__ = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate"]
+
+_HOMES = {
+    "Mechanism": ("mechanism.description", "Mechanism"),
+    "Result": ("runs.result", "Result"),
+    "Simulation": ("hybrid.simulation", "Simulation"),
+    "__version__": ("base.version", "__version__"),
+    "load": ("files.mechanism_file", "find"),
+    "simulate": ("runs.run", "simulate"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its module (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    module, attribute = _HOMES[name]
+    value = getattr(import_module(f".{module}", __name__), attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names, whether or not they have been imported."""
+    return sorted({*globals(), *__all__})

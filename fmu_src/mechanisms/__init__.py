@@ -1,1 +1,0 @@
-"""Shipped mechanisms, one TOML file each: data, no code."""

@@ -1,0 +1,1 @@
+"""Numbers derived from models: impact maps, spectra, holding forces, fits, comparisons."""

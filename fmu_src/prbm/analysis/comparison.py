@@ -1,0 +1,347 @@
+"""Any mechanism beside finite elements and, if there are any, measurements.
+
+:func:`compare` evaluates the same quantities by the pseudo-rigid-body model and by finite elements
+of the same file, and puts measured values with their uncertainties beside them:
+
+* where the released body rests, and the lowest frequencies about that shape;
+* the force that holds it in the drawn shape, the stiffness and the frequencies there;
+* the modal restitution of an arriving fundamental mode at every wall that a force on the released
+  body reaches.
+
+Loads and holding force are the same on both sides.  Friction and damping in proportion to mass,
+which the elements do not have and which none of these quantities depends on, are left out.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from ..base.errors import EquilibriumError, ParameterError
+from ..base.progress import Progress
+from ..data.uncertainty import Estimate
+from ..drawing.style import IMPACT, LINK, REST, own_style
+from ..mechanics.assembly import assemble
+from ..mechanics.modal import Modes, modes
+from ..mechanics.statics import equilibrium
+from ..mechanics.system import System
+from ..mechanism.description import Mechanism
+from ..mechanism.parts import value
+from ..plots.scene import plain
+from ..references.finite_elements import FiniteElements
+from .impact_map import algebraic, by_elements
+from .stretching import notes as stretching_notes
+
+FREQUENCIES = 3  # the lowest that are compared
+NUDGE = 1e-4  # of the mechanism's length: displacements between which a stiffness is taken
+ROUNDING = 1e-9  # of that length, and of the force that it costs: less is 0
+Quantities = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity by every route; NaN or None where a route does not give it.
+
+    Parameters
+    ----------
+    name, unit : str
+        What it is; SI.
+    model, elements : float
+        By the pseudo-rigid-body model and by finite elements.
+    measured : Estimate or None
+        Measured, with its standard uncertainty.
+    """
+
+    name: str
+    unit: str
+    model: float
+    elements: float
+    measured: Estimate | None = None
+
+    @property
+    def error(self) -> float:
+        """Model less elements, in the unit of the quantity."""
+        return self.model - self.elements
+
+    @property
+    def relative(self) -> float:
+        """The same over the elements' value [-]; NaN where that is 0."""
+        return self.error / abs(self.elements) if self.elements else math.nan
+
+    @property
+    def scale(self) -> float:
+        """What differences are told in: the elements' magnitude, 1 for a ratio."""
+        return abs(self.elements) if self.unit else 1.0
+
+    def away(self, found: float) -> float:
+        """Return how far a value is from the measured one, in its standard uncertainties [-]."""
+        if self.measured is None or not 0.0 < self.measured.uncertainty < math.inf:
+            return math.nan
+        return (found - self.measured.value) / self.measured.uncertainty
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Quantities of a mechanism side by side.
+
+    Parameters
+    ----------
+    title : str
+        Of the mechanism.
+    elements : int
+        Cable elements a flexure.
+    rows : tuple of Row
+        Of what both the model and the elements can say, and of all that was measured.
+    notes : tuple of str
+        What could not be compared, and why; what the model hides.
+    """
+
+    title: str
+    elements: int
+    rows: tuple[Row, ...]
+    notes: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Row:
+        """Return a row by name."""
+        for row in self.rows:
+            if row.name == name:
+                return row
+        known = ", ".join(row.name for row in self.rows)
+        raise ParameterError(f"{name!r} was not compared; there are {known}")
+
+    def __str__(self) -> str:
+        head = f"{'':<34}{'model':>12}{'elements':>12}{'difference':>12}"
+        measured = any(row.measured for row in self.rows)
+        if measured:
+            head += f"  {'measured':<22}{'model':>8}{'elements':>10}"
+        lines = [f"{self.title}, {self.elements} elements a flexure", head]
+        lines += [_line(row, measured) for row in self.rows]
+        if measured:
+            lines.append("the last two columns: distances in the measurement's uncertainties")
+        return "\n".join([*lines, *self.notes])
+
+    def csv(self) -> str:
+        """Return the rows as CSV, in SI units; empty where there is nothing."""
+        out = io.StringIO()
+        writer = csv.writer(out, lineterminator="\n")
+        writer.writerow(
+            ["quantity", "unit", "model", "finite elements", "difference", "measured",
+             "standard uncertainty", "model off [u]", "finite elements off [u]"]
+        )  # fmt: skip
+        for row in self.rows:
+            numbers = [row.model, row.elements, row.error]
+            if row.measured is not None:
+                numbers += [row.measured.value, row.measured.uncertainty]
+                numbers += [row.away(row.model), row.away(row.elements)]
+            written = ["" if math.isnan(x) else repr(float(x)) for x in numbers]
+            writer.writerow([row.name, row.unit, *written, *[""] * (7 - len(written))])
+        return out.getvalue()
+
+    def write(self, path: str | Path) -> Path:
+        """Write the rows to a CSV file; return its path."""
+        path = Path(path)
+        path.write_text(self.csv(), encoding="utf-8")
+        return path
+
+    @own_style()
+    def figure(self) -> Figure:
+        """Draw model and measurement over the elements' values [%], ratios in 0.01."""
+        rows = [r for r in self.rows if r.elements and math.isfinite(r.elements)][::-1]
+        figure = Figure((7.0, 1.1 + 0.36 * len(rows)), dpi=110, layout="constrained")
+        axes = figure.subplots()
+        places = np.arange(len(rows))
+        axes.axvline(0.0, color=LINK, linewidth=1.2, label="finite elements")
+        axes.plot(
+            [100 * r.error / r.scale for r in rows],
+            places,
+            "o",
+            color=IMPACT,
+            markersize=6,
+            label="model",
+        )
+        known = [(y, r, r.measured) for y, r in zip(places, rows, strict=True)
+                 if r.measured is not None]  # fmt: skip
+        if known:
+            off = [100 * (m.value - r.elements) / r.scale for _, r, m in known]
+            bars = [100 * m.uncertainty / r.scale for _, r, m in known]
+            axes.errorbar(
+                off, [y for y, *_ in known], xerr=bars, fmt="s", color=REST, capsize=3,
+                markersize=4, label="measured",
+            )  # fmt: skip
+        axes.set_yticks(
+            places, [r.name if r.unit else f"{r.name} [0.01]" for r in rows], fontsize=9
+        )
+        axes.set_ylim(-0.7, len(rows) - 0.3)
+        ratios = "" if all(r.unit for r in rows) else ", or 0.01"
+        axes.set_xlabel(f"difference from finite elements [%{ratios}]")
+        axes.set_title(self.title, fontsize=11, loc="left")
+        plain(axes)
+        axes.legend(fontsize=9, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        return figure
+
+
+def _shown(x: float, form: str = ".5g") -> str:
+    return "-" if math.isnan(x) else format(x, form)
+
+
+def _line(row: Row, measured: bool) -> str:
+    """Return a row as a line of the table: the difference in percent, where it has a meaning.
+
+    It has none for ratios, nor where it is more than the quantity itself.
+    """
+    percent = row.unit and abs(row.relative) <= 1.0
+    off = (
+        f"{100 * row.relative:+.2f} %"
+        if percent
+        else _shown(row.error, "+.3g" if row.error else "g")
+    )
+    name = f"{row.name} [{row.unit}]" if row.unit else row.name
+    line = f"{name:<34}{_shown(row.model):>12}{_shown(row.elements):>12}"
+    line += f"{'-' if math.isnan(row.error) else off:>12}"
+    if measured and row.measured is not None:
+        line += f"  {row.measured!s:<22}{_shown(row.away(row.model), '+.1f'):>8}"
+        line += f"{_shown(row.away(row.elements), '+.1f'):>10}"
+    return line
+
+
+# --- the two sides ------------------------------------------------------------------------------
+
+
+def _frequencies(found: Modes, where: str) -> Quantities:
+    lowest = found.frequency[:FREQUENCIES]
+    return {f"frequency {i} {where}": float(f) for i, f in enumerate(lowest, start=1)}
+
+
+def _straight(hold: Callable[[float], float], step: float) -> Quantities:
+    """Return holding force and stiffness in the drawn shape; step a displacement [m]."""
+    slope = (hold(step) - hold(-step)) / (2 * step)
+    return {"holding force, straight": hold(0.0), "stiffness, straight": slope}
+
+
+def _of_model(system: System, step: float) -> Quantities:
+    free = equilibrium(system)
+    x = float((system.release @ system.directions(free.q)).real) + system.release_c
+    return {
+        "rest position": x,
+        **_frequencies(modes(system, free), "at rest"),
+        **_straight(lambda x: equilibrium(system, x).force, step),
+        **_frequencies(modes(system, equilibrium(system, 0.0)), "straight"),
+    }
+
+
+def _of_elements(fe: FiniteElements, step: float) -> Quantities:
+    free, drawn = fe.equilibrium(), fe.equilibrium(0.0)
+    return {
+        "rest position": fe.displacement(free.q),
+        **_frequencies(fe.modes(free), "at rest"),
+        **_straight(lambda x: fe.equilibrium(x, drawn).force, step),
+        **_frequencies(fe.modes(drawn), "straight"),
+    }
+
+
+def _unit(name: str) -> str:
+    units = {"rest position": "m", "frequency": "Hz", "holding force": "N", "stiffness": "N/m"}
+    return next((unit for start, unit in units.items() if name.startswith(start)), "")
+
+
+def compare(
+    mechanism: Mechanism,
+    values: Mapping[str, float] | None = None,
+    *,
+    elements: int = 32,
+    measured: Mapping[str, Estimate] | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Return a mechanism by its model, by finite elements, and as it was measured.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With a release, any flexures, any stops.
+    values : mapping
+        Parameters that differ from their defaults.
+    elements : int
+        Cable elements a flexure.
+    measured : mapping
+        Measured values by the name of the quantity, in SI units: ``"frequency 1 at rest"``,
+        ``"rest position"``, ``"stiffness, straight"``, ``"modal restitution, stop"``, ...
+    progress : callable or None
+        Told the fraction that is done, from 0 to 1.
+
+    Returns
+    -------
+    Comparison
+        A quantity that the model has not (a third mode of one degree of freedom) is left out.
+
+    Raises
+    ------
+    FiniteElementError
+        If Exudyn is not installed.
+    ParameterError
+        If a value is out of bounds, or something was measured that is not compared.
+    EquilibriumError
+        If there is no shape at rest, or none held straight.
+    """
+    tell = progress or (lambda _: None)
+    given = dict(values or {}) | _without(mechanism)
+    system = assemble(mechanism, mechanism.values(given))
+    step = NUDGE * system.length
+    model = _of_model(system, step)
+    tell(0.1)
+    found = _of_elements(FiniteElements(mechanism, given, elements=elements), step)
+    tell(0.5)
+    notes: list[str] = []
+    for i, (name, pair) in enumerate(_restitutions(mechanism, given, elements, notes)):
+        model[name], found[name] = pair
+        tell(0.5 + 0.5 * (i + 1) / len(mechanism.stops))
+    notes += stretching_notes(mechanism, given)
+    known = dict(measured or {})
+    for name in known:
+        if name not in model:
+            raise ParameterError(
+                f"{name!r} was measured but is not compared; there are {', '.join(model)}"
+            )
+    least = ROUNDING * system.length
+    small = {"m": least, "N": least * abs(found["stiffness, straight"])}
+
+    def row(name: str) -> Row:
+        unit = _unit(name)
+        ours, theirs = (
+            x if abs(x) > small.get(unit, 0.0) else 0.0 for x in (model[name], found[name])
+        )
+        return Row(name, unit, ours, theirs, known.get(name))
+
+    rows = [row(name) for name in model]
+    tell(1.0)
+    return Comparison(mechanism.title, elements, tuple(rows), tuple(notes))
+
+
+def _without(mechanism: Mechanism) -> dict[str, float]:
+    """Return friction and damping in proportion to mass, off."""
+    off = {f"{f.name}.coefficient": 0.0 for f in mechanism.frictions}
+    off |= {f"{s.name}.friction": 0.0 for s in mechanism.stops}
+    return off | {"damping.zeta": 0.0}
+
+
+def _restitutions(
+    mechanism: Mechanism, values: Mapping[str, float], elements: int, notes: list[str]
+) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Give the modal restitution at each stop by both; a note where there is none."""
+    known = mechanism.values(values)
+    for stop in mechanism.stops:
+        place, d = value(stop, "position", known), value(stop, "offset", known)
+        try:
+            pair = (
+                algebraic(mechanism, [place], [d], values, stop=stop.name),
+                by_elements(mechanism, [place], [d], values, stop=stop.name, elements=elements),
+            )
+        except (EquilibriumError, ParameterError) as error:  # out of reach, or a place of its own
+            notes.append(f"no modal restitution at {stop.name}: {error}")
+            continue
+        name = f"modal restitution, {stop.name}"
+        yield name, (pair[0].restitution.item(), pair[1].restitution.item())

@@ -1,0 +1,297 @@
+r"""Frequency content of the motion after an impact, beside the modes at the impact shape.
+
+The wall is taken away after the first impact, so that nothing but the mechanism is heard.  The
+modes are those about the shape of the impact: where they depend on the shape, as the vertical and
+pitch modes of a parallel guide do, the motion leaves them behind and their lines are smeared
+towards the frequencies that follow.
+
+The amplitude of a line is that of the sine which it stands for,
+
+    a(f) = 2 |sum_k w_k x_k exp(-2 pi i f t_k)| / sum_k w_k,
+
+with Hann's window w, after the straight line through x has been taken out.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.signal import detrend, find_peaks
+from scipy.signal.windows import hann
+
+from ..base.errors import ParameterError
+from ..drawing.style import IMPACT, PAST, own_style
+from ..hybrid.simulation import Impact, Simulation
+from ..mechanics.arrays import Real
+from ..mechanics.assembly import assemble
+from ..mechanics.modal import modes_at
+from ..mechanics.system import unit
+from ..mechanism.description import Mechanism
+from ..plots.scene import plain
+from ..runs.result import Result
+from .impact_map import first_impact
+
+FAR = 10.0  # sizes of the mechanism, to which a wall is taken away
+FEWEST = 16  # samples of a spectrum
+MODES_SHOWN = 6
+SIGNALS = {
+    "along": "velocity along the impact [m/s]",
+    "across": "velocity across it [m/s]",
+    "turning": "angular velocity [rad/s]",
+}
+
+
+@dataclass(frozen=True)
+class AfterImpact:
+    """The free motion of the hit body after an impact.
+
+    Parameters
+    ----------
+    title : str
+        Of the mechanism.
+    impact : Impact
+        What came before.
+    time : (m,)
+        Since the impact, in equal steps [s].
+    along, across, turning : (m,)
+        Velocity of the body's centre of mass along the direction of the stop and to the left of
+        it [m/s], its angular velocity [rad/s].
+    modes : (k,)
+        Frequencies at the shape of the impact [Hz]; negative ones are unstable.
+    """
+
+    title: str
+    impact: Impact
+    time: Real
+    along: Real
+    across: Real
+    turning: Real
+    modes: Real
+
+
+def after_impact(
+    mechanism: Mechanism,
+    values: Mapping[str, float] | None = None,
+    duration: float = 0.2,
+    step: float = 2e-4,
+    *,
+    stop: int = 0,
+    tolerance: float = 1e-8,
+) -> AfterImpact:
+    """Simulate from the release to the first impact, and on without the wall.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What moves.
+    values : mapping
+        Parameters that differ from their defaults.
+    duration, step : float
+        Of what is recorded after the impact [s]; frequencies up to 1/(2 step) are seen.
+    stop : int
+        Which stop; the walls of the others stay.
+    tolerance : float
+        Of the integration.
+
+    Raises
+    ------
+    ParameterError
+        If there are too few samples.
+    EquilibriumError
+        If the wall is not reached.
+    """
+    count = round(duration / step) if step > 0.0 else 0
+    if count < FEWEST:
+        raise ParameterError(
+            f"duration = {duration:g} s and step = {step:g} s give {count} samples; a spectrum "
+            f"needs at least {FEWEST}"
+        )
+    simulation = Simulation(mechanism, values, tolerance=tolerance)
+    impact = first_impact(simulation, stop)
+    s = mechanism.stops[stop]
+    simulation.set({f"{s.name}.displacement": FAR * simulation.system.length})
+    u = unit(s.direction).conjugate()
+    moved = np.zeros((count, 3))
+    times = np.linspace(0.0, (count - 1) * step, count)
+    begin = simulation.time
+    for i, t in enumerate(times):
+        simulation.advance(begin + float(t))
+        out = simulation.outputs()
+        v = u * complex(out[f"{s.body}.vx"], out[f"{s.body}.vy"])
+        moved[i] = v.real, v.imag, out[f"{s.body}.omega"]
+    found = modes_at(simulation.system, impact.q).frequency
+    along, across, turning = moved.T
+    since = times + begin - impact.time
+    return AfterImpact(mechanism.title, impact, since, along, across, turning, found)
+
+
+def after_last_impact(result: Result) -> AfterImpact:
+    """Return what a result holds of the motion after its last impact, in its equal steps.
+
+    The wall is where it is: nothing but the mechanism is heard for as long as it is not touched.
+
+    Raises
+    ------
+    ParameterError
+        If there is no impact, too little is recorded after it, or the body rests on the stop.
+    """
+    if not result.impacts:
+        raise ParameterError("the result has no impact: simulate longer, or move the stop")
+    impact, columns = result.impacts[-1], result.columns
+    s = next(stop for stop in result.mechanism.stops if stop.name == impact.stop)
+    later = columns[columns["time"] > impact.time]
+    if len(later) and (later[f"{s.name}.contact"] != 0).any():
+        raise ParameterError(
+            f"after the last impact, at t = {impact.time:.6g} s, {s.body} rests on {s.name}: there "
+            "is nothing to hear; listen after the first one, or simulate less long"
+        )
+    steps = np.diff(later["time"])
+    if len(steps) and abs(steps[-1] - steps[0]) > 1e-6 * steps[0]:
+        later = later[:-1]  # the last step may be shorter
+    if len(later) < FEWEST:
+        raise ParameterError(
+            f"{len(later)} samples follow the last impact, at t = {impact.time:.6g} s; a spectrum "
+            f"needs at least {FEWEST}: simulate longer, or in smaller steps"
+        )
+    v = unit(s.direction).conjugate() * (later[f"{s.body}.vx"] + 1j * later[f"{s.body}.vy"])
+    own = {p.name for p in result.mechanism.parameters}
+    values = {name: x for name, x in result.values.items() if name in own}
+    found = modes_at(assemble(result.mechanism, values), impact.q).frequency
+    return AfterImpact(
+        result.mechanism.title, impact, later["time"] - impact.time, v.real, v.imag,
+        later[f"{s.body}.omega"], found,
+    )  # fmt: skip
+
+
+def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
+    """Return frequencies and amplitudes of a signal.
+
+    Parameters
+    ----------
+    time : (m,)
+        In equal steps [s].
+    signal : (m,)
+        In any unit.
+
+    Returns
+    -------
+    frequency : (m // 2 + 1,)
+        Up to half of the sampling rate [Hz].
+    amplitude : (m // 2 + 1,)
+        Of the sine at each frequency, in the unit of the signal.
+
+    Raises
+    ------
+    ParameterError
+        If there are too few samples, or their steps differ.
+
+    Examples
+    --------
+    >>> t = np.arange(1000) / 1000
+    >>> f, a = spectrum(t, 3.0 * np.sin(2 * np.pi * 50 * t))
+    >>> float(f[a.argmax()]), round(float(a.max()), 3)
+    (50.0, 3.0)
+    """
+    steps = np.diff(time)
+    if len(time) < FEWEST or np.ptp(steps) > 1e-6 * abs(float(steps.mean())):
+        raise ParameterError(
+            f"a spectrum needs at least {FEWEST} samples in equal steps; here are {len(time)}"
+        )
+    window = hann(len(time), sym=False)
+    lines = np.fft.rfft(window * detrend(signal))
+    frequency: Real = np.array(np.fft.rfftfreq(len(time), float(steps.mean())), float)
+    amplitude: Real = 2.0 * np.abs(lines) / float(window.sum())
+    return frequency, amplitude
+
+
+def peaks(frequency: Real, amplitude: Real, share: float = 0.02) -> Real:
+    """Return the frequencies of the lines that stand out, by a parabola through their logarithm.
+
+    Parameters
+    ----------
+    frequency, amplitude : (m,)
+        As :func:`spectrum` gives them.
+    share : float
+        Of the largest amplitude: what is lower is none.
+
+    Returns
+    -------
+    (p,)
+        Increasing [Hz].
+
+    Examples
+    --------
+    >>> t = np.arange(1000) / 1000
+    >>> peaks(*spectrum(t, np.sin(2 * np.pi * 50.3 * t))).round(1).tolist()
+    [50.3]
+    """
+    top = float(amplitude.max())
+    found, _ = find_peaks(amplitude, height=share * top, prominence=share * top / 2)
+    low, here, high = (np.log(amplitude[found + k]) for k in (-1, 0, 1))
+    shift = (low - high) / (2.0 * (low - 2.0 * here + high))
+    result: Real = np.array(frequency[found] + shift * (frequency[1] - frequency[0]), float)
+    return result
+
+
+def numbered(modes: Real) -> list[tuple[int, float]]:
+    """Return the first modes with their numbers, those that vibrate.
+
+    Examples
+    --------
+    >>> numbered(np.array([-1.6, 116.0]))
+    [(2, 116.0)]
+    """
+    first = enumerate(map(float, modes[:MODES_SHOWN]), start=1)
+    return [(i, f) for i, f in first if f > 0.0]
+
+
+@own_style()
+def figure(
+    response: AfterImpact,
+    signals: Sequence[str] = ("along", "across", "turning"),
+    highest: float | None = None,
+) -> Figure:
+    """Draw the spectra of signals, with the modes at the impact shape marked.
+
+    Parameters
+    ----------
+    response : AfterImpact
+        What is to be heard.
+    signals : sequence of {"along", "across", "turning"}
+        A panel each.
+    highest : float or None
+        Frequency up to which to draw [Hz]; None: what the samples show.
+    """
+    drawn = Figure((8.0, 0.9 + 2.0 * len(signals)), dpi=120, layout="constrained")
+    every = np.atleast_1d(drawn.subplots(len(signals), 1, sharex=True))
+    shown = numbered(response.modes)
+    for axes, name in zip(every, signals, strict=True):
+        frequency, amplitude = spectrum(response.time, getattr(response, name))
+        end = highest or float(frequency[-1])
+        inside = (frequency <= end) & (frequency > 0.0)
+        axes.semilogy(frequency[inside], amplitude[inside], color=PAST, linewidth=1.1)
+        for _, f in shown:
+            if f < end:
+                axes.axvline(f, color=IMPACT, linewidth=1.0, linestyle="--")
+        top = float(amplitude[inside].max())
+        axes.set_ylim(max(1e-6 * top, 0.3 * float(amplitude[inside].min())), 3.0 * top)
+        axes.set_xlim(0.0, end)
+        axes.set_ylabel(SIGNALS[name].replace(" [", "\n["), fontsize=9)
+        plain(axes)
+    last = -np.inf
+    for i, f in shown:
+        if f < end and f - last > 0.035 * end:  # labels do not overlap
+            every[0].annotate(
+                f"{i}", (f, 1.0), (0, 3), xycoords=("data", "axes fraction"),
+                textcoords="offset points", ha="center", color=IMPACT, fontsize=9,
+            )  # fmt: skip
+            last = f
+    t = 1e3 * response.impact.time
+    every[0].set_title(
+        f"{response.title}\nafter the impact at {t:.1f} ms; dashed: modes at the impact shape",
+        fontsize=10, loc="left", pad=16,
+    )  # fmt: skip
+    every[-1].set_xlabel("frequency [Hz]")
+    drawn.align_ylabels(list(every))
+    return drawn

@@ -1,0 +1,103 @@
+"""Which stop is hit, and shapes, held by a force on the released body, in which it touches."""
+
+import math
+from collections.abc import Callable
+from typing import TypeVar
+
+from ..base.errors import EquilibriumError, ParameterError
+from ..mechanics.constraints import gap_rows
+from ..mechanics.statics import Equilibrium, equilibrium
+from ..mechanics.system import System, unit
+from ..mechanism.description import Mechanism
+from ..mechanism.expressions import affine
+from ..mechanism.parts import value
+
+TOUCHES = 1e-9  # of the size: gap at which a held shape touches the wall
+SECANTS = 20
+
+S = TypeVar("S")
+
+
+def stop_index(mechanism: Mechanism, name: str | None) -> int:
+    """Return the index of a stop; None: the first.
+
+    Raises
+    ------
+    ParameterError
+        If there is none, or none of that name.
+    """
+    names = [stop.name for stop in mechanism.stops]
+    if not names or (name is not None and name not in names):
+        known = f"; it has {', '.join(names)}" if names else ": describe one, [[stops]]"
+        raise ParameterError(f"{mechanism.name} has no stop {name or 'to hit'}{known}")
+    return 0 if name is None else names.index(name)
+
+
+def touching(
+    hold: Callable[[float, S | None], S],
+    gap: Callable[[S], float],
+    height: float,
+    size: float,
+    near: S | None = None,
+) -> S:
+    """Return the shape, held by a force on the released body, that touches the wall (secant).
+
+    Parameters
+    ----------
+    hold : callable
+        Of a displacement [m] and a shape near by: the shape held there.
+    gap : callable
+        Of a shape: how far the stop is from its wall [m].
+    height : float
+        Position of the wall [m].
+    size : float
+        Of the mechanism [m].
+    near : shape or None
+        Where to begin.
+
+    Raises
+    ------
+    EquilibriumError
+        If there is none.
+    """
+    x, shape = height, hold(height, near)
+    g = gap(shape)
+    last_x, last_g = x - g, math.nan
+    for _ in range(SECANTS):
+        if abs(g) <= TOUCHES * size:
+            return shape
+        slope = (g - last_g) / (x - last_x) if math.isfinite(last_g) else -1.0
+        last_x, last_g = x, g
+        x -= g / slope
+        shape = hold(x, shape)
+        g = gap(shape)
+    raise EquilibriumError(
+        f"no shape held by a force on the released body touches the wall at {height:g} m"
+    )
+
+
+def impact_shape(system: System, stop: int, height: float) -> Equilibrium:
+    """Return the shape at which a stop touches its wall at a height, held by a force.
+
+    Raises
+    ------
+    EquilibriumError
+        If there is none.
+    """
+    rows = gap_rows(system)
+
+    def gap(shape: Equilibrium) -> float:
+        return float(rows.values(system.directions(shape.q))[stop]) + height
+
+    return touching(lambda x, _: equilibrium(system, x), gap, height, system.length)
+
+
+def lever(system: System, stop: int) -> float:
+    """Return how far the line of an impact passes the centre of mass of the body that hits [m].
+
+    In the drawn shape, positive to the left of the direction of the stop.
+    """
+    s = system.mechanism.stops[stop]
+    point = complex(*(affine(coordinate)(system.values) for coordinate in s.point))
+    across = unit(s.direction).conjugate() * (point - system.bodies[s.body].drawn)
+    return float(across.imag) + value(s, "offset", system.values)

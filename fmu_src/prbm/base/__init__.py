@@ -1,0 +1,1 @@
+"""Errors, file writing, texts of units and names: used by every other package."""

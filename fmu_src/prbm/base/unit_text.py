@@ -1,0 +1,43 @@
+"""Units in which a quantity has a handy number."""
+
+
+def length_unit(size: float) -> tuple[float, str]:
+    """Return a unit in which a length has a handy number, as its factor and name.
+
+    Examples
+    --------
+    >>> length_unit(0.08), length_unit(3e-4)
+    ((1000.0, 'mm'), (1000000.0, 'µm'))
+    """
+    for factor, name in ((1.0, "m"), (1e3, "mm"), (1e6, "µm")):
+        if size * factor >= 2.0:
+            return factor, name
+    return 1e9, "nm"
+
+
+def frequency_unit(frequency: float) -> tuple[float, str]:
+    """Return a unit in which a frequency has a handy number, as its factor and name.
+
+    Examples
+    --------
+    >>> frequency_unit(1298.0), frequency_unit(92086.0)
+    ((1.0, 'Hz'), (0.001, 'kHz'))
+    """
+    for factor, name in ((1.0, "Hz"), (1e-3, "kHz"), (1e-6, "MHz")):
+        if abs(frequency) * factor < 1e4:
+            return factor, name
+    return 1e-9, "GHz"
+
+
+def time_unit(span: float) -> tuple[float, str]:
+    """Return a unit in which a duration has a handy number, as its factor and name.
+
+    Examples
+    --------
+    >>> time_unit(0.3), time_unit(4.0)
+    ((1000.0, 'ms'), (1.0, 's'))
+    """
+    for factor, name in ((1.0, "s"), (1e3, "ms")):
+        if span * factor >= 2.0:
+            return factor, name
+    return 1e6, "µs"

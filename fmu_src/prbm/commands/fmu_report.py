@@ -1,0 +1,153 @@
+"""Simulate an FMU with FMPy, report the headline and plot it.
+
+python -m prbm.commands.fmu_report FMU PNG
+"""
+
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import fmpy  # type: ignore[import-untyped]
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.atomic import write
+from ..base.progress import Progress, reporter
+from ..drawing.style import png
+from ..fmu.slave.resolved import read
+from ..fmu.unpack import unpacked
+from ..interface.variables import CLOCK
+from ..mechanism.description import Mechanism
+from ..plots.figures import response
+from ..runs.headline import FREQUENCY, told
+from .building import FAILED, INTERRUPTED, MISTAKE, OK
+
+
+@dataclass(frozen=True)
+class Run:
+    """What an FMU did.
+
+    Parameters
+    ----------
+    name : str
+        Of the model.
+    mechanism : Mechanism
+        What it is a model of.
+    values : dict of str to float
+        Its parameters and inputs at the start.
+    record : structured array
+        Time, all outputs and the fundamental frequency.
+    stop_time : float
+        Until when it was to run [s].
+    seconds : float
+        What that took.
+    """
+
+    name: str
+    mechanism: Mechanism
+    values: dict[str, float]
+    record: NDArray[Any]
+    stop_time: float
+    seconds: float
+
+    @property
+    def finished(self) -> bool:
+        """Whether the simulation came to its end."""
+        return bool(np.isclose(self.record["time"][-1], self.stop_time))
+
+
+def simulate(fmu: Path, progress: Progress) -> Run:
+    """Run the default experiment of an FMU with FMPy.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        If the user wants no more of it; the FMU has finished its step then, undisturbed.
+    """
+    with unpacked(fmu) as folder, interruptible() as wanted:
+        description = fmpy.read_model_description(str(folder))
+        listed = description.modelVariables
+        outputs = [v.name for v in listed if v.causality == "output" and v.type != CLOCK]
+        clocks = any(v.type == CLOCK for v in listed)  # which demand event mode
+        model = read(folder / "resources")
+        stop_time = float(description.defaultExperiment.stopTime)
+
+        def step_finished(t: float, _: object) -> bool:
+            progress(t / stop_time)
+            return wanted()
+
+        begin = time.perf_counter()
+        record = fmpy.simulate_fmu(
+            str(folder),
+            model_description=description,
+            output=[*outputs, FREQUENCY],
+            use_event_mode=clocks,
+            early_return_allowed=clocks,
+            step_finished=step_finished,
+        )
+        seconds = time.perf_counter() - begin
+        if not wanted():
+            raise KeyboardInterrupt
+    return Run(
+        description.modelName, model.mechanism, dict(model.given), record, stop_time, seconds
+    )
+
+
+@contextmanager
+def interruptible() -> Iterator[Callable[[], bool]]:
+    """Have Ctrl-C noted, and the second one obeyed; give what tells whether to go on."""
+    interrupted: list[int] = []
+
+    def note(number: int, _: object) -> None:
+        interrupted.append(number)
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield lambda: not interrupted
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def headline(run: Run) -> list[str]:
+    """Return what happened, line by line."""
+    record = run.record
+    lines = [
+        f"simulated            {record['time'][-1]:g} s in {run.seconds:.2f} s",
+        *told(record, run.mechanism, run.values),
+    ]
+    if not run.finished:
+        lines.append(
+            f"ended early          at t = {record['time'][-1]:g} s instead of {run.stop_time:g} s"
+        )
+    return lines
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Simulate the FMU given first, plot into the file given second."""
+    fmu, picture = Path(arguments[0]), Path(arguments[1])
+    try:
+        run = simulate(fmu, reporter())
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except Exception as error:
+        print(f"{fmu}: {error}", file=sys.stderr)
+        return FAILED
+    for line in headline(run):
+        print(f"  {line}")
+    try:
+        write(picture, png(response(run.record, run.mechanism)))
+    except OSError as error:
+        print(f"cannot write the figure {picture}: {error.strerror}", file=sys.stderr)
+        return MISTAKE
+    print(f"  figure               {picture}", flush=True)
+    return OK if run.finished else FAILED
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

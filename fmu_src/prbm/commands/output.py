@@ -1,0 +1,121 @@
+"""What a command gives: text on standard output, tables and figures in a folder if there is one."""
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..base.atomic import FileError, check_no_folder, check_writable, write_all
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass
+class Output:
+    """Files that are kept until all is computed, then written at once.
+
+    Parameters
+    ----------
+    folder : Path or None
+        Where they go; None: nowhere, and no figure is drawn.
+
+    Raises
+    ------
+    FileError
+        If nothing can be written there.
+    """
+
+    folder: Path | None
+    files: dict[Path, bytes] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        if self.folder is not None:
+            check_writable(self.folder)
+
+    def text(self, name: str, content: str) -> None:
+        """Keep a file of text."""
+        if self.folder is not None:
+            self.files[self.folder / name] = content.encode()
+
+    def table(self, name: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+        """Keep a table as CSV, numbers with all their digits."""
+        if self.folder is not None:
+            self.text(name, csv_text(head, rows))
+
+    def figure(self, name: str, draw: Callable[[], "Figure"]) -> None:
+        """Keep a figure as PNG."""
+        if self.folder is not None:
+            from ..drawing.style import png  # here, because it takes a second
+
+            self.files[self.folder / name] = png(draw())
+
+    def write(self) -> None:
+        """Write all files, or none, and say where they are.
+
+        Raises
+        ------
+        FileError
+            If one cannot be written.
+        """
+        if self.folder is None:
+            return
+        for path in self.files:
+            check_no_folder(path)
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            write_all(self.files)
+        except OSError as error:
+            raise FileError(
+                f"cannot write {error.filename or self.folder}: {error.strerror}; choose a folder "
+                "with --out"
+            ) from None
+        for path in self.files:
+            print(path)
+
+
+def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table as CSV.
+
+    Examples
+    --------
+    >>> print(csv_text(["mode", "frequency [Hz]"], [[1, 4.5]]), end="")
+    mode,frequency [Hz]
+    1,4.5
+    """
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(head)
+    writer.writerows([_cell(x) for x in row] for row in rows)
+    return out.getvalue()
+
+
+def _cell(x: object) -> str:
+    """Return a cell: numbers with all their digits, True and False as FMPy writes them."""
+    if isinstance(x, str):
+        return x
+    if x is None:
+        return ""
+    if type(x).__name__ in ("bool", "bool_"):
+        return "1" if x else "0"
+    return repr(x.item()) if hasattr(x, "item") else repr(x)
+
+
+def aligned(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table in columns for people.
+
+    Examples
+    --------
+    >>> print(aligned(["mode", "Hz"], [["1", "4.5"], ["2", "130"]]))
+    mode   Hz
+       1  4.5
+       2  130
+    """
+    every = [list(head), *map(list, rows)]
+    widths = [max(len(row[i]) for row in every) for i in range(len(head))]
+    return "\n".join(
+        "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
+        for row in every
+    )

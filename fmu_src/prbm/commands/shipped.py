@@ -1,0 +1,13 @@
+"""``prbm list``: the shipped mechanisms."""
+
+import argparse
+
+from ..files.mechanism_file import load, shipped
+
+
+def listed(options: argparse.Namespace) -> None:
+    """Print the shipped mechanisms, a line each."""
+    files = shipped()
+    width = max(map(len, files))
+    for name, path in files.items():
+        print(f"{name:{width}}  {load(path).title}")

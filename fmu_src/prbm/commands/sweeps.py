@@ -1,0 +1,38 @@
+"""``prbm sweep``: an FMU run once for each row of a table."""
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..base.progress import reporter
+from ..files.settings import assigned, quantity
+from ..sweeps.sweep import read_fmu, summary, sweep
+
+
+def swept(options: argparse.Namespace) -> None:
+    """Print how the runs went; their results go into a folder as they are done."""
+    found = sweep(
+        options.fmu, options.table, options.out, outputs=options.output,
+        values=_values(options.fmu, options.set),
+        stop_time=_optional(options.stop_time, "s", "--stop-time"),
+        step=_optional(options.step, "s", "--step"),
+        tolerance=_optional(options.tolerance, "", "--tolerance"),
+        scheduler=options.scheduler, workers=options.workers, retries=options.retries,
+        timeout=_optional(options.timeout, "s", "--timeout"),
+        anew=options.anew, failed=options.failed, progress=reporter(),
+    )  # fmt: skip
+    print(summary(found, options.out))
+
+
+def _optional(text: str | None, unit: str, option: str) -> float | None:
+    return None if text is None else quantity(text, unit, option)
+
+
+def _values(fmu: str, texts: Sequence[str]) -> dict[str, float]:
+    """Read NAME=VALUE pairs of variables of an FMU."""
+    if not texts:
+        return {}
+    _, description = read_fmu(Path(fmu))
+    units = {v.name: v.unit or getattr(v.declaredType, "unit", None) or "" for v in
+             description.modelVariables}  # fmt: skip
+    return assigned(units, texts)

@@ -1,0 +1,56 @@
+"""``prbm validate``: the source's results again, or one mechanism beside its referees."""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from ..base.atomic import check_writable
+from ..base.progress import reporter
+from ..files.mechanism_file import find
+from ..files.settings import UserMistake, settings
+from .output import Output
+from .words import measured
+
+ELEMENTS = 32  # a flexure
+
+
+def validated(options: argparse.Namespace) -> None:
+    """Print how the models compare."""
+    if options.mechanism is None:
+        _source(options)
+    else:
+        _mechanism(options)
+
+
+def _source(options: argparse.Namespace) -> None:
+    """Reproduce the source's results."""
+    for option in ("measured", "set", "elements"):
+        if getattr(options, option) not in (None, []):
+            raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
+    from ..validation.page import PAGE, reproduce  # type: ignore[import-untyped, unused-ignore]
+
+    if options.out is not None:
+        check_writable(options.out)
+    with tempfile.TemporaryDirectory(prefix="prbm_") as folder:
+        results = reproduce(options.out or Path(folder), options.only, reporter())
+    for result in results:
+        print(f"{result.where}: {result.verdict}")
+    if options.out is not None:
+        print(options.out / PAGE)
+
+
+def _mechanism(options: argparse.Namespace) -> None:
+    """Compare a mechanism with finite elements and measurements."""
+    if options.only:
+        raise UserMistake("--only chooses among the source's results: leave MECHANISM out")
+    mechanism = find(options.mechanism)
+    values, output = settings(mechanism, options.set), Output(options.out)
+    known = dict(map(measured, options.measured))
+    from ..analysis.comparison import compare  # type: ignore[import-untyped, unused-ignore]
+
+    elements = ELEMENTS if options.elements is None else options.elements
+    found = compare(mechanism, values, elements=elements, measured=known, progress=reporter())
+    print(found)
+    output.text(f"{mechanism.name}-comparison.csv", found.csv())
+    output.figure(f"{mechanism.name}-comparison.png", found.figure)
+    output.write()

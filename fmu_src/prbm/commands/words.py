@@ -1,0 +1,178 @@
+"""Values with uncertainties, what is fitted and to what, as they stand on a command line."""
+
+import re
+from pathlib import Path
+
+from ..analysis.fit import OWN_UNITS, Free, Frequency
+from ..base.errors import MechanismError, ParameterError
+from ..base.names import unknown
+from ..data.uncertainty import Estimate
+from ..files.settings import PERCENT, UserMistake, has_unit, quantity, without_exponent
+from ..files.units import si_unit
+from ..mechanism.description import Mechanism
+
+PLUS_MINUS = re.compile(r"\s*(?:\+\s*/?\s*-|±)\s*")
+WHERE = re.compile(r"(?P<value>.*?)(?:\s+mode\s+(?P<mode>\d+))?(?:\s+at\s+(?P<at>.+))?\s*")
+
+
+def estimate(text: str, unit: str, what: str) -> Estimate:
+    """Read a value with its standard uncertainty, which is zero if there is none.
+
+    Raises
+    ------
+    UserMistake
+        If it is none.
+
+    Examples
+    --------
+    >>> print(estimate("4.82 Hz +- 0.06", "Hz", "--frequency"))
+    4.820 ± 0.060 Hz
+    >>> print(estimate("40 ± 0.05 mm", "m", "--length"))
+    0.040000 ± 0.000050 m
+    >>> round(estimate("0.1 mm +- 0.5 %", "m", "--thickness").relative, 12)
+    0.005
+    """
+    parts = PLUS_MINUS.split(text.strip())
+    if len(parts) == 1:
+        return Estimate(quantity(text, unit, what), 0.0, unit)
+    if len(parts) > 2:
+        raise UserMistake(f"{what} {text}: write a value and one uncertainty, as 4.82 +- 0.06")
+    value, u = parts
+    share = PERCENT.fullmatch(u)
+    if share and unit:
+        x = quantity(value, unit, what)
+        return Estimate(x, abs(x) * quantity(u, "", what), unit)
+    own, of_u = (re.search(r"[A-Za-zµμ°].*", without_exponent(part)) for part in parts)
+    if own and not of_u:
+        u = f"{u} {own[0]}"
+    elif of_u and not own:
+        value = f"{value} {of_u[0]}"
+    spread = quantity(u, unit, what)
+    if spread < 0.0:
+        raise UserMistake(f"{what} {text}: the uncertainty must not be negative")
+    return Estimate(quantity(value, unit, what), spread, unit)
+
+
+def free(mechanism: Mechanism, text: str) -> Free:
+    """Read a parameter that is to be fitted, NAME or NAME=LOW:HIGH.
+
+    Raises
+    ------
+    UserMistake
+        If it is none.
+    ParameterError
+        If there is no such parameter.
+
+    Examples
+    --------
+    >>> from prbm.files.mechanism_file import find
+    >>> free(find("PRBDM"), "stop.position=-1 mm : 1 mm")
+    Free(name='stop.position', lower=-0.001, upper=0.001, start=None)
+    """
+    name, equals, limits = (part.strip() for part in text.partition("="))
+    units = OWN_UNITS | {p.name: p.unit for p in mechanism.parameters}
+    if name not in units:
+        raise ParameterError(f"--free {text}: {unknown(name, units)}")
+    if not equals:
+        return Free(name)
+    ends = limits.split(":")
+    if len(ends) != 2:
+        raise UserMistake(f"--free {text}: write bounds as {name}=LOW:HIGH")
+    last = re.search(r"[A-Za-zµμ°].*", without_exponent(ends[1]))
+    if last and not has_unit(ends[0]):
+        ends[0] = f"{ends[0].strip()} {last[0]}"
+    low, high = (quantity(end, units[name], f"--free {name}=") for end in ends)
+    if not low < high:
+        raise UserMistake(f"--free {text}: the lower bound is not below the upper one")
+    return Free(name, low, high)
+
+
+def frequency(text: str) -> Frequency:
+    """Read a frequency with its uncertainty, the number of the mode, and where it was measured.
+
+    Raises
+    ------
+    UserMistake
+        If it is none.
+    EvaluationError
+        If its uncertainty is missing.
+
+    Examples
+    --------
+    >>> one = frequency("130.7 Hz +- 0.5 mode 2 at -10 mm")
+    >>> one.mode, one.displacement, one.frequency.value
+    (2, -0.01, 130.7)
+    """
+    found = WHERE.fullmatch(text.strip())
+    assert found is not None  # it matches everything
+    value = estimate(found["value"], "Hz", "--frequency")
+    if value.uncertainty == 0.0:
+        raise UserMistake(
+            f"--frequency {text}: give its standard uncertainty, as in --frequency "
+            f'"{value.value:g} Hz +- {0.01 * value.value:.1g}"; for a computed one half of its '
+            "last digit"
+        )
+    at = None if found["at"] is None else quantity(found["at"], "m", "--frequency ... at")
+    return Frequency(value, int(found["mode"] or 1), at)
+
+
+def measured(text: str) -> tuple[str, Estimate]:
+    """Read NAME=VALUE+-U in any unit, the value with its uncertainty in SI.
+
+    Raises
+    ------
+    UserMistake
+        If it is none.
+
+    Examples
+    --------
+    >>> name, value = measured("frequency=4.82 Hz +- 0.06")
+    >>> print(name, value)
+    frequency 4.820 ± 0.060 Hz
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals and value):
+        raise UserMistake(
+            f'--measured {text}: write NAME=VALUE+-U, as "frequency 1 at rest=4.82 Hz +- 0.06"'
+        )
+    unit = ""
+    for part in reversed(PLUS_MINUS.split(value)):
+        unit = _si(part, f"--measured {text}") or unit
+    return name, estimate(value, unit, f"--measured {name}=")
+
+
+def _si(text: str, what: str) -> str:
+    try:
+        return si_unit(text)
+    except MechanismError as error:
+        raise UserMistake(f"{what}: {error}") from None
+
+
+def pair(text: str, what: str) -> tuple[str, str]:
+    """Read NAME=TEXT.
+
+    Raises
+    ------
+    UserMistake
+        If it is none.
+
+    Examples
+    --------
+    >>> pair("x = mm", "--unit")
+    ('x', 'mm')
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (name and equals):
+        raise UserMistake(f"{what} {text}: write NAME=TEXT, for instance {what} x=mm")
+    return name, value
+
+
+def stem(path: str) -> str:
+    """Return the name of a file without its end, for the files that are made of it.
+
+    Examples
+    --------
+    >>> stem("data/free.csv")
+    'free'
+    """
+    return Path(path).stem

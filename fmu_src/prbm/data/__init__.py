@@ -1,0 +1,1 @@
+"""Measured data: records, uncertainties, evaluation of measurements."""

@@ -1,0 +1,1 @@
+"""Shapes and lines of a mechanism, and its icon."""

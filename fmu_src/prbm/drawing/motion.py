@@ -1,0 +1,73 @@
+"""Shapes of a mechanism whose loops are closed and whose flexures are stretched."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..mechanics.arrays import Complex, Real
+from ..mechanics.constraints import Rows, project_positions
+from ..mechanics.system import FIXED, System
+
+STRETCHING = 4  # corrections of stretches: they are small, and convergence is quadratic
+
+
+def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) -> Real:
+    """Return the nearest shape whose loops are closed, and which touches a wall if asked to.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    q : (n,)
+        Angles near that shape [rad].
+    stop : int or None
+        The stop that touches.
+    wall : float
+        Where its wall is [m].
+    """
+    touching = [] if stop is None else [stop]
+    B = np.vstack([system.loops, system.gaps[touching]])
+    c = np.concatenate([system.loops_c, system.gaps_c[touching] + wall])
+    z, on = np.zeros(len(B), complex), np.full(len(B), FIXED)
+    z[len(system.loops) :], on[len(system.loops) :] = system.gaps_z[touching], system.on[touching]
+    return project_positions(system, Rows(system, B, c, z, on), q, c)[0]
+
+
+def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
+    """Return shapes of given angles with the stretches that close the loops and place the bodies.
+
+    The least ones, where several do (Gauss-Newton).
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    q : (m, n)
+        Angles [rad]; what stands for stretches is not used.
+    placed : mapping of str to (m,)
+        Displacements of bodies from the straight shape [m].
+    """
+    k, arms = system.stretches, system.stretched
+    if not len(k):
+        return q
+    q = q.copy()
+    q[:, k] = 0.0
+    B, c = [system.loops], [np.tile(system.loops_c, (len(q), 1))]
+    for name, displacement in placed.items():
+        frame = system.bodies[name]
+        short = frame.c - frame.drawn - displacement
+        B += [frame.A[None], -1j * frame.A[None]]
+        c += [short.real[:, None], short.imag[:, None]]
+    rows, constants = np.vstack(B), np.hstack(c)
+    for _ in range(STRETCHING):
+        E = system.directions(q)
+        x = (E @ rows.T).real + constants
+        change = np.linalg.pinv((rows[:, arms] * E[:, None, arms]).real) @ x[:, :, None]
+        q[:, k] -= change[:, :, 0]
+    return q
+
+
+def angles(system: System) -> dict[str, int]:
+    """Return the coordinates by the names of their angles."""
+    links = {f"link[{i}].angle": j for i, j in enumerate(system.links, start=1)}
+    return links | {f"{name}.angle": frame.j for name, frame in system.bodies.items()}

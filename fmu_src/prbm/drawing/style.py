@@ -1,0 +1,21 @@
+"""Colours and style of all drawings."""
+
+import io
+from functools import partial
+
+import matplotlib.style
+from matplotlib.figure import Figure
+
+LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
+STRAIGHT, GRID, PROBE = "#b4bcc6", "#eeeeee", "#cc79a7"
+PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
+own_style = partial(matplotlib.style.context, "default")  # whatever matplotlibrc says
+CHAIN = 9  # pivots; a flexure of more is a smooth curve already
+
+
+@own_style()
+def png(figure: Figure) -> bytes:
+    """Return a figure as a PNG file, the same bytes for the same figure."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format="png", metadata={"Software": None})
+    return buffer.getvalue()

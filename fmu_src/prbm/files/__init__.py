@@ -1,0 +1,1 @@
+"""Mechanism files, units and settings as users write them."""

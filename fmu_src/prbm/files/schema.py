@@ -1,0 +1,549 @@
+"""The tables and keys of a mechanism file, and the mechanism that they describe.
+
+The file says more ways than the engine's data: a section and a material may stand with the flexure
+that has them, several types may share a material, a point may be given by its name, and quantities
+have units.  Here all of that becomes the parts of :mod:`prbm.mechanism.description`.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from keyword import iskeyword
+from typing import Annotated, Any
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    StrictBool,
+    StrictInt,
+    StrictStr,
+    Tag,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic_core import CoreSchema, core_schema
+
+from ..base.errors import MechanismError
+from ..mechanism import parameters, parts
+from ..mechanism.description import RESERVED, Mechanism
+from ..mechanism.expressions import Quantity, affine
+from ..mechanism.flexure import CLAMP, ENDS, MODELS, MOST_LINKS
+from ..mechanism.parameters import NAME
+from ..mechanism.parts import FIELDS, GROUND, LARGE, TINY_LENGTH
+from .units import check_coherent, number, quantity, si_unit
+
+LONGEST_NAME = 100  # characters; a name becomes part of the names of files
+MATERIAL = ("youngs_modulus", "density")
+SECTION = ("thickness", "width")
+TEXT, LIST = TAGS = ("<text>", "<list>")  # the ways to write a point, or the ends
+IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
+
+
+# --- what a key holds -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a key holds: a number in a unit, a number with a unit or, mostly, an expression."""
+
+    description: str
+    unit: str
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    expression: bool = True
+
+    def read(self, written: object) -> Quantity:
+        """Return the quantity in the unit of the key, or an expression."""
+        return (quantity if self.expression else number)(written, self.unit)
+
+    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(self, _: CoreSchema, __: GetJsonSchemaHandler) -> Any:
+        bounds = {"minimum": self.minimum, "maximum": self.maximum}
+        finite = {name: bound for name, bound in bounds.items() if math.isfinite(bound)}
+        choices: list[dict[str, Any]] = [{"type": "number", **finite}]
+        if self.expression or self.unit:
+            choices.append({"type": "string", "pattern": r"\S" if self.expression else r"\d"})
+        return {"description": f"{self.description} [{self.unit or '-'}]", "anyOf": choices}
+
+
+@dataclass(frozen=True)
+class InUnit:
+    """What a key of a parameter holds: a number, in the unit beside it; a bound may be infinite."""
+
+    bound: bool = False
+
+    def read(self, written: object, info: ValidationInfo) -> float:
+        """Return the number in the unit of the parameter."""
+        if self.bound and isinstance(written, float) and math.isinf(written):
+            return written
+        return number(written, str(info.data.get("unit", "")).removeprefix("1"))
+
+    def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.with_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(self, _: CoreSchema, __: GetJsonSchemaHandler) -> Any:
+        return {"anyOf": [{"type": "number"}, {"type": "string", "pattern": r"\d"}]}
+
+
+def measured(part: type, key: str) -> Measured:
+    """Return what a field holds that is a parameter of the mechanism."""
+    unit, description, minimum, maximum, *_ = FIELDS[part][key]
+    return Measured(description, unit, minimum, maximum)
+
+
+def _allowed(name: str) -> str:
+    if any(iskeyword(word) for word in re.split(r"[.\[]", name)):
+        raise MechanismError("a word of Python, which expressions cannot hold; choose another name")
+    return name
+
+
+Name = Annotated[
+    StrictStr, Field(max_length=LONGEST_NAME, pattern=f"^{NAME.pattern}$"), AfterValidator(_allowed)
+]
+PointName = Annotated[StrictStr, Field(max_length=LONGEST_NAME, pattern=r"^[^\W\d]\w*$")]
+Coordinate = Annotated[Quantity, Measured("Coordinate", "m")]
+Point = tuple[Coordinate, Coordinate]
+Reference = Annotated[StrictStr, Field(pattern=r"^\S+\.[^.\s]+$")]
+Angle = Annotated[float, Measured("Direction, counter-clockwise from +x", "deg", expression=False)]
+Acceleration = Annotated[
+    float, Measured("Acceleration of gravity", "m/s2", -1e6, 1e6, expression=False)
+]
+End = Annotated[StrictStr, Field(json_schema_extra={"enum": list(ENDS)})]
+Model = Annotated[StrictStr, Field(json_schema_extra={"enum": list(MODELS)})]
+
+
+def _written_as(value: object) -> str:
+    return TEXT if isinstance(value, str) else LIST
+
+
+PointOrName = Annotated[
+    Annotated[Point, Tag(LIST)] | Annotated[Reference, Tag(TEXT)], Discriminator(_written_as)
+]
+EndOrEnds = Annotated[
+    Annotated[tuple[End, End], Tag(LIST)] | Annotated[End, Tag(TEXT)],
+    Discriminator(_written_as),
+]
+
+
+# --- tables -----------------------------------------------------------------------------------
+
+
+class Table(BaseModel):
+    """A table whose keys are all known."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Named(Table):
+    """A table with a name of its own."""
+
+    name: Name = Field(description="Its name")
+
+
+class ParameterTable(Named):
+    """A parameter that points and other quantities refer to."""
+
+    unit: StrictStr = Field("", description="SI unit; that of the value if it is written with one")
+    value: Annotated[float, InUnit()] = Field(description="Default, in the unit")
+    description: StrictStr = Field("", description="One sentence for the reader of the FMU")
+    minimum: Annotated[float, InUnit(bound=True)] | None = Field(
+        None, description="Least value, in the unit"
+    )
+    maximum: Annotated[float, InUnit(bound=True)] | None = Field(
+        None, description="Greatest value, in the unit"
+    )
+    nominal: Annotated[float, InUnit(bound=True)] | None = Field(
+        None, description="Typical magnitude, in the unit"
+    )
+    tunable: StrictBool = Field(False, description="Whether it may change during a simulation")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _unit_of_value(cls, data: Any) -> Any:
+        if isinstance(data, dict) and "unit" not in data and isinstance(data.get("value"), str):
+            try:
+                return {"unit": si_unit(data["value"]), **data}
+            except MechanismError:
+                pass  # told where the value is read
+        return data
+
+
+class MaterialTable(Named):
+    """A material: parameters name.youngs_modulus and name.density."""
+
+    youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")]
+    density: Annotated[Quantity, measured(parts.FlexureType, "density")]
+
+
+class Section(Named):
+    """Section, material and model of flexures."""
+
+    model: Model | None = Field(None, description="Pseudo-rigid-body model")
+    n: Annotated[StrictInt, Field(ge=1, json_schema_extra={"maximum": MOST_LINKS})] | None = Field(
+        None, description="Number of links, of the chain nR alone"
+    )
+    thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")] | None = None
+    width: Annotated[Quantity, measured(parts.FlexureType, "width")] | None = None
+    material: StrictStr | None = Field(
+        None, description="Name of a material, instead of youngs_modulus and density"
+    )
+    youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")] | None = None
+    density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
+    axial: StrictBool = Field(False, description="Whether the flexures stretch, too")
+    coefficients: dict[StrictStr, Annotated[Quantity, Measured("Coefficient", "")]] = Field(
+        {}, description="Values that replace the published coefficients of the model"
+    )
+
+
+_OWN = ("model", "n", *SECTION, "material", *MATERIAL, "axial", "coefficients")
+_NO_MATERIAL_TWICE: list[Any] = [{"not": {"required": ["material", key]}} for key in MATERIAL]
+_MADE_OF: Any = {"anyOf": [{"required": ["material"]}, {"required": [*MATERIAL]}]}
+_OF_A_TYPE: Any = {"required": ["type"]}
+_OF_ITS_OWN: Any = {"allOf": [{"required": ["model", *SECTION]}, _MADE_OF]}
+_NOT_BOTH: list[Any] = [{"not": {"required": ["type", key]}} for key in _OWN]
+
+
+class FlexureTypeTable(Section):
+    """Section, material and model that several flexures share."""
+
+    model_config = ConfigDict(json_schema_extra={"allOf": [_MADE_OF, *_NO_MATERIAL_TWICE]})
+
+    model: Model = Field(description="Pseudo-rigid-body model")
+    thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")]
+    width: Annotated[Quantity, measured(parts.FlexureType, "width")]
+
+
+class FlexureTable(Section):
+    """A straight flexure between two points; of a type, or with a section of its own."""
+
+    model_config = ConfigDict(
+        json_schema_extra={
+            "allOf": [{"anyOf": [_OF_A_TYPE, _OF_ITS_OWN]}, *_NOT_BOTH, *_NO_MATERIAL_TWICE]
+        }
+    )
+
+    type: StrictStr | None = Field(
+        None, description="Name of a flexure type, instead of a model, section and material here"
+    )
+    start: Reference = Field(description="Point at its start, body.point or ground.point")
+    end: Reference = Field(description="Point at its end, body.point or ground.point")
+    ends: EndOrEnds = Field(
+        (CLAMP, CLAMP), description="How it is held: at both ends, or a pair for start and end"
+    )
+
+
+class BodyTable(Named):
+    """A rigid body."""
+
+    mass: Annotated[Quantity, measured(parts.Body, "mass")]
+    inertia: Annotated[Quantity, measured(parts.Body, "inertia")]
+    centre: Point = Field(description="Centre of mass as drawn [m]")
+    points: dict[PointName, Point] = Field({}, description="Points as drawn, by name [m]")
+
+
+class JointTable(Named):
+    """A pin that joins two points, drawn at the same place."""
+
+    start: Reference = Field(description="One point, body.point or ground.point")
+    end: Reference = Field(description="The other point")
+
+
+class StopTable(Named):
+    """A point of a body against a wall, fixed to the ground or to another body."""
+
+    body: StrictStr = Field(description="Body that hits the wall")
+    point: PointOrName = Field(description="Point that hits, coordinates as drawn or body.point")
+    on: StrictStr = Field(GROUND, description="What the wall is fixed to, ground or a body")
+    direction: Angle = parts.Stop.direction
+    position: Annotated[Quantity, measured(parts.Stop, "position")] = parts.Stop.position
+    offset: Annotated[Quantity, measured(parts.Stop, "offset")] = parts.Stop.offset
+    restitution: Annotated[Quantity, measured(parts.Stop, "restitution")] = parts.Stop.restitution
+    friction: Annotated[Quantity, measured(parts.Stop, "friction")] = parts.Stop.friction
+    rest_speed: Annotated[Quantity, measured(parts.Stop, "rest_speed")] = parts.Stop.rest_speed
+
+
+class FrictionTable(Named):
+    """Coulomb friction against the motion of a body along a direction."""
+
+    body: StrictStr = Field(description="Body that is rubbed")
+    point: PointOrName | None = Field(
+        None, description="Where, coordinates as drawn or body.point; else the centre of mass"
+    )
+    direction: Angle = parts.Friction.direction
+    coefficient: Annotated[Quantity, measured(parts.Friction, "coefficient")] = (
+        parts.Friction.coefficient
+    )
+    normal_force: Annotated[Quantity, measured(parts.Friction, "normal_force")] = (
+        parts.Friction.normal_force
+    )
+    normal_stiffness: Annotated[Quantity, measured(parts.Friction, "normal_stiffness")] = (
+        parts.Friction.normal_stiffness
+    )
+
+
+class ForceTable(Named):
+    """Inputs name.x, name.y and name.moment: a force and a moment on a body."""
+
+    body: StrictStr = Field(description="Body that is pushed")
+    point: PointOrName | None = Field(
+        None, description="Where, coordinates as drawn or body.point; else the centre of mass"
+    )
+
+
+class ProbeTable(Named):
+    """Outputs name.x, name.y, name.vx and name.vy: displacement and velocity of a point."""
+
+    point: Reference = Field(description="Point that is watched, body.point")
+
+
+class ReleaseTable(Table):
+    """How the motion starts: from a shape held by a force on a body along a direction."""
+
+    body: StrictStr = Field(description="Body that is held and let go")
+    direction: Angle = parts.Release.direction
+    displacement: Annotated[Quantity, measured(parts.Release, "displacement")] = (
+        parts.Release.displacement
+    )
+    velocity: Annotated[Quantity, measured(parts.Release, "velocity")] = parts.Release.velocity
+
+
+class MechanismTable(Table):
+    """A planar compliant mechanism."""
+
+    name: Annotated[
+        StrictStr, Field(max_length=LONGEST_NAME, json_schema_extra={"pattern": IDENTIFIER})
+    ] = Field(description="Name of the FMU: letters a to z, digits and _")
+    title: StrictStr = Field(description="One line that says what it is")
+    description: StrictStr = Field("", description="A paragraph")
+    gravity: tuple[Acceleration, Acceleration] = Field(
+        (0.0, 0.0), description="Acceleration of gravity along x and y [m/s2]"
+    )
+    damping_zeta: Annotated[
+        float, Measured("Damping ratio of the fundamental mode", "", 0.0, 10.0, expression=False)
+    ] = 0.0
+    damping_beta: Annotated[
+        float,
+        Measured("Damping in proportion to stiffness, as a time constant", "s", 0.0, 1e-2,
+                 expression=False),
+    ] = 0.0  # fmt: skip
+    ground: dict[PointName, Point] = Field(description="Fixed points, by name [m]")
+    geometry: tuple[ParameterTable, ...] = Field(
+        (), description="Parameters that points and other quantities refer to"
+    )
+    materials: tuple[MaterialTable, ...] = Field((), description="Materials")
+    bodies: tuple[BodyTable, ...] = Field(description="Rigid bodies")
+    flexure_types: tuple[FlexureTypeTable, ...] = Field(
+        (), description="Sections, materials and models that several flexures share"
+    )
+    flexures: tuple[FlexureTable, ...] = Field(description="Flexures")
+    joints: tuple[JointTable, ...] = Field((), description="Pins")
+    stops: tuple[StopTable, ...] = Field((), description="Walls")
+    frictions: tuple[FrictionTable, ...] = Field((), description="Coulomb friction")
+    forces: tuple[ForceTable, ...] = Field((), description="Forces that an FMU has as inputs")
+    probes: tuple[ProbeTable, ...] = Field((), description="Points that an FMU has as outputs")
+    release: ReleaseTable = Field(description="How the motion starts")
+
+
+# --- the mechanism that they describe ---------------------------------------------------------
+
+
+def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
+    """Return the mechanism that a file describes.
+
+    Raises
+    ------
+    MechanismError
+        If it contradicts itself or refers to what is not described.
+    ParameterError
+        If a default is out of its bounds.
+    """
+    _check_names(file)
+    materials = _materials(file)
+    own = (flexure for flexure in file.flexures if flexure.type is None)
+    same = ("name", "title", "description", "ground", "gravity", "damping_zeta", "damping_beta")
+    result = Mechanism(
+        **{key: getattr(file, key) for key in same},
+        bodies=tuple(parts.Body(**dict(body)) for body in file.bodies),
+        flexure_types=tuple(_type(t, materials) for t in (*file.flexure_types, *own)),
+        flexures=tuple(map(_flexure, file.flexures)),
+        joints=tuple(parts.Joint(**dict(joint)) for joint in file.joints),
+        stops=tuple(parts.Stop(**_attached(stop, file)) for stop in file.stops),
+        frictions=tuple(parts.Friction(**_attached(part, file)) for part in file.frictions),
+        forces=tuple(parts.Force(**_attached(force, file)) for force in file.forces),
+        probes=tuple(parts.Probe(**dict(probe)) for probe in file.probes),
+        release=parts.Release(**dict(file.release)),
+        geometry=tuple(_parameters(file)),
+        drawing=drawing,
+    )
+    _check_drawn(result)
+    return result
+
+
+def _parameters(file: MechanismTable) -> Iterator[parameters.Parameter]:
+    """Yield the parameters of the file, and those that its materials are."""
+    for table in file.geometry:
+        try:
+            check_coherent(table.unit)
+        except MechanismError as error:
+            raise MechanismError(f"{table.name} has the unit {table.unit!r}: {error}") from None
+        yield parameters.Parameter(**{k: v for k, v in dict(table).items() if v is not None})
+    for material in file.materials:
+        for key in MATERIAL:
+            given = getattr(material, key)
+            if not isinstance(given, str):
+                unit, description, least, most, nominal, _ = FIELDS[parts.FlexureType][key]
+                about = f"{description} of {material.name}"
+                name = f"{material.name}.{key}"
+                yield parameters.Parameter(name, given, unit, about, least, most, nominal)
+
+
+def _materials(file: MechanismTable) -> dict[str, dict[str, Quantity]]:
+    """Return what Young's modulus and density of a flexure type of each material are."""
+    return {m.name: {key: _referred(m, key) for key in MATERIAL} for m in file.materials}
+
+
+def _check_names(file: MechanismTable) -> None:
+    """Refuse a name that two parts of a kind have, or a material and anything else."""
+    parts: tuple[tuple[Named, ...], ...] = (file.bodies, file.flexure_types, file.flexures)
+    parts = (*parts, file.joints, file.stops, file.frictions, file.forces, file.probes)
+    reserved = {*RESERVED}
+    for kind in (file.materials, *parts):
+        seen = set(reserved)
+        for name in (part.name for part in kind):
+            if name in seen:
+                raise MechanismError(
+                    f"the name {name!r} is used twice or reserved: give each part its own"
+                )
+            seen.add(name)
+        reserved |= {material.name for material in file.materials}
+
+
+def _referred(material: MaterialTable, key: str) -> Quantity:
+    given: Quantity = getattr(material, key)
+    return given if isinstance(given, str) else f"{material.name}.{key}"
+
+
+def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts.FlexureType:
+    """Return the type that a table describes; a flexure's own has the name of the flexure."""
+    for key in ("model", *SECTION):
+        if getattr(table, key) is None:
+            raise MechanismError(
+                f"{table.name}.{key} is missing: add the key, or a type that has it"
+            )
+    keys = ("name", "model", *SECTION, "axial", "coefficients")
+    given: dict[str, Any] = {key: getattr(table, key) for key in keys}
+    return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
+
+
+def _material(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> dict[str, Quantity]:
+    """Return Young's modulus and density of what a table describes."""
+    own = {key: getattr(table, key) for key in MATERIAL if key in table.model_fields_set}
+    if table.material is None:
+        if len(own) < len(MATERIAL):
+            raise MechanismError(
+                f"{table.name} has no material: write material = and its name, or "
+                f"{' and '.join(key for key in MATERIAL if key not in own)}"
+            )
+        return own
+    if own:
+        raise MechanismError(
+            f"{table.name} has a material and {' and '.join(own)} of its own: leave one out"
+        )
+    if table.material not in materials:
+        raise MechanismError(
+            f"{table.name}.material = {table.material!r} is not described; materials are "
+            f"{', '.join(materials) or 'none'}"
+        )
+    return materials[table.material]
+
+
+def _flexure(table: FlexureTable) -> parts.Flexure:
+    own = [key for key in _OWN if key in table.model_fields_set]
+    if table.type is not None and own:
+        raise MechanismError(
+            f"{table.name} has a type and {' and '.join(own)} of its own: leave one out"
+        )
+    ends = (table.ends, table.ends) if isinstance(table.ends, str) else table.ends
+    kind = table.name if table.type is None else table.type
+    return parts.Flexure(table.name, kind, table.start, table.end, ends)
+
+
+def _attached(
+    table: StopTable | FrictionTable | ForceTable, file: MechanismTable
+) -> dict[str, Any]:
+    """Return the fields of a part whose point may be given by its name."""
+    given = dict(table)
+    if isinstance(table.point, str):
+        body, _, name = table.point.rpartition(".")
+        points = next((b.points for b in file.bodies if b.name == table.body), {})
+        if body != table.body or name not in points:
+            raise MechanismError(
+                f"{table.name}.point = {table.point!r} is no point of the body {table.body}, "
+                f"whose points are {', '.join(f'{table.body}.{p}' for p in points) or 'none'}"
+            )
+        given["point"] = points[name]
+    return given
+
+
+def _check_drawn(mechanism: Mechanism) -> None:
+    """Refuse, for the defaults, what cannot be drawn, and expressions out of bounds."""
+    values = mechanism.values()
+    for name, point in _places(mechanism):
+        x, y = (affine(coordinate)(values) for coordinate in point)
+        if not math.hypot(x, y) <= LARGE:
+            raise MechanismError(
+                f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within {LARGE:g} m "
+                "of the origin"
+            )
+    for flexure in mechanism.flexures:
+        _check_slender(mechanism, flexure, values)
+    for joint in mechanism.joints:
+        apart = _distance(mechanism, joint, values)
+        if apart > TINY_LENGTH:
+            raise MechanismError(
+                f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
+                "draw them at the same place"
+            )
+
+
+def _check_slender(
+    mechanism: Mechanism, flexure: parts.Flexure, values: Mapping[str, float]
+) -> None:
+    """Refuse a flexure without length, or as thick as long: millimetres written as metres."""
+    length = _distance(mechanism, flexure, values)
+    if length < TINY_LENGTH:
+        raise MechanismError(
+            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has no length: move "
+            "its ends apart"
+        )
+    kind = next(kind for kind in mechanism.flexure_types if kind.name == flexure.type)
+    thickness = parts.value(kind, "thickness", values)
+    if thickness >= length:
+        raise MechanismError(
+            f"{kind.name}.thickness = {thickness:g} m is not less than the length of the flexure "
+            f"{flexure.name}, {length:g} m: check the units of both"
+        )
+
+
+def _places(mechanism: Mechanism) -> Iterator[tuple[str, parts.Point]]:
+    """Yield all drawn points with their names."""
+    yield from ((f"{GROUND}.{name}", point) for name, point in mechanism.ground.items())
+    for body in mechanism.bodies:
+        yield f"{body.name}.centre", body.centre
+        yield from ((f"{body.name}.{name}", point) for name, point in body.points.items())
+
+
+def _distance(
+    mechanism: Mechanism, part: parts.Flexure | parts.Joint, values: Mapping[str, float]
+) -> float:
+    """Return the distance of the two points of a part, as drawn [m]."""
+    ends = (mechanism.point(reference, part.name) for reference in (part.start, part.end))
+    return math.dist(*([affine(c)(values) for c in end] for end in ends))

@@ -1,0 +1,26 @@
+"""FMUs as archives: the same bytes for the same content, and never half a file."""
+
+import io
+import zipfile
+from collections.abc import Mapping
+
+from ..base import atomic as files
+
+TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip archive can hold
+PLAIN, EXECUTABLE = files.PLAIN, 0o755
+LIBRARIES = (".so", ".dll", ".dylib")
+UNIX = 3
+
+
+def zipped(contents: Mapping[str, bytes]) -> bytes:
+    """Return a zip archive whose bytes depend on names and contents alone."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        for name in sorted(contents):
+            info = zipfile.ZipInfo(name, TIMESTAMP)
+            info.create_system = UNIX
+            info.compress_type = zipfile.ZIP_DEFLATED
+            mode = EXECUTABLE if name.endswith(LIBRARIES) else PLAIN
+            info.external_attr = mode << 16
+            archive.writestr(info, contents[name])
+    return buffer.getvalue()

@@ -1,0 +1,236 @@
+"""The model descriptions of native FMUs: FMI 2.0 and 3.0, model exchange and co-simulation."""
+
+from collections.abc import Iterable, Mapping
+from xml.etree.ElementTree import Element, SubElement
+
+from ..interface.structure import dependencies
+from ..interface.variables import CLOCK, NativeInterface, Variable, pushed
+from ..mechanism.description import Mechanism
+from ..mechanism.parts import GROUND
+from .description import (
+    Heading,
+    add_experiment,
+    add_log_categories,
+    add_types,
+    add_units,
+    add_variables,
+    initial_dependencies,
+    number,
+    serialized,
+    used_types,
+    value_attributes,
+)
+
+LOG_CATEGORIES = {
+    "logEvents": "Impacts, with their time, speeds and loss of energy.",
+    "logStatusWarning": "What the importer should know though the simulation goes on.",
+    "logStatusDiscard": "Why something could not be computed here and now.",
+    "logStatusError": "Calls and values that were refused, with the reason and a remedy.",
+    "logStatusFatal": "What ended the instance for good.",
+    "logAll": "All messages.",
+}
+TYPES_3 = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", CLOCK: CLOCK}
+
+# capabilities that are not what the standard assumes
+BOTH_2 = ("canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "canSerializeFMUstate")
+EXCHANGE_2 = (*BOTH_2, "providesDirectionalDerivative")
+SIMULATION_2 = (*BOTH_2, "canHandleVariableCommunicationStepSize")
+BOTH_3 = ("canGetAndSetFMUState", "canSerializeFMUState")
+EXCHANGE_3 = (*BOTH_3, "providesDirectionalDerivatives", "needsCompletedIntegratorStep")
+SIMULATION_3 = (
+    *BOTH_3,
+    "canHandleVariableCommunicationStepSize",
+    "providesIntermediateUpdate",
+    "mightReturnEarlyFromDoStep",
+    "canReturnEarlyAfterIntermediateUpdate",
+    "hasEventMode",
+)
+
+
+def description(
+    version: int,
+    heading: Heading,
+    mechanism: Mechanism,
+    interface: NativeInterface,
+    source: str,
+) -> bytes:
+    """Return the modelDescription.xml.
+
+    Parameters
+    ----------
+    version : {2, 3}
+        Version of FMI.
+    heading : Heading
+        What is said about the model as a whole.
+    mechanism : Mechanism
+        What is exported.
+    interface : NativeInterface
+        Its variables.
+    source : str
+        Name of the source file in ``sources``.
+    """
+    if version == 2:
+        return _fmi2(heading, mechanism, interface, source)
+    return _fmi3(heading, mechanism, interface)
+
+
+def _capabilities(
+    root: Element, kind: str, identifier: str, capabilities: Iterable[str]
+) -> Element:
+    attributes = {"modelIdentifier": identifier} | dict.fromkeys(capabilities, "true")
+    return SubElement(root, kind, attributes)
+
+
+# --- FMI 2.0 ------------------------------------------------------------------------------------
+
+
+def _fmi2(heading: Heading, mechanism: Mechanism, interface: NativeInterface, source: str) -> bytes:
+    version = {"fmiVersion": "2.0", "modelName": heading.name, "guid": heading.guid}
+    root = Element("fmiModelDescription", version | heading.attributes())
+    root.set("numberOfEventIndicators", str(len(interface.indicators)))
+    for kind, capabilities in (("ModelExchange", EXCHANGE_2), ("CoSimulation", SIMULATION_2)):
+        element = _capabilities(root, kind, heading.name, capabilities)
+        SubElement(SubElement(element, "SourceFiles"), "File", {"name": source})
+    add_units(root, interface.variables)
+    add_types(root, interface.variables)
+    add_log_categories(root, heading)
+    add_experiment(root, heading, interface.variables)
+    index = {v.name: str(i) for i, v in enumerate(interface.variables, start=1)}
+    add_variables(root, interface.variables, index)
+    structure = SubElement(root, "ModelStructure")
+    known = dependencies(mechanism, interface)
+    outputs = [v.name for v in interface.variables if v.causality == "output"]
+    for kind, names in (("Outputs", outputs), ("Derivatives", interface.derivatives)):
+        element = SubElement(structure, kind)
+        for name in names:
+            SubElement(element, "Unknown", _unknown("index", name, known[name], index))
+    element = SubElement(structure, "InitialUnknowns")
+    for v in initial_unknowns(interface):
+        names = initial_dependencies(v, interface.variables)
+        SubElement(element, "Unknown", _unknown("index", v.name, names, index))
+    return serialized(root)
+
+
+def _unknown(
+    reference: str, name: str, known: Iterable[str], index: Mapping[str, str]
+) -> dict[str, str]:
+    """Return the attributes of an unknown and what it depends on."""
+    return {reference: index[name], "dependencies": " ".join(index[k] for k in known)}
+
+
+def initial_unknowns(interface: NativeInterface) -> list[Variable]:
+    """Return what initialization computes: outputs, calculated parameters, states, derivatives."""
+    moving = {*interface.states, *interface.derivatives}
+    return [
+        v
+        for v in interface.variables
+        if v.causality in ("output", "calculatedParameter") or v.name in moving
+    ]
+
+
+# --- FMI 3.0 ------------------------------------------------------------------------------------
+
+
+def _fmi3(heading: Heading, mechanism: Mechanism, interface: NativeInterface) -> bytes:
+    token = {"instantiationToken": heading.guid}
+    version = {"fmiVersion": "3.0", "modelName": heading.name} | token
+    root = Element("fmiModelDescription", version | heading.attributes())
+    _capabilities(root, "ModelExchange", heading.name, EXCHANGE_3)
+    _capabilities(root, "CoSimulation", heading.name, SIMULATION_3)
+    add_units(root, interface.variables)
+    types = SubElement(root, "TypeDefinitions")
+    for name, attributes in used_types(interface.variables):
+        SubElement(types, "Float64Type", {"name": name} | attributes)
+    add_log_categories(root, heading)
+    add_experiment(root, heading, interface.variables)
+    listed = SubElement(root, "ModelVariables")
+    reference = {v.name: str(v.reference) for v in interface.variables}
+    for v in interface.variables:
+        SubElement(listed, TYPES_3[v.type], _attributes(v, reference))
+    structure = SubElement(root, "ModelStructure")
+    known = dependencies(mechanism, interface)
+    parameters = tuple(v.name for v in interface.variables if v.causality == "parameter")
+
+    def add(element: str, name: str, names: Iterable[str]) -> None:
+        SubElement(structure, element, _unknown("valueReference", name, names, reference))
+
+    def add_moving(element: str, name: str) -> None:
+        """Add what follows from states and inputs, and so from the parameters: knowns here too."""
+        computed = {*known[name]} - {name}
+        add(element, name, (*parameters, *known[name]) if computed else known[name])
+
+    for v in interface.variables:
+        if v.causality == "output":
+            add_moving("Output", v.name)
+    for name in interface.derivatives:
+        add_moving("ContinuousStateDerivative", name)
+    for v in initial_unknowns(interface):
+        add("InitialUnknown", v.name, initial_dependencies(v, interface.variables))
+    for name in interface.indicators:
+        add_moving("EventIndicator", name)
+    return serialized(root)
+
+
+def _attributes(v: Variable, reference: Mapping[str, str]) -> dict[str, str]:
+    """Return the attributes of a variable of FMI 3.0."""
+    attributes = {
+        "name": v.name,
+        "valueReference": str(v.reference),
+        "description": v.description,
+        "causality": v.causality,
+    }
+    if v.type == CLOCK:
+        return attributes | {"intervalVariability": "triggered"}
+    attributes["variability"] = v.variability
+    if v.causality == "independent":
+        return attributes | {"quantity": v.quantity.name, "unit": v.unit}
+    if v.variability == "continuous" and v.causality in ("output", "local"):
+        attributes["intermediateUpdate"] = "true"
+    if v.initial:
+        attributes["initial"] = v.initial
+    return attributes | value_attributes(v, reference)
+
+
+# --- terminals ------------------------------------------------------------------------------------
+
+STOP_MEMBERS = (
+    "displacement", "velocity", "mobility", "gap", "gap_rate", "force", "contact", "impulse_sum",
+    "point.displacement", "point.velocity", "point.mobility",
+)  # fmt: skip
+FORCE_MEMBERS = ("x", "y", "moment", "impulse.x", "impulse.y", "impulse.moment")
+MOTION_MEMBERS = ("x", "y", "angle", "vx", "vy", "omega")
+BASE_MEMBERS = ("acceleration.x", "acceleration.y", "force.x", "force.y", "moment")
+
+
+def terminals(mechanism: Mechanism) -> bytes:
+    """Return terminalsAndIcons.xml, which is of FMI 3.0 and used by FMI 2.0 as it is.
+
+    A contact port for each stop, a port for each body that a force acts on, and the base.
+    """
+    root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
+    corners = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+    picture = SubElement(root, "GraphicalRepresentation")
+    scale = {"suggestedScalingFactorTo_mm": number(0.1)}
+    SubElement(picture, "CoordinateSystem", corners | scale)
+    SubElement(picture, "Icon", corners)
+    ports = SubElement(root, "Terminals")
+    for stop in mechanism.stops:
+        members = {member: f"{stop.name}.{member}" for member in STOP_MEMBERS}
+        wall = "a wall that moves" if stop.on == GROUND else f"a wall on the {stop.on}"
+        _terminal(ports, stop.name, f"Contact of the {stop.body} with {wall}", members)
+    for force in mechanism.forces:
+        members = {f"force.{member}": f"{force.name}.{member}" for member in FORCE_MEMBERS}
+        members |= {member: f"{force.body}.{member}" for member in MOTION_MEMBERS}
+        text = f"Force on {pushed(force)}, and the motion of the {force.body}"
+        _terminal(ports, force.name, text, members)
+    members = {member: f"base.{member}" for member in BASE_MEMBERS}
+    _terminal(ports, "base", "Acceleration of the base, and what it has to bear", members)
+    return serialized(root)
+
+
+def _terminal(ports: Element, name: str, description: str, members: Mapping[str, str]) -> None:
+    attributes = {"name": name, "matchingRule": "bus", "description": description}
+    terminal = SubElement(ports, "Terminal", attributes)
+    for member, variable in members.items():
+        names = {"variableName": variable, "memberName": member}
+        SubElement(terminal, "TerminalMemberVariable", names | {"variableKind": "signal"})

@@ -1,0 +1,168 @@
+"""Native FMUs: the C kernel, the tables of a mechanism, and all that the standards ask for."""
+
+import hashlib
+import json
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from importlib.resources import files
+
+from ..base.errors import MechanismError
+from ..interface.tables import FILE, tables
+from ..interface.variables import CLOCK, NativeInterface, native_interface
+from ..kernel.compiler import HOST, Platform, libraries
+from ..kernel.sources import TABLES, amalgamation, build_description, kernel, tables_header
+from ..mechanics.independent import independent
+from ..mechanism.description import Mechanism
+from ..runs.experiment import experiment
+from . import documentation
+from .archive import zipped
+from .description import Heading
+from .native_description import LOG_CATEGORIES, description, terminals
+from .reference_results import reference
+from .slave.resolved import FILE as MODEL
+from .slave.resolved import resolved
+from .start import interface, magnitudes, start_sample
+
+NAMESPACE = uuid.UUID("f0b6b5a1-6d5c-5b0e-8c55-1a52a0e6f1d3")
+LICENSES = ("prbm-impact.txt", "fmi-headers.txt")
+WINDOWS_LICENSE = "mingw-w64.txt"
+
+
+def build(
+    mechanism: Mechanism,
+    changes: Mapping[str, float] | None = None,
+    fmi: int = 3,
+    platforms: Sequence[str] = (HOST,),
+    clock: bool = False,
+    progress: Callable[[str], None] = lambda step: None,
+) -> bytes:
+    """Return the native FMU of a mechanism: model exchange and co-simulation.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    changes : mapping
+        Start values of parameters and inputs that differ from the mechanism's own.
+    fmi : {2, 3}
+        Version of FMI.
+    platforms : sequence of str
+        Where it is to run, see :func:`prbm.kernel.compiler.libraries`.
+    clock : bool
+        Whether each stop has an output clock, for FMI 3.0.
+    progress : callable
+        Is told what is being done.
+
+    Raises
+    ------
+    PrbmError
+        If the mechanism cannot start with these values, one of them makes no sense, or there is no
+        compiler for a platform.
+    """
+    from ..drawing import (
+        icon as picture,  # which takes matplotlib: half a second, spared until it is needed
+    )
+
+    changes = dict(changes or {})
+    progress("checking that it starts")
+    native = described(mechanism, changes, fmi, clock)
+    compiled = libraries(platforms, progress)
+    progress(f"collecting {len(native.variables)} variables and the tables")
+    name, source = mechanism.name, f"{mechanism.name}.c"
+    run = experiment(mechanism, changes)
+    heading = Heading(name, mechanism.title, "", LOG_CATEGORIES, run)
+    token = f"{{{uuid.uuid5(NAMESPACE, _digest(mechanism, native, fmi, source, heading))}}}"
+    heading = replace(heading, guid=token)
+    table = tables(mechanism, native.variables, token, native.independent)
+    contents = {
+        "modelDescription.xml": description(fmi, heading, mechanism, native, source),
+        f"resources/{FILE}": table,
+        f"resources/{MODEL}": _model(mechanism, native),
+        f"sources/{source}": amalgamation(name, mechanism.title, fmi).encode(),
+        f"sources/{TABLES}": tables_header(table).encode(),
+        "terminalsAndIcons/terminalsAndIcons.xml": terminals(mechanism),
+    }
+    if fmi == 3:
+        contents["sources/buildDescription.xml"] = build_description(name, source)
+    contents |= dict(_binaries(name, fmi, compiled))
+    progress("computing the reference results")
+    results = reference(mechanism, changes, native.variables, run, progress)
+    contents |= results
+    progress("drawing the icon and writing the documentation")
+    icon = picture.icon(mechanism, start_sample(mechanism, changes))
+    contents["terminalsAndIcons/icon.png"] = icon
+    if fmi == 2:
+        contents["model.png"] = icon
+    names = sorted(platform.name for platform in compiled)
+    contents["documentation/index.html"] = documentation.native_page(
+        mechanism, native, fmi, names, run, bool(results)
+    ).encode()
+    contents |= dict(_licenses(any(platform.system == "windows" for platform in compiled)))
+    progress("packing")
+    return zipped(contents)
+
+
+def described(
+    mechanism: Mechanism, changes: Mapping[str, float], fmi: int, clock: bool = False
+) -> NativeInterface:
+    """Return the interface of the native FMU of a mechanism with other start values.
+
+    Raises
+    ------
+    PrbmError
+        If the mechanism cannot start, a start value names no parameter or input, or there is
+        nothing that a clock could tick for.
+    """
+    if clock and not mechanism.stops:
+        raise MechanismError(
+            f"{mechanism.name} has no stop, so that there is nothing for a clock to tick for: "
+            "leave out the clock"
+        )
+    return native_interface(
+        mechanism,
+        interface(mechanism, changes),
+        start_sample(mechanism, {}),
+        magnitudes(mechanism, changes),
+        independent(mechanism),
+        time=fmi == 3,
+        clock=clock,
+    )
+
+
+def _digest(
+    mechanism: Mechanism, native: NativeInterface, fmi: int, source: str, heading: Heading
+) -> str:
+    """Return a hash of all that decides what the FMU is and does; the heading has no token."""
+    parts = kernel() | {
+        "modelDescription.xml": description(fmi, heading, mechanism, native, source),
+        FILE: tables(mechanism, native.variables, "", native.independent),
+    }
+    digest = hashlib.sha256()
+    for name in sorted(parts):
+        digest.update(name.encode() + b"\0" + hashlib.sha256(parts[name]).digest())
+    return digest.hexdigest()
+
+
+def _model(mechanism: Mechanism, native: NativeInterface) -> bytes:
+    """Return the mechanism and its variables as data for tools; the FMU itself does not read it."""
+    listed = [v for v in native.variables if v.type != CLOCK]
+    return json.dumps(resolved(mechanism, listed), indent=1, sort_keys=True).encode()
+
+
+def _binaries(
+    name: str, fmi: int, compiled: Mapping[Platform, bytes]
+) -> Iterator[tuple[str, bytes]]:
+    for platform, library in compiled.items():
+        folder = platform.folder2 if fmi == 2 else platform.name
+        yield f"binaries/{folder}/{name}{platform.suffix}", library
+
+
+def _licenses(windows: bool) -> Iterator[tuple[str, bytes]]:
+    """Yield the licences of all that is inside, and the entry point that the standard wants."""
+    folder = files(__package__).joinpath("licenses")
+    names = [*LICENSES, *([WINDOWS_LICENSE] if windows else [])]
+    entry = "The model and its engine are under the MIT licence.  All licences of what is inside:\n"
+    yield "documentation/licenses/license.txt", "\n".join([entry, *names, ""]).encode()
+    for name in names:
+        yield f"documentation/licenses/{name}", folder.joinpath(name).read_bytes()

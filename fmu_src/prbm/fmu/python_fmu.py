@@ -1,0 +1,179 @@
+"""Python FMUs: the engine's own source, wrapped by pythonfmu, as FMI 2.0 co-simulation."""
+
+import hashlib
+import json
+import uuid
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from importlib.resources import files as package_files
+from importlib.resources.abc import Traversable
+
+from ..base.errors import MechanismError
+from ..interface.variables import Variable
+from ..mechanism.description import Mechanism
+from ..runs.experiment import experiment
+from . import documentation
+from .archive import zipped
+from .description import Heading, model_description, plain
+from .slave.resolved import FILE, resolved
+from .slave.slave import MechanismSlave
+from .start import interface, start_sample
+
+NAMESPACE = uuid.UUID("6f1c6c1e-0c53-5d0e-9d6e-3b1f0b4f7a52")
+ROOT = __package__.rpartition(".")[0]  # the package that this one is part of
+SHIPPED = ("base", "mechanism", "mechanics", "hybrid", "fmu.slave")  # inside every Python FMU
+ENGINE = "engine"  # stands for the name of the shipped package until that is known
+INIT = '"""The engine and the slave of this FMU, with relative imports only."""\n'
+SHORT = 10  # hexadecimal digits that tell one content from another within a process
+
+SCRIPT = '''\
+"""{title}.
+
+pythonfmu loads this module.  The folder {package} beside it holds the engine and the slave.
+Its name is unique to this FMU and its content, because FMUs in one process share modules.
+
+At every instantiation pythonfmu 0.7.0 runs this file once more and then releases a reference to
+its names that it does not own; without the reference that is added here, they would be freed
+while they are used, and the process would end sooner or later.
+"""
+
+import builtins
+import ctypes
+import sys
+
+if sys.version_info < (3, 11):
+    raise ImportError(
+        "{name}.fmu needs Python 3.11 or later where it runs; this is Python "
+        "%d.%d (%s)" % (sys.version_info[0], sys.version_info[1], sys.executable)
+    )
+try:
+    import numpy
+    import scipy
+except ImportError as error:
+    raise ImportError(
+        "{name}.fmu needs NumPy and SciPy in the Python that runs it (%s); install them with "
+        "'python -m pip install numpy scipy' (%s)" % (sys.executable, error)
+    )
+
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(builtins.globals()))
+
+from {package}.fmu.slave.slave import MechanismSlave
+
+
+class {name}(MechanismSlave):
+    """{title}."""
+'''
+
+
+def build(
+    mechanism: Mechanism,
+    changes: Mapping[str, float] | None = None,
+    progress: Callable[[str], None] = lambda step: None,
+) -> bytes:
+    """Return the Python FMU of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    changes : mapping
+        Start values of parameters and inputs that differ from the mechanism's own.
+    progress : callable
+        Is told what is being done.
+
+    Raises
+    ------
+    PrbmError
+        If the mechanism cannot start with these values, or one of them makes no sense.
+    """
+    from ..drawing import (
+        icon as picture,  # which takes matplotlib: half a second, spared until it is needed
+    )
+
+    changes = dict(changes or {})
+    progress("checking that it starts")
+    listed = interface(mechanism, changes)
+    progress(f"collecting {len(listed)} variables and the engine")
+    sources = dict(_sources(mechanism, listed))
+    token = f"{mechanism.name}_{_digest(sources | {'': SCRIPT.encode()})[:SHORT]}"
+    progress("drawing the icon and writing the documentation")
+    contents = {f"resources/{path}": text for path, text in _named(mechanism, token, sources)}
+    contents |= dict(_binaries(mechanism.name))
+    contents |= dict(_licenses())
+    run = experiment(mechanism, changes)
+    heading = Heading(mechanism.name, mechanism.title, "", MechanismSlave.log_categories, run)
+    anonymous = _digest(sources | {"": model_description(heading, listed)})
+    heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
+    contents["modelDescription.xml"] = model_description(heading, listed)
+    contents["documentation/index.html"] = documentation.page(mechanism, listed, run).encode()
+    contents["model.png"] = picture.icon(mechanism, start_sample(mechanism, changes))
+    progress("packing")
+    return zipped(contents)
+
+
+def _digest(files: Mapping[str, bytes]) -> str:
+    """Return a hash of names and contents."""
+    digest = hashlib.sha256()
+    for name in sorted(files):
+        digest.update(name.encode() + b"\0" + hashlib.sha256(files[name]).digest())
+    return digest.hexdigest()
+
+
+def _sources(mechanism: Mechanism, listed: tuple[Variable, ...]) -> Iterator[tuple[str, bytes]]:
+    """Yield what the FMU computes with: its name depends on all of this."""
+    data = json.dumps(resolved(mechanism, listed), indent=1, sort_keys=True)
+    yield FILE, data.encode()
+    yield f"{ENGINE}/__init__.py", INIT.encode()
+    for package in SHIPPED:
+        yield from _modules(f"{ROOT}.{package}", f"{ENGINE}/{package.replace('.', '/')}")
+    yield f"{ENGINE}/fmu/__init__.py", _folder(__package__, "__init__.py").read_bytes()
+    yield from _modules("pythonfmu", "pythonfmu")
+
+
+def _modules(package: str, folder: str) -> Iterator[tuple[str, bytes]]:
+    for entry in package_files(package).iterdir():
+        if entry.name.endswith(".py"):
+            yield f"{folder}/{entry.name}", entry.read_bytes()
+
+
+def _named(
+    mechanism: Mechanism, token: str, sources: Mapping[str, bytes]
+) -> Iterator[tuple[str, bytes]]:
+    """Yield the resources under names that no other FMU in the process has."""
+    package = f"prbm_{token}"
+    for path, content in sources.items():
+        first, slash, rest = path.partition("/")
+        yield (package if first == ENGINE else first) + slash + rest, content
+    script = SCRIPT.format(name=mechanism.name, title=_plain(mechanism.title), package=package)
+    try:
+        compile(script, token, "exec")
+    except SyntaxError:
+        raise MechanismError(
+            f"mechanism name {mechanism.name!r}: Python cannot give it to a class; choose another"
+        ) from None
+    yield f"{token}.py", script.encode()
+    yield "slavemodule.txt", token.encode()
+
+
+def _plain(title: str) -> str:
+    """Return a title that cannot leave the docstring it is put into."""
+    return plain(title).replace("\\", "/").replace('"', "'").rstrip(".")
+
+
+def _binaries(name: str) -> Iterator[tuple[str, bytes]]:
+    for platform in _folder("pythonfmu", "resources", "binaries").iterdir():
+        for library in platform.iterdir():
+            suffix = "." + library.name.rpartition(".")[2]
+            if suffix in (".so", ".dll", ".dylib"):
+                yield f"binaries/{platform.name}/{name}{suffix}", library.read_bytes()
+
+
+def _folder(package: str, *parts: str) -> Traversable:
+    return package_files(package).joinpath(*parts)
+
+
+def _licenses() -> Iterator[tuple[str, bytes]]:
+    """Yield the licences of all that is inside."""
+    for name in ("prbm-impact.txt", "pythonfmu.txt"):
+        text = _folder(__package__, "licenses", name).read_bytes()
+        yield f"documentation/licenses/{name}", text

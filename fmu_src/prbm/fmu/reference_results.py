@@ -1,0 +1,127 @@
+"""Reference results inside a native FMU, as the layered standard FMI-LS-REF describes them.
+
+They come from the Python engine, so that they are an independent route to what the C kernel
+computes.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from typing import Any
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
+
+from numpy.typing import NDArray
+
+from ..base.errors import PrbmError
+from ..hybrid.simulation import Simulation
+from ..interface.variables import Variable
+from ..mechanics.modal import modes_at
+from ..mechanism.description import Mechanism
+from ..runs.experiment import Experiment
+from ..runs.result import names
+from ..runs.run import simulate
+from .description import serialized
+
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
+ATTRIBUTES = {
+    "fmi-ls-name": "org.fmi-standard.fmi-ls-ref",
+    "fmi-ls-version": "1.0.0-alpha.1",
+    "fmi-ls-description": "Layered Standard providing information on related files included in "
+    "an FMU.",
+}
+DIGITS = 9  # significant; the engine's own error is larger
+MOST_STEPS = 1e5  # of the Python engine, which takes a minute or two for them
+STABLE = 3.0  # the step in units of what the fastest motion lets an explicit method take, 1/omega
+
+
+def reference(
+    mechanism: Mechanism,
+    changes: Mapping[str, float],
+    variables: Iterable[Variable],
+    experiment: Experiment,
+    progress: Callable[[str], None] = lambda step: None,
+) -> dict[str, bytes]:
+    """Return the files by their paths in the FMU; none if the experiment cannot be finished.
+
+    Nor are there any if the Python engine would take minutes for it; ``progress`` is told why.
+    """
+    if steps(mechanism, changes, experiment) > MOST_STEPS:
+        progress("no reference results: the default experiment takes the Python engine minutes")
+        return {}
+    columns = _columns(_Hashed(mechanism), tuple(changes.items()), experiment)
+    if columns is None:
+        progress("no reference results: the default experiment does not come to its end")
+        return {}
+    outputs = [v.name for v in variables if v.causality == "output" and v.name in names(columns)]
+    file = f"{mechanism.name}_out.csv"
+    return {
+        f"{FOLDER}/fmi-ls-manifest.xml": _manifest(file, experiment),
+        f"{FOLDER}/{file}": _table(columns, outputs),
+    }
+
+
+def steps(mechanism: Mechanism, changes: Mapping[str, float], experiment: Experiment) -> float:
+    """Return about how many steps the engine takes for an experiment, by the fastest mode.
+
+    An explicit step is stable up to some units of 1/omega and, of damping in proportion to
+    stiffness, of 1/(beta omega^2).  The estimate is made of frequencies and not of times, so that
+    the same FMU is built again.
+    """
+    simulation = Simulation(mechanism, changes)
+    system, n = simulation.system, simulation.system.n
+    omega = 2 * math.pi * float(abs(modes_at(system, simulation.state()[:n]).frequency).max())
+    fastest = max(omega, simulation.values["damping.beta"] * omega**2)
+    return experiment.stop_time * fastest / STABLE
+
+
+class _Hashed:
+    """A mechanism that is looked up by its identity: it holds mappings, which have no hash."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Hashed) and self.mechanism is other.mechanism
+
+    def __hash__(self) -> int:
+        return id(self.mechanism)
+
+
+@lru_cache(maxsize=2)
+def _columns(
+    hashed: _Hashed, changes: tuple[tuple[str, float], ...], experiment: Experiment
+) -> NDArray[Any] | None:
+    """Return the result of the default experiment; the FMUs of one export share it."""
+    try:
+        return simulate(
+            hashed.mechanism, dict(changes), experiment.stop_time, experiment.step
+        ).columns
+    except PrbmError:
+        return None
+
+
+def _table(columns: NDArray[Any], outputs: Iterable[str]) -> bytes:
+    chosen = ["time", *outputs]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(chosen)
+    for row in columns[chosen]:
+        writer.writerow(f"{float(x):.{DIGITS}g}" for x in row)
+    return text.getvalue().encode()
+
+
+def _manifest(file: str, experiment: Experiment) -> bytes:
+    told = (
+        f"Outputs of the default experiment (0 to {experiment.stop_time:g} s, communication step "
+        f"{1e3 * experiment.step:g} ms), computed by the Python engine"
+    )
+    ElementTree.register_namespace("fmi-ls", NAMESPACE)
+    attributes = {f"{{{NAMESPACE}}}{name}": value for name, value in ATTRIBUTES.items()}
+    root = Element("fmiReferences", attributes)
+    related = {"type": "text/csv", "source": file, "role": "result", "description": told}
+    SubElement(root, "Related", related)
+    return serialized(root)

@@ -1,0 +1,114 @@
+"""A mechanism and its interface as plain data, read back where the FMU runs."""
+
+import json
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from ...mechanism.description import Mechanism
+from ...mechanism.parameters import Parameter
+from ...mechanism.parts import (
+    Body,
+    Flexure,
+    FlexureType,
+    Force,
+    Friction,
+    Joint,
+    Probe,
+    Release,
+    Stop,
+)
+
+FILE = "model.json"
+PARTS: dict[str, Callable[..., Any]] = {
+    "bodies": Body,
+    "flexure_types": FlexureType,
+    "flexures": Flexure,
+    "joints": Joint,
+    "stops": Stop,
+    "frictions": Friction,
+    "forces": Force,
+    "probes": Probe,
+    "geometry": Parameter,
+}
+EMPTY: dict[str, Any] = {"Real": float("nan"), "Integer": 0, "Boolean": False, "String": ""}
+
+
+@dataclass(frozen=True)
+class Model:
+    """What an FMU is made of.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    names : dict of int to str
+        Variables by value reference.
+    types : dict of str to str
+        Their types in FMI.
+    given : dict of str to float
+        Start values of the parameters and inputs.
+    parameters : dict of str to Parameter
+        Their bounds and units.
+    computed : dict of str to number
+        All other variables, with what stands for "no value".
+    """
+
+    mechanism: Mechanism
+    names: Mapping[int, str]
+    types: Mapping[str, str]
+    given: Mapping[str, float]
+    parameters: Mapping[str, Parameter]
+    computed: Mapping[str, float | int | bool]
+
+
+def resolved(mechanism: Mechanism, variables: Iterable[Any]) -> dict[str, Any]:
+    """Return a mechanism and its variables as values that JSON keeps exactly."""
+    kept = ("name", "reference", "type", "start")
+    table = [{key: getattr(variable, key) for key in kept} for variable in variables]
+    return {"mechanism": asdict(mechanism), "variables": table}
+
+
+def read(folder: str | Path) -> Model:
+    """Read the model from the resources of an FMU.
+
+    Parameters
+    ----------
+    folder : str or Path
+        The ``resources`` of the unpacked FMU.
+    """
+    with open(Path(folder) / FILE, encoding="utf-8") as file:
+        data = json.load(file)
+    mechanism = mechanism_from(data["mechanism"])
+    table = data["variables"]
+    return Model(
+        mechanism,
+        {v["reference"]: v["name"] for v in table},
+        {v["name"]: v["type"] for v in table},
+        {v["name"]: v["start"] for v in table if v["start"] is not None},
+        {p.name: p for p in mechanism.parameters},
+        {v["name"]: EMPTY[v["type"]] for v in table if v["start"] is None},
+    )
+
+
+def mechanism_from(data: Mapping[str, Any]) -> Mechanism:
+    """Return the mechanism that :func:`resolved` took apart."""
+    parts: dict[str, Any] = {}
+    for key, value in _tuples(data).items():
+        if key in PARTS:
+            parts[key] = tuple(PARTS[key](**part) for part in value)
+        elif key == "release":
+            parts[key] = Release(**value)
+        else:
+            parts[key] = value
+    return Mechanism(**parts)
+
+
+def _tuples(value: Any) -> Any:
+    """Return JSON data with tuples for lists, as the frozen classes have them."""
+    if isinstance(value, dict):
+        return {key: _tuples(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return tuple(_tuples(item) for item in value)
+    return value

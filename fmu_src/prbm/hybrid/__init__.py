@@ -1,0 +1,1 @@
+"""The event loop: integration, location of events, impacts and resting contact."""

@@ -1,0 +1,275 @@
+"""The tables of a mechanism, as the C kernel reads them from ``resources/mechanism.bin``.
+
+Little-endian; a text is its length, its bytes in UTF-8 and a zero byte; an expression is its
+constant and pairs of a parameter's index and a factor; bodies are counted from 1, 0 is the ground.
+What a simulation computes has a place, its slot, in one vector of all values: :func:`slots`.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+from ..base.errors import MechanismError
+from ..mechanics.assembly import assemble
+from ..mechanics.inputs import input_names
+from ..mechanism.description import Mechanism
+from ..mechanism.expressions import Affine, Quantity, affine
+from ..mechanism.flexure import ENDS
+from ..mechanism.parts import (
+    FIELDS,
+    GROUND,
+    Flexure,
+    FlexureType,
+    Force,
+    Friction,
+    Joint,
+    Part,
+    Point,
+    body_of,
+)
+from .variables import (
+    BASE_OUTPUTS,
+    BODY_OUTPUTS,
+    CLOCK,
+    ENERGIES,
+    INDICATORS,
+    LATCHED,
+    LINK_ANGLE,
+    LINK_STRAIN,
+    PROBE_OUTPUTS,
+    STOP_OUTPUTS,
+    Variable,
+    coordinate_variables,
+    counter_of,
+    state_derivatives,
+)
+
+FILE = "mechanism.bin"
+MAGIC, VERSION = b"PRBM", 2
+HEAD = 16  # bytes before those that the check sum is of
+TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
+MOST_COORDINATES, MOST_STOPS, MOST_PLACES, MOST_POINTS = 512, 64, 1024, 4096  # of the C kernel
+FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
+
+
+def tables(
+    mechanism: Mechanism,
+    variables: Iterable[Variable],
+    token: str,
+    independent: Sequence[int],
+) -> bytes:
+    """Return the tables of a mechanism.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    variables : iterable of Variable
+        The variables of the FMU, whose start values replace the mechanism's own.
+    token : str
+        The guid or instantiation token of the model description.
+    independent : sequence of int
+        The coordinates whose angles and rates are states in model exchange.
+
+    Raises
+    ------
+    MechanismError
+        If it has more parts than the C kernel computes with.
+    """
+    check_size(mechanism)
+    listed = tuple(variables)
+    body = b"".join(_Writer(mechanism, listed, independent).parts(token))
+    size = struct.pack("<I", HEAD + len(body))
+    return MAGIC + _u32(VERSION) + size + _u32(zlib.crc32(body)) + body
+
+
+def check_size(mechanism: Mechanism) -> None:
+    """Refuse a mechanism of more parts than the C kernel computes with.
+
+    Raises
+    ------
+    MechanismError
+        If it has.
+    """
+    m = mechanism
+    for what, count, most in (
+        ("coordinates", assemble(m, m.values()).n, MOST_COORDINATES),
+        ("stops", len(m.stops), MOST_STOPS),
+        ("frictions", len(m.frictions), MOST_STOPS),
+        ("forces", len(m.forces), MOST_PLACES),
+        ("probes", len(m.probes), MOST_PLACES),
+        ("points of the ground", len(m.ground), MOST_POINTS),
+    ):
+        if count > most:
+            raise MechanismError(
+                f"{m.name} has {count} {what}; a native FMU computes with {most} at most"
+            )
+
+
+def slots(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, int]:
+    """Return the slot of every value by its name, in the order of the vector of all values."""
+    return {name: slot for slot, name in enumerate(_names(mechanism, independent))}
+
+
+def _names(mechanism: Mechanism, independent: Sequence[int]) -> Iterator[str]:
+    stops = [stop.name for stop in mechanism.stops]
+    yield from (p.name for p in mechanism.parameters)
+    yield from input_names(mechanism)
+    yield from (f"{body.name}.{what}" for body in mechanism.bodies for what in BODY_OUTPUTS)
+    yield from (f"{stop}.{what}" for stop in stops for what in STOP_OUTPUTS)
+    yield from BASE_OUTPUTS
+    yield from ENERGIES
+    yield from (f"{stop}.{what}" for stop in stops for what in LATCHED)
+    coordinates = coordinate_variables(mechanism)
+    for of_links in (LINK_ANGLE, LINK_STRAIN):
+        yield from (name for pair in coordinates if of_links.search(pair[0]) for name in pair)
+    yield from (f"{probe.name}.{what}" for probe in mechanism.probes for what in PROBE_OUTPUTS)
+    yield "mode.frequency"
+    for kind in mechanism.flexure_types:
+        if len(mechanism.model(kind).gamma) > 1:
+            yield f"{kind.name}.gamma0"
+    yield from state_derivatives(coordinates, independent)
+    yield from (f"{stop}.{what}_indicator" for stop in stops for what in INDICATORS)
+    yield from (f"{friction.name}.slip_indicator" for friction in mechanism.frictions)
+    yield "time"
+
+
+def _u32(*numbers: int) -> bytes:
+    return struct.pack(f"<{len(numbers)}I", *numbers)
+
+
+def _f64(*numbers: float) -> bytes:
+    return struct.pack(f"<{len(numbers)}d", *numbers)
+
+
+def _text(text: str) -> bytes:
+    content = text.replace("\0", " ").encode()
+    return _u32(len(content)) + content + b"\0"
+
+
+class _Writer:
+    """Writes the parts of a mechanism one after the other."""
+
+    def __init__(
+        self, mechanism: Mechanism, variables: Sequence[Variable], independent: Sequence[int]
+    ) -> None:
+        self.mechanism = mechanism
+        self.variables = sorted(variables, key=lambda v: v.reference)
+        self.independent = independent
+        self.starts = {v.name: v.start for v in variables}
+        self.parameters = {p.name: i for i, p in enumerate(mechanism.parameters)}
+        self.inputs = input_names(mechanism)
+        self.body = {b.name: i for i, b in enumerate(mechanism.bodies, start=1)} | {GROUND: 0}
+        self.type = {kind.name: i for i, kind in enumerate(mechanism.flexure_types)}
+        self.bounds = [*self._bounds()]
+
+    def parts(self, token: str) -> Iterator[bytes]:
+        """Yield everything after the head."""
+        m = self.mechanism
+        yield _text(token) + _text(m.name)
+        yield _u32(*self._counts())
+        for p in m.parameters:
+            yield _text(p.name) + _text(p.unit)
+            yield _f64(self._start(p.name, p.value), p.minimum, p.maximum) + _u32(p.tunable)
+        yield _u32(*(self.parameters[name] for name in FIXED_NAMES))
+        for name in self.inputs:
+            yield _text(name) + _f64(self._start(name, 0.0))
+        for body in m.bodies:
+            yield _text(body.name) + self._fields(body) + self._point(body.centre)
+        for kind in m.flexure_types:
+            yield self._type(kind)
+        for flexure in m.flexures:
+            yield _text(flexure.name) + _u32(self.type[flexure.type]) + self._between(flexure)
+            yield _u32(*map(ENDS.index, flexure.ends))
+        for joint in m.joints:
+            yield _text(joint.name) + self._between(joint)
+        for stop in m.stops:
+            yield _text(stop.name) + _u32(self.body[stop.body], self.body[stop.on])
+            yield self._point(stop.point) + _f64(stop.direction) + self._fields(stop)
+        for friction in m.frictions:
+            yield self._placed(friction) + _f64(friction.direction) + self._fields(friction)
+        for force in m.forces:
+            yield self._placed(force)
+        for probe in m.probes:
+            point = self._point(m.point(probe.point, probe.name))
+            yield _text(probe.name) + _u32(self.body[body_of(probe.point)]) + point
+        yield _u32(self.body[m.release.body]) + _f64(m.release.direction)
+        yield self._fields(m.release)
+        yield from map(self._point, m.ground.values())
+        yield from self.bounds
+        yield _u32(*self.independent)
+        yield from self._variables()
+
+    def _counts(self) -> tuple[int, ...]:
+        m = self.mechanism
+        parts: tuple[Mapping[str, object] | Sequence[object], ...] = (
+            self.parameters, m.bodies, m.flexure_types, m.flexures, m.joints, m.stops, m.frictions,
+            m.forces, m.probes, m.ground, self.bounds, self.variables, self.independent,
+            self.inputs,
+        )  # fmt: skip
+        return tuple(map(len, parts))
+
+    def _start(self, name: str, default: float) -> float:
+        start = self.starts.get(name)
+        return default if start is None else float(start)
+
+    def _variables(self) -> Iterator[bytes]:
+        slot = slots(self.mechanism, self.independent)
+        for v in self.variables:
+            place = slot[counter_of(v.name) if v.type == CLOCK else v.name]
+            yield _u32(v.reference, TYPES[v.type], place) + _text(v.name)
+
+    # -- values --
+
+    def _expression(self, expression: Affine) -> bytes:
+        terms = (
+            _u32(self.parameters[name]) + _f64(factor) for name, factor in expression.terms.items()
+        )
+        return _f64(expression.constant) + _u32(len(expression.terms)) + b"".join(terms)
+
+    def _field(self, name: str, quantity: Quantity) -> bytes:
+        """Return what a field of a part is: a parameter, or an expression in parameters."""
+        parameter = Affine(0.0, {name: 1.0})
+        return self._expression(affine(quantity) if isinstance(quantity, str) else parameter)
+
+    def _fields(self, part: Part) -> bytes:
+        names = FIELDS[type(part)]
+        return b"".join(self._field(f"{part.name}.{n}", getattr(part, n)) for n in names)
+
+    def _point(self, point: Point) -> bytes:
+        return b"".join(self._expression(affine(coordinate)) for coordinate in point)
+
+    # -- parts --
+
+    def _type(self, kind: FlexureType) -> bytes:
+        model = self.mechanism.model(kind)
+        coefficients = (
+            self._field(f"{kind.name}.{c.name}", kind.coefficients.get(c.name, c.value))
+            for c in model.coefficients
+        )
+        flags = _u32(model.lumped, model.rate_with_gamma, kind.axial)
+        numbers = flags + _u32(len(model.gamma), model.links)
+        return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
+
+    def _between(self, part: Flexure | Joint) -> bytes:
+        return b"".join(
+            _u32(self.body[body_of(end)]) + self._point(self.mechanism.point(end, part.name))
+            for end in (part.start, part.end)
+        )
+
+    def _placed(self, part: Friction | Force) -> bytes:
+        """Return the name, the body and the point of a part: the centre of mass unless given."""
+        body = self.mechanism.bodies[self.body[part.body] - 1]
+        point = self._point(body.centre if part.point is None else part.point)
+        return _text(part.name) + _u32(self.body[part.body]) + point
+
+    def _bounds(self) -> Iterator[bytes]:
+        """Yield the bounds of the fields that are expressions."""
+        m = self.mechanism
+        parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.frictions, *m.stops, m.release)
+        for part in parts:
+            for name, (unit, _, minimum, maximum, *_) in FIELDS[type(part)].items():
+                quantity = getattr(part, name)
+                if isinstance(quantity, str):
+                    head = _text(f"{part.name}.{name}") + _text(unit)
+                    yield head + self._field(name, quantity) + _f64(minimum, maximum)

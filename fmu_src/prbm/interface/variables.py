@@ -1,0 +1,689 @@
+"""The one list of a mechanism's FMI variables, for every flavour and version of FMI.
+
+Value references are part of the interface and depend on nothing but the name: the CRC-32 of the
+name in UTF-8, without its highest bit.  A variable keeps its reference when others are added,
+removed or moved, in every version and flavour, and nobody has to keep a register of them.
+"""
+
+import math
+import re
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from ..base.errors import MechanismError, ParameterError
+from ..base.names import unknown
+from ..mechanics.assembly import assemble
+from ..mechanics.inputs import LARGEST_MOBILITY, MOBILITY, input_units
+from ..mechanism.description import Mechanism
+from ..mechanism.expressions import affine
+from ..mechanism.parameters import Parameter
+from ..mechanism.parts import GROUND, Force, Stop
+from .units import QUANTITIES, Quantity
+
+Number = float | int | bool
+
+BASE = "base"
+CLOCK = "Clock"
+
+# what is computed, in the order in which the C kernel keeps it
+BODY_OUTPUTS = ("x", "y", "angle", "vx", "vy", "omega")
+PROBE_OUTPUTS = ("x", "y", "vx", "vy")
+STOP_OUTPUTS = (
+    "gap", "gap_rate", "force", "point.displacement", "point.velocity", "point.mobility",
+)  # fmt: skip
+BASE_OUTPUTS = (f"{BASE}.force.x", f"{BASE}.force.y", f"{BASE}.moment")
+STORED = ("energy.dissipated", "energy.work")  # energies that are states
+ENERGIES = ("energy.kinetic", "energy.elastic", "energy.gravitational", *STORED)
+LATCHED = (
+    "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
+    "energy_lost", "modal_restitution", "impulse_sum",
+)  # fmt: skip
+LINK_ANGLE = re.compile(r"^link\[\d+\]\.angle$")
+LINK_STRAIN = re.compile(r"^link\[\d+\]\.strain$")
+INDICATORS = ("impact", "release", "slip")  # event indicators of a stop
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable of the interface.
+
+    Parameters
+    ----------
+    name : str
+        Structured name.
+    description : str
+        What it is, for a person who does not know the model.
+    causality, variability, initial : str
+        As in FMI 2.0; ``initial`` is empty for inputs.
+    unit : str
+        SI unit of a Real; empty for other types.
+    type : {"Real", "Integer", "Boolean", "Clock"}
+        Type in FMI 2.0, or a clock of FMI 3.0.
+    start : number or None
+        Start value where there is one.
+    minimum, maximum : float
+        Inclusive bounds, infinite where there are none.
+    nominal : float or None
+        Typical magnitude.
+    derivative_of : str or None
+        Name of the variable whose time derivative this one is.
+    display : str or None
+        Display unit where it differs from the one of the quantity.
+    reinit : bool
+        Whether an event may change this state in model exchange.
+    """
+
+    name: str
+    description: str
+    causality: str
+    variability: str
+    initial: str
+    unit: str = ""
+    type: str = "Real"
+    start: Number | None = None
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    nominal: float | None = None
+    derivative_of: str | None = None
+    display: str | None = None
+    reinit: bool = False
+
+    @property
+    def reference(self) -> int:
+        """The value reference, see the module."""
+        return zlib.crc32(self.name.encode()) & 0x7FFFFFFF
+
+    @property
+    def quantity(self) -> Quantity:
+        """What a Real measures."""
+        return QUANTITIES[self.unit]
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Typical magnitudes of a mechanism's motion, as powers of ten in SI units."""
+
+    by_unit: Mapping[str, float]
+
+    def __call__(self, unit: str) -> float | None:
+        """Return the nominal value in a unit, None where it says nothing."""
+        return self.by_unit.get(unit)
+
+
+def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
+    """Return typical magnitudes from the release, the masses and the fundamental frequency."""
+    values = mechanism.values()
+    span = extent(mechanism)
+    x = abs(affine(mechanism.release.displacement)(values)) or span / 10
+    omega = 2 * math.pi * float(sample["mode.frequency"]) or 1.0
+    mass = sum(_quantity(body.mass, f"{body.name}.mass", values) for body in mechanism.bodies)
+    magnitudes = {
+        "m": x,
+        "m/s": x * omega,
+        "rad": x / span,
+        "rad/s": x / span * omega,
+        "m/s2": x * omega**2,
+        "rad/s2": x / span * omega**2,
+        "s": 1 / omega,
+        "Hz": omega / (2 * math.pi),
+        "N": mass * x * omega**2,
+        "N.m": mass * x * omega**2 * span,
+        "N.s": mass * x * omega,
+        "N.m.s": mass * x * omega * span,
+        "1/kg": 1 / mass,
+        "J": mass * (x * omega) ** 2,
+        "W": mass * (x * omega) ** 2 * omega,
+    }
+    return Scales({unit: _power_of_ten(value) for unit, value in magnitudes.items()})
+
+
+def extent(mechanism: Mechanism) -> float:
+    """Return the larger side of the box around all points of the straight shape [m]."""
+    values = mechanism.values()
+    points = [*mechanism.ground.values()]
+    for body in mechanism.bodies:
+        points += [body.centre, *body.points.values()]
+    sides = []
+    for axis in (0, 1):
+        along = [affine(point[axis])(values) for point in points]
+        sides.append(max(along) - min(along))
+    return max(sides)
+
+
+def _quantity(quantity: float | str, name: str, values: Mapping[str, float]) -> float:
+    return affine(quantity)(values) if isinstance(quantity, str) else values[name]
+
+
+def _power_of_ten(value: float) -> float:
+    return float(f"1e{round(math.log10(value))}")
+
+
+def _next_power_of_ten(value: float) -> float:
+    return float(f"1e{math.ceil(math.log10(value))}")
+
+
+def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Variable, ...]:
+    """Return all variables of a mechanism, in the order of the interface.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    sample : mapping
+        All outputs of a simulation of it at its start: names and types.
+
+    Raises
+    ------
+    MechanismError
+        If two variables share a name or a value reference, a name is none of FMI, or a parameter
+        has a unit that is not known or a nominal value that is none.
+    """
+    nominal = scales(mechanism, sample)
+    result = tuple(_variables(mechanism, sample, nominal))
+    missing = sample.keys() - {v.name for v in result}
+    if missing:
+        raise MechanismError(f"no description for the outputs {', '.join(sorted(missing))}")
+    check_names(result)
+    return result
+
+
+def check_names(variables: Sequence[Variable]) -> None:
+    """Refuse names that FMI does not have, that are taken, or of the same value reference.
+
+    Raises
+    ------
+    MechanismError
+        If there is one.
+    """
+    seen: dict[int, str] = {}
+    for variable in variables:
+        if seen.get(variable.reference) == variable.name or (
+            variable.name == TIME.name and variable is not TIME
+        ):
+            raise MechanismError(
+                f"two variables of the FMU would have the name {variable.name}: rename the "
+                "parameter or the part that it comes from"
+            )
+        if not variable.name.isascii():
+            raise MechanismError(
+                f"{variable.name}: names of FMI are of the letters a to z, digits and _, without "
+                "accents; rename the part"
+            )
+        other = seen.setdefault(variable.reference, variable.name)
+        if other != variable.name:
+            raise MechanismError(
+                f"{variable.name} and {other} happen to have the same value reference "
+                f"{variable.reference}: rename one of them"
+            )
+
+
+def with_starts(
+    variables: tuple[Variable, ...], changes: Mapping[str, float]
+) -> tuple[Variable, ...]:
+    """Return the variables with other start values.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown or has no start value that may be set.
+    """
+    by_name = {v.name: v for v in variables}
+    settable = {n: v for n, v in by_name.items() if v.causality in ("parameter", "input")}
+    for name in changes:
+        if name not in by_name:
+            raise ParameterError(unknown(name, settable))
+        if name not in settable:
+            raise ParameterError(
+                f"{name} is computed by the model and cannot be set; parameters and inputs can"
+            )
+    return tuple(
+        replace(v, start=float(changes[v.name])) if v.name in changes else v for v in variables
+    )
+
+
+def _variables(
+    mechanism: Mechanism, sample: Mapping[str, Number], nominal: Scales
+) -> Iterator[Variable]:
+    for parameter in mechanism.parameters:
+        if (parameter.unit or "1") not in QUANTITIES:
+            raise MechanismError(
+                f"{parameter.name} has the unit {parameter.unit!r}, which no FMU of ours knows; "
+                f"give it in one of {', '.join(QUANTITIES)}"
+            )
+        nominal_value = parameter.nominal
+        if nominal_value is not None and not 0.0 < nominal_value < math.inf:
+            raise MechanismError(
+                f"{parameter.name}: nominal = {nominal_value} must be positive and finite"
+            )
+        yield _parameter(parameter)
+    for name in sample:
+        if name.endswith(".gamma0"):
+            yield Variable(
+                name,
+                "Length of the stubs at the clamps in units of the length of the cantilever: "
+                "what the other gammas leave of 1",
+                "calculatedParameter", "fixed", "calculated", "1", minimum=0.0, maximum=1.0,
+            )  # fmt: skip
+    yield from _inputs(mechanism, nominal)
+    for body in mechanism.bodies:
+        yield from _body(body.name, nominal)
+    for probe in mechanism.probes:
+        yield from _probe(probe.name, f"of {probe.point}", nominal)
+    for stop in mechanism.stops:
+        yield from _stop(stop.name, nominal)
+    yield from _base(nominal)
+    yield from _energies(nominal)
+    for link in (n.removesuffix(".angle") for n in sample if LINK_ANGLE.search(n)):
+        yield from _link(link, nominal)
+        if f"{link}.strain" in sample:
+            yield from _strain(link)
+    yield Variable(
+        "mode.frequency",
+        "Fundamental frequency about the static equilibrium under gravity, without stops",
+        "local", "fixed", "calculated", "Hz", minimum=0.0, nominal=nominal("Hz"),
+    )  # fmt: skip
+
+
+DISPLAY = {"thickness": "um", "beta": "us", "offset": "mm"}
+
+
+def _parameter(p: Parameter) -> Variable:
+    return Variable(
+        p.name,
+        p.description,
+        "parameter",
+        "tunable" if p.tunable else "fixed",
+        "exact",
+        p.unit or "1",
+        start=p.value,
+        minimum=p.minimum,
+        maximum=p.maximum,
+        nominal=p.nominal,
+        display=DISPLAY.get(p.name.rpartition(".")[2]),
+    )
+
+
+def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
+    units = input_units(mechanism)
+
+    def given(name: str, description: str) -> Variable:
+        unit = units[name]
+        return Variable(
+            name, description, "input", "continuous", "", unit, start=0.0, nominal=nominal(unit)
+        )
+
+    for force in mechanism.forces:
+        yield given(f"{force.name}.x", f"Force on {pushed(force)} along x")
+        yield given(f"{force.name}.y", f"Force on {pushed(force)} along y")
+        yield given(f"{force.name}.moment", f"Moment on the {force.body}")
+    for stop in mechanism.stops:
+        yield given(
+            f"{stop.name}.displacement",
+            f"Displacement of the {wall(stop)}, added to {stop.name}.position; the wall moves "
+            "there uniformly within a communication step that is as long as those before",
+        )
+        yield given(
+            f"{stop.name}.velocity",
+            f"Velocity of the {wall(stop)}, rate of {stop.name}.displacement",
+        )
+    for force in mechanism.forces:
+        for axis, what in (
+            ("x", "Impulses along x"),
+            ("y", "Impulses along y"),
+            ("moment", "Angular impulses"),
+        ):
+            point = f"the {force.body}" if axis == "moment" else pushed(force)
+            total = given(
+                f"{force.name}.impulse.{axis}",
+                f"{what} on {point}, all so far: what it grows by acts at once",
+            )
+            yield replace(total, variability="discrete")
+    for stop in mechanism.stops:
+        mobility = given(
+            f"{stop.name}.{MOBILITY}",
+            f"Inverse of the effective mass of the {wall(stop)}: an impulse changes its velocity "
+            "by so much times itself, 0 if it is immovable",
+        )
+        yield replace(mobility, minimum=0.0, maximum=LARGEST_MOBILITY)
+    for axis in "xy":
+        yield given(
+            f"{BASE}.acceleration.{axis}",
+            f"Acceleration of the base along {axis}; all motion is relative to the base",
+        )  # fmt: skip
+
+
+def pushed(force: Force) -> str:
+    """Return where a force acts, in words."""
+    return f"{'the centre of mass' if force.point is None else 'a point'} of the {force.body}"
+
+
+def wall(stop: Stop) -> str:
+    """Return what the wall of a stop is, in words: its motion is seen from there."""
+    return "wall" if stop.on == GROUND else f"wall on the {stop.on}, as seen from there"
+
+
+def _output(
+    name: str,
+    unit: str,
+    description: str,
+    nominal: Scales,
+    *,
+    minimum: float = -math.inf,
+    derivative_of: str | None = None,
+) -> Variable:
+    return Variable(
+        name, description, "output", "continuous", "calculated", unit,
+        minimum=minimum, nominal=nominal(unit), derivative_of=derivative_of,
+    )  # fmt: skip
+
+
+def _displacements(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
+    for axis in "xy":
+        yield _output(
+            f"{name}.{axis}", "m", f"Displacement {point} along {axis} from straight", nominal
+        )
+
+
+def _velocities(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
+    for axis in "xy":
+        yield _output(
+            f"{name}.v{axis}", "m/s", f"Velocity {point} along {axis}", nominal,
+            derivative_of=f"{name}.{axis}",
+        )  # fmt: skip
+
+
+def _probe(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
+    yield from _displacements(name, point, nominal)
+    yield from _velocities(name, point, nominal)
+
+
+def _body(body: str, nominal: Scales) -> Iterator[Variable]:
+    centre = f"of the centre of mass of the {body}"
+    yield from _displacements(body, centre, nominal)
+    yield _output(f"{body}.angle", "rad", f"Rotation of the {body} from straight", nominal)
+    yield from _velocities(body, centre, nominal)
+    yield _output(
+        f"{body}.omega", "rad/s", f"Angular velocity of the {body}", nominal,
+        derivative_of=f"{body}.angle",
+    )  # fmt: skip
+
+
+def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
+    yield _output(f"{stop}.gap", "m", "Distance of the hit point from the wall", nominal)
+    yield _output(
+        f"{stop}.gap_rate", "m/s", "Rate of the gap, negative while it closes", nominal,
+        derivative_of=f"{stop}.gap",
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.force", "N", "Force of the wall while the stop holds; an impact is an impulse, "
+        "not a force", nominal, minimum=0.0,
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.point.displacement", "m", "Displacement of the hit point, in the direction of the "
+        "wall's: the gap is closed where both are equal", nominal,
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.point.velocity", "m/s", "Velocity of the hit point in that direction", nominal,
+        derivative_of=f"{stop}.point.displacement",
+    )  # fmt: skip
+    yield _output(
+        f"{stop}.point.mobility", "1/kg", "Inverse of the effective mass of the hit point in that "
+        "direction, as if no stop held", nominal, minimum=0.0,
+    )  # fmt: skip
+    latched = Variable(
+        f"{stop}.contact", "Whether the stop holds the body in resting contact",
+        "output", "discrete", "calculated", type="Boolean",
+    )  # fmt: skip
+    yield latched
+    yield replace(
+        latched, name=f"{stop}.impact_count", type="Integer", minimum=0,
+        description="Number of impacts so far; the outputs of the last one mean something once "
+        "it is positive",
+    )  # fmt: skip
+
+    def last(name: str, unit: str, description: str, minimum: float = -math.inf) -> Variable:
+        return replace(
+            latched, name=f"{stop}.{name}", type="Real", unit=unit, description=description,
+            minimum=minimum, nominal=None if name == "impact_time" else nominal(unit),
+        )  # fmt: skip
+
+    yield last("impact_time", "s", "Time of the last impact")
+    yield last("approach_speed", "m/s", "Closing speed before the last impact", 0.0)
+    yield last("rebound_speed", "m/s", "Opening speed after the last impact")
+    yield last("impulse", "N.s", "Impulse of the wall at the last impact", 0.0)
+    yield last("energy_lost", "J", "Energy lost at the last impact")
+    yield last(
+        "modal_restitution", "1",
+        "Velocity of the fundamental mode after over before the last impact, sign changed",
+    )  # fmt: skip
+    yield last("impulse_sum", "N.s", "Impulses of the wall, all so far, those of captures too", 0.0)
+
+
+def _base(nominal: Scales) -> Iterator[Variable]:
+    for axis in "xy":
+        yield _output(
+            f"{BASE}.force.{axis}", "N", f"Force of the mechanism on the ground along {axis}",
+            nominal,
+        )  # fmt: skip
+    yield _output(
+        f"{BASE}.moment", "N.m", "Moment of the mechanism on the ground about the first clamp",
+        nominal,
+    )  # fmt: skip
+
+
+def _energies(nominal: Scales) -> Iterator[Variable]:
+    yield _output("energy.kinetic", "J", "Kinetic energy", nominal, minimum=0.0)
+    yield _output(
+        "energy.elastic", "J", "Energy of the flexures, zero when straight", nominal, minimum=0.0
+    )
+    yield _output(
+        "energy.gravitational", "J", "Potential energy of gravity, zero when straight", nominal
+    )
+    yield _output(
+        "energy.dissipated", "J", "Energy lost so far to damping, friction and impacts", nominal
+    )
+    yield _output(
+        "energy.work", "J", "Work done so far by the inputs and the moving walls", nominal
+    )
+
+
+def _link(link: str, nominal: Scales) -> Iterator[Variable]:
+    number = link.removeprefix("link[").removesuffix("]")
+    angle = replace(
+        _output(
+            f"{link}.angle", "rad",
+            f"Angle of link {number} of the flexures, counter-clockwise from +x", nominal,
+        ),
+        causality="local",
+        nominal=1.0,  # it is absolute
+    )  # fmt: skip
+    yield angle
+    yield replace(
+        angle, name=f"{link}.omega", description=f"Angular velocity of link {number}",
+        unit="rad/s", nominal=nominal("rad/s"), derivative_of=angle.name,
+    )  # fmt: skip
+
+
+def _strain(link: str) -> Iterator[Variable]:
+    number = link.removeprefix("link[").removesuffix("]")
+    strain = Variable(
+        f"{link}.strain",
+        f"Strain of link {number} of the flexures: logarithm of its length over the straight one",
+        "local", "continuous", "calculated", "1",
+    )  # fmt: skip
+    yield strain
+    yield replace(
+        strain, name=f"{link}.strain_rate", description=f"Rate of the strain of link {number}",
+        unit="1/s", derivative_of=strain.name,
+    )  # fmt: skip
+
+
+# --- native FMUs --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class NativeInterface:
+    """The variables of a native FMU, and which of them model exchange works with.
+
+    Parameters
+    ----------
+    variables : tuple of Variable
+        All variables, in the order of the interface.
+    states, derivatives, indicators : tuple of str
+        Names of the continuous states, their derivatives and the event indicators, in order.
+    clocks : tuple of str
+        Names of the output clocks.
+    independent : tuple of int
+        The coordinates whose angles and rates are states.
+    """
+
+    variables: tuple[Variable, ...]
+    states: tuple[str, ...]
+    derivatives: tuple[str, ...]
+    indicators: tuple[str, ...]
+    clocks: tuple[str, ...]
+    independent: tuple[int, ...]
+
+
+def native_interface(
+    mechanism: Mechanism,
+    plain: Sequence[Variable],
+    sample: Mapping[str, Number],
+    magnitudes: tuple[float, float, float],
+    independent: Sequence[int],
+    *,
+    time: bool = False,
+    clock: bool = False,
+) -> NativeInterface:
+    """Return the interface of a native FMU.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    plain : sequence of Variable
+        The variables that every flavour has.
+    sample : mapping
+        All outputs at the start.
+    magnitudes : tuple of float
+        Of those states that are angles, rates and energies; their nominal values are the next
+        powers of ten, as the C kernel gives them.
+    independent : sequence of int
+        The coordinates whose angles and rates are states.
+    time : bool
+        Whether time is a variable, as FMI 3.0 demands.
+    clock : bool
+        Whether each stop has an output clock that ticks at its impacts (FMI 3.0).
+
+    Raises
+    ------
+    MechanismError
+        If two variables share a name or a value reference.
+    """
+    nominal = scales(mechanism, sample)
+    names = coordinate_variables(mechanism)
+    angles, rates = (tuple(names[j][order] for j in independent) for order in (0, 1))
+    states = (*angles, *rates, *STORED)
+    nominals = {
+        name: _next_power_of_ten(size)
+        for kind, size in zip((angles, rates, STORED), magnitudes, strict=True)
+        for name in kind
+    }
+    accelerations = state_derivatives(names, independent)
+    indicators = tuple(_indicators(mechanism))
+    clocks = tuple(f"{stop.name}.impact" for stop in mechanism.stops) if clock else ()
+    listed = (
+        *([TIME] if time else []),
+        *(
+            replace(v, reinit=True, nominal=nominals[v.name]) if v.name in nominals else v
+            for v in plain
+        ),
+        *(_derivative(name, nominal) for name in accelerations),
+        *indicators,
+        *map(_clock, clocks),
+    )
+    check_names(listed)
+    return NativeInterface(
+        listed,
+        states,
+        (*rates, *accelerations),
+        tuple(v.name for v in indicators),
+        clocks,
+        tuple(independent),
+    )
+
+
+def coordinate_variables(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
+    """Return the variables that each coordinate and its rate are: angles, or a link's strain."""
+    system = assemble(mechanism, mechanism.values())
+    names = {j: f"link[{number}]" for number, j in enumerate(system.links, start=1)}
+    names |= {frame.j: name for name, frame in system.bodies.items()}
+    pairs = {j: (f"{name}.angle", f"{name}.omega") for j, name in names.items()}
+    for j, link in zip(system.stretches, system.stretched, strict=True):
+        pairs[j] = (f"{names[link]}.strain", f"{names[link]}.strain_rate")
+    return tuple(pairs[j] for j in range(system.n))
+
+
+def state_derivatives(
+    coordinates: Sequence[tuple[str, str]], independent: Sequence[int]
+) -> tuple[str, ...]:
+    """Return the names of those derivatives of states that are no other variable."""
+    return (
+        *(f"der({coordinates[j][1]})" for j in independent),
+        *(f"der({name})" for name in STORED),
+    )
+
+
+def counter_of(clock: str) -> str:
+    """Return the name of the variable that counts what a clock ticks for.
+
+    Examples
+    --------
+    >>> counter_of("stop.impact")
+    'stop.impact_count'
+    """
+    return f"{clock}_count"
+
+
+TIME = Variable("time", "Time", "independent", "continuous", "", "s")
+DERIVATIVES = {
+    "energy.dissipated": "Power lost to damping and friction, impacts apart",
+    "energy.work": "Power of the inputs and of the moving walls, impacts apart",
+}
+
+
+def _derivative(name: str, nominal: Scales) -> Variable:
+    state = name.removeprefix("der(").removesuffix(")")
+    owner, _, rate = state.rpartition(".")
+    unit, description = {
+        "omega": ("rad/s2", f"Angular acceleration of {owner}"),
+        "strain_rate": ("1/s2", f"Rate of the strain rate of {owner}"),
+    }.get(rate, ("W", DERIVATIVES.get(state, "")))
+    return Variable(
+        name, description, "local", "continuous", "calculated", unit,
+        nominal=nominal(unit), derivative_of=state,
+    )  # fmt: skip
+
+
+INDICATED = {
+    "impact": "Event indicator of an impact at {name}",
+    "release": "Event indicator of the release of what rests on {name}",
+    "slip": "Event indicator of the beginning and the end of sliding at {name}",
+}
+
+
+def _indicators(mechanism: Mechanism) -> Iterator[Variable]:
+    kinds = [(stop.name, kind) for stop in mechanism.stops for kind in INDICATORS]
+    kinds += [(friction.name, "slip") for friction in mechanism.frictions]
+    for name, kind in kinds:
+        yield Variable(
+            f"{name}.{kind}_indicator",
+            INDICATED[kind].format(name=name),
+            "local", "continuous", "calculated", "1",
+        )  # fmt: skip
+
+
+def _clock(name: str) -> Variable:
+    stop = name.removesuffix(".impact")
+    return Variable(name, f"Ticks at each impact at {stop}", "output", "discrete", "", type=CLOCK)

@@ -1,0 +1,1 @@
+"""The C kernel: its sources, its compiler and the constants that it shares with the engine."""

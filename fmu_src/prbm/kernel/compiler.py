@@ -1,0 +1,417 @@
+"""Compiling the C kernel: once for each platform, kept in the user's cache folder.
+
+The same library serves every mechanism, so that an export compiles nothing once the library is
+there.  The system's compiler serves this machine; the compiler of the Python package ``ziglang``
+serves every platform, Linux down to glibc 2.17.
+"""
+
+import hashlib
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..base.atomic import write
+from ..base.errors import PrbmError
+from .sources import UNIT, kernel
+
+HOST, ALL = "host", "all"
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-g0")
+LINK = {
+    "linux": (
+        "-fPIC", "-shared", "-s", "-Wl,--build-id=none", "-Wl,-Bsymbolic", "-Wl,--no-undefined",
+    ),
+    "windows": ("-shared", "-s"),
+    "darwin": ("-fPIC", "-dynamiclib", "-Wl,-install_name,@rpath/prbm_fmu.dylib"),
+}  # fmt: skip
+HEADERS = (
+    "fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h",
+    "fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h",
+)  # fmt: skip
+_made: dict[Path, bytes] = {}  # what this process has got already
+LAST_LINES = 6  # of what a compiler complains about
+TEMPORARY = ("TMPDIR", "TMP", "TEMP")  # where compilers leave their files if they are interrupted
+MAGIC = b"prbm library\n"
+INSTALL = (
+    "install one (on Debian or Ubuntu 'apt install gcc', on macOS 'xcode-select --install'), or "
+    "the compiler that is a Python package with 'python -m pip install ziglang'"
+)
+
+
+class CompilerError(PrbmError):
+    """The kernel cannot be compiled; the message says why and what to do."""
+
+
+class NoCompilerError(CompilerError):
+    """There is no compiler for what is to be compiled."""
+
+
+@dataclass(frozen=True)
+class Platform:
+    """Where a native FMU runs.
+
+    Parameters
+    ----------
+    name : str
+        Platform tuple of FMI 3.0, which is the name of its folder there.
+    folder2 : str
+        Name of its folder in FMI 2.0, whose later texts take the tuple where they have no name.
+    suffix : str
+        Of shared libraries.
+    target : str
+        What ziglang calls it.
+    """
+
+    name: str
+    folder2: str
+    suffix: str
+    target: str
+
+    @property
+    def system(self) -> str:
+        """The operating system."""
+        return self.name.partition("-")[2]
+
+
+PLATFORMS = {
+    p.name: p
+    for p in (
+        Platform("x86_64-linux", "linux64", ".so", "x86_64-linux-gnu.2.17"),
+        Platform("aarch64-linux", "aarch64-linux", ".so", "aarch64-linux-gnu.2.17"),
+        Platform("x86_64-windows", "win64", ".dll", "x86_64-windows-gnu"),
+        Platform("aarch64-windows", "aarch64-windows", ".dll", "aarch64-windows-gnu"),
+        Platform("x86_64-darwin", "darwin64", ".dylib", "x86_64-macos.11.0"),
+        Platform("aarch64-darwin", "aarch64-darwin", ".dylib", "aarch64-macos.11.0"),
+    )
+}
+SYSTEMS = {"linux": "linux", "win32": "windows", "darwin": "darwin"}
+MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64": "aarch64"}
+
+
+def this_platform() -> Platform | None:
+    """Return the platform of this machine, None if it is none of ours."""
+    machine = MACHINES.get(platform.machine().lower())
+    return PLATFORMS.get(f"{machine}-{SYSTEMS.get(sys.platform)}")
+
+
+def libraries(
+    asked: Sequence[str], progress: Callable[[str], None] = lambda step: None
+) -> dict[Platform, bytes]:
+    """Return the compiled kernel for platforms.
+
+    Parameters
+    ----------
+    asked : sequence of str
+        Names of platforms, :data:`HOST` or :data:`ALL`.
+    progress : callable
+        Is told what is being done.
+
+    Raises
+    ------
+    CompilerError
+        If there is no compiler for one of them, or it fails.
+    """
+    result = {}
+    for name in asked:
+        if name == HOST:
+            result[_host()] = _library(_host(), _host_compilers(), progress)
+    wanted = PLATFORMS if ALL in asked else [name for name in asked if name in PLATFORMS]
+    for name in wanted:
+        chosen = PLATFORMS[name]
+        result[chosen] = _library(chosen, _zig(chosen), progress)
+    return result
+
+
+def _host() -> Platform:
+    here = this_platform()
+    if here is None:
+        raise NoCompilerError(
+            f"there is no native FMU for this machine ({platform.machine()}, {sys.platform}); "
+            f"--platform all makes one for {', '.join(PLATFORMS)}"
+        )
+    return here
+
+
+# --- compilers ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A command that compiles, with what tells it from others."""
+
+    command: tuple[str, ...]
+    identity: str
+    name: str
+
+
+def _host_compilers() -> list[Compiler]:
+    """Return what may compile for this machine, best first; what CC names excludes others."""
+    found = [*_system_compilers()]
+    if os.environ.get("CC", "").strip():
+        return found
+    try:
+        found += _zig(_host())
+    except NoCompilerError:
+        if not found:
+            raise NoCompilerError(
+                f"native FMUs need a C compiler, and there is none: {INSTALL}"
+            ) from None
+    return found
+
+
+def _system_compilers() -> Iterator[Compiler]:
+    """Yield the compilers of this system, or the one that the environment variable CC names."""
+    chosen = os.environ.get("CC", "").strip()
+    static = () if sys.platform == "darwin" else ("-static-libgcc",)
+    for text in [chosen] if chosen else ["cc", "gcc", "clang"]:
+        command = _words(text)
+        path = shutil.which(command[0])
+        version = _version((path, *command[1:])) if path else None
+        if version is not None and path is not None:
+            own = static if "Free Software" in version else ()
+            yield Compiler((path, *command[1:], *own), version, text)
+        elif chosen:
+            raise CompilerError(
+                f"the environment variable CC = {chosen!r} is no C compiler that runs; unset it, "
+                "or set it to one"
+            )
+
+
+def _words(text: str) -> list[str]:
+    try:
+        return shlex.split(text, posix=os.name == "posix")
+    except ValueError:
+        return [text]
+
+
+def _version(command: tuple[str, ...]) -> str | None:
+    try:
+        done = subprocess.run(
+            [*command, "--version"], capture_output=True, text=True, check=True,
+            stdin=subprocess.DEVNULL, errors="replace",
+        )  # fmt: skip
+    except (OSError, subprocess.CalledProcessError):
+        return None
+    return done.stdout
+
+
+def _zig(wanted: Platform) -> list[Compiler]:
+    """Return the compiler of the Python package ziglang for a platform."""
+    if importlib.util.find_spec("ziglang") is None:
+        raise NoCompilerError(
+            f"native FMUs for {wanted.name} need the compiler of the Python package ziglang: "
+            "install it with 'python -m pip install ziglang'"
+        )
+    version = importlib.metadata.version("ziglang")
+    command = (sys.executable, "-m", "ziglang", "cc", "-target", wanted.target)
+    return [Compiler(command, f"ziglang {version} {wanted.target}", "ziglang")]
+
+
+# --- compiling ------------------------------------------------------------------------------------
+
+
+def headers() -> dict[str, bytes]:
+    """Return the headers of FMI 2.0 and 3.0, which FMPy brings.
+
+    Raises
+    ------
+    CompilerError
+        If they are not there.
+    """
+    import fmpy  # type: ignore[import-untyped]
+
+    folder = Path(fmpy.__file__).parent / "c-code"
+    try:
+        return {name: (folder / name).read_bytes() for name in HEADERS}
+    except OSError as error:
+        raise CompilerError(
+            f"the headers of FMI are not where FMPy keeps them ({error.filename}: "
+            f"{error.strerror}); this package knows FMPy 0.3.20 to 0.3.x: install one of them with "
+            "'python -m pip install \"fmpy>=0.3.20,<0.4\"'"
+        ) from None
+
+
+def _library(
+    wanted: Platform, compilers: Iterable[Compiler], progress: Callable[[str], None]
+) -> bytes:
+    """Return the library of a platform by the first compiler that makes one."""
+    files = kernel() | headers()
+    problem: CompilerError | None = None
+    for compiler in compilers:
+        try:
+            return _cached(wanted, compiler, files, progress)
+        except CompilerError as error:
+            problem = problem or error
+    assert problem is not None
+    raise problem
+
+
+def _arguments(wanted: Platform) -> tuple[str, ...]:
+    return (*FLAGS, *LINK[wanted.system], "-I.", UNIT, "-o", f"prbm_fmu{wanted.suffix}")
+
+
+def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -> bytes:
+    """Return what a compiler makes of the kernel, in a folder that is removed afterwards.
+
+    All names are relative to that folder, so that none of it gets into the library.
+
+    Raises
+    ------
+    CompilerError
+        If it fails.
+    """
+    libraries = () if wanted.system == "windows" else ("-lm",)
+    with tempfile.TemporaryDirectory(prefix="prbm_") as name:
+        folder = Path(name)
+        for file, content in files.items():
+            (folder / file).write_bytes(content)
+        environment = os.environ | {"LC_ALL": "C"} | dict.fromkeys(TEMPORARY, name)
+        if compiler.name == "ziglang":
+            environment |= _zig_folders(folder)
+        try:
+            done = subprocess.run(
+                [*compiler.command, *_arguments(wanted), *libraries], cwd=folder,
+                capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
+                errors="replace", env=environment,
+            )  # fmt: skip
+            made = (folder / f"prbm_fmu{wanted.suffix}").read_bytes()
+        except FileNotFoundError:
+            made = b""
+        except OSError as error:
+            raise CompilerError(
+                f"{compiler.name} cannot be run ({error.strerror}); {INSTALL}"
+            ) from None
+    if done.returncode != 0 or not made:
+        raise CompilerError(_complaint(wanted, compiler, done))
+    return made
+
+
+def _zig_folders(folder: Path) -> dict[str, str]:
+    """Return where ziglang may write: what it builds of its own is worth keeping."""
+    kept = cache_folder() / "zig"
+    with suppress(OSError):
+        kept.mkdir(parents=True, exist_ok=True)
+    if not os.access(kept, os.W_OK):
+        kept = folder / "zig"
+    return {"ZIG_GLOBAL_CACHE_DIR": str(kept), "ZIG_LOCAL_CACHE_DIR": str(folder / "zig-local")}
+
+
+def _complaint(
+    wanted: Platform, compiler: Compiler, done: "subprocess.CompletedProcess[str]"
+) -> str:
+    lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
+    said = "; ".join(line.strip() for line in lines[-LAST_LINES:]) or "no message"
+    return (
+        f"{compiler.name} cannot compile the kernel for {wanted.name} (status {done.returncode}: "
+        f"{said}); try another compiler: set the environment variable CC, or {INSTALL}"
+    )
+
+
+# --- cache ----------------------------------------------------------------------------------------
+
+
+def cache_folder() -> Path:
+    """Return the user's folder for what can be made again."""
+    home = Path(os.path.expanduser("~"))
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return base / "prbm-impact"
+
+
+def _cached(
+    wanted: Platform,
+    compiler: Compiler,
+    files: Mapping[str, bytes],
+    progress: Callable[[str], None],
+) -> bytes:
+    """Return the library from the cache, or compile it and put it there.
+
+    The cache spares time and nothing else: what cannot be read or written is done without.
+    """
+    digest = hashlib.sha256()
+    for text in (wanted.name, compiler.identity, *compiler.command[1:], *_arguments(wanted)):
+        digest.update(text.encode(errors="surrogateescape") + b"\0")
+    for name in sorted(files):
+        digest.update(name.encode() + b"\0" + hashlib.sha256(files[name]).digest())
+    entry = cache_folder() / f"{digest.hexdigest()[:32]}{wanted.suffix}"
+    if entry not in _made:
+        _made[entry] = _read(entry) or _put(entry, wanted, compiler, files, progress)
+    return _made[entry]
+
+
+def _put(
+    entry: Path,
+    wanted: Platform,
+    compiler: Compiler,
+    files: Mapping[str, bytes],
+    progress: Callable[[str], None],
+) -> bytes:
+    """Compile the library and put it into the cache, unless somebody else just has."""
+    with _locked(entry.parent):
+        content = _read(entry)
+        if content is None:
+            progress(f"compiling the kernel for {wanted.name} with {compiler.name}")
+            content = compiled(wanted, compiler, files)
+            try:
+                write(entry, MAGIC + hashlib.sha256(content).digest() + content)
+            except OSError:
+                progress(f"cannot write to {entry.parent}: the next export compiles again")
+    return content
+
+
+def _read(entry: Path) -> bytes | None:
+    """Return the library of an entry, None if there is none or it is damaged."""
+    try:
+        kept = entry.read_bytes()
+    except OSError:
+        return None
+    head = len(MAGIC) + hashlib.sha256().digest_size
+    content = kept[head:]
+    if kept[:head] != MAGIC + hashlib.sha256(content).digest():
+        return None
+    return content
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    """Keep other exports from compiling the same at the same time.
+
+    The system takes the lock away with the process that holds it, however that ends.  Where there
+    is no such lock, some work is done twice, and nothing is lost.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = open(folder / "lock", "a+b")  # noqa: SIM115
+    except OSError:
+        yield
+        return
+    with file:
+        with suppress(OSError):
+            _lock(file.fileno())
+        yield
+
+
+if sys.platform == "win32":
+    import msvcrt
+
+    def _lock(handle: int) -> None:
+        msvcrt.locking(handle, msvcrt.LK_LOCK, 1)
+
+else:
+    import fcntl
+
+    def _lock(handle: int) -> None:
+        fcntl.flock(handle, fcntl.LOCK_EX)

@@ -1,0 +1,101 @@
+"""The C source inside a native FMU: the kernel as one file, and its tables as a constant array."""
+
+import re
+from collections.abc import Mapping
+from importlib.resources import files
+from xml.etree.ElementTree import Element, SubElement
+
+from ..fmu.description import GENERATION_TOOL, plain, serialized
+
+UNIT = "prbm_fmu.c"  # the one file that is compiled: it includes all others
+TABLES = "mechanism_tables.h"
+WRAPPERS = {2: "fmi2.c", 3: "fmi3.c"}
+INCLUDE = re.compile(r'#\s*include\s+"([^"]+)"\s*')
+OVERRIDE = "FMI{}_OVERRIDE_FUNCTION_PREFIX"
+BYTES_A_LINE = 20
+
+HEAD = """\
+/* {name}: {title}.
+ *
+ * The C kernel of {tool} as one file.  Everything is static but the functions of
+ * FMI {version}.0, whose headers the importer brings.  {tables} holds the mechanism, so
+ * that no file has to be read where it runs.  Compile it without -ffast-math and, for results
+ * that are the same on every platform, with -ffp-contract=off.  With the headers of the standard
+ * its functions get the prefix {name}_, unless {override} is defined.
+ */
+#ifndef {prefix}
+#define {prefix} {name}_
+#endif
+#ifndef PRBM_FMI
+#define PRBM_FMI {version}
+#endif
+#ifndef PRBM_TABLES
+#define PRBM_TABLES
+#endif
+"""
+
+
+def kernel() -> dict[str, bytes]:
+    """Return the files of the kernel by name."""
+    folder = files(__package__)
+    return {
+        entry.name: entry.read_bytes()
+        for entry in folder.iterdir()
+        if entry.name.endswith((".c", ".h"))
+    }
+
+
+def amalgamation(name: str, title: str, version: int) -> str:
+    """Return the kernel as one C file, with the wrapper for one version of FMI."""
+    texts = {file: content.decode() for file, content in kernel().items()}
+    left_out = {file for number, file in WRAPPERS.items() if number != version}
+    head = HEAD.format(
+        name=name,
+        title=plain(title).replace("*/", "* /"),
+        tool=GENERATION_TOOL,
+        version=version,
+        tables=TABLES,
+        prefix=f"FMI{version}_FUNCTION_PREFIX",
+        override=OVERRIDE.format(version),
+    )
+    return head + "\n".join(_lines(UNIT, texts, left_out)) + "\n"
+
+
+def _lines(file: str, texts: Mapping[str, str], done: set[str]) -> list[str]:
+    """Return the lines of a file with those of the files that it includes, each file once."""
+    done.add(file)
+    result = []
+    for line in texts[file].splitlines():
+        found = INCLUDE.fullmatch(line)
+        included = found.group(1) if found else ""
+        if included not in texts:
+            result.append(line)
+        elif included not in done:
+            result += _lines(included, texts, done)
+    return result
+
+
+def tables_header(tables: bytes) -> str:
+    """Return the tables of a mechanism as a constant array."""
+    rows = (
+        ", ".join(map(str, tables[i : i + BYTES_A_LINE])) + ","
+        for i in range(0, len(tables), BYTES_A_LINE)
+    )
+    return (
+        "/* resources/mechanism.bin as a constant array, for targets without a file system. */\n"
+        f"static const unsigned char mechanism_tables[{len(tables)}] = {{\n"
+        + "\n".join(rows)
+        + "\n};\n"
+    )
+
+
+def build_description(identifier: str, source: str) -> bytes:
+    """Return the buildDescription.xml of FMI 3.0: how a shared library is made."""
+    root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
+    sources = SubElement(configuration, "SourceFileSet", {"language": "C99"})
+    SubElement(sources, "SourceFile", {"name": source})
+    override = {"name": OVERRIDE.format(3), "optional": "true"}
+    text = "Functions without the prefix of the model, as a shared library has them"
+    SubElement(sources, "PreprocessorDefinition", override | {"description": text})
+    return serialized(root)

@@ -1,0 +1,1 @@
+"""Equations of motion, constraints, contact laws, statics and modes of an assembled mechanism."""

@@ -1,0 +1,80 @@
+r"""Independent coordinates: what an importer's solver integrates in model exchange.
+
+The loops tie the n coordinates together, Phi(q) = Re(B e) + c = 0.  Of them r are solved from the
+other n - r, so that a solver that knows nothing of constraints stays on them:
+
+    Phi(q_i, q_d) = 0,      v_d = -(dPhi/dq_d)^-1 (dPhi/dq_i) v_i.
+
+The choice is good as long as dPhi/dq_d is far from singular, and is made once, for the shapes
+between the straight one and the release.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.linalg import qr
+
+from ..mechanism.description import Mechanism
+from ..mechanism.parts import value
+from . import constraints
+from .arrays import Real
+from .assembly import assemble
+from .statics import equilibrium
+from .system import System
+
+SHAPES = (0.0, 0.5, 1.0)  # of the displacement at the release
+
+
+def independent(mechanism: Mechanism) -> tuple[int, ...]:
+    """Return the coordinates whose angles and rates are the states, in rising order.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        With its default parameters.
+
+    Returns
+    -------
+    tuple of int
+        n - r coordinates.
+
+    Raises
+    ------
+    EquilibriumError
+        If the shape of the release cannot be reached.
+    """
+    values = mechanism.values()
+    system = assemble(mechanism, values)
+    if not len(system.loops):
+        return tuple(range(system.n))
+    rows = list(_jacobians(system, value(mechanism.release, "displacement", values)))
+    choices = [_pivots(jacobian) for jacobian in rows]
+    best = max(choices, key=lambda dependent: min(conditioning(J, dependent) for J in rows))
+    return tuple(j for j in range(system.n) if j not in best)
+
+
+def _jacobians(system: System, displacement: float) -> Iterator[Real]:
+    """Yield the Jacobian of the loops at the straight shape and towards the release."""
+    loops = system.spread(system.loops)
+    yield constraints.jacobian(loops, system.directions(system.q0))
+    for fraction in SHAPES:
+        shape = equilibrium(system, fraction * displacement)
+        yield constraints.jacobian(loops, system.directions(shape.q))
+
+
+def _pivots(jacobian: Real) -> tuple[int, ...]:
+    """Return as many columns as there are rows, chosen one after the other as the longest left."""
+    _, _, order = qr(jacobian, mode="economic", pivoting=True)
+    return tuple(int(j) for j in order[: len(jacobian)])
+
+
+def conditioning(jacobian: Real, dependent: tuple[int, ...]) -> float:
+    """Return how far the columns are from singular: least over largest singular value, 0 to 1.
+
+    Examples
+    --------
+    >>> conditioning(np.array([[2.0, 0.0, 0.0], [0.0, 1.0, 0.0]]), (0, 1))
+    0.5
+    """
+    size = np.linalg.svd(jacobian[:, dependent], compute_uv=False)
+    return float(size[-1] / np.linalg.svd(jacobian, compute_uv=False)[0])

@@ -1,0 +1,69 @@
+r"""Mass matrix, quadratic velocities, kinetic energy and momentum.
+
+The TMT method (Newton-Euler in generalised coordinates) for absolute angles and stretches: with
+the positions z = c + A E (see :mod:`prbm.mechanics.assembly`), the projection
+T = dz/dq = i A diag(e), where A is spread over the stretches, gives M = Re(T^H diag(m) T) + J, and
+H = A^H diag(m) A is constant.
+
+Sources
+-------
+.. [1] H. Vallery, A. L. Schwab, Advanced Dynamics, Delft (the TMT method).
+"""
+
+from .arrays import Complex, Real
+
+
+def inertia(H: Complex, J: Real, e: Complex) -> tuple[Real, Real]:
+    r"""Mass matrix M and quadratic-velocity matrix C of M a + C v^2 = Q.
+
+    With Hq = diag(e)^H H diag(e),
+
+        M = Re Hq + diag(J),    C = -Im Hq,
+
+    so one Hermitian product yields both.  C multiplies the *squares* v^2: with absolute angles
+    there are no cross products v_i v_j.  With stretches the quadratic velocities are
+    -Im(Hq w^2), w the complex rates of the arms.
+
+    Parameters
+    ----------
+    H : (n, n) complex
+        A^H diag(m) A [kg m^2]; Hermitian.
+    J : (n, n)
+        Rotary inertia of each coordinate about its own mass centres, diagonal [kg m^2].
+    e : (n,) complex
+        Directions [-].
+
+    Returns
+    -------
+    M : (n, n)
+        Symmetric; positive definite iff no motion is massless [kg m^2].
+    C : (n, n)
+        Antisymmetric [kg m^2].
+
+    Examples
+    --------
+    A pendulum of length 2 m and mass 3 kg has m l^2 = 12 kg m^2:
+
+    >>> M, _ = inertia(np.array([[12.0 + 0j]]), np.zeros((1, 1)), np.array([1j]))
+    >>> M.item()
+    12.0
+    """
+    Hq = e.conj()[:, None] * H * e
+    return Hq.real + J, -Hq.imag
+
+
+def kinetic_energy(M: Real, v: Real) -> float:
+    """Kinetic energy v^T M v / 2 [J].
+
+    Examples
+    --------
+    >>> kinetic_energy(np.array([[12.0]]), np.array([2.0]))
+    24.0
+    """
+    return 0.5 * float(v @ M @ v)
+
+
+def mass_accelerations(A: Complex, e: Complex, w: Real | Complex, dw: Real | Complex) -> Complex:
+    """Accelerations z'' = A (i e w' - e w^2) of the mass points [m/s^2]."""
+    result: Complex = A @ (1j * e * dw - e * w * w)
+    return result

@@ -1,0 +1,134 @@
+r"""Small vibrations about a static shape, and what an impact leaves in the fundamental mode."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import eigh, null_space
+
+from . import constraints
+from .arrays import Complex, Real
+from .forces import field_row, springs
+from .kinetics import inertia
+from .statics import Equilibrium, tangent_stiffness
+from .system import System
+
+
+@dataclass(frozen=True)
+class Modes:
+    """Mass-normalised modes in rising order of frequency.
+
+    Parameters
+    ----------
+    frequency : (k,)
+        [Hz]; negative where the shape is unstable, -sqrt(-omega^2)/(2 pi).
+    shape : (n, k)
+        Columns phi with phi^T M phi = 1 and on the tangent of the loops [rad/(kg^.5 m)].
+    M : (n, n)
+        Mass matrix at the shape [kg m^2].
+    """
+
+    frequency: Real
+    shape: Real
+    M: Real
+
+
+def modes(system: System, shape: Equilibrium) -> Modes:
+    """Return the modes about a static shape; its loads and holding force stay as dead loads.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    shape : Equilibrium
+        As :func:`prbm.mechanics.statics.equilibrium` gives it.
+    """
+    B, lam = system.loops, shape.lam
+    if shape.force != 0.0:
+        B = np.vstack([B, system.release])
+        lam = np.append(lam, shape.force)
+    return _modes(system, shape.q, B, lam, shape.load)
+
+
+def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
+    """Solve K_t phi = omega^2 M phi on the tangent space of the loops, w the row of the loads."""
+    e = system.directions(q)
+    M, _ = inertia(system.H, np.diag(system.J), e)
+    K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm)
+    rows = constraints.jacobian(system.spread(system.loops), e)
+    Z = null_space(rows) if len(rows) else np.eye(system.n)
+    omega2, reduced = eigh(Z.T @ K_t @ Z, Z.T @ M @ Z)
+    frequency = np.sign(omega2) * np.sqrt(np.abs(omega2)) / (2 * np.pi)
+    return Modes(frequency, Z @ reduced, M)
+
+
+def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
+    """Return the fundamental mode at a shape that is not in equilibrium, and M there.
+
+    Returns
+    -------
+    phi : (n,)
+        Mass-normalised mode.
+    M : (n, n)
+        Mass matrix [kg m^2].
+    """
+    found = modes_at(system, q)
+    return found.shape[:, 0], found.M
+
+
+def modes_at(system: System, q: Real) -> Modes:
+    """Return the modes at a shape that is not in equilibrium.
+
+    The multipliers are those of the shape held at rest by a force on the released body (Gauss'
+    principle: the accelerations left over are the least ones); at a static shape they are
+    exact.
+    """
+    e = system.directions(q)
+    M, _ = inertia(system.H, np.diag(system.J), e)
+    B = np.vstack([system.loops, system.release])
+    rows = constraints.jacobian(system.spread(B), e)
+    w = field_row(system.spread(system.S), system.gravity)
+    right = np.concatenate([springs(system.K, q - system.q0) + (w * e).real, np.zeros(len(B))])
+    lam = -constraints.solve(constraints.saddle(M, rows, rows), right)[system.n :]
+    return _modes(system, q, B, lam, w)
+
+
+def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:
+    """Return the modal restitution of an impact, -phi^T M v+ / phi^T M v- [-].
+
+    Zero if nothing of the fundamental mode arrives but rounding.
+
+    Examples
+    --------
+    >>> phi, M = np.array([1.0, 0.0]), np.eye(2)
+    >>> simulated_restitution(phi, M, np.array([2.0, 1.0]), np.array([-1.0, 3.0]))
+    0.5
+    """
+    momentum = M @ phi
+    arriving = float(momentum @ before)
+    if abs(arriving) <= 1e-12 * float(np.abs(momentum) @ (np.abs(before) + np.abs(after))):
+        return 0.0
+    return -float(momentum @ after) / arriving
+
+
+def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution: float) -> float:
+    r"""Return the modal restitution of an arriving pure fundamental mode (algebraic) [-].
+
+    With the effective share of the fundamental mode in the hit,
+
+        C = (1 + eps) mu_1 - 1,    mu_1 = G_1^2 / sum_i G_i^2,    G_i = (dg/dq) phi_i.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    shape : Equilibrium
+        Shape at the impact, held by a force on the released body.
+    stop : int
+        Which stop is hit.
+    restitution : float
+        Coefficient of restitution eps [-].
+    """
+    found = modes(system, shape)
+    G = constraints.gap_rows(system).jacobian(system.directions(shape.q))[stop]
+    share = (G @ found.shape) ** 2
+    return (1.0 + restitution) * float(share[0] / share.sum()) - 1.0

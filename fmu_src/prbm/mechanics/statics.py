@@ -1,0 +1,317 @@
+r"""Static equilibrium under gravity, loads and a holding force, and the tangent stiffness there.
+
+At rest the torques balance: K (q - q0) - Re(w e) - Q - J^T lam - r^T F = 0 with w the row of
+gravity and the forces, Q the moments, J the Jacobian of the loops, r that of the held displacement
+and F the holding force.  Second derivatives couple at most an angle and the stretch of the same
+link, because every position is linear in the arms.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import EquilibriumError, ParameterError, SimulationError
+from ..base.names import unknown
+from ..mechanism.parameters import finite
+from . import constraints, contact
+from .arrays import Complex, Real, Whole
+from .forces import field_row, force_row, springs
+from .kinetics import inertia
+from .system import System
+
+NEWTON_STEPS = 30
+LARGEST_TURN = 0.5  # rad per Newton step and per step of the load: further is another shape
+SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
+RIGID = 1e-9  # of the size: a row of the release no longer than that follows from the loops
+IMMOBILE = 1e-12  # share of a body's mobility that the loops leave it: below, it cannot move
+BALANCED = 1e-12  # of the largest spring rate times one radian, or without springs of the load
+CONVERGED = 1e-8  # rad of the last Newton step; what is left after it is its square
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """A static shape.
+
+    Parameters
+    ----------
+    q : (n,)
+        Angles [rad].
+    lam : (r,)
+        Multipliers of the loops: forces at their closures [N].
+    force : float
+        Holding force on the released body along the direction of the release [N]; 0 if free.
+    load : (n,) complex
+        Row w of gravity and the forces that act, Q = Re(w e) [N m].
+    """
+
+    q: Real
+    lam: Real
+    force: float
+    load: Complex
+
+
+def tangent_stiffness(
+    K: Real, w: Complex, B: Complex, lam: Real, e: Complex, arm: Whole | None = None
+) -> Real:
+    r"""Stiffness about a shape, K + diag(Im(w e) + Re(lam^T B e)) [N m/rad].
+
+    With g = Im(w e) + Re(lam^T B e) and h = Im(lam^T B e) - Re(w e) of a link, its stretch has -g
+    on the diagonal and h beside the link's angle.
+
+    Parameters
+    ----------
+    K : (n, n)
+        Torsion springs [N m/rad].
+    w : (n,) complex
+        Row of the dead loads, Q = Re(w e) [N m].
+    B, lam : (r, n) complex, (r,)
+        Constraints and their multipliers [m], [N].
+    e : (n,) complex
+        Directions.
+    arm : (n,) int or None
+        Whose arm a coordinate turns or stretches; None: each its own.
+
+    Examples
+    --------
+    A pendulum of length l hanging along -y under the weight m g has the stiffness m g l:
+
+    >>> l, mg = 2.0, 3.0
+    >>> w = 1j * np.conj(-1j * mg) * np.array([l + 0j])
+    >>> none = np.zeros((0, 1), complex)
+    >>> tangent_stiffness(np.zeros((1, 1)), w, none, np.zeros(0), np.array([-1j])).item()
+    6.0
+    """
+    pull = (lam @ B - 1j * w) * e
+    result: Real = K + np.diag(pull.real)
+    if arm is not None:
+        k = np.flatnonzero(arm != np.arange(len(arm)))
+        a = arm[k]
+        result[k, k] = K[k, k] - pull[a].real
+        result[k, a] += pull[a].imag
+        result[a, k] += pull[a].imag
+    return result
+
+
+def equilibrium(
+    system: System,
+    displacement: float | None = None,
+    loads: Mapping[str, float] | None = None,
+) -> Equilibrium:
+    """Return the shape under gravity and loads, free or with the released body held.
+
+    Gravity, loads and displacement are raised together from the straight, unloaded shape, so that
+    the shape found is the one that the mechanism reaches when it is loaded slowly.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    displacement : float or None
+        Of the released body's centre of mass along the direction of the release [m]; held by a
+        force along that direction.  None: no holding force.
+    loads : mapping or None
+        Forces and moments by the names of the inputs, ``force.x`` and ``force.y`` [N],
+        ``force.moment`` [N m] for a :class:`prbm.mechanism.parts.Force` of the name
+        ``force``; they keep their directions.  What is not named is zero.
+
+    Raises
+    ------
+    ParameterError
+        If a load is none of the mechanism's, or not a finite number.
+    EquilibriumError
+        If there is no such shape, or the loading does not lead there.
+    """
+    B, c = system.loops, system.loops_c
+    if displacement is not None:
+        B = np.vstack([B, system.release])
+        c = np.append(c, system.release_c)
+    w, moment = _loads(system, loads or {})
+    state = np.concatenate([system.q0, np.zeros(len(c))])
+    # what hangs on a pin alone may turn at once; a jump of anything else leads to another branch,
+    # where slow loading does not take it
+    bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
+    done, fraction = 0.0, 1.0
+    while done < 1.0:
+        target = min(1.0, done + fraction)
+        trial = _newton(
+            system, B, c, target * (displacement or 0.0), (target * w, target * moment), state
+        )
+        if trial is not None and np.abs((trial - state)[bent]).max() <= LARGEST_TURN:
+            state, done = trial, target
+            fraction = min(1.0, 2 * fraction)
+        else:
+            fraction /= 2
+            if fraction < SMALLEST_FRACTION:
+                raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
+    n, r = system.n, len(system.loops)
+    force = float(state[n + r]) if displacement is not None else 0.0
+    return Equilibrium(state[:n], state[n : n + r], force, w)
+
+
+def _loads(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
+    """Return the row of gravity and the given forces, and the given moments [N m]."""
+    forces = system.mechanism.forces
+    given = {f"{f.name}.{what}": 0.0 for f in forces for what in ("x", "y", "moment")}
+    for name, x in loads.items():
+        if name not in given:
+            raise ParameterError(unknown(name, given))
+        given[name] = finite(name, x)
+    w, moment = field_row(system.S, system.gravity), np.zeros(system.n)
+    for force, frame in zip(forces, system.pushed, strict=True):
+        x, y, turning = (given[f"{force.name}.{what}"] for what in ("x", "y", "moment"))
+        w = w + force_row(frame.A, complex(x, y))
+        moment[frame.j] += turning
+    return system.spread(w), moment
+
+
+def free_displacement(system: System) -> float:
+    """Return where the released body would rest under gravity alone, without a stop [m].
+
+    The displacement of its centre of mass along the direction of the release, from straight.
+    """
+    e = system.directions(equilibrium(system).q)
+    return float((system.release @ e).real) + system.release_c
+
+
+def _newton(
+    system: System,
+    B: Complex,
+    c: Real,
+    displacement: float,
+    load: tuple[Complex, Real],
+    start: Real,
+) -> Real | None:
+    """Solve the balance under a load, its row and its moments; None if it does not converge."""
+    n = system.n
+    w, moment = load
+    shift = np.zeros(len(c))
+    if len(c) > len(system.loops):
+        shift[-1] = displacement
+    scale = BALANCED * float(np.abs(system.K).max() or np.abs(w).max())
+    state, turn = start.copy(), math.inf
+    for _ in range(NEWTON_STEPS):
+        q, lam = state[:n], state[n:]
+        e = system.directions(q)
+        rows = constraints.jacobian(system.spread(B), e)
+        torque = springs(system.K, q - system.q0) + (w * e).real + moment + lam @ rows
+        open_by = constraints.values(B, c, e) - shift
+        closed = not len(open_by) or np.abs(open_by).max() <= 1e-13 * system.length
+        balanced = closed and np.abs(torque).max() <= scale
+        if balanced and turn <= CONVERGED:
+            return state
+        kkt = constraints.saddle(tangent_stiffness(system.K, w, B, lam, e, system.arm), rows, rows)
+        try:
+            change = constraints.solve(kkt, np.concatenate([torque, -open_by]))
+        except SimulationError:
+            return state if balanced else None
+        change[n:] *= -1.0
+        turn = float(np.abs(change[:n]).max())
+        if not math.isfinite(turn):
+            return None
+        state = state + change * min(1.0, LARGEST_TURN / max(turn, 1e-300))
+    return None
+
+
+def _unreachable(system: System, displacement: float | None, loaded: bool, done: float) -> str:
+    weight = "gravity and " if system.gravity else ""
+    if loaded:
+        return (
+            f"no static equilibrium was found beyond {100 * done:.3g} % of {weight}the loads, "
+            "raised in proportion: reduce the loads, or stiffen the flexures"
+        )
+    if displacement is None:
+        if not system.gravity:
+            return (
+                "no static equilibrium was found: the drawn shape is none, or the flexures are too "
+                "weak to hold it"
+            )
+        return (
+            "no static equilibrium under gravity was found: the flexures are too weak for this "
+            "load; reduce gravity or the masses, or stiffen the flexures"
+        )
+    if held_by_loops(system):
+        return f"release.displacement = {displacement:g} m: {immobile(system)}"
+    where = (
+        f"release.displacement = {displacement:g} m cannot be reached: no equilibrium was found "
+        f"beyond {done * displacement:.4g} m"
+    )
+    if not system.gravity:
+        return f"{where}; release closer to the straight shape"
+    return (
+        f"{where} (gravity raised in proportion); release closer to the straight shape, or reduce "
+        "gravity across the motion"
+    )
+
+
+def held_by_loops(system: System) -> bool:
+    """Tell whether the loops keep the released body, as drawn, from moving along the release."""
+    e = system.directions(system.q0)
+    along = constraints.jacobian(system.spread(system.release[None]), e)
+    return _left_by_loops(system, e, along) <= RIGID * system.length
+
+
+def immobile(system: System) -> str:
+    """Return why the released body, as drawn, cannot move along the release, and a remedy."""
+    name = system.mechanism.release.body
+    if _on_pivot(system, name):
+        return (
+            f"the centre of mass of the body {name} stays where it is, on the pivot that the body "
+            "turns about; put the centre of mass off it, or release another body"
+        )
+    return (
+        f"the body {name} cannot move along the direction of the release; choose another "
+        "direction or body, or let flexures stretch (axial = true)"
+    )
+
+
+def _on_pivot(system: System, name: str) -> bool:
+    """Tell whether a body, as drawn, can turn and its centre of mass can move nowhere."""
+    e, frame = system.directions(system.q0), system.bodies[name]
+    both = constraints.jacobian(system.spread(np.vstack([frame.A, -1j * frame.A])), e)
+    turn = np.eye(system.n)[[frame.j]]
+    return _left_by_loops(system, e, both) <= RIGID * system.length and (
+        _left_by_loops(system, e, turn) > RIGID
+    )
+
+
+def _left_by_loops(system: System, e: Complex, rows: Real) -> float:
+    """Return the largest derivative in rows (k, n) that does not follow from the loops'."""
+    loops = constraints.jacobian(system.spread(system.loops), e)
+    left = rows - (loops.T @ np.linalg.lstsq(loops.T, rows.T)[0]).T
+    return float(np.abs(left).max())
+
+
+def release_velocity(system: System, q: Real, speed: float) -> Real:
+    """Return the velocity of least kinetic energy with a given speed of the released body.
+
+    Parameters
+    ----------
+    q : (n,)
+        Angles at release [rad].
+    speed : float
+        Of the centre of mass along the direction of the release [m/s].
+
+    Returns
+    -------
+    v : (n,)
+        What an impulse on the centre of mass along that direction gives [rad/s].
+
+    Raises
+    ------
+    ParameterError
+        If the body cannot move along that direction.
+    """
+    if speed == 0.0:
+        return np.zeros(system.n)
+    e = system.directions(q)
+    M, _ = inertia(system.H, np.diag(system.J), e)
+    rows = constraints.jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    loops, row = rows[:-1], rows[-1:]
+    left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
+    if left <= IMMOBILE * free:
+        raise ParameterError(f"release.velocity = {speed:g} m/s: {immobile(system)}")
+    rates = np.zeros(len(rows))
+    rates[-1] = -speed
+    return constraints.project_velocities(M, rows, rates, np.zeros(system.n))

@@ -1,0 +1,255 @@
+"""The constant arrays of a mechanism, and the places of its points in them."""
+
+import cmath
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..mechanism.description import Mechanism
+
+if TYPE_CHECKING:
+    from .constraints import Watched
+from .arrays import Complex, Real, Whole
+
+FIXED = -1  # in place of a coordinate: to the ground
+
+
+@dataclass(frozen=True)
+class Place:
+    """A point of the mechanism, z = c + A E.
+
+    Parameters
+    ----------
+    c : complex
+        Fixed part [m].
+    A : dict of int to complex
+        Vectors that turn, and stretch, with the arms [m].
+    """
+
+    c: complex = 0j
+    A: Mapping[int, complex] = field(default_factory=dict)
+
+    def plus(self, j: int | None, vector: complex) -> "Place":
+        """Return the place at the end of a vector fixed to coordinate j (None: the ground)."""
+        if j is None:
+            return Place(self.c + vector, self.A)
+        return Place(self.c, {**self.A, j: self.A.get(j, 0j) + vector})
+
+    def minus(self, other: "Place") -> "Place":
+        """Return the vector from another place to this one."""
+        A = dict(self.A)
+        for j, vector in other.A.items():
+            A[j] = A.get(j, 0j) - vector
+        return Place(self.c - other.c, A)
+
+    def row(self, n: int) -> Complex:
+        """Return A as a row of n columns."""
+        row = np.zeros(n, complex)
+        for j, vector in self.A.items():
+            row[j] = vector
+        return row
+
+
+@dataclass(frozen=True)
+class BodyFrame:
+    """Where a point of a body is, its centre of mass, say: z = c + A E; the body's coordinate."""
+
+    name: str
+    j: int
+    c: complex
+    A: Complex
+    drawn: complex
+
+
+@dataclass(frozen=True)
+class Outline:
+    """A line to draw: the places of its corners, z = c + A E."""
+
+    name: str
+    kind: str
+    c: Complex
+    A: Complex
+
+
+@dataclass(frozen=True)
+class System:
+    """The constant arrays of a mechanism for given parameters: n coordinates, r loop rows.
+
+    Parameters
+    ----------
+    q0 : (n,)
+        Coordinates of the straight shape: absolute angles, counter-clockwise from +x [rad], and
+        stretches, which are zero there [-].
+    arm : (n,) int
+        Whose arm a coordinate turns or stretches: its own, or that of a link.
+    H : (n, n) complex
+        A^H diag(m) A with the columns of A spread, Hermitian [kg m^2].
+    J : (n,)
+        Rotary inertia of each body about the mass centres of its parts [kg m^2].
+    K : (n, n)
+        Springs: elastic energy (q - q0)^T K (q - q0) / 2 [N m/rad], [N m].
+    A, c, m : (p, n) complex, (p,) complex, (p,)
+        Mass points z = c + A E [m] and their masses [kg].
+    loops, loops_c : (r, n) complex, (r,)
+        Loop closures Phi = Re(loops E) + loops_c [m].
+    gaps, gaps_c, gaps_z : (s, n) complex, (s,), (s,) complex
+        Gaps of the stops, without the wall's position [m]: gap = wall + Re(f (gaps E + gaps_z)) +
+        gaps_c, with f = 1 for a wall on the ground, conj(E) of the body that it is fixed to.
+    slides, slides_z : (s, n) complex, (s,) complex
+        Displacement of the hit points along their walls, to the left of the direction [m].
+    on : (s,) int
+        The coordinate of the body that a wall is fixed to; :data:`FIXED`: the ground.
+    rubs, lifts, lifts_c : (f, n) complex, (f, n) complex, (f,)
+        Displacement along and to the left of the direction of each friction point [m].
+    release, release_c : (n,) complex, float
+        Displacement of the released body along the direction of the release [m].
+    bodies : dict of BodyFrame
+        The bodies by name: their centres of mass.
+    pushed : tuple of BodyFrame
+        Where the forces act.
+    probes : tuple of BodyFrame
+        The points that are watched.
+    links : tuple of int
+        The coordinates of the flexures' links, in the order of their names link[1], ...
+    outlines : tuple of Outline
+        What to draw.
+    anchor : complex
+        The first clamp, about which moments on the base are taken [m].
+    length : float
+        Size of the mechanism, scale of all lengths [m].
+    """
+
+    mechanism: Mechanism
+    values: Mapping[str, float]
+    q0: Real
+    arm: Whole
+    H: Complex
+    J: Real
+    K: Real
+    A: Complex
+    c: Complex
+    m: Real
+    loops: Complex
+    loops_c: Real
+    gaps: Complex
+    gaps_c: Real
+    gaps_z: Complex
+    slides: Complex
+    slides_z: Complex
+    on: Whole
+    rubs: Complex
+    lifts: Complex
+    lifts_c: Real
+    release: Complex
+    release_c: float
+    bodies: Mapping[str, BodyFrame]
+    pushed: tuple[BodyFrame, ...]
+    probes: tuple[BodyFrame, ...]
+    links: tuple[int, ...]
+    outlines: tuple[Outline, ...]
+    anchor: complex
+    length: float
+
+    @property
+    def n(self) -> int:
+        """Number of coordinates."""
+        return len(self.q0)
+
+    @cached_property
+    def S(self) -> Complex:
+        """First mass moments m^T A, (n,) complex [kg m]."""
+        result: Complex = self.m @ self.A
+        return result
+
+    @cached_property
+    def watched(self) -> "Watched":
+        """The rows of all gaps, slides and rubs, made once: discrete changes do not touch them."""
+        from .constraints import Watched  # which is about systems
+
+        return Watched.of(self)
+
+    @cached_property
+    def stretches(self) -> Whole:
+        """The coordinates that are stretches."""
+        result: Whole = np.flatnonzero(self.arm != np.arange(self.n))
+        return result
+
+    @cached_property
+    def stretched(self) -> Whole:
+        """The links that they stretch."""
+        result: Whole = self.arm[self.stretches]
+        return result
+
+    def directions(self, q: Real) -> Complex:
+        """Return e: the arms exp(s + i theta), and -i times that for stretches.
+
+        Parameters
+        ----------
+        q : (..., n)
+            Angles [rad] and stretches [-].
+
+        Examples
+        --------
+        A link that stands up, stretched by 1 %:
+
+        >>> class Bar:
+        ...     stretches, stretched = np.array([1]), np.array([0])
+        >>> e = System.directions(Bar, np.array([np.pi / 2, np.log(1.01)]))
+        >>> bool(abs(e - [1.01j, 1.01]).max() < 1e-15)
+        True
+        """
+        if not len(self.stretches):
+            turned: Complex = np.exp(1j * q)
+            return turned
+        w = 1j * q
+        w[..., self.stretched] += q[..., self.stretches]
+        e: Complex = np.exp(w)
+        e[..., self.stretches] = -1j * e[..., self.stretched]
+        return e
+
+    def turning(self, v: Real) -> Real | Complex:
+        """Return the complex rates w = theta' - i s' of the arms; zero for stretches [1/s].
+
+        They are the rates v themselves where nothing stretches.
+        """
+        if not len(self.stretches):
+            return v
+        w = v.astype(complex)
+        w[..., self.stretched] -= 1j * v[..., self.stretches]
+        w[..., self.stretches] = 0.0
+        return w
+
+    def motion(self, frame: BodyFrame, e: Complex, v: Real) -> tuple[complex, complex]:
+        """Return the displacement from the straight shape [m] and the velocity [m/s] of a point."""
+        displacement = complex(frame.A @ e) + frame.c - frame.drawn
+        return displacement, complex(1j * (frame.A @ (e * self.turning(v))))
+
+    def spread(self, B: Complex) -> Complex:
+        """Return rows with the column of each arm repeated for its stretch."""
+        return B[..., self.arm] if len(self.stretches) else B
+
+    @property
+    def gravity(self) -> complex:
+        """Acceleration of gravity as a complex number [m/s^2]."""
+        return complex(self.values["gravity.x"], self.values["gravity.y"])
+
+
+def unit(degrees: float) -> complex:
+    """Return the unit vector at an angle [deg], exact along the axes.
+
+    Examples
+    --------
+    >>> unit(90.0)
+    1j
+    """
+    quarter, rest = divmod(degrees, 90.0)
+    return complex(1j ** int(quarter % 4)) * (cmath.exp(1j * math.radians(rest)) if rest else 1.0)
+
+
+def stacked(rows: list[Complex], n: int) -> Complex:
+    """Stack rows of n columns, also when there are none."""
+    return np.array(rows, complex).reshape(-1, n)

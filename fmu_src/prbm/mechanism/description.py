@@ -1,0 +1,328 @@
+"""A planar compliant mechanism as frozen data that refuses to be inconsistent.
+
+Bodies, flexures, stops, friction, forces and the release are described as they are drawn: all
+points are global coordinates of the straight, unloaded shape.  A number in the description of a
+part becomes a parameter ``part.field``; a text is an expression in parameters, linear in them::
+
+    Body("shuttle", mass=0.05, ..., points={"right": ("shuttle.width", "flexure.length")})
+
+so that the same data serve one simulation, an FMU whose parameters are set by an importer, and a
+picture.  Nothing here knows of files or of FMI.
+"""
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from keyword import iskeyword
+
+from ..base.errors import MechanismError, ParameterError
+from ..base.names import proposal, unknown
+from .expressions import Quantity, affine
+from .flexure import CLAMP, ENDS, FREE, MODELS, MOST_LINKS, FlexureModel
+from .parameters import Parameter
+from .parts import (
+    FIELDS,
+    GROUND,
+    Body,
+    Flexure,
+    FlexureType,
+    Force,
+    Friction,
+    Joint,
+    Part,
+    Point,
+    Probe,
+    Release,
+    Stop,
+    body_of,
+)
+
+RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "release", "solver")
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Everything there is to know about a mechanism before any number is changed.
+
+    Parameters
+    ----------
+    name, title, description : str
+        Identifier of its FMU, one line, a paragraph.
+    ground : mapping
+        Fixed points by name [m].
+    bodies, flexure_types, flexures, joints, stops, frictions, forces, probes : tuples of parts
+        The parts.
+    release : Release
+        How the motion starts.
+    geometry : tuple of Parameter
+        Parameters that the points refer to.
+    gravity : pair of float
+        Default acceleration of gravity along x and y [m/s^2].
+    damping_zeta, damping_beta : float
+        Default damping ratio of the fundamental mode [-] and time constant of the damping in
+        proportion to every spring's rate [s].
+    drawing : str
+        The mechanism in characters.
+
+    Raises
+    ------
+    MechanismError
+        If a name is used twice, a reference leads nowhere or a part cannot be.
+    ParameterError
+        If a default is out of its own bounds.
+    """
+
+    name: str
+    title: str
+    ground: Mapping[str, Point]
+    bodies: tuple[Body, ...]
+    flexure_types: tuple[FlexureType, ...]
+    flexures: tuple[Flexure, ...]
+    release: Release
+    joints: tuple[Joint, ...] = ()
+    stops: tuple[Stop, ...] = ()
+    frictions: tuple[Friction, ...] = ()
+    forces: tuple[Force, ...] = ()
+    probes: tuple[Probe, ...] = ()
+    geometry: tuple[Parameter, ...] = ()
+    gravity: tuple[float, float] = (0.0, 0.0)
+    damping_zeta: float = 0.0
+    damping_beta: float = 0.0
+    description: str = ""
+    drawing: str = ""
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"[A-Za-z_]\w*", self.name, re.ASCII) or iskeyword(self.name):
+            raise MechanismError(
+                f"mechanism name {self.name!r}: use letters a to z, digits and _, not starting "
+                "with a digit, and no word of Python (it becomes a file name and an identifier)"
+            )
+        if len(self.gravity) != 2:
+            raise MechanismError(f"gravity = {self.gravity!r} must have an x and a y component")
+        self._check_references()
+        self._check_names()
+        known = {p.name: p for p in self.parameters}
+        given = dict(self._quantities())
+        for where, quantity in self._quantities():
+            for name in affine(quantity).terms:
+                if name not in known and name in given:
+                    raise MechanismError(
+                        f"{where} refers to {name!r}, which is an expression itself: write it out"
+                    )
+                if name not in known:
+                    raise MechanismError(
+                        f"{where} refers to {name!r}, which is no parameter of {self.name}; "
+                        f"{proposal(name, known)}"
+                    )
+
+    # -- parameters --
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters, in the order of the interface."""
+        return tuple(self._parameters())
+
+    def _parameters(self) -> Iterator[Parameter]:
+        yield from self.geometry
+        for kind in self.flexure_types:
+            yield from _fields(kind)
+            for c in self.model(kind).coefficients:
+                value = kind.coefficients.get(c.name, c.value)
+                if not isinstance(value, str):
+                    yield Parameter(
+                        f"{kind.name}.{c.name}", value, "", c.description, c.minimum, c.maximum
+                    )
+        for body in self.bodies:
+            yield from _fields(body)
+        for axis, g in zip("xy", self.gravity, strict=True):
+            yield Parameter(
+                f"gravity.{axis}", g, "m/s2", f"Acceleration of gravity along {axis}",
+                -1e6, 1e6, 10.0,
+            )  # fmt: skip
+        yield from _fields(self.release)
+        yield Parameter(
+            "solver.tolerance", 1e-8, "",
+            "Relative tolerance of the integration, unless the importer gives one", 1e-13, 1e-2,
+            1e-8,
+        )  # fmt: skip
+        yield Parameter(
+            "damping.zeta", self.damping_zeta, "",
+            "Damping ratio of the fundamental mode, by damping in proportion to mass", 0.0, 10.0,
+            tunable=True,
+        )  # fmt: skip
+        yield Parameter(
+            "damping.beta", self.damping_beta, "s",
+            "Damping in proportion to the rate of every spring, as a time constant", 0.0, 1e-2,
+            1e-5, tunable=True,
+        )  # fmt: skip
+        tuned: tuple[Part, ...] = (*self.frictions, *self.stops)
+        for part in tuned:
+            yield from _fields(part)
+
+    def model(self, kind: FlexureType) -> FlexureModel:
+        """Return the flexure model of a type."""
+        return replace(MODELS[kind.model], links=kind.n)
+
+    def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
+        """Return all parameter values, defaults replaced by the given changes.
+
+        Raises
+        ------
+        ParameterError
+            If a name is unknown or a value out of bounds.
+        """
+        parameters = {p.name: p for p in self.parameters}
+        result = {p.name: p.value for p in parameters.values()}
+        for name, value in (changes or {}).items():
+            if name not in parameters:
+                raise ParameterError(unknown(name, parameters))
+            result[name] = parameters[name].check(value)
+        for part in self._parts():
+            for name, meta in FIELDS[type(part)].items():
+                quantity = getattr(part, name)
+                if isinstance(quantity, str):  # bounds hold for expressions too
+                    Parameter(f"{part.name}.{name}", affine(quantity)(result), *meta)
+        return result
+
+    def _parts(self) -> tuple[Part, ...]:
+        """Return the parts whose fields are parameters or expressions."""
+        parts: tuple[Part, ...] = (*self.flexure_types, *self.bodies, *self.frictions)
+        return (*parts, *self.stops, self.release)
+
+    # -- checks --
+
+    def _check_names(self) -> None:
+        seen = set(RESERVED)
+        own = [f.name for f in self.flexures if f.type != f.name]  # else both have one section
+        parts: tuple[Part, ...] = (*self.bodies, *self.flexure_types, *self.joints, *self.stops)
+        parts = (*parts, *self.frictions, *self.forces, *self.probes)
+        for name in (*(part.name for part in parts), *own):
+            if name in seen:
+                raise MechanismError(
+                    f"the name {name!r} is used twice or reserved: give each part its own"
+                )
+            seen.add(name)
+        names = [p.name for p in self.parameters]
+        for name in names:
+            if names.count(name) > 1:
+                raise MechanismError(f"the parameter {name!r} is defined twice")
+
+    def _check_references(self) -> None:
+        if not self.bodies or not self.flexures:
+            raise MechanismError(f"{self.name} needs at least one body and one flexure")
+        for kind in self.flexure_types:
+            self._check_type(kind)
+        for flexure in self.flexures:
+            self._check_flexure(flexure)
+        for joint in self.joints:
+            self._check_connection("joint", joint)
+        bodies = [body.name for body in self.bodies]
+        attached: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
+        for part in attached:
+            if part.body not in bodies:
+                raise MechanismError(f"{part.name}.body = {part.body!r} is not described")
+        for stop in self.stops:
+            if stop.on not in (GROUND, *bodies):
+                raise MechanismError(f"{stop.name}.on = {stop.on!r} is not described")
+            if stop.on == stop.body:
+                raise MechanismError(f"the stop {stop.name} is fixed to the body that it stops")
+        for probe in self.probes:
+            self.point(probe.point, probe.name)
+        directed: tuple[Stop | Friction | Release, ...] = (*self.stops, *self.frictions)
+        for one in (*directed, self.release):
+            if not math.isfinite(one.direction):
+                raise MechanismError(f"{one.name}.direction = {one.direction} must be an angle")
+        if self.release.body not in bodies:
+            raise MechanismError(f"release.body = {self.release.body!r} is not described")
+
+    def _check_type(self, kind: FlexureType) -> None:
+        if kind.model not in MODELS:
+            raise MechanismError(
+                f"{kind.name}.model = {kind.model!r} is unknown: choose one of {', '.join(MODELS)}"
+            )
+        chain = not MODELS[kind.model].gamma
+        if chain and not 1 <= kind.n <= MOST_LINKS:
+            raise MechanismError(
+                f"{kind.name}.n = {kind.n} must be the number of links of the chain, from 1 to "
+                f"{MOST_LINKS}"
+            )
+        if kind.n and not chain:
+            raise MechanismError(
+                f"{kind.name}.n = {kind.n}: the {kind.model} model has its own number of links; "
+                'leave n out, or choose model = "nR"'
+            )
+        known = {c.name for c in self.model(kind).coefficients}
+        for name in kind.coefficients:
+            if name not in known:
+                raise MechanismError(
+                    f"{kind.name}.{name} is no coefficient of the {kind.model} model, which has "
+                    f"{', '.join(sorted(known)) or 'none'}"
+                )
+
+    def _check_flexure(self, flexure: Flexure) -> None:
+        kind = next((k for k in self.flexure_types if k.name == flexure.type), None)
+        if kind is None:
+            raise MechanismError(f"{flexure.name}.type = {flexure.type!r} is not described")
+        self._check_connection("flexure", flexure)
+        ends = flexure.ends
+        if len(ends) != 2 or any(end not in ENDS for end in ends):
+            raise MechanismError(
+                f"{flexure.name}.ends = {ends!r}: each of the two ends is one of {', '.join(ENDS)}"
+            )
+        if FREE in ends and CLAMP not in ends:
+            raise MechanismError(
+                f"{flexure.name}.ends = {ends!r}: a free end needs a clamp at the other"
+            )
+        if kind.axial and FREE in ends and len(MODELS[kind.model].gamma) == 1:
+            raise MechanismError(
+                f"{flexure.name} has one link, which its free end fixes to the body: it cannot "
+                f"stretch; choose another model than {kind.model}, or axial = false"
+            )
+
+    def _check_connection(self, what: str, part: Flexure | Joint) -> None:
+        for end in (part.start, part.end):
+            self.point(end, part.name)
+        if body_of(part.start) == body_of(part.end):
+            raise MechanismError(f"{what} {part.name} joins {body_of(part.start)} to itself")
+
+    def point(self, reference: str, user: str) -> Point:
+        """Return the drawn point that ``body.point`` names.
+
+        Raises
+        ------
+        MechanismError
+            If there is none.
+        """
+        owner, _, name = reference.rpartition(".")
+        points = {GROUND: self.ground} | {b.name: b.points for b in self.bodies}
+        if owner not in points or name not in points[owner]:
+            every = [f"{o}.{p}" for o, named in points.items() for p in named]
+            raise MechanismError(
+                f"{user} refers to the point {reference!r}, which is not described; points are "
+                f"{', '.join(every)}"
+            )
+        return points[owner][name]
+
+    def _quantities(self) -> Iterator[tuple[str, Quantity]]:
+        for name, point in self.ground.items():
+            yield from ((f"{GROUND}.{name}", c) for c in point)
+        for body in self.bodies:
+            yield from ((f"{body.name}.centre", c) for c in body.centre)
+            for name, point in body.points.items():
+                yield from ((f"{body.name}.{name}", c) for c in point)
+        points: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
+        for part in points:
+            yield from ((f"{part.name}.point", c) for c in part.point or ())
+        for kind in self.flexure_types:
+            yield from ((f"{kind.name}.{n}", c) for n, c in kind.coefficients.items())
+        for one in self._parts():
+            yield from ((f"{one.name}.{f}", getattr(one, f)) for f in FIELDS[type(one)])
+
+
+def _fields(part: Part) -> Iterator[Parameter]:
+    """Yield the parameters that a part's numbers are."""
+    for name, meta in FIELDS[type(part)].items():
+        quantity = getattr(part, name)
+        if not isinstance(quantity, str):
+            yield Parameter(f"{part.name}.{name}", quantity, *meta)

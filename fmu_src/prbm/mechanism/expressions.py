@@ -1,0 +1,105 @@
+"""Quantities of a mechanism: numbers, or affine expressions in parameters."""
+
+import ast
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from ..base.errors import MechanismError
+
+Quantity = float | str
+
+
+# --- values -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Affine:
+    """A linear expression in parameters, constant + sum(factor * parameter)."""
+
+    constant: float = 0.0
+    terms: Mapping[str, float] = field(default_factory=dict)
+
+    def __call__(self, values: Mapping[str, float]) -> float:
+        """Evaluate the expression for the given parameters."""
+        return self.constant + sum(c * values[name] for name, c in self.terms.items())
+
+    def scaled(self, factor: float) -> "Affine":
+        """Return the expression times a number."""
+        terms = {name: factor * c for name, c in self.terms.items()}
+        return Affine(factor * self.constant, terms)
+
+    def plus(self, other: "Affine") -> "Affine":
+        """Return the sum of two expressions."""
+        terms = dict(self.terms)
+        for name, c in other.terms.items():
+            terms[name] = terms.get(name, 0.0) + c
+        return Affine(self.constant + other.constant, terms)
+
+
+def affine(quantity: Quantity) -> Affine:
+    """Read a number or an expression that is linear in parameters.
+
+    Parameters
+    ----------
+    quantity : float or str
+        Numbers, names of parameters, ``+ - * /`` and parentheses.
+
+    Raises
+    ------
+    MechanismError
+        If the text is anything else, or not linear in the parameters.
+
+    Examples
+    --------
+    >>> affine("flexure.length + shuttle.width/2")({"flexure.length": 2, "shuttle.width": 1})
+    2.5
+    """
+    try:
+        if not isinstance(quantity, str):
+            result = Affine(float(quantity))
+        else:
+            result = _affine(ast.parse(quantity.strip(), mode="eval").body)
+    except (
+        TypeError,
+        SyntaxError,
+        ValueError,
+        ArithmeticError,
+        RecursionError,
+        MemoryError,
+    ) as why:
+        reason = why.msg if isinstance(why, SyntaxError) else why
+        raise MechanismError(
+            f"cannot read the expression {str(quantity)[:80]!r}: write numbers and parameter names "
+            f"joined by + - * /, linear in the parameters ({reason})"
+        ) from None
+    if not all(map(math.isfinite, (result.constant, *result.terms.values()))):
+        raise MechanismError(f"cannot read the expression {quantity!r}: its numbers are not finite")
+    return result
+
+
+def _affine(node: ast.expr) -> Affine:
+    match node:
+        case ast.Constant(value=int() | float() as number):
+            return Affine(float(number))
+        case ast.Name() | ast.Attribute() | ast.Subscript():
+            return Affine(0.0, {ast.unparse(node): 1.0})
+        case ast.UnaryOp(op=ast.USub(), operand=a):
+            return _affine(a).scaled(-1.0)
+        case ast.UnaryOp(op=ast.UAdd(), operand=a):
+            return _affine(a)
+        case ast.BinOp(left=a, op=ast.Add(), right=b):
+            return _affine(a).plus(_affine(b))
+        case ast.BinOp(left=a, op=ast.Sub(), right=b):
+            return _affine(a).plus(_affine(b).scaled(-1.0))
+        case ast.BinOp(left=a, op=ast.Mult(), right=b):
+            x, y = _affine(a), _affine(b)
+            if x.terms and y.terms:
+                raise ValueError("a product of two parameters")
+            return y.scaled(x.constant) if y.terms else x.scaled(y.constant)
+        case ast.BinOp(left=a, op=ast.Div(), right=b):
+            x, y = _affine(a), _affine(b)
+            if y.terms:
+                raise ValueError("a division by a parameter")
+            return x.scaled(1.0 / y.constant)
+    raise ValueError(f"{ast.unparse(node)!r} is not allowed")

@@ -1,0 +1,294 @@
+"""Flexures as rigid segments and torsion springs: the pseudo-rigid-body models as data.
+
+A model is a set of published coefficients for a cantilever of length h.  Everything else follows
+from the rules that all of them share:
+
+* clamped at one end: the set once, h = L; the other end is a pin, or free: then it carries its
+  body along, which is fixed to the last link;
+* clamped at both ends: two mirrored cantilevers of half the length, h = L/2, whose middle
+  segments join into one link::
+
+      clamp                                            clamp
+      ##|--g0--o--g1--o----2 g2----o--g1--o--g0--|##          (2R, in units of h)
+              K1     K2           K2     K1
+
+* pinned at both ends: one link, which does not bend.
+
+The chain of n equal links (nR, Hencky) needs no coefficients: springs n EI/L between the links and
+2 n EI/L at every rigid attachment, a free end's body included.
+
+With axial compliance links stretch, too.  The stiffness EA/L of a flexure is that of its middle
+link, which stands for all; in a chain every link has its own, n EA/L.
+
+Sources
+-------
+.. [1] L. L. Howell, Compliant Mechanisms, Wiley, 2001 (1R: gamma, K_Theta).
+.. [2] Y.-Q. Yu, Z.-L. Feng, Q.-P. Xu, Mech. Mach. Theory 55 (2012) 18 (2R).
+.. [3] H.-J. Su, J. Mech. Robotics 1 (2009) 021008 (3R).
+.. [4] Y.-Q. Yu et al., J. Mech. Des. 127 (2005) 760 (1R, dynamic: the lumped masses).
+.. [5] H. Hencky, Der Eisenbau 11 (1920) 437 (the chain of rigid links and springs).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..base.errors import ParameterError
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """A dimensionless number of a flexure model and the bounds within which it has a meaning."""
+
+    name: str
+    value: float
+    description: str
+    minimum: float = 1e-3
+    maximum: float = 1e3
+
+
+@dataclass(frozen=True)
+class FlexureModel:
+    """The coefficients of a pseudo-rigid-body model of a cantilever.
+
+    Parameters
+    ----------
+    name : str
+        Number of pivots of the cantilever: 1R, 2R, 3R; nR for a chain.
+    gamma : tuple of Coefficient
+        Lengths of the moving links, from the clamp to the tip, in units of h [-].
+    K_theta : tuple of Coefficient
+        Stiffness coefficients of the pivots, from the clamp to the tip [-].
+    rate_with_gamma : bool
+        Whether the published stiffness coefficient goes with a factor gamma: the rate is
+        gamma_i K_theta_i EI/h if it does, K_theta_i EI/h if not.
+    lumped : bool
+        Whether the mass is lumped at the pivots (kinetic energy equivalence, [4]); else each
+        segment is a slender rod with its share of the mass.
+    source : str
+        Where the coefficients come from.
+    links : int
+        Number of equal links of a chain; 0: a set of coefficients.
+    """
+
+    name: str
+    gamma: tuple[Coefficient, ...]
+    K_theta: tuple[Coefficient, ...]
+    rate_with_gamma: bool
+    lumped: bool
+    source: str
+    links: int = 0
+
+    @property
+    def coefficients(self) -> tuple[Coefficient, ...]:
+        """All coefficients, lengths first."""
+        return self.gamma + self.K_theta
+
+
+def _gamma(name: str, value: float, which: str) -> Coefficient:
+    text = f"Length of {which} in units of the length of the cantilever"
+    return Coefficient(name, value, text, maximum=1.0)
+
+
+def _K_theta(name: str, value: float, which: str) -> Coefficient:
+    return Coefficient(name, value, f"Stiffness coefficient of {which}")
+
+
+MODELS = {
+    model.name: model
+    for model in (
+        FlexureModel(
+            "1R",
+            (Coefficient("gamma", 0.8517, "Characteristic radius factor", maximum=1.0),),
+            (_K_theta("K_theta", 2.65, "the characteristic pivot"),),
+            rate_with_gamma=True,
+            lumped=True,
+            source="Howell 2001; Yu et al. 2005",
+        ),
+        FlexureModel(
+            "2R",
+            (
+                _gamma("gamma1", 0.44, "the link between the pivots"),
+                _gamma("gamma2", 0.46, "the link at the tip"),
+            ),
+            (
+                _K_theta("K_theta1", 3.4710, "the pivot next to the clamp"),
+                _K_theta("K_theta2", 2.0682, "the pivot next to the tip"),
+            ),
+            rate_with_gamma=False,
+            lumped=False,
+            source="Yu, Feng, Xu 2012",
+        ),
+        FlexureModel(
+            "3R",
+            (
+                _gamma("gamma1", 0.35, "the link next to the clamp"),
+                _gamma("gamma2", 0.40, "the link in the middle"),
+                _gamma("gamma3", 0.15, "the link at the tip"),
+            ),
+            (
+                _K_theta("K_theta1", 3.51, "the pivot next to the clamp"),
+                _K_theta("K_theta2", 2.99, "the pivot in the middle"),
+                _K_theta("K_theta3", 2.58, "the pivot next to the tip"),
+            ),
+            rate_with_gamma=False,
+            lumped=False,
+            source="Su 2009",
+        ),
+        FlexureModel("nR", (), (), rate_with_gamma=False, lumped=False, source="Hencky 1920"),
+    )
+}
+
+CLAMP, PIN, FREE = "clamp", "pin", "free"
+ENDS = (CLAMP, PIN, FREE)
+MOST_LINKS = 200  # of a chain
+
+
+@dataclass(frozen=True)
+class Segments:
+    """A flexure cut into rigid segments, from its start to its end.
+
+    Parameters
+    ----------
+    lengths : tuple of float, n + 2
+        The stub that is part of the body at the start, n links, the stub at the end [m].
+    rates : tuple of float, n + 1
+        Torsion springs between consecutive segments [N m/rad].
+    rods : tuple of float, n + 2
+        Masses of the segments as slender rods [kg].
+    lumps : tuple of float, n + 1
+        Masses at the pivots [kg].
+    axial : tuple of float, n
+        Axial stiffness of the links [N/m]; 0: rigid.
+    """
+
+    lengths: tuple[float, ...]
+    rates: tuple[float, ...]
+    rods: tuple[float, ...]
+    lumps: tuple[float, ...]
+    axial: tuple[float, ...]
+
+    def reversed(self) -> "Segments":
+        """Return the same flexure from its end to its start."""
+        return Segments(*(tuple(reversed(part)) for part in vars(self).values()))
+
+
+def stub(gamma: Sequence[float]) -> float:
+    """Length of the stub at the clamp, gamma0 = 1 - sum(gamma), in units of h [-].
+
+    Raises
+    ------
+    ParameterError
+        If the links are longer than the cantilever.
+
+    Examples
+    --------
+    >>> round(stub([0.44, 0.46]), 12)
+    0.1
+    """
+    gamma0 = 1.0 - sum(gamma)
+    if gamma0 < -1e-12:
+        raise ParameterError(
+            f"the links of a flexure are longer than the flexure: the sum of its gammas is "
+            f"{sum(gamma):.6g}, so that gamma0 = {gamma0:.6g} < 0; choose gammas that add up "
+            "to at most 1"
+        )
+    return max(gamma0, 0.0)
+
+
+def segments(
+    model: FlexureModel,
+    gamma: Sequence[float],
+    K_theta: Sequence[float],
+    ends: tuple[str, str],
+    L: float,
+    EI: float,
+    mass: float,
+    EA: float = 0.0,
+) -> Segments:
+    """Cut a flexure into rigid segments, springs and masses.
+
+    The rates are K_i = K_theta_i EI/h (with a further factor gamma_i where the model says so).
+    The masses at the pivots of the 1R are m/4 + (m L^2/12)/(gamma L)^2: the kinetic energy of
+    a uniform rod about a fixed end, at the radius gamma L (eq. 3.3 of the thesis); with an end
+    that is free or two that are pinned, the 1R is made of rods as the others are.
+
+    Parameters
+    ----------
+    model : FlexureModel
+        Which coefficients mean what.
+    gamma, K_theta : sequences of float
+        Their values, from the clamp to the tip [-].
+    ends : pair of {"clamp", "pin", "free"}
+        How the flexure is held at its start and end; a free end needs a clamp at the other.
+    L, EI, mass : float
+        Length [m], bending stiffness [N m^2] and mass [kg] of the flexure.
+    EA : float
+        Axial stiffness [N]; 0: inextensible.
+
+    Returns
+    -------
+    Segments
+        From the start to the end of the flexure.
+
+    Raises
+    ------
+    ParameterError
+        If the links are longer than the flexure.
+
+    Examples
+    --------
+    The 1R flexure between two clamps is a link gamma L between springs 2 gamma K_theta EI/L:
+
+    >>> s = segments(MODELS["1R"], [0.8], [2.5], ("clamp", "clamp"), 1.0, 1.0, 0.0)
+    >>> [round(l, 12) for l in s.lengths], s.rates
+    ([0.1, 0.8, 0.1], (4.0, 4.0))
+    """
+    if model.links:
+        lengths, rates = _chain(model.links, ends, L, EI)
+    elif ends == (PIN, PIN):
+        lengths, rates = [0.0, L, 0.0], [0.0, 0.0]
+    else:
+        lengths, rates = _cantilevers(model, gamma, K_theta, ends, L, EI)
+    links = lengths[1:-1]
+    lumps, rods = [0.0] * len(rates), [mass * length / L for length in lengths]
+    if model.lumped and FREE not in ends and CLAMP in ends:
+        lumps = [mass / 4 + (mass * L**2 / 12) / max(links) ** 2] * len(rates)
+        rods = [0.0] * len(lengths)
+    if model.links:
+        axial = [model.links * EA / L] * len(links)
+    else:
+        axial = [EA / L if i == len(links) // 2 else 0.0 for i in range(len(links))]
+    return Segments(tuple(lengths), tuple(rates), tuple(rods), tuple(lumps), tuple(axial))
+
+
+def _chain(n: int, ends: tuple[str, str], L: float, EI: float) -> tuple[list[float], list[float]]:
+    """Return lengths and rates of a chain of n equal links."""
+    rate = n * EI / L
+    at_start, at_end = (0.0 if end == PIN else 2 * rate for end in ends)
+    return [0.0, *[L / n] * n, 0.0], [at_start, *[rate] * (n - 1), at_end]
+
+
+def _cantilevers(
+    model: FlexureModel,
+    gamma: Sequence[float],
+    K_theta: Sequence[float],
+    ends: tuple[str, str],
+    L: float,
+    EI: float,
+) -> tuple[list[float], list[float]]:
+    """Return lengths and rates of one cantilever, or of two mirrored ones."""
+    h = L / 2 if ends == (CLAMP, CLAMP) else L
+    half = [h * g for g in (stub(gamma), *gamma)]
+    stiffness = [
+        (g if model.rate_with_gamma else 1.0) * K * EI / h
+        for g, K in zip(gamma, K_theta, strict=True)
+    ]
+    if ends == (CLAMP, CLAMP):
+        return [*half[:-1], 2 * half[-1], *reversed(half[:-1])], [*stiffness, *stiffness[::-1]]
+    if FREE in ends:  # the last link is part of the body
+        lengths, rates = half, stiffness
+    else:
+        lengths, rates = [*half, 0.0], [*stiffness, 0.0]
+    if ends[0] != CLAMP:
+        return lengths[::-1], rates[::-1]
+    return lengths, rates

@@ -1,0 +1,85 @@
+"""Parameters: a value with its unit, its bounds and whether it is tunable."""
+
+import math
+import re
+from dataclasses import dataclass
+
+from ..base.errors import MechanismError, ParameterError
+
+NAME = re.compile(r"[A-Za-z_]\w*(\[\d+\])?(\.[A-Za-z_]\w*(\[\d+\])?)*")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A named value with its unit, its meaning and the bounds within which it makes sense.
+
+    Parameters
+    ----------
+    name : str
+        Structured name, for instance ``flexure.length``.
+    value : float
+        Default, in the unit.
+    unit : str
+        SI unit, products with dots and powers as in ``kg.m2``; empty if dimensionless.
+    description : str
+        One sentence for a person who knows the mechanism but not the model.
+    minimum, maximum : float
+        Inclusive bounds.
+    nominal : float or None
+        Typical magnitude, where it differs much from 1.
+    tunable : bool
+        Whether it may change while the simulation runs.
+    """
+
+    name: str
+    value: float
+    unit: str = ""
+    description: str = ""
+    minimum: float = -math.inf
+    maximum: float = math.inf
+    nominal: float | None = None
+    tunable: bool = False
+
+    def __post_init__(self) -> None:
+        if not NAME.fullmatch(self.name):
+            raise MechanismError(
+                f"{self.name!r} is no name: use letters, digits and _, joined by dots"
+            )
+        self.check(self.value)
+
+    def check(self, value: float) -> float:
+        """Return the value as a float if it is allowed.
+
+        Raises
+        ------
+        ParameterError
+            If it is not a finite number within the bounds.
+        """
+        number = finite(self.name, value, self.unit)
+        unit = f" {self.unit}" if self.unit else ""
+        if number < self.minimum:
+            raise ParameterError(
+                f"{self.name} = {number:.10g}{unit} must be at least {self.minimum:g}{unit}"
+            )
+        if number > self.maximum:
+            raise ParameterError(
+                f"{self.name} = {number:.10g}{unit} must be at most {self.maximum:g}{unit}"
+            )
+        return number
+
+
+def finite(name: str, value: float, unit: str = "") -> float:
+    """Return a finite number as a float.
+
+    Raises
+    ------
+    ParameterError
+        If it is anything else.
+    """
+    unit = f" {unit}" if unit else ""
+    if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
+        raise ParameterError(f"{name} = {value!r} must be a number{unit and ' in'}{unit}")
+    number = float(value)
+    if not math.isfinite(number):
+        raise ParameterError(f"{name} = {number}{unit} must be a finite number")
+    return number

@@ -1,0 +1,350 @@
+"""A picture of a mechanism as its file describes it, with names, and its modes.
+
+python -m prbm.plots.picture FoldedSuspension --modes 3 --out folded.png
+python -m prbm.plots.picture my_mechanism.toml
+"""
+
+import argparse
+import cmath
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from matplotlib.patheffects import withStroke
+
+from ..base.atomic import check_file
+from ..base.errors import ParameterError, PrbmError
+from ..base.unit_text import frequency_unit, length_unit
+from ..commands.arguments import picture_arguments
+from ..drawing.shapes import Shapes, corners, curve
+from ..drawing.style import BODY, CHAIN, FLEXURE, IMPACT, LINK, PROBE, STRAIGHT, WALL, own_style
+from ..files.mechanism_file import find
+from ..files.settings import settings
+from ..mechanics.arrays import Complex
+from ..mechanics.assembly import assemble
+from ..mechanics.modal import Modes, modes
+from ..mechanics.statics import equilibrium
+from ..mechanism.description import Mechanism
+from ..mechanism.parts import value
+from .figures import save
+from .scene import quiet
+
+SHOWN = 0.12  # of the size: the largest displacement in the picture of a mode
+ARROW = 0.14  # of the size: length of the arrows of forces
+MOST_MODES = 12  # in a picture
+COLUMNS = 3  # of modes in a row
+THIN = 0.12  # of the size: a body lower than this has its name above it
+NAME_AT = 0.36  # of the length of a flexure: flexures cross in the middle
+NAME, NAME_OFFSET = "#303030", 7.0  # points between a flexure and its name
+WIDTH, LEAST_HEIGHT, LARGEST_HEIGHT, FRAME = 7.2, 2.4, 6.4, 0.9  # inches, of the picture
+
+
+@own_style()
+def picture(
+    mechanism: Mechanism,
+    values: Mapping[str, float] | None = None,
+    shown: int = 0,
+    held: float | None = None,
+) -> Figure:
+    """Draw the straight shape with the names of its parts, and modes about the equilibrium.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is drawn.
+    values : mapping or None
+        Parameters that differ from their defaults.
+    shown : int
+        How many modes are drawn, about the static equilibrium under gravity, without stops; all
+        there are, if they are fewer.
+    held : float or None
+        Displacement at which the released body is held [m]; None: it rests by itself.
+
+    Returns
+    -------
+    Figure
+        It belongs to no window.
+
+    Raises
+    ------
+    ParameterError
+        If so many modes are too many for a picture, or a value makes no sense.
+    EquilibriumError
+        If there is no equilibrium about which modes could be drawn.
+    """
+    shapes = Shapes(assemble(mechanism, mechanism.values(values)))
+    if not 0 <= shown <= MOST_MODES:
+        raise ParameterError(f"{shown} modes: choose a number from 0 to {MOST_MODES}")
+    z = np.concatenate([*_places(shapes, shapes.straight), *_walls(shapes)])
+    vibrating = _vibrating(shapes, held) if shown else None
+    if vibrating is not None:
+        shown = min(shown, len(vibrating[0].frequency))
+    aspect = float(np.ptp(z.imag[np.isfinite(z)]) / np.ptp(z.real[np.isfinite(z)]))
+    height = FRAME + min(max(aspect * WIDTH, LEAST_HEIGHT), LARGEST_HEIGHT)
+    row = min(max(aspect, 0.5), 1.6) * WIDTH / COLUMNS
+    rows = -(-shown // COLUMNS)
+    figure = Figure((WIDTH, height + rows * row), dpi=120, layout="constrained")
+    grid = figure.add_gridspec(1 + rows, COLUMNS, height_ratios=[height, *[row] * rows])
+    axes = figure.add_subplot(grid[0, :])
+    _Drawing(axes, shapes).parts()
+    axes.set_title(mechanism.title, fontsize=10, loc="left")
+    if vibrating is not None:
+        places = [grid[1 + k // COLUMNS, k % COLUMNS] for k in range(shown)]
+        _draw_modes(figure, places, shapes, *vibrating)
+    return figure
+
+
+def _vibrating(shapes: Shapes, held: float | None) -> tuple[Modes, Complex]:
+    """Return the modes, and the arms of the shape that they are about."""
+    rest = equilibrium(shapes.system, held)
+    return modes(shapes.system, rest), shapes.arms(rest.q)
+
+
+def _draw_modes(
+    figure: Figure, places: Sequence[object], shapes: Shapes, found: Modes, E: Complex
+) -> None:
+    for k, place in enumerate(places):
+        axes = figure.add_subplot(place)  # type: ignore[call-overload]
+        drawing = _Drawing(axes, shapes)
+        drawing.ghost(E)
+        drawing.shape(moved(shapes, E, found, k))
+        axes.set_title(_frequency(float(found.frequency[k])), fontsize=9)
+        axes.axis("off")
+
+
+def _frequency(frequency: float) -> str:
+    """Return a frequency in words; an unstable shape has none.
+
+    Examples
+    --------
+    >>> _frequency(4.8899), _frequency(92086.3), _frequency(-2.0)
+    ('4.890 Hz', '92.09 kHz', 'unstable')
+    """
+    if frequency <= 0.0:
+        return "unstable"
+    factor, unit = frequency_unit(frequency)
+    return f"{frequency * factor:#.4g} {unit}".replace(". ", " ")
+
+
+def moved(shapes: Shapes, E: Complex, found: Modes, k: int) -> Complex:
+    """Return the arms of a shape moved along a mode, so far that the largest part can be seen.
+
+    Parameters
+    ----------
+    shapes : Shapes
+        What is drawn.
+    E : (n,) complex
+        Arms of the shape in which it vibrates.
+    found : Modes
+        Its modes.
+    k : int
+        Which mode.
+    """
+    w = shapes.system.turning(found.shape[:, k])
+    along: Complex = E * (1 + 1j * w)
+    largest = max(
+        float(np.abs(new - old).max())
+        for new, old in zip(_places(shapes, along), _places(shapes, E), strict=True)
+    )
+    amplitude = SHOWN * shapes.size / largest
+    heaviest = shapes.system.mechanism.release.body
+    if (shapes.centre(heaviest, along) - shapes.centre(heaviest, E)).real < 0.0:
+        amplitude = -amplitude
+    result: Complex = E * (1 + 1j * amplitude * w)
+    return result
+
+
+def _walls(shapes: Shapes) -> list[Complex]:
+    """Return the walls of the stops as drawn."""
+    system, E = shapes.system, shapes.straight
+    stops = enumerate(system.mechanism.stops)
+    return [shapes.wall(i, value(stop, "position", system.values), E) for i, stop in stops]
+
+
+def _places(shapes: Shapes, E: Complex) -> list[Complex]:
+    lines = [corners(line.outline, E) for line in shapes.flexures]
+    return [*lines, *(shapes.body(name, E) for name in shapes.bodies)]
+
+
+class _Drawing:
+    """Draws shapes on axes, in a handy unit."""
+
+    def __init__(self, axes: Axes, shapes: Shapes) -> None:
+        self.axes, self.shapes = axes, shapes
+        self.factor, self.unit = length_unit(shapes.size)
+        axes.set_aspect("equal")
+
+    def line(self, z: Complex, color: str, width: float, zorder: float, style: str = "-") -> None:
+        z = z * self.factor
+        self.axes.plot(
+            z.real, z.imag, style, color=color, linewidth=width, zorder=zorder,
+            solid_capstyle="butt",
+        )  # fmt: skip
+
+    def mark(self, z: Complex, marker: str, color: str, size: float, zorder: float) -> None:
+        z = np.atleast_1d(z) * self.factor
+        self.axes.plot(
+            z.real, z.imag, linestyle="none", marker=marker, markersize=size, color=color,
+            markeredgecolor="white", markeredgewidth=0.6, zorder=zorder,
+        )  # fmt: skip
+
+    def pivots(self, z: Complex, size: float, zorder: float, width: float = 1.0) -> None:
+        z = z * self.factor
+        self.axes.plot(
+            z.real, z.imag, "o", color=LINK, markersize=size, markerfacecolor="white",
+            markeredgewidth=width, zorder=zorder,
+        )  # fmt: skip
+
+    def text(
+        self, z: complex, words: str, color: str = NAME, ha: str = "center", va: str = "center"
+    ) -> None:
+        self.axes.annotate(
+            words, (z.real * self.factor, z.imag * self.factor), color=color, fontsize=8,
+            ha=ha, va=va, zorder=9, path_effects=[withStroke(linewidth=2.2, foreground="white")],
+        )  # fmt: skip
+
+    # -- shapes --
+
+    def ghost(self, E: Complex) -> None:
+        """Draw where things stand, faintly."""
+        for ground in self.shapes.ground():
+            self.line(ground, WALL, 0.9, 1.0)
+        for line in self.shapes.flexures:
+            self.line(corners(line.outline, E), STRAIGHT, 0.9, 0.5, "--")
+        for name in self.shapes.bodies:
+            z = self.shapes.body(name, E)
+            self.line(np.append(z, z[0]), STRAIGHT, 0.9, 0.5, "--")
+
+    def shape(self, E: Complex, pivots: bool = False) -> None:
+        """Draw flexures, bodies and pins."""
+        for line in self.shapes.flexures:
+            z = corners(line.outline, E)
+            many = len(z) - 2 > CHAIN
+            self.line(z if many else curve(z, line.guided), FLEXURE, 3.6, 2.0)
+            self.line(z, LINK, 0.9, 2.5)
+            if pivots:
+                self.pivots(z[1:-1], 1.5 if many else 3.4, 4.0)
+        for name in self.shapes.bodies:
+            z = self.shapes.body(name, E) * self.factor
+            self.axes.add_patch(
+                Polygon(
+                    np.column_stack([z.real, z.imag]), facecolor=BODY, edgecolor=LINK,
+                    linewidth=1.0, alpha=0.9, joinstyle="round", zorder=3.0,
+                )
+            )  # fmt: skip
+        self.pivots(self.shapes.pins(E), 6.0, 5.0, 1.5)
+        self.axes.autoscale_view()
+
+    def parts(self) -> None:
+        """Draw the straight shape with all its parts and their names."""
+        shapes, E = self.shapes, self.shapes.straight
+        for ground in shapes.ground():
+            self.line(ground, WALL, 1.2, 3.2)
+        self.shape(E, pivots=True)
+        for name in shapes.bodies:
+            self.mark(np.array([shapes.centre(name, E)]), "P", LINK, 6.0, 4.0)
+        self.mark(shapes.probes(E), "D", PROBE, 5.5, 6.0)
+        self.stops(E)
+        self.forces(E)
+        self.names(E)
+        quiet(self.axes)
+        self.axes.set_xlabel(f"x [{self.unit}]", fontsize=9)
+        self.axes.set_ylabel(f"y [{self.unit}]", fontsize=9)
+        self.axes.margins(0.08)
+
+    def stops(self, E: Complex) -> None:
+        stops = self.shapes.system.mechanism.stops
+        for i, (stop, wall) in enumerate(zip(stops, _walls(self.shapes), strict=True)):
+            self.line(wall, WALL, 1.6, 3.5)
+            self.mark(np.array([self.shapes.hit(i, E)]), "o", IMPACT, 6.0, 7.0)
+            end = max(wall[:2], key=lambda z: (round(z.imag / self.shapes.size, 6), z.real))
+            self.text(complex(end), stop.name, va="bottom")
+
+    def forces(self, E: Complex) -> None:
+        length = ARROW * self.shapes.size * self.factor
+        forces = self.shapes.system.mechanism.forces
+        for force, z in zip(forces, self.shapes.forces(E), strict=True):
+            x, y = z.real * self.factor, z.imag * self.factor
+            for dx, dy in ((length, 0.0), (0.0, length)):
+                self.axes.annotate(
+                    "", (x + dx, y + dy), (x, y), zorder=6,
+                    arrowprops={"arrowstyle": "-|>", "color": IMPACT, "linewidth": 1.1},
+                )  # fmt: skip
+            self.text(complex(x + length, y) / self.factor, f" {force.name}", IMPACT, ha="left")
+
+    def along(self, start: complex, end: complex, words: str) -> None:
+        """Write along a line, left of it as one reads."""
+        place = (start + NAME_AT * (end - start)) * self.factor
+        degrees = math.degrees(cmath.phase(end - start))
+        turned = (degrees + 89.0) % 180.0 - 89.0
+        away = cmath.rect(NAME_OFFSET, math.radians(turned + 90.0))
+        self.axes.annotate(
+            words, (place.real, place.imag), (away.real, away.imag), textcoords="offset points",
+            rotation=turned, ha="center", va="center", color=NAME, fontsize=7, zorder=9,
+            path_effects=[withStroke(linewidth=2.2, foreground="white")],
+        )  # fmt: skip
+
+    def names(self, E: Complex) -> None:
+        """Write the names of bodies, flexures, joints and probes, out of each other's way."""
+        shapes = self.shapes
+        for name in shapes.bodies:
+            z, x = shapes.body(name, E), shapes.centre(name, E).real
+            low, high = float(z.imag.min()), float(z.imag.max())
+            if high - low < THIN * shapes.size:
+                self.text(complex(x, high), name, LINK, va="bottom")
+            else:
+                self.text(complex(x, 0.75 * low + 0.25 * high), name, LINK)
+        for line in shapes.flexures:
+            z = corners(line.outline, E)
+            self.along(complex(z[0]), complex(z[-1]), line.flexure.name)
+        for joint in shapes.joints:
+            self.text(complex(corners(joint, E)[0]), f"  {joint.name}", ha="left", va="bottom")
+        for probe, z in zip(shapes.system.mechanism.probes, shapes.probes(E), strict=True):
+            self.text(z, f"  {probe.name}", PROBE, ha="left", va="top")
+
+
+# --- command ----------------------------------------------------------------------------------
+
+
+def run(options: argparse.Namespace) -> Path:
+    """Draw what a command line says; return the file, whose folder is made.
+
+    Raises
+    ------
+    PrbmError
+        If there is no such mechanism or parameter, or the file cannot be written.
+    OSError
+        If it turns out later that it cannot.
+    """
+    mechanism = find(options.mechanism)
+    path = options.out or Path(f"{mechanism.name}.png")
+    check_file(path)
+    drawn = picture(mechanism, settings(mechanism, options.set), options.modes)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return save(drawn, path)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Draw a mechanism to a PNG file."""
+    parser = argparse.ArgumentParser(
+        prog="python -m prbm.plots.picture",
+        description="Draw a mechanism with the names of its parts, and its modes, to a PNG file.",
+    )
+    picture_arguments(parser)
+    options = parser.parse_args(arguments)
+    try:
+        print(run(options))
+    except PrbmError as error:
+        parser.exit(2, f"{parser.prog}: {error}\n")
+    except OSError as error:
+        parser.exit(2, f"{parser.prog}: {error.filename}: cannot be written ({error.strerror})\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,1 @@
+"""Simulations of a mechanism: default experiment, result, headline."""

@@ -1,0 +1,114 @@
+"""What a result says, line by line: frequency, place of rest, impacts, rest on a stop."""
+
+from collections.abc import Mapping
+
+from ..base.unit_text import frequency_unit, length_unit, time_unit
+from ..mechanics.assembly import assemble
+from ..mechanics.statics import free_displacement
+from ..mechanics.system import System, unit
+from ..mechanism.description import Mechanism
+from .marks import marks
+from .result import Columns, column, rest_time
+
+FREQUENCY = "mode.frequency"
+SHORT = 0.1  # s; the times of a run that is shorter are not told in seconds
+
+
+def length(x: float, size: float) -> str:
+    """Return a length in mm, or what is handy in a smaller mechanism, to a hundredth.
+
+    There is no negative zero.
+
+    Examples
+    --------
+    >>> length(-1.8e-3, 0.08), length(-1e-9, 0.08), length(3e-6, 2e-4)
+    ('-1.80 mm', '0.00 mm', '3.00 µm')
+    """
+    factor, unit = length_unit(min(size, 1.0))
+    return f"{round(factor * x, 2) + 0.0:.2f} {unit}"
+
+
+def instant(t: float, span: float, digits: int) -> str:
+    """Return a time of a run in seconds, or what is handy if that is short.
+
+    Examples
+    --------
+    >>> instant(0.0349812, 1.0, 5), instant(2.71034e-6, 1e-4, 3)
+    ('0.03498 s', '2.710 µs')
+    """
+    factor, unit = (1.0, "s") if span >= SHORT else time_unit(span)
+    return f"{factor * t:.{digits}f} {unit}"
+
+
+def told(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
+    """Return what happened, line by line.
+
+    Parameters
+    ----------
+    columns : structured array
+        Of :func:`prbm.runs.run.simulate`, or of FMPy, with all outputs.
+    mechanism : Mechanism
+        What moved.
+    values : mapping
+        Its parameters and inputs at the start.
+
+    Raises
+    ------
+    ResultError
+        If a column is missing.
+    """
+    parameters = {p.name for p in mechanism.parameters}
+    system = assemble(mechanism, {n: x for n, x in values.items() if n in parameters})
+    time = column(columns, "time")
+    span = float(time[-1] - time[0])
+    lines = _free(columns, system)
+    seen = marks(columns, mechanism)
+    for i, stop in enumerate(s.name for s in mechanism.stops):
+        count = int(column(columns, f"{stop}.impact_count")[-1])
+        first = next((mark for mark in seen if mark.stop == i), None)
+        more = ""
+        if first is not None:
+            which = "the first" if first.count == 1 else f"number {first.count}"
+            more = f", {which} at t = {instant(first.time, span, 5)} with {first.speed:.3f} m/s"
+        lines.append(f"impacts at {stop:9} {count}{more}")
+        since = rest_time(columns, stop)
+        if since is not None:
+            lines.append(
+                f"came to rest         at t = {instant(since, span, 3)} on {stop}, "
+                f"{_place(columns, system)}, pressed with "
+                f"{column(columns, f'{stop}.force')[-1]:.4g} N"
+            )
+    return lines
+
+
+def _free(columns: Columns, system: System) -> list[str]:
+    """Tell about the equilibrium without stops, if it is one that lasts."""
+    frequency = column(columns, FREQUENCY)[0]
+    if frequency == 0.0:
+        weight = " under gravity" if system.gravity else ""
+        return [f"fundamental          none: without stops, the equilibrium{weight} is unstable"]
+    factor, hertz = frequency_unit(frequency)
+    release = system.mechanism.release
+    weight = "under gravity" if system.gravity else "without gravity"
+    rest = length(free_displacement(system), system.length)
+    return [
+        f"fundamental          {factor * frequency:.4g} {hertz}",
+        f"free rest position   {release.body} {rest} from straight"
+        f"{_along(release.direction)}, {weight}, without stops",
+    ]
+
+
+def _along(direction: float) -> str:
+    return "" if direction == 0.0 else f" along {direction:g} degrees"
+
+
+def _place(columns: Columns, system: System) -> str:
+    """Tell where the released body is at the end."""
+    body, direction = system.mechanism.release.body, system.mechanism.release.direction
+    x, y = (float(column(columns, f"{body}.{axis}")[-1]) for axis in "xy")
+    u = unit(direction)
+    if direction == 0.0:
+        return f"{body}.x = {length(x, system.length)}"
+    return (
+        f"{body} {length(x * u.real + y * u.imag, system.length)} from straight{_along(direction)}"
+    )

@@ -1,0 +1,69 @@
+"""The impacts in a result."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mechanism.description import Mechanism
+from .result import Columns, Result, names
+
+
+@dataclass(frozen=True)
+class Mark:
+    """An impact to mark.
+
+    Parameters
+    ----------
+    stop : int
+        Which stop.
+    time : float
+        [s].
+    speed, rebound : float
+        How fast it closed, and opened afterwards [m/s]; the latter NaN if not recorded.
+    count : int
+        Number of impacts at the stop, up to this one.
+    """
+
+    stop: int
+    time: float
+    speed: float
+    rebound: float
+    count: int
+
+
+def marks(result: Result | Columns, mechanism: Mechanism) -> tuple[Mark, ...]:
+    """Return the impacts of a result in order.
+
+    All of them if they were recorded; of FMPy's columns, the last one in each step.  Without
+    the columns for it, none.
+    """
+    if isinstance(result, Result) and result.impacts:
+        numbers = {stop.name: i for i, stop in enumerate(mechanism.stops)}
+        return tuple(
+            Mark(
+                numbers[impact.stop],
+                impact.time,
+                impact.latched.approach_speed,
+                impact.latched.rebound_speed,
+                impact.latched.impact_count,
+            )
+            for impact in result.impacts
+        )
+    columns = result.columns if isinstance(result, Result) else result
+    found = (m for i in range(len(mechanism.stops)) for m in _latched(i, columns, mechanism))
+    return tuple(sorted(found, key=lambda mark: mark.time))
+
+
+def _latched(i: int, columns: Columns, mechanism: Mechanism) -> Iterator[Mark]:
+    """Yield the impacts at a stop that its latched outputs show."""
+    stop = mechanism.stops[i].name
+    needed = [f"{stop}.{what}" for what in ("impact_count", "impact_time", "approach_speed")]
+    if any(name not in names(columns) for name in needed):
+        return
+    count, when, speed = (columns[name] for name in needed)
+    opening = f"{stop}.rebound_speed"
+    rebound = columns[opening] if opening in names(columns) else np.full(len(columns), np.nan)
+    for row in np.flatnonzero(np.diff(count, prepend=0) > 0):
+        if columns["time"][0] <= when[row] <= columns["time"][-1]:
+            yield Mark(i, float(when[row]), float(speed[row]), float(rebound[row]), int(count[row]))

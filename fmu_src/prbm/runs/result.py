@@ -1,0 +1,138 @@
+"""The result of a simulation: columns by name, impacts, and results read from files."""
+
+import csv
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.errors import PrbmError
+from ..hybrid.simulation import Impact
+from ..mechanism.description import Mechanism
+
+Columns = NDArray[Any]
+
+
+class ResultError(PrbmError, ValueError):
+    """A result lacks what is asked of it, or is no result of the mechanism."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """A mechanism, what it was given, and what it did.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What moved.
+    values : mapping
+        All its parameters at the start, and the inputs that were given then.
+    columns : (m,) structured array
+        ``time`` and the variables by name, in SI units, one row a communication point.
+    impacts : tuple of Impact
+        All impacts in order, with the state around each, as far as they were recorded.
+    """
+
+    mechanism: Mechanism
+    values: Mapping[str, float]
+    columns: Columns
+    impacts: tuple[Impact, ...] = field(default=())
+
+    def __getitem__(self, name: str) -> Columns:
+        """Return a column by name."""
+        return column(self.columns, name)
+
+
+def column(columns: Columns, name: str) -> Columns:
+    """Return a column of a result.
+
+    Raises
+    ------
+    ResultError
+        If there is none of that name.
+    """
+    if name not in names(columns):
+        raise ResultError(
+            f"the result has no column {name!r}; record it, with FMPy as in "
+            f"simulate_fmu(..., output=[..., {name!r}])"
+        )
+    found: Columns = columns[name]
+    return found
+
+
+def names(columns: Columns) -> tuple[str, ...]:
+    """Return the names of the columns of a result."""
+    return columns.dtype.names or ()
+
+
+def structured(rows: Iterable[Mapping[str, float | int | bool]]) -> Columns:
+    """Return rows of values by name as a structured array with FMPy's types.
+
+    Examples
+    --------
+    >>> structured([{"time": 0.0, "stop.contact": True}])["stop.contact"]
+    array([ True])
+    """
+    table = list(rows)
+    kinds = {bool: np.bool_, int: np.int32}
+    dtype = [(name, kinds.get(type(x), np.float64)) for name, x in table[0].items()]
+    return np.array([tuple(row.values()) for row in table], dtype)
+
+
+WORDS = {"true": 1.0, "false": 0.0}
+
+
+def read_csv(path: str | Path) -> Columns:
+    """Read a result from a CSV file as FMPy writes it: names, then a row for every time.
+
+    Raises
+    ------
+    ResultError
+        If the file cannot be read or is no such table; the message names the line.
+    """
+    path = Path(path)
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as file:
+            lines = [line for line in csv.reader(file) if line]
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be read ({error.strerror})") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise ResultError(f"{path}: is no CSV file ({error})") from None
+    if len(lines) < 3 or lines[0][0].strip() != "time":
+        raise ResultError(
+            f"{path}: is no result; the first line names the columns, the first of them is "
+            "time, and two rows or more follow"
+        )
+    header = [name.strip() for name in lines[0]]
+    if len(set(header)) < len(header):
+        raise ResultError(f"{path}: a column stands there twice")
+    rows = []
+    for number, line in enumerate(lines[1:], start=2):
+        if len(line) != len(header):
+            raise ResultError(
+                f"{path}: row {number} has {len(line)} values for {len(header)} columns"
+            )
+        try:
+            rows.append(tuple(WORDS[x.lower()] if x.lower() in WORDS else float(x) for x in line))
+        except ValueError:
+            raise ResultError(f"{path}: row {number} holds what is no number") from None
+    return np.array(rows, [(name, np.float64) for name in header])
+
+
+def rest_time(columns: Columns, stop: str = "stop") -> float | None:
+    """Return the first recorded time from which on a stop holds to the end of the result [s].
+
+    None if it does not hold at the end.
+
+    Examples
+    --------
+    >>> rows = [{"time": 0.0, "stop.contact": False}, {"time": 0.5, "stop.contact": True}]
+    >>> rest_time(structured(rows))
+    0.5
+    """
+    open_rows = np.flatnonzero(column(columns, f"{stop}.contact") == 0)
+    first = int(open_rows[-1]) + 1 if len(open_rows) else 0
+    return float(columns["time"][first]) if first < len(columns) else None

@@ -1,0 +1,1 @@
+"""The shipped mechanisms, one TOML file each."""

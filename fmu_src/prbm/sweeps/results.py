@@ -1,0 +1,177 @@
+"""Results of a sweep on disk: a Parquet dataset that grows part by part and survives a kill.
+
+    results.parquet/_sweep.json            what was asked for
+    results.parquet/part-000000-1f3a.parquet, ...
+
+A part holds the runs of one batch and is there entirely or not at all.  pandas, pyarrow and Dask
+read the folder as one table.
+"""
+
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pyarrow as pa  # type: ignore[import-untyped]
+import pyarrow.parquet as pq  # type: ignore[import-untyped]
+
+from ..base.errors import ParameterError
+from .runs import GOOD, Outcome
+
+SETTINGS = "_sweep.json"
+ROW, STATUS, MESSAGE, SECONDS = "row", "status", "message", "seconds"
+OWN = (ROW, STATUS, MESSAGE, SECONDS)
+"""The columns that every sweep has; no parameter or output may be called like them."""
+
+
+class Results:
+    """The dataset of a sweep.
+
+    Parameters
+    ----------
+    folder : Path
+        Where it is, or will be.
+    settings : mapping
+        All that the results depend on but the table, for JSON; a line of each is compared.
+    parameters, outputs : sequence of str
+        Columns.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        settings: Mapping[str, Any],
+        parameters: Sequence[str],
+        outputs: Sequence[str],
+    ) -> None:
+        self.folder, self.settings = folder, json.loads(json.dumps(settings))
+        self.parameters, self.outputs = tuple(parameters), tuple(outputs)
+        numbers = [(name, pa.float64()) for name in (*self.parameters, *self.outputs)]
+        own = [(STATUS, pa.string()), (MESSAGE, pa.string()), (SECONDS, pa.float64())]
+        self.schema = pa.schema([(ROW, pa.int64()), *numbers, *own])
+        self.count = 0
+
+    def begin(self, anew: bool = False) -> None:
+        """Make the folder, or go on in one of a sweep with the same settings.
+
+        Raises
+        ------
+        ParameterError
+            If there is something else, or the settings differ and it is not to begin anew.
+        """
+        file = self.folder / SETTINGS
+        try:
+            if self.folder.exists() and not file.exists() and not _is_empty(self.folder):
+                raise ParameterError(
+                    f"{self.folder} exists and holds no sweep; give another name for the results"
+                )
+            for draft in self.folder.glob("_*.draft"):
+                draft.unlink()
+            if file.exists() and anew:
+                self._clear()
+            if file.exists():
+                self._compare(json.loads(file.read_text(encoding="utf-8")))
+                return
+            self.folder.mkdir(parents=True, exist_ok=True)
+            draft = file.with_suffix(".json.draft")
+            draft.write_text(json.dumps(self.settings, indent=2), encoding="utf-8")
+            draft.replace(file)
+        except OSError as error:
+            raise ParameterError(
+                f"{self.folder} cannot be written ({error.strerror}); give another name"
+            ) from None
+        except json.JSONDecodeError:
+            raise ParameterError(f"{file} is broken; remove {self.folder}, or begin anew") from None
+
+    def _compare(self, before: Mapping[str, Any]) -> None:
+        for name in {**before, **self.settings}:
+            old, new = before.get(name), self.settings.get(name)
+            if old != new:
+                raise ParameterError(
+                    f"{self.folder} holds a sweep with another {name} ({_short(old)}, now "
+                    f"{_short(new)}); give another name for the results, or begin anew (--anew)"
+                )
+
+    def _clear(self) -> None:
+        for part in self._parts():
+            part.unlink()
+        (self.folder / SETTINGS).unlink()
+
+    def _parts(self) -> list[Path]:
+        return sorted(self.folder.glob("part-*.parquet"))
+
+    def read(self) -> pd.DataFrame:
+        """Return what is done, ordered by row, each row once.
+
+        Raises
+        ------
+        ParameterError
+            If a part cannot be read.
+        """
+        tables = [table for _, table in self._tables()]
+        self.count = len(tables)
+        if not tables:
+            return self.schema.empty_table().to_pandas()  # type: ignore[no-any-return]
+        frame: pd.DataFrame = pa.concat_tables(tables).to_pandas()
+        return frame.drop_duplicates(ROW).sort_values(ROW, ignore_index=True)
+
+    def _tables(self) -> Iterator[tuple[Path, Any]]:
+        for part in self._parts():
+            try:
+                yield part, pq.read_table(part, schema=self.schema)
+            except (OSError, ValueError, pa.ArrowException) as error:
+                reason = str(error).splitlines()[0]
+                raise ParameterError(
+                    f"{part} cannot be read ({reason}); remove it, and its runs are done again"
+                ) from None
+
+    def forget_failures(self) -> None:
+        """Remove the rows of runs that failed, so that they are done again."""
+        for part, table in list(self._tables()):
+            good = table.filter(pa.compute.is_in(table[STATUS], pa.array(GOOD)))
+            if good.num_rows == 0:
+                part.unlink()
+            elif good.num_rows < table.num_rows:
+                self._write(good, part)
+
+    def add(
+        self,
+        rows: Sequence[int],
+        values: Sequence[Mapping[str, float]],
+        outcomes: Sequence[Outcome],
+    ) -> None:
+        """Write the runs of a batch as a part."""
+        columns: dict[str, Any] = {ROW: list(rows)}
+        for name in self.parameters:
+            columns[name] = [row[name] for row in values]
+        for k, name in enumerate(self.outputs):
+            columns[name] = [o.values[k] if o.values else float("nan") for o in outcomes]
+        columns[STATUS] = [o.status for o in outcomes]
+        columns[MESSAGE] = [o.message for o in outcomes]
+        columns[SECONDS] = [o.seconds for o in outcomes]
+        name = f"part-{self.count:06d}-{os.urandom(3).hex()}.parquet"
+        self._write(pa.table(columns, schema=self.schema), self.folder / name)
+        self.count += 1
+
+    def _write(self, table: Any, part: Path) -> None:
+        """Write a part under another name first: a kill leaves a draft, which nobody reads."""
+        draft = part.with_name(f"_{part.name}.draft")
+        try:
+            with draft.open("wb") as file:
+                pq.write_table(table, file)
+                file.flush()
+                os.fsync(file.fileno())
+            draft.replace(part)
+        finally:
+            draft.unlink(missing_ok=True)
+
+
+def _is_empty(folder: Path) -> bool:
+    return folder.is_dir() and next(folder.iterdir(), None) is None
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."

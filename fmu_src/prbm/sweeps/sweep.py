@@ -1,0 +1,566 @@
+"""Parameter sweeps and Monte Carlo: from a table of parameters to a table of results.
+
+    prbm sweep PRBDM2R.fmu table.csv --output "max(shuttle.x)" --stop-time 1
+
+A row of the table is a run of the FMU, a column a variable that it is started with.  The runs are
+spread over the cores of this machine, or over the workers of a ``distributed`` scheduler by its
+address.  What is done is on disk: a sweep that was killed goes on where it was.  A run that fails
+is a row with its message.
+"""
+
+import hashlib
+import importlib.util
+import io
+import logging
+import math
+import os
+import sys
+import time
+import uuid
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+import fmpy  # type: ignore[import-untyped]
+
+from ..base.errors import ParameterError, PrbmError
+from ..base.progress import Progress
+from ..runs.run import MOST_ROWS
+from .runs import CRASHED, GOOD, Job, Outcome, Output, SpecificationError, parsed
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .results import Results
+
+EXTRA = ("distributed", "pandas", "pyarrow")
+REMEDY = "install what sweeps need with: python -m pip install 'prbm-impact[sweep]'"
+
+SHORTEST, LONGEST, SHARE = 1.0, 30.0, 0.02  # s, s, of the time so far: how long a batch takes
+AHEAD = 2  # batches a thread that are under way, so that none waits for work
+ENOUGH = 20  # runs a process from which on it is worth finding out whether resets may be trusted
+POINTS = 1000  # communication points where the FMU proposes no step
+CONNECT = 10.0  # s for a scheduler and its workers to answer
+FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".xls", ".xlsx")
+"""Ends of names that say of the results what they are not: one file."""
+RECENT = 50  # runs whose median duration sizes the next batch
+
+ABSENT = "No module named"  # what Python says of a package that is not installed
+
+Outputs = Sequence[str] | Mapping[str, str]
+
+
+class SweepError(PrbmError, RuntimeError):
+    """A sweep cannot be done, whatever its table."""
+
+
+def sweep(
+    fmu: str | Path,
+    table: "pd.DataFrame | str | Path",
+    out: str | Path = "results.parquet",
+    *,
+    outputs: Outputs | None = None,
+    values: Mapping[str, float] | None = None,
+    stop_time: float | None = None,
+    step: float | None = None,
+    tolerance: float | None = None,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    retries: int = 1,
+    timeout: float | None = None,
+    anew: bool = False,
+    failed: bool = False,
+    progress: Progress | None = None,
+) -> "pd.DataFrame":
+    """Run an FMU once for each row of a table.
+
+    Parameters
+    ----------
+    fmu : str or Path
+        An FMU of FMI 2.0 or 3.0 with co-simulation.
+    table : DataFrame, str or Path
+        A column for each variable that is set, under its name, a row for each run; or a CSV or
+        Parquet file of it. All in the FMU's units, which are SI for those of this project.
+    out : str or Path
+        Folder of the results, a Parquet dataset. If it holds part of the same sweep, only the rest
+        is done; rows may have been added to the table.
+    outputs : sequence of str, or mapping of str to str
+        What is kept of a run: a variable for its final value, or ``max(x)``, ``min(x)``,
+        ``mean(x)`` over the communication points; ``first(x)`` and ``since(x)``: the first
+        communication point at which x is true, or from which on it is to the end [s], NaN if none;
+        with numbers ``first(x > 0.001)``. A mapping gives columns names of their own. None: the
+        final values of all outputs of the FMU.
+    values : mapping
+        Start values that all runs have.
+    stop_time, step, tolerance : float
+        End of the runs [s], distance of the communication points [s], relative tolerance; None:
+        of the FMU's default experiment, or 1 s, a thousandth of the run, none.
+    scheduler : str or None
+        Address of a ``distributed`` scheduler, as ``tcp://host:8786``; its workers need this
+        package, too. None: this machine.
+    workers : int or None
+        Runs at a time on this machine; None: one a core.
+    retries : int
+        How often a run whose process died is tried again.
+    timeout : float or None
+        A run that takes longer fails [s of the clock].
+    anew : bool
+        Whether to forget what ``out`` holds.
+    failed : bool
+        Whether to do again what failed before.
+    progress : callable or None
+        Told the fraction that is done, from 0 to 1.
+
+    Returns
+    -------
+    DataFrame
+        In the order of the table: ``row`` (from 0), its parameters, the outputs (float64; NaN
+        where the run failed), ``status`` (``ok``; ``ended``: by the FMU, before ``stop_time``;
+        ``failed``, ``crashed``, ``timeout``), ``message`` and ``seconds`` that the run took.
+
+    Raises
+    ------
+    ParameterError
+        If the table, an output, a setting or ``out`` is not what it should be, or ``out`` holds
+        another sweep.
+    SweepError
+        If the FMU cannot be read or loaded, the scheduler does not answer, or something is not
+        installed.
+    KeyboardInterrupt
+        After Ctrl-C; it says what is done, which is kept.
+    """
+    _needed()
+    _check_name(Path(out))
+    plan = _planned(fmu, table, outputs, values, stop_time, step, tolerance)
+    _check_counts(workers, retries, timeout)
+    results = _results(plan, Path(out))
+    tell = progress or (lambda fraction: None)
+    with ExitStack() as stack:  # nothing is thrown away before there is who does it again
+        client = stack.enter_context(_client(scheduler, workers)) if anew else None
+        results.begin(anew)
+        done = results.read()
+        _same_rows(plan, done, results.folder)
+        seen = set(done["row"][done["status"].isin(GOOD)] if failed else done["row"])
+        rest = [row for row in range(len(plan.rows)) if row not in seen]
+        tell(1.0 - len(rest) / len(plan.rows))
+        if rest:
+            client = client or stack.enter_context(_client(scheduler, workers))
+            if failed:
+                results.forget_failures()
+            _Sweep(client, plan, results, tell).run(rest, retries, timeout)
+    return results.read()
+
+
+def samples(
+    distributions: Mapping[str, Any], n: int, seed: int = 0, method: str = "random"
+) -> "pd.DataFrame":
+    """Draw a table of parameters at random: see :func:`prbm.sweeps.table.samples`."""
+    _needed()
+    from . import table as sweep_table
+
+    return sweep_table.samples(distributions, n, seed, method)
+
+
+# --- what is to be done -------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep that makes sense.
+
+    ``digest`` is the SHA-256 of the FMU's bytes; ``rows`` are the values of each run.
+    """
+
+    name: str
+    fmu: bytes
+    digest: str
+    job: Job
+    parameters: tuple[str, ...]
+    rows: list[dict[str, float]]
+
+
+def _needed() -> None:
+    """Refuse to begin without the packages of the extra.
+
+    Raises
+    ------
+    SweepError
+    """
+    for name in EXTRA:
+        if importlib.util.find_spec(name) is None:
+            raise SweepError(f"sweeps need the package {name}; {REMEDY}")
+
+
+def _planned(
+    fmu: str | Path,
+    table: "pd.DataFrame | str | Path",
+    outputs: Outputs | None,
+    values: Mapping[str, float] | None,
+    stop_time: float | None,
+    step: float | None,
+    tolerance: float | None,
+) -> Plan:
+    from .table import check_settable, checked, read_table
+
+    data, description = read_fmu(Path(fmu))
+    variables = {v.name: v for v in description.modelVariables}
+    frame = checked(read_table(table), variables)
+    fixed = {name: float(x) for name, x in (values or {}).items()}
+    for name, x in fixed.items():
+        check_settable(name, variables)
+        if name in frame:
+            raise ParameterError(f"{name} is in the table and among the values; leave one out")
+        if not math.isfinite(x):
+            raise ParameterError(f"{name} = {x:g} among the values must be finite")
+    kept = _outputs(outputs, variables)
+    _unambiguous([*frame.columns], [output.column for output in kept])
+    times = _times(description, stop_time, step, tolerance)
+    rows = frame.to_dict("records")
+    job = Job(**times, values=fixed, outputs=kept)
+    return Plan(
+        description.modelName, data, hashlib.sha256(data).hexdigest(), job,
+        tuple(frame.columns), rows,  # type: ignore[arg-type]
+    )  # fmt: skip
+
+
+def read_fmu(path: Path) -> tuple[bytes, Any]:
+    """Return an FMU as bytes, with its description by FMPy.
+
+    Raises
+    ------
+    SweepError
+        If it cannot be read, or has no co-simulation of FMI 2.0 or 3.0.
+    """
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SweepError(f"{path} cannot be read ({error.strerror}); give an FMU") from None
+    try:
+        description = fmpy.read_model_description(io.BytesIO(data), validate=False)
+    except Exception as error:  # FMPy raises Exception itself, and what zipfile and lxml do
+        reason = " ".join(str(error).split())
+        raise SweepError(f"{path} is no FMU that can be read: {reason}") from None
+    if not description.fmiVersion.startswith(("2", "3")) or description.coSimulation is None:
+        raise SweepError(
+            f"{path} is an FMU of FMI {description.fmiVersion} without co-simulation or older than "
+            "FMI 2.0; export it for co-simulation in FMI 2.0 or 3.0"
+        )
+    return data, description
+
+
+def _outputs(outputs: Outputs | None, variables: Mapping[str, Any]) -> tuple[Output, ...]:
+    from .table import check_outputs
+
+    if outputs is None:
+        plain = (v for v in variables.values() if v.causality == "output" and not v.shape)
+        outputs = [v.name for v in plain if v.type not in ("String", "Binary", "Clock")]
+    if isinstance(outputs, str):
+        outputs = [outputs]
+    pairs = outputs.items() if isinstance(outputs, Mapping) else ((text, text) for text in outputs)
+    try:
+        kept = tuple(parsed(text, variables, column) for column, text in pairs)
+    except SpecificationError as error:
+        raise ParameterError(f"output {error}") from None
+    if not kept:
+        raise ParameterError("there is no output to keep; name one, as outputs=['shuttle.x']")
+    check_outputs(((output.column, output.variable) for output in kept), variables)
+    return kept
+
+
+def _unambiguous(parameters: Sequence[str], outputs: Sequence[str]) -> None:
+    from .results import OWN
+
+    names = [*parameters, *outputs, *OWN]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ParameterError(
+            f"the results would have the column {twice[0]!r} twice; give the output another name, "
+            f"as outputs={{'{twice[0]}_': ...}}"
+        )
+
+
+def _times(
+    description: Any, stop_time: float | None, step: float | None, tolerance: float | None
+) -> dict[str, Any]:
+    """Return start, stop, step and tolerance, from the default experiment where they are None."""
+    default, co_simulation = description.defaultExperiment, description.coSimulation
+
+    def proposed(name: str) -> float | None:
+        value = getattr(default, name, None)
+        return None if value is None else float(value)
+
+    start = proposed("startTime") or 0.0
+    stop = stop_time if stop_time is not None else proposed("stopTime")
+    stop = start + 1.0 if stop is None else float(stop)
+    size = step if step is not None else proposed("stepSize")
+    if size is None and co_simulation.fixedInternalStepSize is not None:
+        size = float(co_simulation.fixedInternalStepSize)
+    size = (stop - start) / POINTS if size is None else float(size)
+    tolerance = tolerance if tolerance is not None else proposed("tolerance")
+    if not (math.isfinite(stop) and stop > start):
+        raise ParameterError(f"stop_time = {stop:g} s must be finite and after {start:g} s")
+    for name, x, unit in (("step", size, " s"), ("tolerance", tolerance, "")):
+        if x is not None and not (math.isfinite(x) and x > 0.0):
+            raise ParameterError(f"{name} = {x:g}{unit} must be positive and finite")
+    steps = (stop - start) / size
+    if steps > MOST_ROWS:
+        raise ParameterError(
+            f"step = {size:g} s makes {steps:.0f} steps in {stop - start:g} s: choose a larger one"
+        )
+    odd = abs(steps - round(steps)) > 1e-9 * steps
+    if odd and not co_simulation.canHandleVariableCommunicationStepSize:
+        raise ParameterError(
+            f"stop_time = {stop:g} s is no multiple of step = {size:g} s, and the FMU takes steps "
+            "of one size only; choose one that divides it"
+        )
+    return {"start": start, "stop": stop, "step": size, "tolerance": tolerance}
+
+
+def _check_name(out: Path) -> None:
+    if out.suffix.lower() in FILES:
+        raise ParameterError(
+            f"{out} is the name of a {out.suffix} file, but the results are a folder of Parquet "
+            f"files: choose a name such as {out.with_suffix('.parquet')}; "
+            "pandas.read_parquet(name).to_csv(...) makes one file of them"
+        )
+
+
+def _check_counts(workers: int | None, retries: int, timeout: float | None) -> None:
+    if workers is not None and workers < 1:
+        raise ParameterError(f"workers = {workers} must be 1 or more")
+    if retries < 0:
+        raise ParameterError(f"retries = {retries} must be 0 or more")
+    if timeout is not None and not timeout > 0.0:
+        raise ParameterError(f"timeout = {timeout:g} s must be positive")
+
+
+def _results(plan: Plan, folder: Path) -> "Results":
+    from .results import Results
+
+    job = plan.job
+    settings = {
+        "FMU": plan.digest,
+        "model": plan.name,
+        "parameters": plan.parameters,
+        "outputs": {o.column: [o.variable, o.reduction, o.relation, o.bound] for o in job.outputs},
+        "values": job.values,
+        "start time [s]": job.start,
+        "stop time [s]": job.stop,
+        "step [s]": job.step,
+        "tolerance": job.tolerance,
+    }
+    return Results(folder, settings, plan.parameters, [output.column for output in job.outputs])
+
+
+def _same_rows(plan: Plan, done: "pd.DataFrame", folder: Path) -> None:
+    """Refuse to go on if a row that is done is not what the table has there now."""
+    for k, *values in done[["row", *plan.parameters]].itertuples(index=False):
+        now = [*plan.rows[k].values()] if k < len(plan.rows) else None
+        if now != values:
+            raise ParameterError(
+                f"{folder} holds a sweep over another table: row {k} is "
+                f"{'gone' if now is None else 'another one now'}; give another name for the "
+                "results, or begin anew (--anew)"
+            )
+
+
+# --- doing it -----------------------------------------------------------------------------------
+
+
+@contextmanager
+def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
+    """Give a client of the scheduler at an address, or of one in this process.
+
+    In this process a worker with threads is enough: the FMU runs in processes of its own.
+    """
+    from dask.system import CPU_COUNT
+    from distributed import Client, LocalCluster
+
+    if scheduler is None:
+        with (
+            LocalCluster(  # type: ignore[no-untyped-call]
+                n_workers=1,
+                threads_per_worker=workers or CPU_COUNT,
+                processes=False,
+                dashboard_address="127.0.0.1:0",  # None would take a port of all interfaces
+                worker_dashboard_address="127.0.0.1:0",
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
+            ) as cluster,
+            Client(cluster, set_as_default=False) as client,  # type: ignore[no-untyped-call]
+        ):
+            yield client
+        return
+    try:
+        client = Client(  # type: ignore[no-untyped-call]
+            scheduler, timeout=CONNECT, set_as_default=False
+        )
+    except (TimeoutError, OSError, ValueError) as error:
+        reason = (str(error).splitlines() or [type(error).__name__])[0]
+        raise SweepError(
+            f"no scheduler answers at {scheduler} ({reason}); start one with: dask scheduler"
+        ) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=CONNECT)
+        except (TimeoutError, OSError):
+            raise SweepError(
+                f"the scheduler at {scheduler} has no workers; start one with: "
+                f"dask worker {scheduler}"
+            ) from None
+        yield client
+
+
+class _Sweep:
+    """Batches of rows on their way to the workers and back."""
+
+    def __init__(self, client: Any, plan: Plan, results: "Results", progress: Progress) -> None:
+        self.client, self.plan, self.results, self.progress = client, plan, results, progress
+        self.plugin = f"prbm-sweep-{uuid.uuid4().hex}"
+        self.begin = time.monotonic()
+        self.recent: deque[float] = deque(maxlen=RECENT)
+        self.done = 0
+
+    def run(self, rows: Sequence[int], retries: int, timeout: float | None) -> None:
+        """Do the rows, and write each batch as it comes."""
+        self.done = len(self.plan.rows) - len(rows)
+        try:
+            self._install(rows, retries, timeout)
+            self._gather(deque(rows), retries)
+        except KeyboardInterrupt:
+            kept = len(self.results.read())
+            raise KeyboardInterrupt(
+                f"the sweep was stopped: {kept} of {len(self.plan.rows)} runs are kept in "
+                f"{self.results.folder}, and the same call does the rest"
+            ) from None
+        finally:
+            with suppress(OSError, KeyError):  # of a scheduler that is gone, a worker without it
+                self.client.unregister_worker_plugin(self.plugin)
+
+    def _install(self, rows: Sequence[int], retries: int, timeout: float | None) -> None:
+        """Bring the FMU to the workers."""
+        from dataclasses import replace
+
+        from .worker import FmuPlugin
+
+        # to find out takes a run twice as long, which a timeout might end
+        reuse = timeout is None and len(rows) >= ENOUGH * self._threads()
+        job = replace(self.plan.job, reuse=reuse)
+        try:
+            self.client.register_plugin(
+                FmuPlugin(self.plan.fmu, job, retries, timeout), name=self.plugin
+            )
+        except Exception as error:  # distributed wraps what a worker raises
+            if ABSENT not in str(error):
+                raise
+            raise SweepError(
+                "a worker cannot import prbm; install there what is installed here: "
+                "python -m pip install 'prbm-impact[sweep]'"
+            ) from None
+
+    def _threads(self) -> int:
+        threads: dict[str, int] = self.client.nthreads()
+        return max(1, sum(threads.values()))
+
+    def _gather(self, rest: deque[int], retries: int) -> None:
+        from distributed import as_completed
+
+        running: dict[Any, list[int]] = {}
+        deaths: dict[int, int] = {}  # of workers, by rows that were alone with them
+        suspects: deque[int] = deque()
+        completed = as_completed(loop=self.client.loop)  # type: ignore[no-untyped-call]
+        self._submit(rest, running, completed)
+        for future in completed:
+            rows = running.pop(future)
+            outcomes = self._outcomes(future)
+            if outcomes is None:
+                outcomes = self._after_death(rows, deaths, suspects, retries)
+            if outcomes:
+                self._keep(rows, outcomes)
+            self._submit(rest, running, completed)
+            if suspects and not running:
+                self._send([suspects.popleft()], running, completed)
+
+    def _after_death(
+        self, rows: list[int], deaths: dict[int, int], suspects: deque[int], retries: int
+    ) -> list[Outcome]:
+        """Return the outcome of a row whose workers died too often, or have the rows done again.
+
+        Not only the row that kills a worker is lost with it. So all that were are done again in
+        the end, one by one, with nothing else under way: then it is clear which one it is.
+        """
+        for row in rows:
+            deaths[row] = deaths.get(row, -1) + 1
+        if deaths[rows[0]] > retries:
+            return [Outcome(CRASHED, "the workers that had it died, one after the other")]
+        suspects.extend(rows)
+        return []
+
+    def _keep(self, rows: list[int], outcomes: list[Outcome]) -> None:
+        self.results.add(rows, [self.plan.rows[row] for row in rows], outcomes)
+        self.recent.extend(o.seconds for o in outcomes if o.seconds > 0.0)
+        self.done += len(rows)
+        self.progress(self.done / len(self.plan.rows))
+
+    def _submit(self, rest: deque[int], running: dict[Any, list[int]], completed: Any) -> None:
+        """Have enough batches under way."""
+        threads = self._threads()
+        while rest and len(running) < AHEAD * threads:
+            size = self._size(len(rest), threads)
+            self._send([rest.popleft() for _ in range(size)], running, completed)
+
+    def _size(self, rest: int, threads: int) -> int:
+        """Return how many rows the next batch has: few at first, and few at the end."""
+        if not self.recent:
+            return 1
+        seconds = min(max(SHARE * (time.monotonic() - self.begin), SHORTEST), LONGEST)
+        fair = math.ceil(rest / (AHEAD * threads))
+        return max(1, min(int(seconds / median(self.recent)), fair))
+
+    def _send(self, rows: list[int], running: dict[Any, list[int]], completed: Any) -> None:
+        from .worker import run_batch
+
+        values = [self.plan.rows[row] for row in rows]
+        future = self.client.submit(run_batch, self.plugin, values, pure=False)
+        running[future] = rows
+        completed.add(future)
+
+    def _outcomes(self, future: Any) -> list[Outcome] | None:
+        """Return what became of a batch; None if its workers died."""
+        from distributed import KilledWorker
+
+        from .worker import Unusable
+
+        try:
+            return future.result()  # type: ignore[no-any-return]
+        except KilledWorker:
+            return None
+        except Unusable as error:
+            raise SweepError(f"{self.plan.name}: {error}") from None
+        except CancelledError:
+            raise SweepError(
+                f"the scheduler is gone; {len(self.results.read())} of {len(self.plan.rows)} runs "
+                f"are kept in {self.results.folder}, and the same call does the rest"
+            ) from None
+
+
+def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
+    """Return in a few lines how the runs of a sweep went."""
+    good = results["status"].isin(GOOD)
+    lines = [f"{len(results)} runs, {int((~good).sum())} failed: {out}"]
+    for row, status, message in results.loc[~good, ["row", "status", "message"]].head(3).values:
+        lines.append(f"row {row} {status}: {message}")
+    if (~good).sum() > 3:
+        lines.append("and more in the columns status and message")
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    from ..commands.command_line import main
+
+    sys.exit(main(["sweep", *sys.argv[1:]]))

@@ -1,0 +1,256 @@
+"""Tables of parameters: given, read from files or drawn at random, and compared with an FMU."""
+
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from fmpy.simulation import (  # type: ignore[import-untyped]
+    settable_in_initialization_mode,
+    settable_in_instantiated,
+)
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from ..base.errors import ParameterError
+from ..base.names import proposal
+
+Table = pd.DataFrame | str | Path
+METHODS = ("random", "latin", "sobol")
+SEPARATORS = {";": "semicolons", "\t": "tabs"}  # of tables that are none of ours
+WORDS = {"true": 1.0, "false": 0.0}
+EDGE = 2.0**-53  # how near to 0 and 1 a probability may come, where distributions may have no end
+RANGES = {"Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31, "Int64": 53,
+          "UInt8": 8, "UInt16": 16, "UInt32": 32, "UInt64": 53}  # fmt: skip
+"""Bits of the whole numbers of FMI, as far as a float holds them."""
+
+
+def samples(
+    distributions: Mapping[str, Any], n: int, seed: int = 0, method: str = "random"
+) -> pd.DataFrame:
+    """Draw a table of parameters.
+
+    A column is x = F^-1(u), F the distribution and u a sequence in (0, 1): pseudo-random, a Latin
+    hypercube or Sobol's, scrambled. The columns are independent of each other.
+
+    Parameters
+    ----------
+    distributions : mapping
+        For each parameter a frozen distribution of ``scipy.stats`` (anything with ``ppf``), or
+        (low, high), between which it is uniform; in SI units.
+    n : int
+        Rows; a power of two for Sobol's sequence, which is out of balance otherwise.
+    seed : int
+        The same seed gives the same table.
+    method : str
+        ``random``, ``latin`` or ``sobol``.
+
+    Returns
+    -------
+    DataFrame, shape (n, len(distributions))
+
+    Raises
+    ------
+    ParameterError
+        If there is nothing to draw, a distribution is none, or it gives no finite numbers.
+
+    Examples
+    --------
+    >>> table = samples({"stop.restitution": (0.4, 0.6)}, 4, method="latin")
+    >>> sorted((table["stop.restitution"] * 20).astype(int).tolist())
+    [8, 9, 10, 11]
+    """
+    if not distributions or n < 1:
+        raise ParameterError(
+            f"{n} rows of {len(distributions)} parameters are no table; draw 1 x 1 or more"
+        )
+    unit = np.clip(_unit(n, len(distributions), seed, method), EDGE, 1.0 - EDGE)
+    columns = {
+        name: _quantiles(name, distribution, unit[:, k])
+        for k, (name, distribution) in enumerate(distributions.items())
+    }
+    return pd.DataFrame(columns)
+
+
+def _unit(n: int, d: int, seed: int, method: str) -> NDArray[np.float64]:
+    if method == "random":
+        return np.random.default_rng(seed).random((n, d))
+    if method == "latin":
+        return qmc.LatinHypercube(d, seed=seed).random(n)
+    if method == "sobol":
+        if n & (n - 1):
+            near = 2 ** round(math.log2(n))
+            raise ParameterError(f"n = {n} is no power of two, as Sobol's points are; try {near}")
+        return qmc.Sobol(d, seed=seed).random(n)
+    raise ParameterError(f"there is no method {method!r}; methods are {', '.join(METHODS)}")
+
+
+def _quantiles(name: str, distribution: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
+    if isinstance(distribution, tuple):
+        low, high = distribution
+        x = np.asarray(low + (high - low) * u, dtype=float)
+    elif hasattr(distribution, "ppf"):
+        x = np.asarray(distribution.ppf(u), dtype=float)
+    else:
+        raise ParameterError(
+            f"{name}: {distribution!r} is no distribution; give one of scipy.stats, as "
+            "norm(0.0, 1e-3), or (low, high)"
+        )
+    if x.shape != u.shape or not np.isfinite(x).all():
+        raise ParameterError(f"{name}: the distribution gives what is no finite number")
+    return x
+
+
+def read_table(table: Table) -> pd.DataFrame:
+    """Return a table of parameters, from a CSV or Parquet file if it is a path.
+
+    Raises
+    ------
+    ParameterError
+        If the file cannot be read, or the table has no row or no column.
+    """
+    where = "the table"
+    if not isinstance(table, pd.DataFrame):
+        where, table = str(table), _read_file(Path(table))
+    if table.shape[0] == 0 or table.shape[1] == 0:
+        rows, columns = table.shape
+        raise ParameterError(
+            f"{where} has {rows} rows and {columns} columns; give a column for each parameter, "
+            "under its name, and a row for each run"
+        )
+    names = [str(name).strip() for name in table.columns]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise ParameterError(f"{where} has the column {twice[0]!r} twice; keep one")
+    return table.set_axis(names, axis="columns").reset_index(drop=True)
+
+
+def _read_file(path: Path) -> pd.DataFrame:
+    if not path.exists():
+        raise ParameterError(f"{path} does not exist; give a CSV or Parquet file of parameters")
+    try:
+        if path.suffix.lower() in (".parquet", ".pq"):
+            return pd.read_parquet(path)
+        return pd.read_csv(path, dtype=str, keep_default_na=False, skipinitialspace=True)
+    except pd.errors.EmptyDataError:
+        return pd.DataFrame()
+    except (OSError, ValueError) as error:  # those of pandas and pyarrow among them
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise ParameterError(f"{path} is no table that can be read: {reason}") from None
+
+
+def checked(table: pd.DataFrame, variables: Mapping[str, Any]) -> pd.DataFrame:
+    """Return a table as float64 after comparing it with the variables of an FMU.
+
+    Parameters
+    ----------
+    table : DataFrame
+        From :func:`read_table`.
+    variables : mapping
+        The variables of the FMU as FMPy describes them, by name.
+
+    Raises
+    ------
+    ParameterError
+        If a name is unknown or cannot be set, or a cell is no finite number of the right type.
+    """
+    columns = {}
+    for name in table.columns:
+        _check_separator(name, variables)
+        check_settable(name, variables)
+        columns[name] = _numbers(name, table[name], variables[name].type)
+    return pd.DataFrame(columns)
+
+
+def _check_separator(name: str, variables: Mapping[str, Any]) -> None:
+    for sign, word in SEPARATORS.items():
+        if sign in str(name) and name not in variables:
+            raise ParameterError(
+                f"the table has the column {name!r}: its columns seem to be separated by {word}; "
+                "separate them by commas, and write numbers with a decimal point"
+            )
+
+
+def check_settable(name: str, variables: Mapping[str, Any]) -> None:
+    """Refuse a variable that no start value can be given to.
+
+    Raises
+    ------
+    ParameterError
+    """
+    settable = {key: v for key, v in variables.items() if _settable(v)}
+    if name in settable:
+        return
+    hint = proposal(name, settable)
+    if len(settable) > 10 and hint.startswith("known"):
+        hint = "modelDescription.xml and fmpy info list what there is"
+    if name not in variables:
+        raise ParameterError(f"the FMU has no variable {name!r}; {hint}")
+    variable = variables[name]
+    kind = f"{variable.causality or 'local'} variable of type {variable.type}"
+    shape = f" and shape {variable.shape}" if variable.shape else ""
+    raise ParameterError(f"{name} is a {kind}{shape}, which no table can set; {hint}")
+
+
+def _settable(variable: Any) -> bool:
+    """Whether FMPy sets it before or in initialization, from one number."""
+    if variable.type in ("String", "Binary", "Clock") or variable.shape:
+        return False
+    if variable.causality in ("structuralParameter", "calculatedParameter", "independent"):
+        return False
+    return bool(settable_in_instantiated(variable) or settable_in_initialization_mode(variable))
+
+
+def _numbers(name: str, column: "pd.Series[Any]", kind: str) -> NDArray[np.float64]:
+    x = np.array([_number(name, row, cell) for row, cell in enumerate(column)])
+    if kind == "Boolean":
+        _refuse(name, x, (x != 0.0) & (x != 1.0), "a Boolean, write 0 or 1")
+    elif kind in RANGES:
+        high = 2.0 ** RANGES[kind]
+        low = 0.0 if kind[0] == "U" else -high
+        _refuse(name, x, (x != np.round(x)) | (x < low) | (x >= high), f"a whole number ({kind})")
+    return x
+
+
+def _number(name: str, row: int, cell: Any) -> float:
+    """Return a cell as a finite number."""
+    try:
+        text = cell.strip().lower() if isinstance(cell, str) else None
+        x = WORDS[text] if text in WORDS else float(cell)
+    except (TypeError, ValueError):
+        x = math.nan
+    if not math.isfinite(x):
+        raise ParameterError(
+            f"row {row} of the table has {name} = {cell!s}, which is no finite number; correct it "
+            "or leave the row out"
+        )
+    return x
+
+
+def _refuse(name: str, x: NDArray[np.float64], wrong: NDArray[np.bool_], what: str) -> None:
+    if wrong.any():
+        row = int(wrong.argmax())
+        raise ParameterError(f"row {row} of the table has {name} = {x[row]:g}; it is {what}")
+
+
+def check_outputs(names: Iterable[tuple[str, str]], variables: Mapping[str, Any]) -> None:
+    """Refuse outputs, given as (what was written, variable), that are no scalar numbers of an FMU.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for text, name in names:
+        variable = variables.get(name)
+        if variable is None:
+            hint = proposal(name, variables)
+            hint = "fmpy info lists what there is" if len(hint) > 200 else hint
+            raise ParameterError(f"output {text}: the FMU has no variable {name!r}; {hint}")
+        if variable.type in ("String", "Binary", "Clock") or variable.shape:
+            raise ParameterError(
+                f"output {text}: {name} is of type {variable.type}"
+                + (f" and shape {variable.shape}" if variable.shape else "")
+                + ", not one number; leave it out"
+            )

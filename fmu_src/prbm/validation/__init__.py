@@ -1,0 +1,1 @@
+"""The results of the thesis, reproduced beside printed values and finite elements."""

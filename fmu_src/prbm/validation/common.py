@@ -1,0 +1,113 @@
+"""What several results of the source need: its guides, figures, swings."""
+
+import math
+from dataclasses import fields
+from functools import cache
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..files.mechanism_file import load, shipped
+from ..mechanics.arrays import Real
+from ..mechanics.assembly import assemble
+from ..mechanics.modal import modes
+from ..mechanics.statics import equilibrium
+from ..mechanism.description import Mechanism
+from ..plots import figures
+from ..references import source_model
+
+K = "flexure.K_theta"
+K_HOWELL, K_SOURCE = 2.65, 2.5449
+REFITTED = np.array([8.7614, 4.0104])
+LASER, RATE, CELL = 4e-6, 750.0, 1e-3  # m, Hz; N: 0.2 % of the load cell's range
+DRAWS = 200
+COVERED = 3 * math.sqrt(0.683 * 0.317 / DRAWS)  # three standard deviations of the share covered
+WEIGHTLESS = {"gravity.x": 0.0}
+BLUE, RED, GREEN, PINK, GREY = "#1f4e79", "#d55e00", "#009e73", "#cc79a7", "#b4bcc6"
+Crossings = tuple[float, float]
+
+
+@cache
+def guide(name: str) -> Mechanism:
+    """Return a shipped mechanism."""
+    return load(shipped()[name])
+
+
+def parameters(of: source_model.Structure) -> dict[str, float]:
+    """Return the parameters of a guide with the dimensions of a structure, without gravity."""
+    names = {
+        "length": "flexure.length",
+        "thickness": "flexure.thickness",
+        "width": "flexure.width",
+        "youngs_modulus": "flexure.youngs_modulus",
+        "density": "flexure.density",
+        "shuttle_width": "shuttle.width",
+        "shuttle_mass": "shuttle.mass",
+        "com_height": "shuttle.com_height",
+    }
+    given = {names[one.name]: float(getattr(of, one.name)) for one in fields(of)}
+    return {
+        **given,
+        "shuttle.inertia": of.shuttle_mass * of.shuttle_width**2 / 12,
+        "gravity.x": 0.0,
+        "damping.beta": 0.0,
+    }
+
+
+PMMA = {
+    **parameters(source_model.PMMA),
+    "release.displacement": 0.0,
+    "release.velocity": 1.0,
+    "stop.position": 0.15,
+}
+"""The PMMA guide of the source's chapter 4, set going at 1 m/s, its wall out of reach."""
+
+
+def frequencies(
+    mechanism: Mechanism, values: dict[str, float], displacement: float | None = None
+) -> Real:
+    """Return the frequencies about a shape, at rest or held [Hz]."""
+    system = assemble(mechanism, mechanism.values(values))
+    return modes(system, equilibrium(system, displacement)).frequency
+
+
+def crossings(t: Real, x: Real) -> Crossings:
+    """Return mean frequency between rising zeros [Hz], largest value, of a swing from zero."""
+    rising, below = [0.0], False
+    for i in range(len(x) - 1):
+        below = below or x[i] < -0.1 * x.max()  # a zero follows a whole swing, not noise
+        if below and x[i + 1] >= 0.0:
+            rising.append(float(t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i])))
+            below = False
+    return float(1.0 / np.diff(rising).mean()), float(x.max())
+
+
+def repeated(t: Real, x: Real) -> float:
+    """Return the frequency between the first and the last maximum of a swing [Hz].
+
+    A maximum is that of the parabola through three samples.
+    """
+    tops = []
+    for i in np.flatnonzero((x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])) + 1:
+        a, b, c = x[i - 1 : i + 2]
+        tops.append(float(t[i] + (t[i + 1] - t[i]) * (a - c) / (2 * (a - 2 * b + c))))
+    return (len(tops) - 1) / (tops[-1] - tops[0])
+
+
+def panels(rows: int, columns: int = 1, size: tuple[float, float] = (7.0, 3.0)) -> list[Axes]:
+    """Return the axes of a new figure, row by row."""
+    return figures.panels(rows, columns, size, dpi=100)[1]
+
+
+def figure_of(axes: Axes) -> Figure:
+    """Return the figure that axes are on."""
+    figure = axes.get_figure()
+    assert isinstance(figure, Figure)
+    return figure
+
+
+def legend(axes: Axes, **options: Any) -> None:
+    """Add a legend without a frame."""
+    axes.legend(fontsize=9, frameon=False, **options)

@@ -1,1 +1,0 @@
-"""What a desk needs and an FMU does not: mechanism files, figures, animation, fits."""
