@@ -502,9 +502,9 @@ def test_ctrl_c_while_it_imports_is_no_traceback(monkeypatch, capsys):
 def test_a_package_that_is_missing_is_named(monkeypatch, capsys):
     monkeypatch.delitem(sys.modules, "prbm.commands.building")
     monkeypatch.delattr(sys.modules["prbm.commands"], "building")
-    monkeypatch.setitem(sys.modules, "prbm.mechanics.dynamics", None)
+    monkeypatch.setitem(sys.modules, "prbm.mechanics.inputs", None)
     assert command.main() == cli.MISTAKE
-    assert "needs the Python package prbm.mechanics.dynamics" in capsys.readouterr().err
+    assert "needs the Python package prbm.mechanics.inputs" in capsys.readouterr().err
 
 
 FILES = {
