@@ -33,7 +33,8 @@ SOURCES = Path(__file__).with_name("importer")
 KERNEL = Path(prbm.kernel.__file__).parent
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, "-isystem", str(HEADERS))
+FOLDERS = (f"-I{KERNEL}", "-isystem", str(HEADERS))
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *FOLDERS)
 POSIX = ("-D_POSIX_C_SOURCE=200809L", "-ldl", "-lm", "-lpthread")
 TYPES = {"Real": "r", "Float64": "r", "Integer": "i", "Int32": "i", "Boolean": "b"}
 TWO_STOPS, ANVIL = "TwoStops", "Anvil"
