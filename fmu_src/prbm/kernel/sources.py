@@ -4,9 +4,9 @@ import re
 from collections.abc import Iterator, Mapping
 from importlib.resources import files
 from importlib.resources.abc import Traversable
-from xml.etree.ElementTree import Element, SubElement
 
-from ..fmu.description import GENERATION_TOOL, plain, serialized
+from ..base.text import printable
+from ..base.version import GENERATION_TOOL
 
 UNIT = "prbm_fmu.c"  # the one file that is compiled: it includes all others
 TABLES = "mechanism_tables.h"
@@ -56,7 +56,7 @@ def amalgamation(name: str, title: str, version: int) -> str:
     left_out = {file for number, file in WRAPPERS.items() if number != version}
     head = HEAD.format(
         name=name,
-        title=plain(title).replace("*/", "* /"),
+        title=printable(title).replace("*/", "* /"),
         tool=GENERATION_TOOL,
         version=version,
         tables=TABLES,
@@ -92,15 +92,3 @@ def tables_header(tables: bytes) -> str:
         + "\n".join(rows)
         + "\n};\n"
     )
-
-
-def build_description(identifier: str, source: str) -> bytes:
-    """Return the buildDescription.xml of FMI 3.0: how a shared library is made."""
-    root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
-    sources = SubElement(configuration, "SourceFileSet", {"language": "C99"})
-    SubElement(sources, "SourceFile", {"name": source})
-    override = {"name": OVERRIDE.format(3), "optional": "true"}
-    text = "Functions without the prefix of the model, as a shared library has them"
-    SubElement(sources, "PreprocessorDefinition", override | {"description": text})
-    return serialized(root)
