@@ -6,7 +6,6 @@ import json
 import re
 import subprocess
 import sys
-import tomllib
 import zipfile
 import zlib
 from dataclasses import replace
@@ -19,7 +18,6 @@ from fmpy.validation import validate_fmu
 
 import prbm
 from fmu_host import OK, Instance
-from prbm.base.version import __version__
 from prbm.fmu.description import Heading, model_description
 from prbm.fmu.documentation import page
 from prbm.fmu.native_fmu import described
@@ -303,8 +301,3 @@ def test_an_fmu_carries_exactly_the_modules_of_the_package_that_it_imports(fmus,
     engine = {"base", "mechanism", "mechanics", "hybrid", "fmu"}
     assert {path.name for path in package.iterdir() if path.is_dir()} == engine
     assert {path.name for path in (package / "fmu").iterdir() if path.is_dir()} == {"slave"}
-
-
-def test_the_version_is_the_one_of_the_project():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert prbm.__version__ == __version__ == project["version"]
