@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ..base.errors import EquilibriumError, PrbmError, SimulationError
 from .arguments import (
     ANIMATION_USAGE,
     animation_arguments,
@@ -517,7 +518,7 @@ def _run(words: Sequence[str]) -> int:
         status = _status(error)
         if status is None:
             raise
-        from ..files.settings import in_options
+        from ..files.settings import in_options  # here, so that help comes at once
 
         return _told(f"{name}: {in_options(str(error))}", status)
 
@@ -543,8 +544,6 @@ def _function(run: str) -> Callable[[argparse.Namespace], None]:
 
 def _status(error: Exception) -> int | None:
     """Return the status of a mistake or a failed computation; None if it is an error of ours."""
-    from ..base.errors import EquilibriumError, PrbmError, SimulationError
-
     if isinstance(error, EquilibriumError | SimulationError):
         return FAILED
     return MISTAKE if isinstance(error, PrbmError) else None

@@ -128,7 +128,7 @@ def _spectrum(
 
 def _tell_peaks(lines: Mapping[str, tuple[Real, Real]], size: float) -> None:
     """Print the peaks of every signal that is more than rounding."""
-    from ..analysis.spectrum import peaks
+    from ..analysis.spectrum import peaks  # here, because it takes two seconds
 
     loudest = float(lines["along"][1].max())
     for name, (frequency, amplitude) in lines.items():

@@ -88,9 +88,7 @@ def build(
     PrbmError
         If the mechanism cannot start with these values, or one of them makes no sense.
     """
-    from ..drawing import (
-        icon as picture,  # which takes matplotlib: half a second, spared until it is needed
-    )
+    from ..drawing.icon import icon  # here, because Matplotlib takes half a second
 
     changes = dict(changes or {})
     progress("checking that it starts")
@@ -108,7 +106,7 @@ def build(
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
     contents["documentation/index.html"] = documentation.page(mechanism, listed, run).encode()
-    contents["model.png"] = picture.icon(mechanism, start_sample(mechanism, changes))
+    contents["model.png"] = icon(mechanism, start_sample(mechanism, changes))
     progress("packing")
     return zipped(contents)
 
