@@ -27,7 +27,7 @@ def _source(options: argparse.Namespace) -> None:
     for option in ("measured", "set", "elements"):
         if getattr(options, option) not in (None, []):
             raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
-    from ..validation.page import PAGE, reproduce  # here, because it takes two seconds
+    from ..validation.page import PAGE, reproduce  # type: ignore[import-untyped, unused-ignore]
 
     if options.out is not None:
         check_writable(options.out)
@@ -46,7 +46,7 @@ def _mechanism(options: argparse.Namespace) -> None:
     mechanism = find(options.mechanism)
     values, output = settings(mechanism, options.set), Output(options.out)
     known = dict(map(measured, options.measured))
-    from ..analysis.comparison import compare  # here, because it takes two seconds
+    from ..analysis.comparison import compare  # type: ignore[import-untyped, unused-ignore]
 
     elements = ELEMENTS if options.elements is None else options.elements
     found = compare(mechanism, values, elements=elements, measured=known, progress=reporter())
