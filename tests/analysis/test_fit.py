@@ -23,7 +23,7 @@ from prbm.analysis.fit import (
     valley,
 )
 from prbm.base.errors import ParameterError
-from prbm.data.records import Series
+from prbm.data.series import Series
 from prbm.data.uncertainty import Estimate, EvaluationError
 from prbm.drawing.style import png
 from prbm.mechanics.assembly import assemble

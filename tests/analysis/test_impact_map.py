@@ -10,7 +10,7 @@ import pytest
 
 from prbm.analysis import impact_map, stretching
 from prbm.base.errors import EquilibriumError, ParameterError
-from prbm.data.records import RecordError
+from prbm.data.series import RecordError
 from prbm.drawing.style import png
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics import constraints

@@ -10,7 +10,7 @@ import sys
 import time
 import zipfile
 from importlib import metadata
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import matplotlib
 import pytest
@@ -153,7 +153,12 @@ def test_what_is_installed_has_the_kernel_too(tmp_path):
         installed = metadata.distribution("prbm-impact").files or []
     except metadata.PackageNotFoundError:
         installed = []
-    packed = {f.name: f.locate() for f in installed if f.parent.name == "kernel"}
+    folder = PurePosixPath("prbm/kernel")
+    packed = {
+        f.relative_to(folder).as_posix(): f.locate()
+        for f in installed
+        if folder in f.parents and f.suffix in (".c", ".h")
+    }
     if not packed:
         pytest.skip("no wheel of this package is installed")
     if {name: Path(path).read_bytes() for name, path in packed.items()} != kernel():
@@ -502,9 +507,9 @@ def test_ctrl_c_while_it_imports_is_no_traceback(monkeypatch, capsys):
 def test_a_package_that_is_missing_is_named(monkeypatch, capsys):
     monkeypatch.delitem(sys.modules, "prbm.commands.building")
     monkeypatch.delattr(sys.modules["prbm.commands"], "building")
-    monkeypatch.setitem(sys.modules, "prbm.mechanics.dynamics", None)
+    monkeypatch.setitem(sys.modules, "prbm.mechanics.inputs", None)
     assert command.main() == cli.MISTAKE
-    assert "needs the Python package prbm.mechanics.dynamics" in capsys.readouterr().err
+    assert "needs the Python package prbm.mechanics.inputs" in capsys.readouterr().err
 
 
 FILES = {

@@ -16,7 +16,7 @@ from prbm.data.measurement import (
     turning_points,
     youngs_modulus,
 )
-from prbm.data.records import Series
+from prbm.data.series import Series
 from prbm.data.uncertainty import Estimate, EvaluationError, line, power_law
 from prbm.plots.fit_figures import bending_figure
 

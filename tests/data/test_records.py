@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from prbm.base.errors import PrbmError
-from prbm.data.records import RecordError, Series, read_record
+from prbm.data.records import read_record
+from prbm.data.series import RecordError, Series
 
 TIME = np.arange(40) * 1e-3
 SIGNAL = 5e-3 * np.cos(30.0 * TIME)

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from prbm.data.records import Series
+from prbm.data.series import Series
 from prbm.data.uncertainty import Estimate, EvaluationError
 from prbm.data.vibration import damping_verdict, fourier_peak, free_vibration, impacts
 

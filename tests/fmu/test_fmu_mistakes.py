@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from fmpy import simulate_fmu
 
 from fmu_host import DISCARD, OK, Instance
 from importer_mistakes import AT_START, LATER, NAN, STEPS
+from prbm.fmu.slave import instance
+from prbm.fmu.slave.resolved import FILE
 from prbm.fmu.slave.slave import MechanismSlave
 from support import ROOT, SUPPORT
 
@@ -156,20 +159,22 @@ def test_a_wrong_get_has_no_value_and_harms_nothing(fmus, getter):
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("by nothing"), KeyboardInterrupt()])
-def test_an_exception_while_it_starts_is_the_reason_that_is_given(error, capsys):
+def test_an_exception_while_it_starts_is_the_reason_that_is_given(
+    error, fmus, tmp_path, monkeypatch, capsys
+):
+    def fails(*_: object, **__: object) -> None:
+        raise error
 
     class Slave(MechanismSlave):
-        def _start(self) -> None:
-            raise error
+        pass
 
-    slave = object.__new__(Slave)
-    vars(slave).update(
-        failure=None, running=False, simulation=None, refused={}, told=set(), table=None,
-        log_queue=[], instance_name="it",
-    )  # fmt: skip
+    with zipfile.ZipFile(fmus["PRBDM"]) as fmu:
+        (tmp_path / FILE).write_bytes(fmu.read(f"resources/{FILE}"))
+    monkeypatch.setattr(instance, "Simulation", fails)
+    slave = Slave(instance_name="it", resources=str(tmp_path))
     slave.exit_initialization_mode()
     reason = "by nothing" if isinstance(error, ZeroDivisionError) else "was interrupted"
-    assert reason in slave.failure
+    assert reason in slave.instance.failure
     assert not slave.do_step(0.0, 1e-3)
     assert reason in capsys.readouterr().err
     assert not any("came before" in entry.msg for entry in slave.log_queue)

@@ -9,7 +9,6 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
-import prbm
 from kernel_simulation import KernelSimulation
 from many_parts import anvil, elastic
 from prbm.fmu import native_fmu, python_fmu
@@ -139,4 +138,4 @@ def test_what_lets_go_while_it_is_pressed_again_does_not_chatter():
 @pytest.mark.parametrize("guide", [anvil(), elastic()], ids=lambda guide: guide.name)
 def test_a_mechanism_survives_its_way_through_json(guide):
     data = json.loads(json.dumps(resolved(guide, ())["mechanism"]))
-    assert mechanism_from(data, prbm) == guide
+    assert mechanism_from(data) == guide

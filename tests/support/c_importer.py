@@ -21,19 +21,20 @@ import numpy as np
 import pytest
 from fmpy import read_model_description
 
+import prbm.kernel
 from many_parts import anvil
 from prbm.base.atomic import write
-from prbm.fmu import native_fmu
 from prbm.kernel.compiler import _locked, cache_folder
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Stop
 from support import built, mechanism
 
 SOURCES = Path(__file__).with_name("importer")
-KERNEL = Path(native_fmu.__file__).with_name("kernel")
+KERNEL = Path(prbm.kernel.__file__).parent
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, "-isystem", str(HEADERS))
+FOLDERS = (f"-I{KERNEL}", "-isystem", str(HEADERS))
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *FOLDERS)
 POSIX = ("-D_POSIX_C_SOURCE=200809L", "-ldl", "-lm", "-lpthread")
 TYPES = {"Real": "r", "Float64": "r", "Integer": "i", "Int32": "i", "Boolean": "b"}
 TWO_STOPS, ANVIL = "TwoStops", "Anvil"

@@ -85,7 +85,7 @@ def _target(name: str) -> Path:
     flags = [
         *SANITIZERS, "-fsanitize=fuzzer" if clang else "-DSTANDALONE", *POSIX,
         "-DPRBM=",  # the functions of the kernel are not static
-        "-I", str(KERNEL), "-I", str(SOURCES),
+        "-I", str(SOURCES),
     ]  # fmt: skip
     compiler = "clang" if clang else "cc"
     return once(f"fuzz-{name}", lambda path: compile_c(path, sources, flags, "", compiler))

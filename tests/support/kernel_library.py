@@ -152,9 +152,8 @@ def prototypes() -> dict[str, Prototype]:
 
 def unit() -> str:
     """Return the part of the library's one file that kernel.h declares, as C."""
-    includes = re.findall(r'#include "(\w+\.c)"', (KERNEL / "prbm_fmu.c").read_text())
-    files = includes[: includes.index("hybrid.c")]
-    return "".join(f'#include "{name}"\n' for name in ("kernel.h", *files))
+    includes = re.findall(r'#include "(core/\w+\.c)"', (KERNEL / "prbm_fmu.c").read_text())
+    return "".join(f'#include "{name}"\n' for name in ("kernel.h", *includes))
 
 
 def compiled(flags: Sequence[str] = (), compiler: Sequence[str] = ("cc",)) -> ctypes.CDLL:

@@ -57,7 +57,7 @@ def library() -> ctypes.CDLL:
     """Return the kernel up to the simulation, compiled once, all functions visible."""
     folder = Path(mkdtemp(prefix="prbm-simulation-"))
     try:
-        kernel = (KERNEL / "prbm_fmu.c").read_text().partition('#include "fmu.h"')[0]
+        kernel = (KERNEL / "prbm_fmu.c").read_text().partition('#include "fmi/')[0]
         source, built = folder / "kernel.c", folder / "kernel.so"
         source.write_text(kernel)
         subprocess.run(["cc", *FLAGS, str(source), "-o", str(built), "-lm"], check=True)

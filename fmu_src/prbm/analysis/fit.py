@@ -23,7 +23,7 @@ from scipy.optimize import least_squares
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.names import unknown
-from ..data.records import Series
+from ..data.series import Series
 from ..data.uncertainty import Estimate, EvaluationError, serial_correlation, widening
 from ..data.vibration import impacts
 from ..hybrid.simulation import Simulation

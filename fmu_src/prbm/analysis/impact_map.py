@@ -40,7 +40,7 @@ from matplotlib.figure import Figure
 
 from ..base.errors import EquilibriumError, ParameterError
 from ..base.progress import Progress
-from ..data.records import Series
+from ..data.series import Series
 from ..drawing.style import own_style
 from ..hybrid.simulation import Impact, Simulation
 from ..mechanics.arrays import Real

@@ -22,8 +22,8 @@ from .arguments import (
     set_argument,
     stop_time_argument,
 )
+from .program import FAILED, INTERRUPTED, MISTAKE, OK
 
-OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 WIDTH = 79  # columns of a description
 NEGATIVE = re.compile(r"-\.?\d")
 MECHANISM = "name of a shipped mechanism (prbm list), or a mechanism file, FILE.toml"
@@ -536,7 +536,7 @@ def protected(words: Sequence[str]) -> list[str]:
 def _function(run: str) -> Callable[[argparse.Namespace], None]:
     module, _, function = run.partition(":")
     found: Callable[[argparse.Namespace], None] = getattr(
-        importlib.import_module(f".commands.{module}", __package__), function
+        importlib.import_module(f".{module}", __package__), function
     )
     return found
 

@@ -9,12 +9,13 @@ from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
 
 from ..base.errors import MechanismError
+from ..base.text import printable
 from ..interface.variables import Variable
 from ..mechanism.description import Mechanism
 from ..runs.experiment import experiment
 from . import documentation
 from .archive import zipped
-from .description import Heading, model_description, plain
+from .description import Heading, model_description
 from .slave.resolved import FILE, resolved
 from .slave.slave import MechanismSlave
 from .start import interface, start_sample
@@ -157,7 +158,7 @@ def _named(
 
 def _plain(title: str) -> str:
     """Return a title that cannot leave the docstring it is put into."""
-    return plain(title).replace("\\", "/").replace('"', "'").rstrip(".")
+    return printable(title).replace("\\", "/").replace('"', "'").rstrip(".")
 
 
 def _binaries(name: str) -> Iterator[tuple[str, bytes]]:

@@ -27,7 +27,7 @@ from ..analysis.impact_map import (
 from ..base.errors import SimulationError
 from ..base.progress import Progress
 from ..data.measurement import Beam, beam_table, youngs_modulus
-from ..data.records import Series
+from ..data.series import Series
 from ..data.uncertainty import Estimate
 from ..data.vibration import free_vibration
 from ..drawing.style import own_style

@@ -6,7 +6,7 @@ from decimal import Decimal
 from functools import cache
 from typing import Any
 
-from ..files.units import MECHANICAL
+from .units import MECHANICAL
 
 DEFINITIONS = f"""{MECHANICAL}@alias second = sec
 inch = 0.0254 * metre = in = inches

@@ -4,7 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmu.h"
+#include "fmi/fmu.h"
 
 static const double TIME_SLACK = 1e-6;  /* of a step: round-off that importers gather */
 static const double TIME_ROUND = 1e-12; /* of the time itself */

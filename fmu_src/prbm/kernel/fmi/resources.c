@@ -3,7 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "fmu.h"
+#include "fmi/fmu.h"
 
 #if defined(PRBM_TABLES)
 

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "fmi2Functions.h"
-#include "fmu.h"
+#include "fmi/fmu.h"
 
 /* --- what the standard allows when ------------------------------------------------------------ */
 

@@ -12,7 +12,7 @@
 #if defined(__clang__)
 #pragma clang diagnostic pop
 #endif
-#include "fmu.h"
+#include "fmi/fmu.h"
 
 /* --- what the standard allows when ------------------------------------------------------------ */
 
