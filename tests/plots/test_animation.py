@@ -123,7 +123,7 @@ def test_the_hit_point_touches_the_wall_in_the_frame_of_an_impact(
         }
 
     values = {"stop.offset": -5e-3, "stop.position": 1e-3}
-    result = simulate(mechanisms["PRBDM2R"], values, 0.15, source=wall)
+    result = simulate(mechanisms["PRBDM2R"], values, stop_time=0.15, source=wall)
     count = len(result.impacts)
     assert count >= 2
     scene = scene_of(result if recorded else replace(result, impacts=()), slow=20.0)
@@ -161,7 +161,7 @@ def test_a_result_of_fmpy_and_one_of_the_engine_are_drawn_alike(
     mechanisms: dict[str, Mechanism], fmus: dict[str, Path]
 ) -> None:
     mechanism = mechanisms["PRBDM"]
-    of_engine = simulate(mechanism, {"stop.offset": 2e-3}, STOP_TIME)
+    of_engine = simulate(mechanism, {"stop.offset": 2e-3}, stop_time=STOP_TIME)
     of_fmpy = fmpy.simulate_fmu(
         fmus["PRBDM"],
         stop_time=STOP_TIME,

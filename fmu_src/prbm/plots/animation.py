@@ -24,11 +24,11 @@ from ..base.errors import ParameterError, PrbmError
 from ..base.names import unknown
 from ..base.progress import Progress, reporter
 from ..commands.arguments import ANIMATION_USAGE, animation_arguments
+from ..commands.duration import span
 from ..files.mechanism_file import find, load, shipped
 from ..files.settings import quantity, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
-from ..runs.duration import span
 from ..runs.result import Columns, Result, ResultError, names, read_csv
 from ..runs.run import simulate
 from .motion import FPS, film, fmpy_command, motion, needed
@@ -338,7 +338,8 @@ def _result(options: argparse.Namespace) -> Result:
         if mechanism is None:
             raise ParameterError("name what to show: RESULT.csv, --model or --mechanism")
         changes = settings(mechanism, options.set)
-        return simulate(mechanism, changes, *span(mechanism, changes, options.stop_time))
+        stop_time, step = span(mechanism, changes, options.stop_time)
+        return simulate(mechanism, changes, stop_time=stop_time, step=step)
     if len(files) > 2:
         raise ParameterError(f"{len(files)} files are given: RESULT.csv OUT, or OUT")
     columns = read_csv(files[0])
