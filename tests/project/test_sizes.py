@@ -2,7 +2,7 @@
 
 from textwrap import dedent
 
-from project import sizes
+import sizes
 
 
 def test_files_classes_and_functions_are_within_their_limits():
