@@ -24,6 +24,7 @@ from .arguments import (
     stop_time_argument,
 )
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
+from .remedies import in_options
 
 WIDTH = 79  # columns of a description
 NEGATIVE = re.compile(r"-\.?\d")
@@ -518,8 +519,6 @@ def _run(words: Sequence[str]) -> int:
         status = _status(error)
         if status is None:
             raise
-        from ..files.settings import in_options  # here, so that help comes at once
-
         return _told(f"{name}: {in_options(str(error))}", status)
 
 
