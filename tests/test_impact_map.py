@@ -18,6 +18,7 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.contact import response as impulse_response
 from prbm.mechanics.kinetics import inertia
 from prbm.mechanics.modal import modes, modes_at
+from prbm.plots import impact_map as figures
 from support import mechanism
 
 WEIGHTLESS = {"gravity.x": 0.0}
@@ -228,11 +229,11 @@ def test_a_map_is_written_and_drawn(tmp_path):
     assert sum(map(float, rows[1][4:])) == pytest.approx(1.0, abs=5e-6)
     assert str(one).splitlines()[0] == "2R"
     for figure in (
-        impact_map.heat_map([one, one]), impact_map.surface([one, one]), impact_map.energies(one),
+        figures.heat_map([one, one]), figures.surface([one, one]), figures.energies(one),
     ):  # fmt: skip
         assert png(figure).startswith(b"\x89PNG")
     point = impact_map.algebraic(guide(), [-5e-3], [0.0], WEIGHTLESS)
-    assert png(impact_map.heat_map([point])).startswith(b"\x89PNG")
+    assert png(figures.heat_map([point])).startswith(b"\x89PNG")
 
 
 def test_every_way_tells_how_much_of_it_is_done():

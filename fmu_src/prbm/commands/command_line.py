@@ -536,7 +536,7 @@ def protected(words: Sequence[str]) -> list[str]:
 def _function(run: str) -> Callable[[argparse.Namespace], None]:
     module, _, function = run.partition(":")
     found: Callable[[argparse.Namespace], None] = getattr(
-        importlib.import_module(f".commands.{module}", __package__), function
+        importlib.import_module(f".{module}", __package__), function
     )
     return found
 
