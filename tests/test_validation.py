@@ -154,7 +154,7 @@ def test_a_part_can_be_reproduced_without_elements(tmp_path, monkeypatch):
             raise ImportError(f"No module named {name!r}")
         return found_module(name, *rest)
 
-    monkeypatch.setattr(finite_elements.importlib, "import_module", missing)
+    monkeypatch.setattr("importlib.import_module", missing)
     told = []
     (found,) = reproduce(tmp_path / "docs", ["table-1"], told.append)
     assert found.verdict == "agrees"

@@ -379,7 +379,7 @@ def by_elements(
     def hits(offset: float) -> Iterator[Hit]:
         fe = FiniteElements(mechanism, which.at(values, 0.0, offset), elements=elements)
         eps = value(mechanism.stops[which.index], "restitution", fe.values)
-        size = max(float(np.abs(z).max()) for z in fe.drawn.values())
+        size = fe.model.size
         shape: Shape | None = None
         for h in heights:
 
