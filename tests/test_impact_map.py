@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from prbm.analysis import impact_map, stretching
+from prbm.analysis.touching import impact_shape
 from prbm.base.errors import EquilibriumError, ParameterError
 from prbm.data.records import RecordError
 from prbm.drawing.style import png
@@ -46,7 +47,7 @@ def test_algebraic_restitution_is_that_of_an_impulse(model, axial):
     """The sum over modes against the mass matrix on the tangent of the loops."""
     values = WEIGHTLESS | {"stop.offset": 3e-3, "stop.position": -7e-3}
     system = assemble(m := guide(model, axial=axial), m.values(values))
-    shape = impact_map.impact_shape(system, 0, -7e-3)
+    shape = impact_shape(system, 0, -7e-3)
     e = system.directions(shape.q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     loops = constraints.jacobian(system.spread(system.loops), e)
@@ -173,7 +174,7 @@ def test_energies_of_a_simulated_impact_add_up():
 def test_modes_at_a_static_shape_are_those_of_the_shape():
     """Gauss' multipliers are the static ones where the body is held."""
     system = assemble(m := guide(axial=True), m.values(WEIGHTLESS))
-    shape = impact_map.impact_shape(system, 0, -5e-3)
+    shape = impact_shape(system, 0, -5e-3)
     np.testing.assert_allclose(
         modes_at(system, shape.q).frequency, modes(system, shape).frequency, rtol=1e-7
     )
