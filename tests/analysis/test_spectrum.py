@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from prbm.analysis.spectrum import after_impact, after_last_impact, figure, peaks, spectrum
+from prbm.analysis.spectrum import after_impact, after_last_impact, peaks, spectrum
 from prbm.base.errors import ParameterError
 from prbm.drawing.style import png
+from prbm.plots.spectrum import spectrum_figure
 from prbm.runs.run import simulate
 from support import mechanism
 
@@ -67,8 +68,8 @@ def test_too_few_or_unequal_samples_are_refused():
 
 
 def test_the_figure_is_drawn(small_motion):
-    assert png(figure(small_motion, highest=400.0)).startswith(b"\x89PNG")
-    assert len(figure(small_motion, ("along",)).axes) == 1
+    assert png(spectrum_figure(small_motion, highest=400.0)).startswith(b"\x89PNG")
+    assert len(spectrum_figure(small_motion, ("along",)).axes) == 1
 
 
 def test_after_the_last_impact_a_1r_rings_at_its_one_frequency():

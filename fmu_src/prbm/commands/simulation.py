@@ -93,7 +93,8 @@ def _spectrum(
     options: argparse.Namespace, result: Result, values: dict[str, float], duration: float
 ) -> None:
     """Tell which frequencies are heard after an impact."""
-    from ..analysis import spectrum  # here, because it takes two seconds
+    from ..analysis import spectrum  # here for the start-up time
+    from ..plots.spectrum import spectrum_figure
 
     mechanism, output = result.mechanism, Output(options.out)
     if not result.impacts:
@@ -122,7 +123,7 @@ def _spectrum(
         np.column_stack([grid, *(amplitude for _, amplitude in lines.values())]).tolist(),
     )
     highest = min(SHOWN * max([f for _, f in modes], default=grid[-1]), float(grid[-1]))
-    output.figure(f"{mechanism.name}-spectrum.png", lambda: spectrum.figure(heard, highest=highest))
+    output.figure(f"{mechanism.name}-spectrum.png", lambda: spectrum_figure(heard, highest=highest))
     output.write()
 
 

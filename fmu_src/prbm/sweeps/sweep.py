@@ -14,7 +14,6 @@ import io
 import logging
 import math
 import os
-import sys
 import time
 import uuid
 from collections import deque
@@ -558,9 +557,3 @@ def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
     if (~good).sum() > 3:
         lines.append("and more in the columns status and message")
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    from ..commands.command_line import main
-
-    sys.exit(main(["sweep", *sys.argv[1:]]))
