@@ -12,6 +12,8 @@ from prbm.fmu import python_fmu
 from prbm.mechanism.description import Mechanism
 from support import GUIDES, built, mechanism
 
+collect_ignore = ["support"]  # imported by tests, not collected
+
 
 class Built(dict[Any, Path]):
     """FMUs by what they are of: the guides' at once, others when they are asked for."""

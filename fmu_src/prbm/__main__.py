@@ -1,4 +1,4 @@
-"""The command ``prbm``, up to where it imports what takes time and may be missing."""
+"""The entry point of the command ``prbm``: reports a missing package in a sentence."""
 
 import sys
 
@@ -8,7 +8,7 @@ NOT_STARTED, INTERRUPTED = 2, 130
 def main() -> int:
     """Run the command; return its exit status."""
     try:
-        from .commands.command_line import main as command
+        from .commands.command_line import main as command  # here, so that Ctrl-C is caught
 
         return command()
     except ModuleNotFoundError as error:

@@ -1,39 +1,33 @@
-"""The command that builds FMUs, up to where it imports what takes time and may be missing."""
+"""The entry point of the command that builds FMUs.
+
+NumPy and SciPy are imported after ``SOURCE_DATE_EPOCH`` has been checked, and a missing package is
+reported in a sentence.
+"""
 
 import sys
-from pathlib import Path
 
 from ..fmu.date import date
-
-FAILED_TO_START, INTERRUPTED = 2, 130
-
-
-def command_name() -> str:
-    """Return what the user typed to get here."""
-    path = Path(sys.argv[0])
-    if path.resolve() == Path(__file__).resolve():
-        return f"python -m {__spec__.name}"
-    return path.stem if path.suffix == ".exe" else path.name
+from .program import INTERRUPTED, MISTAKE, command_name
 
 
 def main() -> int:
     """Run the command; return its exit status."""
     try:
         try:
-            date()  # a wrong one keeps SciPy from being imported: numpy.f2py reads it too
+            date()  # a wrong one fails the import of SciPy: numpy.f2py reads it, too
         except ValueError as error:
             print(f"{command_name()}: {error}", file=sys.stderr)
-            return FAILED_TO_START
-        from . import building as cli
+            return MISTAKE
+        from . import building  # here, because it takes a second and packages may be missing
 
-        return cli.main()
+        return building.main()
     except ModuleNotFoundError as error:
         print(
             f"{command_name()} needs the Python package {error.name}; install what it needs with "
             "'python -m pip install .' in the folder of build_fmu.py",
             file=sys.stderr,
         )
-        return FAILED_TO_START
+        return MISTAKE
     except KeyboardInterrupt:
         print(f"{command_name()}: interrupted", file=sys.stderr)
         return INTERRUPTED

@@ -16,24 +16,20 @@ from ..base.atomic import check_no_folder, check_writable, write
 from ..base.errors import PrbmError
 from ..base.version import __version__
 from ..files.mechanism_file import load, schema, shipped
+from ..files.settings import UserMistake
 from ..fmu import native_fmu, python_fmu
 from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
 from ..mechanics.inputs import input_names
 from ..mechanism.description import Mechanism
-from .build_fmu import command_name
+from .program import FAILED, INTERRUPTED, MISTAKE, OK, command_name
 
-OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
-PATIENCE = 2.0  # s for the process of a simulation to end after Ctrl-C
+TERMINATION_TIMEOUT = 2.0  # s for the process of a simulation to end after Ctrl-C
 REPORT = f"""
 import os, signal, sys
 signal.signal(signal.SIGINT, lambda *_: os._exit({INTERRUPTED}))
 from prbm.commands.fmu_report import main
 sys.exit(main(sys.argv[1:]))
 """  # Ctrl-C while it imports needs no traceback
-
-
-class UserMistake(Exception):
-    """What the user asked for cannot be done; the message says why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{command_name()}: {missing}", file=sys.stderr)
             status = max(status, FAILED)
         return status
-    except (UserMistake, PrbmError) as error:
+    except PrbmError as error:
         print(f"{command_name()}: {error}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt:
@@ -379,7 +375,7 @@ def _end(process: subprocess.Popen[bytes]) -> None:
     """Wait for a process that should end by itself; insist if it does not."""
     for number in (signal.SIGINT, signal.SIGTERM):
         try:
-            process.wait(PATIENCE)
+            process.wait(TERMINATION_TIMEOUT)
             return
         except subprocess.TimeoutExpired:
             os.kill(process.pid, number)

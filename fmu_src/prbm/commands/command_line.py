@@ -22,8 +22,8 @@ from .arguments import (
     set_argument,
     stop_time_argument,
 )
+from .program import FAILED, INTERRUPTED, MISTAKE, OK
 
-OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 WIDTH = 79  # columns of a description
 NEGATIVE = re.compile(r"-\.?\d")
 MECHANISM = "name of a shipped mechanism (prbm list), or a mechanism file, FILE.toml"

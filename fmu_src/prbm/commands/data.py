@@ -8,8 +8,9 @@ from pathlib import Path
 
 from ..analysis.fit import DISPLACEMENT
 from ..data.measurement import Calibration, calibrate
-from ..data.record_units import same_dimension
-from ..data.records import Channel, Record, Series, read_record
+from ..data.records import Channel, Record, read_record
+from ..data.series import Series
+from ..files.record_units import same_dimension
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble

@@ -25,7 +25,7 @@ from ..interface.variables import CLOCK
 from ..mechanism.description import Mechanism
 from ..plots.figures import response
 from ..runs.headline import FREQUENCY, told
-from .building import FAILED, INTERRUPTED, MISTAKE, OK
+from .program import FAILED, INTERRUPTED, MISTAKE, OK
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from ..plots.figures import save
 from ..plots.motion import FPS, film, fmpy_command, motion, needed
 from ..plots.picture import picture
 from ..plots.scene import Scene
-from ..runs.duration import span
 from ..runs.result import Columns, Result, ResultError, names, read_csv
 from ..runs.run import simulate
+from .duration import span
 
 
 def drawn(options: argparse.Namespace) -> None:
@@ -64,7 +64,8 @@ def _result(options: argparse.Namespace) -> Result:
         if mechanism is None:
             raise ParameterError("name the source of the film: RESULT.csv, --model or --mechanism")
         changes = settings(mechanism, options.set)
-        return simulate(mechanism, changes, *span(mechanism, changes, options.stop_time))
+        stop_time, step = span(mechanism, changes, options.stop_time)
+        return simulate(mechanism, changes, stop_time=stop_time, step=step)
     if len(files) > 2:
         raise ParameterError(f"{len(files)} files are given: RESULT.csv OUT, or OUT")
     columns = read_csv(files[0])

@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..mechanics.arrays import Real
-from .records import Series
+from .series import Series
 from .uncertainty import CORRELATED, Estimate, EvaluationError, Line, line, power_law
 
 STIFFENING = 36 / 35  # of the elastica under a force that keeps its direction, times (d/l)^2

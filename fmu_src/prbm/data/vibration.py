@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
 from ..mechanics.arrays import Real
-from .records import Series
+from .series import Series
 from .uncertainty import LEVEL, Estimate, EvaluationError, serial_correlation, widening
 
 FEWEST_PERIODS = 3.0  # in a record, for a frequency

@@ -7,7 +7,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from ..interface.variables import Number
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.assembly import assemble
 from ..mechanics.system import System
@@ -24,7 +23,7 @@ MANY = 4  # flexures; lines of more are drawn thinner
 
 
 @own_style()
-def icon(mechanism: Mechanism, sample: Mapping[str, Number]) -> bytes:
+def icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
     """Return the icon as PNG: the straight shape in grey, the shape at release in colour.
 
     Parameters
@@ -46,7 +45,7 @@ def icon(mechanism: Mechanism, sample: Mapping[str, Number]) -> bytes:
     return png(figure)
 
 
-def shape(system: System, sample: Mapping[str, Number]) -> Real:
+def shape(system: System, sample: Mapping[str, float]) -> Real:
     """Return the coordinates that outputs tell of: angles, and stretches that close the loops."""
     q = np.array(system.q0)
     for name, j in angles(system).items():

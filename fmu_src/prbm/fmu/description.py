@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from ..base.version import __version__
+from ..base.text import printable
+from ..base.version import GENERATION_TOOL, __version__
 from ..interface.units import QUANTITIES, UNITS
 from ..interface.variables import Variable
 from ..runs.experiment import Experiment
 from .date import date
 
 TOLERANCE = "solver.tolerance"
-GENERATION_TOOL = f"prbm-impact {__version__}"
 
 
 @dataclass(frozen=True)
@@ -58,20 +58,9 @@ def serialized(root: Element) -> bytes:
     ElementTree.indent(root)
     for element in root.iter():
         for name, value in element.items():
-            element.set(name, plain(value))
+            element.set(name, printable(value))
     text: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
     return text + b"\n"
-
-
-def plain(text: str) -> str:
-    r"""Return a text with blanks for the characters that XML and HTML cannot hold.
-
-    Examples
-    --------
-    >>> plain("a bell\a rings")
-    'a bell  rings'
-    """
-    return "".join(c if c.isprintable() else " " for c in text)
 
 
 def number(value: float | int | bool | None) -> str:

@@ -4,11 +4,13 @@ import html
 import math
 from collections.abc import Iterable, Sequence
 
-from ..interface.variables import NativeInterface, Variable
+from ..base.text import printable
+from ..base.version import GENERATION_TOOL
+from ..interface.native import NativeInterface
+from ..interface.variables import Variable
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import FlexureType
 from ..runs.experiment import Experiment
-from .description import GENERATION_TOOL, plain
 
 STYLE = """
 body { font: 16px/1.5 system-ui, sans-serif; color: #222; max-width: 62rem; margin: 2rem auto;
@@ -59,7 +61,7 @@ SOURCES = (
 
 def escape(text: str) -> str:
     """Return a text as HTML has it, line by line."""
-    return "\n".join(html.escape(plain(line)) for line in text.splitlines())
+    return "\n".join(html.escape(printable(line)) for line in text.splitlines())
 
 
 def page(mechanism: Mechanism, variables: tuple[Variable, ...], experiment: Experiment) -> str:

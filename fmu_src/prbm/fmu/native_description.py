@@ -3,8 +3,10 @@
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
+from ..interface.native import NativeInterface
 from ..interface.structure import dependencies
-from ..interface.variables import CLOCK, NativeInterface, Variable, pushed
+from ..interface.variables import CLOCK, Variable, pushed
+from ..kernel.sources import OVERRIDE
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import GROUND
 from .description import (
@@ -234,3 +236,15 @@ def _terminal(ports: Element, name: str, description: str, members: Mapping[str,
     for member, variable in members.items():
         names = {"variableName": variable, "memberName": member}
         SubElement(terminal, "TerminalMemberVariable", names | {"variableKind": "signal"})
+
+
+def build_description(identifier: str, source: str) -> bytes:
+    """Return the buildDescription.xml of FMI 3.0: how the sources become a shared library."""
+    root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
+    configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
+    sources = SubElement(configuration, "SourceFileSet", {"language": "C99"})
+    SubElement(sources, "SourceFile", {"name": source})
+    override = {"name": OVERRIDE.format(3), "optional": "true"}
+    text = "Functions without the prefix of the model, as a shared library has them"
+    SubElement(sources, "PreprocessorDefinition", override | {"description": text})
+    return serialized(root)

@@ -8,17 +8,18 @@ from dataclasses import replace
 from importlib.resources import files
 
 from ..base.errors import MechanismError
+from ..interface.native import NativeInterface, native_interface
 from ..interface.tables import FILE, tables
-from ..interface.variables import CLOCK, NativeInterface, native_interface
+from ..interface.variables import CLOCK
 from ..kernel.compiler import HOST, Platform, libraries
-from ..kernel.sources import TABLES, amalgamation, build_description, kernel, tables_header
+from ..kernel.sources import TABLES, amalgamation, kernel, tables_header
 from ..mechanics.independent import independent
 from ..mechanism.description import Mechanism
 from ..runs.experiment import experiment
 from . import documentation
 from .archive import zipped
 from .description import Heading
-from .native_description import LOG_CATEGORIES, description, terminals
+from .native_description import LOG_CATEGORIES, build_description, description, terminals
 from .reference_results import reference
 from .slave.resolved import FILE as MODEL
 from .slave.resolved import resolved

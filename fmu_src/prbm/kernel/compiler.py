@@ -273,6 +273,7 @@ def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -
     with tempfile.TemporaryDirectory(prefix="prbm_") as name:
         folder = Path(name)
         for file, content in files.items():
+            (folder / file).parent.mkdir(parents=True, exist_ok=True)
             (folder / file).write_bytes(content)
         environment = os.environ | {"LC_ALL": "C"} | dict.fromkeys(TEMPORARY, name)
         if compiler.name == "ziglang":

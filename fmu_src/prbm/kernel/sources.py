@@ -1,15 +1,16 @@
 """The C source inside a native FMU: the kernel as one file, and its tables as a constant array."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
-from xml.etree.ElementTree import Element, SubElement
+from importlib.resources.abc import Traversable
 
-from ..fmu.description import GENERATION_TOOL, plain, serialized
+from ..base.text import printable
+from ..base.version import GENERATION_TOOL
 
 UNIT = "prbm_fmu.c"  # the one file that is compiled: it includes all others
 TABLES = "mechanism_tables.h"
-WRAPPERS = {2: "fmi2.c", 3: "fmi3.c"}
+WRAPPERS = {2: "fmi/fmi2.c", 3: "fmi/fmi3.c"}
 INCLUDE = re.compile(r'#\s*include\s+"([^"]+)"\s*')
 OVERRIDE = "FMI{}_OVERRIDE_FUNCTION_PREFIX"
 BYTES_A_LINE = 20
@@ -36,13 +37,17 @@ HEAD = """\
 
 
 def kernel() -> dict[str, bytes]:
-    """Return the files of the kernel by name."""
-    folder = files(__package__)
-    return {
-        entry.name: entry.read_bytes()
-        for entry in folder.iterdir()
-        if entry.name.endswith((".c", ".h"))
-    }
+    """Return the files of the kernel by path relative to its folder, with ``/`` between names."""
+    return dict(_files(files(__package__), ""))
+
+
+def _files(folder: Traversable, prefix: str) -> Iterator[tuple[str, bytes]]:
+    for entry in folder.iterdir():
+        path = f"{prefix}{entry.name}"
+        if entry.is_dir():
+            yield from _files(entry, f"{path}/")
+        elif entry.name.endswith((".c", ".h")):
+            yield path, entry.read_bytes()
 
 
 def amalgamation(name: str, title: str, version: int) -> str:
@@ -51,7 +56,7 @@ def amalgamation(name: str, title: str, version: int) -> str:
     left_out = {file for number, file in WRAPPERS.items() if number != version}
     head = HEAD.format(
         name=name,
-        title=plain(title).replace("*/", "* /"),
+        title=printable(title).replace("*/", "* /"),
         tool=GENERATION_TOOL,
         version=version,
         tables=TABLES,
@@ -87,15 +92,3 @@ def tables_header(tables: bytes) -> str:
         + "\n".join(rows)
         + "\n};\n"
     )
-
-
-def build_description(identifier: str, source: str) -> bytes:
-    """Return the buildDescription.xml of FMI 3.0: how a shared library is made."""
-    root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
-    sources = SubElement(configuration, "SourceFileSet", {"language": "C99"})
-    SubElement(sources, "SourceFile", {"name": source})
-    override = {"name": OVERRIDE.format(3), "optional": "true"}
-    text = "Functions without the prefix of the model, as a shared library has them"
-    SubElement(sources, "PreprocessorDefinition", override | {"description": text})
-    return serialized(root)

@@ -124,10 +124,13 @@ def equilibrium(
         If there is no such shape, or the loading does not lead there.
     """
     B, c = system.loops, system.loops_c
+    w, moment = _loads(system, loads or {})
     if displacement is not None:
+        moved = displacement != 0.0 or np.any(w) or np.any(moment)
+        if moved and held_by_loops(system):  # The matrix of the balance is singular.
+            raise EquilibriumError(f"release.displacement = {displacement:g} m: {immobile(system)}")
         B = np.vstack([B, system.release])
         c = np.append(c, system.release_c)
-    w, moment = _loads(system, loads or {})
     state = np.concatenate([system.q0, np.zeros(len(c))])
     # what hangs on a pin alone may turn at once; a jump of anything else leads to another branch,
     # where slow loading does not take it
@@ -231,8 +234,6 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
             "no static equilibrium under gravity was found: the flexures are too weak for this "
             "load; reduce gravity or the masses, or stiffen the flexures"
         )
-    if held_by_loops(system):
-        return f"release.displacement = {displacement:g} m: {immobile(system)}"
     where = (
         f"release.displacement = {displacement:g} m cannot be reached: no equilibrium was found "
         f"beyond {done * displacement:.4g} m"

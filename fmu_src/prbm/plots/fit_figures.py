@@ -8,7 +8,7 @@ from ..analysis.fit import Fit, ForceDeflection, Response, Valley
 from ..analysis.spectrum import spectrum
 from ..base.unit_text import length_unit, time_unit
 from ..data.measurement import Calibration, YoungsModulus
-from ..data.records import Series
+from ..data.series import Series
 from ..data.uncertainty import EvaluationError
 from ..data.vibration import FreeVibration
 from ..drawing.style import IMPACT, LINK, PAST, own_style

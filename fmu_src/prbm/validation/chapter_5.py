@@ -12,7 +12,7 @@ from ..analysis.fit import Frequency, fit, fitted_restitution
 from ..analysis.impact_map import response
 from ..base.progress import Progress
 from ..data.measurement import Beam, youngs_modulus
-from ..data.records import Series
+from ..data.series import Series
 from ..data.uncertainty import Estimate
 from ..data.vibration import free_vibration
 from ..drawing.style import own_style

@@ -273,7 +273,7 @@ def figure_6_3(tell: Progress) -> Result:
 def figure_6_4(tell: Progress) -> Result:
     """Return the centred impact with straight flexures."""
     two, end = guide("PRBDM2R"), 0.3
-    ours = simulate(two, {}, end, 1e-3)
+    ours = simulate(two, {}, stop_time=end, step=1e-3)
     tell(0.3)
     fe = FiniteElements(two, elements=8).transient(end, 1e-4, spectral_radius=0.5)
     hits = [route(two, [0.0], [0.0], WEIGHTLESS).hits[0][0] for route in (algebraic, by_elements)]

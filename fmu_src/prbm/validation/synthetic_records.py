@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from ..data.records import Series
+from ..data.series import Series
 from ..mechanics.arrays import Real
 from .common import LASER, RATE
 

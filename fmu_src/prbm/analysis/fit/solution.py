@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...base.progress import Progress
-from ...data.records import Series
+from ...data.series import Series
 from ...data.uncertainty import Estimate, EvaluationError, serial_correlation, widening
 from ...data.vibration import impacts
 from ...mechanics.arrays import Real

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from ...base.names import unknown
-from ...data.records import Series
+from ...data.series import Series
 from ...data.uncertainty import Estimate, EvaluationError
 from ...hybrid.simulation import Simulation
 from ...mechanics.arrays import Real

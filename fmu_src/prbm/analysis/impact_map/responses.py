@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...data.records import Series
+from ...data.series import Series
 from ...mechanics.arrays import Real
 from ...mechanism.description import Mechanism
 from ..fit import DISPLACEMENT, Fit, Response, fit

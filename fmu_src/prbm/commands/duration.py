@@ -1,0 +1,51 @@
+"""Duration and communication step of a simulation, from a command line or by default."""
+
+from collections.abc import Mapping
+
+from ..files.settings import quantity
+from ..mechanism.description import Mechanism
+from ..runs.experiment import Experiment, experiment
+
+
+def span(
+    mechanism: Mechanism,
+    values: Mapping[str, float],
+    stop_time: str | None,
+    step: str | None = None,
+) -> tuple[float, float]:
+    """Return duration and communication step of a simulation [s].
+
+    Both are those of the default experiment by default.  With a duration alone, the step is at
+    most a thousandth of it.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism to simulate.
+    values : mapping
+        Its parameters and inputs that differ from their defaults.
+    stop_time, step : str or None
+        Options of the command, with or without a unit.
+
+    Raises
+    ------
+    UserMistake
+        If an option is no time.
+    ParameterError, EquilibriumError
+        If the mechanism cannot start with these values.
+
+    Examples
+    --------
+    >>> from prbm.files.mechanism_file import find
+    >>> span(find("PRBDM"), {}, None), span(find("PRBDM"), {}, "200 ms", "1e-4")
+    ((1.0, 0.001), (0.2, 0.0001))
+    """
+    duration = None if stop_time is None else quantity(stop_time, "s", "--stop-time")
+    if step is not None and duration is not None:
+        return duration, quantity(step, "s", "--step")
+    chosen = experiment(mechanism, values)
+    if duration is None:
+        duration, distance = chosen.stop_time, chosen.step
+    else:
+        distance = min(chosen.step, Experiment(duration).step) if duration > 0.0 else chosen.step
+    return duration, distance if step is None else quantity(step, "s", "--step")

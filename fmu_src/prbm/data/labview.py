@@ -1,0 +1,68 @@
+"""LabVIEW measurement files (``.lvm``), versions 0.9 to 2, one segment."""
+
+from collections.abc import Mapping
+
+from .cells import Table, cells_of
+from .series import RecordError
+
+LVM, LVM_END = "LabVIEW Measurement", "***End_of_Header***"
+
+
+def labview_table(source: str, lines: list[str]) -> Table:
+    """Return the table of a LabVIEW measurement file of one segment."""
+    ends = [i for i, line in enumerate(lines) if line.startswith(LVM_END)]
+    if len(ends) != 2 or ends[1] + 2 >= len(lines):
+        raise RecordError(
+            f"{source}: a LabVIEW measurement file of one segment has two lines {LVM_END} above "
+            f"its numbers, this one has {len(ends)}: export one segment a file, with a header"
+        )
+    between = "\t" if "Tab" in " ".join(lines[: ends[0]]) else ","
+    tags = {
+        cells[0]: cells[1:] for cells in (cells_of(x, between) for x in lines[: ends[1]]) if cells
+    }
+    decimal = tags.get("Decimal_Separator", ["."])[0]
+    axes = tags.get("X_Columns", ["One"])[0]
+    if axes not in ("No", "One"):
+        raise RecordError(
+            f"{source}: X_Columns is {axes}, a time for every channel: export with one X column"
+        )
+    try:
+        channels = int(tags["Channels"][0])
+    except (KeyError, IndexError, ValueError):
+        raise RecordError(
+            f"{source}: the header does not say how many Channels there are"
+        ) from None
+    names = [cell.strip() for cell in lines[ends[1] + 1].split(between)][1 : channels + 1]
+    if len(names) < channels:
+        raise RecordError(
+            f"{source}, line {ends[1] + 2}: {len(names)} names for {channels} channels: export "
+            "the file again"
+        )
+    units = tags.get("Y_Unit_Label", [])
+    units = units + [""] * (channels - len(units))
+    is_time = tags.get("X_Dimension", ["Time"])[0] == "Time"
+    heads = [("time" if is_time else "X_Value", "s" if is_time else "")]
+    heads += list(zip(names, units[:channels], strict=True))
+    numbers, rows = [], []
+    for number, line in enumerate(lines[ends[1] + 2 :], start=ends[1] + 3):
+        if line.strip():
+            numbers.append(number)
+            rows.append([cell.strip() for cell in line.split(between)][: channels + 1])
+    if axes == "No":
+        _count_times(source, rows, tags, decimal)
+    comments = tuple(line.strip() for line in lines[: ends[1]] if line.strip())
+    return Table(heads, numbers, rows, decimal, comments)
+
+
+def _count_times(
+    source: str, rows: list[list[str]], tags: Mapping[str, list[str]], decimal: str
+) -> None:
+    """Write X0 + i Delta_X into the first, empty cells."""
+    try:
+        start, step = (float(tags[key][0].replace(",", ".")) for key in ("X0", "Delta_X"))
+    except (KeyError, IndexError, ValueError):
+        raise RecordError(
+            f"{source}: there is no X column, nor X0 and Delta_X to count it: export with X column"
+        ) from None
+    for i, row in enumerate(rows):
+        row[0] = repr(start + i * step).replace(".", decimal)

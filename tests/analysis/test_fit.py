@@ -1,0 +1,531 @@
+"""Parameters fitted to frequencies, responses and forces, and what the data do not determine."""
+
+import dataclasses
+import math
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from prbm.analysis.fit import (
+    Fit,
+    ForceDeflection,
+    Free,
+    Frequency,
+    Response,
+    Valley,
+    fit,
+    fitted_restitution,
+    valley,
+)
+from prbm.base.errors import ParameterError
+from prbm.data.series import Series
+from prbm.data.uncertainty import Estimate, EvaluationError
+from prbm.drawing.style import png
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.modal import modal_restitution, modes
+from prbm.mechanics.statics import equilibrium
+from prbm.plots.fit_figures import force_figure, response_figure, valley_figure
+from support import PMMA, ScalarGuide, mechanism
+
+RATE, NOISE = 750.0, 4e-6  # Hz, m: the source's laser
+K = "flexure.K_theta"
+F5 = Frequency(Estimate(5.0, 0.01))
+DROPPED = {"release.displacement": -0.01, "damping.beta": 0.0, K: 2.5449}
+
+
+def guide(values):
+    """Return the 1R guide as a scalar equation."""
+    return ScalarGuide.of(mechanism("PRBDM").values(values))
+
+
+def frequency(values):
+    """Return the frequency at rest of the scalar equation [Hz]: m r^2 w^2 = 4 k + m g r sin phi."""
+    one = guide(values)
+    rest = brentq(lambda phi: 4 * one.k * phi - one.mass * one.g * one.r * math.cos(phi), 0, 1.5)
+    stiffness = 4 * one.k + one.mass * one.g * one.r * math.sin(rest)
+    return math.sqrt(stiffness / one.mass) / one.r / (2 * math.pi)
+
+
+@cache
+def record(restitution, duration=0.2, wall=0.0, seed=0, shift=0.0, noise=NOISE):
+    """Return the response of the scalar equation with Newton impacts, by SciPy's DOP853."""
+    one = guide(DROPPED)
+    t = np.arange(round(duration * RATE)) / RATE
+    at = math.asin(wall / one.r)
+
+    def rate(_, y):
+        turn = -4 * one.k * y[0] + one.mass * one.g * one.r * math.cos(y[0])
+        return [y[1], turn / (one.mass * one.r**2)]
+
+    def hit(_, y):
+        return y[0] - at
+
+    hit.terminal, hit.direction = True, 1.0
+    start, state, x = 0.0, [math.asin(-0.01 / one.r), 0.0], np.zeros(len(t))
+    while start < duration + shift:
+        run = solve_ivp(
+            rate, (start, duration + shift), state, "DOP853", dense_output=True, events=hit,
+            rtol=1e-11, atol=1e-13, max_step=2e-3,
+        )  # fmt: skip
+        inside = (t + shift >= start) & (t + shift <= run.t[-1])
+        if inside.any():
+            x[inside] = one.r * np.sin(run.sol(t[inside] + shift)[0])
+        start, speed = run.t[-1], run.y[1, -1]
+        if abs(speed) * one.r * math.cos(at) < 1e-3:  # stop.rest_speed
+            break
+        state = [at - 1e-15, -restitution * speed]
+    x[t + shift > start] = wall
+    return Series(t, x + noise * np.random.default_rng(seed).standard_normal(len(t)))
+
+
+# --- frequencies --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("measured", [5.6375, 5.6348])
+def test_the_1r_of_the_pmma_guide_is_stiffened_to_2_55(measured):
+    """Finite elements have 5.6375 Hz, the source's 5.6348: K_theta = 2.545 -+ 0.01.
+
+    Without gravity the frequency goes with the root of K_theta, so that the fit has a closed form.
+    """
+    found = fit(mechanism("PRBDM"), [K], Frequency(Estimate(measured, 5e-5)), PMMA)
+    expected = 2.65 * (measured / frequency(PMMA)) ** 2
+    assert found[K].value == pytest.approx(expected, rel=1e-8)
+    assert found[K].value == pytest.approx(2.545, abs=0.01)
+    assert found[K].relative == pytest.approx(2 * 5e-5 / measured, rel=1e-6)
+    assert found.identifiable
+    assert found.notes == ()
+    assert found.values[K] == found[K].value
+
+
+def test_the_1r_of_the_steel_guide_takes_2_586():
+    """Finite elements have 4.907 Hz at rest: above the 2.545 of the straight PMMA guide.
+
+    Gravity deflects the steel guide by a quarter of its length and stiffens it, which the 1R has
+    less of than the flexures.
+    """
+    found = fit(mechanism("PRBDM"), [K], Frequency(Estimate(4.907, 5e-4)))
+    expected = brentq(lambda k: frequency({K: k}) - 4.907, 2.0, 3.0, xtol=1e-13)
+    assert found[K].value == pytest.approx(expected, rel=1e-8)
+    assert found[K].value == pytest.approx(2.586, abs=1e-3)
+
+
+def test_frequencies_can_be_of_held_shapes_and_higher_modes():
+    """The value that the target has for true parameters is the engine's own; fits go back."""
+    m, truth = mechanism("PRBDM2R"), {"flexure.K_theta1": 3.9, "flexure.K_theta2": 1.9}
+    system = assemble(m, m.values(truth))
+    targets = []
+    for mode, displacement in ((1, 0.005), (2, 0.005), (1, None), (2, None)):
+        f = modes(system, equilibrium(system, displacement)).frequency[mode - 1]
+        targets.append(Frequency(Estimate(float(f), 1e-4 * f), mode, displacement))
+    found = fit(m, list(truth), targets)
+    for name, value in truth.items():
+        assert found[name].value == pytest.approx(value, rel=1e-6)
+    assert found.identifiable
+    assert found.freedom == 2
+    assert list(found.rms) == [target.label for target in targets]
+
+
+@pytest.mark.slow
+def test_stated_uncertainties_of_a_fit_cover_the_truth():
+    """K_theta from 200 noisy frequencies: 68.3 %, -+ 3 standard deviations of a count."""
+    rng = np.random.default_rng(0)
+    truth = frequency({K: 2.6})
+    hits = 0
+    for _ in range(200):
+        target = Frequency(Estimate(truth + 0.01 * rng.standard_normal(), 0.01))
+        found = fit(mechanism("PRBDM"), [K], target)[K]
+        hits += abs(found.value - 2.6) < found.uncertainty
+    assert 0.585 < hits / 200 < 0.781
+
+
+# --- what cannot be told apart ------------------------------------------------------------------
+
+BOTH = ["flexure.K_theta1", "flexure.K_theta2"]
+
+
+@pytest.fixture(scope="module")
+def ambiguous() -> Fit:
+    """Both stiffness coefficients of the 2R to one frequency, as the source fitted them."""
+    return fit(mechanism("PRBDM2R"), BOTH, Frequency(Estimate(5.6375, 5e-5)), PMMA)
+
+
+def test_one_frequency_does_not_tell_two_coefficients_apart(ambiguous):
+    """The fit meets the frequency and says that it determines neither, and the direction."""
+    assert ambiguous.rms["frequency 1 at rest"] < 1e-6
+    assert not ambiguous.identifiable
+    assert ambiguous.singular[1] == 0.0
+    assert all(math.isinf(ambiguous[name].uncertainty) for name in BOTH)
+    (note,) = ambiguous.notes
+    assert "flexure.K_theta1 and flexure.K_theta2 cannot be told apart" in note
+    assert "changes nothing" in note
+    assert "not determined" in str(ambiguous)
+
+
+def test_the_direction_of_the_valley_leaves_the_frequency_alone(ambiguous):
+    """A step of 1e-3 along it changes the frequency to second order, across it to first."""
+    direction = np.array(list(ambiguous.valleys[0].shares.values())) * ambiguous.p
+    target = ambiguous.problem.targets[0]
+
+    def changed(step):
+        values = PMMA | dict(zip(BOTH, map(float, ambiguous.p + step), strict=True))
+        return abs(target.model(mechanism("PRBDM2R"), values)[0] - 5.6375) / 5.6375
+
+    across = np.array([direction[1], -direction[0]])
+    assert changed(1e-3 * direction) < 1e-6
+    assert changed(1e-3 * across) > 1e-4
+
+
+def test_the_valley_is_a_level_curve_and_a_figure(ambiguous):
+    """Along the profile every pair has the frequency; the published pair is next to it."""
+    found = valley(ambiguous, BOTH[0], (2.9, 6.0), 7)
+    assert found.points[[0, -1], 0].tolist() == [2.9, 6.0]
+    assert np.all(np.diff(found.points, axis=0)[:, 0] > 0)
+    assert np.all(np.diff(found.points, axis=0)[:, 1] < 0)
+    assert found.misfit.max() < 1e-6
+    assert str(found).count("\n") == len(found.points)
+    figure = valley_figure(found)
+    assert len(figure.axes) == 2
+    assert png(figure).startswith(b"\x89PNG")
+    assert valley(ambiguous, points=2).along in BOTH
+
+
+def test_the_head_of_a_valley_is_apart_as_its_columns_are(ambiguous):
+    """Names are longer than numbers: words of the head end where the numbers under them end."""
+    names = ("flexure.K_theta", "flexure_of_a_long_name.youngs_modulus", "release.displacement")
+    points = np.array([[2.65, 181.5e9, -0.01]])
+    head, row = str(Valley(names, names[0], points, np.zeros(1), points[0])).splitlines()
+    assert head.split() == [*names, "misfit"]
+    ends = [[m.end() for m in re.finditer(r"\S+", line)] for line in (head, row)]
+    assert ends[0] == ends[1]
+
+
+def test_three_coefficients_and_one_frequency_leave_two_valleys():
+    """The 3R: two directions change nothing, the third is as sharp as the frequency."""
+    m = mechanism("PRBDM2R")
+    kinds = tuple(dataclasses.replace(kind, model="3R") for kind in m.flexure_types)
+    m = dataclasses.replace(m, flexure_types=kinds)
+    free = [f"flexure.K_theta{i}" for i in (1, 2, 3)]
+    found = fit(m, free, Frequency(Estimate(5.6375, 5e-5)), PMMA)
+    assert found.rms["frequency 1 at rest"] < 1e-6
+    assert [math.isinf(one.uncertainty) for one in found.valleys] == [True, True]
+    assert found.singular[0] > 1e4
+
+
+def test_a_product_cannot_be_taken_apart():
+    """The stiffness has E K_theta only: the valley is (1, -1)/sqrt 2 in relative changes."""
+    free = [K, "flexure.youngs_modulus"]
+    found = fit(mechanism("PRBDM"), free, Frequency(Estimate(4.9, 1e-3)))
+    shares = np.array(list(found.valleys[0].shares.values()))
+    assert np.abs(shares) == pytest.approx([math.sqrt(0.5)] * 2, rel=1e-3)
+    assert shares[0] * shares[1] < 0
+    assert "by +1 %" in str(found.valleys[0])
+    assert "by -1 %" in str(found.valleys[0])
+
+
+def test_a_parameter_without_effect_is_not_determined():
+    """The static shape does not know of the restitution."""
+    target = Frequency(Estimate(5.6375, 1e-3))
+    found = fit(mechanism("PRBDM"), [K, "stop.restitution"], target, PMMA)
+    assert str(found.valleys[0]) == "stop.restitution cannot be determined by these data"
+    assert math.isinf(found["stop.restitution"].uncertainty)
+    assert found[K].uncertainty == pytest.approx(found[K].value * 2e-3 / 5.6375, rel=1e-3)
+    assert np.isnan(found.correlation[0, 1])
+
+
+# --- forces -------------------------------------------------------------------------------------
+
+
+def held(values, x):
+    """Return the force that holds the 1R guide: F = 4 k phi/(r cos phi) - m g, x = r sin phi."""
+    one = guide(values)
+    phi = np.arcsin(x / one.r)
+    return 4 * one.k * phi / (one.r * np.cos(phi)) - one.mass * one.g
+
+
+def test_forces_of_the_1r_are_those_of_the_scalar_equation():
+    x = np.linspace(-0.015, 0.015, 7)
+    target = ForceDeflection(x, np.zeros(7))
+    np.testing.assert_allclose(target.model(mechanism("PRBDM"), {}), held({}, x), rtol=1e-8)
+
+
+def test_stiffness_and_sensor_zero_come_back_from_a_force_deflection_curve():
+    """A cell of 1 mN; gravity and its zero are told from the stiffness by the curve's slope."""
+    x = np.linspace(-0.01, 0.01, 60)
+    F = held({K: 2.5}, x) + 0.02 + 1e-3 * np.random.default_rng(1).standard_normal(60)
+    found = fit(mechanism("PRBDM"), [K, Free("record.zero", -0.1, 0.1)], ForceDeflection(x, F))
+    assert found[K].value == pytest.approx(2.5, abs=3 * found[K].uncertainty)
+    assert found["record.zero"].value == pytest.approx(0.02, abs=1e-3)
+    assert found.rms["force over deflection"] == pytest.approx(1e-3, rel=0.3)
+    assert found[K].freedom == 58
+    assert abs(found.correlation[0, 1]) < 0.1, "a symmetric range keeps them apart"
+
+
+def test_a_model_that_errs_more_than_the_data_is_said():
+    """Forces of a cubic spring: the residuals exceed the stated uncertainty, which is widened."""
+    x = np.linspace(-0.01, 0.01, 40)
+    F = held({}, x) * (1 + 2e3 * x**2)
+    found = fit(mechanism("PRBDM"), [K], ForceDeflection(x, F, 1e-4))
+    assert found.reduced > 10
+    assert any("the model errs" in note for note in found.notes)
+    close = fit(mechanism("PRBDM"), [K], ForceDeflection(x, held({}, x), 1e-4))
+    assert found[K].uncertainty > 10 * close[K].uncertainty
+    assert close.notes == ()
+
+
+def test_bounds_hold_and_are_said():
+    found = fit(mechanism("PRBDM"), [Free(K, 2.6, 3.0)], Frequency(Estimate(4.7, 1e-3)))
+    assert found[K].value == pytest.approx(2.6, rel=1e-6)
+    assert any("ended at its bound 2.6" in note for note in found.notes)
+    assert "2.6 (not determined)" in str(found), "the data would have it below"
+    assert not found.identifiable
+    assert found.valleys == (), "it is the bound that holds it, not the data that say nothing"
+    wide = fit(mechanism("PRBDM"), [K, Free("stop.restitution", -1.0, 5.0)], F5).problem
+    assert (wide.lower[1], wide.upper[1]) == (0.0, 1.0), "the mechanism's own bounds hold, too"
+
+
+def test_the_title_of_a_fit_is_not_wider_than_its_figure():
+    """What is known to twelve digits takes a line a parameter, what is short shares one."""
+    m = mechanism("PRBDM")
+    d = np.array([-0.01, 0.005, 0.01])
+    system = assemble(m, m.values())
+    curve = ForceDeflection(d, np.array([equilibrium(system, x).force for x in d]))
+    found = fit(m, ["flexure.youngs_modulus", "shuttle.mass"], curve)
+    figure = force_figure(found)
+    figure.draw_without_rendering()
+    title = figure.axes[0].get_title(loc="left")
+    assert len(title.splitlines()) == 2
+    (drawn,) = (text for text in figure.findobj(Text) if text.get_text() == title)
+    assert drawn.get_window_extent().x1 <= figure.bbox.x1
+
+
+# --- responses ----------------------------------------------------------------------------------
+
+
+def test_stiffness_comes_back_from_a_free_response():
+    """As the source fitted, by the RMSE over time; here it ends at the noise of the sensor."""
+    series = record(1.0, 0.3, 0.03)  # the wall is out of reach
+    values = DROPPED | {"stop.position": 0.03, K: 2.65}
+    found = fit(mechanism("PRBDM"), [Free(K, 2.0, 3.2)], Response(series), values)
+    assert found[K].value == pytest.approx(2.5449, abs=3 * found[K].uncertainty)
+    assert found[K].relative < 1e-5
+    assert found.rms["shuttle.x over time"] == pytest.approx(NOISE, rel=0.2)
+    assert len(response_figure(found).axes) == 2
+
+
+@pytest.mark.parametrize("restitution", [0.25, 0.6, 0.95])
+def test_restitution_comes_back_from_a_bouncing_response(restitution):
+    """Within 0.01 whatever it starts from; the record is of another integrator."""
+    found = fitted_restitution(
+        mechanism("PRBDM"), record(restitution, 0.13), DROPPED | {"stop.restitution": 0.5}
+    )
+    estimate = found["stop.restitution"]
+    assert estimate.value == pytest.approx(restitution, abs=0.01)
+    assert estimate.value == pytest.approx(restitution, abs=max(4 * estimate.uncertainty, 1e-4))
+    assert found.rms["shuttle.x over time"] < 1.2 * NOISE
+
+
+@pytest.mark.slow
+def test_restitution_wall_and_start_come_back_together():
+    """The wall 0.4 mm off, the record 0.7 ms late: none of it spoils the restitution."""
+    series = record(0.6, 0.2, 0.4e-3, 0, 0.7e-3)
+    more = [Free("stop.position", -2e-3, 2e-3), Free("record.shift", -2e-3, 2e-3)]
+    found = fitted_restitution(mechanism("PRBDM"), series, DROPPED, uncertainty=NOISE, free=more)
+    assert found["stop.restitution"].value == pytest.approx(0.6, abs=1e-3)
+    assert found["stop.position"].value == pytest.approx(0.4e-3, abs=5e-6)
+    assert found["record.shift"].value == pytest.approx(0.7e-3, abs=2e-5)
+    assert found.identifiable
+
+
+@pytest.mark.slow
+def test_stated_uncertainty_of_the_restitution_covers_the_truth():
+    """68.3 % of 200 draws of the noise, -+ 3 standard deviations of a count: 0.585 to 0.781."""
+    hits = 0
+    clean = record(0.6, 0.1, noise=0.0)
+    rng = np.random.default_rng(3)
+    for _ in range(200):
+        x = clean.values + NOISE * rng.standard_normal(len(clean.time))
+        target = Response(Series(clean.time, x), uncertainty=NOISE)
+        free = [Free("stop.restitution", 0.5, 0.7, 0.6)]
+        found = fit(mechanism("PRBDM"), free, target, DROPPED, starts=1)["stop.restitution"]
+        hits += abs(found.value - 0.6) < found.uncertainty
+    assert 0.585 < hits / 200 < 0.781
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("wall", "low", "high"), [(0.0, -0.01, 0.01), (-0.01, 0.04, 0.12)])
+def test_the_1r_reads_the_modal_restitution_of_a_model_with_more_modes(wall, low, high):
+    """A 2R that stretches, eps 0.6: the 1R finds (1 + eps) mu_1 - 1 where flexures are straight.
+
+    Deflected by 10 mm it finds more, because later impacts meet what the first left in other
+    modes: the number is of all impacts of the record.
+    """
+    m = mechanism("PRBDM2R")
+    kinds = tuple(dataclasses.replace(kind, axial=True) for kind in m.flexure_types)
+    m = dataclasses.replace(m, flexure_types=kinds)
+    values = {"stop.position": wall, "release.displacement": -0.018}
+    t = np.arange(105) / RATE
+    x = Response(Series(t, t)).model(m, values)
+    series = Series(t, x + NOISE * np.random.default_rng(0).standard_normal(len(t)))
+    system = assemble(m, m.values(values))
+    arriving = modal_restitution(system, equilibrium(system, wall), 0, 0.6)
+    rest = Frequency(Estimate(float(modes(system, equilibrium(system)).frequency[0]), 1e-4))
+    stiffness = fit(mechanism("PRBDM"), [K], rest)[K].value
+    found = fitted_restitution(mechanism("PRBDM"), series, values | {K: stiffness})
+    assert low < found["stop.restitution"].value - arriving < high
+
+
+def test_the_starts_are_tried_and_told():
+    """Five along the one parameter, and the given one."""
+    told = []
+    found = fit(mechanism("PRBDM"), [K], F5, starts=5, progress=told.append)
+    assert told[:6] == pytest.approx([1 / 12, 2 / 12, 3 / 12, 4 / 12, 5 / 12, 6 / 12])
+    assert told == sorted(told), "then the fit from the best"
+    assert told[-1] == 1.0
+    assert found[K].value == pytest.approx(fit(mechanism("PRBDM"), [K], F5)[K].value, rel=1e-8)
+
+
+def test_a_fit_without_convergence_has_a_note(monkeypatch):
+    monkeypatch.setattr("prbm.analysis.fit.problem.STEPS_MAX", 1)
+    found = fit(mechanism("PRBDM"), [K], F5)
+    assert not found.converged
+    assert "did not lead to a least misfit" in str(found)
+    monkeypatch.undo()
+    assert fit(mechanism("PRBDM"), [K], F5).converged
+
+
+def test_what_is_known_of_the_record_is_given():
+    """A zero of the sensor that is not fitted is taken as it is."""
+    x = np.linspace(-0.01, 0.01, 20)
+    target = ForceDeflection(x, held({K: 2.5}, x) + 0.05)
+    found = fit(mechanism("PRBDM"), [K], target, {"record.zero": 0.05})
+    assert found[K].value == pytest.approx(2.5, rel=1e-8)
+    assert "record.zero" not in found.values
+    freed = fit(mechanism("PRBDM"), [K, "record.zero"], target, {"record.zero": 0.04})
+    assert freed["record.zero"].value == pytest.approx(0.05, rel=1e-8), "bounds are about 0.04"
+
+
+def test_a_record_without_impact_has_no_restitution():
+    with pytest.raises(EvaluationError, match="no impact in the record"):
+        fitted_restitution(mechanism("PRBDM"), record(1.0, 0.5, 0.03), DROPPED)
+
+
+# --- refusals -----------------------------------------------------------------------------------
+
+REFUSED = {
+    "nothing": (lambda m: fit(m, [], F5), "nothing to fit"),
+    "no target": (lambda m: fit(m, [K], []), "nothing to fit"),
+    "twice": (lambda m: fit(m, [K, K], F5), "fitted twice"),
+    "bounds": (lambda m: fit(m, [Free(K, 3.0, 2.0)], F5), "leave nothing to fit"),
+    "zero without bounds": (lambda m: fit(m, ["stop.position"], F5), "give Free"),
+    "mixed uncertainties": (
+        lambda m: fit(m, [K], [F5, ForceDeflection(np.zeros(2), np.zeros(2))]), "some targets only"
+    ),
+    "no freedom": (
+        lambda m: fit(m, [K], ForceDeflection(np.array([0.01]), np.array([0.1]))), "1 data cannot"
+    ),
+    "exact frequency": (lambda m: Frequency(Estimate(5.0, 0.0)), "standard uncertainty"),
+    "frequency without uncertainty": (lambda m: Frequency(5.0), "^frequency = 5.0 has no uncert"),
+    "frequency as text": (lambda m: Frequency("5 Hz"), r"give Frequency\(Estimate\(value, stand"),
+    "target that is none": (lambda m: fit(m, [K], 3.0), "3.0 is no target"),
+    "mode 0": (lambda m: Frequency(Estimate(5.0, 0.1), 0), "the fundamental is 1"),
+    "mode 2 of one": (lambda m: fit(m, [K], Frequency(Estimate(5.0, 0.1), 2)), "has 1 modes"),
+    "pairs": (lambda m: ForceDeflection(np.zeros(2), np.zeros(3)), "give pairs"),
+    "uncertainty": (lambda m: ForceDeflection(np.zeros(2), np.zeros(2), 0.0), "must be positive"),
+    "sample uncertainty": (lambda m: Response(record(0.6), uncertainty=-1.0), "must be positive"),
+    "out of reach": (
+        lambda m: fit(m, [K], ForceDeflection(np.array([0.0, 1.0]), np.zeros(2))),
+        "narrow the bounds",
+    ),
+    "starts": (lambda m: fit(m, [K], F5, starts=500), "choose fewer"),
+    "valley of one": (lambda m: valley(fit(m, [K], F5)), "two parameters or more"),
+    "no response": (lambda m: response_figure(fit(m, [K], F5)), "was not to a response"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_fits_that_cannot_be_are_refused(name):
+    """Each with a sentence of its own."""
+    attempt, says = REFUSED[name]
+    with pytest.raises(EvaluationError, match=says):
+        attempt(mechanism("PRBDM"))
+
+
+@dataclasses.dataclass(frozen=True)
+class Own:
+    """A target of a user's, whose model says what it is told to."""
+
+    said: object
+    label: str = "rest position"
+    unit: str = "m"
+    uncertainty: float | None = 1e-5
+
+    @property
+    def data(self):
+        return np.array([0.01])
+
+    def model(self, mechanism, values):
+        return self.said
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ([1.0, 2.0], "an array of length 2, its data are an array of length 1"),
+        (np.ones((1, 1)), r"an array of shape \(1, 1\), its data are an array of length 1"),
+        (1.0, r"an array of shape \(\), its data are an array of length 1"),
+    ],
+)
+def test_a_model_of_another_length_than_its_data_is_refused(said, words):
+    """Not stretched to the data: a fit to that is none."""
+    with pytest.raises(EvaluationError, match=f"rest position: its model returns {words}"):
+        fit(mechanism("PRBDM"), [K], Own(said))
+
+
+def test_unknown_names_are_refused_with_the_nearest():
+    with pytest.raises(ParameterError, match=r"did you mean .*flexure\.K_theta"):
+        fit(mechanism("PRBDM"), ["flexure.K_thet"], F5)
+    with pytest.raises(EvaluationError, match=r"did you mean .*shuttle\.x") as caught:
+        fit(mechanism("PRBDM"), [K], Response(record(0.6), "shuttl.x"))
+    assert "bounds" not in str(caught.value)
+    with pytest.raises(EvaluationError, match="was not fitted"):
+        valley(fit(mechanism("PRBDM2R"), BOTH, F5), K)
+
+
+@pytest.mark.parametrize("amount", [1, 2])
+def test_exact_data_give_exact_parameters(amount):
+    """Forces of the model itself leave no residual: that is knowledge, not the lack of it."""
+    names, x = ["flexure.youngs_modulus", "shuttle.mass"][:amount], np.linspace(-0.015, 0.015, 7)
+    guide = mechanism("PRBDM")
+    F = ForceDeflection(x, np.ones(7)).model(guide, {})
+    found = fit(guide, names, ForceDeflection(x, F), {})
+    assert found.identifiable
+    for name in names:
+        assert found[name].value == pytest.approx(guide.values()[name], rel=1e-9)
+        assert found[name].relative < 1e-7
+
+
+def test_a_response_may_be_the_displacement_along_the_release():
+    """Of a guide released along x it is x; along any other direction the projection."""
+    guide = mechanism("PRBDM")
+    turned = dataclasses.replace(guide, release=dataclasses.replace(guide.release, direction=30.0))
+    t = np.arange(20) * 2e-3
+    values = {"release.displacement": -5e-3}
+    x, y, along = (
+        Response(Series(t, 0 * t), output).model(turned, values)
+        for output in ("shuttle.x", "shuttle.y", "displacement")
+    )
+    np.testing.assert_allclose(along, math.sqrt(0.75) * x + 0.5 * y, atol=1e-12)
+    assert along[0] == pytest.approx(-5e-3, abs=1e-9)
+
+
+def test_a_valley_tells_how_much_of_it_is_followed():
+    told = []
+    both = fit(mechanism("PRBDM2R"), ["flexure.K_theta1", "flexure.K_theta2"], F5)
+    found = valley(both, points=3, progress=told.append)
+    assert len(told) == len(found.misfit)
+    assert told[-1] == 1.0

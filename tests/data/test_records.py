@@ -1,0 +1,307 @@
+"""Measured data as people and instruments write them, and the sentences about what is wrong."""
+
+import contextlib
+
+import numpy as np
+import pytest
+
+from prbm.base.errors import PrbmError
+from prbm.data.records import read_record
+from prbm.data.series import RecordError, Series
+
+TIME = np.arange(40) * 1e-3
+SIGNAL = 5e-3 * np.cos(30.0 * TIME)
+
+
+def table(delimiter=",", decimal=".", factors=(1.0, 1e3), columns=(TIME, SIGNAL), end="\n"):
+    """Return rows of numbers as text."""
+    rows = zip(*(f * x for f, x in zip(factors, columns, strict=True)), strict=True)
+    text = end.join(delimiter.join(f"{x:.9g}" for x in row) for row in rows)
+    return text.replace(".", decimal) + end
+
+
+LVM = """LabVIEW Measurement\t
+Writer_Version\t2
+Reader_Version\t2
+Separator\tTab
+Decimal_Separator\t{decimal}
+Multi_Headings\tNo
+X_Columns\t{columns}
+Time_Pref\tRelative
+Operator\tlab
+Date\t2015/03/04
+Time\t12:00:00,5
+***End_of_Header***\t
+\t
+Channels\t2\t\t
+Samples\t40\t40\t
+Date\t2015/03/04\t2015/03/04\t
+Time\t12:00:00,5\t12:00:00,5\t
+Y_Unit_Label\tmm\tVolts\t
+X_Dimension\tTime\tTime\t
+X0\t0{decimal}0000000000000000E+0\t0{decimal}0000000000000000E+0\t
+Delta_X\t0{decimal}001000\t0{decimal}001000\t
+***End_of_Header***\t\t\t
+X_Value\tLaser\tLoad cell\tComment
+"""
+
+
+def lvm(decimal=".", columns="One"):
+    """Return a LabVIEW measurement file of two channels, the first row with a comment."""
+    rows = table("\t", decimal, (1.0, 1e3, 1.0), (TIME, SIGNAL, SIGNAL)).splitlines()
+    if columns == "No":
+        rows = ["\t" + row.split("\t", 1)[1] for row in rows]
+    rows[0] += "\tStandby"
+    return LVM.format(decimal=decimal, columns=columns) + "\n".join(rows) + "\n"
+
+
+LAYOUTS = {  # name: (text, names of time and signal)
+    "brackets": ("t [s],x [mm]\n" + table(), ("t", "x")),
+    "parentheses": ("time (ms),x (mm)\n" + table(factors=(1e3, 1e3)), ("time", "x")),
+    "slash": ("t/ms;x/um\n" + table(";", factors=(1e3, 1e6)), ("t", "x")),
+    "words": ('"Time, s","x in mm"\n' + table(), ("Time", "x")),
+    "decimal comma": ("t [s];x [mm]\n" + table(";", ","), ("t", "x")),
+    "decimal comma, tabs": ("t [s]\tx [mm]\n" + table("\t", ","), ("t", "x")),
+    "decimal comma, quoted": (
+        "t [s],x [mm]\n"
+        + "".join(f'"{t:.3f}","{1e3 * x:.9f}"\n' for t, x in zip(TIME, SIGNAL, strict=True))
+        .replace('","', "|").replace(".", ",").replace("|", '","'),
+        ("t", "x"),
+    ),
+    "byte order mark, CRLF": ("\ufefft [s],x [mm]\r\n" + table(end="\r\n"), ("t", "x")),
+    "row of units": ("t,x\ns,mm\n" + table(), ("t", "x")),
+    "row of units in brackets": ("t;x\n[s];[mm]\n\n" + table(";"), ("t", "x")),
+    "PicoScope": ("Time,Channel A\n(ms),(mm)\n\n" + table(factors=(1e3, 1e3)), ("Time",
+        "Channel A")),
+    "PicoScope, German": (
+        "Zeit;Kanal A\n(ms);(mm)\n\n" + table(";", ",", (1e3, 1e3)), ("Zeit", "Kanal A"),
+    ),
+    "Keysight": ("x-axis,1\nsecond,Millimeter\n" + table(), ("x-axis", "1")),
+    "Tektronix": (
+        "Model,MSO4034\nHorizontal Units,S\nRecord Length,40\nVertical Units,mm\n,\nTIME,CH1\n"
+        + table(),
+        ("TIME", "CH1"),
+    ),
+    "Instron": (
+        '"Specimen","3"\n"Rate 1","0.5","mm/min"\n\n"Time","Extension"\n"(s)","(mm)"\n'
+        + "".join(f'"{t}","{1e3 * x}"\n' for t, x in zip(TIME, SIGNAL, strict=True)),
+        ("Time", "Extension"),
+    ),
+    "LabVIEW": (lvm(), ("time", "Laser")),
+    "LabVIEW, decimal comma": (lvm(","), ("time", "Laser")),
+    "LabVIEW, no X column": (lvm(columns="No"), ("time", "Laser")),
+    "comments": ("# laser, 750 Hz\n% zeroed\nt [s],x [mm]\n# go\n" + table() + "# end\n", ("t",
+        "x")),
+    "head in a comment": ("# t [s] x [mm]\n" + table(" "), ("t", "x")),
+    "aligned with blanks": ("   t[s]     x[mm]\n" + table("     "), ("t", "x")),
+    "delimiter at the end": (
+        "t [s];x [mm];\n" + table(";").replace("\n", ";\n"), ("t", "x"),
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_layouts_give_the_same_channels_in_si(name, tmp_path):
+    """What was written is read back, to the nine digits that were written."""
+    text, (time, signal) = LAYOUTS[name]
+    path = tmp_path / "record.csv"
+    path.write_bytes(text.encode())
+    record = read_record(path)
+    series = record.series(signal, "m")
+    assert record.time.name == time
+    np.testing.assert_allclose(series.time, TIME, rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(series.values, SIGNAL, rtol=1e-8)
+    assert series.unit == "m"
+    assert "record.csv" in str(record)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "unit"), [("utf-16", "µm"), ("cp1252", "µm"), ("utf-8", "µm"), ("utf-8", "μm")]
+)
+def test_encodings(encoding, unit, tmp_path):
+    path = tmp_path / "record.txt"
+    path.write_bytes(f"t [s]\tx [{unit}]\n{table(chr(9), factors=(1.0, 1e6))}".encode(encoding))
+    np.testing.assert_allclose(read_record(path).column("x", "m"), SIGNAL, rtol=1e-8)
+
+
+def test_a_table_without_a_head_is_given_one(tmp_path):
+    """The layout of the source's carbon-nanotube records: three columns and no head."""
+    path = tmp_path / "TS02E01CNT009_1_data.txt"
+    path.write_text(table("\t", factors=(1.0, 1e3, 1.0), columns=(TIME, SIGNAL, SIGNAL)))
+    record = read_record(path, columns=["t [s]", "d [mm]", "F"], units={"F": "mN"})
+    np.testing.assert_allclose(record.column("d", "mm"), SIGNAL, rtol=1e-8)
+    np.testing.assert_allclose(record.column("f", "N"), 1e-3 * SIGNAL, rtol=1e-8)
+
+
+def test_temperatures_and_ratios_have_offsets_and_factors(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("t [min];T [°C];u [%];n [-]\n0;20;50;1\n1;21,5;51;2\n2;22;52;3\n")
+    record = read_record(path)
+    assert record.time.values.tolist() == [0.0, 60.0, 120.0]
+    assert record.column("T", "K") == pytest.approx([293.15, 294.65, 295.15], rel=1e-15)
+    assert record.column("u", "-") == pytest.approx([0.5, 0.51, 0.52], rel=1e-15)
+    assert record.column("n", "1").tolist() == [1.0, 2.0, 3.0]
+
+
+HEAD = "t [s],x [mm]\n"
+ROWS = table().splitlines()
+
+
+def rows(*changed, keep=ROWS):
+    """Return the table with some of its rows replaced, (index, text)."""
+    lines = list(keep)
+    for i, text in changed:
+        lines[i] = text
+    return "\n".join(line for line in lines if line is not None) + "\n"
+
+
+MALFORMED = {  # name: (bytes, what the sentence must say, column asked for)
+    "empty": (b"", "is empty"),
+    "blank": (b" \r\n \n", "is empty"),
+    "binary": (bytes(range(256)) * 20, "binary"),
+    "zeros": (b"t [s],x [mm]\n\0\0\0\0", "binary"),
+    "spreadsheet": (b"PK\x03\x04" + b"x" * 100, "spreadsheet"),
+    "prose": (b"Dear all,\nthe data follow tomorrow.\n", "no table"),
+    "one column": (("x [mm]\n" + "\n".join("12345")).encode(), "no table"),
+    "no head": (table().encode(), "no names above 2 columns"),
+    "too few names": (("x\n" + table(factors=(1, 1, 1), columns=(TIME,) * 3)).encode(),
+                      "1 names above 3 columns"),
+    "empty name": ((",x [mm]\n" + table()).encode(), "column 1 has no name"),
+    "name twice": (("x [s],x [mm]\n" + table()).encode(), "'x' stands above columns 1 and 2"),
+    "too short": ((HEAD + rows(keep=ROWS[:2])).encode(), "2 rows of numbers are too few"),
+    "too few samples": ((HEAD + rows(keep=ROWS[:9])).encode(), "9 samples of x are too few"),
+    "a value missing": ((HEAD + rows((6, "0.006"))).encode(),
+        "line 8: 1 values for 2 columns: mend"),
+    "a value too many": ((HEAD + rows((6, "0.006,1,2"))).encode(), "line 8: 3 values for 2"),
+    "cut off": ((HEAD + rows((39, "0.039"))).encode(),
+        "line 41: 1 values for 2 columns: the file was"),
+    "NaN": ((HEAD + rows((4, "0.004,NaN"))).encode(), "line 6, column 'x': 'NaN' is no value"),
+    "NaN in the first row": ((HEAD + rows((0, "0,nan"))).encode(), "line 2, column 'x': 'nan'"),
+    "infinite": ((HEAD + rows((4, "0.004,-inf"))).encode(),
+        "line 6, column 'x': '-inf' is no value"),
+    "overload": ((HEAD + rows((4, "0.004,OL"))).encode(), "line 6, column 'x': 'OL' is no value"),
+    "empty cell": ((HEAD + rows((4, ",3"))).encode(), "line 6, column 't': '' is no value"),
+    "word": ((HEAD + rows((4, "0.004,trigger"))).encode(),
+        "line 6, column 'x': 'trigger' is no number"),
+    "unit in a cell": ((HEAD + rows((4, "0.004,4.9 mm"))).encode(),
+        "'4.9 mm' has a unit of its own"),
+    "two tables": ((HEAD + table() + HEAD + table()).encode(), "line 42, column 't': 't [s]'"),
+    "mixed decimal signs": (("t [s];x [mm]\n" + table(";").replace("0.004;", "0,004;")).encode(),
+                            "line 6, column 't': '0,004' has another decimal sign than the rest"),
+    "thousands": (("t [s];x [mm]\n" + table(";", ",").replace("0,004;", "1.000,4;")).encode(),
+                  "line 6, column 't': '1.000,4' is no number"),
+    "underscore": ((HEAD + rows((4, "0.004,1_0"))).encode(), "'1_0' is no number"),
+    "hexadecimal": ((HEAD + rows((4, "0.004,0x1F"))).encode(), "'0x1F' is no number"),
+    "unit missing": (("t [s],x\n" + table()).encode(),
+        "the column 'x' has no unit: give it, units="),
+    "unit unknown": (("t [s],x [furlong]\n" + table()).encode(),
+        "has the unit 'furlong', which is unkn"),
+    "unit of something else": (("t [s],x [mN]\n" + table()).encode(),
+        "'x' is in mN, but m was expected"),
+    "mass for force": (("t [s],x [g]\n" + table()).encode(), "'x' is in g, but m was expected"),
+    "time in mm": (("t [mm],x [mm]\n" + table()).encode(),
+        "no column is a time; columns are t [mm]"),
+    "time without unit": (("t,x [mm]\n" + table()).encode(),
+        "no column is a time; columns are t [?]"),
+
+    "several times": (
+        ("a [s],b [s],x [mm]\n" + table(factors=(1, 1, 1), columns=(TIME,) * 3)).encode(),
+        "the columns a, b are all in s"),
+    "another column": (("t [s],y [mm]\n" + table()).encode(), "no column 'x'; columns are t, y"),
+    "time backwards": ((HEAD + rows((7, "0.0035,1"))).encode(),
+        "line 9: the time 0.0035 s is before"),
+    "time twice": ((HEAD + rows((7, "0.006,1"))).encode(), "line 9: the time 0.006 s equals"),
+    "a gap": ((HEAD + rows((7, None))).encode(), "line 9: a gap of 0.002 s follows t = 0.006 s"),
+    "a long gap": ((HEAD + rows(*((i, None) for i in range(5, 20)))).encode(),
+        "line 7: a gap of 0.016 s"),
+    "LabVIEW, two segments": ((lvm() + lvm()).encode(), "of one segment"),
+    "LabVIEW, several times": (lvm(columns="Multi").encode(), "X_Columns is Multi"),
+    "LabVIEW, cut off in its head": (lvm()[:300].encode(), "two lines ***End_of_Header***"),
+    "LabVIEW, a word": (lvm().replace("0.004\t", "stop\t").encode(),
+        "line 28, column 'time': 'stop'"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MALFORMED)
+def test_malformed_records_get_one_clear_sentence(name, tmp_path):
+    """It names the file, says what is wrong where, and what to do; it is no other exception."""
+    data, says = MALFORMED[name]
+    path = tmp_path / "bad record.csv"
+    path.write_bytes(data)
+    with pytest.raises(RecordError) as caught:
+        read_record(path).series("x", "m")
+    sentence = str(caught.value)
+    assert says in sentence
+    assert sentence.startswith("bad record.csv")
+    assert "\n" not in sentence
+    assert isinstance(caught.value, PrbmError)
+
+
+def test_arguments_that_do_not_fit_the_file_are_refused(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text(HEAD + table())
+    with pytest.raises(RecordError, match="a unit was given for 'y', which is no column"):
+        read_record(path, units={"y": "mm"})
+    with pytest.raises(RecordError, match="the unit 'ell' given for 'x' is unknown"):
+        read_record(path, units={"x": "ell"})
+    with pytest.raises(RecordError, match="3 names were given for 2 columns"):
+        read_record(path, columns=["t [s]", "x [mm]", "F [N]"])
+    with pytest.raises(RecordError, match="is no table"):
+        read_record(path, delimiter=";")
+    with pytest.raises(RecordError, match="cannot be read"):
+        read_record(tmp_path / "missing.csv")
+    with pytest.raises(RecordError, match="cannot be read"):
+        read_record(tmp_path)
+
+
+def test_units_that_were_given_replace_those_of_the_file(tmp_path):
+    path = tmp_path / "record.csv"
+    path.write_text("t [s],x [mm]\n" + table())
+    record = read_record(path, units={"t": "ms", "x": "V"})
+    np.testing.assert_allclose(record.time.values, 1e-3 * TIME, atol=1e-15)
+    np.testing.assert_allclose(record.column("x", "mV"), 1e3 * SIGNAL, rtol=1e-8)
+
+
+def test_times_that_were_rounded_are_no_gaps():
+    """750 Hz written to the millisecond: steps of 1 and 2 ms; a lost sample is a gap."""
+    time = np.round(np.arange(400) / 750, 3)
+    assert set(np.round(np.diff(time), 6)) == {0.001, 0.002}
+    series = Series(time, time)
+    assert series.step == pytest.approx(1 / 750, rel=1e-3)
+    lost = np.delete(time, 200)
+    assert np.diff(lost).max() == pytest.approx(0.003)
+    with pytest.raises(RecordError, match=r"sample 201: a gap of 0\.003 s"):
+        Series(lost, lost)
+
+
+def test_parts_of_a_series_keep_their_times():
+    series = Series(TIME, SIGNAL)
+    part = series.between(0.01, 0.03)
+    assert (part.time[0], part.time[-1]) == (0.01, 0.03)
+    assert part.from_zero().time[0] == 0.0
+    assert part.duration == pytest.approx(21e-3)
+    with pytest.raises(RecordError, match="too few"):
+        series.between(0.01, 0.012)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_damage_ends_in_another_exception(seed, tmp_path):
+    """Bytes changed, cut or repeated at random: a record or a RecordError."""
+    rng = np.random.default_rng(seed)
+    layouts = [text.encode() for text, _ in LAYOUTS.values()]
+    path = tmp_path / "record.csv"
+    for data in layouts:
+        damaged = bytearray(data)
+        for _ in range(int(rng.integers(1, 8))):
+            at = int(rng.integers(len(damaged)))
+            kind = int(rng.integers(3))
+            if kind == 0:
+                damaged[at] = int(rng.choice(list(b'\t\n ,;."-+eE#[]()0s\xb5\xff')))
+            elif kind == 1:
+                del damaged[at : at + int(rng.integers(1, 40))]
+            else:
+                damaged[at:at] = damaged[at : at + 30]
+        path.write_bytes(bytes(damaged))
+        with contextlib.suppress(RecordError):
+            record = read_record(path)
+            record.series(record.names[-1], "m")

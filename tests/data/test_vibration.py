@@ -1,0 +1,209 @@
+"""Frequency and damping come back from noisy records: 4 um at 750 Hz, as the source's laser."""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+from prbm.data.series import Series
+from prbm.data.uncertainty import Estimate, EvaluationError
+from prbm.data.vibration import damping_verdict, fourier_peak, free_vibration, impacts
+
+RATE, NOISE, FREQUENCY = 750.0, 4e-6, 4.82  # Hz, m, Hz
+
+
+def vibration(zeta, rng, duration=10.0, amplitude=10e-3, noise=NOISE, frequency=FREQUENCY):
+    """Return a record of a damped sine; the frequency is the undamped one."""
+    t = np.arange(round(duration * RATE)) / RATE
+    omega = 2 * np.pi * frequency
+    decay, turning = zeta * omega, omega * math.sqrt(1 - zeta**2)
+    phase = rng.uniform(0, 2 * np.pi)
+    x = 3e-3 + amplitude * np.exp(-decay * t) * np.cos(turning * t + phase)
+    return Series(t, x + noise * rng.standard_normal(len(t)))
+
+
+@pytest.mark.parametrize("zeta", [1e-4, 1e-3, 1e-2, 0.1, 0.3])
+def test_frequency_and_damping_come_back(zeta):
+    """Frequency within 0.01 Hz and zeta within 10 %, both ways."""
+    found = free_vibration(vibration(zeta, np.random.default_rng(0)))
+    assert found.frequency.value == pytest.approx(FREQUENCY, abs=0.01)
+    assert found.zeta.value == pytest.approx(zeta, rel=0.1)
+    assert found.damping_measurable
+    damped = FREQUENCY * math.sqrt(1 - zeta**2)
+    assert found.damped_frequency.value == pytest.approx(damped, abs=0.01)
+    delta = 2 * np.pi * zeta / math.sqrt(1 - zeta**2)
+    assert found.decrement.value == pytest.approx(delta, rel=0.1)
+    assert found.decrement_zeta.value == pytest.approx(zeta, rel=0.1)
+    assert found.residual == pytest.approx(NOISE, rel=0.05)
+    assert "damping ratio, fit" in str(found)
+
+
+@pytest.mark.parametrize(("unit", "said"), [("m", " m"), ("m/s2", " m/s2"), ("1", "")])
+def test_an_amplitude_has_the_unit_of_its_record(unit, said):
+    series = dataclasses.replace(vibration(1e-2, np.random.default_rng(0)), unit=unit)
+    found = free_vibration(series)
+    assert f"amplitude {found.amplitude:.4g}{said}, residual" in str(found)
+    assert f"residual {found.residual:.3g}{said}, correlation" in str(found)
+
+
+def test_a_motion_that_dies_at_once_has_no_decrement_but_a_fit():
+    """At zeta = 0.6 a tenth is left after each half period: three peaks above the noise."""
+    found = free_vibration(vibration(0.6, np.random.default_rng(0)))
+    assert found.decrement is None
+    assert found.decrement_zeta is None
+    assert found.zeta.value == pytest.approx(0.6, rel=0.01)
+
+
+@pytest.mark.parametrize("zeta", [6.88e-9, 0.0])
+def test_damping_that_the_record_does_not_hold_is_too_small_to_measure(zeta):
+    """The source's 6.88e-9 is a tenth of what 10 s of its laser resolve: u about 8e-8.
+
+    The Cramer-Rao bound of the decay of a sine is u = (noise/amplitude) sqrt(2/n) sqrt(12)/T.
+    """
+    said = 0
+    for seed in range(20):
+        series = vibration(zeta, np.random.default_rng(seed))
+        found = free_vibration(series)
+        bound = NOISE / 10e-3 * math.sqrt(2 / 7500) * math.sqrt(12) / 10 / (2 * np.pi * FREQUENCY)
+        assert found.zeta.uncertainty == pytest.approx(bound, rel=0.1)
+        said += found.damping.startswith("too small to measure") or "negative" in found.damping
+        if found.damping.startswith("too small"):
+            assert found.zeta.interval()[1] > zeta
+            assert not found.damping_measurable
+    assert said >= 17, "at 95 % one in forty errs to the one side"
+
+
+def test_uncertainties_cover_the_truth():
+    """68.3 % of 200 draws, -+ 3 standard deviations of a count of them: 0.585 to 0.781."""
+    rng = np.random.default_rng(1)
+    hits = dict.fromkeys(("frequency", "zeta", "decrement", "its zeta"), 0)
+    for _ in range(200):
+        found = free_vibration(vibration(2e-3, rng, 3.0, 1e-3))
+        delta = 2 * np.pi * 2e-3
+        hits["frequency"] += abs(found.frequency.value - FREQUENCY) < found.frequency.uncertainty
+        hits["zeta"] += abs(found.zeta.value - 2e-3) < found.zeta.uncertainty
+        by_peaks = found.decrement_zeta
+        hits["its zeta"] += abs(by_peaks.value - 2e-3) < by_peaks.uncertainty
+        hits["decrement"] += abs(found.decrement.value - delta) < found.decrement.uncertainty
+    for name, count in hits.items():
+        assert 0.585 < count / 200 < 0.781, name
+
+
+def test_confidence_intervals_of_the_damping_hold_zero_as_often_as_stated():
+    """Without damping 95 % of the intervals include zero: 190 of 200, -+ 3 x 3.1."""
+    rng = np.random.default_rng(2)
+    zeros = sum(
+        free_vibration(vibration(0.0, rng, 2.0, 1e-3)).zeta.includes_zero() for _ in range(200)
+    )
+    assert 181 <= zeros <= 199
+
+
+@pytest.mark.parametrize("duration", [2.0, 5.3, 16.7])
+def test_the_spectrum_is_as_sharp_as_it_says(duration):
+    """The highest line is within half a line; the parabola within 2 % of one."""
+    rng = np.random.default_rng(3)
+    for _ in range(20):
+        frequency = FREQUENCY + rng.uniform(-0.5, 0.5)
+        series = vibration(1e-4, rng, duration, frequency=frequency)
+        found = fourier_peak(series)
+        assert found.resolution == pytest.approx(1 / duration, rel=1e-9)
+        assert abs(found.frequency.value - frequency) <= 0.52 * found.resolution
+        assert found.frequency.uncertainty == pytest.approx(found.resolution / math.sqrt(12))
+        assert abs(found.interpolated - frequency) <= 0.02 * found.resolution
+
+
+def test_the_source_reads_its_spectrum_to_006_hz():
+    """4.82 Hz -+ 0.06 Hz is a record of 17 s: lines 1/T apart."""
+    found = fourier_peak(vibration(1e-4, np.random.default_rng(4), 1 / 0.06))
+    assert found.resolution == pytest.approx(0.06, rel=1e-3)
+
+
+def test_uneven_sampling_is_no_obstacle():
+    """Times rounded to the millisecond: a jitter of 0.3 ms of 207 ms, known to the fit."""
+    rng = np.random.default_rng(5)
+    t = np.round(np.arange(3000) / RATE, 3)
+    x = 1e-2 * np.exp(-0.03 * t) * np.cos(2 * np.pi * FREQUENCY * t)
+    found = free_vibration(Series(t, x + NOISE * rng.standard_normal(3000)))
+    assert found.damped_frequency.value == pytest.approx(FREQUENCY, abs=1e-4)
+
+
+def test_quantised_readings_widen_nothing_beyond_reason():
+    """Steps of 4 um, the sensor's resolution, are noise of 4 um/sqrt(12)."""
+    t = np.arange(7500) / RATE
+    x = 1e-2 * np.exp(-0.1 * t) * np.cos(2 * np.pi * FREQUENCY * t)
+    found = free_vibration(Series(t, np.round(x / 4e-6) * 4e-6))
+    assert found.residual == pytest.approx(4e-6 / math.sqrt(12), rel=0.05)
+    assert found.damped_frequency.value == pytest.approx(FREQUENCY, abs=1e-5)
+
+
+def test_a_second_mode_widens_the_uncertainty():
+    """What the model leaves out is correlated from sample to sample, not noise."""
+    rng = np.random.default_rng(6)
+    series = vibration(1e-3, rng)
+    second = 2e-4 * np.cos(2 * np.pi * 20.0 * series.time)
+    found = free_vibration(Series(series.time, series.values + second))
+    plain = free_vibration(series)
+    assert found.serial > 0.9
+    assert found.frequency.uncertainty > 100 * plain.frequency.uncertainty
+    assert abs(found.frequency.value - FREQUENCY) < 3 * found.frequency.uncertainty
+
+
+REFUSED = {
+    "still": (np.full(200, 3e-3), "does not change"),
+    "drift": (np.linspace(0, 1, 200), "periods or less"),
+    "one period": (np.cos(np.linspace(0, 2 * np.pi, 200)), "periods or less"),
+    "noise": (np.random.default_rng(7).standard_normal(2000), "explains"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_records_without_a_vibration_are_refused(name):
+    x, says = REFUSED[name]
+    with pytest.raises(EvaluationError, match=says) as caught:
+        free_vibration(Series(np.arange(len(x)) / RATE, x, source="record.csv"))
+    assert str(caught.value).startswith("record.csv: ")
+
+
+def test_a_growing_motion_is_no_damping():
+    found = free_vibration(vibration(-1e-3, np.random.default_rng(8)))
+    assert "negative" in found.damping
+    assert not found.damping_measurable
+    assert "negative" in damping_verdict(Estimate(-1e-3, 1e-5))
+
+
+# --- impacts ------------------------------------------------------------------------------------
+
+
+def bouncing(restitution=0.6, noise=NOISE, height=15e-3, count=5):
+    """Return times of a ball's impacts, and its record: closed form."""
+    g = 9.81
+    fall = math.sqrt(2 * height / g)
+    when = [fall]
+    speeds = [g * fall]
+    for _ in range(count - 1):
+        speeds.append(restitution * speeds[-1])
+        when.append(when[-1] + 2 * speeds[-1] / g)
+    t = np.arange(round((when[-1] + 0.02) * RATE)) / RATE
+    x = height - g * t**2 / 2
+    for hit, speed in zip(when, speeds, strict=True):
+        after = t >= hit
+        s = t[after] - hit
+        x[after] = restitution * speed * s - g * s**2 / 2
+    rng = np.random.default_rng(9)
+    return np.array(when), Series(t, x + noise * rng.standard_normal(len(t)))
+
+
+def test_impacts_are_kinks():
+    """Every bounce of a ball, down to 0.07 m/s, to a sample."""
+    when, series = bouncing()
+    assert impacts(series) == pytest.approx(when, abs=1.01 / RATE)
+
+
+def test_a_record_without_impact_says_so():
+    with pytest.raises(EvaluationError, match="no impact in the record"):
+        impacts(vibration(1e-3, np.random.default_rng(10)))
+    with pytest.raises(EvaluationError, match="no impact in the record"):
+        impacts(vibration(1e-3, np.random.default_rng(10), noise=0.0))
+    with pytest.raises(EvaluationError, match="no impact in the record"):
+        impacts(Series(np.arange(100) / RATE, np.zeros(100)))

@@ -1,0 +1,22 @@
+"""The commands of docs/measurements.md run, on records made for them, and print what they find."""
+
+import re
+
+import pytest
+
+from measurement_records import records
+from support import ROOT
+
+PAGE = ROOT / "docs" / "measurements.md"
+
+
+def test_the_commands_of_the_page_find_what_was_put_in(tmp_path, monkeypatch, capsys):
+    (block,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    records(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    found = {}
+    exec(compile(block, str(PAGE), "exec"), found)
+    assert found["free"].frequency.value == pytest.approx(4.9, abs=0.001)
+    assert "beam flexure: E = (18" in capsys.readouterr().out
+    assert not found["ambiguous"].identifiable
+    assert found["stiffness"].identifiable

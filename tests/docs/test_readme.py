@@ -1,0 +1,73 @@
+"""What the README and the page about native FMUs show runs as it stands there."""
+
+import re
+import shutil
+
+import pytest
+
+from support import ROOT
+
+README = (ROOT / "README.md").read_text()
+NATIVE = (ROOT / "docs" / "native-fmus.md").read_text()
+
+
+def blocks(text: str) -> list[str]:
+    return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+
+
+@pytest.fixture
+def _built(fmus, native, tmp_path, monkeypatch) -> None:
+    """Go to a folder that holds what the first command has built."""
+    paths = {("python", name): path for name, path in fmus.items()}
+    paths |= {(f"fmi{fmi}", name): path for (name, fmi), path in native.items()}
+    for (folder, name), path in paths.items():
+        there = tmp_path / "dist" / folder
+        there.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, there / f"{name}.fmu")
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+@pytest.mark.usefixtures("_built")
+def test_python_blocks_run(capsys):
+    assert len(blocks(README)) == 2
+    for block in blocks(README):
+        exec(compile(block, "README.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert re.search(r"^\d+ impacts, resting: True$", printed, re.MULTILINE)
+    assert len(re.findall(r"^0\.\d{6} s: \d\.\d{4} m/s$", printed, re.MULTILINE)) == 3
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+@pytest.mark.usefixtures("_built")
+def test_native_fmus_do_what_their_page_shows(capsys):
+    """Three ways to the same impacts; Newton's law at the first, e = 0.6."""
+    space: dict[str, object] = {}
+    for block in blocks(NATIVE):
+        exec(compile(block, "native-fmus.md", "exec"), space)
+    printed = capsys.readouterr().out
+    assert re.findall(r"^(.*): 14 impacts$", printed, re.MULTILINE) == [
+        "co-simulation", "model exchange"
+    ]  # fmt: skip
+    before, after = map(float, re.findall(r"(-?0\.\d+) m/s", printed))
+    # the hit is off the centre of mass by nothing, and the wall stands still
+    assert after == pytest.approx(-0.6 * before, abs=1e-4)  # printed with four decimals
+
+
+def test_files_that_the_readme_names_exist():
+    named = set(re.findall(r"\]\(([^)#:]+)\)", README))
+    named |= {name for name in re.findall(r"`([\w./]+)`", README) if "/" in name}
+    for name in named:
+        built = name.startswith("dist/") or name == "documentation/index.html"
+        assert built or (ROOT / name).exists(), name
+
+
+def test_there_are_two_commands():
+    """The first installs, builds and simulates; the second runs the tests."""
+    commands = README.split("<!-- commands -->")[1].split("<!-- end -->")[0]
+    lines = [line for line in commands.splitlines() if line and not line.startswith("```")]
+    assert len(lines) == 2
+    assert "build_fmu.py --simulate" in lines[0]
+    assert "pytest" in lines[1]

@@ -1,0 +1,235 @@
+"""The examples of embedding: their headlines against one solver, closed forms, energy balances."""
+
+import math
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from prbm.fmu import native_fmu
+from prbm.mechanism.description import Mechanism
+from support import ROOT
+
+EXAMPLES = ROOT / "examples"
+NAMES = ("voice_coil", "energy_harvester", "drop_test", "escapement", "model_exchange")
+
+pytestmark = [pytest.mark.fmu, pytest.mark.native]
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+_built: dict[tuple[str, int], bytes] = {}
+
+
+def once(mechanism: Mechanism, fmi: int) -> bytes:
+    """Return a native FMU; the examples build the same ones again and again."""
+    key = mechanism.name, fmi
+    if key not in _built:
+        _built[key] = native_fmu.build(mechanism, fmi=fmi)
+    return _built[key]
+
+
+def example(name: str) -> SimpleNamespace:
+    """Return the functions of an example, as it is but for FMUs that have been built before."""
+    found = runpy.run_path(str(EXAMPLES / name / "run.py"))
+    found["main"].__globals__["build"] = once
+    return SimpleNamespace(**found)
+
+
+def is_picture(path: str | Path) -> bool:
+    with Image.open(path) as image:
+        return image.format == "PNG" and min(image.size) > 300
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_readme_teaches_and_shows(name):
+    """A sentence on what it teaches, the figure that it makes, the command that makes it."""
+    text = (EXAMPLES / name / "README.md").read_text()
+    assert "**What it teaches:**" in text
+    assert f"({name}.png)" in text
+    assert f"python examples/{name}/run.py" in text
+    assert is_picture(EXAMPLES / name / f"{name}.png")
+
+
+def test_voice_coil_settles_as_one_solver_has_it(capsys):
+    """Impacts and rest, to the delay of a step; the rest ends what a step may err in each."""
+    run = example("voice_coil")
+    record, reference = run.simulate(0.2), run.monolith(0.2)
+    found, exact = run.impacts(record), np.array(reference.impacts)
+    assert len(found) == len(exact) == 9
+    np.testing.assert_allclose(found[:, 0], exact[:, 0], atol=0.1 * run.STEP)
+    np.testing.assert_allclose(found[:, 1], exact[:, 1], atol=1e-5)
+    settled = run.rest_time(record, "guide.stop")
+    assert settled == pytest.approx(reference.rest_time, abs=2 * run.STEP)
+
+
+def test_voice_coil_errs_in_proportion_to_its_step_in_the_books():
+    """What coil and guide make of the same velocity within a step, before any impact."""
+    run = example("voice_coil")
+    records = [run.simulate(0.03, step) for step in (1e-4, 5e-5)]
+    longer, shorter = (abs(run.books(record)[-1]) for record in records)
+    assert shorter == pytest.approx(longer / 2, rel=0.1)
+    assert longer < 0.01 * records[0]["guide.energy.work"][-1]
+
+
+def test_voice_coil_prints_and_plots(capsys):
+    example("voice_coil").main(["--stop-time", "0.04"])
+    assert "not at rest yet: simulate longer" in capsys.readouterr().out
+    assert is_picture("voice_coil.png")
+
+
+@pytest.mark.parametrize("time", ["0", "nan", "inf"])
+def test_voice_coil_refuses_a_time_that_is_none(time, capsys):
+    with pytest.raises(SystemExit):
+        example("voice_coil").main(["--stop-time", time])
+    assert f"--stop-time {time}: must be 0.0001 s or longer" in capsys.readouterr().err
+
+
+def test_harvester_has_the_power_of_one_solver_between_the_stops():
+    """Hitting each once a period; the load and the coil share it as their resistances."""
+    run = example("energy_harvester")
+    table = run.sweep([36.0])
+    assert table["power"][0] == pytest.approx(run.monolith([36.0])[0], rel=2e-3)
+    assert table["impacts"][0] == 2.0
+    share = run.LOAD["load"] / run.LOAD["resistance"]
+    assert table["power"][0] == pytest.approx(share * table["heat"][0], rel=1e-12)
+
+
+@pytest.mark.slow
+def test_harvester_has_the_power_of_the_closed_form_when_it_hits_nothing():
+    """A shift of the resonance by the delay of half a step, c w^2 h / 2 K, halves with it."""
+    run = example("energy_harvester")
+    exact, errors = run.monolith([28.0], stops=False)[0], []
+    for steps in (64, 128):
+        run.sweep.__globals__["STEPS"] = steps
+        table = run.sweep([28.0])
+        assert table["impacts"][0] == 0.0
+        errors.append(table["power"][0] / exact - 1.0)
+    assert abs(errors[0]) < 0.015
+    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.1)
+
+
+def test_harvester_s_closed_form_is_that_of_one_solver():
+    """Without stops, to the amplitude: (x / r)^2 is 4e-4."""
+    run = example("energy_harvester")
+    assert run.monolith([28.0], stops=False)[0] == pytest.approx(run.linear(28.0), rel=1e-3)
+
+
+@pytest.mark.slow
+def test_harvester_remembers_where_it_comes_from():
+    """Rising, it hits in step up to 44 Hz; from above it does not."""
+    run = example("energy_harvester")
+    table = run.sweep([36.0, 38.0, 40.0, 42.0, 44.0, 50.0, 44.0])
+    assert table["impacts"].tolist() == [2.0] * 5 + [0.0, 0.0]
+    assert table["power"][4] > 10 * table["power"][6]
+    assert table["power"][6] == pytest.approx(run.linear(44.0), rel=0.05)
+
+
+def test_harvester_prints_and_plots(capsys, monkeypatch):
+    run = example("energy_harvester")
+    for name, value in (("SETTLING", 2), ("MEASURED", 1)):
+        monkeypatch.setitem(run.main.__globals__, name, value)
+    run.main(["--frequencies", "36", "30"])
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in printed[1:3]] == ["30.0", "36.0"]
+    assert is_picture("energy_harvester.png")
+
+
+def test_drop_test_hits_as_hard_as_the_scalar_equation_and_nearly_beam_theory():
+    """An acceleration that is held within a step: 2e-4. The 1R is 4 % too stiff: 3 % of a speed."""
+    run = example("drop_test")
+    heights = (0.01, 0.05, 0.5)
+    table = run.study(heights)
+    np.testing.assert_allclose(table["speed"], [run.monolith(h) for h in heights], rtol=2e-4)
+    np.testing.assert_allclose(table["speed"], [run.linear(h) for h in heights], rtol=0.03)
+    assert (table["speed"] > 0).tolist() == [False, True, True]
+
+
+def test_drop_test_s_impulse_is_momentum():
+    """P = (1 + eps) m v of a mass on a circle of radius r: m = M / cos(phi)^2 along x."""
+    run = example("drop_test")
+    table, body = run.study((0.3,)), run.guide()
+    mass = body.mass / (1 - (run.TRAVEL / body.r) ** 2)
+    expected = (1 + body.restitution) * mass * table["speed"][0]
+    assert table["impulse"][0] == pytest.approx(expected, rel=1e-9)
+
+
+def test_drop_test_s_short_shock_is_a_velocity(monkeypatch):
+    """sqrt(u^2 - (w x)^2) is left at the stop of an impulse u, by conservation of energy."""
+    run = example("drop_test")
+    for function in (run.linear, run.monolith):
+        monkeypatch.setitem(function.__globals__, "SHOCK", 1e-6)
+    monkeypatch.setitem(run.monolith.__globals__, "STEP", 1e-7)
+    u, body = run.change(0.1), run.guide()
+    mass = 0.005 + 2 * 13 / 35 * 7800 * 0.01 * 8e-3 * 1e-4
+    stiffness = 24 * 181.5e9 * 8e-3 * 1e-12 / 12 / 0.01**3
+    left = math.sqrt(u**2 - stiffness / mass * run.TRAVEL**2)
+    assert run.linear(0.1) == pytest.approx(left, rel=1e-5)
+    assert body.mass == pytest.approx(mass, rel=0.02)
+
+
+def test_drop_test_prints_and_plots(capsys):
+    example("drop_test").main(["--heights", "0.1", "0.01"])
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[1:3]] == ["10.0", "100.0"]
+    assert is_picture("drop_test.png")
+
+
+def test_drop_test_refuses_a_height_that_is_none(capsys):
+    with pytest.raises(SystemExit):
+        example("drop_test").main(["--heights", "0"])
+    assert "--heights: must be above 0 and up to 100 m" in capsys.readouterr().err
+
+
+def test_cosimulation_is_of_the_first_order_and_event_mode_tells_in_time(capsys, monkeypatch):
+    """Before an impact, and after two with event mode; the news of an impact is at its time."""
+    run = example("model_exchange")
+    found = run.study([1e-3, 5e-4, 2.5e-4, 1.25e-4])
+    with_events = "Gauss-Seidel, event mode"
+    for errors in (
+        found.before["Gauss-Seidel"],
+        found.before[with_events],
+        found.after[with_events],
+    ):
+        assert run.order(found.steps, errors) == pytest.approx(1.0, abs=0.05)
+    assert (found.late[with_events] == 0.0).all()
+    for way in ("Jacobi", "Gauss-Seidel"):
+        assert (found.late[way] > 0.0).all()
+        assert (found.late[way] <= found.steps).all() or way == "Jacobi"
+    monkeypatch.setitem(run.main.__globals__, "study", lambda: found)
+    run.main([])
+    printed = capsys.readouterr().out
+    assert "heard of it late by" in printed
+    assert is_picture("model_exchange.png")
+
+
+def test_escapement_exchanges_momentum_and_is_the_one_mechanism():
+    """Momentum to rounding, energy to the tolerance, times with the square of the step."""
+    run = example("escapement")
+    reference = run.monolith()
+    found = []
+    for step in (2e-3, 1e-3, 5e-4):
+        result = run.coupled(step)
+        assert len(run.impacts(result)) == len(reference) == 6
+        assert run.exchanged(result).max() < 1e-9
+        books = run.energy(result)
+        assert np.abs(books - books[0]).max() < 1e-7 * books[0]
+        found.append(run.errors(result, reference))
+    time, speed = np.array(found).T
+    assert time[2] < 3e-5
+    assert speed[2] < 3e-5
+    assert math.log2(time[0] / time[2]) / 2 == pytest.approx(2.0, abs=0.5)
+
+
+def test_escapement_prints_and_plots(capsys, monkeypatch):
+    run = example("escapement")
+    run.main.__globals__["STEPS"] = (2e-3, 1e-3)
+    assert run.main([]) == 0
+    assert "momentum             exchanged to" in capsys.readouterr().out
+    assert is_picture("escapement.png")

@@ -1,0 +1,214 @@
+"""Every example runs, and its headline agrees with the independent value beside it."""
+
+import functools
+import re
+import runpy
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from prbm.plots.animation import animate
+from support import ROOT
+
+EXAMPLES = ROOT / "examples"
+
+pytestmark = pytest.mark.fmu
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def example(name: str) -> SimpleNamespace:
+    """Return the functions of an example."""
+    return SimpleNamespace(**runpy.run_path(str(EXAMPLES / name)))
+
+
+def is_picture(path: str) -> bool:
+    with Image.open(path) as image:
+        return image.format == "PNG" and min(image.size) > 300
+
+
+def test_quickstart_has_the_frequency_of_finite_elements(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Within the model error of the 2R, 0.5 %, and twice the uncertainty of the experiment."""
+    quickstart = example("quickstart.py")
+    quickstart.main([])
+    printed = capsys.readouterr().out
+    frequency = float(printed.split()[2])
+    assert frequency == pytest.approx(quickstart.FINITE_ELEMENTS, rel=5e-3)
+    measured, uncertainty = quickstart.MEASURED
+    assert abs(frequency - measured) < 2 * uncertainty
+    assert "14 impacts, at rest from 0.24" in printed
+    assert is_picture("quickstart.png")
+    assert Path("PRBDM2R.fmu").exists()
+
+
+def test_quickstart_simulates_as_long_as_it_is_told(tmp_path: Path) -> None:
+    result = example("quickstart.py").simulate(tmp_path, stop_time=0.02)
+    assert result["time"][-1] == pytest.approx(0.02)
+    assert {"shuttle.x", "link[6].angle", "mode.frequency"} < set(result.dtype.names)
+
+
+def test_straight_line_is_that_of_beam_theory_and_far_better_when_folded(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Two leaves: 3 x^2 / (5 L), within the model error of the 3R."""
+    example("straight_line.py").main([])
+    printed = capsys.readouterr().out
+    lines = [line for line in printed.splitlines() if line.endswith(" um")]
+    leaves, uneven, half, folded, beam = (
+        float(line.split(": ")[1].removesuffix(" um")) for line in lines
+    )
+    assert leaves == pytest.approx(beam, rel=0.015)
+    assert folded < half < uneven < 0.1 * leaves
+    assert is_picture("straight_line.png")
+
+
+def test_quickstart_says_where_it_cannot_write() -> None:
+    Path("PRBDM2R.fmu").mkdir()
+    with pytest.raises(SystemExit, match=r"cannot write .*PRBDM2R\.fmu: Is a directory; run this"):
+        example("quickstart.py").main([])
+
+
+def test_quickstart_films_what_does_not_come_to_rest(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main = example("quickstart.py").main
+    short = main.__globals__["simulate"]
+    monkeypatch.setitem(main.__globals__, "simulate", lambda folder: short(folder, 0.01))
+    film = functools.partial(animate, slow=50.0, fps=10.0)
+    monkeypatch.setitem(main.__globals__, "animate", film)
+    main(["--gif"])
+    printed = capsys.readouterr().out
+    assert "0 impacts, not at rest yet" in printed
+    assert Path("quickstart.gif").exists()
+
+
+def test_parameter_study_rests_when_the_scalar_equation_does() -> None:
+    """The bouncing ends early by 2 eps v_r / (a (1 - eps)) at most, a about g."""
+    study = example("parameter_study.py")
+    restitutions = (0.3, 0.6, 0.8)
+    table = study.study(restitutions)
+    np.testing.assert_allclose(table["rebound"], restitutions, rtol=1e-9)
+    eps = table["restitution"]
+    bound = 2 * eps * study.REST_SPEED / (9.0 * (1 - eps)) + 1e-6
+    early = table["exact"] - table["rest_time"]
+    assert (early > -1e-6).all()
+    assert (early < bound).all()
+
+
+def test_parameter_study_has_the_right_scalar_equation() -> None:
+    """Another program's times of the first impact and of the accumulation, to their digits."""
+    rest_time = example("parameter_study.py").exact_rest_time
+    assert rest_time(1e-9, release=-0.010, K_theta=2.5449) == pytest.approx(0.034981, abs=1e-6)
+    assert rest_time(0.6, release=-0.010, K_theta=2.5449) == pytest.approx(0.18034, abs=1e-5)
+
+
+def test_parameter_study_writes_its_table_and_figure(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    namespace = runpy.run_path(str(EXAMPLES / "parameter_study.py"))
+    main = namespace["main"]
+    monkeypatch.setitem(main.__globals__, "study", lambda: namespace["study"]((0.2, 0.4)))
+    main()
+    assert "largest difference" in capsys.readouterr().out
+    assert is_picture("parameter_study.png")
+
+
+@pytest.mark.native
+def test_sweep_spreads_as_the_first_order_says(capsys: pytest.CaptureFixture[str]) -> None:
+    """Within four standard errors of a standard deviation, s / sqrt(2 n) each."""
+    main = example("sweep/run.py").main
+    main(["--runs", "40"])
+    printed = capsys.readouterr().out
+    found, first_order = map(float, re.findall(r"([\d.]+) ms", printed.splitlines()[2]))
+    assert found == pytest.approx(first_order, rel=4 / np.sqrt(2 * 40))
+    assert "at rest in the end: 40 of 40" in printed
+    assert is_picture("settling.png")
+    main(["--runs", "40"])  # which finds it done
+    assert capsys.readouterr().out == printed
+
+
+def test_stroke_controller_keeps_the_books_and_the_stroke(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Its work is known to the guide, its bounce to beam theory.
+
+    Work and balance to the tolerance of the integration; the speed to the model error of the
+    1R, whose stiffness is 4 % above that of a beam, and the delay of a step.
+    """
+    run = example("stroke_controller/run.py")
+    record = run.simulate(stop_time=2.0)
+    np.testing.assert_allclose(run.work(record), record["energy.work"], atol=1e-9)
+    assert record["energy.work"][-1] > 0.1  # J, five times what the release put in
+    assert np.ptp(run.balance(record)) < 1e-6 * record["energy.dissipated"][-1]
+    rate, speed = run.steady(record)
+    assert speed == pytest.approx(run.expected_speed(run.STROKE), rel=0.03)
+    late = record["reached"][record["time"] > 1.0]
+    np.testing.assert_allclose(late, run.STROKE, rtol=0.05)
+    assert 10.0 < rate < 20.0
+
+
+def test_stroke_controller_prints_and_plots(capsys: pytest.CaptureFixture[str]) -> None:
+    example("stroke_controller/run.py").main(["--stop-time", "1.0"])
+    printed = capsys.readouterr().out
+    assert "wanted 8.000 mm" in printed
+    assert is_picture("stroke_controller.png")
+
+
+@pytest.mark.parametrize("time", ["0", "-1", "nan", "inf"])
+def test_stroke_controller_refuses_a_time_that_is_none(
+    time: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        example("stroke_controller/run.py").main(["--stop-time", time])
+    assert end.value.code == 2
+    assert f"--stop-time {time}: must be 0.0005 s or longer" in capsys.readouterr().err
+
+
+def test_stroke_controller_tells_that_it_has_not_settled(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """With the other model, in a tenth of a second."""
+    example("stroke_controller/run.py").main(["--stop-time", "0.1", "--model", "PRBDM2R"])
+    assert "fewer than two impacts in the second half: simulate longer" in capsys.readouterr().out
+
+
+def test_stroke_controller_counts_an_impact_at_the_start() -> None:
+    record = np.zeros(5, [(n, float) for n in ("time", "stop.impact_count", "stop.approach_speed")])
+    record["time"] = np.arange(5)
+    record["stop.impact_count"] = 1, 1, 2, 2, 3
+    record["stop.approach_speed"] = 9, 9, 2, 2, 4
+    assert example("stroke_controller/run.py").steady(record) == (0.5, 3.0)
+    assert example("stroke_controller/run.py").steady(record[:1]) is None
+
+
+def test_stroke_controller_lifts_a_shuttle_that_lies_at_the_stop(tmp_path: Path) -> None:
+    controller = example("stroke_controller/stroke_controller.py").StrokeController(
+        instance_name="c", resources=str(tmp_path)
+    )
+    controller.do_step(0.0, 1e-3)
+    assert controller.force == -controller.limit
+    controller.velocity = 0.1
+    controller.do_step(1e-3, 1e-3)
+    assert controller.force == 0.0
+
+
+def test_stroke_controller_pushes_the_way_the_shuttle_goes(tmp_path: Path) -> None:
+    controller = example("stroke_controller/stroke_controller.py").StrokeController(
+        instance_name="c", resources=str(tmp_path)
+    )
+    for velocity, position in ((-0.1, -1e-3), (0.1, -3e-3)):
+        controller.velocity, controller.position = velocity, position
+        controller.do_step(0.0, 1e-3)
+    assert controller.reached == 3e-3
+    assert controller.force == pytest.approx(25.0 * 5e-3)
+    controller.velocity = -0.1
+    controller.do_step(0.0, 1e-3)
+    assert controller.force == pytest.approx(-25.0 * 5e-3)

@@ -1,0 +1,308 @@
+"""Several stops, friction and walls together: laws that hold at every impact and in between."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.integrate import simpson
+
+from many_parts import two_stops
+from prbm.hybrid.simulation import Simulation
+from support import ScalarGuide, energy_balance, mechanism, simulation
+
+
+def watched(guide, values=None, time=0.3, step=1e-3):
+    """Run and hold the energy, the gaps and the forces at every output."""
+    sim = Simulation(guide, values)
+    sim.record = []
+    start = energy_balance(sim.outputs())
+    dissipated, out = 0.0, sim.outputs()
+    for t in np.arange(1, round(time / step) + 1) * step:
+        sim.advance(t)
+        out = sim.outputs()
+        assert energy_balance(out) == pytest.approx(start, abs=1e-6 * abs(start))
+        assert out["energy.dissipated"] >= dissipated - 1e-7 * abs(start)
+        dissipated = out["energy.dissipated"]
+        for stop in guide.stops:
+            assert out[f"{stop.name}.gap"] > -1e-9
+            assert out[f"{stop.name}.force"] >= 0.0
+    return sim, out
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+@pytest.mark.parametrize("position", [0.0, -0.006])
+def test_two_stops_end_in_rest_on_the_wall(model, position):
+    """Hit together or in turn, chatter that converges ends in rest; the weight is carried once."""
+    guide = two_stops(model, high={"position": position}, low={"position": position})
+    sim, out = watched(guide, time=0.45)
+    assert out["high.contact"] or out["low.contact"]
+    carried = out["high.force"] + out["low.force"]
+    sim.advance(0.5)
+    later = sim.outputs()
+    assert later["high.force"] + later["low.force"] == pytest.approx(carried, rel=0.02)
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+def test_two_stops_hit_at_once_balance_momentum_and_each_its_energy(model):
+    """M (v+ - v-) = sum G^T P + Phi_q^T Lambda, -P (u- + u+)/2 at each, whatever the order."""
+    eps = {"high": {"restitution": 0.9}, "low": {"restitution": 0.1}}
+    guide = two_stops(model, **eps)
+    swapped = dataclasses.replace(guide, stops=guide.stops[::-1])
+    results = []
+    for one in (guide, swapped):
+        sim = Simulation(
+            one, {"gravity.x": 0.0, "release.velocity": 0.3, "release.displacement": 0}
+        )
+        out = sim.outputs()
+        assert out["high.impact_count"] + out["low.impact_count"] >= 1
+        y, n = sim.state(), sim.system.n
+        start = 0.5 * ScalarGuide.of(mechanism("PRBDM").values()).mass * 0.3**2
+        assert 0 < out["energy.dissipated"] < start
+        for name in ("high", "low"):
+            if out[f"{name}.impact_count"]:
+                lost = out[f"{name}.impulse"] * (
+                    out[f"{name}.approach_speed"] - out[f"{name}.rebound_speed"]
+                )
+                assert out[f"{name}.energy_lost"] == pytest.approx(lost / 2, rel=1e-9)
+        results.append((y[n : 2 * n], out["energy.dissipated"]))
+    if model == "PRBDM2R":  # one degree of freedom leaves the shares of the impulse open
+        np.testing.assert_allclose(results[0][0], results[1][0], atol=1e-9)
+        assert results[0][1] == pytest.approx(results[1][1], rel=1e-9)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("lever", [0.01, 0.03])
+def test_a_held_stop_takes_part_in_an_impact_elsewhere(friction, lever):
+    """It receives an impulse or opens, never pulls; its moving wall does the work of its impulse.
+
+    Struck at a short lever it opens, at a long one it is pressed.
+    """
+    guide = two_stops(
+        "PRBDM2R",
+        high={"position": -0.006, "offset": lever, "rest_speed": 0.2},
+        low={"position": -0.0056, "offset": -lever, "restitution": 0.8, "friction": friction},
+    )
+    sim = Simulation(guide)
+    sim.record = []
+    sim.advance(0.5)
+    assert sim.outputs()["high.contact"]
+    start, count = energy_balance(sim.outputs()), sim.outputs()["low.impact_count"]
+    while sim.outputs()["low.impact_count"] == count:
+        past = sim.time - 0.5  # the lower wall comes up faster than the one that carries
+        sim.set({"high.velocity": -0.05, "high.displacement": -0.05 * past})
+        sim.set({"low.velocity": -0.2, "low.displacement": -0.2 * past})
+        held = sim.outputs()["high.contact"]
+        sim.advance(sim.time + 5e-4)
+        assert sim.time < 0.52
+    assert held
+    impact = next(i for i in sim.record if i.stop == "low" and i.time > 0.5)
+    system = sim.system
+    e = np.exp(1j * impact.q)
+    M = (e.conj()[:, None] * system.H * e).real + np.diag(system.J)
+    G = -(system.gaps * e).imag
+    rates = G @ impact.after + [wall.rate for wall in sim.inputs.walls]
+    before = G @ impact.before + [wall.rate for wall in sim.inputs.walls]
+    assert abs(before[0]) < 1e-9, "it was held"
+    assert rates[0] >= -1e-12
+    if friction == 0.0:
+        assert (rates[0] < 1e-9) == (lever == 0.03), "pressed by the hit below"
+        assert rates[1] == pytest.approx(0.8 * impact.latched.approach_speed, rel=1e-9)
+        rows = np.vstack([-(system.loops * e).imag, G])
+        *_, P_high, P_low = np.linalg.lstsq(rows.T, M @ (impact.after - impact.before), rcond=None)[
+            0
+        ]
+        assert P_low == pytest.approx(impact.impulse, rel=1e-6)
+        assert P_high >= -1e-12
+        assert (P_high > 1e-6) == (lever == 0.03)
+        work = 0.05 * P_high + 0.2 * P_low
+        gained = 0.5 * (impact.after @ M @ impact.after - impact.before @ M @ impact.before)
+        assert impact.latched.energy_lost == pytest.approx(work - gained, rel=1e-6)
+    assert impact.latched.energy_lost >= 0
+    assert energy_balance(sim.outputs()) == pytest.approx(start, abs=1e-8)
+
+
+@pytest.mark.parametrize("rest_speed", [0.0, 1e-5])
+@pytest.mark.parametrize(("position", "offset"), [(0.0, 0.0), (-0.004, 0.003), (0.005, -0.002)])
+def test_zeno_of_the_2r_ends_in_rest(rest_speed, position, offset):
+    """The chatter converges wherever the wall is; no message, no hang."""
+    values = {
+        "stop.rest_speed": rest_speed, "stop.position": position, "stop.offset": offset,
+        "damping.beta": 2e-5,
+    }  # fmt: skip
+    sim = simulation("PRBDM2R", values, tolerance=1e-7)
+    sim.advance(0.5)
+    assert sim.outputs()["stop.contact"]
+
+
+def test_friction_opposes_what_a_wall_pushes():
+    """At constant speed mu N is dissipated over the path, and the wall carries it."""
+    still = {"damping.beta": 0.0}
+    rubbing = still | {"friction.coefficient": 1.0, "friction.normal_force": 0.2}
+    ends = []
+    for values in (still, rubbing):
+        sim = simulation("PRBDM", values)
+        sim.advance(0.6)
+        lost = sim.outputs()["energy.dissipated"]
+        for k in range(1000):  # 1 m/s^2 up to 20 mm/s, in steps below the rest speed
+            speed = min(0.02, k * 5e-4)
+            here = sim.inputs.walls[0].at(sim.time)
+            sim.set({"stop.displacement": here, "stop.velocity": -speed})
+            sim.advance(0.6 + (k + 1) * 2e-4)
+        out = sim.outputs()
+        ends.append((out["stop.force"], out["energy.dissipated"] - lost, out["shuttle.x"]))
+    (free, _, x), (pushed, dissipated, y) = ends
+    assert x == pytest.approx(y, abs=1e-7)
+    assert pushed - free == pytest.approx(0.2, rel=1e-3)
+    assert dissipated == pytest.approx(0.2 * abs(y), rel=5e-3)
+
+
+def test_friction_keeps_what_a_retreating_wall_leaves():
+    """Stuck with 5 N against a weight of half a newton: the contact opens, nothing follows."""
+    values = {
+        "friction.normal_force": 5.0, "friction.coefficient": 1.0, "release.displacement": 0.0,
+    }  # fmt: skip
+    sim = simulation("PRBDM", values)
+    sim.set({"stop.velocity": 0.02})
+    sim.advance(0.05)
+    out = sim.outputs()
+    assert not out["stop.contact"]
+    assert abs(out["shuttle.vx"]) < 1e-9
+    assert out["stop.gap"] == pytest.approx(0.02 * 0.05, rel=1e-6)
+
+
+def test_a_dragged_contact_pushes_along_its_wall_within_the_cone():
+    """2R held away from straight, pulled along the wall: |tangential| = mu N while it slides."""
+    values = {"stop.position": -0.01, "stop.friction": 0.2, "release.displacement": -0.0101}
+    sim = simulation("PRBDM2R", values)
+    sim.advance(0.4)
+    for force in (-2.0, 2.0):
+        sim.set({"force.y": force})
+        for _ in range(40):
+            sim.advance(sim.time + 2.5e-4)
+            n, y = sim.system.n, sim.state()
+            a, lam, M = sim.equations.accelerations(y[:n], y[n : 2 * n])
+            if not sim.equations.held:
+                continue
+            normal = float(lam[sim.equations.first_hold])
+            assert normal > 0.0
+            # what is left of the balance of the shuttle along the wall is friction
+            e, v = np.exp(1j * y[:n]), y[n : 2 * n]
+            G, T = (-(B * e).imag for B in (sim.system.gaps[0], sim.system.slides[0]))
+            C = -(e.conj()[:, None] * sim.system.H * e).imag
+            torques = sim.equations.torques(np.concatenate([y[:n], v]))[:n]
+            left = M @ a + C @ v**2 + torques - (sim.equations.w * e).real - G * normal
+            rows = np.vstack([-(sim.system.loops * e).imag, T])
+            tangential = float(np.linalg.lstsq(rows.T, left, rcond=None)[0][-1])
+            assert abs(tangential) <= 0.2 * normal * (1 + 1e-5)
+            if sim.equations.sliding:
+                assert tangential * float(T @ v) <= 0.0
+                assert abs(tangential) == pytest.approx(0.2 * normal, rel=1e-5)
+
+
+def test_base_reactions_count_the_inputs():
+    """Integral of the base force and moment = impulse of all loads - change of momentum."""
+    values = {"gravity.x": 2.0, "gravity.y": -3.0, "stop.position": 0.05}
+    sim = simulation("PRBDM2R", values, tolerance=1e-11)
+    sim.set({"force.x": 0.3, "force.y": -0.2, "force.moment": 4e-3, "base.acceleration.y": 1.5})
+    n, system = sim.system.n, sim.system
+    times = np.linspace(0, 0.01, 1001)
+    forces, moments, loads, turns = [], [], [], []
+
+    def momenta():
+        y = sim.state()
+        e, v = np.exp(1j * y[:n]), y[n : 2 * n]
+        z, rate = system.A @ e + system.c - system.anchor, 1j * (system.A @ (e * v))
+        angular = float((z.conj() * system.m * rate).imag.sum() + system.J @ v)
+        return complex(system.m @ rate), angular
+
+    first = momenta()
+    for t in times:
+        sim.advance(t)
+        out = sim.outputs()
+        e = np.exp(1j * sim.state()[:n])
+        z = system.A @ e + system.c - system.anchor
+        frame = system.bodies["shuttle"]
+        centre = complex(frame.A @ e) + frame.c - system.anchor
+        field, pull = 2.0 - 3.0j - 1.5j, 0.3 - 0.2j
+        loads.append(complex(system.m.sum() * field + pull))
+        turns.append(
+            float((z.conj() * system.m * field).imag.sum())
+            + (centre.conjugate() * pull).imag
+            + 4e-3
+        )
+        forces.append(complex(out["base.force.x"], out["base.force.y"]))
+        moments.append(out["base.moment"])
+    last = momenta()
+    linear = simpson(np.array(loads) - np.array(forces), x=times)
+    angular = simpson(np.array(turns) - np.array(moments), x=times)
+    assert last[0] - first[0] == pytest.approx(linear, abs=1e-6 * abs(linear))
+    assert last[1] - first[1] == pytest.approx(angular, abs=1e-6 * abs(angular) + 1e-12)
+
+
+def test_nothing_happens_in_an_exact_equilibrium_that_touches():
+    """No gravity, no motion: rounding is not counted as an impact."""
+    sim = simulation("PRBDM2R", {"gravity.x": 0.0, "release.displacement": 0.0})
+    sim.advance(0.2)
+    assert sim.outputs()["stop.impact_count"] == 0
+    assert abs(sim.outputs()["stop.gap"]) < 1e-9
+
+
+def test_a_micrometre_switch_bounces_at_its_own_pace():
+    """Elastic bounces of a MHz device are no chatter: the guard counts in periods."""
+    scale = 1e-4
+    values = {
+        "flexure.length": 0.04 * scale, "shuttle.width": 0.08 * scale,
+        "flexure.thickness": 1e-4 * scale, "flexure.width": 8e-3 * scale,
+        "shuttle.com_height": 0.0, "shuttle.mass": 0.05 * scale**3,
+        "shuttle.inertia": 2.8e-5 * scale**5, "gravity.x": 0.0,
+        "release.displacement": -0.01 * scale, "stop.restitution": 1.0, "damping.beta": 0.0,
+    }  # fmt: skip
+    sim = simulation("PRBDM", values)
+    period = 1 / sim.frequency
+    sim.advance(1000 * period)
+    assert len(sim.record) == pytest.approx(2000, abs=2)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"start_time": float("nan")}, "start_time = nan s"),
+        ({"step": -1e-3}, "step = -0.001 s must be positive"),
+        ({"step": float("nan")}, "step = nan s"),
+    ],
+)
+def test_options_that_are_none_are_refused(options, words):
+    with pytest.raises(ValueError, match=words):
+        Simulation(mechanism("PRBDM"), **options)
+
+
+@pytest.mark.parametrize("bad", ["abc", None, 1j, True])
+def test_inputs_that_are_no_numbers_are_refused(bad):
+    sim = simulation("PRBDM")
+    with pytest.raises(ValueError, match=r"force\.x = "):
+        sim.set({"force.x": bad})
+    assert sim.given["force.x"] == 0.0
+
+
+def test_an_absurd_force_is_refused_not_integrated():
+    sim = simulation("PRBDM")
+    sim.set({"force.x": 1e300})
+    with np.errstate(all="ignore"), pytest.raises(RuntimeError, match="step size fell below"):
+        sim.advance(1e-3)
+
+
+def test_two_stops_that_cannot_move_apart_share_a_rocking_load():
+    """2R, straight: it can hardly rotate; a moment takes the weight from one stop to the other."""
+    guide = two_stops("PRBDM2R")
+    sim = Simulation(guide, {"release.displacement": 0.0})
+    weight = sim.outputs()["high.force"] + sim.outputs()["low.force"]
+    carried = set()
+    for k in range(200):
+        sim.set({"force.moment": 0.02 * np.sin(2 * np.pi * 10 * sim.time)})
+        sim.advance((k + 1) * 1e-3)
+        out = sim.outputs()
+        assert out["high.force"] + out["low.force"] == pytest.approx(weight, rel=0.2)
+        assert min(out["high.gap"], out["low.gap"]) > -1e-9
+        carried |= {name for name in ("high", "low") if out[f"{name}.force"] > 0.3 * weight}
+    assert carried == {"high", "low"}
+    assert out["high.impact_count"] + out["low.impact_count"] == 0

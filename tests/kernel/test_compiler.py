@@ -1,0 +1,313 @@
+"""The kernel is compiled once, whole, for each platform; what stands against it is a sentence.
+
+A stub stands in for the kernel where it does not matter what is compiled.
+"""
+
+import hashlib
+import os
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from prbm.kernel import compiler
+from prbm.kernel.compiler import (
+    ALL,
+    HOST,
+    PLATFORMS,
+    CompilerError,
+    NoCompilerError,
+    cache_folder,
+    libraries,
+    this_platform,
+)
+from support import ROOT
+
+STUB = b"""
+#include <math.h>
+#include "fmi2Functions.h"
+#include "fmi3Functions.h"
+const char *fmi2GetVersion(void) { return "2.0"; }
+const char *fmi3GetVersion(void) { return sqrt(4.0) > 1.0 ? "3.0" : ""; }
+"""
+SYSTEM = shutil.which("cc")
+
+pytestmark = [
+    pytest.mark.native,
+    pytest.mark.skipif(SYSTEM is None or os.name != "posix", reason="needs the command cc"),
+]
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch) -> Path:
+    """Return an empty cache, with the stub for a kernel and no choice of a compiler."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compiler, "kernel", lambda: {"prbm_fmu.c": STUB})
+    monkeypatch.setattr(compiler, "_made", {})
+    return cache_folder()
+
+
+def entries(cache: Path) -> list[Path]:
+    return [p for p in cache.iterdir() if p.name != "lock"] if cache.is_dir() else []
+
+
+def only(made: dict) -> bytes:
+    (content,) = made.values()
+    return content
+
+
+def script(path: Path, text: str) -> Path:
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+    return path
+
+
+def without_ziglang(monkeypatch) -> None:
+    monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
+
+
+def test_a_second_export_compiles_nothing(cache, monkeypatch):
+    told: list[str] = []
+    first = libraries([HOST], told.append)
+    monkeypatch.setattr(compiler, "_made", {})  # as a new process has it
+    monkeypatch.setattr(compiler, "compiled", lambda *_: pytest.fail("compiled again"))
+    assert libraries([HOST], told.append) == first
+    assert told == [f"compiling the kernel for {this_platform().name} with cc"]
+    assert len(entries(cache)) == 1
+
+
+def test_another_kernel_is_another_library(cache, monkeypatch):
+    first = only(libraries([HOST]))
+    monkeypatch.setattr(compiler, "kernel", lambda: {"prbm_fmu.c": STUB.replace(b"2.0", b"2.1")})
+    assert only(libraries([HOST])) != first
+    assert len(entries(cache)) == 2
+
+
+def test_the_same_source_gives_the_same_bytes_and_no_path_gets_into_them(cache, monkeypatch):
+    first = only(libraries([HOST]))
+    shutil.rmtree(cache)
+    monkeypatch.setattr(compiler, "_made", {})
+    assert only(libraries([HOST])) == first
+    assert b"prbm_" not in first.replace(b"prbm_fmu", b"")
+    assert str(Path.home()).encode() + b"/" not in first
+
+
+def test_without_any_compiler_it_says_what_to_install(cache, monkeypatch):
+    monkeypatch.setenv("PATH", "")
+    without_ziglang(monkeypatch)
+    with pytest.raises(NoCompilerError, match=r"need a C compiler.*gcc.*pip install ziglang"):
+        libraries([HOST])
+
+
+def test_ziglang_is_named_where_only_it_can_do(cache, monkeypatch):
+    without_ziglang(monkeypatch)
+    for asked in ([ALL], ["x86_64-windows"]):
+        with pytest.raises(NoCompilerError, match=r"pip install ziglang"):
+            libraries(asked)
+
+
+@pytest.mark.parametrize("chosen", ["no-such-compiler", "false", "'unclosed"])
+def test_a_compiler_that_does_not_run_is_named(cache, monkeypatch, chosen):
+    monkeypatch.setenv("CC", chosen)
+    with pytest.raises(CompilerError, match=re.escape(f"CC = {chosen!r} is no C compiler")):
+        libraries([HOST])
+
+
+def test_what_a_compiler_complains_about_is_told(cache, tmp_path, monkeypatch):
+    bad = script(
+        tmp_path / "bin" / "bad",
+        '[ "$1" = --version ] && echo bad 1.0 && exit 0\n'
+        "for i in 1 2 3 4 5 6 7 8 9; do echo line $i >&2; done; exit 3",
+    )
+    monkeypatch.setenv("CC", str(bad))
+    with pytest.raises(CompilerError, match=r"status 3: line 4; .*line 9\)") as error:
+        libraries([HOST])
+    assert "line 3" not in str(error.value)
+    assert "\n" not in str(error.value)
+    assert entries(cache) == []
+
+
+def test_a_broken_compiler_gives_way_to_the_next(cache, tmp_path, monkeypatch):
+    folder = script(tmp_path / "bin" / "cc", '[ "$1" = --version ] && exit 0; exit 1').parent
+    script(folder / "gcc", f'exec {SYSTEM} "$@"')
+    monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
+    told: list[str] = []
+    assert only(libraries([HOST], told.append))
+    assert told[0].endswith("with cc")
+    assert told[1].endswith("with gcc")
+
+
+def test_a_compiler_that_writes_nothing_is_broken(cache, tmp_path, monkeypatch):
+    monkeypatch.setenv("CC", str(script(tmp_path / "bin" / "idle", "exit 0")))
+    with pytest.raises(CompilerError, match=r"cannot compile .*status 0: no message"):
+        libraries([HOST])
+
+
+def test_options_beside_the_compiler_are_taken(cache, monkeypatch):
+    monkeypatch.setenv("CC", f"{SYSTEM} -DEXTRA")
+    stub = STUB + b"\n#ifndef EXTRA\n#error\n#endif\n"
+    monkeypatch.setattr(compiler, "kernel", lambda: {"prbm_fmu.c": stub})
+    assert only(libraries([HOST]))
+
+
+def test_a_function_that_is_missing_is_found_at_once_and_not_by_the_importer(cache, monkeypatch):
+    stub = STUB + b"\nextern int missing(void);\nfmi2Status fmi2Reset(fmi2Component c)"
+    stub += b"{ return c ? missing() : 0; }"
+    monkeypatch.setattr(compiler, "kernel", lambda: {"prbm_fmu.c": stub})
+    monkeypatch.setenv("CC", SYSTEM)
+    with pytest.raises(CompilerError, match="missing"):
+        libraries([HOST])
+
+
+def test_a_cache_that_cannot_be_written_is_done_without(cache, monkeypatch):
+    cache.parent.parent.mkdir(exist_ok=True)
+    cache.parent.write_text("a file where the folder should be")
+    told: list[str] = []
+    made = libraries([HOST], told.append)
+    assert only(made)
+    assert told[1].startswith(f"cannot write to {cache}: ")
+    assert libraries([HOST], told.append) == made  # this process knows it
+    assert len(told) == 2
+
+
+@pytest.mark.parametrize("damage", [b"", b"garbage", "truncated", "flipped"])
+def test_a_damaged_entry_is_made_again(cache, monkeypatch, damage):
+    made = libraries([HOST])
+    (entry,) = entries(cache)
+    good = entry.read_bytes()
+    flipped = good[:-1] + bytes([good[-1] ^ 1])
+    entry.write_bytes({"truncated": good[:-1], "flipped": flipped}.get(damage, damage))
+    monkeypatch.setattr(compiler, "_made", {})
+    assert libraries([HOST]) == made
+    assert entry.read_bytes() == good
+
+
+def test_ctrl_c_leaves_nothing_in_the_cache(cache, monkeypatch):
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as context:
+        context.setattr(compiler.os, "replace", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            libraries([HOST])
+    assert entries(cache) == []
+    with monkeypatch.context() as context:
+        context.setattr(compiler, "compiled", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            libraries([HOST])
+    assert entries(cache) == []
+    assert only(libraries([HOST]))  # and the lock is free
+
+
+def test_two_exports_at_a_time_compile_once(cache, tmp_path):
+    log = tmp_path / "log"
+    slow = script(
+        tmp_path / "bin" / "slow",
+        f'[ "$1" = --version ] || {{ echo one >> {log}; sleep 1; }}\nexec {SYSTEM} "$@"',
+    )
+    code = (
+        "from prbm.kernel import compiler\n"
+        f"compiler.kernel = lambda: {{'prbm_fmu.c': {STUB!r}}}\n"
+        "import hashlib\n"
+        "for made in compiler.libraries(['host']).values():\n"
+        "    print(hashlib.sha256(made).hexdigest())"
+    )
+    environment = os.environ | {"CC": str(slow), "PYTHONPATH": str(ROOT / "fmu_src")}
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(3)
+    ]
+    printed = {process.communicate()[0] for process in started}
+    assert [process.returncode for process in started] == [0, 0, 0]
+    assert len(printed) == 1
+    assert log.read_text() == "one\n"
+
+
+def test_a_lock_that_a_dead_process_left_does_not_matter(cache):
+    code = (
+        "import os, sys\nfrom pathlib import Path\nfrom prbm.kernel import compiler\n"
+        "with compiler._locked(Path(sys.argv[1])): os._exit(9)"
+    )
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "fmu_src")}
+    done = subprocess.run([sys.executable, "-c", code, str(cache)], env=environment, check=False)
+    assert done.returncode == 9
+    assert (cache / "lock").exists()
+    assert only(libraries([HOST]))
+
+
+def test_headers_that_have_moved_are_a_sentence(cache, tmp_path, monkeypatch):
+    monkeypatch.setattr(fmpy, "__file__", str(tmp_path / "fmpy" / "__init__.py"))
+    with pytest.raises(CompilerError, match=r"headers of FMI.*pip install \"fmpy>=0.3.20,<0.4\""):
+        libraries([HOST])
+
+
+def test_a_machine_that_is_none_of_ours_is_told(cache, monkeypatch):
+    monkeypatch.setattr(compiler.platform, "machine", lambda: "riscv64")
+    assert this_platform() is None
+    with pytest.raises(NoCompilerError, match=r"this machine \(riscv64, .*--platform all"):
+        libraries([HOST])
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads ELF with nm")
+def test_the_library_shows_nothing_but_functions_of_fmi_and_needs_nothing_but_libc(tmp_path):
+    """The kernel itself: all else would get mixed up with other libraries in the process."""
+    library = tmp_path / "prbm.so"
+    library.write_bytes(only(libraries([HOST])))
+    named = subprocess.run(
+        ["nm", "-D", "--defined-only", library], capture_output=True, text=True, check=True
+    ).stdout.split()[2::3]
+    assert len(named) > 100
+    assert {name[:4] for name in named} == {"fmi2", "fmi3"}
+    needed = subprocess.run(
+        ["readelf", "-d", library], capture_output=True, text=True, check=True
+    ).stdout
+    libc = {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
+    assert set(re.findall(r"NEEDED.*\[(.*)\]", needed)) <= libc
+
+
+MACHINES = {
+    "x86_64-linux": (b"\x7fELF\x02", 18, 62),
+    "aarch64-linux": (b"\x7fELF\x02", 18, 183),
+    "x86_64-windows": (b"MZ", None, 0x8664),
+    "aarch64-windows": (b"MZ", None, 0xAA64),
+    "x86_64-darwin": (b"\xcf\xfa\xed\xfe", 4, 0x0007),
+    "aarch64-darwin": (b"\xcf\xfa\xed\xfe", 4, 0x000C),
+}
+
+
+@pytest.mark.slow
+def test_ziglang_makes_a_library_for_every_platform(native, mechanisms, tmp_path):
+    """Each of its own format and machine; that for Linux needs nothing newer than glibc 2.17."""
+    from prbm.fmu import native_fmu
+
+    pytest.importorskip("ziglang")
+    made = {platform.name: content for platform, content in libraries([ALL]).items()}
+    assert made.keys() == MACHINES.keys() == PLATFORMS.keys()
+    for name, content in made.items():
+        magic, offset, machine = MACHINES[name]
+        assert content.startswith(magic), name
+        if offset is None:
+            offset = struct.unpack_from("<I", content, 0x3C)[0] + 4
+        assert struct.unpack_from("<H", content, offset) == (machine,), name
+        if name.endswith("linux"):
+            versions = {int(v) for v in re.findall(rb"GLIBC_2\.(\d+)", content)}
+            assert max(versions) <= 17, name
+    for fmi, folders in ((2, {"linux64", "win64", "darwin64"}), (3, {"x86_64-linux"})):
+        path = tmp_path / f"{fmi}.fmu"
+        path.write_bytes(native_fmu.build(mechanisms["PRBDM"], fmi=fmi, platforms=[ALL]))
+        with zipfile.ZipFile(path) as fmu:
+            names = [n for n in fmu.namelist() if n.startswith("binaries/")]
+            assert "documentation/licenses/mingw-w64.txt" in fmu.namelist()
+            digests = {hashlib.sha256(fmu.read(n)).digest() for n in names}
+        assert folders <= {n.split("/")[1] for n in names}
+        assert len(names) == len(digests) == len(PLATFORMS)

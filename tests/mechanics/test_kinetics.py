@@ -1,0 +1,117 @@
+"""Equations of motion against SymPy's Lagrange equations, and their own identities."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from many_parts import cantilever
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.kinetics import inertia
+from support import mechanism
+
+RNG = np.random.default_rng(3)
+
+
+def test_accelerations_are_those_of_lagrange():
+    """A 2R cantilever with a tip body on a pin: three angles, no loop, every term at once."""
+    sim = Simulation(cantilever(damping_beta=0.0))
+    system = sim.system
+    n = system.n
+    assert n == 3
+    assert len(system.loops) == 0
+    L, h, b, E, rho = 0.05, 2e-4, 1e-2, 2e11, 7800.0
+    EI, m_leaf = E * b * h**3 / 12, rho * b * h * L
+    g1, g2, K1, K2 = 0.44, 0.46, 3.4710 * EI / L, 2.0682 * EI / L
+
+    t = sp.symbols("t")
+    q = [sp.Function(f"q{i}")(t) for i in range(3)]
+    unit = [sp.Matrix([sp.cos(a), sp.sin(a)]) for a in q]
+    across = [sp.Matrix([-sp.sin(a), sp.cos(a)]) for a in q]
+    pivot = sp.Matrix([0.1 * L, 0])
+    end1 = pivot + g1 * L * unit[0]
+    end2 = end1 + g2 * L * unit[1]
+    rods = [
+        (g1 * m_leaf, pivot + g1 * L / 2 * unit[0], (g1 * L) ** 2 / 12, q[0]),
+        (g2 * m_leaf, end1 + g2 * L / 2 * unit[1], (g2 * L) ** 2 / 12, q[1]),
+        (0.02, end2 + 0.01 * unit[2] + 0.004 * across[2], 3e-6 / 0.02, q[2]),
+    ]
+    T = sum(m * (z.diff(t).dot(z.diff(t)) + k2 * a.diff(t) ** 2) / 2 for m, z, k2, a in rods)
+    V = K1 * q[0] ** 2 / 2 + K2 * (q[1] - q[0]) ** 2 / 2
+    V -= sum(m * z.dot(sp.Matrix([1.0, -9.81])) for m, z, _, _ in rods)
+    Q, W, A = (sp.symbols(f"{name}0:3") for name in "QWA")
+    equations = []
+    for a in q:
+        lagrange = (T - V).diff(a.diff(t)).diff(t) - (T - V).diff(a)
+        for i in range(3):
+            lagrange = (
+                lagrange.subs(q[i].diff(t, 2), A[i]).subs(q[i].diff(t), W[i]).subs(q[i], Q[i])
+            )
+        equations.append(lagrange)
+    matrix, right = sp.linear_eq_to_matrix(equations, A)
+    evaluate = sp.lambdify([*Q, *W], (matrix, right))
+    for _ in range(20):
+        angles, rates = RNG.normal(size=3), 20 * RNG.normal(size=3)
+        M, f = evaluate(*angles, *rates)
+        expected = np.linalg.solve(np.array(M, float), np.array(f, float).ravel())
+        found, _, mass = sim.equations.accelerations(angles, rates)
+        np.testing.assert_allclose(mass, np.array(M, float), rtol=1e-12, atol=1e-20)
+        np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-8)
+
+
+def test_centrifugal_terms_do_the_work_that_the_mass_matrix_takes():
+    """v.(M v)' / 2 = v.C v^2: what changes in T at constant rates is inertial power."""
+    system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
+    J, h = np.diag(system.J), 1e-6
+    for _ in range(20):
+        q, v = RNG.normal(size=system.n), RNG.normal(size=system.n)
+        M1, M2 = (inertia(system.H, J, np.exp(1j * (q + s * h * v)))[0] for s in (-1, 1))
+        _, C = inertia(system.H, J, np.exp(1j * q))
+        power = v @ (M2 - M1) @ v / (4 * h)
+        assert v @ C @ (v * v) == pytest.approx(power, rel=1e-6, abs=1e-12)
+        np.testing.assert_allclose(C, -C.T, atol=1e-18)
+
+
+def test_fused_product_equals_the_separate_equations():
+    """One product with e gives what inertia, jacobian and convective give each for itself."""
+    from prbm.mechanics import constraints, forces
+
+    sim = Simulation(mechanism("PRBDM2R"), {"damping.zeta": 0.02})
+    system, equations = sim.system, sim.equations
+    for _ in range(10):
+        q = system.q0 + 0.2 * RNG.normal(size=system.n)
+        v = RNG.normal(size=system.n)
+        e = np.exp(1j * q)
+        M, C = inertia(system.H, np.diag(system.J), e)
+        rows = constraints.jacobian(system.loops, e)
+        w = forces.field_row(system.S, system.gravity)
+        Q = forces.springs(system.K, q - system.q0) + forces.generalised(w, e)
+        Q -= 8e-6 * system.K @ v + 2 * 0.02 * sim.omega * M @ v
+        right = np.concatenate([Q - C @ v**2, constraints.convective(system.loops, e, v)])
+        x = constraints.solve(constraints.saddle(M, rows, rows), right)
+        a, lam, _ = equations.accelerations(q, v)
+        np.testing.assert_allclose(a, x[: system.n], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(lam, -x[system.n :], rtol=1e-9, atol=1e-12)
+
+
+def test_constraint_rows_are_the_derivatives_of_the_constraints():
+    """Central differences, and the convective term by differencing the Jacobian."""
+    from prbm.mechanics import constraints
+
+    system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
+    B, h = np.vstack([system.loops, system.gaps, system.slides, system.rubs]), 6e-6
+    q, v = RNG.normal(size=system.n), RNG.normal(size=system.n)
+    zero = np.zeros(len(B))
+
+    def value(angles):
+        return constraints.values(B, zero, np.exp(1j * angles))
+
+    def rows(angles):
+        return constraints.jacobian(B, np.exp(1j * angles))
+
+    differences = np.array(
+        [(value(q + d) - value(q - d)) / (2 * h) for d in h * np.eye(system.n)]
+    ).T
+    np.testing.assert_allclose(rows(q), differences, atol=1e-9)
+    turning = (rows(q + h * v) - rows(q - h * v)) @ v / (2 * h)
+    np.testing.assert_allclose(constraints.convective(B, np.exp(1j * q), v), -turning, atol=1e-9)

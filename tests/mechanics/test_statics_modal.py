@@ -1,0 +1,148 @@
+"""Static shapes and small vibrations against beam theory, minimisation and differences."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from many_parts import cantilever
+from prbm.base.errors import EquilibriumError
+from prbm.mechanics import constraints
+from prbm.mechanics.assembly import assemble
+from prbm.mechanics.forces import elastic_energy, gravitational_energy
+from prbm.mechanics.modal import modes
+from prbm.mechanics.statics import equilibrium, release_velocity
+from prbm.mechanism.flexure import MODELS
+from support import mechanism
+
+
+def tip_deflection(model, force):
+    """Return the deflection of a cantilever under a tip force, in units of F h^3/EI."""
+    L, EI = 0.05, 2e11 * 1e-2 * (2e-4) ** 3 / 12
+    beam = cantilever(model)
+    values = beam.values({"gravity.x": 0.0, "tip.mass": 1.0, "leaf.density": 1.0})
+    # the weight of the tip body is the force: across the beam, at the pin by zero lever
+    values |= {"gravity.y": force}
+    system = assemble(beam, values)
+    shape = equilibrium(system)
+    e = np.exp(1j * shape.q)
+    frame = system.bodies["tip"]
+    lever = complex(0.01, 0.004)
+    pin = complex(frame.A @ e) + frame.c - lever * e[frame.j]
+    return pin.imag / (force * L**3 / EI)
+
+
+@pytest.mark.parametrize(("model", "error"), [("1R", 0.037), ("2R", 0.0071), ("3R", 0.022)])
+def test_a_cantilever_deflects_as_its_published_coefficients_say(model, error):
+    """Sum of lever^2/K over the pivots, to 1e-4; beam theory, 1/3, to the error of the model."""
+    data = MODELS[model]
+    gamma, K_theta = ([c.value for c in part] for part in (data.gamma, data.K_theta))
+    levers = np.cumsum(gamma[::-1])[::-1]
+    rates = [K * (g if data.rate_with_gamma else 1.0) for g, K in zip(gamma, K_theta, strict=True)]
+    closed = sum(levers**2 / rates)
+    assert tip_deflection(model, 1e-4) == pytest.approx(closed, rel=1e-4)
+    assert closed == pytest.approx(1 / 3, rel=error)
+
+
+def test_held_shape_is_the_minimum_of_potential_energy():
+    """An independent route: SLSQP on elastic + gravitational energy under the constraints."""
+    guide = mechanism("PRBDM2R")
+    system = assemble(guide, guide.values())
+    shape = equilibrium(system, -0.012)
+    B = np.vstack([system.loops, system.release])
+    c = np.append(system.loops_c, system.release_c + 0.012)
+    found = minimize(
+        lambda q: 1e3 * (
+            elastic_energy(system.K, q - system.q0) + gravitational_energy(system, np.exp(1j * q))
+        ),
+        shape.q + 1e-3,
+        constraints={"type": "eq", "fun": lambda q: 1e2 * constraints.values(B, c, np.exp(1j * q))},
+        method="SLSQP",
+        options={"ftol": 1e-15, "maxiter": 500},
+    )  # fmt: skip
+    np.testing.assert_allclose(found.x, shape.q, atol=2e-5)
+
+
+def test_holding_force_is_the_derivative_of_the_energy():
+    """F = dV/dx along the path of held shapes."""
+    guide = mechanism("PRBDM2R")
+    system = assemble(guide, guide.values())
+
+    def energy(x):
+        q = equilibrium(system, x).q
+        return elastic_energy(system.K, q - system.q0) + gravitational_energy(
+            system, np.exp(1j * q)
+        )
+
+    h = 1e-5
+    slope = (energy(-0.01 + h) - energy(-0.01 - h)) / (2 * h)
+    assert equilibrium(system, -0.01).force == pytest.approx(slope, rel=1e-6)
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+def test_free_equilibrium_needs_no_force(model):
+    """Held where it would rest anyway, the holding force vanishes."""
+    guide = mechanism(model)
+    system = assemble(guide, guide.values())
+    free = equilibrium(system)
+    x = float((system.release @ np.exp(1j * free.q)).real) + system.release_c
+    held = equilibrium(system, x)
+    np.testing.assert_allclose(held.q, free.q, atol=1e-9)
+    assert abs(held.force) < 1e-9
+
+
+def test_modes_are_orthogonal_and_on_the_tangent_of_the_loops():
+    guide = mechanism("PRBDM2R")
+    system = assemble(guide, guide.values())
+    rest = equilibrium(system)
+    found = modes(system, rest)
+    rows = constraints.jacobian(system.loops, np.exp(1j * rest.q))
+    np.testing.assert_allclose(found.shape.T @ found.M @ found.shape, np.eye(5), atol=1e-10)
+    assert np.abs(rows @ found.shape).max() < 1e-9
+
+
+def test_frequencies_are_those_of_the_linearised_motion():
+    """The right-hand side, differenced about the equilibrium on the tangent space."""
+    from prbm.hybrid.simulation import Simulation
+
+    guide = mechanism("PRBDM2R")
+    sim = Simulation(guide, {"damping.beta": 0.0})
+    system = sim.system
+    rest = equilibrium(system)
+    found = modes(system, rest)
+    for phi, f in zip(found.shape.T, found.frequency, strict=True):
+        h = 1e-6 / np.abs(phi).max()
+        states = [sim.equations.project(0.0, np.concatenate([rest.q + s * h * phi, np.zeros(9)]))
+                  for s in (-1, 1)]  # fmt: skip
+        a = [sim.equations.accelerations(y[:7], np.zeros(7))[0] for y in states]
+        stiffness = -phi @ found.M @ (a[1] - a[0]) / (2 * h)
+        assert math.sqrt(stiffness) / (2 * math.pi) == pytest.approx(f, rel=1e-5)
+
+
+def test_unstable_equilibrium_has_no_frequency():
+    """Weight on top of the flexures beyond buckling: omega^2 < 0 is told by a negative sign."""
+    guide = mechanism("PRBDM2R")
+    system = assemble(guide, guide.values({"gravity.x": 0.0, "gravity.y": -200.0}))
+    assert modes(system, equilibrium(system)).frequency[0] < 0
+
+
+def test_release_velocity_is_what_an_impulse_on_the_centre_gives():
+    """M v = impulse along the release + Phi_q^T Lambda: least kinetic energy for its speed."""
+    guide = mechanism("PRBDM2R")
+    system = assemble(guide, guide.values())
+    q = equilibrium(system, -0.012).q
+    v = release_velocity(system, q, 0.7)
+    e = np.exp(1j * q)
+    rows = constraints.jacobian(np.vstack([system.loops, system.release]), e)
+    M = (e.conj()[:, None] * system.H * e).real + np.diag(system.J)
+    assert rows @ v == pytest.approx([0.0, 0.0, 0.7], abs=1e-12)
+    lam = np.linalg.lstsq(rows.T, M @ v, rcond=None)[0]
+    np.testing.assert_allclose(rows.T @ lam, M @ v, atol=1e-14)
+
+
+def test_no_equilibrium_is_said_not_guessed():
+    guide = mechanism("PRBDM")
+    system = assemble(guide, guide.values())
+    with pytest.raises(EquilibriumError, match="beyond"):
+        equilibrium(system, 0.2)

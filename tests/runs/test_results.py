@@ -1,0 +1,214 @@
+"""Results: the columns that FMPy would give, and their figures."""
+
+import io
+import time
+from pathlib import Path
+
+import fmpy.util
+import matplotlib
+import numpy as np
+import pytest
+from PIL import Image
+
+from prbm.base.errors import ParameterError
+from prbm.base.progress import reporter
+from prbm.drawing.style import png
+from prbm.files.mechanism_file import load, shipped
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanism.description import Mechanism
+from prbm.plots.figures import response
+from prbm.runs.result import Result, ResultError, read_csv, rest_time
+from prbm.runs.run import simulate
+
+
+@pytest.fixture(scope="module")
+def result(mechanisms: dict[str, Mechanism]) -> Result:
+    return simulate(mechanisms["PRBDM"], stop_time=0.3)
+
+
+def test_rows_are_the_outputs_of_the_simulation(
+    result: Result, mechanisms: dict[str, Mechanism]
+) -> None:
+    simulation = Simulation(mechanisms["PRBDM"])
+    simulation.advance(0.11)
+    row = result.columns[110]
+    for name, x in simulation.outputs().items():
+        assert row[name] == pytest.approx(x, abs=1e-12)
+    assert result["time"][-1] == 0.3
+    assert len(result.columns) == 301
+
+
+def test_every_impact_is_recorded(result: Result) -> None:
+    assert len(result.impacts) == result["stop.impact_count"][-1]
+    times = [impact.time for impact in result.impacts]
+    assert times == sorted(times)
+
+
+def test_integers_and_booleans_have_the_types_of_fmpy(result: Result) -> None:
+    assert result.columns.dtype["stop.contact"] == np.bool_
+    assert result.columns.dtype["stop.impact_count"] == np.int32
+    assert result.columns.dtype["shuttle.x"] == np.float64
+
+
+def test_the_last_step_ends_at_the_stop_time(mechanisms: dict[str, Mechanism]) -> None:
+    short = simulate(mechanisms["PRBDM"], stop_time=0.005, step=0.002)
+    np.testing.assert_allclose(short["time"], [0.0, 0.002, 0.004, 0.005], rtol=1e-15)
+
+
+def test_a_source_acts_from_its_row_on(mechanisms: dict[str, Mechanism]) -> None:
+    """Force times displacement is the work of a force that is constant within each step."""
+    driven = simulate(
+        mechanisms["PRBDM"], stop_time=0.03, source=lambda t: {"force.x": 0.2 if t < 0.01 else -0.1}
+    )
+    assert driven["force.x"][0] == 0.2
+    assert driven["force.x"][10] == -0.1
+    work = np.cumsum(driven["force.x"][:-1] * np.diff(driven["shuttle.x"]))
+    np.testing.assert_allclose(driven["energy.work"][1:], work, atol=1e-9)
+
+
+def test_the_values_are_those_of_the_start(mechanisms: dict[str, Mechanism]) -> None:
+    driven = simulate(
+        mechanisms["PRBDM"],
+        {"stop.offset": 1e-3, "force.y": 0.1},
+        stop_time=0.002,
+        source=lambda t: {},
+    )
+    assert driven.values["stop.offset"] == 1e-3
+    assert driven.values["force.y"] == 0.1
+    assert driven.values["stop.restitution"] == 0.6
+
+
+def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
+    told: list[float] = []
+    simulate(mechanisms["PRBDM"], stop_time=0.004, progress=told.append)
+    np.testing.assert_allclose(told, [0.0, 0.25, 0.5, 0.75, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("settings", "sentence"),
+    [
+        ({"stop_time": 0.0}, "stop_time = 0 s must be positive"),
+        ({"stop_time": np.inf}, "stop_time = inf s must be positive and finite"),
+        ({"step": -1e-3}, "step = -0.001 s must be positive"),
+        ({"step": 1e-9}, "step = 1e-09 s makes 1000000000 steps"),
+        ({"changes": {"stop.restitutoin": 0.5}}, "did you mean stop.restitution"),
+        ({"tolerance": 1.0}, "tolerance = 1 must lie between"),
+    ],
+)
+def test_what_cannot_be_simulated_is_refused(
+    mechanisms: dict[str, Mechanism], settings: dict[str, float], sentence: str
+) -> None:
+    with pytest.raises(ParameterError, match=sentence):
+        simulate(mechanisms["PRBDM"], **settings)
+
+
+def test_a_column_that_is_missing_is_named(result: Result) -> None:
+    with pytest.raises(ResultError, match=r"no column 'stop\.gapp'"):
+        result["stop.gapp"]
+
+
+def test_rest_time_is_the_first_row_of_the_last_hold(result: Result) -> None:
+    t = rest_time(result.columns)
+    assert t is not None
+    row = round(t / 1e-3)
+    assert result["stop.contact"][row:].all()
+    assert not result["stop.contact"][row - 1]
+    assert rest_time(result.columns[:100]) is None
+
+
+def test_a_file_of_fmpy_is_read_back_exactly(tmp_path: Path, result: Result) -> None:
+    fmpy.util.write_csv(tmp_path / "result.csv", result.columns)
+    back = read_csv(tmp_path / "result.csv")
+    assert back.dtype.names == result.columns.dtype.names
+    for name in back.dtype.names:
+        np.testing.assert_array_equal(back[name], result[name])
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("", "is no result"),
+        ("shuttle.x,time\n0,0\n0,1\n", "is no result"),
+        ("time,a\n0,0\n", "two rows or more"),
+        ("time,a,a\n0,0,0\n1,0,0\n", "a column stands there twice"),
+        ("time,a\n0,0\n1\n", "row 3 has 1 values for 2 columns"),
+        ("time,a\n0,0\n1,x\n", "row 3 holds what is no number"),
+    ],
+)
+def test_a_file_that_is_no_result_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+    path = tmp_path / "result.csv"
+    path.write_text(text)
+    with pytest.raises(ResultError, match=sentence):
+        read_csv(path)
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "result.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ResultError, match="is no CSV file"):
+        read_csv(tmp_path / "result.csv")
+
+
+def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path: Path) -> None:
+    (tmp_path / "result.csv").write_text("time,a\n0,0\n1,2\n", encoding="utf-8-sig")
+    assert read_csv(tmp_path / "result.csv").dtype.names == ("time", "a")
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_progress_is_told_after_a_second(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In one line on a terminal; elsewhere in a line every other second."""
+    clock = iter([0.0, *np.arange(0.25, 5.25, 0.25)])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    stream = io.StringIO()
+    monkeypatch.setattr(stream, "isatty", lambda: terminal)
+    report = reporter(stream)
+    for k in range(1, 21):
+        report(k / 20)
+    told = stream.getvalue()
+    if terminal:
+        assert told.startswith("\r 20%\r 25%")
+        assert told.endswith("\r100%\n")
+    else:
+        assert told.split() == ["20%", "done", "60%", "done"]
+
+
+def test_a_figure_does_not_depend_on_the_users_taste(result: Result) -> None:
+    plain = png(response(result))
+    taste = {"lines.linewidth": 5.0, "savefig.transparent": True, "xtick.direction": "in"}
+    with matplotlib.rc_context(taste):
+        assert png(response(result)) == plain
+
+
+def test_the_response_shows_all_impacts_and_a_constant_balance(
+    tmp_path: Path, result: Result
+) -> None:
+    figure = response(result)
+    displacement, _, speeds, energies = figure.axes
+    assert len(displacement.lines[1].get_xdata()) == len(result.impacts)
+    closing, opening = (line.get_ydata() for line in speeds.lines)
+    np.testing.assert_allclose(np.divide(opening, closing), 0.6, rtol=1e-6)
+    balance = energies.lines[-1].get_ydata()
+    assert np.ptp(balance) < 1e-5  # of 17 mJ, at the default tolerance
+    figure.savefig(tmp_path / "response.png")
+    with Image.open(tmp_path / "response.png") as image:
+        assert image.format == "PNG"
+
+
+def test_legends_lie_beside_what_the_response_shows() -> None:
+    """Of a leaf that falls from the upper left to the lower right, with curves everywhere."""
+    figure = response(simulate(load(shipped()["Cantilever"]), stop_time=0.06, step=1e-4))
+    figure.draw_without_rendering()
+    displacement, _, speeds, energies = figure.axes
+    for axes in (displacement, speeds, energies):
+        legend = axes.get_legend().get_window_extent()
+        for line in axes.lines:
+            points = axes.transData.transform(line.get_xydata())
+            assert legend.count_contains(points) == 0, line.get_label()
+
+
+def test_the_response_has_a_panel_for_what_was_recorded(result: Result) -> None:
+    few = result.columns[["time", "shuttle.x", "shuttle.y"]]
+    assert len(response(few, result.mechanism).axes) == 1
+    with pytest.raises(ResultError, match=r"nothing to plot: record shuttle\.x"):
+        response(result.columns[["time"]], result.mechanism)
+    with pytest.raises(ResultError, match="give the mechanism"):
+        response(few)

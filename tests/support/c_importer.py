@@ -1,0 +1,357 @@
+"""The C importer of ``importer/``: compiled where needed, given jobs, its rows read back."""
+
+import atexit
+import dataclasses
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import read_model_description
+
+import prbm.kernel
+from many_parts import anvil
+from prbm.base.atomic import write
+from prbm.kernel.compiler import _locked, cache_folder
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parts import Stop
+from support import built, mechanism
+
+SOURCES = Path(__file__).with_name("importer")
+KERNEL = Path(prbm.kernel.__file__).parent
+HEADERS = Path(fmpy.__file__).parent / "c-code"
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshadow", "-Werror")
+FOLDERS = (f"-I{KERNEL}", "-isystem", str(HEADERS))
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", *WARNINGS, *FOLDERS)
+POSIX = ("-D_POSIX_C_SOURCE=200809L", "-ldl", "-lm", "-lpthread")
+TYPES = {"Real": "r", "Float64": "r", "Integer": "i", "Int32": "i", "Boolean": "b"}
+TWO_STOPS, ANVIL = "TwoStops", "Anvil"
+
+
+@dataclass(frozen=True)
+class Host:
+    """Where an importer runs: on this machine, or on another in an emulator."""
+
+    name: str
+    folders: tuple[str, ...]
+    suffix: str
+    target: str = ""
+    emulator: tuple[str, ...] = ()
+    environment: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def windows(self) -> bool:
+        return self.suffix == ".dll"
+
+    def path(self, path: Path) -> str:
+        """Return how a program there calls a file of this machine."""
+        return "Z:" + str(path).replace("/", "\\") if self.windows else str(path)
+
+    def uri(self, path: Path) -> str:
+        return ("file:///Z:" if self.windows else "file://") + quote(str(path))
+
+
+NATIVE = Host("x86_64-linux", ("x86_64-linux", "linux64"), ".so")
+WINE = Host(
+    "x86_64-windows",
+    ("x86_64-windows", "win64"),
+    ".dll",
+    "x86_64-windows-gnu",
+    ("wine",),
+    (("WINEDEBUG", "-all"), ("WINEDLLOVERRIDES", "mscoree,mshtml=")),
+)
+ARM = Host(
+    "aarch64-linux",
+    ("aarch64-linux",),
+    ".so",
+    "aarch64-linux-gnu.2.17",
+    ("qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"),
+)
+PACKAGES = {
+    "cc": "gcc",
+    "valgrind": "valgrind",
+    "wine": "wine64",
+    "qemu-aarch64-static": "qemu-user-static and libc6-arm64-cross",
+}
+
+
+def needs(*programs: str) -> None:
+    """Skip a test where a program is missing; say which package brings it."""
+    for program in programs:
+        if shutil.which(program) is None:
+            pytest.skip(f"{program} is not installed (Debian: {PACKAGES.get(program, program)})")
+
+
+@cache
+def _folder() -> Path:
+    """Return a folder for what is made once, shared by all processes of a run of the tests."""
+    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", f"of-{os.getpid()}")
+    folder = Path(tempfile.gettempdir()) / f"prbm_importer_{run}"
+    users = folder / "users"
+    users.mkdir(parents=True, exist_ok=True)
+    (users / str(os.getpid())).touch()
+    atexit.register(_leave, folder)
+    return folder
+
+
+def _leave(folder: Path) -> None:
+    """Remove the folder if no other process uses it any more."""
+    users = folder / "users"
+    (users / str(os.getpid())).unlink()
+    if not any(users.iterdir()):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def once(name: str, make: Callable[[Path], object]) -> Path:
+    """Return a file or folder that is made by whoever needs it first."""
+    path = _folder() / name
+    with _locked(path.with_name(f"{name}.lock")):
+        if not path.exists():
+            part = path.with_name(f"part-{name}")
+            make(part)
+            part.rename(path)
+    return path
+
+
+def zig(target: str) -> list[str]:
+    return [sys.executable, "-m", "ziglang", "cc", "-target", target]
+
+
+def zig_environment() -> dict[str, str]:
+    """Return an environment in which ziglang shares what it builds with the exporter."""
+    return os.environ | {
+        "ZIG_GLOBAL_CACHE_DIR": str(cache_folder() / "zig"),
+        "ZIG_LOCAL_CACHE_DIR": str(_folder() / f"zig-{os.getpid()}"),
+    }
+
+
+def compile_c(
+    output: Path,
+    sources: Sequence[Path],
+    flags: Sequence[str] = (),
+    target: str = "",
+    compiler: str = "cc",
+) -> None:
+    """Compile with the system's compiler or, for a target, ziglang's; warnings are errors."""
+    needs(*([] if target else [compiler]))
+    command = zig(target) if target else [compiler]
+    done = subprocess.run(
+        [*command, *FLAGS, *map(str, sources), "-o", str(output), *flags],
+        capture_output=True, text=True, check=False,
+        env=zig_environment() if target else None,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+@cache
+def importer(host: Host = NATIVE, flags: tuple[str, ...] = ()) -> Path:
+    """Return the importer for a host; skip the test if it cannot be made or run."""
+    needs(*host.emulator[:1])
+    name = f"importer-{host.name}-{len(flags)}{'.exe' if host.windows else ''}"
+    sources, system = sorted(SOURCES.glob("*.c")), () if host.windows else POSIX
+    return once(name, lambda path: compile_c(path, sources, [*flags, *system], host.target))
+
+
+@dataclass(frozen=True)
+class Job:
+    """What an importer is to do with an FMU that is unpacked.
+
+    Parameters
+    ----------
+    folder : Path
+        The unpacked FMU.
+    kind : str
+        ``cs``, ``events`` (co-simulation in event mode) or ``me``.
+    points : array
+        Communication points, the first of them the start.
+    sets : mapping
+        Start values by name.
+    changes : mapping
+        Values by name that are set at the communication point of an index.
+    records : sequence of str
+        What is recorded; all variables if empty.
+    substep : float
+        Step of the integration in model exchange [s].
+    library : Path or None
+        Another library than the one in the FMU.
+    resources : str or None
+        Another location of the resources than theirs.
+    """
+
+    folder: Path
+    kind: str = "cs"
+    points: Any = (0.0, 1e-3)
+    sets: Mapping[str, float] = field(default_factory=dict)
+    changes: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
+    records: Sequence[str] = ()
+    tolerance: float | None = None
+    substep: float = 2e-5
+    library: Path | None = None
+    resources: str | None = None
+    host: Host = NATIVE
+
+    def text(self) -> str:
+        """Return the job file."""
+        found = read_model_description(str(self.folder))
+        variables = {v.name: v for v in found.modelVariables if v.type in TYPES}
+        version = int(found.fmiVersion[0])
+        interface = found.modelExchange if self.kind == "me" else found.coSimulation
+        named = {n: f"{v.valueReference} {TYPES[v.type]}" for n, v in variables.items()}
+        library = self.library or self._library(interface.modelIdentifier)
+        resources = self.folder / "resources"
+        location = self.host.uri(resources) if version == 2 else self.host.path(resources)
+        lines = [
+            f"fmi {version}",
+            f"kind {self.kind}",
+            f"library {self.host.path(library)}",
+            f"resources {location if self.resources is None else self.resources}",
+            "name an instance",
+            f"token {found.guid if version == 2 else found.instantiationToken}",
+            f"start {_bits(self.points[0])}",
+            f"substep {_bits(self.substep)}",
+        ]
+        if self.kind == "me":
+            states = found.numberOfContinuousStates
+            lines += [f"states {states}", f"indicators {found.numberOfEventIndicators}"]
+        if self.tolerance is not None:
+            lines.append(f"tolerance {_bits(self.tolerance)}")
+        lines += [f"set {named[name]} {_bits(x)}" for name, x in self.sets.items()]
+        lines += [f"record {named[name]}" for name in self.records or named]
+        for k, time in enumerate(self.points[1:]):
+            change = self.changes.get(k, {})
+            lines += [f"change {named[name]} {_bits(x)}" for name, x in change.items()]
+            lines.append(f"point {_bits(time)}")
+        return "\n".join(lines) + "\n"
+
+    def _library(self, identifier: str) -> Path:
+        for folder in self.host.folders:
+            path = self.folder / "binaries" / folder / (identifier + self.host.suffix)
+            if path.is_file():
+                return path
+        pytest.skip(f"the FMU has no library for {self.host.name}")
+
+    def names(self) -> list[str]:
+        """Return the names of the columns after the time."""
+        found = read_model_description(str(self.folder))
+        return [*self.records] or [v.name for v in found.modelVariables if v.type in TYPES]
+
+    def on(self, host: Host) -> "Job":
+        return replace(self, host=host)
+
+
+def _bits(x: float) -> str:
+    return struct.pack(">d", float(x)).hex()
+
+
+@dataclass(frozen=True)
+class Done:
+    """What came of a job."""
+
+    status: int
+    output: bytes
+    errors: str
+    names: Sequence[str]
+
+    def rows(self, marks: str = "p") -> np.ndarray:
+        """Return the rows with one of the marks as a structured array, the time in ``at``."""
+        lines = [line.split() for line in self.output.decode().splitlines()]
+        numbers = [
+            [struct.unpack(">d", bytes.fromhex(word))[0] for word in words[1:]]
+            for words in lines
+            if words[0] in marks
+        ]
+        kinds = [(name, float) for name in ("at", *self.names)]
+        return np.array([tuple(row) for row in numbers], dtype=kinds)
+
+
+def unpack(fmu: Path, folder: Path) -> Path:
+    """Unpack an FMU into a folder, whatever its name."""
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def execute(
+    job: Job,
+    *words: Any,
+    program: Path | None = None,
+    before: Sequence[str] = (),
+    environment: Mapping[str, str] | None = None,
+    timeout: float = 600.0,
+) -> Done:
+    """Run the importer with a job; raise nothing, whatever happens there."""
+    host = job.host
+    program = program or importer(host)
+    needs(*host.emulator[:1], *before[:1])
+    with tempfile.TemporaryDirectory(prefix="prbm_job_") as name:
+        file = Path(name) / "job.txt"
+        file.write_text(job.text(), encoding="utf-8")
+        own = {"WINEPREFIX": str(_folder() / f"wine-{os.getpid()}")} if host.windows else {}
+        done = subprocess.run(
+            [*host.emulator, *before, str(program), host.path(file), *map(str, words)],
+            capture_output=True, check=False, timeout=timeout,
+            env=os.environ | own | dict(host.environment) | dict(environment or {}),
+        )  # fmt: skip
+    return Done(done.returncode, done.stdout, done.stderr.decode(errors="replace"), job.names())
+
+
+def run(job: Job, *words: Any, **options: Any) -> Done:
+    """Run the importer with a job that must go well."""
+    done = execute(job, *words, **options)
+    assert done.status == 0, done.errors
+    return done
+
+
+@cache
+def given(model: str) -> Mechanism:
+    """Return a mechanism by name: a shipped one, or one of the tests' own.
+
+    The 2R guide with two stops that rub, and bodies that hit each other on flexures that stretch.
+    """
+    if model == ANVIL:
+        return anvil()
+    if model != TWO_STOPS:
+        return mechanism(model)
+    place = ("shuttle.width", "flexure.length + shuttle.com_height")
+    stops = [
+        Stop(name, "shuttle", place, offset=offset, friction=friction, restitution=restitution)
+        for name, offset, friction, restitution in (
+            ("high", 0.01, 0.3, 0.7),
+            ("low", -0.01, 0.1, 0.5),
+        )
+    ]
+    return dataclasses.replace(mechanism("PRBDM2R"), name=TWO_STOPS, stops=tuple(stops))
+
+
+@cache
+def native(model: str, fmi: int, platform: str = "host") -> Path:
+    """Return a native FMU of a mechanism, unpacked; the FMU itself lies beside it.
+
+    What takes the engine long has no reference results.
+    """
+    name = f"{model}-{fmi}-{platform}"
+    fmu = once(
+        f"{name}.fmu",
+        lambda path: write(path, built(given(model), fmi, (platform,))),
+    )
+    return once(name, lambda path: unpack(fmu, path))
+
+
+@cache
+def kernel_library(name: str, flags: tuple[str, ...], compiler: str = "cc") -> Path:
+    """Return the FMUs' library, compiled with flags of one's own; it serves every mechanism."""
+    shared = ("-fPIC", "-shared", "-fvisibility=hidden", *flags, "-lm")
+    sources = [KERNEL / "prbm_fmu.c"]
+    return once(f"{name}.so", lambda path: compile_c(path, sources, shared, "", compiler))

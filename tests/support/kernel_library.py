@@ -1,0 +1,342 @@
+"""The C kernel as a Python module: every function that kernel.h declares, on NumPy arrays.
+
+The header is the only description there is: its structures become :class:`ctypes.Structure`, its
+prototypes become functions.  Working memory and the place for a sentence are supplied, and what a
+function leaves in the latter is raised; whether it gave back what it took is checked each time.
+"""
+
+import ctypes
+import re
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import Any
+
+import numpy as np
+
+from prbm.interface.tables import tables
+from prbm.mechanism.description import Mechanism
+
+KERNEL = Path(__file__).parents[1] / "fmu_src" / "prbm" / "kernel"
+FLAGS = (
+    "-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
+    "-Wl,-Bsymbolic",  # names as common as these must not be found elsewhere in the process
+)  # fmt: skip
+ROOM = 1 << 16  # doubles of working memory
+
+SCALARS = {
+    "bool": ctypes.c_bool,
+    "char": ctypes.c_char,
+    "unsigned char": ctypes.c_ubyte,
+    "int": ctypes.c_int,
+    "double": ctypes.c_double,
+    "size_t": ctypes.c_size_t,
+    "uint32_t": ctypes.c_uint32,
+}
+DTYPES = {
+    "double": np.float64,
+    "int": np.int32,
+    "Complex": np.complex128,
+    "unsigned char": np.uint8,
+}
+
+
+class KernelError(Exception):
+    """What a function of the kernel says when it returns false."""
+
+
+# --- the header -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A name with its type: ``const double *K`` or ``int gravity[2]``."""
+
+    name: str
+    type: str
+    const: bool
+    stars: int
+    length: str = ""
+
+
+@dataclass(frozen=True)
+class Prototype:
+    """A function as kernel.h declares it, and the file that it is in."""
+
+    name: str
+    result: Declared
+    arguments: tuple[Declared, ...]
+    variadic: bool
+    file: str
+
+
+def _plain(text: str) -> str:
+    """Return C without comments (but for the headings), directives and attributes."""
+    text = re.sub(r"/\* --- (\w+\.c)\b[^*]*\*/", r"@\1@", text)
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    text = re.sub(r"^#.*(?:\\\n.*)*$", "", text, flags=re.MULTILINE)
+    return re.sub(r"__attribute__\s*\(\(.*?\)\)\)?", "", text)
+
+
+def _declared(text: str) -> list[Declared]:
+    """Read ``const double *a, *b`` or ``int gravity[2], tolerance``."""
+    words = re.sub(r"\bstruct\b", "", text).strip()
+    const = "const" in words
+    base, rest = re.match(r"((?:unsigned\s+)?\w+)\s*(.*)", words.replace("const", "").strip(),
+                          re.DOTALL).groups()  # fmt: skip
+    found = []
+    for one in rest.split(",") if rest else [""]:
+        stars, name, length = re.fullmatch(r"([\s*]*)(\w*)(?:\[(\w+)\])?\s*", one.strip()).groups()
+        found.append(Declared(name, base, const, stars.count("*"), length or ""))
+    return found
+
+
+def _header() -> str:
+    return _plain((KERNEL / "kernel.h").read_text())
+
+
+def constants() -> dict[str, int]:
+    """Return the numbers that the header names."""
+    found: dict[str, int] = {}
+    for body in re.findall(r"\benum\s*\{(.*?)\}", _header(), re.DOTALL):
+        number = -1
+        for entry in filter(None, (part.strip() for part in body.split(","))):
+            name, _, given = (part.strip() for part in entry.partition("="))
+            number = int(given) if given else number + 1
+            found[name] = number
+    return found
+
+
+@cache
+def structures() -> dict[str, type[ctypes.Structure]]:
+    """Return the structures of the header by name."""
+    known, numbers = {}, constants()
+    for body, name in re.findall(r"typedef struct\s*\{([^}]*)\}\s*(\w+);", _header()):
+        fields = []
+        for line in filter(str.strip, body.split(";")):
+            for field in _declared(line):
+                kind = known.get(field.type) or SCALARS[field.type]
+                if field.stars:
+                    kind = ctypes.c_void_p
+                if field.length:
+                    kind *= int(numbers.get(field.length, 0) or field.length)
+                fields.append((field.name, kind))
+        known[name] = type(name, (ctypes.Structure,), {"_fields_": fields})
+    return known
+
+
+@cache
+def prototypes() -> dict[str, Prototype]:
+    """Return all functions of the header by name."""
+    found = {}
+    file = "memory.c"
+    for heading, head, body in re.findall(
+        r"@(\w+\.c)@|\bPRBM\b([^;()]*)\(([^;]*?)\)\s*;", _header()
+    ):
+        if heading:
+            file = heading
+            continue
+        result = _declared(head)[0]
+        parts = [part.strip() for part in body.split(",")]
+        arguments = tuple(_declared(part)[0] for part in parts if part not in ("...", "void"))
+        found[result.name] = Prototype(result.name, result, arguments, "..." in parts, file)
+    return found
+
+
+# --- the library ----------------------------------------------------------------------------------
+
+
+def unit() -> str:
+    """Return the part of the library's one file that kernel.h declares, as C."""
+    includes = re.findall(r'#include "(core/\w+\.c)"', (KERNEL / "prbm_fmu.c").read_text())
+    return "".join(f'#include "{name}"\n' for name in ("kernel.h", *includes))
+
+
+def compiled(flags: Sequence[str] = (), compiler: Sequence[str] = ("cc",)) -> ctypes.CDLL:
+    """Compile the kernel with all its functions visible."""
+    folder = Path(mkdtemp(prefix="prbm-kernel-"))
+    try:
+        source, library = folder / "kernel.c", folder / "kernel.so"
+        source.write_text(unit())
+        command = [*compiler, *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
+        subprocess.run(command, check=True, capture_output=True, text=True)
+        return ctypes.CDLL(str(library))
+    finally:
+        shutil.rmtree(folder)
+
+
+class Kernel:
+    """The functions of the kernel, called by their names in C.
+
+    Arrays are passed as they are: those that a function may write must be contiguous and of the
+    right type, so that the caller sees what was written.
+    """
+
+    def __init__(self, library: ctypes.CDLL) -> None:
+        self.library = library
+        self.called: set[str] = set()
+        self.memory = np.full(ROOM, np.nan)
+        self.spare = np.full(ROOM, np.nan)
+        self.scratch = structures()["Scratch"](
+            self.memory.ctypes.data, self.spare.ctypes.data, 0, ROOM, 0, False
+        )
+        self.problem = structures()["Problem"]()
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        if name not in prototypes():
+            raise AttributeError(f"kernel.h declares no function {name}")
+        return lambda *given: self.call(prototypes()[name], given)
+
+    def call(self, prototype: Prototype, given: tuple[Any, ...]) -> Any:
+        """Call a function; what it says when it fails is raised."""
+        self.called.add(prototype.name)
+        function = getattr(self.library, prototype.name)
+        function.restype = _result(prototype.result)
+        self.scratch.most, self.scratch.exceeded, self.problem.text = 0, False, b""
+        supplied, kept = iter(given), []
+        arguments = [self._argument(a, supplied, kept) for a in prototype.arguments]
+        rest = list(supplied)
+        assert prototype.variadic or not rest, f"{prototype.name}: {len(rest)} arguments too many"
+        result = function(*arguments, *rest)
+        assert self.scratch.used == 0, f"{prototype.name} keeps working memory"
+        assert not self.scratch.exceeded, f"{prototype.name} needs more working memory"
+        self.memory[: self.scratch.most] = np.nan  # what it leaves there is of no use to others
+        if self.problem.text:
+            raise KernelError(self.problem.text.decode())
+        return complex(result.re, result.im) if hasattr(result, "re") else result
+
+    def _argument(self, wanted: Declared, supplied: Iterator[Any], kept: list[Any]) -> Any:
+        if wanted.stars and wanted.type == "Scratch":
+            return ctypes.byref(self.scratch)
+        if wanted.stars and wanted.type == "Problem":
+            return ctypes.byref(self.problem)
+        value = next(supplied)
+        if not wanted.stars:
+            return _scalar(wanted.type, value)
+        if value is None or isinstance(value, (bytes, int)):
+            return ctypes.c_void_p(value) if isinstance(value, int) else value
+        if isinstance(value, ctypes.Structure):
+            return ctypes.byref(value)
+        kind = DTYPES[wanted.type]
+        if wanted.const:
+            value = np.ascontiguousarray(value, kind)
+        assert value.dtype == kind, f"{wanted.name} must be {kind}"
+        assert value.flags.c_contiguous, f"{wanted.name} must be contiguous"
+        kept.append(value)
+        return ctypes.c_void_p(value.ctypes.data)
+
+
+def _result(declared: Declared) -> Any:
+    if declared.stars:
+        return ctypes.c_void_p
+    if declared.type == "void":
+        return None
+    return structures().get(declared.type) or SCALARS[declared.type]
+
+
+def _scalar(kind: str, value: Any) -> Any:
+    if kind == "Complex":
+        return structures()["Complex"](value.real, value.imag)
+    known = structures().get(kind)
+    return value if known else SCALARS[kind](value)
+
+
+@cache
+def kernel() -> Kernel:
+    """Return the kernel, compiled once."""
+    return Kernel(compiled())
+
+
+# --- a mechanism in the kernel --------------------------------------------------------------------
+
+
+def array(address: int | None, *shape: int, kind: str = "double") -> np.ndarray:
+    """Return a copy of an array of the kernel."""
+    dtype = np.dtype(DTYPES[kind])
+    count = int(np.prod(shape))
+    if not count:
+        return np.zeros(shape, dtype)
+    return np.frombuffer(ctypes.string_at(address, count * dtype.itemsize), dtype).reshape(shape)
+
+
+def placed(lay_out: Callable[[ctypes.Structure], Any]) -> np.ndarray:
+    """Return a block in which something is laid out as it asks for."""
+    counting = structures()["Memory"](None, 0)
+    lay_out(counting)
+    block = np.full(counting.used // 8 + 2, np.nan)
+    start = block.ctypes.data + -block.ctypes.data % 16
+    placing = structures()["Memory"](start, 0)
+    lay_out(placing)
+    assert placing.used == counting.used
+    return block
+
+
+class KernelSystem:
+    """A mechanism, read from its tables and assembled by the kernel."""
+
+    def __init__(self, mechanism: Mechanism, count: int) -> None:
+        self.kernel, self.count = kernel(), count
+        content = tables(mechanism, (), "token", range(count))
+        self.address = self.kernel.mechanism_open(content, len(content))
+        self.mechanism = structures()["Mechanism"].from_address(self.address)
+        self.structure = structures()["System"]()
+        self.block = placed(
+            lambda memory: self.kernel.system_place(self.structure, self.address, memory)
+        )
+
+    def assemble(self, values: dict[str, float]) -> None:
+        """Compute the arrays for the values of all parameters."""
+        self.values = np.array(list(values.values()))
+        self.kernel.assemble(self.structure, self.values)
+
+    def close(self) -> None:
+        """Free the tables."""
+        self.kernel.mechanism_close(self.address)
+
+    def __getattr__(self, name: str) -> Any:
+        value = getattr(self.structure, name)
+        shapes = self._shapes()
+        if name not in shapes:
+            return complex(value.re, value.im) if hasattr(value, "re") else value
+        kind, *shape = shapes[name]
+        return array(value, *shape, kind=kind)
+
+    def _shapes(self) -> dict[str, tuple[Any, ...]]:
+        x = self.structure
+        n, r, p, s, f = x.n, x.r, x.p, x.s, x.f
+        return {
+            "q0": ("double", n), "J": ("double", n), "K": ("double", n, n),
+            "H": ("Complex", n, n), "A": ("Complex", p, n), "c": ("Complex", p),
+            "m": ("double", p), "S": ("Complex", n),
+            "loops": ("Complex", r, n), "loops_c": ("double", r),
+            "gaps": ("Complex", s, n), "slides": ("Complex", s, n), "gaps_c": ("double", s),
+            "gaps_z": ("Complex", s), "slides_z": ("Complex", s), "on": ("int", s),
+            "rubs": ("Complex", f, n), "lifts": ("Complex", f, n), "lifts_c": ("double", f),
+            "release": ("Complex", n), "stretches": ("int", x.stretch_count),
+        }  # fmt: skip
+
+    def links(self) -> np.ndarray:
+        """Return the coordinates of the links."""
+        return array(self.mechanism.links, self.mechanism.link_count, kind="int")
+
+    def arm(self) -> np.ndarray:
+        """Return whose arm each coordinate turns or stretches."""
+        return array(self.mechanism.coordinates, self.structure.n, 3, kind="int")[:, 2]
+
+    def blocks(self) -> np.ndarray:
+        """Return the starts and sizes of the blocks of the mass matrix."""
+        return array(self.structure.blocks, self.structure.block_count, 2, kind="int")
+
+    def frame(self, group: str, i: int) -> tuple[int, complex, complex, np.ndarray]:
+        """Return the coordinate, the constant, the drawn place and the row of a point of a body.
+
+        The group is one of bodies, pushed, probes.
+        """
+        kind = structures()["BodyFrame"]
+        frame = kind.from_address(getattr(self.structure, group) + i * ctypes.sizeof(kind))
+        c, drawn = (complex(z.re, z.im) for z in (frame.c, frame.drawn))
+        return frame.j, c, drawn, array(frame.A, self.structure.n, kind="Complex")

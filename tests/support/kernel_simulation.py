@@ -1,0 +1,197 @@
+"""A simulation in the C kernel, with the interface of the engine's own."""
+
+import ctypes
+import shutil
+import subprocess
+from functools import cache
+from pathlib import Path
+from tempfile import mkdtemp
+
+import numpy as np
+
+from kernel_library import FLAGS, KERNEL
+from prbm.fmu.python_fmu import interface
+from prbm.interface.tables import slots, tables
+from prbm.mechanics.independent import independent
+from prbm.mechanism.description import Mechanism
+
+DOUBLE, POINTER, BOOL, INT = ctypes.c_double, ctypes.c_void_p, ctypes.c_bool, ctypes.c_int
+SENTENCE = 640
+FUNCTIONS = {
+    "simulation_set": (BOOL, POINTER, INT, DOUBLE, POINTER),
+    "simulation_get": (BOOL, POINTER, INT, POINTER, POINTER),
+    "simulation_start": (BOOL, POINTER, DOUBLE, DOUBLE, BOOL, POINTER),
+    "simulation_advance": (BOOL, POINTER, DOUBLE, POINTER),
+    "simulation_advance_some": (BOOL, POINTER, DOUBLE, BOOL, POINTER, POINTER),
+    "simulation_happen": (BOOL, POINTER, POINTER),
+    "simulation_restore": (BOOL, POINTER, POINTER, POINTER),
+    "simulation_reset": (None, POINTER),
+    "simulation_close": (None, POINTER),
+    "simulation_open": (POINTER, POINTER),
+    "simulation_bytes": (ctypes.c_size_t, POINTER),
+    "simulation_state_count": (ctypes.c_size_t, POINTER),
+    "simulation_state": (POINTER, POINTER),
+    "simulation_time": (DOUBLE, POINTER),
+    "mechanism_open": (POINTER, POINTER, ctypes.c_size_t, POINTER),
+    "mechanism_close": (None, POINTER),
+    "exchange_states": (INT, POINTER),
+    "exchange_indicators": (INT, POINTER),
+    "exchange_slot": (INT, POINTER, INT),
+    "exchange_set_time": (None, POINTER, DOUBLE),
+    "exchange_set": (None, POINTER, POINTER),
+    "exchange_get": (None, POINTER, POINTER),
+    "exchange_derivatives": (BOOL, POINTER, POINTER, POINTER),
+    "exchange_event_indicators": (BOOL, POINTER, POINTER, POINTER),
+    "exchange_completed_step": (BOOL, POINTER, POINTER, POINTER),
+    "exchange_event": (BOOL, POINTER, POINTER, POINTER),
+    "exchange_directional": (BOOL, POINTER, POINTER, POINTER, POINTER, POINTER),
+}
+
+
+class KernelMistake(Exception):
+    """What the kernel refuses, in its words."""
+
+
+@cache
+def library() -> ctypes.CDLL:
+    """Return the kernel up to the simulation, compiled once, all functions visible."""
+    folder = Path(mkdtemp(prefix="prbm-simulation-"))
+    try:
+        kernel = (KERNEL / "prbm_fmu.c").read_text().partition('#include "fmi/')[0]
+        source, built = folder / "kernel.c", folder / "kernel.so"
+        source.write_text(kernel)
+        subprocess.run(["cc", *FLAGS, str(source), "-o", str(built), "-lm"], check=True)
+        found = ctypes.CDLL(str(built))
+    finally:
+        shutil.rmtree(folder)
+    for name, (result, *arguments) in FUNCTIONS.items():
+        function = getattr(found, name)
+        function.restype, function.argtypes = result, arguments
+    return found
+
+
+class KernelSimulation:
+    """A mechanism in motion in the kernel.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What moves.
+    values : dict
+        Parameters and inputs that differ from their defaults.
+    exchange : bool
+        Whether somebody else integrates.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        values: dict[str, float] | None = None,
+        *,
+        start_time: float = 0.0,
+        tolerance: float = 0.0,
+        exchange: bool = False,
+    ) -> None:
+        self.library = library()
+        self.sentence = ctypes.create_string_buffer(SENTENCE)
+        self.inner, self.states_of = None, None
+        chosen = independent(mechanism)
+        self.slots = slots(mechanism, chosen)
+        data = tables(mechanism, interface(mechanism, {}), "token", chosen)
+        self.tables = self.library.mechanism_open(data, len(data), self.sentence)
+        self._check(self.tables is not None)
+        self.inner = self.library.simulation_open(self.tables)
+        self.set(values or {})
+        self.call("simulation_start", start_time, tolerance, exchange)
+
+    def __del__(self) -> None:
+        if self.inner:
+            self.library.simulation_close(self.inner)
+        if self.tables:
+            self.library.mechanism_close(self.tables)
+
+    def _check(self, right: bool) -> None:
+        if not right:
+            raise KernelMistake(self.sentence.value.decode())
+
+    def call(self, name, *arguments) -> None:
+        """Call a function that may fail; raise its sentence."""
+        self._check(getattr(self.library, name)(self.inner, *arguments, self.sentence))
+
+    # -- as prbm.Simulation --
+
+    def set(self, changes: dict[str, float]) -> None:
+        for name, value in changes.items():
+            self.call("simulation_set", self.slots[name], value)
+
+    def advance(self, time: float) -> None:
+        self.call("simulation_advance", time)
+
+    def get(self, name: str) -> float:
+        value = DOUBLE()
+        self.call("simulation_get", self.slots[name], ctypes.byref(value))
+        return value.value
+
+    def outputs(self) -> dict[str, float]:
+        return {name: self.get(name) for name in self.slots}
+
+    # -- the state --
+
+    @property
+    def state(self) -> np.ndarray:
+        count = self.library.simulation_state_count(self.inner)
+        address = self.library.simulation_state(self.inner)
+        return np.ctypeslib.as_array((DOUBLE * count).from_address(address)).copy()
+
+    def restore(self, state: np.ndarray) -> None:
+        self.call("simulation_restore", pointer(state))
+
+    # -- model exchange --
+
+    @property
+    def states(self) -> list[str]:
+        """Return the names of the states of model exchange."""
+        names = {slot: name for name, slot in self.slots.items()}
+        count = self.library.exchange_states(self.inner)
+        return [names[self.library.exchange_slot(self.inner, k)] for k in range(count)]
+
+    def exchange_set(self, time: float, x: np.ndarray) -> None:
+        self.library.exchange_set_time(self.inner, time)
+        self.library.exchange_set(self.inner, pointer(x))
+
+    def exchange_get(self) -> np.ndarray:
+        x = np.empty(self.library.exchange_states(self.inner))
+        self.library.exchange_get(self.inner, pointer(x))
+        return x
+
+    def derivatives(self) -> np.ndarray:
+        dx = np.empty(self.library.exchange_states(self.inner))
+        self.call("exchange_derivatives", pointer(dx))
+        return dx
+
+    def indicators(self) -> np.ndarray:
+        z = np.empty(self.library.exchange_indicators(self.inner))
+        self.call("exchange_event_indicators", pointer(z))
+        return z
+
+    def completed_step(self) -> bool:
+        event = BOOL()
+        self.call("exchange_completed_step", ctypes.byref(event))
+        return event.value
+
+    def event(self) -> bool:
+        changed = BOOL()
+        self.call("exchange_event", ctypes.byref(changed))
+        return changed.value
+
+    def directional(self, dx: np.ndarray, du: np.ndarray) -> np.ndarray:
+        result = np.empty(len(self.slots))
+        self.call("exchange_directional", pointer(dx), pointer(du), pointer(result))
+        return result
+
+
+def pointer(x: np.ndarray) -> int:
+    """Return the address of an array of doubles."""
+    assert x.dtype == np.float64
+    assert x.flags.c_contiguous
+    return x.ctypes.data

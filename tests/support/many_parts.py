@@ -1,0 +1,180 @@
+"""Mechanisms with some of everything, for tests that compare the kernel with the package."""
+
+import dataclasses
+
+from prbm.mechanism.description import Mechanism
+from prbm.mechanism.parameters import Parameter
+from prbm.mechanism.parts import (
+    Body,
+    Flexure,
+    FlexureType,
+    Force,
+    Friction,
+    Joint,
+    Probe,
+    Release,
+    Stop,
+)
+from support import mechanism
+
+
+def length(name, x):
+    return Parameter(name, x, "m", "A length", 1e-9, 1e3)
+
+
+def rich(model="3R"):
+    """Return a mechanism with some of everything: two bodies, pins, 1R beside others, two stops."""
+    return Mechanism(
+        name="Rich",
+        title="A stage on two leaves, with a pendulum on a third",
+        ground={"left": (0.0, 0.0), "right": ("0.08", 0.003)},
+        bodies=(
+            Body(
+                "stage", 0.05, "3e-5 + 1e-5*L", ("0.04", "L + 0.01"),
+                {"left": (0.0, "L"), "right": ("0.08", "L"), "top": (0.03, "L + 0.02")},
+            ),
+            Body("tip", 0.004, 2e-7, ("0.03", "1.6*L + 0.02"), {"end": (0.03, "1.5*L + 0.02")}),
+        ),
+        flexure_types=(
+            FlexureType("leaf", model, "L/400", 8e-3, 1.8e11, 7800.0),
+            FlexureType("thin", "1R", 1e-4, 8e-3, 1.8e11, 7800.0),
+        ),
+        flexures=(
+            Flexure("one", "leaf", "ground.left", "stage.left"),
+            Flexure("two", "thin", "stage.right", "ground.right", ("clamp", "pin")),
+            Flexure("three", "leaf", "stage.top", "tip.end", ("clamp", "pin")),
+        ),
+        stops=(
+            Stop("high", "stage", (0.08, "L"), 10.0, 2e-3, "L/8", 0.7, 0.2),
+            Stop("low", "tip", (0.03, "1.6*L"), 180.0, 3e-3, 0.0, 0.4, 0.0),
+        ),
+        frictions=(Friction("rub", "stage", 20.0, 0.3, 0.4, 50.0), Friction("dry", "tip", 90.0)),
+        forces=(Force("pull", "tip"), Force("push", "stage")),
+        release=Release("stage", 15.0, -4e-3),
+        geometry=(length("L", 0.04),),
+        gravity=(1.0, -9.81),
+        damping_beta=8e-6,
+    )  # fmt: skip
+
+
+def elastic():
+    """Return a mechanism of what stretches, hangs, leans on a body and closes two loops.
+
+    A stage on two leaves, of which one is a chain; a hammer at the free end of a third that hits a
+    wall on the stage; a lever between a bar and a joint; a pendulum on another joint.
+    """
+    return Mechanism(
+        name="Elastic",
+        title="Bodies that hit each other, on flexures that stretch",
+        ground={"left": (0.0, 0.0), "right": (0.08, 0.002), "far": (0.115, "L - 0.03")},
+        bodies=(
+            Body(
+                "stage", 0.05, 3e-5, (0.04, "L + 0.01"),
+                {
+                    "left": (0.0, "L"), "right": (0.08, "L"), "top": (0.03, "L + 0.02"),
+                    "hinge": (0.09, "L + 0.01"), "hook": (0.02, "L"),
+                },
+            ),
+            Body("hammer", 0.004, 2e-7, (0.032, "L + 0.055"), {"root": (0.03, "L + 0.05")}),
+            Body(
+                "lever", 0.003, 4e-7, (0.1, "L + 0.02"),
+                {"pin": (0.09, "L + 0.01"), "end": (0.11, "L + 0.025")},
+            ),
+            Body("pendulum", 0.002, 1e-7, (0.021, "L - 0.012"), {"pin": (0.02, "L")}),
+        ),
+        flexure_types=(
+            FlexureType("leaf", "2R", "L/100", 8e-3, 3e9, 1200.0, axial=True),
+            FlexureType("chain", "nR", "L/80", 8e-3, 3e9, 1200.0, n=4, axial=True),
+            FlexureType("bar", "1R", 5e-4, 4e-3, 2e9, 1200.0, axial=True),
+        ),
+        flexures=(
+            Flexure("one", "leaf", "stage.left", "ground.left", ("clamp", "pin")),
+            Flexure("two", "chain", "ground.right", "stage.right"),
+            Flexure("three", "leaf", "hammer.root", "stage.top", ("free", "clamp")),
+            Flexure("strut", "bar", "lever.end", "ground.far", ("pin", "pin")),
+        ),
+        joints=(
+            Joint("hinge", "stage.hinge", "lever.pin"), Joint("hook", "pendulum.pin", "stage.hook"),
+        ),
+        stops=(
+            Stop("knock", "hammer", (0.035, "L + 0.055"), 5.0, 2e-3, "L/20", 0.7, 0.2, on="stage"),
+            Stop("low", "stage", (0.08, "L"), 10.0, 2e-3, 0.0, 0.4, 0.0),
+            Stop("tap", "stage", (0.02, "L - 0.02"), 160.0, 4e-3, 0.0, 0.5, 0.3, on="pendulum"),
+        ),
+        frictions=(
+            Friction("rub", "hammer", 20.0, 0.3, 0.4, 50.0, point=(0.03, "L + 0.06")),
+            Friction("dry", "pendulum", 90.0),
+        ),
+        forces=(Force("pull", "hammer", point=("0.03", "L + 0.06")), Force("push", "stage")),
+        probes=(
+            Probe("tip", "hammer.root"), Probe("eye", "lever.end"), Probe("still", "ground.left"),
+        ),
+        release=Release("stage", 15.0, -3e-3),
+        geometry=(length("L", 0.04),),
+        gravity=(1.0, -9.81),
+        damping_beta=1e-7,
+    )  # fmt: skip
+
+
+def anvil():
+    """Return a stage on two leaves that stretch, with a hammer on a third above an anvil on it."""
+    return Mechanism(
+        name="Anvil",
+        title="A hammer that falls on the stage that carries it",
+        ground={"left": (0.0, 0.0), "right": (0.06, 0.0)},
+        bodies=(
+            Body(
+                "stage", 0.05, 3e-5, (0.03, "L + 0.01"),
+                {"left": (0.0, "L"), "right": (0.06, "L"), "post": (0.005, "L + 0.02")},
+            ),
+            Body("hammer", 0.006, 3e-7, (0.05, "L + 0.02"), {"root": (0.045, "L + 0.02")}),
+        ),
+        flexure_types=(
+            FlexureType("leaf", "1R", "L/100", 8e-3, 1e9, 1200.0, axial=True),
+            FlexureType("arm", "2R", "L/100", 8e-3, 5e9, 1200.0, axial=True),
+        ),
+        flexures=(
+            Flexure("one", "leaf", "ground.left", "stage.left"),
+            Flexure("two", "leaf", "stage.right", "ground.right"),
+            Flexure("three", "arm", "stage.post", "hammer.root", ("clamp", "free")),
+        ),
+        stops=(
+            Stop("face", "hammer", (0.05, "L + 0.015"), -85.0, 2e-3, 1e-3, 0.5, 0.3, on="stage"),
+            Stop("side", "stage", (0.06, "L"), 0.0, 2e-3, 0.0, 0.6, 0.0),
+        ),
+        frictions=(Friction("rub", "hammer", 80.0, 0.2, 0.05, 1.0, point=(0.05, "L + 0.03")),),
+        forces=(Force("blow", "hammer", point=(0.052, "L + 0.025")),),
+        probes=(Probe("tip", "hammer.root"),),
+        release=Release("stage", 0.0, -2e-3),
+        geometry=(length("L", 0.04),),
+        gravity=(0.0, -1.0),
+        damping_beta=1e-5,
+    )  # fmt: skip
+
+
+HIGH, LOW = (
+    Stop(name, "shuttle", ("shuttle.width", "flexure.length + shuttle.com_height"), offset=offset)
+    for name, offset in (("high", 0.01), ("low", -0.01))
+)
+
+
+def two_stops(model, **changes):
+    """Return the guide with two stops, above and below the centre of mass."""
+    stops = [dataclasses.replace(s, **changes.get(s.name, {})) for s in (HIGH, LOW)]
+    return dataclasses.replace(mechanism(model), name="Two", stops=tuple(stops))
+
+
+def cantilever(model="2R", **parts):
+    """Return a flexure clamped to ground that carries a body at its pinned end: an open chain."""
+    return Mechanism(
+        name="cantilever",
+        title="A flexure with a pendulum at its end",
+        ground={"clamp": (0.0, 0.0)},
+        bodies=(Body("tip", 0.02, 3e-6, ("L + 0.01", 0.004), {"end": ("L", 0.0)}),),
+        flexure_types=(FlexureType("leaf", model, 2e-4, 1e-2, 2e11, 7800.0),),
+        flexures=(Flexure("leaf1", "leaf", "ground.clamp", "tip.end", ("clamp", "pin")),),
+        release=Release("tip", direction=90.0),
+        geometry=(length("L", 0.05),),
+        gravity=(1.0, -9.81),
+        **parts,
+    )

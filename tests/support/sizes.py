@@ -1,0 +1,135 @@
+"""Sizes of files, classes and functions, in Python and C.
+
+``python tests/support/sizes.py`` prints the ten largest of each.
+
+The body of a function are the lines below its signature and docstring, to its end; in C, the lines
+between its braces.
+"""
+
+import ast
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("fmu_src",)
+GENERATED = ("generated.h",)
+SHOWN = 10
+
+FILE_MAX = 700  # lines
+CLASS_MAX = 30  # methods
+BODY_MAX = 60  # lines
+PAGE_BODY_MAX = 100  # lines of a function that writes a page
+PAGES = "fmu_src/prbm/validation/"
+
+C_NOISE = re.compile(
+    r"""
+      /\*.*?\*/ | //[^\n]*                           # comments
+    | "(?:\\.|[^"\\\n])*" | '(?:\\.|[^'\\\n])*'      # strings and characters
+    | ^[ \t]*\#(?:\\\n|[^\n])*                       # directives of the preprocessor
+    """,
+    re.DOTALL | re.MULTILINE | re.VERBOSE,
+)
+C_FUNCTION = re.compile(r"([A-Za-z_]\w*)\s*\([^{}]*\)\s*\Z")
+
+
+class Size(NamedTuple):
+    """The size of something, and its place."""
+
+    size: int
+    name: str
+    place: str
+
+    def __str__(self) -> str:
+        return f"{self.size:5}  {self.name:40} {self.place}"
+
+
+class Sizes(NamedTuple):
+    """Sizes of files and functions in lines, of classes in methods."""
+
+    files: list[Size]
+    classes: list[Size]
+    functions: list[Size]
+
+
+def measured(root: Path = ROOT, folders: Iterable[str] = FOLDERS) -> Sizes:
+    """Return the sizes of all that is in the Python and C files of some folders."""
+    sizes = Sizes([], [], [])
+    paths = (path for folder in folders for path in sorted((root / folder).rglob("*")))
+    for path in paths:
+        if path.suffix not in (".py", ".c", ".h") or path.name in GENERATED:
+            continue
+        text, place = path.read_text(encoding="utf-8"), path.relative_to(root).as_posix()
+        sizes.files.append(Size(len(text.splitlines()), path.name, place))
+        if path.suffix == ".py":
+            sizes.classes.extend(python_classes(text, place))
+            sizes.functions.extend(python_functions(text, place))
+        else:
+            sizes.functions.extend(c_functions(text, place))
+    return sizes
+
+
+def python_classes(text: str, place: str) -> Iterator[Size]:
+    """Yield the classes of a Python file with their numbers of methods."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.ClassDef):
+            count = sum(isinstance(x, ast.FunctionDef | ast.AsyncFunctionDef) for x in node.body)
+            yield Size(count, node.name, f"{place}:{node.lineno}")
+
+
+def python_functions(text: str, place: str) -> Iterator[Size]:
+    """Yield the functions and methods of a Python file with the lengths of their bodies."""
+    for node in ast.walk(ast.parse(text)):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            continue
+        body = node.body
+        if ast.get_docstring(node, clean=False) is not None:
+            body = body[1:]
+        length = body[-1].end_lineno - body[0].lineno + 1 if body else 0
+        yield Size(length, node.name, f"{place}:{node.lineno}")
+
+
+def c_functions(text: str, place: str) -> Iterator[Size]:
+    """Yield the functions of a C file with the lengths of their bodies."""
+    text = C_NOISE.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
+    depth, begin, name, since = 0, 0, "", 0
+    for found in re.finditer(r"[{};]", text):
+        brace, at = found[0], found.start()
+        if brace == "{":
+            if depth == 0:
+                head = C_FUNCTION.search(text[since:at])
+                name, begin = head[1] if head else "", at
+            depth += 1
+        elif brace == "}":
+            depth -= 1
+            if depth == 0 and name:
+                length = max(text.count("\n", begin, at) - 1, 0)
+                yield Size(length, name, f"{place}:{text.count(chr(10), 0, begin) + 1}")
+        if depth == 0:
+            since = at + 1
+
+
+def violations(sizes: Sizes) -> list[str]:
+    """Return a sentence for everything that is too large."""
+    sentences = [f"{x}: {FILE_MAX} lines at most" for x in sizes.files if x.size > FILE_MAX]
+    sentences += [f"{x}: {CLASS_MAX} methods at most" for x in sizes.classes if x.size > CLASS_MAX]
+    for x in sizes.functions:
+        limit = PAGE_BODY_MAX if x.place.startswith(PAGES) else BODY_MAX
+        if x.size > limit:
+            sentences.append(f"{x}: {limit} lines at most")
+    return sentences
+
+
+def report(sizes: Sizes, count: int = SHOWN) -> str:
+    """Return tables of the largest files, classes and functions."""
+    units = {"files": "lines", "classes": "methods", "functions": "lines"}
+    lines = []
+    for kind, unit in units.items():
+        lines.append(f"{kind} [{unit}]")
+        lines += map(str, sorted(getattr(sizes, kind), reverse=True)[:count])
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    print(report(measured()))
