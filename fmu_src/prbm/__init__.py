@@ -6,9 +6,8 @@
 >>> int(result["stop.impact_count"][-1])
 1
 
-The names below are the public interface; they are imported when they are first used, so that
-``import prbm`` costs nothing.  Everything else is in the packages that ``docs/architecture.md``
-describes.
+The public names are imported on first use, so that ``import prbm`` takes no time.
+``docs/architecture.md`` describes the packages below.
 """
 
 from importlib import import_module

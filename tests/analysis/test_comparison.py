@@ -15,7 +15,7 @@ from prbm.drawing.style import png
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
-from prbm.references import finite_elements
+from prbm.plots.comparison import comparison_figure
 from prbm.references.finite_elements import FiniteElementError
 from support import mechanism
 
@@ -95,7 +95,7 @@ def test_a_comparison_is_a_table_a_file_and_a_figure(guide, tmp_path):
     by_name = {row[0]: row for row in rows}
     assert float(by_name["rest position"][2]) == guide["rest position"].model
     assert float(by_name["frequency 1 at rest"][5]) == 4.82
-    assert png(guide.figure()).startswith(b"\x89PNG")
+    assert png(comparison_figure(guide)).startswith(b"\x89PNG")
 
 
 def test_walls_that_cannot_be_moved_are_noted_and_zeros_are_zeros():
@@ -127,13 +127,14 @@ def test_what_is_not_compared_is_refused(guide):
         guide["frequency"]
 
 
-def test_without_exudyn_a_sentence_says_how_to_install_it(monkeypatch):
+def test_without_exudyn_the_error_names_the_installation(monkeypatch):
     def missing(name):
         raise ImportError(f"No module named {name!r}")
 
-    monkeypatch.setattr(finite_elements.importlib, "import_module", missing)
+    guide = mechanism("PRBDM")
+    monkeypatch.setattr("importlib.import_module", missing)
     with pytest.raises(FiniteElementError, match="pip install"):
-        compare(mechanism("PRBDM"))
+        compare(guide)
 
 
 @pytest.mark.parametrize(
@@ -149,4 +150,4 @@ def test_without_exudyn_a_sentence_says_how_to_install_it(monkeypatch):
 def test_percents_are_told_where_they_have_a_meaning(row, last):
     told = str(Comparison("some", 8, (row,)))
     assert told.endswith(last)
-    assert png(Comparison("some", 8, (row,)).figure()).startswith(b"\x89PNG")
+    assert png(comparison_figure(Comparison("some", 8, (row,)))).startswith(b"\x89PNG")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from prbm.analysis import impact_map, stretching
+from prbm.analysis.touching import impact_shape
 from prbm.base.errors import EquilibriumError, ParameterError
 from prbm.data.series import RecordError
 from prbm.drawing.style import png
@@ -18,6 +19,7 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.contact import response as impulse_response
 from prbm.mechanics.kinetics import inertia
 from prbm.mechanics.modal import modes, modes_at
+from prbm.plots import impact_map as figures
 from support import mechanism
 
 WEIGHTLESS = {"gravity.x": 0.0}
@@ -45,7 +47,7 @@ def test_algebraic_restitution_is_that_of_an_impulse(model, axial):
     """The sum over modes against the mass matrix on the tangent of the loops."""
     values = WEIGHTLESS | {"stop.offset": 3e-3, "stop.position": -7e-3}
     system = assemble(m := guide(model, axial=axial), m.values(values))
-    shape = impact_map.impact_shape(system, 0, -7e-3)
+    shape = impact_shape(system, 0, -7e-3)
     e = system.directions(shape.q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     loops = constraints.jacobian(system.spread(system.loops), e)
@@ -172,7 +174,7 @@ def test_energies_of_a_simulated_impact_add_up():
 def test_modes_at_a_static_shape_are_those_of_the_shape():
     """Gauss' multipliers are the static ones where the body is held."""
     system = assemble(m := guide(axial=True), m.values(WEIGHTLESS))
-    shape = impact_map.impact_shape(system, 0, -5e-3)
+    shape = impact_shape(system, 0, -5e-3)
     np.testing.assert_allclose(
         modes_at(system, shape.q).frequency, modes(system, shape).frequency, rtol=1e-7
     )
@@ -228,11 +230,11 @@ def test_a_map_is_written_and_drawn(tmp_path):
     assert sum(map(float, rows[1][4:])) == pytest.approx(1.0, abs=5e-6)
     assert str(one).splitlines()[0] == "2R"
     for figure in (
-        impact_map.heat_map([one, one]), impact_map.surface([one, one]), impact_map.energies(one),
+        figures.heat_map([one, one]), figures.surface([one, one]), figures.energies(one),
     ):  # fmt: skip
         assert png(figure).startswith(b"\x89PNG")
     point = impact_map.algebraic(guide(), [-5e-3], [0.0], WEIGHTLESS)
-    assert png(impact_map.heat_map([point])).startswith(b"\x89PNG")
+    assert png(figures.heat_map([point])).startswith(b"\x89PNG")
 
 
 def test_every_way_tells_how_much_of_it_is_done():

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from prbm.analysis.spectrum import after_impact, after_last_impact, figure, peaks, spectrum
+from prbm.analysis.spectrum import after_impact, after_last_impact, peaks, spectrum
 from prbm.base.errors import ParameterError
 from prbm.drawing.style import png
+from prbm.plots.spectrum import spectrum_figure
 from prbm.runs.run import simulate
 from support import mechanism
 
@@ -67,14 +68,14 @@ def test_too_few_or_unequal_samples_are_refused():
 
 
 def test_the_figure_is_drawn(small_motion):
-    assert png(figure(small_motion, highest=400.0)).startswith(b"\x89PNG")
-    assert len(figure(small_motion, ("along",)).axes) == 1
+    assert png(spectrum_figure(small_motion, highest=400.0)).startswith(b"\x89PNG")
+    assert len(spectrum_figure(small_motion, ("along",)).axes) == 1
 
 
 def test_after_the_last_impact_a_1r_rings_at_its_one_frequency():
     """The hammer bounces off once, and vibrates at small amplitude in 20 periods of a record."""
     values = {"release.displacement": -3e-3, "impact.restitution": 0.5, "damping.beta": 0.0}
-    result = simulate(mechanism("ImpactOscillator"), values, 1.0)
+    result = simulate(mechanism("ImpactOscillator"), values, stop_time=1.0)
     heard = after_last_impact(result)
     assert heard.time[0] > 0.0
     assert heard.impact is result.impacts[-1]
@@ -85,7 +86,7 @@ def test_after_the_last_impact_a_1r_rings_at_its_one_frequency():
 def test_there_is_nothing_to_hear_at_rest_or_without_an_impact():
     guide = mechanism("PRBDM")
     with pytest.raises(ParameterError, match="shuttle rests on stop"):
-        after_last_impact(simulate(guide, {"stop.restitution": 0.0}, 0.2))
+        after_last_impact(simulate(guide, {"stop.restitution": 0.0}, stop_time=0.2))
     with pytest.raises(ParameterError, match="has no impact"):
         after_last_impact(simulate(guide, stop_time=0.01))
     with pytest.raises(ParameterError, match="samples follow the last impact"):

@@ -417,7 +417,7 @@ def test_a_folder_that_is_not_there_is_made(line, capsys):
 
 def test_a_film_that_cannot_be_written_is_not_simulated_first(monkeypatch):
     Path("taken").write_text("")
-    monkeypatch.setattr("prbm.plots.animation.simulate", pytest.fail)
+    monkeypatch.setattr("prbm.commands.pictures.simulate", pytest.fail)
     assert run("animate PRBDM taken/a.gif") == cli.MISTAKE
 
 

@@ -4,11 +4,12 @@ import ast
 import importlib.metadata
 import json
 import re
+import subprocess
 import sys
-import tomllib
 import zipfile
 import zlib
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
@@ -17,7 +18,6 @@ from fmpy.validation import validate_fmu
 
 import prbm
 from fmu_host import OK, Instance
-from prbm.base.version import __version__
 from prbm.fmu.description import Heading, model_description
 from prbm.fmu.documentation import page
 from prbm.fmu.native_fmu import described
@@ -273,6 +273,29 @@ def test_the_bundle_imports_nothing_but_itself_numpy_scipy_and_the_standard_libr
     assert len(bundled) > 10
 
 
-def test_the_version_is_the_one_of_the_project():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert __version__ == project["version"]
+LOADED = """
+import pathlib, sys
+sys.path[:] = [path for path in sys.path if "prbm" not in path and "fmu_src" not in path]
+sys.path.insert(0, sys.argv[1])
+__import__(pathlib.Path(sys.argv[1], "slavemodule.txt").read_text())
+for name, module in sys.modules.items():
+    if name.partition("_")[0].partition(".")[0] == "prbm":
+        print(module.__file__)
+"""
+
+
+def test_an_fmu_carries_exactly_the_modules_of_the_package_that_it_imports(fmus, tmp_path):
+    with zipfile.ZipFile(fmus["PRBDM2R"]) as archive:
+        archive.extractall(tmp_path)
+    resources = tmp_path / "resources"
+    done = subprocess.run(
+        [sys.executable, "-I", "-B", "-c", LOADED, str(resources)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    loaded = {Path(line) for line in done.stdout.splitlines()}
+    (package,) = (path for path in resources.iterdir() if path.name.startswith("prbm_"))
+    assert loaded == {*package.rglob("*.py")}
+    engine = {"base", "mechanism", "mechanics", "hybrid", "fmu"}
+    assert {path.name for path in package.iterdir() if path.is_dir()} == engine
+    assert {path.name for path in (package / "fmu").iterdir() if path.is_dir()} == {"slave"}

@@ -1,5 +1,6 @@
 """An FMU does what the engine does, whatever else happens in its process."""
 
+import re
 import subprocess
 import sys
 from functools import cache
@@ -205,6 +206,7 @@ def test_two_builds_of_one_model_in_one_process_keep_their_own_content(fmus, mec
         for k in range(50):
             assert a.step(k * 1e-3, 1e-3) == b.step(k * 1e-3, 1e-3) == OK
         first, second = a.values(), b.values()
+    assert len([name for name in sys.modules if re.fullmatch(r"prbm_PRBDM_\w+", name)]) >= 2
     for values, restitution in ((first, 0.6), (second, 0.1)):
         assert values["stop.restitution"] == restitution
         assert values["stop.impact_count"] == 1

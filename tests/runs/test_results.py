@@ -68,7 +68,10 @@ def test_a_source_acts_from_its_row_on(mechanisms: dict[str, Mechanism]) -> None
 
 def test_the_values_are_those_of_the_start(mechanisms: dict[str, Mechanism]) -> None:
     driven = simulate(
-        mechanisms["PRBDM"], {"stop.offset": 1e-3, "force.y": 0.1}, 0.002, source=lambda t: {}
+        mechanisms["PRBDM"],
+        {"stop.offset": 1e-3, "force.y": 0.1},
+        stop_time=0.002,
+        source=lambda t: {},
     )
     assert driven.values["stop.offset"] == 1e-3
     assert driven.values["force.y"] == 0.1
@@ -88,7 +91,7 @@ def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
         ({"stop_time": np.inf}, "stop_time = inf s must be positive and finite"),
         ({"step": -1e-3}, "step = -0.001 s must be positive"),
         ({"step": 1e-9}, "step = 1e-09 s makes 1000000000 steps"),
-        ({"values": {"stop.restitutoin": 0.5}}, "did you mean stop.restitution"),
+        ({"changes": {"stop.restitutoin": 0.5}}, "did you mean stop.restitution"),
         ({"tolerance": 1.0}, "tolerance = 1 must lie between"),
     ],
 )
@@ -192,7 +195,7 @@ def test_the_response_shows_all_impacts_and_a_constant_balance(
 
 def test_legends_lie_beside_what_the_response_shows() -> None:
     """Of a leaf that falls from the upper left to the lower right, with curves everywhere."""
-    figure = response(simulate(load(shipped()["Cantilever"]), {}, 0.06, 1e-4))
+    figure = response(simulate(load(shipped()["Cantilever"]), stop_time=0.06, step=1e-4))
     figure.draw_without_rendering()
     displacement, _, speeds, energies = figure.axes
     for axes in (displacement, speeds, energies):

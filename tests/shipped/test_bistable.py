@@ -10,6 +10,7 @@ from scipy.optimize import minimize_scalar
 from prbm.analysis import holding
 from prbm.analysis.equilibria import force_curve, holding_force, rests, snap
 from prbm.mechanics.assembly import assemble
+from prbm.plots.holding import holding_figure
 from support import mechanism, run
 
 BISTABLE = mechanism("Bistable")
@@ -123,7 +124,7 @@ def test_the_curve_of_the_fundamental_lies_within_its_panel() -> None:
     """Even one that hardly changes; where nothing is stable there is none."""
     for low, high in ((-1e-3, 1e-3), (10e-3, 14e-3)):
         force = holding.curve(SYSTEM, np.linspace(low, high, 5))
-        panel = holding.figure(force, "").axes[-1]
+        panel = holding_figure(force, "").axes[-1]
         bottom, top = panel.get_ylim()
         assert bottom == 0.0 < top
         assert not any(point.frequency > 0.9 * top for point in force.points)

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from prbm.commands.command_line import main
 from prbm.references import finite_elements
 from prbm.validation import page as validation
 from prbm.validation.page import ValidationError, chosen, page, parts, reproduce
@@ -47,7 +48,7 @@ def check(key):
     assert result.key == key
     assert all(0.0 <= fraction <= 1.0 for fraction in told)
     known = parts(PAGE, key)
-    assert known is not None, f"{key} is not on the page: python -m prbm.validation.page"
+    assert known is not None, f"{key} is not on the page: prbm validate --out docs"
     row, section = known
     assert same(row, result.row()), f"{row}\n{result.row()}"
     for shown, found in zip(section.splitlines(), result.section().splitlines(), strict=True):
@@ -153,7 +154,7 @@ def test_a_part_can_be_reproduced_without_elements(tmp_path, monkeypatch):
             raise ImportError(f"No module named {name!r}")
         return found_module(name, *rest)
 
-    monkeypatch.setattr(finite_elements.importlib, "import_module", missing)
+    monkeypatch.setattr("importlib.import_module", missing)
     told = []
     (found,) = reproduce(tmp_path / "docs", ["table-1"], told.append)
     assert found.verdict == "agrees"
@@ -163,22 +164,22 @@ def test_a_part_can_be_reproduced_without_elements(tmp_path, monkeypatch):
         reproduce(tmp_path, ["finite-elements"])
 
 
-def test_the_command_writes_lists_and_refuses(tmp_path, capsys, monkeypatch):
+def test_the_command_writes_and_lists_results_and_rejects_mistakes(tmp_path, capsys, monkeypatch):
     import matplotlib.figure
 
     drawn = Result("quick", "Figure 1", "what", (Number("x", 1.0),), "Because.", "",
                    (Drawing("quick", "A figure", matplotlib.figure.Figure()),))  # fmt: skip
     monkeypatch.setattr(validation, "RESULTS", (Reproduction("quick", lambda tell: drawn),))
-    assert validation.main(["--out", str(tmp_path)]) == 0
+    assert main(["validate", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "figures" / "validation-quick.png").read_bytes().startswith(b"\x89PNG")
     assert "![A figure](figures/validation-quick.png)" in (tmp_path / "validation.md").read_text()
-    assert validation.main(["--list"]) == 0
+    assert main(["validate", "--list"]) == 0
     assert "quick" in capsys.readouterr().out
-    assert validation.main(["--only", "figure-9"]) == 1
+    assert main(["validate", "--only", "figure-9"]) == 2
     assert "there is no result 'figure-9'" in capsys.readouterr().err
     (tmp_path / "file").write_text("")
-    assert validation.main(["--out", str(tmp_path / "file")]) == 1
-    assert "cannot be written" in capsys.readouterr().err
+    assert main(["validate", "--out", str(tmp_path / "file")]) == 2
+    assert "file is a file" in capsys.readouterr().err
 
 
 def test_an_unknown_result_is_refused_with_those_there_are():

@@ -19,20 +19,15 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
-
 from ..base.errors import EquilibriumError, ParameterError
 from ..base.progress import Progress
 from ..data.uncertainty import Estimate
-from ..drawing.style import IMPACT, LINK, REST, own_style
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import Modes, modes
 from ..mechanics.statics import equilibrium
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
-from ..plots.scene import plain
 from ..references.finite_elements import FiniteElements
 from .impact_map import algebraic, by_elements
 from .stretching import notes as stretching_notes
@@ -147,42 +142,6 @@ class Comparison:
         path = Path(path)
         path.write_text(self.csv(), encoding="utf-8")
         return path
-
-    @own_style()
-    def figure(self) -> Figure:
-        """Draw model and measurement over the elements' values [%], ratios in 0.01."""
-        rows = [r for r in self.rows if r.elements and math.isfinite(r.elements)][::-1]
-        figure = Figure((7.0, 1.1 + 0.36 * len(rows)), dpi=110, layout="constrained")
-        axes = figure.subplots()
-        places = np.arange(len(rows))
-        axes.axvline(0.0, color=LINK, linewidth=1.2, label="finite elements")
-        axes.plot(
-            [100 * r.error / r.scale for r in rows],
-            places,
-            "o",
-            color=IMPACT,
-            markersize=6,
-            label="model",
-        )
-        known = [(y, r, r.measured) for y, r in zip(places, rows, strict=True)
-                 if r.measured is not None]  # fmt: skip
-        if known:
-            off = [100 * (m.value - r.elements) / r.scale for _, r, m in known]
-            bars = [100 * m.uncertainty / r.scale for _, r, m in known]
-            axes.errorbar(
-                off, [y for y, *_ in known], xerr=bars, fmt="s", color=REST, capsize=3,
-                markersize=4, label="measured",
-            )  # fmt: skip
-        axes.set_yticks(
-            places, [r.name if r.unit else f"{r.name} [0.01]" for r in rows], fontsize=9
-        )
-        axes.set_ylim(-0.7, len(rows) - 0.3)
-        ratios = "" if all(r.unit for r in rows) else ", or 0.01"
-        axes.set_xlabel(f"difference from finite elements [%{ratios}]")
-        axes.set_title(self.title, fontsize=11, loc="left")
-        plain(axes)
-        axes.legend(fontsize=9, frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
-        return figure
 
 
 def _shown(x: float, form: str = ".5g") -> str:

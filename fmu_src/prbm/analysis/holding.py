@@ -14,21 +14,15 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from ..base.errors import EquilibriumError
 from ..base.progress import Progress
-from ..base.unit_text import length_unit
-from ..drawing.style import IMPACT, PAST, REST, own_style
 from ..mechanics.arrays import Real
 from ..mechanics.modal import modes
 from ..mechanics.statics import Equilibrium, equilibrium, free_displacement, held_by_loops
 from ..mechanics.system import System, unit
-from ..plots.scene import plain
 from .equilibria import Rest, holding_force, rests, snap
 
-ROUNDING = 1e-9  # of its scale: what a computation leaves of zero
 DIFFERENCE = 1e-5  # of the size of the mechanism: step of the stiffness, whose error is its square
 
 
@@ -154,74 +148,3 @@ def curve(
     found = rests(system, displacements, np.array([point.force for point in points]))
     between = (snap(system, a.displacement, b.displacement) for a, b in pairwise(found))
     return Curve(tuple(points), tuple(found), tuple(between))
-
-
-@own_style()
-def figure(curve: Curve, title: str) -> Figure:
-    """Draw force, motion across and fundamental frequency over the displacement.
-
-    Places of rest are filled where they are stable and open where they are not; diamonds are
-    where a force makes the mechanism snap.
-    """
-    x = np.array([point.displacement for point in curve.points])
-    factor, name = length_unit(float(np.abs(x).max()) or 1.0)
-    drawn = Figure((8.0, 6.6), dpi=120, layout="constrained")
-    every: list[Axes] = list(
-        drawn.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [2, 1, 1]})
-    )
-    force, across, frequency = every
-    scale, newton = _force_unit(max(abs(point.force) for point in curve.points))
-    force.plot(factor * x, [scale * p.force for p in curve.points], color=PAST, linewidth=1.4)
-    force.axhline(0.0, color="#808080", linewidth=0.8)
-    for stable, words in ((True, "stable rest"), (False, "unstable rest")):
-        places = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
-        if places:
-            force.plot(
-                places, np.zeros(len(places)), "o", color=REST, markersize=7,
-                markerfacecolor=REST if stable else "white", label=words,
-            )  # fmt: skip
-    if curve.snaps:
-        snaps = np.array(curve.snaps) * (factor, scale)
-        force.plot(*snaps.T, "D", color=IMPACT, markersize=5, label="snaps through")
-    if curve.rests:
-        force.legend(fontsize=9, frameon=False)
-    force.set_ylabel(f"holding force [{newton}]")
-    force.set_title(title, fontsize=11, loc="left")
-    y = np.array([p.across for p in curve.points])
-    y = np.where(np.abs(y) > ROUNDING * np.abs(x).max(), y, 0.0)
-    aside, small = length_unit(float(np.abs(y).max()) or 1e-4)
-    across.plot(factor * x, aside * y, color=PAST, linewidth=1.2)
-    across.set_ylabel(f"across [{small}]")
-    hertz = np.array([point.frequency for point in curve.points])
-    frequency.plot(factor * x, np.where(hertz > 0.0, hertz, np.nan), color=PAST, linewidth=1.2)
-    if (hertz <= 0.0).any():
-        for axes in every:
-            axes.fill_between(
-                factor * x, 0.0, 1.0, where=hertz <= 0.0, color=IMPACT, alpha=0.08, linewidth=0,
-                transform=axes.get_xaxis_transform(),
-            )  # fmt: skip
-        frequency.annotate(
-            "shaded: unstable when let go", (0.5, 0.06), xycoords="axes fraction", ha="center",
-            fontsize=9, color=IMPACT,
-        )  # fmt: skip
-    frequency.set_ylim(0.0, 1.15 * max(float(hertz.max()), 0.0) or 1.0)
-    frequency.set_ylabel("fundamental [Hz]")
-    frequency.set_xlabel(f"displacement [{name}]")
-    for axes in every:
-        plain(axes)
-    drawn.align_ylabels(every)
-    return drawn
-
-
-def _force_unit(largest: float) -> tuple[float, str]:
-    """Return a unit in which a force has a handy number, as its factor and name.
-
-    Examples
-    --------
-    >>> _force_unit(3.0), _force_unit(0.2)
-    ((1.0, 'N'), (1000.0, 'mN'))
-    """
-    for factor, name in ((1.0, "N"), (1e3, "mN")):
-        if largest * factor >= 1.0:
-            return factor, name
-    return 1e6, "µN"

@@ -12,23 +12,20 @@ The amplitude of a line is that of the sine which it stands for,
 with Hann's window w, after the straight line through x has been taken out.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.signal import detrend, find_peaks
 from scipy.signal.windows import hann
 
 from ..base.errors import ParameterError
-from ..drawing.style import IMPACT, PAST, own_style
 from ..hybrid.simulation import Impact, Simulation
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at
 from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
-from ..plots.scene import plain
 from ..runs.result import Result
 from .impact_map import first_impact
 
@@ -244,54 +241,3 @@ def numbered(modes: Real) -> list[tuple[int, float]]:
     """
     first = enumerate(map(float, modes[:MODES_SHOWN]), start=1)
     return [(i, f) for i, f in first if f > 0.0]
-
-
-@own_style()
-def figure(
-    response: AfterImpact,
-    signals: Sequence[str] = ("along", "across", "turning"),
-    highest: float | None = None,
-) -> Figure:
-    """Draw the spectra of signals, with the modes at the impact shape marked.
-
-    Parameters
-    ----------
-    response : AfterImpact
-        What is to be heard.
-    signals : sequence of {"along", "across", "turning"}
-        A panel each.
-    highest : float or None
-        Frequency up to which to draw [Hz]; None: what the samples show.
-    """
-    drawn = Figure((8.0, 0.9 + 2.0 * len(signals)), dpi=120, layout="constrained")
-    every = np.atleast_1d(drawn.subplots(len(signals), 1, sharex=True))
-    shown = numbered(response.modes)
-    for axes, name in zip(every, signals, strict=True):
-        frequency, amplitude = spectrum(response.time, getattr(response, name))
-        end = highest or float(frequency[-1])
-        inside = (frequency <= end) & (frequency > 0.0)
-        axes.semilogy(frequency[inside], amplitude[inside], color=PAST, linewidth=1.1)
-        for _, f in shown:
-            if f < end:
-                axes.axvline(f, color=IMPACT, linewidth=1.0, linestyle="--")
-        top = float(amplitude[inside].max())
-        axes.set_ylim(max(1e-6 * top, 0.3 * float(amplitude[inside].min())), 3.0 * top)
-        axes.set_xlim(0.0, end)
-        axes.set_ylabel(SIGNALS[name].replace(" [", "\n["), fontsize=9)
-        plain(axes)
-    last = -np.inf
-    for i, f in shown:
-        if f < end and f - last > 0.035 * end:  # labels do not overlap
-            every[0].annotate(
-                f"{i}", (f, 1.0), (0, 3), xycoords=("data", "axes fraction"),
-                textcoords="offset points", ha="center", color=IMPACT, fontsize=9,
-            )  # fmt: skip
-            last = f
-    t = 1e3 * response.impact.time
-    every[0].set_title(
-        f"{response.title}\nafter the impact at {t:.1f} ms; dashed: modes at the impact shape",
-        fontsize=10, loc="left", pad=16,
-    )  # fmt: skip
-    every[-1].set_xlabel("frequency [Hz]")
-    drawn.align_ylabels(list(every))
-    return drawn

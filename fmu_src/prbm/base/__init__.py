@@ -1,1 +1,1 @@
-"""Errors, file writing, texts of units and names: used by every other package."""
+"""Errors, file writing, units and names in text, version: used by every other package."""

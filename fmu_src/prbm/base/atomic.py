@@ -1,4 +1,4 @@
-"""Files that are written at once: whoever looks sees the old one or the new one, never a part."""
+"""Atomic writing of files: a reader sees the old content or the new one, never a part of it."""
 
 import os
 import tempfile
@@ -7,45 +7,46 @@ from pathlib import Path
 
 from .errors import PrbmError
 
-PLAIN = 0o644
+FILE_MODE = 0o644  # temporary files are private
 
 
 class FileError(PrbmError, OSError):
-    """A file cannot be written where it should be."""
+    """A file cannot be written to its place."""
 
 
 def write(path: str | Path, content: bytes) -> None:
-    """Write a file whole or not at all, in a folder that is created if it does not exist.
+    """Write a file completely or not at all, and create its folder.
 
     Raises
     ------
     OSError
         If the folder cannot be created or the file cannot be written.
     """
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    write_all({path: content})
+    write_all({Path(path): content})
 
 
 def write_all(files: Mapping[Path, bytes]) -> None:
-    """Write files: first all contents beside their places, then all names.
+    """Write files, and create their folders.
+
+    First all contents are written under temporary names, then all files are renamed: if one of them
+    cannot be written, no file is changed, unless a renaming fails after others have succeeded.
 
     Raises
     ------
     OSError
-        If one of them cannot be written, which it names; then none is, unless it is a name that
-        fails after others went well.
+        If a folder cannot be created or a file cannot be written; ``filename`` is that file.
     """
     partial: dict[Path, str] = {}
     path = Path()
     try:
         for path, content in files.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
             handle, partial[path] = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
             with os.fdopen(handle, "wb") as file:
                 file.write(content)
                 file.flush()
                 os.fsync(file.fileno())
-            os.chmod(partial[path], PLAIN)
+            os.chmod(partial[path], FILE_MODE)
         for path, name in partial.items():
             os.replace(name, path)
     except OSError as error:
@@ -57,7 +58,9 @@ def write_all(files: Mapping[Path, bytes]) -> None:
 
 
 def check_writable(folder: Path, remedy: str = "choose a folder with --out") -> None:
-    """Find out before the work whether its result can be kept in a folder, which may not exist.
+    """Check, before a long computation, that files can be written to a folder.
+
+    The folder need not exist.
 
     Raises
     ------
@@ -74,7 +77,9 @@ def check_writable(folder: Path, remedy: str = "choose a folder with --out") -> 
 
 
 def check_file(path: Path) -> None:
-    """Find out before the work whether a file can be written, whose folder may not exist.
+    """Check, before a long computation, that a file can be written.
+
+    Its folder need not exist.
 
     Raises
     ------
@@ -87,12 +92,12 @@ def check_file(path: Path) -> None:
 
 
 def check_no_folder(path: Path) -> None:
-    """Refuse a folder where a file is to be.
+    """Check that the path of a file is not a folder.
 
     Raises
     ------
     FileError
-        If there is one.
+        If it is a folder.
     """
     if path.is_dir():
         raise FileError(

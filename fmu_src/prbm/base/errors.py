@@ -1,4 +1,4 @@
-"""What can go wrong, by whose hand: the description, the values or the motion.
+"""Errors of the package: of a description, of values, of an equilibrium, of a simulation.
 
 Every message names the variable, its value, its unit and a remedy; it is meant to be shown to
 the user as it is.
@@ -14,12 +14,12 @@ class MechanismError(PrbmError, ValueError):
 
 
 class ParameterError(PrbmError, ValueError):
-    """A parameter or an input has a value that makes no sense."""
+    """A parameter or an input is unknown, or its value is out of bounds."""
 
 
 class EquilibriumError(PrbmError, ValueError):
-    """No static shape satisfies what was asked for."""
+    """No static shape satisfies the conditions."""
 
 
 class SimulationError(PrbmError, RuntimeError):
-    """The motion cannot be continued with what was asked for."""
+    """The simulation cannot be continued."""

@@ -8,20 +8,27 @@ from typing import TextIO
 
 Progress = Callable[[float], object]
 
-
-FIRST_WORD, EVERY = 1.0, 2.0  # s; what is done sooner needs no report, and lines are few
+DELAY = 1.0  # s; a shorter computation reports nothing
+LINE_INTERVAL = 2.0  # s between the lines in a file
+TERMINAL_INTERVAL = 0.1  # s between the updates of a line on a terminal
 
 
 def reporter(stream: TextIO | None = None) -> Progress:
-    """Return what tells on a stream, standard error by default, how much of a work is done.
+    """Return a progress callback, to be called with the fraction of the work that is done.
 
-    It says nothing in the first second; then it rewrites its line on a terminal, and adds a line
-    every other second elsewhere.
+    It writes nothing in the first second.  After that it updates one line on a terminal; to any
+    other stream it adds a line every two seconds.
+
+    Parameters
+    ----------
+    stream : text stream or None
+        Where to write (default: standard error).
     """
     out = sys.stderr if stream is None else stream
     terminal = out.isatty()
+    interval = TERMINAL_INTERVAL if terminal else LINE_INTERVAL
     begin = time.monotonic()
-    last = -math.inf  # when it said something [s]
+    last = -math.inf  # time of the last output [s]
 
     def report(fraction: float) -> None:
         nonlocal last
@@ -30,7 +37,7 @@ def reporter(stream: TextIO | None = None) -> Progress:
         if done and terminal and last > 0.0:
             print("\r100%", file=out, flush=True)
             last = -math.inf
-        elif not done and now >= FIRST_WORD and now - last >= (0.1 if terminal else EVERY):
+        elif not done and now >= DELAY and now - last >= interval:
             text, end = (f"\r{fraction:4.0%}", "") if terminal else (f"{fraction:4.0%} done", "\n")
             print(text, end=end, file=out, flush=True)
             last = now

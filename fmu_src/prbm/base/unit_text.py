@@ -1,8 +1,8 @@
-"""Units in which a quantity has a handy number."""
+"""Display units: those in which a quantity has few digits before the point."""
 
 
 def length_unit(size: float) -> tuple[float, str]:
-    """Return a unit in which a length has a handy number, as its factor and name.
+    """Return the display unit of a length of this size [m], as its factor and name.
 
     Examples
     --------
@@ -16,7 +16,7 @@ def length_unit(size: float) -> tuple[float, str]:
 
 
 def frequency_unit(frequency: float) -> tuple[float, str]:
-    """Return a unit in which a frequency has a handy number, as its factor and name.
+    """Return the display unit of a frequency [Hz], as its factor and name.
 
     Examples
     --------
@@ -30,7 +30,7 @@ def frequency_unit(frequency: float) -> tuple[float, str]:
 
 
 def time_unit(span: float) -> tuple[float, str]:
-    """Return a unit in which a duration has a handy number, as its factor and name.
+    """Return the display unit of a duration [s], as its factor and name.
 
     Examples
     --------

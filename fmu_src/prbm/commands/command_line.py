@@ -369,6 +369,7 @@ def _validate(commands: Commands) -> None:
     add = parser.add_argument
     add("mechanism", nargs="?", metavar="MECHANISM", help=f"{MECHANISM}; default: the source's")
     add("--only", nargs="+", default=[], metavar="NAME", help="some of the source's results")
+    add("--list", action="store_true", help="list the names of the source's results")
     add("--elements", type=int, metavar="N", help="a flexure of MECHANISM; 32")
     add(
         "--measured", action="append", default=[], metavar="NAME=VALUE+-U",

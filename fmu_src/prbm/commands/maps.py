@@ -16,6 +16,7 @@ from ..files.mechanism_file import find
 from ..files.settings import UserMistake, quantities, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
+from ..plots import impact_map as figures
 from .output import Output
 from .systems import check_length
 
@@ -165,10 +166,10 @@ def _keep(maps: Sequence[ImpactMap], output: Output, name: str) -> None:
     head, rows = maps[0].csv().split("\n", 1)
     rest = [one.csv().split("\n", 1)[1] for one in maps[1:]]
     output.text(f"{name}-impact-map.csv", head + "\n" + rows + "".join(rest))
-    output.figure(f"{name}-impact-map.png", lambda: impact_map.heat_map(maps))
+    output.figure(f"{name}-impact-map.png", lambda: figures.heat_map(maps))
     if np.all(np.array(maps[0].restitution.shape) > 1):
-        output.figure(f"{name}-impact-map-3d.png", lambda: impact_map.surface(maps))
+        output.figure(f"{name}-impact-map-3d.png", lambda: figures.surface(maps))
     for one in maps:
         if one.hits:
             slug = re.sub(r"[^\w.]+", "-", one.label)
-            output.figure(f"{name}-energies-{slug}.png", partial(impact_map.energies, one))
+            output.figure(f"{name}-energies-{slug}.png", partial(figures.energies, one))

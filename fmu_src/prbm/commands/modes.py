@@ -58,9 +58,9 @@ def frequencies(options: argparse.Namespace) -> None:
 def _figure(
     mechanism: Mechanism, values: Mapping[str, float], count: int, at: float | None
 ) -> "Figure":
-    from ..plots.picture import MOST_MODES, picture  # here, because it takes a second
+    from ..plots.picture import MODES_MAX, picture  # here, because it takes a second
 
-    return picture(mechanism, values, min(count, MOST_MODES), at)
+    return picture(mechanism, values, min(count, MODES_MAX), at)
 
 
 def _shares(system: System, e: Complex, phi: Real) -> list[float]:

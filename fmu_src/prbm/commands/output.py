@@ -1,4 +1,4 @@
-"""What a command gives: text on standard output, tables and figures in a folder if there is one."""
+"""Output of a command: text on standard output; tables and figures in a folder, if one is given."""
 
 import csv
 import io
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 @dataclass
 class Output:
-    """Files that are kept until all is computed, then written at once.
+    """Files that are collected during a computation and then written at once.
 
     Parameters
     ----------
     folder : Path or None
-        Where they go; None: nowhere, and no figure is drawn.
+        Their folder; None: no file is written and no figure is drawn.
 
     Raises
     ------
@@ -65,7 +65,6 @@ class Output:
         for path in self.files:
             check_no_folder(path)
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
             write_all(self.files)
         except OSError as error:
             raise FileError(

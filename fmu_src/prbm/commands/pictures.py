@@ -1,15 +1,36 @@
 """``prbm picture`` and ``prbm animate``."""
 
 import argparse
+from collections.abc import Iterable
+from pathlib import Path
 
-from ..base.atomic import FileError
-from ..plots import animation, picture
+from ..base.atomic import FileError, check_file
+from ..base.errors import ParameterError
+from ..base.names import unknown
+from ..base.progress import reporter
+from ..files.mechanism_file import find, load, shipped
+from ..files.settings import quantity, settings
+from ..mechanics.assembly import assemble
+from ..mechanism.description import Mechanism
+from ..plots.animation import AnimationError, check_encoder, write_film
+from ..plots.figures import save
+from ..plots.motion import FPS, film, fmpy_command, motion, needed
+from ..plots.picture import picture
+from ..plots.scene import Scene
+from ..runs.result import Columns, Result, ResultError, names, read_csv
+from ..runs.run import simulate
+from .duration import span
 
 
 def drawn(options: argparse.Namespace) -> None:
     """Draw a mechanism to a PNG file."""
+    mechanism = find(options.mechanism)
+    path = options.out or Path(f"{mechanism.name}.png")
+    check_file(path)
+    figure = picture(mechanism, settings(mechanism, options.set), options.modes)
     try:
-        print(picture.run(options))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        print(save(figure, path))
     except OSError as error:
         if isinstance(error, FileError):
             raise
@@ -17,5 +38,102 @@ def drawn(options: argparse.Namespace) -> None:
 
 
 def animated(options: argparse.Namespace) -> None:
-    """Write a film."""
-    print(animation.run(options))
+    """Write a film of a result, or of a mechanism simulated now."""
+    path = Path(options.files[-1])
+    check_encoder(path)
+    check_file(path)
+    start, stop = _seconds(options.start, "--from"), _seconds(options.stop, "--to")
+    moved = motion(_result(options))
+    fps = FPS if options.fps is None else options.fps
+    scene = Scene(moved, film(moved, options.slow, fps, start, stop))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise AnimationError(f"{path}: cannot be written ({error.strerror})") from None
+    print(write_film(scene, path, reporter()))
+
+
+def _seconds(text: str | None, option: str) -> float | None:
+    return None if text is None else quantity(text, "s", option)
+
+
+def _result(options: argparse.Namespace) -> Result:
+    """Return the requested result, read from a file or simulated."""
+    mechanism, files = _named(options)
+    if len(files) == 1:
+        if mechanism is None:
+            raise ParameterError("name the source of the film: RESULT.csv, --model or --mechanism")
+        changes = settings(mechanism, options.set)
+        stop_time, step = span(mechanism, changes, options.stop_time)
+        return simulate(mechanism, changes, stop_time=stop_time, step=step)
+    if len(files) > 2:
+        raise ParameterError(f"{len(files)} files are given: RESULT.csv OUT, or OUT")
+    columns = read_csv(files[0])
+    mechanism = mechanism or _owner(columns)
+    changes, known = settings(mechanism, options.set), mechanism.values()
+    for name in changes:
+        if name not in known:
+            raise ParameterError(unknown(name, known))
+    return Result(mechanism, mechanism.values(changes), columns)
+
+
+def _named(options: argparse.Namespace) -> tuple[Mechanism | None, list[str]]:
+    """Return the mechanism that the command line names, if any, and the remaining files."""
+    if options.mechanism is not None:
+        return load(options.mechanism), options.files
+    if options.model is not None:
+        return find(options.model), options.files
+    first = options.files[0]
+    if len(options.files) == 2 and (first in shipped() or first.endswith(".toml")):
+        return find(first), options.files[1:]
+    return None, options.files
+
+
+def _owner(columns: Columns) -> Mechanism:
+    """Return the shipped mechanism whose angles are exactly those of a result.
+
+    Several mechanisms may have the same angles, for instance guides with and without stretching
+    flexures.  Then it is the one with the fewest coordinates whose loops are closed.
+    """
+    recorded = {name for name in names(columns) if name.endswith(".angle")}
+    every = [load(path) for path in shipped().values()]
+    alike = sorted((m for m in every if _angle_names(m) == recorded), key=_size)
+    for mechanism in alike:
+        if _closes_loops(columns, mechanism):
+            return mechanism
+    fewer = [m for m in every if recorded and _parts(names(columns)) == _parts(needed(m))]
+    if fewer and not alike:
+        raise ResultError(
+            "the result lacks the angles of the links; simulate again with\n"
+            + "\nor ".join(fmpy_command(m) for m in fewer)
+        )
+    raise ResultError(
+        "the columns do not identify the mechanism of this result: name it with "
+        f"--model ({', '.join(shipped())}) or --mechanism FILE.toml"
+    )
+
+
+def _closes_loops(columns: Columns, mechanism: Mechanism) -> bool:
+    """Return whether the angles of a result close the loops of a mechanism."""
+    try:
+        motion(columns, mechanism)
+    except ResultError:
+        return False
+    return True
+
+
+def _size(mechanism: Mechanism) -> int:
+    return assemble(mechanism, mechanism.values()).n
+
+
+def _angle_names(mechanism: Mechanism) -> set[str]:
+    return {name for name in needed(mechanism) if name.endswith(".angle")}
+
+
+def _parts(variables: Iterable[str]) -> set[str]:
+    """Return the angles of the bodies and the gaps of the stops among variables."""
+    return {
+        name
+        for name in variables
+        if name.endswith((".angle", ".gap")) and not name.startswith("link[")
+    }

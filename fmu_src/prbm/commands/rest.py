@@ -12,6 +12,7 @@ from ..files.settings import UserMistake, quantities, quantity
 from ..mechanics.statics import immobile
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
+from ..plots.holding import holding_figure
 from .output import Output, aligned
 from .systems import assembled, check_length, tiny
 
@@ -87,7 +88,7 @@ def _range(
         ],
     )  # fmt: skip
     output.figure(
-        f"{mechanism.name}-equilibrium.png", lambda: holding.figure(curve, mechanism.title)
+        f"{mechanism.name}-equilibrium.png", lambda: holding_figure(curve, mechanism.title)
     )
 
 

@@ -14,10 +14,10 @@ from ..files.settings import UserMistake, quantity, settings
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
-from ..runs.duration import span
 from ..runs.headline import told
 from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
+from .duration import span
 from .output import Output
 from .systems import ROUNDING
 
@@ -42,8 +42,9 @@ def simulated(options: argparse.Namespace) -> None:
     communication_points(stop_time, step)
     begin = time.perf_counter()
     result = simulate(
-        mechanism, values, stop_time, step, _tolerance(options.tolerance), progress=reporter()
-    )
+        mechanism, values, stop_time=stop_time, step=step,
+        tolerance=_tolerance(options.tolerance), progress=reporter(),
+    )  # fmt: skip
     print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")
     for line in told(result.columns, mechanism, result.values):
         print(line)
@@ -92,7 +93,8 @@ def _spectrum(
     options: argparse.Namespace, result: Result, values: dict[str, float], duration: float
 ) -> None:
     """Tell which frequencies are heard after an impact."""
-    from ..analysis import spectrum  # here, because it takes two seconds
+    from ..analysis import spectrum  # here for the start-up time
+    from ..plots.spectrum import spectrum_figure
 
     mechanism, output = result.mechanism, Output(options.out)
     if not result.impacts:
@@ -121,7 +123,7 @@ def _spectrum(
         np.column_stack([grid, *(amplitude for _, amplitude in lines.values())]).tolist(),
     )
     highest = min(SHOWN * max([f for _, f in modes], default=grid[-1]), float(grid[-1]))
-    output.figure(f"{mechanism.name}-spectrum.png", lambda: spectrum.figure(heard, highest=highest))
+    output.figure(f"{mechanism.name}-spectrum.png", lambda: spectrum_figure(heard, highest=highest))
     output.write()
 
 

@@ -27,8 +27,12 @@ def _source(options: argparse.Namespace) -> None:
     for option in ("measured", "set", "elements"):
         if getattr(options, option) not in (None, []):
             raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
-    from ..validation.page import PAGE, reproduce  # type: ignore[import-untyped, unused-ignore]
+    from ..validation.page import PAGE, chosen, reproduce  # here for the start-up time
 
+    if options.list:
+        for one in chosen(options.only):
+            print(f"{one.key}{'  (finite elements)' if one.elements else ''}")
+        return
     if options.out is not None:
         check_writable(options.out)
     with tempfile.TemporaryDirectory(prefix="prbm_") as folder:
@@ -41,16 +45,17 @@ def _source(options: argparse.Namespace) -> None:
 
 def _mechanism(options: argparse.Namespace) -> None:
     """Compare a mechanism with finite elements and measurements."""
-    if options.only:
-        raise UserMistake("--only chooses among the source's results: leave MECHANISM out")
+    if options.only or options.list:
+        raise UserMistake("--only and --list concern the source's results: leave MECHANISM out")
     mechanism = find(options.mechanism)
     values, output = settings(mechanism, options.set), Output(options.out)
     known = dict(map(measured, options.measured))
-    from ..analysis.comparison import compare  # type: ignore[import-untyped, unused-ignore]
+    from ..analysis.comparison import compare  # here for the start-up time
+    from ..plots.comparison import comparison_figure
 
     elements = ELEMENTS if options.elements is None else options.elements
     found = compare(mechanism, values, elements=elements, measured=known, progress=reporter())
     print(found)
     output.text(f"{mechanism.name}-comparison.csv", found.csv())
-    output.figure(f"{mechanism.name}-comparison.png", found.figure)
+    output.figure(f"{mechanism.name}-comparison.png", lambda: comparison_figure(found))
     output.write()

@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from ..analysis.fit import OWN_UNITS, Free, Frequency
+from ..analysis.fit import RECORD_UNITS, Free, Frequency
 from ..base.errors import MechanismError, ParameterError
 from ..base.names import unknown
 from ..data.uncertainty import Estimate
@@ -70,7 +70,7 @@ def free(mechanism: Mechanism, text: str) -> Free:
     Free(name='stop.position', lower=-0.001, upper=0.001, start=None)
     """
     name, equals, limits = (part.strip() for part in text.partition("="))
-    units = OWN_UNITS | {p.name: p.unit for p in mechanism.parameters}
+    units = RECORD_UNITS | {p.name: p.unit for p in mechanism.parameters}
     if name not in units:
         raise ParameterError(f"--free {text}: {unknown(name, units)}")
     if not equals:

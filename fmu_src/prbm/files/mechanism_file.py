@@ -114,22 +114,27 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def find(name: str) -> Mechanism:
-    """Return the mechanism of a file, or the shipped one of a name.
+def find(name: str | Path) -> Mechanism:
+    """Return a shipped mechanism, or read one from a file.
+
+    Parameters
+    ----------
+    name : str or Path
+        Name of a shipped mechanism, or path of a mechanism file.
 
     Raises
     ------
     ParameterError
-        If there is no shipped mechanism of that name.
+        If there is neither a shipped mechanism of that name nor a file.
     MechanismError
-        If the file describes none.
+        If the file cannot be read or does not describe a mechanism.
 
     Examples
     --------
     >>> find("Bistable").name
     'Bistable'
     """
-    files = shipped()
+    name, files = str(name), shipped()
     if name in files:
         return load(files[name])
     if not Path(name).suffix and not Path(name).is_file():

@@ -1,15 +1,15 @@
-"""FMUs as archives: the same bytes for the same content, and never half a file."""
+"""FMUs as zip archives: the same bytes for the same content."""
 
 import io
 import zipfile
 from collections.abc import Mapping
 
-from ..base import atomic as files
+from ..base.atomic import FILE_MODE
 
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip archive can hold
-PLAIN, EXECUTABLE = files.PLAIN, 0o755
+EXECUTABLE_MODE = 0o755
 LIBRARIES = (".so", ".dll", ".dylib")
-UNIX = 3
+UNIX = 3  # the system whose permissions an archive keeps
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
@@ -20,7 +20,7 @@ def zipped(contents: Mapping[str, bytes]) -> bytes:
             info = zipfile.ZipInfo(name, TIMESTAMP)
             info.create_system = UNIX
             info.compress_type = zipfile.ZIP_DEFLATED
-            mode = EXECUTABLE if name.endswith(LIBRARIES) else PLAIN
+            mode = EXECUTABLE_MODE if name.endswith(LIBRARIES) else FILE_MODE
             info.external_attr = mode << 16
             archive.writestr(info, contents[name])
     return buffer.getvalue()

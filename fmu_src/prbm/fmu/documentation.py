@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 
 from ..base.text import printable
 from ..base.version import GENERATION_TOOL
-from ..interface.variables import NativeInterface, Variable
+from ..interface.native import NativeInterface
+from ..interface.variables import Variable
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import FlexureType
 from ..runs.experiment import Experiment

@@ -3,8 +3,9 @@
 from collections.abc import Iterable, Mapping
 from xml.etree.ElementTree import Element, SubElement
 
+from ..interface.native import NativeInterface
 from ..interface.structure import dependencies
-from ..interface.variables import CLOCK, NativeInterface, Variable, pushed
+from ..interface.variables import CLOCK, Variable, pushed
 from ..kernel.sources import OVERRIDE
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import GROUND

@@ -8,8 +8,9 @@ from dataclasses import replace
 from importlib.resources import files
 
 from ..base.errors import MechanismError
+from ..interface.native import NativeInterface, native_interface
 from ..interface.tables import FILE, tables
-from ..interface.variables import CLOCK, NativeInterface, native_interface
+from ..interface.variables import CLOCK
 from ..kernel.compiler import HOST, Platform, libraries
 from ..kernel.sources import TABLES, amalgamation, kernel, tables_header
 from ..mechanics.independent import independent

@@ -1,9 +1,10 @@
 """Python FMUs: the engine's own source, wrapped by pythonfmu, as FMI 2.0 co-simulation."""
 
+import ast
 import hashlib
 import json
 import uuid
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib.resources import files as package_files
 from importlib.resources.abc import Traversable
@@ -22,7 +23,7 @@ from .start import interface, start_sample
 
 NAMESPACE = uuid.UUID("6f1c6c1e-0c53-5d0e-9d6e-3b1f0b4f7a52")
 ROOT = __package__.rpartition(".")[0]  # the package that this one is part of
-SHIPPED = ("base", "mechanism", "mechanics", "hybrid", "fmu.slave")  # inside every Python FMU
+SLAVE = "fmu.slave.slave"  # the module that the script of an FMU imports
 ENGINE = "engine"  # stands for the name of the shipped package until that is known
 INIT = '"""The engine and the slave of this FMU, with relative imports only."""\n'
 SHORT = 10  # hexadecimal digits that tell one content from another within a process
@@ -125,16 +126,41 @@ def _sources(mechanism: Mechanism, listed: tuple[Variable, ...]) -> Iterator[tup
     data = json.dumps(resolved(mechanism, listed), indent=1, sort_keys=True)
     yield FILE, data.encode()
     yield f"{ENGINE}/__init__.py", INIT.encode()
-    for package in SHIPPED:
-        yield from _modules(f"{ROOT}.{package}", f"{ENGINE}/{package.replace('.', '/')}")
-    yield f"{ENGINE}/fmu/__init__.py", _folder(__package__, "__init__.py").read_bytes()
-    yield from _modules("pythonfmu", "pythonfmu")
-
-
-def _modules(package: str, folder: str) -> Iterator[tuple[str, bytes]]:
-    for entry in package_files(package).iterdir():
+    for path, text in shipped_modules().items():
+        yield f"{ENGINE}/{path}", text
+    for entry in package_files("pythonfmu").iterdir():
         if entry.name.endswith(".py"):
-            yield f"{folder}/{entry.name}", entry.read_bytes()
+            yield f"pythonfmu/{entry.name}", entry.read_bytes()
+
+
+def shipped_modules() -> dict[str, bytes]:
+    """Return the slave and the modules that it imports, directly or not, by their paths."""
+    found: dict[str, bytes] = {}
+    waiting = [SLAVE]
+    while waiting:
+        module = waiting.pop()
+        parts = module.split(".")
+        file = package_files(ROOT).joinpath(*parts[:-1], f"{parts[-1]}.py")
+        folder = package_files(ROOT).joinpath(*parts)
+        if folder.is_dir():
+            parts, file = [*parts, "__init__"], folder.joinpath("__init__.py")
+        path = "/".join(parts) + ".py"
+        if path in found or not file.is_file():  # a name that a module defines is no file
+            continue
+        found[path] = file.read_bytes()
+        waiting += _imported(found[path], parts[:-1])
+        waiting += [".".join(parts[:k]) for k in range(1, len(parts))]
+    return found
+
+
+def _imported(source: bytes, package: Sequence[str]) -> Iterator[str]:
+    """Yield the names that a module of a package imports relatively, with their modules."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and node.level:
+            parts = [*package[: len(package) - node.level + 1], *(node.module or "").split(".")]
+            module = ".".join(filter(None, parts))
+            yield module
+            yield from (f"{module}.{alias.name}" for alias in node.names)
 
 
 def _named(

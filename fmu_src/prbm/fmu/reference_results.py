@@ -97,11 +97,12 @@ def _columns(
 ) -> NDArray[Any] | None:
     """Return the result of the default experiment; the FMUs of one export share it."""
     try:
-        return simulate(
-            hashed.mechanism, dict(changes), experiment.stop_time, experiment.step
-        ).columns
+        result = simulate(
+            hashed.mechanism, dict(changes), stop_time=experiment.stop_time, step=experiment.step
+        )
     except PrbmError:
         return None
+    return result.columns
 
 
 def _table(columns: NDArray[Any], outputs: Iterable[str]) -> bytes:

@@ -9,7 +9,8 @@ from collections.abc import Mapping
 
 from ..mechanics.inputs import MOBILITY, impulse_names, input_names
 from ..mechanism.description import Mechanism
-from .variables import BASE_OUTPUTS, INDICATORS, LATCHED, STORED, NativeInterface
+from .native import NativeInterface
+from .variables import BASE_OUTPUTS, INDICATORS, LATCHED, STORED
 
 Dependencies = Mapping[str, tuple[str, ...]]
 

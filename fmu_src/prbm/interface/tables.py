@@ -27,6 +27,7 @@ from ..mechanism.parts import (
     Point,
     body_of,
 )
+from .native import coordinate_variables, counter_of, state_derivatives
 from .variables import (
     BASE_OUTPUTS,
     BODY_OUTPUTS,
@@ -39,9 +40,6 @@ from .variables import (
     PROBE_OUTPUTS,
     STOP_OUTPUTS,
     Variable,
-    coordinate_variables,
-    counter_of,
-    state_derivatives,
 )
 
 FILE = "mechanism.bin"
@@ -174,6 +172,18 @@ class _Writer:
         yield _u32(*(self.parameters[name] for name in FIXED_NAMES))
         for name in self.inputs:
             yield _text(name) + _f64(self._start(name, 0.0))
+        yield from self._members()
+        yield from self._contacts()
+        yield _u32(self.body[m.release.body]) + _f64(m.release.direction)
+        yield self._fields(m.release)
+        yield from map(self._point, m.ground.values())
+        yield from self.bounds
+        yield _u32(*self.independent)
+        yield from self._variables()
+
+    def _members(self) -> Iterator[bytes]:
+        """Yield bodies, types of flexures, flexures and joints."""
+        m = self.mechanism
         for body in m.bodies:
             yield _text(body.name) + self._fields(body) + self._point(body.centre)
         for kind in m.flexure_types:
@@ -183,6 +193,10 @@ class _Writer:
             yield _u32(*map(ENDS.index, flexure.ends))
         for joint in m.joints:
             yield _text(joint.name) + self._between(joint)
+
+    def _contacts(self) -> Iterator[bytes]:
+        """Yield stops, friction points, forces and probes."""
+        m = self.mechanism
         for stop in m.stops:
             yield _text(stop.name) + _u32(self.body[stop.body], self.body[stop.on])
             yield self._point(stop.point) + _f64(stop.direction) + self._fields(stop)
@@ -193,12 +207,6 @@ class _Writer:
         for probe in m.probes:
             point = self._point(m.point(probe.point, probe.name))
             yield _text(probe.name) + _u32(self.body[body_of(probe.point)]) + point
-        yield _u32(self.body[m.release.body]) + _f64(m.release.direction)
-        yield self._fields(m.release)
-        yield from map(self._point, m.ground.values())
-        yield from self.bounds
-        yield _u32(*self.independent)
-        yield from self._variables()
 
     def _counts(self) -> tuple[int, ...]:
         m = self.mechanism

@@ -1,15 +1,8 @@
-"""A picture of a mechanism as its file describes it, with names, and its modes.
+"""A picture of a mechanism as its file describes it, with the names of its parts, and its modes."""
 
-python -m prbm.plots.picture FoldedSuspension --modes 3 --out folded.png
-python -m prbm.plots.picture my_mechanism.toml
-"""
-
-import argparse
 import cmath
 import math
-import sys
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,31 +10,26 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 
-from ..base.atomic import check_file
-from ..base.errors import ParameterError, PrbmError
+from ..base.errors import ParameterError
 from ..base.unit_text import frequency_unit, length_unit
-from ..commands.arguments import picture_arguments
 from ..drawing.shapes import Shapes, corners, curve
 from ..drawing.style import BODY, CHAIN, FLEXURE, IMPACT, LINK, PROBE, STRAIGHT, WALL, own_style
-from ..files.mechanism_file import find
-from ..files.settings import settings
 from ..mechanics.arrays import Complex
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import Modes, modes
 from ..mechanics.statics import equilibrium
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
-from .figures import save
 from .scene import quiet
 
-SHOWN = 0.12  # of the size: the largest displacement in the picture of a mode
-ARROW = 0.14  # of the size: length of the arrows of forces
-MOST_MODES = 12  # in a picture
-COLUMNS = 3  # of modes in a row
-THIN = 0.12  # of the size: a body lower than this has its name above it
-NAME_AT = 0.36  # of the length of a flexure: flexures cross in the middle
-NAME, NAME_OFFSET = "#303030", 7.0  # points between a flexure and its name
-WIDTH, LEAST_HEIGHT, LARGEST_HEIGHT, FRAME = 7.2, 2.4, 6.4, 0.9  # inches, of the picture
+MODE_AMPLITUDE = 0.12  # Largest displacement in the picture of a mode, as a share of the size.
+ARROW_LENGTH = 0.14  # Length of the arrows of forces, as a share of the size.
+MODES_MAX = 12  # Largest number of modes in a picture.
+COLUMNS = 3  # Modes per row.
+THIN_BODY = 0.12  # A body lower than this share of the size has its name above it.
+NAME_AT = 0.36  # Place of a flexure's name, as a share of its length: flexures cross in the middle.
+NAME, NAME_OFFSET = "#303030", 7.0  # Colour; distance of a flexure from its name [points].
+WIDTH, HEIGHT_MIN, HEIGHT_MAX, FRAME = 7.2, 2.4, 6.4, 0.9  # Of the picture [inch].
 
 
 @own_style()
@@ -51,41 +39,42 @@ def picture(
     shown: int = 0,
     held: float | None = None,
 ) -> Figure:
-    """Draw the straight shape with the names of its parts, and modes about the equilibrium.
+    """Draw the straight shape with the names of its parts, and modes about an equilibrium.
 
     Parameters
     ----------
     mechanism : Mechanism
-        What is drawn.
+        The mechanism.
     values : mapping or None
         Parameters that differ from their defaults.
     shown : int
-        How many modes are drawn, about the static equilibrium under gravity, without stops; all
-        there are, if they are fewer.
+        Number of modes to draw, about the static equilibrium under gravity without stops; a
+        mechanism with fewer modes is drawn with all of them.
     held : float or None
-        Displacement at which the released body is held [m]; None: it rests by itself.
+        Displacement at which the released body is held [m]; None: the equilibrium without a
+        holding force.
 
     Returns
     -------
     Figure
-        It belongs to no window.
+        A figure without a window.
 
     Raises
     ------
     ParameterError
-        If so many modes are too many for a picture, or a value makes no sense.
+        If ``shown`` is negative or above :data:`MODES_MAX`, or a value is out of bounds.
     EquilibriumError
-        If there is no equilibrium about which modes could be drawn.
+        If there is no equilibrium.
     """
     shapes = Shapes(assemble(mechanism, mechanism.values(values)))
-    if not 0 <= shown <= MOST_MODES:
-        raise ParameterError(f"{shown} modes: choose a number from 0 to {MOST_MODES}")
+    if not 0 <= shown <= MODES_MAX:
+        raise ParameterError(f"{shown} modes: choose a number from 0 to {MODES_MAX}")
     z = np.concatenate([*_places(shapes, shapes.straight), *_walls(shapes)])
     vibrating = _vibrating(shapes, held) if shown else None
     if vibrating is not None:
         shown = min(shown, len(vibrating[0].frequency))
     aspect = float(np.ptp(z.imag[np.isfinite(z)]) / np.ptp(z.real[np.isfinite(z)]))
-    height = FRAME + min(max(aspect * WIDTH, LEAST_HEIGHT), LARGEST_HEIGHT)
+    height = FRAME + min(max(aspect * WIDTH, HEIGHT_MIN), HEIGHT_MAX)
     row = min(max(aspect, 0.5), 1.6) * WIDTH / COLUMNS
     rows = -(-shown // COLUMNS)
     figure = Figure((WIDTH, height + rows * row), dpi=120, layout="constrained")
@@ -100,7 +89,7 @@ def picture(
 
 
 def _vibrating(shapes: Shapes, held: float | None) -> tuple[Modes, Complex]:
-    """Return the modes, and the arms of the shape that they are about."""
+    """Return the modes, and the arms of the shape in equilibrium."""
     rest = equilibrium(shapes.system, held)
     return modes(shapes.system, rest), shapes.arms(rest.q)
 
@@ -118,7 +107,7 @@ def _draw_modes(
 
 
 def _frequency(frequency: float) -> str:
-    """Return a frequency in words; an unstable shape has none.
+    """Return a frequency with its unit, or ``unstable`` if it is not positive.
 
     Examples
     --------
@@ -132,18 +121,18 @@ def _frequency(frequency: float) -> str:
 
 
 def moved(shapes: Shapes, E: Complex, found: Modes, k: int) -> Complex:
-    """Return the arms of a shape moved along a mode, so far that the largest part can be seen.
+    """Return the arms of a shape displaced along a mode by :data:`MODE_AMPLITUDE` of the size.
 
     Parameters
     ----------
     shapes : Shapes
-        What is drawn.
+        Shapes of the mechanism.
     E : (n,) complex
-        Arms of the shape in which it vibrates.
+        Arms of the shape in equilibrium.
     found : Modes
-        Its modes.
+        Modes about it.
     k : int
-        Which mode.
+        Index of the mode.
     """
     w = shapes.system.turning(found.shape[:, k])
     along: Complex = E * (1 + 1j * w)
@@ -151,7 +140,7 @@ def moved(shapes: Shapes, E: Complex, found: Modes, k: int) -> Complex:
         float(np.abs(new - old).max())
         for new, old in zip(_places(shapes, along), _places(shapes, E), strict=True)
     )
-    amplitude = SHOWN * shapes.size / largest
+    amplitude = MODE_AMPLITUDE * shapes.size / largest
     heaviest = shapes.system.mechanism.release.body
     if (shapes.centre(heaviest, along) - shapes.centre(heaviest, E)).real < 0.0:
         amplitude = -amplitude
@@ -172,7 +161,7 @@ def _places(shapes: Shapes, E: Complex) -> list[Complex]:
 
 
 class _Drawing:
-    """Draws shapes on axes, in a handy unit."""
+    """Draws shapes on axes, in a unit suited to their size."""
 
     def __init__(self, axes: Axes, shapes: Shapes) -> None:
         self.axes, self.shapes = axes, shapes
@@ -211,7 +200,7 @@ class _Drawing:
     # -- shapes --
 
     def ghost(self, E: Complex) -> None:
-        """Draw where things stand, faintly."""
+        """Draw a shape in dashed, pale lines."""
         for ground in self.shapes.ground():
             self.line(ground, WALL, 0.9, 1.0)
         for line in self.shapes.flexures:
@@ -266,7 +255,7 @@ class _Drawing:
             self.text(complex(end), stop.name, va="bottom")
 
     def forces(self, E: Complex) -> None:
-        length = ARROW * self.shapes.size * self.factor
+        length = ARROW_LENGTH * self.shapes.size * self.factor
         forces = self.shapes.system.mechanism.forces
         for force, z in zip(forces, self.shapes.forces(E), strict=True):
             x, y = z.real * self.factor, z.imag * self.factor
@@ -278,7 +267,7 @@ class _Drawing:
             self.text(complex(x + length, y) / self.factor, f" {force.name}", IMPACT, ha="left")
 
     def along(self, start: complex, end: complex, words: str) -> None:
-        """Write along a line, left of it as one reads."""
+        """Write along a line, above it in the direction of reading."""
         place = (start + NAME_AT * (end - start)) * self.factor
         degrees = math.degrees(cmath.phase(end - start))
         turned = (degrees + 89.0) % 180.0 - 89.0
@@ -290,12 +279,12 @@ class _Drawing:
         )  # fmt: skip
 
     def names(self, E: Complex) -> None:
-        """Write the names of bodies, flexures, joints and probes, out of each other's way."""
+        """Write the names of bodies, flexures, joints and probes without overlaps."""
         shapes = self.shapes
         for name in shapes.bodies:
             z, x = shapes.body(name, E), shapes.centre(name, E).real
             low, high = float(z.imag.min()), float(z.imag.max())
-            if high - low < THIN * shapes.size:
+            if high - low < THIN_BODY * shapes.size:
                 self.text(complex(x, high), name, LINK, va="bottom")
             else:
                 self.text(complex(x, 0.75 * low + 0.25 * high), name, LINK)
@@ -306,45 +295,3 @@ class _Drawing:
             self.text(complex(corners(joint, E)[0]), f"  {joint.name}", ha="left", va="bottom")
         for probe, z in zip(shapes.system.mechanism.probes, shapes.probes(E), strict=True):
             self.text(z, f"  {probe.name}", PROBE, ha="left", va="top")
-
-
-# --- command ----------------------------------------------------------------------------------
-
-
-def run(options: argparse.Namespace) -> Path:
-    """Draw what a command line says; return the file, whose folder is made.
-
-    Raises
-    ------
-    PrbmError
-        If there is no such mechanism or parameter, or the file cannot be written.
-    OSError
-        If it turns out later that it cannot.
-    """
-    mechanism = find(options.mechanism)
-    path = options.out or Path(f"{mechanism.name}.png")
-    check_file(path)
-    drawn = picture(mechanism, settings(mechanism, options.set), options.modes)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return save(drawn, path)
-
-
-def main(arguments: list[str] | None = None) -> int:
-    """Draw a mechanism to a PNG file."""
-    parser = argparse.ArgumentParser(
-        prog="python -m prbm.plots.picture",
-        description="Draw a mechanism with the names of its parts, and its modes, to a PNG file.",
-    )
-    picture_arguments(parser)
-    options = parser.parse_args(arguments)
-    try:
-        print(run(options))
-    except PrbmError as error:
-        parser.exit(2, f"{parser.prog}: {error}\n")
-    except OSError as error:
-        parser.exit(2, f"{parser.prog}: {error.filename}: cannot be written ({error.strerror})\n")
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,4 +1,4 @@
-"""A mechanism simulated without an FMU, with the result that FMPy would give for one."""
+"""Simulation of a mechanism without an FMU, with the columns that FMPy returns for one."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -7,18 +7,20 @@ from ..base.errors import ParameterError
 from ..base.progress import Progress
 from ..hybrid.simulation import Simulation
 from ..mechanism.description import Mechanism
+from .experiment import experiment
 from .result import Result, structured
 
 Source = Callable[[float], Mapping[str, float]]
-MOST_ROWS = 10_000_000  # more communication points than this are a mistake in the units of step
-ROUND_OFF = 1e-9  # of a communication step: a last step shorter than this is none
+STEPS_MAX = 10_000_000  # More steps than this are a mistake in the unit of the step.
+LAST_STEP_RTOL = 1e-9  # A last step below this fraction of a communication step is round-off.
 
 
 def simulate(
     mechanism: Mechanism,
-    values: Mapping[str, float] | None = None,
-    stop_time: float = 1.0,
-    step: float = 1e-3,
+    changes: Mapping[str, float] | None = None,
+    *,
+    stop_time: float | None = None,
+    step: float | None = None,
     tolerance: float | None = None,
     source: Source | None = None,
     progress: Progress | None = None,
@@ -28,32 +30,46 @@ def simulate(
     Parameters
     ----------
     mechanism : Mechanism
-        What moves.
-    values : mapping
+        The mechanism.
+    changes : mapping or None
         Parameters and inputs that differ from their defaults.
-    stop_time, step : float
-        Duration and distance of the communication points [s]; the last step may be shorter.
+    stop_time, step : float or None
+        Duration and communication step [s] (default: those of the default experiment, for most
+        mechanisms 1 s and 1 ms).  The last step may be shorter.
     tolerance : float or None
-        Relative tolerance of the integration; None: ``solver.tolerance``.
+        Relative tolerance of the integration (default: ``solver.tolerance``).
     source : callable or None
-        Gives inputs and tunable parameters by name for the step that begins at a time [s].
+        Function of time that returns inputs and tunable parameters by name, for the step that
+        begins at that time [s].
     progress : callable or None
-        Told the fraction that is done, from 0 to 1.
+        Called with the fraction of the steps that are done, from 0 to 1.
 
     Returns
     -------
     Result
-        An input stands in the row at which it begins to act.
+        The columns have one row per communication point.  An input is in the row at which it
+        begins to act.
 
     Raises
     ------
     ParameterError
-        If a name is unknown, a value out of bounds or there is no step to take.
+        If a name is unknown, a value out of bounds or a time not positive.
     EquilibriumError, SimulationError
         As :class:`prbm.Simulation` does.
+
+    Examples
+    --------
+    >>> from prbm.files.mechanism_file import find
+    >>> result = simulate(find("PRBDM"), {"stop.restitution": 0.5}, stop_time=0.05)
+    >>> len(result["time"]), int(result["stop.impact_count"][-1])
+    (51, 1)
     """
+    if stop_time is None or step is None:
+        default = experiment(mechanism, changes)
+        stop_time = default.stop_time if stop_time is None else stop_time
+        step = default.step if step is None else step
     times = communication_points(stop_time, step)
-    simulation = Simulation(mechanism, values, tolerance=tolerance)
+    simulation = Simulation(mechanism, changes, tolerance=tolerance)
     simulation.record = []
     start = {**simulation.values, **simulation.given}
     rows = []
@@ -84,8 +100,8 @@ def communication_points(stop_time: float, step: float) -> list[float]:
     for name, value in (("stop_time", stop_time), ("step", step)):
         if not (math.isfinite(value) and value > 0.0):
             raise ParameterError(f"{name} = {value:g} s must be positive and finite")
-    steps = math.ceil(stop_time / step - ROUND_OFF)
-    if steps > MOST_ROWS:
+    steps = math.ceil(stop_time / step - LAST_STEP_RTOL)
+    if steps > STEPS_MAX:
         raise ParameterError(
             f"step = {step:g} s makes {steps} steps in {stop_time:g} s: choose a larger one"
         )

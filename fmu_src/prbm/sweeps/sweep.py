@@ -14,7 +14,6 @@ import io
 import logging
 import math
 import os
-import sys
 import time
 import uuid
 from collections import deque
@@ -30,7 +29,7 @@ import fmpy  # type: ignore[import-untyped]
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.progress import Progress
-from ..runs.run import MOST_ROWS
+from ..runs.run import STEPS_MAX
 from .runs import CRASHED, GOOD, Job, Outcome, Output, SpecificationError, parsed
 
 if TYPE_CHECKING:
@@ -308,7 +307,7 @@ def _times(
         if x is not None and not (math.isfinite(x) and x > 0.0):
             raise ParameterError(f"{name} = {x:g}{unit} must be positive and finite")
     steps = (stop - start) / size
-    if steps > MOST_ROWS:
+    if steps > STEPS_MAX:
         raise ParameterError(
             f"step = {size:g} s makes {steps:.0f} steps in {stop - start:g} s: choose a larger one"
         )
@@ -558,9 +557,3 @@ def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
     if (~good).sum() > 3:
         lines.append("and more in the columns status and message")
     return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    from ..commands.command_line import main
-
-    sys.exit(main(["sweep", *sys.argv[1:]]))

@@ -19,7 +19,6 @@ from ..analysis.impact_map import (
     closed_form,
     first_impact,
     fit_response,
-    heat_map,
     response,
     simulated,
     with_flexures,
@@ -37,6 +36,7 @@ from ..mechanics.assembly import assemble
 from ..mechanics.modal import modal_restitution, modes
 from ..mechanics.statics import equilibrium
 from ..mechanism.description import Mechanism
+from ..plots.impact_map import heat_map
 from ..references.finite_elements import FiniteElements
 from ..runs.result import Result as Motion
 from .common import (

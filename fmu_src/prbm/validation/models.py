@@ -251,7 +251,7 @@ CAST = {
 def figure_4_4(_: Progress) -> Result:
     """Return the impacts of the PMMA guide beside finite elements."""
     one, end = guide("PRBDM"), 0.28
-    ours = simulate(one, CAST, end, 1e-3)
+    ours = simulate(one, CAST, stop_time=end, step=1e-3)
     bare = {name: x for name, x in CAST.items() if name != K}
     theirs = FiniteElements(one, bare, elements=8).transient(end, 5e-5, spectral_radius=0.5)
     model = with_flexures(guide("PRBDM2R"), "2R", axial=True)
@@ -339,8 +339,8 @@ def figure_4_5(tell: Progress) -> Result:
         "friction.coefficient": 0.2,
         "friction.normal_force": mu_N / 0.2,
     }
-    run = simulate(one, values, 1.2, 1e-3)
-    more = simulate(one, values | {"friction.normal_stiffness": 200.0}, 1.2, 1e-3)
+    run = simulate(one, values, stop_time=1.2, step=1e-3)
+    more = simulate(one, values | {"friction.normal_stiffness": 200.0}, stop_time=1.2, step=1e-3)
     x = run["shuttle.x"]
     turns = np.abs(
         x[[i for i in range(1, len(x) - 1) if (x[i] - x[i - 1]) * (x[i + 1] - x[i]) < 0]]
@@ -594,7 +594,7 @@ def figure_6_3(tell: Progress) -> Result:
 def figure_6_4(tell: Progress) -> Result:
     """Return the centred impact with straight flexures."""
     two, end = guide("PRBDM2R"), 0.3
-    ours = simulate(two, {}, end, 1e-3)
+    ours = simulate(two, {}, stop_time=end, step=1e-3)
     tell(0.3)
     fe = FiniteElements(two, elements=8).transient(end, 1e-4, spectral_radius=0.5)
     hits = [route(two, [0.0], [0.0], WEIGHTLESS).hits[0][0] for route in (algebraic, by_elements)]

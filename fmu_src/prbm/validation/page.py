@@ -1,23 +1,20 @@
-"""The source's results, reproduced: a page with printed, own and finite-element values.
+"""The results of the source, reproduced: a page with printed, computed and reference values.
 
-    python -m prbm.validation.page --out docs
-
-computes every result of :data:`prbm.validation.reproduced.RESULTS` and writes ``validation.md`` and
-the figures ``figures/validation-*.png`` into a folder.  With ``--only`` a part of them is computed,
-and the rest of an existing page stays.  Synthetic records are seeded, so that a run repeats itself.
+``prbm validate --out docs`` computes all of :data:`prbm.validation.reproduced.RESULTS` and
+writes ``validation.md`` and the figures ``figures/validation-*.png`` into a folder.  With
+``--only`` some results are computed and the others stay as the existing page has them.  The random
+numbers of synthetic records are seeded: all runs give the same page.
 
 Source: S. Boersma, Modelling and Validation of the Impact Response in Compliant Mechanisms, MSc
 thesis, TU Delft, 2015.
 """
 
-import argparse
 import re
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from ..base.errors import PrbmError
-from ..base.progress import Progress, reporter
+from ..base.progress import Progress
 from ..plots.figures import save
 from .reproduced import RESULTS
 from .side_by_side import FIGURES, Reproduction, Result, file_name
@@ -26,7 +23,7 @@ PAGE = "validation.md"
 
 
 class ValidationError(PrbmError, ValueError):
-    """What is to be reproduced is not known, or its page cannot be written."""
+    """A result is unknown, or the page cannot be written."""
 
 
 # --- the page -----------------------------------------------------------------------------------
@@ -37,7 +34,7 @@ What S. Boersma's thesis (*Modelling and Validation of the Impact Response in Co
 TU Delft, 2015) prints, beside what this package computes and beside a reference that knows nothing
 of pseudo-rigid bodies: finite elements (**FE**, Exudyn's ANCF cables, from the same mechanism
 files), closed forms (**exact**), or what was **put in** to a synthetic record.
-`python -m prbm.validation.page --out docs` computes every number and figure of this page in a few
+`prbm validate --out docs` computes every number and figure of this page in a few
 minutes; the tests compute them again and compare.
 
 The thesis' measured records are not public: where it measures, a synthetic record with its sensors'
@@ -55,14 +52,14 @@ SECTION = r"<!-- result: {} -->\n(.*?)<!-- end -->"
 
 
 def page(results: Sequence[Result], known: str = "", keys: Sequence[str] = ()) -> str:
-    """Return the page of results; what was not computed is taken over from a known page.
+    """Return the page of results; results that were not computed are copied from a known page.
 
     Parameters
     ----------
     results : sequence of Result
-        What was computed.
+        Computed results.
     known : str
-        An earlier page, or nothing.
+        An earlier page, or an empty text.
     keys : sequence of str
         Order of all results; those of ``results`` if empty.
     """
@@ -82,14 +79,14 @@ def page(results: Sequence[Result], known: str = "", keys: Sequence[str] = ()) -
 
 
 def parts(text: str, key: str) -> tuple[str, str] | None:
-    """Return the summary's row and the section of a result on a page; None if it is not there."""
+    """Return the row in the summary and the section of a result; None if it is not on the page."""
     row = re.search(rf"^\| \[[^\]]*\]\(#{re.escape(key)}\) .*$", text, re.MULTILINE)
     section = re.search(SECTION.format(re.escape(key)), text, re.DOTALL)
     return (row[0], section[1]) if row and section else None
 
 
 def chosen(only: Sequence[str] = ()) -> tuple[Reproduction, ...]:
-    """Return the reproductions of some keys, all if there are none.
+    """Return the reproductions with these keys; without keys all of them.
 
     Raises
     ------
@@ -111,24 +108,24 @@ def reproduce(
     Parameters
     ----------
     folder : Path
-        Where ``validation.md`` and ``figures/`` are written; it is made if it is not there.
+        Folder of ``validation.md`` and ``figures/``, created if necessary.
     only : sequence of str
-        Keys of the results; none: all.  The others stay as an existing page has them.
+        Keys of the results; empty: all.  The others stay as the existing page has them.
     progress : callable or None
-        Told the fraction that is done, from 0 to 1.
+        Called with the completed fraction, from 0 to 1.
 
     Returns
     -------
     sequence of Result
-        What was computed, in the order of the page.
+        The computed results in the order of the page.
 
     Raises
     ------
     ValidationError
         If a key is unknown, or the page cannot be written.
     FiniteElementError
-        If a result needs the finite elements and Exudyn is not installed: ``only`` names those
-        that do not.
+        If a result needs finite elements and Exudyn is not installed; ``only`` selects results
+        without them.
     """
     wanted = chosen(only)
     results = [one for one in _computed(wanted, progress or (lambda _: None))]
@@ -159,38 +156,3 @@ def _computed(wanted: Sequence[Reproduction], tell: Progress) -> list[Result]:
         done += one.seconds
         tell(done / total)
     return results
-
-
-# --- command ------------------------------------------------------------------------------------
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
-    parser = argparse.ArgumentParser(
-        prog="python -m prbm.validation.page",
-        description="Compute the results of the source again and write them beside the printed "
-        "values to a page with figures.",
-    )
-    parser.add_argument("--out", type=Path, default=Path("docs"), help="folder (docs)")
-    parser.add_argument(
-        "--only", action="append", default=[], metavar="KEY", help="a result; may be repeated"
-    )
-    parser.add_argument("--list", action="store_true", help="list the results and end")
-    options = parser.parse_args(arguments)
-    try:
-        if options.list:
-            for one in chosen():
-                print(f"{one.key}{'  (finite elements)' if one.elements else ''}")
-            return 0
-        results = reproduce(options.out, options.only, reporter())
-    except PrbmError as error:
-        print(error, file=sys.stderr)
-        return 1
-    for result in results:
-        print(f"{result.where}: {result.verdict}")
-    print(options.out / PAGE)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,10 +1,10 @@
-"""Duration and step of a simulation, as given on a command line or as suits the mechanism."""
+"""Duration and communication step of a simulation, from a command line or by default."""
 
 from collections.abc import Mapping
 
 from ..files.settings import quantity
 from ..mechanism.description import Mechanism
-from .experiment import Experiment, experiment
+from ..runs.experiment import Experiment, experiment
 
 
 def span(
@@ -13,12 +13,26 @@ def span(
     stop_time: str | None,
     step: str | None = None,
 ) -> tuple[float, float]:
-    """Return duration and step of a simulation [s], as given or as suits the mechanism.
+    """Return duration and communication step of a simulation [s].
+
+    Both are those of the default experiment by default.  With a duration alone, the step is at
+    most a thousandth of it.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism to simulate.
+    values : mapping
+        Its parameters and inputs that differ from their defaults.
+    stop_time, step : str or None
+        Options of the command, with or without a unit.
 
     Raises
     ------
-    UserMistake, ParameterError, EquilibriumError
-        As :func:`quantity` and :func:`prbm.runs.experiment.experiment` do.
+    UserMistake
+        If an option is no time.
+    ParameterError, EquilibriumError
+        If the mechanism cannot start with these values.
 
     Examples
     --------

@@ -1,0 +1,132 @@
+"""Compare the FMUs of two versions: interface, default runs, number of impacts.
+
+    python build_fmu.py --out new            # in the clone of this version
+    python build_fmu.py --out old            # in the clone of the other version
+    python benchmarks/versions.py old new
+
+For every FMU that both folders hold it prints
+
+* the variables whose name, value reference, type, causality or start value differ;
+* the largest difference of the continuous outputs of the default run, per unit, up to the time at
+  which the two runs diverge (a difference of lengths above ``--divergence``), and that time;
+* the number of impacts of every stop in both runs.
+
+The exit status is 1 if an interface differs, a run differs by more than 1e-9 m before it diverges,
+or a number of impacts differs.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+
+LENGTH_TOLERANCE = 1e-9  # m; the largest difference of lengths before the runs diverge
+KINDS = ("ModelExchange", "CoSimulation")
+
+
+def interface(path: Path) -> dict[str, tuple[Any, ...]]:
+    """Return the properties of each variable of an FMU by its name."""
+    description = fmpy.read_model_description(str(path))
+    return {
+        v.name: (v.valueReference, v.type, v.causality, v.variability, v.start)
+        for v in description.modelVariables
+    }
+
+
+def run(path: Path, kind: str) -> Any:
+    """Return the default run of an FMU, all outputs by name."""
+    description = fmpy.read_model_description(str(path))
+    outputs = [v for v in description.modelVariables if v.causality == "output"]
+    clocks = any(v.type == "Clock" for v in outputs)
+    return fmpy.simulate_fmu(
+        str(path),
+        fmi_type=kind,
+        output=[v.name for v in outputs if v.type != "Clock"],
+        use_event_mode=clocks,
+        early_return_allowed=clocks,
+    )
+
+
+def units(path: Path) -> dict[str, str]:
+    """Return the units of the continuous outputs by name."""
+    description = fmpy.read_model_description(str(path))
+    return {
+        v.name: v.unit or (v.declaredType.unit if v.declaredType else None) or "-"
+        for v in description.modelVariables
+        if v.causality == "output" and v.variability == "continuous"
+    }
+
+
+def compared(old: Path, new: Path, kind: str, divergence: float) -> Iterator[tuple[str, bool]]:
+    """Yield what the default runs of two FMUs have in common, and whether it is as it should be."""
+    before, after = run(old, kind), run(new, kind)
+    rows = min(len(before), len(after))
+    unit = units(new)
+    lengths = [name for name in unit if unit[name] == "m" and name in before.dtype.names]
+    gap = np.max([np.abs(before[n][:rows] - after[n][:rows]) for n in lengths], axis=0)
+    apart = np.flatnonzero(gap > divergence)
+    end = int(apart[0]) if len(apart) else rows
+    worst: dict[str, float] = {}
+    for name, symbol in unit.items():
+        if name in before.dtype.names and end:
+            off = float(np.abs(before[name][:end] - after[name][:end]).max())
+            worst[symbol] = max(worst.get(symbol, 0.0), off)
+    until = f"until {before['time'][end - 1]:g} s" if end < rows else "to the end"
+    text = ", ".join(f"{off:.1e} {symbol}" for symbol, off in sorted(worst.items()) if off)
+    good = worst.get("m", 0.0) <= LENGTH_TOLERANCE
+    yield f"{kind}: {text or 'the same bits'} {until}", good
+    for name in before.dtype.names:
+        if name.endswith("impact_count"):
+            counts = int(before[name][-1]), int(after[name][-1])
+            yield f"{kind}: {name} {counts[0]} and {counts[1]}", counts[0] == counts[1]
+
+
+def report(old: Path, new: Path, divergence: float) -> bool:
+    """Print the comparison of two FMUs; return whether they agree."""
+    good = True
+    one, other = interface(old), interface(new)
+    for name in sorted(one.keys() | other.keys()):
+        if one.get(name) != other.get(name):
+            good = False
+            print(f"  {name}: {one.get(name)} and {other.get(name)}")
+    description = fmpy.read_model_description(str(new))
+    kinds = (description.modelExchange, description.coSimulation)
+    for kind, there in zip(KINDS, kinds, strict=True):
+        if there is not None:
+            for line, fine in compared(old, new, kind, divergence):
+                good &= fine
+                print(f"  {line}{'' if fine else '   <-- differs'}")
+    return good
+
+
+def main() -> int:
+    """Compare all FMUs that two folders have in common; return the exit status."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("old", type=Path, help="folder of FMUs of one version")
+    parser.add_argument("new", type=Path, help="folder of FMUs of the other version")
+    parser.add_argument(
+        "--divergence", type=float, default=1e-7, metavar="LENGTH",
+        help="difference at which chaotic runs count as diverged (default: 1e-7 m)",
+    )  # fmt: skip
+    options = parser.parse_args()
+    common = sorted(
+        path.relative_to(options.old)
+        for path in options.old.rglob("*.fmu")
+        if (options.new / path.relative_to(options.old)).exists()
+    )
+    if not common:
+        parser.error(f"{options.old} and {options.new} have no FMU in common")
+    good = True
+    for path in common:
+        print(path)
+        good &= report(options.old / path, options.new / path, options.divergence)
+    print("the versions agree" if good else "the versions differ")
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

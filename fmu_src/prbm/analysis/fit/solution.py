@@ -1,0 +1,383 @@
+"""The solution of a fit: parameters, covariance, and directions that the data do not determine."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...base.progress import Progress
+from ...data.series import Series
+from ...data.uncertainty import Estimate, EvaluationError, serial_correlation, widening
+from ...data.vibration import impacts
+from ...mechanics.arrays import Real
+from ...mechanism.description import Mechanism
+from .problem import STEPS_MAX, Free, Problem, stated_problem
+from .targets import RECORD_UNITS, Response, Target, of_mechanism
+
+UNCERTAINTY_MAX = 0.5  # Relative standard uncertainty of a direction that the data determine.
+MODEL_RTOL = 1e-9  # Computation error of a model, relative to the data.
+SINGULAR_RTOL = 1e-6  # Singular values below this fraction of the largest are round-off.
+SHARE_MIN = 0.1  # Least share of a direction at which a parameter takes part in it.
+REDUCED_MAX = 3.0  # Residual over stated uncertainty; above it the model is wrong.
+STARTS = {1: 9, 2: 5}  # Starts along each of k parameters of a response with several valleys.
+STARTS_MAX = 400
+START_PROGRESS = 0.5  # Share of the starts in the reported progress.
+
+
+@dataclass(frozen=True)
+class Direction:
+    """A direction among the parameters that the data do not determine.
+
+    Parameters
+    ----------
+    shares : dict
+        Relative change of each parameter, a vector of length 1 [-].
+    uncertainty : float
+        Relative standard uncertainty along it [-]; infinite without any information.
+    """
+
+    shares: dict[str, float]
+    uncertainty: float
+
+    def __str__(self) -> str:
+        part = {name: x for name, x in self.shares.items() if abs(x) >= SHARE_MIN}
+        if len(part) == 1:
+            return f"{next(iter(part))} cannot be determined by these data"
+        lead = next(iter(part))
+        moves = [f"{name} by {x / part[lead]:+.3g} %" for name, x in part.items()]
+        known = "nothing" if math.isinf(self.uncertainty) else (
+            f"less than the uncertainty of the data allows to see (relative {self.uncertainty:.2g})"
+        )  # fmt: skip
+        return (
+            f"{' and '.join(part)} cannot be told apart by these data: changing "
+            f"{', '.join(moves)} changes {known}"
+        )
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The best parameters, their covariance, and the directions that remain unknown.
+
+    Parameters
+    ----------
+    problem : Problem
+        The problem.
+    p : (k,)
+        Parameters in the order of ``problem.names``.
+    covariance : (k, k)
+        Covariance of the parameters.  For a parameter that the data do not determine, or that ended
+        at a given bound, it is infinite on the diagonal and not a number elsewhere.
+    singular : (k,)
+        Singular values of the Jacobian scaled by the sizes of the parameters [-].
+    directions : (k, k)
+        Directions of the singular values, in rows.
+    valleys : tuple of Direction
+        Directions that the data do not determine.
+    model : (m,)
+        Values of the model for the data.
+    evaluations : int
+        Number of evaluations of the model.
+    converged : bool
+        Whether the minimiser converged.
+    """
+
+    problem: Problem
+    p: Real
+    covariance: Real
+    singular: Real
+    directions: Real
+    valleys: tuple[Direction, ...]
+    model: Real
+    evaluations: int
+    converged: bool
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """The parameters with their standard uncertainties."""
+        units = {x.name: x.unit for x in self.problem.mechanism.parameters} | RECORD_UNITS
+        u = np.sqrt(np.diag(self.covariance))
+        freedom = math.inf if self.problem.known else float(self.freedom)
+        return {
+            name: Estimate(float(x), float(ux), units[name], freedom)
+            for name, x, ux in zip(self.problem.names, self.p, u, strict=True)
+        }
+
+    def __getitem__(self, name: str) -> Estimate:
+        return self.estimates[name]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted and fixed parameters of the mechanism, for :class:`prbm.Simulation`."""
+        return of_mechanism(self.problem.values(self.p))
+
+    @property
+    def identifiable(self) -> bool:
+        """Whether the data determine all parameters."""
+        return bool(np.isfinite(np.diag(self.covariance)).all())
+
+    @property
+    def freedom(self) -> int:
+        """Number of data less number of parameters."""
+        return len(self.model) - len(self.p)
+
+    @property
+    def reduced(self) -> float:
+        """Root mean square of (model - data)/uncertainty with the degrees of freedom [-]."""
+        rest = (self.model - self.problem.data) / self.problem.uncertainty
+        return math.sqrt(float(rest @ rest) / self.freedom) if self.freedom > 0 else 0.0
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root mean square of model - data for each target, in its unit."""
+        rest, result = self.model - self.problem.data, {}
+        for i, target in enumerate(self.problem.targets, start=1):
+            part, rest = rest[: len(target.data)], rest[len(target.data) :]
+            name = target.label if target.label not in result else f"{target.label} ({i})"
+            result[name] = math.sqrt(float(np.mean(part**2)))
+        return result
+
+    @property
+    def at_bounds(self) -> tuple[str, ...]:
+        """Parameters that ended at a bound."""
+        return self._those(self.problem.at_bounds(self.p))
+
+    def _those(self, which: NDArray[np.bool_]) -> tuple[str, ...]:
+        return tuple(name for name, it in zip(self.problem.names, which, strict=True) if it)
+
+    @property
+    def correlation(self) -> Real:
+        """Correlation of the parameters, (k, k) [-]; not a number where not determined."""
+        u = np.sqrt(np.diag(self.covariance))
+        with np.errstate(invalid="ignore"):
+            result: Real = self.covariance / np.outer(u, u)
+        return result
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Warnings about the numbers: valleys, bounds, convergence, errors of the model."""
+        notes = [str(valley) for valley in self.valleys]
+        if not self.converged:
+            notes.append(
+                f"{STEPS_MAX} steps did not lead to a least misfit: the model cannot follow these "
+                "data, or starts too far away; give bounds near the values, or look at the figure"
+            )
+        ends = self._those(self.problem.at_ends(self.p))
+        for name in self.at_bounds:
+            limit = self.problem.values(self.p)[name]
+            if name in ends:
+                notes.append(f"{name} ended at {limit:g}, the end of its range")
+            else:
+                notes.append(f"{name} ended at its bound {limit:.6g}: widen the bounds")
+        if self.problem.known and self.reduced > REDUCED_MAX:
+            notes.append(
+                f"the residuals are {self.reduced:.3g} times the stated uncertainty: the model "
+                "errs more than the data; uncertainties were widened by that factor and hold "
+                "within this model only"
+            )
+        return tuple(notes)
+
+    def __str__(self) -> str:
+        rows = [f"{name} = {estimate}" for name, estimate in self.estimates.items()]
+        units = [target.unit for target in self.problem.targets]
+        rows += [
+            f"  rms of {label}: {rms:.4g} {unit_}"
+            for (label, rms), unit_ in zip(self.rms.items(), units, strict=True)
+        ]
+        if len(self.p) > 1:
+            known = ", ".join(f"{s:.3g}" for s in self.singular)
+            rows.append(f"  singular values {known} (1/relative uncertainty)")
+        return "\n".join([*rows, *(f"  note: {note}" for note in self.notes)])
+
+
+def fit(
+    mechanism: Mechanism,
+    free: Sequence[Free | str],
+    targets: Sequence[Target] | Target,
+    values: Mapping[str, float] | None = None,
+    *,
+    starts: int | None = None,
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit named parameters of a mechanism to data.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism.
+    free : sequence of Free or str
+        Parameters to fit.
+    targets : Target or sequence of Target
+        :class:`Frequency`, :class:`Response`, :class:`ForceDeflection`; any mixture.
+    values : mapping
+        Other parameters that differ from those of the mechanism.
+    starts : int or None
+        Number of starts along each parameter; None: several if there is a response, whose misfit
+        has several valleys, else one.
+    progress : callable or None
+        Called with the completed fraction, from 0 to 1: of the starts, then of the minimisation.
+
+    Raises
+    ------
+    EvaluationError
+        If there is nothing to fit, bounds are invalid, uncertainties are known for some targets
+        only, or there is no motion or shape within the bounds.
+    ParameterError
+        If a name is unknown.
+
+    Examples
+    --------
+    >>> from prbm.analysis.fit import Frequency
+    >>> from prbm.files.mechanism_file import load, shipped
+    >>> guide = load(shipped()["PRBDM"])
+    >>> found = fit(guide, ["flexure.K_theta"], Frequency(Estimate(4.82, 0.06)))
+    >>> print(found["flexure.K_theta"])
+    2.475 ± 0.076
+    """
+    several = (targets,) if not isinstance(targets, Sequence) else tuple(targets)
+    problem = stated_problem(mechanism, free, several, values or {})
+    report = progress or _unreported
+    best = _best_start(problem, several, starts, lambda done: report(START_PROGRESS * done))
+    rest = 1.0 - START_PROGRESS
+    p, evaluations, converged = problem.minimised(
+        best, np.arange(len(best)), lambda done: report(START_PROGRESS + rest * done)
+    )
+    found = _assessed(problem, p, evaluations, converged)
+    report(1.0)
+    return found
+
+
+def _unreported(done: float) -> None:
+    pass
+
+
+def _assessed(problem: Problem, p: Real, evaluations: int, converged: bool) -> Fit:
+    """Return a fit with the covariance and the unknown directions of its parameters."""
+    model = problem.model(p)
+    rest = (model - problem.data) / problem.uncertainty
+    size = problem.size(p)
+    J = problem.jacobian(p, size, np.arange(len(p)))
+    m, k = J.shape
+    _, s, V = np.linalg.svd(J, full_matrices=True)
+    s = np.concatenate([s, np.zeros(k - len(s))])
+    noise = math.sqrt(float(rest @ rest) / (m - k)) if m > k else 1.0
+    if problem.known:
+        noise = max(1.0, noise) if m > k else 1.0
+    elif m <= k:
+        raise EvaluationError(
+            f"{m} data cannot give {k} parameters and their own scatter: give their uncertainty"
+        )
+    noise *= widening(serial_correlation(rest), m) if m > k else 1.0
+    least = MODEL_RTOL * float(np.abs(problem.data / problem.uncertainty).max())
+    s = s / max(noise, least, 1e-300)
+    s[s <= SINGULAR_RTOL * s.max(initial=0.0)] = 0.0
+    valleys = []
+    for row, known in zip(V, s, strict=True):
+        if known * UNCERTAINTY_MAX < 1.0:
+            row = row * np.sign(row[np.argmax(np.abs(row))])
+            shares = dict(zip(problem.names, map(float, row), strict=True))
+            valleys.append(Direction(shares, 1.0 / known if known > 0.0 else math.inf))
+    held = problem.at_bounds(p) & ~problem.at_ends(p)
+    covariance = _covariance(s, V, size, held)
+    return Fit(problem, p, covariance, s, V, tuple(valleys), model, evaluations, converged)
+
+
+def _covariance(s: Real, V: Real, size: Real, held: NDArray[np.bool_]) -> Real:
+    """Return diag(size) V^T diag(1/s^2) V diag(size).
+
+    It is infinite for parameters in unknown directions and for parameters at given bounds.
+    """
+    kept = s * UNCERTAINTY_MAX >= 1.0
+    W = V[kept] / s[kept, None]
+    result: Real = (W.T @ W) * np.outer(size, size)
+    lost = held | np.any(np.abs(V[~kept]) >= SHARE_MIN, axis=0)
+    result[lost] = result[:, lost] = math.nan
+    result[lost, lost] = math.inf
+    return result
+
+
+def _best_start(
+    problem: Problem, targets: tuple[Target, ...], starts: int | None, progress: Progress
+) -> Real:
+    """Return the best start: the given one, or a point of a grid within the bounds."""
+    k = len(problem.names)
+    if starts is None:
+        responds = any(isinstance(target, Response) for target in targets)
+        starts = STARTS.get(k, 1) if responds else 1
+    if starts**k > STARTS_MAX:
+        raise EvaluationError(
+            f"starts = {starts} along {k} parameters are {starts**k}: choose fewer, at most "
+            f"{STARTS_MAX} in all"
+        )
+    if starts <= 1:
+        return problem.start
+    axes = [
+        low + (high - low) * (np.arange(starts) + 0.5) / starts
+        for low, high in zip(problem.lower, problem.upper, strict=True)
+    ]
+    grid = [problem.start, *(np.array(point) for point in product(*axes))]
+    costs, failure = [], None
+    for i, point in enumerate(grid):
+        try:
+            costs.append(float(np.sum(problem.residuals(point) ** 2)))
+        except EvaluationError as error:  # There may be no motion in a corner of the bounds.
+            costs.append(math.inf)
+            failure = error
+        progress((i + 1) / len(grid))
+    best = int(np.argmin(costs))
+    if failure is not None and math.isinf(costs[best]):
+        raise failure
+    return grid[best]
+
+
+def fitted_restitution(
+    mechanism: Mechanism,
+    series: Series,
+    values: Mapping[str, float] | None = None,
+    *,
+    output: str = "shuttle.x",
+    stop: str = "stop",
+    uncertainty: float | None = None,
+    free: Sequence[Free | str] = (),
+    progress: Progress | None = None,
+) -> Fit:
+    """Fit the restitution of a stop to a bouncing response.
+
+    The 1R guide has no other mode: its restitution is the restitution in the fundamental mode as
+    the source defines it, for all measured mechanisms.  It is one number for all impacts of the
+    record.  If an impact leaves much energy in other modes, the following impacts depend on it, and
+    the number differs from that of the first one (:func:`prbm.mechanics.modal.modal_restitution`).
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The 1R guide, or another mechanism with a stop.
+    series : Series
+        The record, since the release at t = 0.
+    values : mapping
+        Parameters that differ from those of the mechanism: release, position of the stop,
+        stiffness.
+    output : str
+        Name of the recorded output; as for :class:`Response`.
+    stop : str
+        Name of the stop.
+    uncertainty : float or None
+        Standard uncertainty of a sample; None: estimated from the residuals.
+    free : sequence of Free or str
+        Further parameters, for instance ``Free("stop.position", -1e-3, 1e-3)``,
+        ``Free("record.shift", -5e-3, 5e-3)``.
+    progress : callable or None
+        As for :func:`fit`.
+
+    Raises
+    ------
+    EvaluationError
+        If there is no impact in the record, or as :func:`fit` does.
+    """
+    impacts(series)
+    name = f"{stop}.restitution"
+    wanted = [Free(name, 0.0, 1.0), *free]
+    target = Response(series, output, uncertainty)
+    return fit(mechanism, wanted, target, values, progress=progress)

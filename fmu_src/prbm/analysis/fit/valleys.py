@@ -1,0 +1,106 @@
+"""Valleys of a fit: the best fit for each of several values of one parameter."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.progress import Progress
+from ...data.uncertainty import EvaluationError
+from ...mechanics.arrays import Real
+from .solution import Fit
+
+
+@dataclass(frozen=True)
+class Valley:
+    """The best fit for each of several values of one parameter.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of the parameters.
+    along : str
+        Name of the given parameter.
+    points : (n, k)
+        Parameters.
+    misfit : (n,)
+        Sum of ((model - data)/u)^2 [-], with u = 1 for unknown uncertainties.
+    best : (k,)
+        Parameters of the fit.
+    """
+
+    names: tuple[str, ...]
+    along: str
+    points: Real
+    misfit: Real
+    best: Real
+
+    def __str__(self) -> str:
+        widths = [max(22, 2 + len(name)) for name in self.names]
+        head = "".join(f"{name:>{w}}" for name, w in zip(self.names, widths, strict=True))
+        head += f"{'misfit':>14}"
+        rows = [
+            "".join(f"{x:>{w}.6g}" for x, w in zip(point, widths, strict=True)) + f"{misfit:>14.4g}"
+            for point, misfit in zip(self.points, self.misfit, strict=True)
+        ]
+        return "\n".join([head, *rows])
+
+
+def valley(
+    found: Fit,
+    along: str | None = None,
+    span: tuple[float, float] | None = None,
+    points: int = 11,
+    progress: Progress | None = None,
+) -> Valley:
+    """Return the profile of a fit along one of its parameters, all others fitted again.
+
+    Parameters
+    ----------
+    found : Fit
+        A fit of two parameters or more.
+    along : str or None
+        Name of the parameter; None: the one with the largest share in the worst direction.
+    span : pair of float or None
+        Range of its values; None: half to twice the best value, within the bounds.
+    points : int
+        Number of values.
+    progress : callable or None
+        Called with the completed fraction of the values, from 0 to 1.
+
+    Raises
+    ------
+    EvaluationError
+        If there is only one parameter, or ``along`` was not fitted.
+    """
+    problem = found.problem
+    if len(problem.names) < 2:
+        raise EvaluationError("a valley needs two parameters or more")
+    if along is None:
+        along = problem.names[int(np.argmax(np.abs(found.directions[-1])))]
+    if along not in problem.names:
+        raise EvaluationError(f"{along} was not fitted; fitted were {', '.join(problem.names)}")
+    i = problem.names.index(along)
+    best = float(found.p[i])
+    low, high = span or (min(best / 2, best * 2), max(best / 2, best * 2))
+    low, high = max(low, float(problem.lower[i])), min(high, float(problem.upper[i]))
+    if not low < high or points < 2:
+        raise EvaluationError(f"span = {span}, points = {points}: give two values and two points")
+    values = np.unique(np.append(np.linspace(low, high, points), np.clip(best, low, high)))
+    centre = int(np.argmin(np.abs(values - best)))
+    others = np.delete(np.arange(len(found.p)), i)
+    rows: dict[int, Real] = {}
+    for order in (range(centre, len(values)), range(centre - 1, -1, -1)):
+        near = found.p
+        for j in order:
+            rows[j] = near = problem.minimised(_replaced(near, i, values[j]), others)[0]
+            if progress is not None:
+                progress(len(rows) / len(values))
+    ordered = np.array([rows[j] for j in sorted(rows)])
+    misfit = np.array([float(np.sum(problem.residuals(p) ** 2)) for p in ordered])
+    return Valley(problem.names, along, ordered, misfit, found.p)
+
+
+def _replaced(p: Real, i: int, value: float) -> Real:
+    changed = p.copy()
+    changed[i] = value
+    return changed

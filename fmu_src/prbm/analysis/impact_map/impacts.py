@@ -1,0 +1,66 @@
+"""The first impact after a release, and the energies of the modes before and after it."""
+
+from ...base.errors import EquilibriumError
+from ...hybrid.simulation import Impact, Simulation
+from ...mechanics.modal import modes_at
+from ...mechanics.system import System
+from ...mechanism.parts import value
+from .maps import Hit
+
+PERIODS_MAX = 1.5  # Periods of the fundamental mode within which a wall must be reached.
+STEPS_PER_PERIOD = 50
+
+
+def first_impact(simulation: Simulation, stop: int) -> Impact:
+    """Advance a simulation to its first impact at a stop, and return this impact.
+
+    Raises
+    ------
+    EquilibriumError
+        If the wall is not reached in :data:`PERIODS_MAX` periods of the fundamental mode.
+    """
+    name = simulation.mechanism.stops[stop].name
+    simulation.record = []
+    period = 1.0 / simulation.frequency
+    end = simulation.time + PERIODS_MAX * period
+    while simulation.time < end:
+        simulation.advance(min(end, simulation.time + period / STEPS_PER_PERIOD))
+        for impact in simulation.record:
+            if impact.stop == name:
+                return impact
+    raise EquilibriumError(
+        f"the wall {name} is not reached in {PERIODS_MAX:g} periods from "
+        f"release.displacement = {simulation.values.get('release.displacement', 0.0):g} m: release "
+        "further away"
+    )
+
+
+def mode_energies(system: System, impact: Impact) -> Hit:
+    """Return the energies of the modes before and after an impact, at its shape.
+
+    Parameters
+    ----------
+    system : System
+        The simulated mechanism.
+    impact : Impact
+        Impact from the record of a :class:`prbm.Simulation`.
+
+    Returns
+    -------
+    Hit
+        Energies in units of the arriving energy; position and offset of the wall from the
+        parameters.
+    """
+    found = modes_at(system, impact.q)
+    rates = [found.shape.T @ (found.M @ v) for v in (impact.before, impact.after)]
+    before, after = (rate**2 / 2 for rate in rates)
+    arriving = float(before.sum())
+    values = system.values
+    height, offset = (
+        value(next(s for s in system.mechanism.stops if s.name == impact.stop), name, values)
+        for name in ("position", "offset")
+    )
+    return Hit(
+        height, offset, impact.latched.modal_restitution, found.frequency,
+        before / arriving, after / arriving, impact.latched.energy_lost / arriving,
+    )  # fmt: skip

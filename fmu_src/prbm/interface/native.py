@@ -1,0 +1,182 @@
+"""The variables of native FMUs: those of every flavour, and those of model exchange."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from ..mechanics.assembly import assemble
+from ..mechanism.description import Mechanism
+from .variables import (
+    CLOCK,
+    INDICATORS,
+    STORED,
+    TIME,
+    Number,
+    Scales,
+    Variable,
+    check_names,
+    next_power_of_ten,
+    scales,
+)
+
+DERIVATIVES = {
+    "energy.dissipated": "Power lost to damping and friction, impacts apart",
+    "energy.work": "Power of the inputs and of the moving walls, impacts apart",
+}
+INDICATED = {
+    "impact": "Event indicator of an impact at {name}",
+    "release": "Event indicator of the release of what rests on {name}",
+    "slip": "Event indicator of the beginning and the end of sliding at {name}",
+}
+
+
+@dataclass(frozen=True)
+class NativeInterface:
+    """The variables of a native FMU, and which of them model exchange works with.
+
+    Parameters
+    ----------
+    variables : tuple of Variable
+        All variables, in the order of the interface.
+    states, derivatives, indicators : tuple of str
+        Names of the continuous states, their derivatives and the event indicators, in order.
+    clocks : tuple of str
+        Names of the output clocks.
+    independent : tuple of int
+        The coordinates whose angles and rates are states.
+    """
+
+    variables: tuple[Variable, ...]
+    states: tuple[str, ...]
+    derivatives: tuple[str, ...]
+    indicators: tuple[str, ...]
+    clocks: tuple[str, ...]
+    independent: tuple[int, ...]
+
+
+def native_interface(
+    mechanism: Mechanism,
+    plain: Sequence[Variable],
+    sample: Mapping[str, Number],
+    magnitudes: tuple[float, float, float],
+    independent: Sequence[int],
+    *,
+    time: bool = False,
+    clock: bool = False,
+) -> NativeInterface:
+    """Return the interface of a native FMU.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        What is exported.
+    plain : sequence of Variable
+        The variables that every flavour has.
+    sample : mapping
+        All outputs at the start.
+    magnitudes : tuple of float
+        Of those states that are angles, rates and energies; their nominal values are the next
+        powers of ten, as the C kernel gives them.
+    independent : sequence of int
+        The coordinates whose angles and rates are states.
+    time : bool
+        Whether time is a variable, as FMI 3.0 demands.
+    clock : bool
+        Whether each stop has an output clock that ticks at its impacts (FMI 3.0).
+
+    Raises
+    ------
+    MechanismError
+        If two variables share a name or a value reference.
+    """
+    nominal = scales(mechanism, sample)
+    names = coordinate_variables(mechanism)
+    angles, rates = (tuple(names[j][order] for j in independent) for order in (0, 1))
+    states = (*angles, *rates, *STORED)
+    nominals = {
+        name: next_power_of_ten(size)
+        for kind, size in zip((angles, rates, STORED), magnitudes, strict=True)
+        for name in kind
+    }
+    accelerations = state_derivatives(names, independent)
+    indicators = tuple(_indicators(mechanism))
+    clocks = tuple(f"{stop.name}.impact" for stop in mechanism.stops) if clock else ()
+    listed = (
+        *([TIME] if time else []),
+        *(
+            replace(v, reinit=True, nominal=nominals[v.name]) if v.name in nominals else v
+            for v in plain
+        ),
+        *(_derivative(name, nominal) for name in accelerations),
+        *indicators,
+        *map(_clock, clocks),
+    )
+    check_names(listed)
+    return NativeInterface(
+        listed,
+        states,
+        (*rates, *accelerations),
+        tuple(v.name for v in indicators),
+        clocks,
+        tuple(independent),
+    )
+
+
+def coordinate_variables(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
+    """Return the variables that each coordinate and its rate are: angles, or a link's strain."""
+    system = assemble(mechanism, mechanism.values())
+    names = {j: f"link[{number}]" for number, j in enumerate(system.links, start=1)}
+    names |= {frame.j: name for name, frame in system.bodies.items()}
+    pairs = {j: (f"{name}.angle", f"{name}.omega") for j, name in names.items()}
+    for j, link in zip(system.stretches, system.stretched, strict=True):
+        pairs[j] = (f"{names[link]}.strain", f"{names[link]}.strain_rate")
+    return tuple(pairs[j] for j in range(system.n))
+
+
+def state_derivatives(
+    coordinates: Sequence[tuple[str, str]], independent: Sequence[int]
+) -> tuple[str, ...]:
+    """Return the names of those derivatives of states that are no other variable."""
+    return (
+        *(f"der({coordinates[j][1]})" for j in independent),
+        *(f"der({name})" for name in STORED),
+    )
+
+
+def counter_of(clock: str) -> str:
+    """Return the name of the variable that counts what a clock ticks for.
+
+    Examples
+    --------
+    >>> counter_of("stop.impact")
+    'stop.impact_count'
+    """
+    return f"{clock}_count"
+
+
+def _derivative(name: str, nominal: Scales) -> Variable:
+    state = name.removeprefix("der(").removesuffix(")")
+    owner, _, rate = state.rpartition(".")
+    unit, description = {
+        "omega": ("rad/s2", f"Angular acceleration of {owner}"),
+        "strain_rate": ("1/s2", f"Rate of the strain rate of {owner}"),
+    }.get(rate, ("W", DERIVATIVES.get(state, "")))
+    return Variable(
+        name, description, "local", "continuous", "calculated", unit,
+        nominal=nominal(unit), derivative_of=state,
+    )  # fmt: skip
+
+
+def _indicators(mechanism: Mechanism) -> Iterator[Variable]:
+    kinds = [(stop.name, kind) for stop in mechanism.stops for kind in INDICATORS]
+    kinds += [(friction.name, "slip") for friction in mechanism.frictions]
+    for name, kind in kinds:
+        yield Variable(
+            f"{name}.{kind}_indicator",
+            INDICATED[kind].format(name=name),
+            "local", "continuous", "calculated", "1",
+        )  # fmt: skip
+
+
+def _clock(name: str) -> Variable:
+    stop = name.removesuffix(".impact")
+    return Variable(name, f"Ticks at each impact at {stop}", "output", "discrete", "", type=CLOCK)

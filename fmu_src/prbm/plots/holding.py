@@ -1,0 +1,115 @@
+"""Figure of a holding force over the displacement, with places of rest and snaps."""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..analysis.holding import Curve
+from ..base.unit_text import length_unit
+from ..drawing.style import IMPACT, PAST, REST, own_style
+from ..mechanics.arrays import Real
+from .scene import plain
+
+SIDEWAYS_RTOL = 1e-9  # Sideways motion below this fraction of the displacement is round-off.
+
+
+@own_style()
+def holding_figure(curve: Curve, title: str) -> Figure:
+    """Draw holding force, sideways motion and fundamental frequency over the displacement.
+
+    Stable places of rest are filled circles, unstable ones are open circles; diamonds mark the
+    displacements at which the mechanism snaps through under a force.
+    """
+    x = np.array([point.displacement for point in curve.points])
+    factor, name = length_unit(float(np.abs(x).max()) or 1.0)
+    drawn = Figure((8.0, 6.6), dpi=120, layout="constrained")
+    every: list[Axes] = list(
+        drawn.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [2, 1, 1]})
+    )
+    force, across, frequency = every
+    _draw_force(force, curve, factor)
+    force.set_title(title, fontsize=11, loc="left")
+    _draw_across(across, curve, factor)
+    _draw_frequency(frequency, curve, factor)
+    _shade_unstable(every, factor * x, _frequencies(curve))
+    frequency.set_xlabel(f"displacement [{name}]")
+    for axes in every:
+        plain(axes)
+    drawn.align_ylabels(every)
+    return drawn
+
+
+def _frequencies(curve: Curve) -> Real:
+    return np.array([point.frequency for point in curve.points])
+
+
+def _draw_force(axes: Axes, curve: Curve, factor: float) -> None:
+    """Draw the holding force, the places of rest and the snaps."""
+    scale, newton = _force_unit(max(abs(point.force) for point in curve.points))
+    axes.plot(
+        [factor * p.displacement for p in curve.points], [scale * p.force for p in curve.points],
+        color=PAST, linewidth=1.4,
+    )  # fmt: skip
+    axes.axhline(0.0, color="#808080", linewidth=0.8)
+    for stable, words in ((True, "stable rest"), (False, "unstable rest")):
+        places = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
+        if places:
+            axes.plot(
+                places, np.zeros(len(places)), "o", color=REST, markersize=7,
+                markerfacecolor=REST if stable else "white", label=words,
+            )  # fmt: skip
+    if curve.snaps:
+        snaps = np.array(curve.snaps) * (factor, scale)
+        axes.plot(*snaps.T, "D", color=IMPACT, markersize=5, label="snaps through")
+    if curve.rests:
+        axes.legend(fontsize=9, frameon=False)
+    axes.set_ylabel(f"holding force [{newton}]")
+
+
+def _draw_across(axes: Axes, curve: Curve, factor: float) -> None:
+    """Draw the motion across the direction of the release."""
+    x = np.array([point.displacement for point in curve.points])
+    y = np.array([point.across for point in curve.points])
+    y = np.where(np.abs(y) > SIDEWAYS_RTOL * np.abs(x).max(), y, 0.0)
+    scale, unit = length_unit(float(np.abs(y).max()) or 1e-4)
+    axes.plot(factor * x, scale * y, color=PAST, linewidth=1.2)
+    axes.set_ylabel(f"across [{unit}]")
+
+
+def _draw_frequency(axes: Axes, curve: Curve, factor: float) -> None:
+    """Draw the fundamental frequency where the free mechanism is stable."""
+    x = np.array([point.displacement for point in curve.points])
+    hertz = _frequencies(curve)
+    axes.plot(factor * x, np.where(hertz > 0.0, hertz, np.nan), color=PAST, linewidth=1.2)
+    if (hertz <= 0.0).any():
+        axes.annotate(
+            "shaded: unstable when released", (0.5, 0.06), xycoords="axes fraction", ha="center",
+            fontsize=9, color=IMPACT,
+        )  # fmt: skip
+    axes.set_ylim(0.0, 1.15 * max(float(hertz.max()), 0.0) or 1.0)
+    axes.set_ylabel("fundamental [Hz]")
+
+
+def _shade_unstable(every: list[Axes], x: Real, hertz: Real) -> None:
+    """Shade the displacements at which the released mechanism is unstable."""
+    if not (hertz <= 0.0).any():
+        return
+    for axes in every:
+        axes.fill_between(
+            x, 0.0, 1.0, where=hertz <= 0.0, color=IMPACT, alpha=0.08, linewidth=0,
+            transform=axes.get_xaxis_transform(),
+        )  # fmt: skip
+
+
+def _force_unit(largest: float) -> tuple[float, str]:
+    """Return the factor and the name of a unit of force suited to a magnitude.
+
+    Examples
+    --------
+    >>> _force_unit(3.0), _force_unit(0.2)
+    ((1.0, 'N'), (1000.0, 'mN'))
+    """
+    for factor, name in ((1.0, "N"), (1e3, "mN")):
+        if largest * factor >= 1.0:
+            return factor, name
+    return 1e6, "µN"

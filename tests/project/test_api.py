@@ -1,0 +1,75 @@
+"""The public names of the package."""
+
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import prbm
+
+ROOT = Path(__file__).parents[2]
+PUBLIC = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate"]
+HEAVY = ("numpy", "scipy", "matplotlib", "pydantic", "pint", "fmpy")
+
+
+def in_new_process(script: str) -> str:
+    paths = [str(ROOT / "fmu_src")]
+    done = subprocess.run(
+        [sys.executable, "-c", f"import sys; sys.path[:0] = {paths!r}\n{script}"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return done.stdout
+
+
+def test_importing_the_package_imports_nothing_else():
+    script = "import prbm; print(*(name for name in sys.modules if name.startswith('prbm')))"
+    assert in_new_process(script).split() == ["prbm"]
+    script = f"import prbm; prbm.__version__; print(*({{*sys.modules}} & {{*{HEAVY!r}}}))"
+    assert in_new_process(script).split() == []
+
+
+def test_simulation_from_python_imports_no_matplotlib_and_mechanisms_need_no_pydantic():
+    script = "import prbm; prbm.Simulation; prbm.Mechanism; prbm.Result; prbm.simulate"
+    script += "; print(*({*sys.modules} & {'matplotlib', 'pydantic', 'pint', 'fmpy'}))"
+    assert in_new_process(script).split() == []
+
+
+def test_a_star_import_gives_the_public_names():
+    script = "from prbm import *; print(*sorted({*dir()} & {*" + repr(PUBLIC) + "}))"
+    assert in_new_process(script).split() == sorted(PUBLIC)
+    assert sorted(prbm.__all__) == sorted(PUBLIC)
+    assert {*PUBLIC} <= {*dir(prbm)}
+
+
+def test_an_unknown_public_name_is_an_attribute_error():
+    with pytest.raises(AttributeError, match="has no attribute 'simulation'"):
+        prbm.simulation  # noqa: B018
+
+
+def test_the_version_is_the_one_of_the_project():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert prbm.__version__ == project["version"]
+
+
+def test_load_takes_a_shipped_name_or_a_path():
+    path = ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml"
+    guide = prbm.load("PRBDM")
+    assert isinstance(guide, prbm.Mechanism)
+    assert prbm.load(path) == prbm.load(str(path)) == guide
+
+
+def test_load_proposes_the_nearest_names():
+    with pytest.raises(ValueError, match="no model 'Bistabel'; did you mean Bistable"):
+        prbm.load("Bistabel")
+
+
+def test_simulate_takes_the_default_experiment_by_default():
+    """A second and a millisecond for the guides, less for a mechanism of high frequency."""
+    result = prbm.simulate(prbm.load("PRBDM"), {"stop.restitution": 0.0})
+    assert isinstance(result, prbm.Result)
+    assert result["time"][-1] == 1.0
+    assert len(result["time"]) == 1001
+    short = prbm.simulate(prbm.load("PRBDM"), stop_time=0.0025)
+    assert short["time"].tolist() == pytest.approx([0.0, 1e-3, 2e-3, 2.5e-3], abs=1e-15)
