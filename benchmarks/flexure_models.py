@@ -22,12 +22,11 @@ from numpy.typing import NDArray
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from prbm.files.mechanism_file import load, shipped
+from prbm import Mechanism, load
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modal_restitution, modes
 from prbm.mechanics.statics import equilibrium, free_displacement
 from prbm.mechanics.system import System
-from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Probe, Release
 from prbm.references.beams import Tip, end_force, end_moment, wavenumber
 
@@ -119,7 +118,7 @@ def frequency_error(system: System, tip: tuple[float, float], mode: int) -> floa
 @cache
 def guide(model: str, *, axial: bool = False) -> Mechanism:
     """Return the steel guide of the thesis with another model of its flexures."""
-    shipped_guide = load(shipped()["PRBDM2R"])
+    shipped_guide = load("PRBDM2R")
     section = kind("flexure", model, axial=axial)
     flexure = replace(shipped_guide.flexure_types[0], model=section.model, n=section.n, axial=axial)
     return replace(shipped_guide, flexure_types=(flexure,))

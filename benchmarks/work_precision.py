@@ -48,9 +48,8 @@ from scipy.optimize import brentq
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
+from prbm import Simulation, load
 from prbm.base.errors import SimulationError
-from prbm.files.mechanism_file import load, shipped
-from prbm.hybrid.simulation import Simulation
 from prbm.mechanics import constraints, contact
 from prbm.mechanics.kinetics import inertia
 
@@ -496,7 +495,7 @@ def problem(
     impact: bool = False,
 ) -> Problem:
     """Return the motion of a shipped mechanism from a time at which nothing has to happen."""
-    simulation = Simulation(load(shipped()[MODELS[model]]), changes, tolerance=1e-12)
+    simulation = Simulation(load(MODELS[model]), changes, tolerance=1e-12)
     simulation.advance(start)
     return Problem(simulation, start, simulation.state().copy(), times, impact)
 

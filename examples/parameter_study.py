@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from prbm.files.mechanism_file import load, shipped
+from prbm import load
 from prbm.fmu.python_fmu import build
 
 RESTITUTIONS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
@@ -47,7 +47,7 @@ def study(restitutions: Sequence[float] = RESTITUTIONS) -> np.ndarray:
     """
     with tempfile.TemporaryDirectory() as folder:
         fmu = Path(folder) / "PRBDM.fmu"
-        fmu.write_bytes(build(load(shipped()["PRBDM"])))
+        fmu.write_bytes(build(load("PRBDM")))
         unzipped = fmpy.extract(fmu, Path(folder) / "unzipped")
         start = {"damping.beta": 0.0, "stop.rest_speed": REST_SPEED}
         rows = []

@@ -13,14 +13,14 @@ from pathlib import Path
 import fmpy
 import numpy as np
 
+from prbm import load
 from prbm.base.errors import PrbmError
-from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.python_fmu import build
 from prbm.plots.animation import animate
 from prbm.plots.figures import response, save
 from prbm.runs.result import rest_time
 
-MECHANISM = load(shipped()["PRBDM2R"])
+MECHANISM = load("PRBDM2R")
 MEASURED = 4.82, 0.06  # Hz, of the steel structure, and its uncertainty
 FINITE_ELEMENTS = 4.907  # Hz, 32 ANCF elements a flexure
 

@@ -13,10 +13,9 @@ from dataclasses import replace
 import numpy as np
 from matplotlib.figure import Figure
 
-from prbm.files.mechanism_file import load, shipped
+from prbm import Mechanism, load
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import equilibrium
-from prbm.mechanism.description import Mechanism
 from prbm.plots.figures import save
 
 STROKES = np.linspace(0.0, 0.03, 16)  # m
@@ -79,7 +78,7 @@ def uneven(folded: Mechanism) -> Mechanism:
 
 def simulate(strokes: np.ndarray = STROKES) -> dict[str, np.ndarray]:
     """Return the lateral errors by the names of the mechanisms [m]."""
-    folded = load(shipped()["FoldedSuspension"])
+    folded = load("FoldedSuspension")
     return {
         "two leaves": lateral(single(folded), strokes),
         "folded, one leaf 5 % thicker": lateral(uneven(folded), strokes),
@@ -108,7 +107,7 @@ def plot(errors: dict[str, np.ndarray], beam: np.ndarray) -> Figure:
 
 def main(arguments: Sequence[str]) -> int:
     """Print the lateral errors at the full stroke beside that of beam theory, and plot them."""
-    length = load(shipped()["FoldedSuspension"]).values()["flexure.length"]
+    length = load("FoldedSuspension").values()["flexure.length"]
     beam = 0.6 * STROKES**2 / length
     errors = simulate()
     print(f"at a stroke of {1e3 * STROKES[-1]:g} mm:")

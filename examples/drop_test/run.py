@@ -21,14 +21,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.optimize import brentq
 
+from prbm import load
 from prbm.base.errors import PrbmError
 from prbm.base.progress import Progress, reporter
-from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.native_fmu import build
 from prbm.references.scalar_guide import Monolith, ScalarGuide
 from prbm.systems.cosimulation import simulate as cosimulate
 
-GUIDE = load(shipped()["PRBDM"])
+GUIDE = load("PRBDM")
 TRAVEL = 1e-3  # m, to the stop
 START = {
     "flexure.length": 0.01, "shuttle.width": 0.02, "shuttle.com_height": 0.003,

@@ -22,9 +22,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
+from prbm import load
 from prbm.base.errors import PrbmError
 from prbm.base.progress import Progress, reporter
-from prbm.files.mechanism_file import load
 from prbm.fmu.native_fmu import build
 from prbm.references.scalar_guide import Monolith, ScalarGuide
 from prbm.systems.cosimulation import System

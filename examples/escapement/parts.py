@@ -3,8 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
-from prbm.files.mechanism_file import load
-from prbm.mechanism.description import Mechanism
+from prbm import Mechanism, load
 
 FOLDER = Path(__file__).parent
 wheel, oscillator = (load(FOLDER / name) for name in ("Wheel.toml", "Oscillator.toml"))

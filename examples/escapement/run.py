@@ -28,11 +28,11 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from parts import both, oscillator, wheel
 
+from prbm import simulate as simulate_one
 from prbm.base.errors import PrbmError
 from prbm.base.progress import Progress, reporter
 from prbm.fmu.native_fmu import build
 from prbm.hybrid.simulation import Impact
-from prbm.runs.run import simulate as simulate_one
 from prbm.systems.cosimulation import simulate as cosimulate
 
 MOMENT, STOP_TIME, TOLERANCE = -1e-4, 0.3, 1e-9  # N m on the wheel, s
@@ -77,7 +77,7 @@ def coupled(step: float, stop_time: float = STOP_TIME) -> np.ndarray:
 def monolith(stop_time: float = STOP_TIME) -> tuple[Impact, ...]:
     """Return the impacts of wheel and oscillator as one mechanism."""
     given = {"drive.moment": MOMENT}
-    return simulate_one(both(), given, stop_time, tolerance=TOLERANCE).impacts
+    return simulate_one(both(), given, stop_time=stop_time, tolerance=TOLERANCE).impacts
 
 
 def impacts(result: np.ndarray) -> np.ndarray:

@@ -21,16 +21,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
+from prbm import load
 from prbm.base.errors import PrbmError
 from prbm.base.progress import reporter
-from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.native_fmu import build
 from prbm.systems import model_exchange
 from prbm.systems.cosimulation import GAUSS_SEIDEL, JACOBI
 from prbm.systems.cosimulation import simulate as cosimulate
 
 HERE = Path(__file__).resolve().parent
-GUIDE = load(shipped()["PRBDM"])
+GUIDE = load("PRBDM")
 START = {"gravity.x": 0.0, "release.displacement": -5e-3, "stop.restitution": 0.8}
 CONTROLLER = {"gain": 20.0, "damping": 0.5, "wanted": 1e-3, "lag": 5e-3}  # N/m, N s/m, m, s
 CONNECTIONS = {

@@ -21,7 +21,8 @@ from fmpy.fmi2 import FMU2Slave
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
-from prbm.files.mechanism_file import load, shipped
+from prbm import load
+from prbm.files.mechanism_file import shipped
 from prbm.fmu.python_fmu import build
 
 STROKE = 0.008  # m
@@ -80,7 +81,7 @@ def slaves(model: str, stroke: float) -> Iterator[tuple[Slave, Slave]]:
     """Build the guide and the controller, start both, and stop them in the end."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        (folder / "guide.fmu").write_bytes(build(load(shipped()[model])))
+        (folder / "guide.fmu").write_bytes(build(load(model)))
         source = Path(__file__).with_name("stroke_controller.py")
         controller_fmu = FmuBuilder.build_FMU(source, dest=folder)
         guide = Slave(folder / "guide.fmu", folder, "guide")

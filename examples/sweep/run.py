@@ -20,9 +20,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from scipy import stats
 
+from prbm import load
 from prbm.base.errors import PrbmError
 from prbm.base.progress import reporter
-from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.native_fmu import build
 from prbm.sweeps.sweep import samples, sweep
 
@@ -96,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     runs = parser.parse_args(arguments).runs
     try:
         fmu = Path("PRBDM2R.fmu")
-        fmu.write_bytes(build(load(shipped()["PRBDM2R"])))
+        fmu.write_bytes(build(load("PRBDM2R")))
         results = distribution(fmu, runs, Path("settling.parquet"))
         spread = propagated(fmu, Path("derivatives.parquet"))
         figure(results, spread).savefig("settling.png")

@@ -18,16 +18,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from pythonfmu import FmuBuilder
 
+from prbm import load
 from prbm.base.errors import PrbmError
 from prbm.base.progress import reporter
-from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.native_fmu import build
 from prbm.references.scalar_guide import Monolith, ScalarGuide
 from prbm.runs.result import rest_time
 from prbm.systems.cosimulation import simulate as cosimulate
 
 HERE = Path(__file__).resolve().parent
-GUIDE = load(shipped()["PRBDM"])
+GUIDE = load("PRBDM")
 START = {"gravity.x": 0.0, "release.displacement": 0.0, "stop.position": 0.002}
 COIL = {"resistance": 4.0, "inductance": 2e-3, "constant": 2.0}  # Ohm, H, N/A
 CONTROLLER = {"gain": 4.0, "rate": 8e3, "limit": 12.0, "wanted": 0.1}  # V/A, V/(A s), V, A

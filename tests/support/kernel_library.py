@@ -21,7 +21,7 @@ import numpy as np
 from prbm.interface.tables import tables
 from prbm.mechanism.description import Mechanism
 
-KERNEL = Path(__file__).parents[1] / "fmu_src" / "prbm" / "kernel"
+KERNEL = Path(__file__).parents[2] / "fmu_src" / "prbm" / "kernel"
 FLAGS = (
     "-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
     "-Wl,-Bsymbolic",  # names as common as these must not be found elsewhere in the process
