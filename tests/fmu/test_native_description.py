@@ -104,7 +104,7 @@ def test_the_reference_results_are_those_of_the_python_engine(native):
 
 
 def test_an_experiment_that_does_not_come_to_its_end_has_no_reference_results(monkeypatch):
-    def fails(*_: object) -> None:
+    def fails(*_: object, **__: object) -> None:
         raise SimulationError("too many impacts")
 
     monkeypatch.setattr(reference, "simulate", fails)
