@@ -16,7 +16,6 @@ from scipy.linalg import qr
 
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
-from . import constraints
 from .arrays import Real
 from .assembly import assemble
 from .statics import equilibrium
@@ -55,11 +54,11 @@ def independent(mechanism: Mechanism) -> tuple[int, ...]:
 
 def _jacobians(system: System, displacement: float) -> Iterator[Real]:
     """Yield the Jacobian of the loops at the straight shape and towards the release."""
-    loops = system.spread(system.loops)
-    yield constraints.jacobian(loops, system.directions(system.q0))
+    loops = system.loop_rows
+    yield loops.jacobian(system.directions(system.q0))
     for fraction in SHAPES:
         shape = equilibrium(system, fraction * displacement)
-        yield constraints.jacobian(loops, system.directions(shape.q))
+        yield loops.jacobian(system.directions(shape.q))
 
 
 def _pivots(jacobian: Real) -> tuple[int, ...]:
