@@ -135,6 +135,11 @@ class Simulation:
         return self.configuration.omega
 
     @property
+    def tolerance(self) -> float:
+        """Relative tolerance of the integration."""
+        return self.configuration.tolerance
+
+    @property
     def equations(self) -> Equations:
         """The equations of motion for the present contacts and inputs."""
         return self.front.equations
