@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from prbm.hybrid.impacts import impact
+from prbm.hybrid import impacts
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modal_restitution, modes
@@ -167,5 +167,5 @@ def test_a_simulated_pure_mode_has_the_algebraic_modal_restitution():
     sim = simulation("PRBDM2R", values)
     G = -(system.gaps[0] * np.exp(1j * shape.q)).imag
     sim.front.v[:] = -0.1 * phi / (G @ phi)
-    _, (hit,) = impact(sim.configuration, sim.front, 0)
+    _, (hit,) = impacts.impact(sim.configuration, sim.front, 0)
     assert hit.latched.modal_restitution == pytest.approx(expected, abs=1e-9)

@@ -1,7 +1,6 @@
 """A step of the integration as a function of time."""
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -41,14 +40,14 @@ class Arc:
         """Return the state at time t, not projected."""
         return interpolate(BOGACKI_SHAMPINE, self.y, self.k, self.h, (t - self.start) / self.h)
 
-    @cached_property
-    def times(self) -> Real:
-        """The ends of the intervals in which the guards are evaluated, (w + 1,) [s]."""
-        result: Real = self.start + self.h * FRACTIONS
-        return result
+    def samples(self) -> tuple[Real, Real]:
+        """Return the ends of the intervals in which the guards are evaluated.
 
-    @cached_property
-    def states(self) -> Real:
-        """The states at these times, (w + 1, 2 n + 2), not projected."""
-        result: Real = self.y + self.h * (GRID @ self.k)
-        return result
+        Returns
+        -------
+        times : (w + 1,)
+            [s].
+        states : (w + 1, 2 n + 2)
+            Not projected.
+        """
+        return self.start + self.h * FRACTIONS, self.y + self.h * (GRID @ self.k)

@@ -94,26 +94,16 @@ class Looks:
     forces: Real
 
     @cached_property
-    def e(self) -> Complex:
-        """Directions at the ends of the intervals, (w + 1, n)."""
-        return self.equations.system.directions(self.arc.states[:, : self.equations.n])
+    def samples(self) -> tuple[Real, Complex, Real]:
+        """Times (w + 1,), directions and rates (w + 1, n) at the ends of the intervals."""
+        n, (times, states) = self.equations.n, self.arc.samples()
+        return times, self.equations.system.directions(states[:, :n]), states[:, n : 2 * n]
 
     @cached_property
-    def v(self) -> Real:
-        """Rates at the ends of the intervals, (w + 1, n)."""
-        n = self.equations.n
-        result: Real = self.arc.states[:, n : 2 * n]
-        return result
-
-    @cached_property
-    def gaps(self) -> Real:
-        """Gaps at the ends of the intervals, (w + 1, s) [m]."""
-        return self.equations.gaps(self.arc.times, self.e)
-
-    @cached_property
-    def gap_rates(self) -> Real:
-        """Rates of the gaps at the ends of the intervals, (w + 1, s) [m/s]."""
-        return self.equations.gap_rates(self.e, self.v)
+    def gaps_and_rates(self) -> tuple[Real, Real]:
+        """Gaps and their rates at the ends of the intervals, (w + 1, s) [m], [m/s]."""
+        times, e, v = self.samples
+        return self.equations.gaps(times, e), self.equations.gap_rates(e, v)
 
     @cached_property
     def evaluations(self) -> list[tuple[float, Complex, Evaluation]]:
@@ -166,7 +156,8 @@ def closing_time(looks: Looks, guard: Guard, stop: int) -> float | None:
     impact that has just been resolved, whose gap is zero up to round-off of either sign, is not
     found again.  The rates show a dip below zero between two looks.
     """
-    gaps, rates = looks.gaps[:, stop], looks.gap_rates[:, stop]
+    all_gaps, all_rates = looks.gaps_and_rates
+    gaps, rates = all_gaps[:, stop], all_rates[:, stop]
     for j in range(GUARD_INTERVALS):
         if gaps[j + 1] > 0.0 and not rates[j] < 0.0 < rates[j + 1]:
             continue
@@ -178,10 +169,9 @@ def closing_time(looks: Looks, guard: Guard, stop: int) -> float | None:
 
 def _closing_time_between(looks: Looks, guard: Guard, stop: int, j: int) -> float | None:
     """Return when a gap closes within an interval of the looks that ends or dips below zero."""
-    times, near = looks.arc.times, looks.scales.touching
-    a, b = float(times[j]), float(times[j + 1])
-    z, (gap_a, gap_b) = looks.along(guard, stop), looks.gaps[j : j + 2, stop]
-    rate_a, rate_b = looks.gap_rates[j : j + 2, stop]
+    z, near = looks.along(guard, stop), looks.scales.touching
+    a, b = looks.samples[0][j : j + 2].tolist()
+    (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2, stop] for x in looks.gaps_and_rates)
     if abs(rate_a) <= looks.scales.zero_speed and abs(gap_a) <= _round_off(looks):
         # Released too early: it is pressed again a little later.
         return fall_time(lambda t: z(t) + near, a, b) if gap_b < -near else None
@@ -237,9 +227,9 @@ def reversal_time(looks: Looks, guard: Guard, contact: int) -> float | None:
     A contact that begins to slip is at rest, up to round-off of either sign: it slips the other
     way if it does so at the end of the step.
     """
-    equations, times = looks.equations, looks.arc.times
+    equations, (times, e, v) = looks.equations, looks.samples
     rows, i = equations.slip_rows(contact)
-    z = equations.contacts.modes[contact].slip * rows.rates(looks.e, looks.v)[:, i]
+    z = equations.contacts.modes[contact].slip * rows.rates(e, v)[:, i]
     begins = bool(z[0] <= looks.scales.zero_speed)
     for j in range(int(begins), GUARD_INTERVALS):
         if z[j] > 0.0 >= z[j + 1]:

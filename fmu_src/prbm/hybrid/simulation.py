@@ -295,10 +295,10 @@ class Simulation:
             y, self.k1 = equations.project_near(arc.end, step.y, step.factors), step.k[-1]
         else:
             # A step that an event cuts short says little about the next one: keep its size.
-            controller = replace(controller, h=step.h)
+            controller = StepSizeController(step.h, controller.last_error)
             arc = replace(arc, end=event.time)
             y, self.k1 = equations.project(event.time, arc.at(event.time)), None
-        self.front = replace(front, time=arc.end, y=y)
+        self.front = Front(arc.end, y, equations, front.latched)
         self.arc, self.pending, self.controller = arc, event, controller
 
     # -- state and outputs --

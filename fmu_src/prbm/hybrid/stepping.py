@@ -129,7 +129,8 @@ def take_step(
     if configuration.step:
         return fixed_step(configuration, front, k1), controller
     h = controller.h or first_step(configuration, y, k1)
-    controller = replace(controller, h=min(h, configuration.scales.step_max))
+    h = min(h, configuration.scales.step_max)
+    controller = StepSizeController(h, controller.last_error)
     while True:
         check_size(t, controller.h)
         try:

@@ -5,6 +5,7 @@ Contacts are numbered in one list, the stops first, then the friction points.
 
 from dataclasses import dataclass, replace
 from enum import IntEnum
+from functools import cached_property
 
 
 class ContactMode(IntEnum):
@@ -83,12 +84,12 @@ class ContactState:
         """Number of friction points f."""
         return len(self.modes) - self.stops
 
-    @property
+    @cached_property
     def held(self) -> tuple[int, ...]:
         """The closed stops in rising order."""
         return tuple(i for i in range(self.stops) if self.modes[i].closed)
 
-    @property
+    @cached_property
     def open_stops(self) -> tuple[int, ...]:
         """The open stops in rising order."""
         return tuple(i for i in range(self.stops) if not self.modes[i].closed)
