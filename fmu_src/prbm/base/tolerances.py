@@ -12,7 +12,7 @@ import math
 JOINT_DISTANCE_RTOL = 1e-9  # Of the size: largest distance of two points that a joint connects.
 MASSLESS_RTOL = 1e-13  # Smallest eigenvalue of the mass matrix, scaled to a unit diagonal.
 DEPENDENT_LOOP_RTOL = 1e-9  # Of the largest entry: smaller pivots of the loops are round-off.
-STUB_RTOL = 1e-12  # Of a cantilever: a stub that is longer than minus this is none.
+STUB_RTOL = 1e-12  # Of a cantilever: excess of the links over its length that is round-off.
 
 # --- constraints -------------------------------------------------------------------------------
 CONSTRAINT_RTOL = 1e-14  # Of the size: residual of a closed loop, a few roundings of a coordinate.
@@ -71,6 +71,7 @@ EVENT_CORRECTION_RTOL = 1e-2  # Of the step: a larger correction is that of a gr
 # --- step size ---------------------------------------------------------------------------------
 TOLERANCE_MIN = 1e-13  # Smallest relative tolerance of the integration.
 TOLERANCE_MAX = 1e-2  # Largest relative tolerance of the integration.
+TABLEAU_ATOL = 1e-14  # Error of a sum of Runge-Kutta coefficients that is round-off.
 STEP_SAFETY_FACTOR = 0.9  # Of the optimal step size.
 STEP_SHRINK_MIN = 0.2  # Smallest ratio of successive step sizes.
 STEP_GROWTH_MAX = 5.0  # Largest ratio of successive step sizes.

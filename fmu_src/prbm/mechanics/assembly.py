@@ -21,7 +21,7 @@ from ..mechanism.expressions import affine
 from ..mechanism.flexure import Segments, segments, stub
 from ..mechanism.parts import (
     GROUND,
-    TINY_LENGTH,
+    LENGTH_MIN,
     Flexure,
     FlexureType,
     Joint,
@@ -251,7 +251,7 @@ class _Assembler:
     def segments(self, flexure: Flexure) -> Segments:
         kind = next(k for k in self.mechanism.flexure_types if k.name == flexure.type)
         L = self.length(flexure)
-        if L < TINY_LENGTH:
+        if L < LENGTH_MIN:
             raise ParameterError(
                 f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
                 f"{L:g} m: move its ends apart"

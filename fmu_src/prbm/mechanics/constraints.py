@@ -89,7 +89,8 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
     Returns
     -------
     q : (n,)
-        On the constraints, to :data:`prbm.base.tolerances.CONSTRAINT_RTOL` times the length where rounding allows.
+        On the constraints, to :data:`prbm.base.tolerances.CONSTRAINT_RTOL` times the length
+        where round-off allows.
     e : (n,) complex
         Its directions.
 

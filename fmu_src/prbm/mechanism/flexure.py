@@ -33,6 +33,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..base.errors import ParameterError
+from ..base.tolerances import STUB_RTOL
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,7 @@ MODELS = {
 
 CLAMP, PIN, FREE = "clamp", "pin", "free"
 ENDS = (CLAMP, PIN, FREE)
-MOST_LINKS = 200  # of a chain
+LINKS_MAX = 200  # Of a chain.
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,7 @@ def stub(gamma: Sequence[float]) -> float:
     0.1
     """
     gamma0 = 1.0 - sum(gamma)
-    if gamma0 < -1e-12:
+    if gamma0 < -STUB_RTOL:
         raise ParameterError(
             f"the links of a flexure are longer than the flexure: the sum of its gammas is "
             f"{sum(gamma):.6g}, so that gamma0 = {gamma0:.6g} < 0; choose gammas that add up "
