@@ -33,7 +33,7 @@ from ..base.errors import MechanismError
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism
 from ..mechanism.expressions import Quantity, affine
-from ..mechanism.flexure import CLAMP, ENDS, MODELS, LINKS_MAX
+from ..mechanism.flexure import CLAMP, ENDS, LINKS_MAX, MODELS
 from ..mechanism.parameters import NAME
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .units import check_coherent, number, quantity, si_unit
@@ -500,8 +500,8 @@ def _check_drawn(mechanism: Mechanism) -> None:
         x, y = (affine(coordinate)(values) for coordinate in point)
         if not math.hypot(x, y) <= LENGTH_MAX:
             raise MechanismError(
-                f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within {LENGTH_MAX:g} m "
-                "of the origin"
+                f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within "
+                f"{LENGTH_MAX:g} m of the origin"
             )
     for flexure in mechanism.flexures:
         _check_slender(mechanism, flexure, values)

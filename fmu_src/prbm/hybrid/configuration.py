@@ -35,7 +35,7 @@ class Scales:
     length : float
         Size of the mechanism [m].
     rate : float
-        Fundamental angular frequency; where there is none, that of the stiffest spring [rad/s].
+        Fundamental angular frequency; without one, that of the stiffest spring [rad/s].
     energy : float
         Of one radian against the stiffest torsion spring; without springs, of one radian in a
         period [J].
@@ -88,7 +88,7 @@ class Scales:
     def of_state(self, y: Real) -> Real:
         """Return the magnitudes against which errors of a state are measured, (2 n + 2,).
 
-        One radian for angles, whatever they are; for rates and energies at least their scales.
+        One radian for angles of any size; for rates and energies at least their scales.
         """
         n = len(y) // 2 - 1
         scale = np.abs(y)

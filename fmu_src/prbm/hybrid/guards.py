@@ -74,7 +74,7 @@ def _friction_margin(
 
 @dataclass(frozen=True)
 class Looks:
-    """A step, and what the guards evaluate of it, once and on demand.
+    """The quantities that guards evaluate in a step, each computed once and on demand.
 
     Parameters
     ----------

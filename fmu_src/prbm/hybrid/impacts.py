@@ -1,4 +1,4 @@
-"""Rigid impacts: the stops that take part, their impulses, and what is booked of them."""
+"""Rigid impacts: the stops that take part, their impulses, and the booking of the results."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -107,7 +107,7 @@ class Simulation:
         self.record: list[Impact] | None = None
         self._output_cache: tuple[float, Outputs] | None = None
 
-    # -- what is simulated --
+    # -- mechanism and equations --
 
     @property
     def mechanism(self) -> Mechanism:

@@ -144,7 +144,7 @@ def take_step(
 
 
 def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
-    """Return a step of the fixed size, whatever its error.
+    """Return a step of the fixed size.
 
     Raises
     ------

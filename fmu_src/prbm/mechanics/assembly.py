@@ -64,14 +64,14 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
 
 
 def _some(names: Sequence[str]) -> str:
-    """Return names in words, the first of them if they are many."""
+    """Return a list of names as text, cut after the first few."""
     rest = len(names) - NAMES_MAX
     return ", ".join(names[:NAMES_MAX]) + (f" and {rest} more" if rest > 0 else "")
 
 
 @dataclass(frozen=True)
 class Hit:
-    """The gap of a stop, Re(f (B E + z)) + c, as seen from what its wall is fixed to."""
+    """The gap of a stop, Re(f (B E + z)) + c, as seen from the body that its wall is fixed to."""
 
     B: Complex
     c: float
@@ -187,11 +187,11 @@ class _Assembler:
         self.lines.append((joint.name, "joint", [place]))
 
     def reach(self, body: str, place: Place, drawn: complex, j: int | None) -> None:
-        """Note where a drawn point of a body is that turns with a coordinate."""
+        """Register the place of a drawn point of a body that turns with a coordinate."""
         self.origin[body], self.drawn[body], self.index[body] = place, drawn, j
 
     def close(self, name: str, place: Place, other: Place) -> None:
-        """Ask for two places to be one."""
+        """Close a loop: require that two places coincide."""
         self.loops.append((name, place.minus(other)))
 
     def flexure(self, flexure: Flexure) -> None:
@@ -277,7 +277,7 @@ class _Assembler:
     # -- arrays --
 
     def arrays(self) -> System:
-        """Return the arrays of all that was collected."""
+        """Return the arrays from the collected parts."""
         n, mechanism = len(self.q0), self.mechanism
         arm = np.array(self.arm)
         A = np.array([place.row(n) for place, _ in self.masses])
@@ -431,7 +431,7 @@ def calculated(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, f
 
 
 def check_masses(M: Real, J: Sequence[float]) -> None:
-    """Refuse a motion that moves no mass.
+    """Reject a motion that moves no mass.
 
     Parameters
     ----------
@@ -458,7 +458,7 @@ def check_masses(M: Real, J: Sequence[float]) -> None:
 
 
 def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
-    """Refuse loops that are not independent of each other at the straight shape.
+    """Reject loops that are not independent of each other at the straight shape.
 
     Parameters
     ----------

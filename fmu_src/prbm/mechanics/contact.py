@@ -293,7 +293,7 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
 def _sweep(W: Real, u: Real, friction: Real, least: Real) -> Real:
     """Gauss-Seidel over contacts: P_n >= least, u_n >= 0, complementary; Coulomb's law.
 
-    Strongly coupled contacts can make the sweeps run in circles; shorter steps lead out.
+    The sweeps may cycle between strongly coupled contacts; relaxation ends the cycle.
     """
     k = len(friction)
     for relaxation in SWEEP_RELAXATIONS:

@@ -13,7 +13,7 @@ class ContactMode(IntEnum):
 
     OPEN = 0
     FRICTIONLESS = 1
-    """Closed without friction: there is none, or other contacts carry all of the load."""
+    """Closed without a friction force: no friction, or other contacts carry all of the load."""
     STICK = 2
     SLIP_POSITIVE = 3
     SLIP_NEGATIVE = 4

@@ -418,8 +418,8 @@ class Equations:
     def base_reaction(self, q: Real, v: Real, a: Real) -> tuple[complex, float]:
         """Return the force [N] and the moment about the first clamp [N m] on the ground.
 
-        From the balance of momentum of everything that moves: what the ground, its stops and
-        its friction points put in is what gravity, the inputs and inertia leave.
+        From the balance of momentum of all moving parts: clamps, stops and friction points on the
+        ground balance gravity, inputs and inertia.
         """
         system = self.system
         e = system.directions(q)

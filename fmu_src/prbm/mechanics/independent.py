@@ -1,4 +1,4 @@
-r"""Independent coordinates: what an importer's solver integrates in model exchange.
+r"""Independent coordinates, which the importer's solver integrates in model exchange.
 
 The loops tie the n coordinates together, Phi(q) = Re(B e) + c = 0.  Of them r are solved from the
 other n - r, so that a solver that knows nothing of constraints stays on them:
@@ -21,7 +21,7 @@ from .assembly import assemble
 from .statics import equilibrium
 from .system import System
 
-SHAPES = (0.0, 0.5, 1.0)  # of the displacement at the release
+SHAPES = (0.0, 0.5, 1.0)  # Of the displacement at the release.
 
 
 def independent(mechanism: Mechanism) -> tuple[int, ...]:
@@ -62,13 +62,13 @@ def _jacobians(system: System, displacement: float) -> Iterator[Real]:
 
 
 def _pivots(jacobian: Real) -> tuple[int, ...]:
-    """Return as many columns as there are rows, chosen one after the other as the longest left."""
+    """Return as many columns as there are rows, chosen by QR with column pivoting."""
     _, _, order = qr(jacobian, mode="economic", pivoting=True)
     return tuple(int(j) for j in order[: len(jacobian)])
 
 
 def conditioning(jacobian: Real, dependent: tuple[int, ...]) -> float:
-    """Return how far the columns are from singular: least over largest singular value, 0 to 1.
+    """Return the ratio of the least singular value of some columns to the largest of all, 0 to 1.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-r"""Small vibrations about a static shape, and what an impact leaves in the fundamental mode."""
+r"""Small vibrations about a static shape, and the effect of an impact on the fundamental mode."""
 
 from dataclasses import dataclass
 
@@ -106,7 +106,7 @@ def modes_at(system: System, q: Real) -> Modes:
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:
     """Return the modal restitution of an impact, -phi^T M v+ / phi^T M v- [-].
 
-    Zero if nothing of the fundamental mode arrives but rounding.
+    Zero if the fundamental mode arrives with round-off alone.
 
     Examples
     --------
@@ -135,7 +135,7 @@ def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution
     shape : Equilibrium
         Shape at the impact, held by a force on the released body.
     stop : int
-        Which stop is hit.
+        Number of the stop that is hit.
     restitution : float
         Coefficient of restitution eps [-].
     """

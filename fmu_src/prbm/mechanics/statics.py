@@ -73,7 +73,7 @@ def tangent_stiffness(
     e : (n,) complex
         Directions.
     arm : (n,) int or None
-        Whose arm a coordinate turns or stretches; None: each its own.
+        The arm that a coordinate turns or stretches; None: each its own.
 
     Examples
     --------
@@ -116,12 +116,12 @@ def equilibrium(
     loads : mapping or None
         Forces and moments by the names of the inputs, ``force.x`` and ``force.y`` [N],
         ``force.moment`` [N m] for a :class:`prbm.mechanism.parts.Force` of the name
-        ``force``; they keep their directions.  What is not named is zero.
+        ``force``; they keep their directions.  Others are zero.
 
     Raises
     ------
     ParameterError
-        If a load is none of the mechanism's, or not a finite number.
+        If a load is unknown, or not a finite number.
     EquilibriumError
         If there is no such shape, or the loading does not lead there.
     """
@@ -134,8 +134,8 @@ def equilibrium(
         B = np.vstack([B, system.release])
         c = np.append(c, system.release_c)
     state = np.concatenate([system.q0, np.zeros(len(c))])
-    # what hangs on a pin alone may turn at once; a jump of anything else leads to another branch,
-    # where slow loading does not take it
+    # A body that hangs on a pin alone may turn at once.  A jump of any other coordinate leads to
+    # another branch, which slow loading does not reach.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
     done, fraction = 0.0, 1.0
     while done < 1.0:
@@ -251,7 +251,7 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
 
 
 def held_by_loops(system: System) -> bool:
-    """Tell whether the loops keep the released body, as drawn, from moving along the release."""
+    """Return whether the loops keep the released body, as drawn, from moving along the release."""
     e = system.directions(system.q0)
     along = jacobian(system.spread(system.release[None]), e)
     return _left_by_loops(system, e, along) <= RELEASE_ROW_RTOL * system.length
@@ -272,7 +272,7 @@ def immobile(system: System) -> str:
 
 
 def _on_pivot(system: System, name: str) -> bool:
-    """Tell whether a body, as drawn, can turn and its centre of mass can move nowhere."""
+    """Return whether a body, as drawn, can turn while its centre of mass is fixed."""
     e, frame = system.directions(system.q0), system.bodies[name]
     both = jacobian(system.spread(np.vstack([frame.A, -1j * frame.A])), e)
     turn = np.eye(system.n)[[frame.j]]
@@ -301,7 +301,7 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     Returns
     -------
     v : (n,)
-        What an impulse on the centre of mass along that direction gives [rad/s].
+        The rates after an impulse on the centre of mass along that direction [rad/s].
 
     Raises
     ------

@@ -250,7 +250,7 @@ class System:
     links : tuple of int
         The coordinates of the flexures' links, in the order of their names link[1], ...
     outlines : tuple of Outline
-        What to draw.
+        Lines to draw.
     anchor : complex
         The first clamp, about which moments on the base are taken [m].
     length : float
@@ -398,5 +398,5 @@ def unit(degrees: float) -> complex:
 
 
 def stacked(rows: list[Complex], n: int) -> Complex:
-    """Stack rows of n columns, also when there are none."""
+    """Return rows of n columns as an array (k, n); k may be 0."""
     return np.array(rows, complex).reshape(-1, n)

@@ -20,7 +20,7 @@ from ..base.errors import MechanismError, ParameterError
 from ..base.names import proposal, unknown
 from ..base.tolerances import TOLERANCE_MAX, TOLERANCE_MIN
 from .expressions import Quantity, affine
-from .flexure import CLAMP, ENDS, FREE, MODELS, LINKS_MAX, FlexureModel
+from .flexure import CLAMP, ENDS, FREE, LINKS_MAX, MODELS, FlexureModel
 from .parameters import Parameter
 from .parts import (
     FIELDS,
@@ -297,7 +297,7 @@ class Mechanism:
         Raises
         ------
         MechanismError
-            If there is none.
+            If it is not described.
         """
         owner, _, name = reference.rpartition(".")
         points = {GROUND: self.ground} | {b.name: b.points for b in self.bodies}

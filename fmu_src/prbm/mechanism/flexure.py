@@ -208,7 +208,7 @@ def segments(
 ) -> Segments:
     """Cut a flexure into rigid segments, springs and masses.
 
-    The rates are K_i = K_theta_i EI/h (with a further factor gamma_i where the model says so).
+    The rates are K_i = K_theta_i EI/h (times gamma_i if ``rate_with_gamma``).
     The masses at the pivots of the 1R are m/4 + (m L^2/12)/(gamma L)^2: the kinetic energy of
     a uniform rod about a fixed end, at the radius gamma L (eq. 3.3 of the thesis); with an end
     that is free or two that are pinned, the 1R is made of rods as the others are.
@@ -216,7 +216,7 @@ def segments(
     Parameters
     ----------
     model : FlexureModel
-        Which coefficients mean what.
+        The meaning of the coefficients.
     gamma, K_theta : sequences of float
         Their values, from the clamp to the tip [-].
     ends : pair of {"clamp", "pin", "free"}

@@ -89,8 +89,8 @@ class Stop:
 
     The wall is a line across ``direction`` [deg], the direction in which the body travels
     towards it; it is touched when the point has moved by ``position`` [m] from the straight
-    shape along that direction, as seen from what the wall is fixed to.  ``offset`` [m] shifts
-    the point along the wall, positive to the left of the direction.
+    shape along that direction, as seen from the body or ground that the wall is fixed to.
+    ``offset`` [m] shifts the point along the wall, positive to the left of the direction.
     """
 
     name: str
