@@ -1003,23 +1003,6 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         assert_same(energy, kinetics.kinetic_energy(M, y[n : 2 * n]))
 
 
-@each_mechanism
-def test_rates_have_the_same_bytes_by_avx_and_without(name):
-    """The two are compiled from one text; where the processor has no AVX, one is run twice."""
-    for theirs, mine, y, _ in equations(name):
-        has, found, closed = mine.structure.avx, [], y.copy()
-        t = theirs.inputs.walls[0].since + 1e-4  # of the wall that may hold
-        kernel().project(mine.structure, t, closed)
-        for avx in {has, False}:
-            mine.structure.avx = avx
-            k, y1 = np.full((8, len(y)), np.nan), np.full(len(y), np.nan)
-            kernel().rate(mine.structure, t, closed, k[0])
-            kernel().project_from_here(mine.structure, t, near := closed + 1e-9)
-            kernel().stages(mine.structure, len(y), t, closed, 1e-6, k, y1)
-            found.append(b"".join(part.tobytes() for part in (k, y1, near)))
-        assert found[0] == found[-1]
-
-
 HEAVY = ("density", "youngs_modulus", "shuttle.mass", "shuttle.inertia")
 
 

@@ -51,20 +51,12 @@
 #define UNROLLED
 #define UNROLLED_BY_LANES
 #endif
-/* What takes most of the time is compiled twice: for every x86-64, and for those with AVX, whose
- * instructions do not overwrite their operands, so that an eighth of them is not needed.  The
- * operations are the same, without fused ones: so are all bits. */
+/* Vectors of the compiler: two numbers at a time, with the same operations on each, so that all
+ * bits are those of the loops without them (-DPRBM_PLAIN). */
 #if defined(__GNUC__) && !defined(PRBM_PLAIN)
-#define VECTORS 1 /* of the compiler */
+#define VECTORS 1
 #else
 #define VECTORS 0
-#endif
-#if VECTORS && defined(__x86_64__)
-#define AVX_TOO 1
-#define BY_AVX __attribute__((target("avx")))
-#else
-#define AVX_TOO 0
-#define BY_AVX
 #endif
 /* Whether the compiler knows a length where a function is inlined; loops over unknown ones are
  * compiled once. */
@@ -574,7 +566,6 @@ typedef struct {
     bool driven, walls_push;
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
-    bool avx;               /* which of two compiled versions is run */
     double *own;            /* (n,) the diagonal of M now */
     /* where the present step began, or something else that others are near */
     double *start;          /* (even,) its angles */

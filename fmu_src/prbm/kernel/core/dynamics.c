@@ -53,7 +53,6 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.block = place(memory, n * n, sizeof(double));
     q.least = place(memory, s, sizeof(double));
     q.most = place(memory, s, sizeof(double));
-    q.avx = avx_here();
     q.factors.even = (int)even;
     q.factors.blocks = system->blocks;
     q.factors.L = place(memory, n * n, sizeof(double));
@@ -461,7 +460,7 @@ SIZED bool small_block_motion(Equations *q, int size, int start, const Complex *
     return true;
 }
 
-SIZED bool all_blocks_motion(Equations *q) {
+static bool blocks_motion(Equations *q) {
     bool regular = true;
     const Complex *H = q->system->coupling;
     double *L = q->factors.L;
@@ -478,14 +477,6 @@ SIZED bool all_blocks_motion(Equations *q) {
         L += size * size;
     }
     return regular;
-}
-
-static bool blocks_motion(Equations *q) {
-    return all_blocks_motion(q);
-}
-
-BY_AVX static bool blocks_motion_by_avx(Equations *q) {
-    return all_blocks_motion(q);
 }
 
 /* v^T diag(e)^H H diag(e) v / 2 */
@@ -553,10 +544,10 @@ static void set_columns(Equations *q) {
 }
 
 /* The factors, and x := L^-1 x, from the rows in Z. */
-SIZED bool factor_motion(int even, Equations *q, bool avx) {
+SIZED bool factor_motion(int even, Equations *q) {
     q->factors.r = q->r;
     q->factors.block_count = q->system->block_count;
-    if (!(avx ? blocks_motion_by_avx(q) : blocks_motion(q))) {
+    if (!blocks_motion(q)) {
         return false;
     }
     set_columns(q);
@@ -571,13 +562,13 @@ RARE void add_coriolis(Equations *q) {
 }
 
 /* Solve for x = a and lam at angle and speed; turned: near the start. */
-SIZED bool motion_of_length(int even, Equations *q, bool turned, bool avx) {
+SIZED bool motion_of_length(int even, Equations *q, bool turned) {
     directions_of(even, q, turned);
     find_loads(even, q);
     add_springs(even, q);
     rows_of_length(even, q, q->factors.Z);
     add_rubs(q);
-    if (!factor_motion(even, q, avx)) {
+    if (!factor_motion(even, q)) {
         return false;
     }
     finish_of_length(even, &q->factors, q->x, q->lam);
@@ -590,7 +581,7 @@ SIZED bool motion_of_length(int even, Equations *q, bool turned, bool avx) {
 static bool solve_motion(Equations *q, const double *angle, const double *v, bool turned) {
     pad(q->system->n, angle, q->angle);
     pad(q->system->n, v, q->speed);
-    return motion_of_length(q->system->even, q, turned, false);
+    return motion_of_length(q->system->even, q, turned);
 }
 
 /* Only the factors, at a state that is then a start. */
@@ -601,7 +592,7 @@ static bool factor_start(Equations *q, const double *angle, const double *v) {
     find_directions(q, true);
     find_loads(q->system->even, q);
     rows_and_convection(q, q->factors.Z);
-    return factor_motion(q->system->even, q, false);
+    return factor_motion(q->system->even, q);
 }
 
 PRBM bool accelerations(Equations *equations, const double *q, const double *v, double *a,
@@ -659,12 +650,11 @@ PRBM void begin_trace(Equations *q) {
     }
 }
 
-SIZED bool rates_of_length(int even, Equations *q, const double *y, bool turned, bool avx,
-                           double *dy) {
+SIZED bool rates_of_length(int even, Equations *q, const double *y, bool turned, double *dy) {
     int n = q->system->n;
     pad_of(even, n, y, q->angle);
     pad_second(even, n, y, q->speed);
-    if (!motion_of_length(even, q, turned, avx)) {
+    if (!motion_of_length(even, q, turned)) {
         return false;
     }
     join(even, n, q->speed, q->x, dy);
@@ -672,30 +662,20 @@ SIZED bool rates_of_length(int even, Equations *q, const double *y, bool turned,
 }
 
 /* The lengths of the guides' vectors are known where they are compiled, so that loops unroll. */
-SIZED bool rates_to_length(Equations *q, const double *y, bool turned, bool avx, double *dy) {
+static bool rates_of_motion(Equations *q, const double *y, bool turned, double *dy) {
     int even = q->system->even;
     switch (even) {
-    case 4: return rates_of_length(4, q, y, turned, avx, dy);
-    case 8: return rates_of_length(8, q, y, turned, avx, dy);
-    default: return rates_of_length(even, q, y, turned, avx, dy);
+    case 4: return rates_of_length(4, q, y, turned, dy);
+    case 8: return rates_of_length(8, q, y, turned, dy);
+    default: return rates_of_length(even, q, y, turned, dy);
     }
-}
-
-static bool rates_of_motion(Equations *q, const double *y, bool turned, double *dy) {
-    return rates_to_length(q, y, turned, false, dy);
-}
-
-BY_AVX static bool rates_of_motion_by_avx(Equations *q, const double *y, bool turned,
-                                            double *dy) {
-    return rates_to_length(q, y, turned, true, dy);
 }
 
 /* The rates of y; turned: near the start. */
 static bool rates_at(Equations *q, const double *y, bool turned, double *dy, Problem *problem) {
     int n = q->system->n;
     const double *v = y + n;
-    if (!(q->avx ? rates_of_motion_by_avx(q, y, turned, dy)
-                 : rates_of_motion(q, y, turned, dy))) {
+    if (!rates_of_motion(q, y, turned, dy)) {
         return fail(problem, "%s", SINGULAR);
     }
     trace_forces(q);
@@ -823,21 +803,13 @@ SIZED bool corrected_of_length(int even, Equations *q, double t, double *y, bool
     return true;
 }
 
-SIZED bool corrected_to_length(Equations *q, double t, double *y, bool turned) {
+static bool corrected(Equations *q, double t, double *y, bool turned) {
     int even = q->system->even;
     switch (even) {
     case 4: return corrected_of_length(4, q, t, y, turned);
     case 8: return corrected_of_length(8, q, t, y, turned);
     default: return corrected_of_length(even, q, t, y, turned);
     }
-}
-
-static bool corrected(Equations *q, double t, double *y, bool turned) {
-    return corrected_to_length(q, t, y, turned);
-}
-
-BY_AVX static bool corrected_by_avx(Equations *q, double t, double *y, bool turned) {
-    return corrected_to_length(q, t, y, turned);
 }
 
 static bool project_near(Equations *q, double t, double *y, bool turned, Scratch *scratch,
@@ -847,8 +819,7 @@ static bool project_near(Equations *q, double t, double *y, bool turned, Scratch
     double *kept = take(scratch, (size_t)n);
     copy(n, y, kept);
     scratch->used = mark;
-    if (q->sliding_count == 0 &&
-        (q->avx ? corrected_by_avx(q, t, y, turned) : corrected(q, t, y, turned))) {
+    if (q->sliding_count == 0 && corrected(q, t, y, turned)) {
         return true;
     }
     copy(n, kept, y); /* as if nothing had been tried */

@@ -11,27 +11,6 @@
 
 #include "kernel.h"
 
-/* --- the processor ---------------------------------------------------------------------------- */
-
-#if AVX_TOO
-#include <cpuid.h>
-
-/* Whether the processor has AVX, and the system keeps its registers. */
-static bool avx_here(void) {
-    enum { SSE_AND_AVX_STATE = 6 };
-    unsigned a, b, c, d, kept = 0, more;
-    if (!__get_cpuid(1, &a, &b, &c, &d) || !(c & bit_OSXSAVE) || !(c & bit_AVX)) {
-        return false;
-    }
-    __asm__ volatile("xgetbv" : "=a"(kept), "=d"(more) : "c"(0));
-    return (kept & SSE_AND_AVX_STATE) == SSE_AND_AVX_STATE;
-}
-#else
-static bool avx_here(void) {
-    return false;
-}
-#endif
-
 /* --- pairs of numbers ------------------------------------------------------------------------- */
 
 /* Two numbers at a time where the compiler has vectors, else one: the same operations on each. */

@@ -69,23 +69,13 @@ SIZED void combine_length(int n, int stride, int count, double h, const double *
     }
 }
 
-SIZED void combine_any(int n, int count, double h, const double *a, const double *k,
-                       const double *y, double *result) {
+static void combine(int n, int count, double h, const double *a, const double *k, const double *y,
+                    double *result) {
     switch (n) {
     case 8: combine_length(8, 8, count, h, a, k, y, result); break;
     case 16: combine_length(16, 16, count, h, a, k, y, result); break;
     default: combine_length(n, n, count, h, a, k, y, result);
     }
-}
-
-static void combine(int n, int count, double h, const double *a, const double *k, const double *y,
-                    double *result) {
-    combine_any(n, count, h, a, k, y, result);
-}
-
-BY_AVX static void combine_by_avx(int n, int count, double h, const double *a, const double *k,
-                                  const double *y, double *result) {
-    combine_any(n, count, h, a, k, y, result);
 }
 
 /* The stages k (STAGES, n), of which the first is given, and the new state y1. */
@@ -94,11 +84,7 @@ PRBM bool stages(Equations *equations, int n, double t, const double *y, double 
     (void)t; /* see rate */
     start_from(equations, y);
     for (int i = 1; i < STAGES; i++) {
-        if (equations->avx) {
-            combine_by_avx(n, i, h, STAGE[i], k, y, y1);
-        } else {
-            combine(n, i, h, STAGE[i], k, y, y1);
-        }
+        combine(n, i, h, STAGE[i], k, y, y1);
         if (!rates_at(equations, y1, true, k + i * n, problem)) {
             return false;
         }
