@@ -75,8 +75,7 @@ class Prototype:
 
 
 def _plain(text: str) -> str:
-    """Return C without comments (but for the headings), directives and attributes."""
-    text = re.sub(r"/\* --- (\w+\.c)\b[^*]*\*/", r"@\1@", text)
+    """Return C without comments, directives and attributes."""
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     text = re.sub(r"^#.*(?:\\\n.*)*$", "", text, flags=re.MULTILINE)
     return re.sub(r"__attribute__\s*\(\(.*?\)\)\)?", "", text)
@@ -95,8 +94,13 @@ def _declared(text: str) -> list[Declared]:
     return found
 
 
+@cache
 def _header() -> str:
-    return _plain((KERNEL / "kernel.h").read_text())
+    """Return all that kernel.h declares, the part of each header below ``@name.c@``."""
+    included = re.findall(r'#include "core/(\w+)\.h"', (KERNEL / "kernel.h").read_text())
+    return "\n".join(
+        f"@{name}.c@\n" + _plain((KERNEL / "core" / f"{name}.h").read_text()) for name in included
+    )
 
 
 def constants() -> dict[str, int]:

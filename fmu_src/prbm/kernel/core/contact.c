@@ -1,10 +1,12 @@
 /* Rigid impacts in contact space: Newton's law for all stops at once, Stronge's with friction.
  *
- * Sources: as in the twin, prbm/contact.py.
+ * Sources: as in the twin, mechanics/contact.py.
  */
 #include <math.h>
 
-#include "kernel.h"
+#include "core/constraints.h"
+#include "core/contact.h"
+#include "core/matrix.h"
 
 #define FEASIBLE 1e-10 /* of the largest approach: what the complementarity may be violated by */
 #define WEDGED 1e-10   /* of the inverse normal mass: a smaller rate of approach is a rounding */

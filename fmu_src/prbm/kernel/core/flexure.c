@@ -1,7 +1,7 @@
-/* Flexures as rigid segments, torsion springs and axial ones: the twin of prbm/flexure.py. */
+/* Flexures as rigid segments, torsion springs and axial ones: the twin of mechanism/flexure.py. */
 #include <math.h>
 
-#include "kernel.h"
+#include "core/flexure.h"
 
 PRBM bool stub(int pivots, const double *gamma, double *gamma0, Problem *problem) {
     double sum = 0.0;

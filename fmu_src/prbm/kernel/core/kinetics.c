@@ -1,5 +1,5 @@
-/* Mass matrix, quadratic velocities, kinetic energy: the twin of prbm/kinetics.py. */
-#include "kernel.h"
+/* Mass matrix, quadratic velocities, kinetic energy: the twin of mechanics/kinetics.py. */
+#include "core/kinetics.h"
 
 PRBM void inertia(int n, const Complex *H, const double *J, const Complex *e, double *M,
                   double *C) {

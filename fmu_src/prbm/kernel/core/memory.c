@@ -2,7 +2,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#include "kernel.h"
+#include "core/memory.h"
 
 enum { ALIGNMENT = 16 };
 

@@ -1,8 +1,12 @@
 /* Small vibrations about a static shape, and what an impact leaves in the fundamental mode: the
- * twin of prbm/modal.py. */
+ * twin of mechanics/modal.py. */
 #include <math.h>
 
-#include "kernel.h"
+#include "core/constraints.h"
+#include "core/forces.h"
+#include "core/kinetics.h"
+#include "core/matrix.h"
+#include "core/modal.h"
 
 #define AT_EASE 1e-7 /* of the highest frequency: a lower one is what rounding leaves of none */
 

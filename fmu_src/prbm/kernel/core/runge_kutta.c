@@ -1,5 +1,7 @@
-/* The pair 5(4) of Bogacki and Shampine with a quartic: the data of prbm/runge_kutta.py. */
-#include "kernel.h"
+/* The pair 5(4) of Bogacki and Shampine with a quartic: the data of hybrid/runge_kutta.py. */
+#include "core/dynamics.h"
+#include "core/matrix.h"
+#include "core/runge_kutta.h"
 
 static const double STAGE[STAGES][STAGES] = {
     {0.0},

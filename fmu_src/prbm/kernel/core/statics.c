@@ -1,10 +1,15 @@
-/* Static equilibrium under gravity and a holding force: the twin of prbm/statics.py.
+/* Static equilibrium under gravity and a holding force: the twin of mechanics/statics.py.
  *
  * At rest the torques balance: -K (q - q0) + Re(w e) + J^T lam + r^T F = 0.
  */
 #include <math.h>
 
-#include "kernel.h"
+#include "core/constraints.h"
+#include "core/contact.h"
+#include "core/forces.h"
+#include "core/kinetics.h"
+#include "core/matrix.h"
+#include "core/statics.h"
 
 #define LARGEST_TURN 0.5 /* rad per Newton step and step of the load: further is another shape */
 #define SMALLEST_FRACTION (1.0 / 512) /* of the load, before the continuation gives up */

@@ -155,7 +155,7 @@ typedef struct {
 /* Read the tables; what is returned is freed by the caller. */
 PRBM Mechanism *tables_read(const char *resources, Problem *problem);
 
-/* --- fmu.c: messages -------------------------------------------------------------------------- */
+/* --- journal.c -------------------------------------------------------------------------------- */
 
 #if defined(__GNUC__)
 PRBM void report(const Journal *journal, int status, const char *format, ...)
@@ -169,7 +169,7 @@ PRBM int refuse(const Instance *instance, int status, const char *format, ...);
 PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t count,
                            const char *const *names);
 
-/* --- fmu.c: life ------------------------------------------------------------------------------ */
+/* --- instance.c ------------------------------------------------------------------------------- */
 
 PRBM Instance *instance_open(const Request *request);
 PRBM void instance_close(Instance *instance);
@@ -183,20 +183,20 @@ PRBM int exit_initialization(Instance *instance);
 PRBM int end_run(Instance *instance);
 PRBM int reset(Instance *instance);
 
-/* --- fmu.c: values ---------------------------------------------------------------------------- */
+/* --- values.c --------------------------------------------------------------------------------- */
 
 PRBM int read_value(Instance *instance, uint32_t reference, int type, double *x);
 PRBM int write_value(Instance *instance, uint32_t reference, int type, double x);
 PRBM int read_clock(Instance *instance, uint32_t reference, bool *active);
 
-/* --- fmu.c: steps and events ------------------------------------------------------------------ */
+/* --- step.c ----------------------------------------------------------------------------------- */
 
 PRBM int make_step(Instance *instance, double time, double size, Outcome *outcome);
 PRBM int enter_event_mode(Instance *instance);
 PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed);
 PRBM int leave_event_mode(Instance *instance, const Rule *rule, Mode next);
 
-/* --- fmu.c: model exchange -------------------------------------------------------------------- */
+/* --- exchange.c ------------------------------------------------------------------------------- */
 
 PRBM int set_time(Instance *instance, double time);
 PRBM int set_states(Instance *instance, const double *x, size_t count);
@@ -209,7 +209,7 @@ PRBM int directional_derivative(Instance *instance, const uint32_t *unknowns, si
                                 const uint32_t *knowns, size_t known_count, const double *seed,
                                 double *sensitivity);
 
-/* --- fmu.c: saved states ---------------------------------------------------------------------- */
+/* --- state.c ---------------------------------------------------------------------------------- */
 
 PRBM int save_state(const Instance *instance, void **state);
 PRBM int restore_state(Instance *instance, const void *state);
