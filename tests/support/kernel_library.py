@@ -98,7 +98,7 @@ def _declared(text: str) -> list[Declared]:
 def _header() -> str:
     """Return all that kernel.h declares, the part of each header below ``@name.c@``."""
     included = re.findall(r'#include "core/(\w+)\.h"', (KERNEL / "kernel.h").read_text())
-    return "\n".join(
+    return _plain((KERNEL / "generated.h").read_text()) + "\n".join(
         f"@{name}.c@\n" + _plain((KERNEL / "core" / f"{name}.h").read_text()) for name in included
     )
 
@@ -106,7 +106,7 @@ def _header() -> str:
 def constants() -> dict[str, int]:
     """Return the numbers that the header names."""
     found: dict[str, int] = {}
-    for body in re.findall(r"\benum\s*\{(.*?)\}", _header(), re.DOTALL):
+    for body in re.findall(r"\benum\s*\w*\s*\{(.*?)\}", _header(), re.DOTALL):
         number = -1
         for entry in filter(None, (part.strip() for part in body.split(","))):
             name, _, given = (part.strip() for part in entry.partition("="))

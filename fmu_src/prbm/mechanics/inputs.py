@@ -11,6 +11,8 @@ from ..mechanism.parameters import finite
 from .arrays import Real
 
 LOADS = {"x": "N", "y": "N", "moment": "N.m"}  # of a force; times s, of an impulse
+WALL_INPUTS = {"displacement": "m", "velocity": "m/s"}  # of a stop
+BASE_AXES = "xy"
 MOBILITY = "mobility"  # of a wall: an input of its stop
 LARGEST_MOBILITY = 1e100  # 1/kg; beyond, impulses are lost to underflow
 
@@ -60,10 +62,10 @@ def input_units(mechanism: Mechanism) -> dict[str, str]:
     """Return the inputs in the order of the interface, with their units."""
     units = {f"{f.name}.{axis}": unit for f in mechanism.forces for axis, unit in LOADS.items()}
     for stop in mechanism.stops:
-        units |= {f"{stop.name}.displacement": "m", f"{stop.name}.velocity": "m/s"}
+        units |= {f"{stop.name}.{what}": unit for what, unit in WALL_INPUTS.items()}
     units |= _impulse_units(mechanism)
     units |= {f"{stop.name}.{MOBILITY}": "1/kg" for stop in mechanism.stops}
-    return units | {f"base.acceleration.{axis}": "m/s2" for axis in "xy"}
+    return units | {f"base.acceleration.{axis}": "m/s2" for axis in BASE_AXES}
 
 
 def input_names(mechanism: Mechanism) -> tuple[str, ...]:

@@ -9,8 +9,6 @@
 #include "core/kinetics.h"
 #include "core/matrix.h"
 
-#define TOGETHER 1e-9 /* of the size: points that a joint joins are drawn no further apart */
-
 /* --- values and places ------------------------------------------------------------------------ */
 
 static Complex at_point(const System *system, Point point) {
@@ -101,7 +99,7 @@ static bool cut_flexure(const System *system, const Flexure *flexure, Segments *
     const Connection *between = &flexure->between;
     double L = modulus(minus(at_point(system, between->end_point),
                              at_point(system, between->start_point)));
-    if (!(L >= 1e-9)) {
+    if (!(L >= TINY_LENGTH)) {
         return fail(problem, "flexure %s has the length %g m: move its ends apart", flexure->name,
                     L);
     }
@@ -159,7 +157,7 @@ static Span span_of(const System *system, const Step *step) {
 static bool walk_joint(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     Span span = span_of(system, step);
     double apart = modulus(minus(span.z_end, span.z_start));
-    if (!(apart <= TOGETHER * system->length)) {
+    if (!(apart <= JOINT_DISTANCE_RTOL * system->length)) {
         return fail(problem,
                     "the joint %s joins points that are drawn %.4g m apart: draw them at the same "
                     "place",
@@ -467,7 +465,7 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
     }
     if (sound) {
         symmetric_eigen(system->n, M, w, NULL);
-        sound = w[0] > 1e-13;
+        sound = w[0] > MASSLESS_RTOL;
     }
     scratch->used = mark;
     if (!sound) {
@@ -549,7 +547,7 @@ static bool check_loops(const System *system, const Complex *e0, Scratch *scratc
     Rows loops = plain_rows(system, r, system->loops, system->loops_c);
     jacobian(&loops, e0, rows);
     double scale = largest(r * n, rows);
-    bool any = repeated_loops(r, n, rows, loop, 1e-9 * scale, repeated);
+    bool any = repeated_loops(r, n, rows, loop, DEPENDENT_LOOP_RTOL * scale, repeated);
     name_loops(system->mechanism, repeated, names, sizeof names);
     scratch->used = mark;
     return !any || fail(problem,

@@ -6,11 +6,6 @@
 #include "core/kinetics.h"
 #include "core/matrix.h"
 
-#define CLOSED 1e-14        /* of the size of the mechanism: a few roundings of its coordinates */
-#define BARELY_CLOSED 1e-12 /* of that size: accepted if the iteration can do no better */
-
-enum { ITERATIONS = 20 }; /* Gauss-Newton converges quadratically: twenty are hopeless */
-
 static const char SINGULAR[] =
     "the equations of motion are singular here: two constraints repeat each other, or a part that "
     "can move has no mass";
@@ -175,11 +170,11 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
     bool right_way = true, closed = false;
     Rows now = *rows;
     now.c = c;
-    for (int step = 0; step < ITERATIONS && right_way && !closed; step++) {
+    for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && right_way && !closed; step++) {
         directions(system, q, e);
         scalars(&now, e, s);
         double error = largest(rows->count, s), length = system->length;
-        closed = error <= CLOSED * length || (BARELY_CLOSED * length >= best && best <= error);
+        closed = error <= CONSTRAINT_RTOL * length || (CONSTRAINT_STALLED_RTOL * length >= best && best <= error);
         best = error < best ? error : best;
         if (!closed) {
             jacobian(rows, e, G);

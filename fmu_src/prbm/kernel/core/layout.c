@@ -25,9 +25,9 @@ static void count_coordinates(Reader *reader, Mechanism *m) {
     long long parts = (long long)m->flexure_count + m->joint_count, b = m->body_count;
     long long n = links + stretching + b, r = 2 * (parts - b);
     if (!reader->wrong &&
-        (n > MOST_COORDINATES || r >= n || m->stop_count > MOST_STOPS ||
-         m->friction_count > MOST_STOPS || m->force_count > MOST_PLACES ||
-         m->probe_count > MOST_PLACES || m->ground_count > MOST_POINTS)) {
+        (n > COORDINATES_MAX || r >= n || m->stop_count > STOPS_MAX ||
+         m->friction_count > STOPS_MAX || m->force_count > PLACES_MAX ||
+         m->probe_count > PLACES_MAX || m->ground_count > GROUND_POINTS_MAX)) {
         reader->wrong = "more parts than can be computed with, or loops that leave no motion";
     } else if (!reader->wrong && (b < 1 || r < 0)) {
         reader->wrong = "a body that nothing holds";

@@ -4,8 +4,6 @@
 
 #include "core/memory.h"
 
-enum { GROUND = 0 }; /* bodies are counted from 1 */
-
 /* constant + sum(factor * parameter) */
 typedef struct {
     double constant;
@@ -44,8 +42,6 @@ typedef struct {
     int start, end;
     Point start_point, end_point;
 } Connection;
-
-enum { CLAMP, PIN, FREE };
 
 typedef struct {
     const char *name;
@@ -100,11 +96,9 @@ typedef struct {
     double minimum, maximum;
 } Bound;
 
-enum { REAL, INTEGER, BOOLEAN, CLOCK }; /* a clock has the slot of the impact_count of its stop */
-
 typedef struct {
     uint32_t reference;
-    int type; /* REAL, INTEGER, BOOLEAN, CLOCK */
+    int type; /* REAL, INTEGER, BOOLEAN, CLOCK; a clock has the slot of its impact_count */
     int slot; /* in the vector of all values, see Slots */
     const char *name;
 } Variable;
@@ -114,22 +108,6 @@ typedef struct {
     int parameters, inputs, bodies, stops, base, energies, latched, links, stretches, probes,
         frequency, calculated, derivatives, indicators, time, count;
 } Slots;
-
-enum {
-    PER_BODY = 6,    /* x, y, angle, vx, vy, omega */
-    PER_STOP = 6,    /* gap, gap_rate, force, point.displacement, point.velocity, point.mobility */
-    PER_BASE = 3,    /* force.x, force.y, moment */
-    PER_ENERGY = 5,  /* kinetic, elastic, gravitational, dissipated, work */
-    PER_LATCHED = 9, /* contact, impact_count, impact_time, approach_speed, rebound_speed, impulse,
-                        energy_lost, modal_restitution, impulse_sum */
-    LOADS = 3,       /* of a force, and of an impulse: x, y, moment */
-    PER_WALL = 2,    /* displacement, velocity */
-    AXES = 2,        /* of the base's acceleration: x, y */
-    PER_LINK = 2,    /* angle, omega */
-    PER_STRETCH = 2, /* strain, strain_rate */
-    PER_PROBE = 4,   /* x, y, vx, vy */
-    STOP_INDICATORS = 3, /* impact, release, slip; then one slip for each friction point */
-};
 
 /* Where the groups of inputs begin; the forces are the first. */
 typedef struct {

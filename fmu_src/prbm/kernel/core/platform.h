@@ -6,6 +6,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "generated.h"
+
 /* All functions are local to the one file that the library is compiled from.  A test that looks
  * at them one by one defines PRBM as nothing. */
 #ifndef PRBM

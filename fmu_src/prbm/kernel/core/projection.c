@@ -94,7 +94,7 @@ SIZED bool corrected_of_length(int even, Equations *q, double t, double *y, bool
     correct(even, q, y);
     pad_of(even, n, y, q->angle);
     directions_of(even, q, turned);
-    if (!(ask_positions(even, q, t) <= CLOSED * q->system->length)) {
+    if (!(ask_positions(even, q, t) <= CONSTRAINT_RTOL * q->system->length)) {
         return false;
     }
     pad_second(even, n, y, q->speed);

@@ -3,18 +3,6 @@
 
 #include "core/tables.h"
 
-enum {
-    TABLES_VERSION = 2,
-    CHECKED_FROM = 16,         /* bytes before what the checksum covers */
-    MOST_COORDINATES = 512,    /* a mass matrix of 2 MB; no mechanism of this kind has as many */
-    MOST_STOPS = 64,           /* and friction points */
-    MOST_PLACES = 1024,        /* where forces act, that are watched */
-    MOST_POINTS = 4096,        /* of the ground: every pair of them has a distance */
-    MOST_PIVOTS = 256,         /* and links of a chain */
-    ROOM = 8,                  /* bytes of memory for each byte of the tables, more than needed */
-    ROOM_OF_COORDINATE = 32,   /* and for each coordinate */
-};
-
 typedef struct {
     const unsigned char *at;
     size_t left;

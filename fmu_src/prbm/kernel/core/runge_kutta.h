@@ -4,8 +4,6 @@
 
 #include "core/equations.h"
 
-enum { STAGES = 8, ORDER = 5, DENSE = 4 };
-
 PRBM bool stages(Equations *equations, int n, double t, const double *y, double h, double *k,
                  double *y1, Problem *problem);
 PRBM void error_of(int n, const double *k, double h, double *error);

@@ -4,6 +4,11 @@
 
 #include "core/tables.h"
 
+enum {
+    ROOM = 8,                /* bytes of memory for each byte of the tables, more than needed */
+    ROOM_OF_COORDINATE = 32, /* and for each coordinate */
+};
+
 /* --- parts ------------------------------------------------------------------------------------ */
 
 static Expression read_expression(Reader *reader, Mechanism *m) {
@@ -84,8 +89,8 @@ static void read_types(Reader *reader, Mechanism *m) {
         t->lumped = read_flag(reader);
         t->rate_with_gamma = read_flag(reader);
         t->axial = read_flag(reader);
-        t->pivots = read_index(reader, 0, MOST_PIVOTS + 1);
-        t->links = read_index(reader, 0, MOST_PIVOTS + 1);
+        t->pivots = read_index(reader, 0, PIVOTS_MAX + 1);
+        t->links = read_index(reader, 0, PIVOTS_MAX + 1);
         if ((t->pivots == 0) == (t->links == 0)) {
             reader->wrong = reader->wrong ? reader->wrong : "a flexure of no kind";
         }
@@ -243,8 +248,10 @@ static void read_variables(Reader *reader, Mechanism *m) {
         v->name = read_text(reader);
         int latched = v->slot - m->slots.latched;
         bool of_stop = latched >= 0 && v->slot < m->slots.links;
-        int what = of_stop ? latched % PER_LATCHED : -1;
-        bool fits = v->type == REAL ? what != 0 && what != 1 : what == (v->type != BOOLEAN);
+        int output = of_stop ? latched % PER_LATCHED : -1;
+        bool fits = v->type == REAL      ? output != LATCHED_CONTACT && output != LATCHED_IMPACT_COUNT
+                    : v->type == BOOLEAN ? output == LATCHED_CONTACT
+                                         : output == LATCHED_IMPACT_COUNT;
         if (!fits || (i > 0 && v->reference <= variables[i - 1].reference)) {
             reader->wrong = reader->wrong ? reader->wrong : "variables that contradict each other";
         }
@@ -266,7 +273,7 @@ static uint32_t checksum(const unsigned char *bytes, size_t size) {
 }
 
 static void read_header(Reader *reader, const unsigned char *bytes, size_t size) {
-    if (size < CHECKED_FROM || memcmp(bytes, "PRBM", 4) != 0) {
+    if (size < TABLES_HEAD || memcmp(bytes, "PRBM", 4) != 0) {
         reader->wrong = "no tables of a mechanism";
         return;
     }
@@ -276,7 +283,7 @@ static void read_header(Reader *reader, const unsigned char *bytes, size_t size)
         reader->wrong = "tables of another version";
     } else if (read_u32(reader) != size) {
         reader->wrong = "another size than it should have";
-    } else if (read_u32(reader) != checksum(bytes + CHECKED_FROM, size - CHECKED_FROM)) {
+    } else if (read_u32(reader) != checksum(bytes + TABLES_HEAD, size - TABLES_HEAD)) {
         reader->wrong = "a wrong checksum";
     }
 }
@@ -334,7 +341,7 @@ PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem 
     read_header(&reader, bytes, size);
     Mechanism *m = NULL;
     if (!reader.wrong) {
-        size_t room = sizeof *m + ROOM * size + MOST_COORDINATES * ROOM_OF_COORDINATE;
+        size_t room = sizeof *m + ROOM * size + COORDINATES_MAX * ROOM_OF_COORDINATE;
         m = calloc(1, room);
         if (!m) {
             fail(problem, "there is not enough memory for the tables of the mechanism");

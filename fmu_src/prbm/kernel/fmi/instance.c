@@ -301,7 +301,7 @@ PRBM int set_up(Instance *instance, bool tolerance_defined, double tolerance, do
 static double impact_count(const Instance *instance, int stop) {
     Problem problem;
     double count = 0.0;
-    int slot = instance->mechanism->slots.latched + PER_LATCHED * stop + 1;
+    int slot = instance->mechanism->slots.latched + PER_LATCHED * stop + LATCHED_IMPACT_COUNT;
     (void)simulation_get(instance->simulation, slot, &count, &problem);
     return count;
 }

@@ -3,10 +3,6 @@
 
 #include "fmi/fmu.h"
 
-static const double TIME_SLACK = 1e-6;  /* of a step: round-off that importers gather */
-static const double TIME_ROUND = 1e-12; /* of the time itself */
-static const double END_SLACK = 1e-3;   /* of a step: an end that steps were added up to */
-
 /* Keep the state of the simulation, to go back to. */
 static void keep(Instance *instance) {
     const Simulation *simulation = instance->simulation;
@@ -23,8 +19,8 @@ static void go_back(Instance *instance) {
 
 static int check_step(const Instance *instance, double time, double size) {
     double now = simulation_time(instance->simulation), target = time + size;
-    double slack = TIME_SLACK * size + TIME_ROUND * (now < 0.0 ? -now : now);
-    double sums = slack + END_SLACK * size;
+    double slack = STEP_SUM_RTOL * size + TIME_SUM_RTOL * (now < 0.0 ? -now : now);
+    double sums = slack + STOP_TIME_RTOL * size;
     if (stands(instance, FMU_DISCARD)) {
         return FMU_DISCARD;
     }
