@@ -160,12 +160,14 @@ def unit() -> str:
     return "".join(f'#include "{name}"\n' for name in ("kernel.h", *includes))
 
 
-def compiled(flags: Sequence[str] = (), compiler: Sequence[str] = ("cc",)) -> ctypes.CDLL:
-    """Compile the kernel with all its functions visible."""
+def compiled(
+    flags: Sequence[str] = (), compiler: Sequence[str] = ("cc",), text: str = ""
+) -> ctypes.CDLL:
+    """Compile the kernel, and more C, with all its functions visible."""
     folder = Path(mkdtemp(prefix="prbm-kernel-"))
     try:
         source, library = folder / "kernel.c", folder / "kernel.so"
-        source.write_text(unit())
+        source.write_text(unit() + text)
         command = [*compiler, *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
         subprocess.run(command, check=True, capture_output=True, text=True)
         return ctypes.CDLL(str(library))
