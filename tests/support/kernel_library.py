@@ -18,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
+import prbm.kernel
 from prbm.interface.tables import tables
 from prbm.mechanism.description import Mechanism
 
-KERNEL = Path(__file__).parents[1] / "fmu_src" / "prbm" / "kernel"
+KERNEL = Path(prbm.kernel.__file__).parent
 FLAGS = (
     "-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
     "-Wl,-Bsymbolic",  # names as common as these must not be found elsewhere in the process
