@@ -1,4 +1,5 @@
-/* From a mechanism and parameter values to the constant arrays: the twin of mechanics/assembly.py. */
+/* From a mechanism and parameter values to the constant arrays: the twin of
+ * mechanics/assembly.py. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

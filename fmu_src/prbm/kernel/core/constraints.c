@@ -174,7 +174,8 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
         directions(system, q, e);
         scalars(&now, e, s);
         double error = largest(rows->count, s), length = system->length;
-        closed = error <= CONSTRAINT_RTOL * length || (CONSTRAINT_STALLED_RTOL * length >= best && best <= error);
+        closed = error <= CONSTRAINT_RTOL * length ||
+                 (CONSTRAINT_STALLED_RTOL * length >= best && best <= error);
         best = error < best ? error : best;
         if (!closed) {
             jacobian(rows, e, G);

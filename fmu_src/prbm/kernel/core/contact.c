@@ -232,7 +232,8 @@ PRBM void stronge(const double *W, const double *u, double friction, double rest
                   double *P_n, double *P_t) {
     Hit hit = {.nn = W[0], .nt = W[1], .tt = W[3], .friction = friction, .u_n = u[0], .u_t = u[1]};
     double reach = hit.nn > 0.0 ? fabs(hit.u_n) * sqrt(hit.tt / hit.nn) : 0.0;
-    double small_n = ZERO_SPEED_RTOL * fabs(hit.u_n), small_t = ZERO_SPEED_RTOL * (fabs(hit.u_t) + reach);
+    double small_n = ZERO_SPEED_RTOL * fabs(hit.u_n);
+    double small_t = ZERO_SPEED_RTOL * (fabs(hit.u_t) + reach);
     double work = compress(&hit);
     /* with one degree of freedom both rates vanish together, up to a rounding */
     hit.u_n = hit.u_n > small_n ? hit.u_n : 0.0;

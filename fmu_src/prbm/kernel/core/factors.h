@@ -5,8 +5,7 @@
 #include "core/system.h"
 
 /* M = L D L^T block by block, Z = L^-1 rows^T and the Schur complement S of a saddle-point matrix
- * [[M, columns^T], [rows, 0]]: what to solve with, again and again.  Vectors are padded to an even
- * length. */
+ * [[M, columns^T], [rows, 0]], for repeated solution.  Vectors are padded to an even length. */
 typedef struct {
     int even, r, block_count;
     const Block *blocks;
@@ -18,7 +17,7 @@ typedef struct {
     bool symmetric;             /* S is, and small: its factor is L D L^T, else LU */
 } Factors;
 
-/* S from Z and Y_columns, factored. */
+/* Compute S from Z and Z_columns, and factor it. */
 PRBM bool factor_schur(Factors *factors);
 /* x (even,) and lam (r,): in, the right side; out, the solution a and the multipliers. */
 PRBM void solve_again(const Factors *factors, double *x, double *lam);

@@ -12,7 +12,7 @@ typedef struct {
 
 PRBM bool stub(int pivots, const double *gamma, double *gamma0, Problem *problem);
 PRBM void reverse(int count, double *x);
-/* How many links stand for a flexure, and whether the i-th of n stretches. */
+/* The number of links of a flexure, and whether the i-th of n stretches. */
 PRBM int links_of(const FlexureType *model, int start_end, int end_end);
 PRBM bool stretches(const FlexureType *model, int i, int n);
 PRBM bool segments(const FlexureType *model, const double *gamma, const double *K_theta,

@@ -57,7 +57,7 @@ typedef struct {
 
 typedef struct {
     const char *name;
-    int body, on; /* 1 ...; what its wall is fixed to, GROUND or 1 ... */
+    int body, on; /* 1 ...; the body that carries its wall, GROUND or 1 ... */
     Point point;
     double direction; /* deg */
     Expression position, offset, restitution, friction, rest_speed;
@@ -124,7 +124,7 @@ typedef struct {
     int first;              /* of the coordinates that it adds */
 } Step;
 
-/* What a coordinate is: the angle of a link, its stretch, or the angle of a body. */
+/* A coordinate: the angle of a link, its stretch, or the angle of a body. */
 typedef struct {
     int link, body; /* 0 ... or -1; 1 ... or 0 */
     int arm;        /* whose arm it turns or stretches: its own, or that of a link */

@@ -10,14 +10,14 @@ typedef struct {
     char text[PROBLEM_LENGTH];
 } Problem;
 
-/* Write a sentence; returns false, so that "return fail(problem, ...)" reads well. */
+/* Write an error message and return false. */
 #if defined(__GNUC__)
 PRBM bool fail(Problem *problem, const char *format, ...) __attribute__((format(printf, 2, 3)));
 #else
 PRBM bool fail(Problem *problem, const char *format, ...);
 #endif
 
-/* A block that is laid out once: first with base NULL to count, then to place. */
+/* A block of memory: laid out with base NULL to count its bytes, then again to place its parts. */
 typedef struct {
     char *base;
     size_t used;
@@ -25,9 +25,9 @@ typedef struct {
 
 PRBM void *place(Memory *memory, size_t count, size_t size);
 
-/* Working memory for one call: taken in order, given back by setting used to what it was.
- * Asking for more than there is yields the spare block, which is as large as any single request
- * may be, and sets exceeded: results are then worthless, but nothing is overwritten. */
+/* Working memory for one call: taken in order, given back by restoring the value of used.  A
+ * request for more than is left yields the spare block, which is as large as any single request,
+ * and sets exceeded: the results are then invalid, but nothing is overwritten. */
 typedef struct {
     double *base, *spare;
     size_t used, size, most;

@@ -8,8 +8,8 @@
 
 #include "generated.h"
 
-/* All functions are local to the one file that the library is compiled from.  A test that looks
- * at them one by one defines PRBM as nothing. */
+/* All functions are local to the one file from which the library is compiled.  A test that calls
+ * them one by one defines PRBM as nothing. */
 #ifndef PRBM
 #if defined(__GNUC__)
 #define PRBM static __attribute__((unused))
@@ -18,7 +18,7 @@
 #endif
 #endif
 
-/* Of a pointer: the only one to its array within the function. */
+/* Qualifier of a pointer that is the only one to its array within the function. */
 #if defined(_MSC_VER)
 #define ALONE __restrict
 #else
@@ -31,13 +31,13 @@
 #else
 #define SIZED static
 #endif
-/* What few mechanisms need stays out of the way of what all do. */
+/* Code that few mechanisms need is not inlined into the code that all of them run. */
 #if defined(__GNUC__)
 #define RARE static __attribute__((noinline))
 #else
 #define RARE static
 #endif
-#if defined(__GNUC__) && !defined(__clang__) /* which needs to be told */
+#if defined(__GNUC__) && !defined(__clang__) /* Clang unrolls without a pragma */
 #define UNROLLED _Pragma("GCC unroll 8")
 #define UNROLLED_BY_LANES _Pragma("GCC unroll 4")
 #else
@@ -51,13 +51,13 @@
 #else
 #define VECTORS 0
 #endif
-/* Whether the compiler knows a length where a function is inlined; loops over unknown ones are
- * compiled once. */
+/* Whether a length is a constant where a function is inlined; loops over other lengths are compiled
+ * once. */
 #if defined(__GNUC__)
 #define KNOWN(length) __builtin_constant_p(length)
 #else
 #define KNOWN(length) false
 #endif
-enum { SMALL = 4 }; /* the largest such size; loops to a constant are the ones that unroll */
+enum { SMALL = 4 }; /* the largest size with a copy of its own */
 
 #endif

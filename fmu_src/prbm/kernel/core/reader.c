@@ -6,7 +6,7 @@
 typedef struct {
     const unsigned char *at;
     size_t left;
-    const char *wrong; /* what is wrong with the tables, or NULL */
+    const char *wrong; /* the first defect of the tables, or NULL */
     Memory memory;
     size_t room;
 } Reader;
@@ -92,7 +92,7 @@ static bool read_flag(Reader *reader) {
     return read_index(reader, 0, 2) == 1;
 }
 
-/* How many records of at least so many bytes follow. */
+/* The number of records that follow, each of at least so many bytes. */
 static int read_count(Reader *reader, size_t bytes) {
     uint32_t count = read_u32(reader);
     if (count > reader->left / bytes) {

@@ -106,7 +106,8 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     int n = system->n, r = balance->rows.count;
     Complex *e = take_complex(scratch, 1, n);
     double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
-    double *rows = take_matrix(scratch, r, n), scale = STATICS_FORCE_RTOL * largest(n * n, system->K);
+    double *rows = take_matrix(scratch, r, n);
+    double scale = STATICS_FORCE_RTOL * largest(n * n, system->K);
     double turn = HUGE_VAL;
     bool going = true, balanced = false, done = false;
     for (int j = 0; j < n && scale == 0.0; j++) {

@@ -249,9 +249,8 @@ static void read_variables(Reader *reader, Mechanism *m) {
         int latched = v->slot - m->slots.latched;
         bool of_stop = latched >= 0 && v->slot < m->slots.links;
         int output = of_stop ? latched % PER_LATCHED : -1;
-        bool fits = v->type == REAL      ? output != LATCHED_CONTACT && output != LATCHED_IMPACT_COUNT
-                    : v->type == BOOLEAN ? output == LATCHED_CONTACT
-                                         : output == LATCHED_IMPACT_COUNT;
+        bool contact = output == LATCHED_CONTACT, counter = output == LATCHED_IMPACT_COUNT;
+        bool fits = v->type == REAL ? !contact && !counter : v->type == BOOLEAN ? contact : counter;
         if (!fits || (i > 0 && v->reference <= variables[i - 1].reference)) {
             reader->wrong = reader->wrong ? reader->wrong : "variables that contradict each other";
         }

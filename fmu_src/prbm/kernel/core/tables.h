@@ -4,8 +4,8 @@
 
 #include "core/mechanism.h"
 
-/* Read tables that anybody may have tampered with; NULL and a sentence if they are not sound.
- * The result is one block and keeps nothing of the bytes. */
+/* Read untrusted tables; NULL and an error message if they are invalid.  The result is one block
+ * and keeps no pointer to the bytes. */
 PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem *problem);
 PRBM void mechanism_close(Mechanism *mechanism);
 

@@ -1,8 +1,8 @@
-/* An instance of an FMU: what FMI 2.0 and FMI 3.0 have in common.
+/* An instance of an FMU: the common part of FMI 2.0 and FMI 3.0.
  *
  * fmi2.c and fmi3.c translate the functions of the two standards to the ones declared here.  An
- * instance is a simulation, the state of the standard's state machine that it is in, and what the
- * importer did wrong and has not yet put right.
+ * instance is a simulation, a state of the standard's state machine, and the rejected values that
+ * the importer has not yet corrected.
  */
 #ifndef PRBM_FMU_H
 #define PRBM_FMU_H
@@ -152,7 +152,7 @@ typedef struct {
 
 /* --- resources.c ------------------------------------------------------------------------------ */
 
-/* Read the tables; what is returned is freed by the caller. */
+/* Read the tables; the caller frees the result. */
 PRBM Mechanism *tables_read(const char *resources, Problem *problem);
 
 /* --- journal.c -------------------------------------------------------------------------------- */
@@ -173,9 +173,9 @@ PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t
 
 PRBM Instance *instance_open(const Request *request);
 PRBM void instance_close(Instance *instance);
-/* The instance behind a handle, if the rule allows the call: otherwise NULL, and it is told why. */
+/* The instance of a handle if the rule allows the call; otherwise NULL, and the reason is logged. */
 PRBM Instance *allowed(void *handle, const Rule *rule);
-/* Whether none of n pointers that are needed is NULL; count 0 makes a pointer needless. */
+/* Reject a NULL pointer to count elements; no pointer is needed for none. */
 PRBM bool given(const Instance *instance, const Rule *rule, size_t count, const void *pointer);
 PRBM int set_up(Instance *instance, bool tolerance_defined, double tolerance, double start_time,
                 bool stop_defined, double stop_time);

@@ -3,7 +3,7 @@
 
 #include "fmi/fmu.h"
 
-/* Keep the state of the simulation, to go back to. */
+/* Save the state of the simulation for go_back. */
 static void keep(Instance *instance) {
     const Simulation *simulation = instance->simulation;
     size_t bytes = simulation_state_count(simulation) * sizeof(double);
@@ -82,7 +82,7 @@ static bool walk(Instance *instance, double target, Outcome *outcome, Problem *p
     return true;
 }
 
-/* Continue to a time, or leave everything as it was. */
+/* Continue to a time; on failure the state stays as it was. */
 static bool advanced(Instance *instance, double target, Outcome *outcome, Problem *problem) {
     Simulation *simulation = instance->simulation;
     if (!instance->event_mode && !instance->update) {

@@ -64,7 +64,7 @@ PRBM int read_value(Instance *instance, uint32_t reference, int type, double *x)
     return FMU_OK;
 }
 
-/* Remember that a set was refused until the variable is set properly. */
+/* Mark a variable as rejected until it is set to a valid value. */
 static int refuse_set(Instance *instance, int slot) {
     instance->refused[slot] = 1;
     return FMU_ERROR;
