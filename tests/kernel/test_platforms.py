@@ -172,8 +172,8 @@ def test_every_compiler_computes_the_same_bytes(model):
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R", TWO_STOPS])
-def test_a_compiler_or_processor_without_vectors_computes_the_same_bytes(model):
-    """As others than GCC and Clang compile it: one number at a time, no AVX."""
+def test_a_compiler_without_vectors_computes_the_same_bytes(model):
+    """As others than GCC and Clang compile it: one number at a time."""
     job = Job(native(model, 2), "cs", POINTS)
     plain = kernel_library("without-vectors", ("-O2", "-DPRBM_PLAIN"))
     assert run(replace(job, library=plain)).output == run(job).output

@@ -18,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
+import prbm.kernel
 from prbm.interface.tables import tables
 from prbm.mechanism.description import Mechanism
 
-KERNEL = Path(__file__).parents[2] / "fmu_src" / "prbm" / "kernel"
+KERNEL = Path(prbm.kernel.__file__).parent
 FLAGS = (
     "-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
     "-Wl,-Bsymbolic",  # names as common as these must not be found elsewhere in the process
@@ -75,8 +76,7 @@ class Prototype:
 
 
 def _plain(text: str) -> str:
-    """Return C without comments (but for the headings), directives and attributes."""
-    text = re.sub(r"/\* --- (\w+\.c)\b[^*]*\*/", r"@\1@", text)
+    """Return C without comments, directives and attributes."""
     text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
     text = re.sub(r"^#.*(?:\\\n.*)*$", "", text, flags=re.MULTILINE)
     return re.sub(r"__attribute__\s*\(\(.*?\)\)\)?", "", text)
@@ -95,14 +95,19 @@ def _declared(text: str) -> list[Declared]:
     return found
 
 
+@cache
 def _header() -> str:
-    return _plain((KERNEL / "kernel.h").read_text())
+    """Return all that kernel.h declares, the part of each header below ``@name.c@``."""
+    included = re.findall(r'#include "core/(\w+)\.h"', (KERNEL / "kernel.h").read_text())
+    return _plain((KERNEL / "generated.h").read_text()) + "\n".join(
+        f"@{name}.c@\n" + _plain((KERNEL / "core" / f"{name}.h").read_text()) for name in included
+    )
 
 
 def constants() -> dict[str, int]:
     """Return the numbers that the header names."""
     found: dict[str, int] = {}
-    for body in re.findall(r"\benum\s*\{(.*?)\}", _header(), re.DOTALL):
+    for body in re.findall(r"\benum\s*\w*\s*\{(.*?)\}", _header(), re.DOTALL):
         number = -1
         for entry in filter(None, (part.strip() for part in body.split(","))):
             name, _, given = (part.strip() for part in entry.partition("="))
@@ -156,12 +161,14 @@ def unit() -> str:
     return "".join(f'#include "{name}"\n' for name in ("kernel.h", *includes))
 
 
-def compiled(flags: Sequence[str] = (), compiler: Sequence[str] = ("cc",)) -> ctypes.CDLL:
-    """Compile the kernel with all its functions visible."""
+def compiled(
+    flags: Sequence[str] = (), compiler: Sequence[str] = ("cc",), text: str = ""
+) -> ctypes.CDLL:
+    """Compile the kernel, and more C, with all its functions visible."""
     folder = Path(mkdtemp(prefix="prbm-kernel-"))
     try:
         source, library = folder / "kernel.c", folder / "kernel.so"
-        source.write_text(unit())
+        source.write_text(unit() + text)
         command = [*compiler, *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
         subprocess.run(command, check=True, capture_output=True, text=True)
         return ctypes.CDLL(str(library))

@@ -44,9 +44,14 @@ from .variables import (
 
 FILE = "mechanism.bin"
 MAGIC, VERSION = b"PRBM", 2
-HEAD = 16  # bytes before those that the check sum is of
+HEAD = 16  # Bytes before those of the checksum.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
-MOST_COORDINATES, MOST_STOPS, MOST_PLACES, MOST_POINTS = 512, 64, 1024, 4096  # of the C kernel
+COORDINATES_MAX = 512  # A mass matrix of 2 MB; no mechanism of this kind has as many.
+STOPS_MAX = 64  # Also of friction points.
+PLACES_MAX = 1024  # Forces, and probes.
+GROUND_POINTS_MAX = 4096  # Every pair of them has a distance.
+PIVOTS_MAX = 256  # Pivots of a flexure, and links of a chain.
+GROUND_NUMBER = 0  # Bodies are counted from 1.
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
 
 
@@ -91,12 +96,12 @@ def check_size(mechanism: Mechanism) -> None:
     """
     m = mechanism
     for what, count, most in (
-        ("coordinates", assemble(m, m.values()).n, MOST_COORDINATES),
-        ("stops", len(m.stops), MOST_STOPS),
-        ("frictions", len(m.frictions), MOST_STOPS),
-        ("forces", len(m.forces), MOST_PLACES),
-        ("probes", len(m.probes), MOST_PLACES),
-        ("points of the ground", len(m.ground), MOST_POINTS),
+        ("coordinates", assemble(m, m.values()).n, COORDINATES_MAX),
+        ("stops", len(m.stops), STOPS_MAX),
+        ("frictions", len(m.frictions), STOPS_MAX),
+        ("forces", len(m.forces), PLACES_MAX),
+        ("probes", len(m.probes), PLACES_MAX),
+        ("points of the ground", len(m.ground), GROUND_POINTS_MAX),
     ):
         if count > most:
             raise MechanismError(
@@ -157,7 +162,8 @@ class _Writer:
         self.starts = {v.name: v.start for v in variables}
         self.parameters = {p.name: i for i, p in enumerate(mechanism.parameters)}
         self.inputs = input_names(mechanism)
-        self.body = {b.name: i for i, b in enumerate(mechanism.bodies, start=1)} | {GROUND: 0}
+        self.body = {b.name: i for i, b in enumerate(mechanism.bodies, start=1)}
+        self.body[GROUND] = GROUND_NUMBER
         self.type = {kind.name: i for i, kind in enumerate(mechanism.flexure_types)}
         self.bounds = [*self._bounds()]
 

@@ -39,6 +39,8 @@ LATCHED = (
     "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
     "energy_lost", "modal_restitution", "impulse_sum",
 )  # fmt: skip
+LINK_OUTPUTS = ("angle", "omega")
+STRETCH_OUTPUTS = ("strain", "strain_rate")
 LINK_ANGLE = re.compile(r"^link\[\d+\]\.angle$")
 LINK_STRAIN = re.compile(r"^link\[\d+\]\.strain$")
 INDICATORS = ("impact", "release", "slip")  # event indicators of a stop

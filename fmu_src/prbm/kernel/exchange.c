@@ -118,11 +118,11 @@ static bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
     Rows loops = plain_rows(system, r, system->loops, system->loops_c);
     bool closed = false, regular = true;
     dependents(sim->mechanism, dependent);
-    for (int step = 0; step < ITERATIONS && regular && !closed; step++) {
+    for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && regular && !closed; step++) {
         directions(system, q, sim->e);
         scalars(&loops, sim->e, s);
         double error = largest(r, s), length = system->length;
-        closed = error <= CLOSED * length || (BARELY_CLOSED * length >= best && best <= error);
+        closed = error <= CONSTRAINT_RTOL * length || (CONSTRAINT_STALLED_RTOL * length >= best && best <= error);
         best = lesser(best, error);
         jacobian(&loops, sim->e, rows);
         regular = factor_dependents(sim, rows, dependent, a, pivot);
@@ -568,7 +568,7 @@ static void arm(Simulation *sim) {
 
 static bool let_all_happen(Simulation *sim, Problem *problem) {
     enum { MOST_AT_ONCE = 16 };
-    bool struck[MOST_STOPS] = {false};
+    bool struck[STOPS_MAX] = {false};
     bool thrown = impulses_changed(sim);
     if (!evaluate_motion(sim, problem) || !receive_impulses(sim, problem)) {
         return false;

@@ -442,7 +442,7 @@ static void start_discrete(Simulation *sim) {
 }
 
 static bool set_off(Simulation *sim, Problem *problem) {
-    int every[MOST_STOPS];
+    int every[STOPS_MAX];
     for (int i = 0; i < sim->system.s; i++) {
         every[i] = i;
     }
@@ -584,7 +584,7 @@ static bool plan_walls(const Simulation *sim, double time, Wall *planned) {
  * a wall that it touches.  Such a stop is returned, or -1. */
 PRBM int unsettled(Simulation *sim) {
     int n = sim->system.n, struck = -1;
-    double gaps[MOST_STOPS], rates[MOST_STOPS], bound = still(sim);
+    double gaps[STOPS_MAX], rates[STOPS_MAX], bound = still(sim);
     directions(&sim->system, sim->front, sim->e);
     for (int i = 0; i < sim->system.s; i++) {
         gaps[i] = gap(&sim->equations, i, sim->now->time, sim->e);
@@ -991,7 +991,7 @@ static bool polished(Simulation *sim, int i, double opens, double *time, Problem
 static bool closing(Simulation *sim, int i, Event *first, Problem *problem) {
     int n = sim->system.n;
     double near = TOUCHING * sim->system.length, *gaps = sim->look_gap, *rates = sim->look_rate;
-    double bound = still(sim), closed = CLOSED * sim->system.length;
+    double bound = still(sim), closed = CONSTRAINT_RTOL * sim->system.length;
     Guard guard = {sim, IMPACT, i, 1.0, 0.0}, opening = {sim, IMPACT, i, -1.0, 0.0};
     Guard deeper = {sim, IMPACT, i, 1.0, near};
     for (int k = 0; k <= WATCHED; k++) {
@@ -1567,7 +1567,7 @@ static bool free_at_rest(Simulation *sim, int count, const Rubbing *rubbing, con
     int n = sim->system.n, resting = 0;
     bool right = true, mobile = false;
     double *row = take(&sim->scratch, (size_t)n);
-    Rubbing at_rest[2 * MOST_STOPS];
+    Rubbing at_rest[2 * STOPS_MAX];
     directions(&sim->system, sim->front, sim->e);
     for (int k = 0; k < count; k++) {
         Rows rows = rows_of(sim, rubbing[k].kind);
@@ -1597,8 +1597,8 @@ static bool free_at_rest(Simulation *sim, int count, const Rubbing *rubbing, con
 static bool settle_together(Simulation *sim, int count, const Rubbing *rubbing, const Turn *turn,
                             Problem *problem) {
     static const int states[3] = {STICKS, SLIDES, SLIDES_BACK};
-    double kept[2 * MOST_STOPS];
-    Rubbing chosen[2 * MOST_STOPS];
+    double kept[2 * STOPS_MAX];
+    Rubbing chosen[2 * STOPS_MAX];
     int many, combinations = 1;
     bool found = false;
     keep_friction(sim, kept);
@@ -1632,8 +1632,8 @@ static bool settle_together(Simulation *sim, int count, const Rubbing *rubbing, 
 static bool settle_friction(Simulation *sim, const Holding *holding, const Turn *turn,
                             Problem *problem) {
     int count = 0;
-    double before[2 * MOST_STOPS];
-    Rubbing rubbing[2 * MOST_STOPS];
+    double before[2 * STOPS_MAX];
+    Rubbing rubbing[2 * STOPS_MAX];
     for (int k = 0; k < holding->count; k++) {
         if (sim->equations.stop_friction[holding->stops[k]] > 0.0) {
             Rubbing one = {SLIDE, holding->stops[k], IDLE};
@@ -1705,7 +1705,7 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, const E
     if (!turn_of(sim, event, &turn, problem)) {
         return false;
     }
-    int n = sim->system.n, s = sim->system.s, candidates[2 * MOST_STOPS], count = 0;
+    int n = sim->system.n, s = sim->system.s, candidates[2 * STOPS_MAX], count = 0;
     double near = TOUCHING * sim->system.length + RELEASE_GAP, bound = still(sim);
     const double *v = sim->front + n;
     for (int i = 0; i < s; i++) {
@@ -1748,11 +1748,11 @@ PRBM bool settle(Simulation *sim, const int *resting, int resting_count, const E
 
 /* An impact that is being resolved: the stops struck and held, velocities after, impulses. */
 typedef struct {
-    int struck_count, held_count, struck[MOST_STOPS], held[MOST_STOPS];
-    double restitution[MOST_STOPS];
+    int struck_count, held_count, struck[STOPS_MAX], held[STOPS_MAX];
+    double restitution[STOPS_MAX];
     double *after;                          /* (n,) */
-    double normal[MOST_STOPS], tangential[MOST_STOPS];      /* by stop */
-    bool with_normal[MOST_STOPS];                   /* whether the stop took part */
+    double normal[STOPS_MAX], tangential[STOPS_MAX];      /* by stop */
+    bool with_normal[STOPS_MAX];                   /* whether the stop took part */
 } Hits;
 
 /* The a-th of the stops that take part: those that are struck, then those that hold. */
@@ -1907,8 +1907,8 @@ static bool hits_with_friction(Simulation *sim, const Here *here, const double *
 static bool impulse(Simulation *sim, const double *q, const double *v, Hits *hits,
                     Problem *problem) {
     size_t mark = sim->scratch.used;
-    int s = sim->system.s, kept_count = hits->held_count, kept[MOST_STOPS];
-    double mu[MOST_STOPS], u[MOST_STOPS];
+    int s = sim->system.s, kept_count = hits->held_count, kept[STOPS_MAX];
+    double mu[STOPS_MAX], u[STOPS_MAX];
     bool rough = false, pulling = true, right = true;
     Here here = mass_and_loops(sim, q);
     for (int i = 0; i < s; i++) {
@@ -1942,7 +1942,7 @@ static bool impulse(Simulation *sim, const double *q, const double *v, Hits *hit
 static bool captured(Simulation *sim, int i, const Hits *hits, const double *q, const double *v,
                      double speed, bool *result, Problem *problem) {
     size_t mark = sim->scratch.used;
-    int n = sim->system.n, candidates[MOST_STOPS];
+    int n = sim->system.n, candidates[STOPS_MAX];
     *result = speed <= still(sim);
     if (*result) {
         return true;
@@ -2017,7 +2017,7 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
     Rows walls = slide_rows(system);
     int n = system->n, s = system->s;
     bool any = false, right = true;
-    double lost[MOST_STOPS], before[MOST_STOPS], after[MOST_STOPS], all_lost = 0.0, work = 0.0, modal = 0.0;
+    double lost[STOPS_MAX], before[STOPS_MAX], after[STOPS_MAX], all_lost = 0.0, work = 0.0, modal = 0.0;
     directions(&sim->system, q, sim->e);
     for (int i = 0; i < s; i++) {
         double wall = sim->walls[i].rate;
@@ -2061,9 +2061,9 @@ static bool book(Simulation *sim, const Hits *hits, const bool *counted, const d
 /* Resolve the impact of a stop and of all that touch with it. */
 PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     size_t mark = sim->scratch.used;
-    int n = sim->system.n, s = sim->system.s, resting[MOST_STOPS], resting_count = 0;
-    double near = TOUCHING * sim->system.length, bound = still(sim), rates[MOST_STOPS];
-    bool counted[MOST_STOPS];
+    int n = sim->system.n, s = sim->system.s, resting[STOPS_MAX], resting_count = 0;
+    double near = TOUCHING * sim->system.length, bound = still(sim), rates[STOPS_MAX];
+    bool counted[STOPS_MAX];
     double *q = take(&sim->scratch, (size_t)n), *v = take(&sim->scratch, (size_t)n);
     Hits hits;
     hits.after = take(&sim->scratch, (size_t)n);
@@ -2212,7 +2212,7 @@ static bool advance(Simulation *sim, double time, bool each, bool events, bool *
     Scalars *now = sim->now;
     *event = false;
     if (!continues(sim, time)) {
-        Wall planned[MOST_STOPS];
+        Wall planned[STOPS_MAX];
         bool walls = plan_walls(sim, time, planned), rest = within_step(sim, time);
         double begins = now->time, due = due_walls(sim);
         if ((walls || values_changed(sim) || given_changed(sim)) &&
@@ -2320,7 +2320,7 @@ PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     }
     keep_backup(sim);
     sim->fresh = NOTHING;
-    double acted[MOST_STOPS];
+    double acted[STOPS_MAX];
     for (int i = 0; i < sim->system.s; i++) {
         acted[i] = *acting_velocity(sim, i);
     }
@@ -2329,7 +2329,7 @@ PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     }
     bool right = !event || let_happen(sim, problem);
     if (right && thrown) {
-        Wall walls[MOST_STOPS];
+        Wall walls[STOPS_MAX];
         memcpy(walls, sim->walls, (size_t)sim->system.s * sizeof *walls);
         right = restart(sim, walls, problem);
     }
@@ -2579,7 +2579,7 @@ static bool sound_state(const Simulation *sim) {
                  whole_number(now->has_arc, 0, 1) && whole_number(now->underway, 0, 1) &&
                  whole_number(now->adrift, 0, 1) &&
                  whole_number(now->event_kind, 0, (int)RUB) && now->h >= 0.0 &&
-                 whole_number(now->event_index, 0, MOST_STOPS) && now->window_count >= 0.0 &&
+                 whole_number(now->event_index, 0, STOPS_MAX) && now->window_count >= 0.0 &&
                  now->window_count <= CHATTER && sound_event(sim);
     if (sound && now->started != 0.0) {
         sound = now->tolerance >= 1e-13 && now->tolerance <= 1e-2 && now->frequency >= 0.0 &&

@@ -15,6 +15,10 @@ LOADS = {"x": "N", "y": "N", "moment": "N.m"}
 """Components of a force and their units; times s, those of an impulse."""
 MOBILITY = "mobility"
 """The input of a stop that is the inverse mass of its wall."""
+WALL_INPUTS = {"displacement": "m", "velocity": "m/s"}
+"""Inputs of a stop that move its wall, and their units."""
+BASE_AXES = "xy"
+"""Components of the acceleration of the base."""
 
 T = TypeVar("T", float, Real, float | Real)
 
@@ -89,10 +93,10 @@ def input_units(mechanism: Mechanism) -> dict[str, str]:
     """Return the inputs in the order of the interface, with their units."""
     units = {f"{f.name}.{axis}": unit for f in mechanism.forces for axis, unit in LOADS.items()}
     for stop in mechanism.stops:
-        units |= {f"{stop.name}.displacement": "m", f"{stop.name}.velocity": "m/s"}
+        units |= {f"{stop.name}.{what}": unit for what, unit in WALL_INPUTS.items()}
     units |= _impulse_units(mechanism)
     units |= {f"{stop.name}.{MOBILITY}": "1/kg" for stop in mechanism.stops}
-    return units | {f"base.acceleration.{axis}": "m/s2" for axis in "xy"}
+    return units | {f"base.acceleration.{axis}": "m/s2" for axis in BASE_AXES}
 
 
 def input_names(mechanism: Mechanism) -> tuple[str, ...]:

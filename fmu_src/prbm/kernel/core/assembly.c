@@ -1,172 +1,14 @@
-/* From a mechanism and parameter values to the constant arrays: the twin of prbm/assembly.py.
- *
- * Each link and body has an arm E = exp(s + i theta), E' = i w E, w = theta' - i s', and places are
- * z = c + A E.  A coordinate is an angle theta or a stretch s; e has E for angles and -i E for
- * stretches, so that dE/dq = i e for both.
- */
+/* From a mechanism and parameter values to the constant arrays: the twin of
+ * mechanics/assembly.py. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#include "kernel.h"
-
-#define TOGETHER 1e-9 /* of the size: points that a joint joins are drawn no further apart */
-
-PRBM Complex complex_of(double re, double im) {
-    Complex z = {re, im};
-    return z;
-}
-
-PRBM Complex plus(Complex a, Complex b) {
-    return complex_of(a.re + b.re, a.im + b.im);
-}
-
-PRBM Complex minus(Complex a, Complex b) {
-    return complex_of(a.re - b.re, a.im - b.im);
-}
-
-PRBM Complex product(Complex a, Complex b) {
-    return complex_of(a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re);
-}
-
-PRBM Complex conjugate(Complex a) {
-    return complex_of(a.re, -a.im);
-}
-
-PRBM Complex scaled(double x, Complex a) {
-    return complex_of(x * a.re, x * a.im);
-}
-
-PRBM double modulus(Complex a) {
-    return sqrt(a.re * a.re + a.im * a.im);
-}
-
-/* Frames with rows of n columns. */
-static BodyFrame *place_frames(Memory *memory, size_t count, size_t n) {
-    BodyFrame *frames = place(memory, count, sizeof *frames);
-    Complex *rows = place(memory, count * n, sizeof *rows);
-    for (size_t i = 0; memory->base && i < count; i++) {
-        frames[i].A = rows + i * n;
-    }
-    return frames;
-}
-
-static Place *place_origins(Memory *memory, size_t count, size_t n) {
-    Place *origins = place(memory, count, sizeof *origins);
-    Complex *rows = place(memory, count * n, sizeof *rows);
-    for (size_t i = 0; memory->base && i < count; i++) {
-        origins[i].A = rows + i * n;
-    }
-    return origins;
-}
-
-PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
-    const Mechanism *m = mechanism;
-    size_t n = (size_t)m->coordinate_count, r = (size_t)m->loop_count;
-    size_t p = (size_t)m->mass_count, s = (size_t)m->stop_count, f = (size_t)m->friction_count;
-    size_t b = (size_t)m->body_count;
-    System result = {0};
-    result.mechanism = mechanism;
-    result.n = (int)n;
-    result.even = even_length((int)n);
-    result.r = (int)r;
-    result.s = (int)s;
-    result.f = (int)f;
-    result.b = (int)b;
-    result.q0 = place(memory, n, sizeof(double));
-    result.e0 = place(memory, n, sizeof(Complex));
-    result.J = place(memory, n, sizeof(double));
-    result.K = place(memory, n * n, sizeof(double));
-    result.H = place(memory, n * n, sizeof(Complex));
-    result.A = place(memory, p * n, sizeof(Complex));
-    result.c = place(memory, p, sizeof(Complex));
-    result.m = place(memory, p, sizeof(double));
-    result.S = place(memory, n, sizeof(Complex));
-    result.loops = place(memory, r * n, sizeof(Complex));
-    result.loops_c = place(memory, r, sizeof(double));
-    result.gaps = place(memory, s * n, sizeof(Complex));
-    result.slides = place(memory, s * n, sizeof(Complex));
-    result.gaps_c = place(memory, s, sizeof(double));
-    result.gaps_z = place(memory, s, sizeof(Complex));
-    result.slides_z = place(memory, s, sizeof(Complex));
-    result.on = place(memory, s, sizeof(int));
-    result.rubs = place(memory, f * n, sizeof(Complex));
-    result.lifts = place(memory, f * n, sizeof(Complex));
-    result.lifts_c = place(memory, f, sizeof(double));
-    result.release = place(memory, n, sizeof(Complex));
-    result.bodies = place_frames(memory, b, n);
-    result.pushed = place_frames(memory, (size_t)m->force_count, n);
-    result.probes = place_frames(memory, (size_t)m->probe_count, n);
-    result.origins = place_origins(memory, b + 1, n);
-    result.stretch_count = m->stretch_count;
-    result.stretches = m->stretches;
-    result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
-    result.blocks = place(memory, n, sizeof(Block));
-    result.coupling = place(memory, n * n, sizeof(Complex));
-    result.own = place(memory, n, sizeof(double));
-    result.straight = place(memory, (size_t)result.even, sizeof(double));
-    result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
-    *system = result;
-}
-
-/* --- arms ------------------------------------------------------------------------------------- */
-
-PRBM int arm_of(const System *system, int j) {
-    return system->mechanism->coordinates[j].arm;
-}
-
-/* Unit vectors e become the arms and, at stretches, -i times those. */
-static void stretch(const System *system, const double *q, Complex *e) {
-    for (int k = 0; k < system->stretch_count; k++) {
-        int j = system->stretches[k], a = arm_of(system, j);
-        e[a] = scaled(exponential(q[j]), e[a]);
-        e[j] = complex_of(e[a].im, -e[a].re);
-    }
-}
-
-PRBM void directions(const System *system, const double *q, Complex *e) {
-    unit_vectors(system->n, q, e);
-    stretch(system, q, e);
-}
-
-PRBM void turning(const System *system, const double *v, Complex *w) {
-    for (int j = 0; j < system->n; j++) {
-        w[j] = complex_of(v[j], 0.0);
-    }
-    for (int k = 0; k < system->stretch_count; k++) {
-        int j = system->stretches[k];
-        w[arm_of(system, j)].im = -v[j];
-        w[j] = complex_of(0.0, 0.0);
-    }
-}
-
-PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
-                 Complex *displacement, Complex *velocity) {
-    Complex at = minus(frame->c, frame->drawn), speed = {0.0, 0.0};
-    for (int j = 0; j < system->n; j++) {
-        Complex arm = product(frame->A[j], e[j]);
-        at = plus(at, arm);
-        speed.re -= arm.im * v[j];
-        speed.im += arm.re * v[j];
-    }
-    for (int k = 0; k < system->stretch_count; k++) {
-        int j = system->stretches[k];
-        Complex along_arm = product(frame->A[arm_of(system, j)], e[j]);
-        speed.re -= along_arm.im * v[j];
-        speed.im += along_arm.re * v[j];
-    }
-    *displacement = at;
-    *velocity = speed;
-}
-
-PRBM void spread(const System *system, int r, const Complex *B, Complex *rows) {
-    int n = system->n;
-    for (int i = 0; i < r * n; i += n) {
-        for (int j = 0; j < n; j++) {
-            rows[i + j] = B[i + arm_of(system, j)];
-        }
-    }
-}
+#include "core/assembly.h"
+#include "core/constraints.h"
+#include "core/flexure.h"
+#include "core/kinetics.h"
+#include "core/matrix.h"
 
 /* --- values and places ------------------------------------------------------------------------ */
 
@@ -258,7 +100,7 @@ static bool cut_flexure(const System *system, const Flexure *flexure, Segments *
     const Connection *between = &flexure->between;
     double L = modulus(minus(at_point(system, between->end_point),
                              at_point(system, between->start_point)));
-    if (!(L >= 1e-9)) {
+    if (!(L >= TINY_LENGTH)) {
         return fail(problem, "flexure %s has the length %g m: move its ends apart", flexure->name,
                     L);
     }
@@ -316,7 +158,7 @@ static Span span_of(const System *system, const Step *step) {
 static bool walk_joint(System *system, const Step *step, Scratch *scratch, Problem *problem) {
     Span span = span_of(system, step);
     double apart = modulus(minus(span.z_end, span.z_start));
-    if (!(apart <= TOGETHER * system->length)) {
+    if (!(apart <= JOINT_DISTANCE_RTOL * system->length)) {
         return fail(problem,
                     "the joint %s joins points that are drawn %.4g m apart: draw them at the same "
                     "place",
@@ -453,21 +295,6 @@ static double along(int n, Complex u, const Complex *A, const Complex *e0, Compl
         c += product(B[j], e0[j]).re;
     }
     return -c;
-}
-
-PRBM Complex unit(double degrees) {
-    static const double RADIANS = 0.017453292519943295; /* pi / 180 */
-    double quarters = floor(degrees / 90.0), rest = degrees - 90.0 * quarters;
-    int quarter = (int)(quarters - 4.0 * floor(quarters / 4.0));
-    double angle = rest * RADIANS;
-    Complex e = {1.0, 0.0};
-    if (rest != 0.0) {
-        unit_vectors(1, &angle, &e);
-    }
-    for (int i = 0; i < quarter; i++) {
-        e = complex_of(-e.im, e.re);
-    }
-    return e;
 }
 
 /* The gap of a stop, but for its wall's position, as seen from what the wall is fixed to, and the
@@ -639,7 +466,7 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
     }
     if (sound) {
         symmetric_eigen(system->n, M, w, NULL);
-        sound = w[0] > 1e-13;
+        sound = w[0] > MASSLESS_RTOL;
     }
     scratch->used = mark;
     if (!sound) {
@@ -721,7 +548,7 @@ static bool check_loops(const System *system, const Complex *e0, Scratch *scratc
     Rows loops = plain_rows(system, r, system->loops, system->loops_c);
     jacobian(&loops, e0, rows);
     double scale = largest(r * n, rows);
-    bool any = repeated_loops(r, n, rows, loop, 1e-9 * scale, repeated);
+    bool any = repeated_loops(r, n, rows, loop, DEPENDENT_LOOP_RTOL * scale, repeated);
     name_loops(system->mechanism, repeated, names, sizeof names);
     scratch->used = mark;
     return !any || fail(problem,

@@ -1,20 +1,14 @@
 /* Rigid impacts in contact space: Newton's law for all stops at once, Stronge's with friction.
  *
- * Sources: as in the twin, prbm/contact.py.
+ * Sources: as in the twin, mechanics/contact.py.
  */
 #include <math.h>
 
-#include "kernel.h"
+#include "core/constraints.h"
+#include "core/contact.h"
+#include "core/matrix.h"
 
-#define FEASIBLE 1e-10 /* of the largest approach: what the complementarity may be violated by */
-#define WEDGED 1e-10   /* of the inverse normal mass: a smaller rate of approach is a rounding */
-#define ROUNDING 1e-12 /* of the rates before: what is left of a rate that has vanished */
-#define SETTLED 1e-14  /* change of the impulses at which the sweeps end, relative */
-enum {
-    SWEEPS = 2000, /* of Gauss-Seidel over several contacts with friction */
-    SEARCHED = 12, /* stops of which every set is tried; of more, there are too many sets */
-};
-static const double RELAXATIONS[] = {1.0, 0.3, 0.05}; /* of the sweeps, tried in this order */
+static const double RELAXATIONS[] = SWEEP_RELAXATIONS;
 
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
                    double *X, Scratch *scratch, Problem *problem) {
@@ -66,7 +60,7 @@ static void impulses_of_set(int k, int size, const int *members, const double *W
             part[i * size + j] = W[members[i] * k + members[j]];
         }
     }
-    least_squares(size, size, part, right, 1e-13, found, scratch);
+    least_squares(size, size, part, right, IMPULSE_RANK_RTOL, found, scratch);
     zeros(k, P);
     for (int i = 0; i < size; i++) {
         P[members[i]] = found[i];
@@ -95,7 +89,7 @@ static void keep_positive(int k, const double *P, double *kept) {
 /* Gauss-Seidel, which lowers P.W P/2 + b.P with each step, where the sets are too many. */
 static void newton_sweeps(int k, const double *W, const double *b, double *P) {
     zeros(k, P);
-    for (int sweep = 0; sweep < SWEEPS; ++sweep) {
+    for (int sweep = 0; sweep < SWEEPS_MAX; ++sweep) {
         for (int i = 0; i < k; i++) {
             double mobility = W[i * k + i];
             if (mobility > 0.0) {
@@ -138,8 +132,8 @@ PRBM void newton(int k, const double *W, const double *u, const double *restitut
     for (int i = 0; i < k; i++) {
         b[i] = (1.0 + restitution[i]) * u[i];
     }
-    if (k <= SEARCHED) {
-        newton_search(k, W, b, FEASIBLE * largest(k, u), P, scratch);
+    if (k <= IMPACT_SETS_MAX) {
+        newton_search(k, W, b, COMPLEMENTARITY_RTOL * largest(k, u), P, scratch);
     } else {
         newton_sweeps(k, W, b, P);
     }
@@ -202,7 +196,7 @@ static double compress(Hit *hit) {
     double work = 0.0;
     while (hit->u_n < 0.0) {
         double sticking = stops_sliding(hit);
-        double closed = hit->rate_n > WEDGED * hit->nn ? -hit->u_n / hit->rate_n : HUGE_VAL;
+        double closed = hit->rate_n > WEDGED_RTOL * hit->nn ? -hit->u_n / hit->rate_n : HUGE_VAL;
         double step = lesser(sticking, closed);
         if (step == HUGE_VAL) {
             break;
@@ -218,7 +212,7 @@ static double compress(Hit *hit) {
 static void restore(Hit *hit, double left) {
     while (left > 0.0) {
         double sticking = stops_sliding(hit);
-        double rate = fabs(hit->rate_n) > WEDGED * hit->nn ? hit->rate_n : 0.0;
+        double rate = fabs(hit->rate_n) > WEDGED_RTOL * hit->nn ? hit->rate_n : 0.0;
         double spent = restitution_ends(hit->u_n, rate, left);
         double step = lesser(sticking, spent);
         if (step == HUGE_VAL) {
@@ -238,7 +232,8 @@ PRBM void stronge(const double *W, const double *u, double friction, double rest
                   double *P_n, double *P_t) {
     Hit hit = {.nn = W[0], .nt = W[1], .tt = W[3], .friction = friction, .u_n = u[0], .u_t = u[1]};
     double reach = hit.nn > 0.0 ? fabs(hit.u_n) * sqrt(hit.tt / hit.nn) : 0.0;
-    double small_n = ROUNDING * fabs(hit.u_n), small_t = ROUNDING * (fabs(hit.u_t) + reach);
+    double small_n = ZERO_SPEED_RTOL * fabs(hit.u_n);
+    double small_t = ZERO_SPEED_RTOL * (fabs(hit.u_t) + reach);
     double work = compress(&hit);
     /* with one degree of freedom both rates vanish together, up to a rounding */
     hit.u_n = hit.u_n > small_n ? hit.u_n : 0.0;
@@ -270,7 +265,7 @@ static bool relaxed_sweeps(int k, const double *W, const double *u, const double
                            const double *least, double relaxation, double *P, double *last) {
     copy(k, least, P);
     zeros(k, P + k);
-    for (int sweep = 0; sweep < SWEEPS; ++sweep) {
+    for (int sweep = 0; sweep < SWEEPS_MAX; ++sweep) {
         copy(2 * k, P, last);
         for (int i = 0; i < k; i++) {
             relax(2 * k, W, u, relaxation, i, least[i], HUGE_VAL, P);
@@ -280,7 +275,7 @@ static bool relaxed_sweeps(int k, const double *W, const double *u, const double
         for (int i = 0; i < 2 * k; i++) {
             last[i] -= P[i];
         }
-        if (largest(2 * k, last) <= SETTLED * relaxation * largest(2 * k, P)) {
+        if (largest(2 * k, last) <= SWEEP_RTOL * relaxation * largest(2 * k, P)) {
             return true;
         }
     }
@@ -334,7 +329,7 @@ static bool restitution_of_several(int k, const double *W, const double *after,
     if (gain <= lost) {
         return true;
     }
-    while (gain > lost && high - low > 1e-12) {
+    while (gain > lost && high - low > REBOUND_RTOL) {
         double s = (low + high) / 2, trial;
         if (!rebound(k, W, after, friction, wanted, s, R, &trial, scratch, problem)) {
             return false;

@@ -1,7 +1,7 @@
-/* Flexures as rigid segments, torsion springs and axial ones: the twin of prbm/flexure.py. */
+/* Flexures as rigid segments, torsion springs and axial ones: the twin of mechanism/flexure.py. */
 #include <math.h>
 
-#include "kernel.h"
+#include "core/flexure.h"
 
 PRBM bool stub(int pivots, const double *gamma, double *gamma0, Problem *problem) {
     double sum = 0.0;
@@ -9,7 +9,7 @@ PRBM bool stub(int pivots, const double *gamma, double *gamma0, Problem *problem
         sum += gamma[i];
     }
     *gamma0 = 1.0 - sum;
-    if (*gamma0 < -1e-12) {
+    if (*gamma0 < -STUB_RTOL) {
         return fail(problem,
                     "the links of a flexure are longer than the flexure: the sum of its gammas is "
                     "%.6g, so that gamma0 = %.6g < 0; choose gammas that add up to at most 1",

@@ -1,5 +1,5 @@
-/* Generalised forces: the twin of prbm/forces.py. */
-#include "kernel.h"
+/* Generalised forces: the twin of mechanics/forces.py. */
+#include "core/forces.h"
 
 PRBM void springs(int n, const double *K, const double *deflection, double *torque) {
     for (int i = 0; i < n; i++) {

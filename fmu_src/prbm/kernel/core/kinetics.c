@@ -1,5 +1,5 @@
-/* Mass matrix, quadratic velocities, kinetic energy: the twin of prbm/kinetics.py. */
-#include "kernel.h"
+/* Mass matrix and quadratic velocities: the twin of mechanics/kinetics.py. */
+#include "core/kinetics.h"
 
 PRBM void inertia(int n, const Complex *H, const double *J, const Complex *e, double *M,
                   double *C) {
@@ -10,14 +10,4 @@ PRBM void inertia(int n, const Complex *H, const double *J, const Complex *e, do
             C[i * n + j] = -turned.im;
         }
     }
-}
-
-PRBM double kinetic_energy(int n, const double *M, const double *v) {
-    double sum = 0.0;
-    for (int i = 0; i < n; i++) {
-        for (int j = 0; j < n; j++) {
-            sum += v[i] * M[i * n + j] * v[j];
-        }
-    }
-    return 0.5 * sum;
 }

@@ -6,7 +6,7 @@
 #include <float.h>
 #include <math.h>
 
-#include "kernel.h"
+#include "core/matrix.h"
 
 enum { ROTATION_SWEEPS = 60 }; /* Jacobi's converge quadratically: about six are usual */
 

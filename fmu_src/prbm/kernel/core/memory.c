@@ -2,7 +2,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-#include "kernel.h"
+#include "core/memory.h"
 
 enum { ALIGNMENT = 16 };
 
@@ -27,7 +27,7 @@ PRBM void *place(Memory *memory, size_t count, size_t size) {
     return memory->base == NULL ? NULL : memory->base + start;
 }
 
-/* What is taken too much is counted too, so that most is what would have been enough. */
+/* Requests beyond the size count, too, so that most is the size that would suffice. */
 PRBM double *take(Scratch *scratch, size_t count) {
     double *taken = scratch->base + scratch->used;
     bool enough = scratch->used <= scratch->size && count <= scratch->size - scratch->used;

@@ -1,10 +1,12 @@
 /* Small vibrations about a static shape, and what an impact leaves in the fundamental mode: the
- * twin of prbm/modal.py. */
+ * twin of mechanics/modal.py. */
 #include <math.h>
 
-#include "kernel.h"
-
-#define AT_EASE 1e-7 /* of the highest frequency: a lower one is what rounding leaves of none */
+#include "core/constraints.h"
+#include "core/forces.h"
+#include "core/kinetics.h"
+#include "core/matrix.h"
+#include "core/modal.h"
 
 #define FULL_TURN 6.283185307179586 /* rad */
 
@@ -149,7 +151,7 @@ PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch
     bool found = equilibrium(system, false, 0.0, &shape, scratch, problem) &&
                  modes(system, &shape, frequencies, phi, scratch, problem);
     if (found) {
-        bool bends = frequencies[0] > AT_EASE * largest(k, frequencies);
+        bool bends = frequencies[0] > ZERO_FREQUENCY_RTOL * largest(k, frequencies);
         *frequency = bends ? frequencies[0] : 0.0;
     }
     scratch->used = used;
@@ -215,5 +217,5 @@ PRBM double simulated_restitution(int n, const double *phi, const double *M, con
         leaving += momentum * after[i];
         size += fabs(momentum) * (fabs(before[i]) + fabs(after[i]));
     }
-    return fabs(arriving) <= 1e-12 * size ? 0.0 : -leaving / arriving;
+    return fabs(arriving) <= ZERO_MODE_RTOL * size ? 0.0 : -leaving / arriving;
 }

@@ -1,18 +1,15 @@
-/* Static equilibrium under gravity and a holding force: the twin of prbm/statics.py.
+/* Static equilibrium under gravity and a holding force: the twin of mechanics/statics.py.
  *
  * At rest the torques balance: -K (q - q0) + Re(w e) + J^T lam + r^T F = 0.
  */
 #include <math.h>
 
-#include "kernel.h"
-
-#define LARGEST_TURN 0.5 /* rad per Newton step and step of the load: further is another shape */
-#define SMALLEST_FRACTION (1.0 / 512) /* of the load, before the continuation gives up */
-#define BALANCED 1e-12 /* of the largest spring rate times one radian, or else of the load */
-#define CONVERGED 1e-8 /* rad of the last Newton step; what is left after it is its square */
-#define IMMOBILE 1e-12 /* share of a body's mobility that loops leave it: below, it cannot move */
-
-enum { NEWTON_STEPS = 30 };
+#include "core/constraints.h"
+#include "core/contact.h"
+#include "core/forces.h"
+#include "core/kinetics.h"
+#include "core/matrix.h"
+#include "core/statics.h"
 
 PRBM void stack_release(const System *system, Complex *B, double *c) {
     int n = system->n, r = system->r;
@@ -93,7 +90,7 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
     }
     bool solved = solve(size, kkt, change, scratch, &ignored);
     double turn = solved ? largest(n, change) : HUGE_VAL;
-    double share = lesser(1.0, LARGEST_TURN / greater(turn, 1e-300));
+    double share = lesser(1.0, STATICS_TURN_MAX / greater(turn, 1e-300));
     for (int i = 0; solved && i < size; i++) {
         state[i] += (i < n ? share : -share) * change[i];
     }
@@ -109,18 +106,19 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     int n = system->n, r = balance->rows.count;
     Complex *e = take_complex(scratch, 1, n);
     double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
-    double *rows = take_matrix(scratch, r, n), scale = BALANCED * largest(n * n, system->K);
+    double *rows = take_matrix(scratch, r, n);
+    double scale = STATICS_FORCE_RTOL * largest(n * n, system->K);
     double turn = HUGE_VAL;
     bool going = true, balanced = false, done = false;
     for (int j = 0; j < n && scale == 0.0; j++) {
-        scale = greater(scale, BALANCED * modulus(balance->w[j]));
+        scale = greater(scale, STATICS_FORCE_RTOL * modulus(balance->w[j]));
     }
-    for (int step = 0; step < NEWTON_STEPS && going && !done; step++) {
+    for (int step = 0; step < STATICS_ITERATIONS_MAX && going && !done; step++) {
         directions(system, state, e);
         unbalanced(balance, state, e, torque, open_by, rows, scratch);
-        bool closed = largest(r, open_by) <= 1e-13 * system->length;
+        bool closed = largest(r, open_by) <= STATICS_CONSTRAINT_RTOL * system->length;
         balanced = closed && largest(n, torque) <= scale;
-        done = balanced && turn <= CONVERGED;
+        done = balanced && turn <= STATICS_STEP_ATOL;
         going = done || newton_step(balance, e, torque, open_by, rows, state, &turn, scratch);
     }
     scratch->used = used;
@@ -182,12 +180,12 @@ static bool load_slowly(const System *system, bool held, double displacement, do
     size_t used = scratch->used;
     int size = system->n + system->r + held;
     double *trial = take(scratch, (size_t)size), done = 0.0, fraction = 1.0;
-    while (done < 1.0 && fraction >= SMALLEST_FRACTION) {
+    while (done < 1.0 && fraction >= STATICS_LOAD_STEP_MIN) {
         double target = lesser(1.0, done + fraction);
         copy(size, state, trial);
         /* a jump of a link leads to another branch, where slow loading does not take it */
         if (loaded(system, held, displacement, target, trial, scratch) &&
-            jump(system, state, trial) <= LARGEST_TURN) {
+            jump(system, state, trial) <= STATICS_TURN_MAX) {
             copy(size, trial, state);
             done = target;
             fraction = lesser(1.0, 2 * fraction);
@@ -225,7 +223,7 @@ static bool releasable(const System *system, const double *M, int r, const doubl
                  response(n, 0, 1, M, rows, row, free, scratch, problem);
     double share = right ? dot(n, row, left) / dot(n, row, free) : 0.0;
     scratch->used = used;
-    if (right && !(share > IMMOBILE)) {
+    if (right && !(share > RELEASE_MOBILITY_RTOL)) {
         const Mechanism *m = system->mechanism;
         return fail(problem,
                     "release.velocity = %g m/s: the body %s cannot move along the direction of the "

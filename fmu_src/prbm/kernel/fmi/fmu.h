@@ -1,8 +1,8 @@
-/* An instance of an FMU: what FMI 2.0 and FMI 3.0 have in common.
+/* An instance of an FMU: the common part of FMI 2.0 and FMI 3.0.
  *
  * fmi2.c and fmi3.c translate the functions of the two standards to the ones declared here.  An
- * instance is a simulation, the state of the standard's state machine that it is in, and what the
- * importer did wrong and has not yet put right.
+ * instance is a simulation, a state of the standard's state machine, and the rejected values that
+ * the importer has not yet corrected.
  */
 #ifndef PRBM_FMU_H
 #define PRBM_FMU_H
@@ -152,10 +152,10 @@ typedef struct {
 
 /* --- resources.c ------------------------------------------------------------------------------ */
 
-/* Read the tables; what is returned is freed by the caller. */
+/* Read the tables; the caller frees the result. */
 PRBM Mechanism *tables_read(const char *resources, Problem *problem);
 
-/* --- fmu.c: messages -------------------------------------------------------------------------- */
+/* --- journal.c -------------------------------------------------------------------------------- */
 
 #if defined(__GNUC__)
 PRBM void report(const Journal *journal, int status, const char *format, ...)
@@ -169,13 +169,13 @@ PRBM int refuse(const Instance *instance, int status, const char *format, ...);
 PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t count,
                            const char *const *names);
 
-/* --- fmu.c: life ------------------------------------------------------------------------------ */
+/* --- instance.c ------------------------------------------------------------------------------- */
 
 PRBM Instance *instance_open(const Request *request);
 PRBM void instance_close(Instance *instance);
-/* The instance behind a handle, if the rule allows the call: otherwise NULL, and it is told why. */
+/* The instance of a handle if the rule allows the call; otherwise NULL, and the reason is logged. */
 PRBM Instance *allowed(void *handle, const Rule *rule);
-/* Whether none of n pointers that are needed is NULL; count 0 makes a pointer needless. */
+/* Reject a NULL pointer to count elements; no pointer is needed for none. */
 PRBM bool given(const Instance *instance, const Rule *rule, size_t count, const void *pointer);
 PRBM int set_up(Instance *instance, bool tolerance_defined, double tolerance, double start_time,
                 bool stop_defined, double stop_time);
@@ -183,20 +183,20 @@ PRBM int exit_initialization(Instance *instance);
 PRBM int end_run(Instance *instance);
 PRBM int reset(Instance *instance);
 
-/* --- fmu.c: values ---------------------------------------------------------------------------- */
+/* --- values.c --------------------------------------------------------------------------------- */
 
 PRBM int read_value(Instance *instance, uint32_t reference, int type, double *x);
 PRBM int write_value(Instance *instance, uint32_t reference, int type, double x);
 PRBM int read_clock(Instance *instance, uint32_t reference, bool *active);
 
-/* --- fmu.c: steps and events ------------------------------------------------------------------ */
+/* --- step.c ----------------------------------------------------------------------------------- */
 
 PRBM int make_step(Instance *instance, double time, double size, Outcome *outcome);
 PRBM int enter_event_mode(Instance *instance);
 PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed);
 PRBM int leave_event_mode(Instance *instance, const Rule *rule, Mode next);
 
-/* --- fmu.c: model exchange -------------------------------------------------------------------- */
+/* --- exchange.c ------------------------------------------------------------------------------- */
 
 PRBM int set_time(Instance *instance, double time);
 PRBM int set_states(Instance *instance, const double *x, size_t count);
@@ -209,7 +209,7 @@ PRBM int directional_derivative(Instance *instance, const uint32_t *unknowns, si
                                 const uint32_t *knowns, size_t known_count, const double *seed,
                                 double *sensitivity);
 
-/* --- fmu.c: saved states ---------------------------------------------------------------------- */
+/* --- state.c ---------------------------------------------------------------------------------- */
 
 PRBM int save_state(const Instance *instance, void **state);
 PRBM int restore_state(Instance *instance, const void *state);

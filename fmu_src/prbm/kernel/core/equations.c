@@ -1,0 +1,224 @@
+/* The equations of motion in one discrete state: their rows, laws, loads and workspace. */
+#include <string.h>
+
+#include "core/equations.h"
+#include "core/forces.h"
+#include "core/matrix.h"
+
+static Parts place_parts(Memory *memory, size_t count) {
+    Parts parts;
+    parts.re = place(memory, count, sizeof(double));
+    parts.im = place(memory, count, sizeof(double));
+    return parts;
+}
+
+PRBM void equations_place(Equations *equations, const System *system, Memory *memory) {
+    size_t n = (size_t)system->n, s = (size_t)system->s, f = (size_t)system->f;
+    size_t r = (size_t)system->r + 2 * s + f, even = (size_t)system->even;
+    Equations q = {0};
+    q.system = system;
+    q.discrete.holds = place(memory, s, sizeof(int));
+    q.discrete.slides = place(memory, s, sizeof(int));
+    q.discrete.rubs = place(memory, f, sizeof(int));
+    q.held = place(memory, s, sizeof(int));
+    q.stuck = place(memory, s, sizeof(int));
+    q.rubbing = place(memory, f, sizeof(int));
+    q.sliding = place(memory, s, sizeof(int));
+    q.rub_slides = place(memory, f, sizeof(int));
+    q.stop_friction = place(memory, s, sizeof(double));
+    q.rub_law = place(memory, 3 * f, sizeof(double));
+    q.B = place(memory, r * n, sizeof(Complex));
+    q.z = place(memory, r, sizeof(Complex));
+    q.c = place(memory, r, sizeof(double));
+    q.on = place(memory, r, sizeof(int));
+    q.carried = place(memory, r, sizeof(int));
+    q.own = place(memory, n, sizeof(double));
+    q.w = place(memory, n, sizeof(Complex));
+    q.w_input = place(memory, n, sizeof(Complex));
+    q.moment = place(memory, even, sizeof(double));
+    q.B_conjugate = place_parts(memory, r * even);
+    q.w_parts = place_parts(memory, even);
+    q.start = place(memory, even, sizeof(double));
+    q.e_at_start = place(memory, even, sizeof(Complex));
+    q.e_start = place_parts(memory, even);
+    q.angle = place(memory, even, sizeof(double));
+    q.speed = place(memory, even + 2, sizeof(double));
+    q.squares = place(memory, even, sizeof(double));
+    q.turns = place(memory, even + 2, sizeof(double));
+    q.e = place(memory, even, sizeof(Complex));
+    q.e_parts = place_parts(memory, even);
+    q.rows = place(memory, r * even, sizeof(double));
+    q.columns = place(memory, r * even, sizeof(double));
+    q.x = place(memory, even + 2, sizeof(double));
+    q.lam = place(memory, r, sizeof(double));
+    q.block = place(memory, n * n, sizeof(double));
+    q.least = place(memory, s, sizeof(double));
+    q.most = place(memory, s, sizeof(double));
+    q.factors.even = (int)even;
+    q.factors.blocks = system->blocks;
+    q.factors.L = place(memory, n * n, sizeof(double));
+    q.factors.inverse = place(memory, even, sizeof(double));
+    q.factors.Z = place(memory, r * even, sizeof(double));
+    q.factors.S = place(memory, 2 * r * r + r, sizeof(double));
+    q.factors.pivots = place(memory, r, sizeof(int));
+    *equations = q;
+}
+
+/* --- what holds, sticks and slides ------------------------------------------------------------ */
+
+/* Make the i-th of some rows the next active one, with the constant c. */
+static void add_row(Equations *q, const Rows *rows, int i, double c) {
+    int n = q->system->n, on = seen_from(rows, i);
+    memcpy(q->B + q->r * n, rows->B + i * n, (size_t)n * sizeof *rows->B);
+    q->c[q->r] = c;
+    q->on[q->r] = on;
+    if (on != FIXED) {
+        q->z[q->r] = rows->z[i];
+        q->carried[q->carried_count++] = q->r;
+    }
+    q->r++;
+}
+
+static void set_rows(Equations *q) {
+    const System *system = q->system;
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    Rows gaps = gap_rows(system), walls = slide_rows(system), rubs = rub_rows(system);
+    q->r = q->carried_count = 0;
+    for (int k = 0; k < system->r; k++) {
+        add_row(q, &loops, k, system->loops_c[k]);
+    }
+    q->first_hold = q->r;
+    q->held_count = q->stuck_count = q->rubbing_count = q->sliding_count = 0;
+    for (int i = 0; i < system->s; i++) {
+        if (q->discrete.holds[i]) {
+            q->held[q->held_count++] = i;
+            add_row(q, &gaps, i, system->gaps_c[i] + q->inputs.walls[i].position);
+        }
+    }
+    q->first_stick = q->r;
+    for (int k = 0; k < q->held_count; k++) {
+        int i = q->held[k], slides = q->discrete.slides[i];
+        if (slides == STICKS) {
+            q->stuck[q->stuck_count++] = i;
+            add_row(q, &walls, i, 0.0);
+        } else if (slides != IDLE) {
+            q->sliding[q->sliding_count++] = i;
+        }
+    }
+    q->first_rub = q->r;
+    q->rub_slide_count = 0;
+    for (int i = 0; i < system->f; i++) {
+        int slides = q->discrete.rubs[i];
+        if (slides == STICKS) {
+            q->rubbing[q->rubbing_count++] = i;
+            add_row(q, &rubs, i, 0.0);
+        } else if (slides != IDLE && q->rub_law[3 * i] > 0.0) {
+            q->rub_slides[q->rub_slide_count++] = i;
+        }
+    }
+    Rows active = {system, q->r, q->B, q->c, q->z, q->on};
+    q->active = active;
+}
+
+static Parts parts_from(Parts parts, int start) {
+    parts.re += start;
+    parts.im += start;
+    return parts;
+}
+
+/* What is behind the coordinates in padded vectors stays zero; the rows' parts are spread. */
+static void set_padding(Equations *q) {
+    int n = q->system->n, even = q->system->even;
+    for (int k = 0; k < q->r; k++) {
+        spread(q->system, 1, q->B + k * n, q->w); /* which the loads are put into later */
+        pad_parts(n, q->w, parts_from(q->B_conjugate, k * even));
+    }
+    for (int i = 0; i < q->r * even; i++) {
+        q->B_conjugate.im[i] = -q->B_conjugate.im[i];
+    }
+    copy(n, q->system->own, q->own);
+    zeros(q->r * even, q->factors.Z);
+    zeros(even, q->factors.inverse);
+    q->speed[n] = q->turns[n] = 0.0;
+}
+
+/* Where an index stands in a list that has it. */
+static int place_in(const int *list, int index) {
+    int k = 0;
+    while (list[k] != index) {
+        k++;
+    }
+    return k;
+}
+
+/* The place of a held stop among those that hold. */
+static int held_at(const Equations *q, int stop) {
+    return place_in(q->held, stop);
+}
+
+static void set_laws(Equations *q) {
+    const Mechanism *m = q->system->mechanism;
+    const double *values = q->system->values;
+    q->beta = values[m->damping_beta];
+    q->mass_damping = 2.0 * values[m->damping_zeta] * q->omega;
+    for (int i = 0; i < m->stop_count; i++) {
+        q->stop_friction[i] = evaluate(m->stops[i].friction, values);
+    }
+    for (int i = 0; i < m->friction_count; i++) {
+        q->rub_law[3 * i] = evaluate(m->frictions[i].coefficient, values);
+        q->rub_law[3 * i + 1] = evaluate(m->frictions[i].normal_force, values);
+        q->rub_law[3 * i + 2] = evaluate(m->frictions[i].normal_stiffness, values);
+    }
+}
+
+static void set_loads(Equations *q) {
+    const System *system = q->system;
+    const Mechanism *m = system->mechanism;
+    int n = system->n;
+    zeros(system->even, q->moment);
+    field_row(n, system->S, scaled(-1.0, q->inputs.base), q->w_input);
+    for (int i = 0; i < m->force_count; i++) {
+        const BodyFrame *frame = &system->pushed[i];
+        const double *given = q->inputs.forces + LOADS * i;
+        force_row(n, frame->A, complex_of(given[0], given[1]), q->w);
+        for (int j = 0; j < n; j++) {
+            q->w_input[j] = plus(q->w_input[j], q->w[j]);
+        }
+        q->moment[frame->j] += given[2];
+    }
+    spread(system, 1, q->w_input, q->w_input);
+    field_row(n, system->S, system->gravity, q->w);
+    spread(system, 1, q->w, q->w);
+    q->driven = false;
+    for (int j = 0; j < n; j++) {
+        q->w[j] = plus(q->w_input[j], q->w[j]);
+        q->driven = q->driven || q->w_input[j].re != 0.0 || q->w_input[j].im != 0.0 ||
+                    q->moment[j] != 0.0;
+    }
+    pad_parts(n, q->w, q->w_parts);
+    q->walls_push = false;
+    for (int k = 0; k < q->held_count; k++) {
+        q->walls_push = q->walls_push || q->inputs.walls[q->held[k]].rate != 0.0;
+    }
+}
+
+PRBM void set_equations(Equations *equations, const Inputs *inputs, const Discrete *discrete,
+                        double omega) {
+    Equations *q = equations;
+    size_t s = (size_t)q->system->s, f = (size_t)q->system->f;
+    q->inputs = *inputs;
+    q->omega = omega;
+    memmove(q->discrete.holds, discrete->holds, s * sizeof(int));
+    memmove(q->discrete.slides, discrete->slides, s * sizeof(int));
+    memmove(q->discrete.rubs, discrete->rubs, f * sizeof(int));
+    set_laws(q);
+    set_rows(q);
+    set_padding(q);
+    set_loads(q);
+}
+
+/* --- walls ------------------------------------------------------------------------------------ */
+
+PRBM double wall_at(const Wall *wall, double t) {
+    return wall->position + wall->rate * (t - wall->since);
+}

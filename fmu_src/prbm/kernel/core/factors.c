@@ -1,0 +1,320 @@
+/* Factors of a saddle-point matrix, block by block, for repeated solution. */
+#include "core/factors.h"
+#include "core/matrix.h"
+
+/* M = L D L^T of the lower triangle of M, L with ones on its diagonal, and the inverse of D; false
+ * if M is not positive definite. */
+SIZED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
+    for (int i = 0; i < size; i++) {
+        double pivot = M[i * size + i];
+        for (int j = 0; j < i; j++) {
+            double sum = M[i * size + j];
+            UNROLLED
+            for (int k = 0; k < j; k++) {
+                sum -= L[i * size + k] * L[j * size + k];
+            }
+            L[i * size + j] = sum; /* L_ij D_j so far */
+        }
+        UNROLLED
+        for (int j = 0; j < i; j++) {
+            double share = L[i * size + j] * inverse[j];
+            pivot -= share * L[i * size + j];
+            L[i * size + j] = share;
+        }
+        if (!(pivot > 0.0)) {
+            return false;
+        }
+        inverse[i] = 1.0 / pivot;
+    }
+    return true;
+}
+
+RARE bool factor(int size, const double *M, double *L, double *inverse) {
+    return factor_any(size, M, L, inverse);
+}
+
+#define LEAST_MULTIPLE 1e-280 /* below and above, it is near what doubles can hold */
+#define LARGEST_MULTIPLE 1e280
+
+/* The same of a small M without waiting for one division after the other: elimination without
+ * divisions leaves w_0 = M_00, w_1 = M_00 D_1, w_2 = w_0 w_1 D_2, ..., and all w_k L_ik.  False,
+ * too, where doubles hardly hold these multiples: factor may still succeed, then. */
+SIZED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
+    double w[SMALL][SMALL], multiple = 1.0;
+    bool safe;
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        UNROLLED
+        for (int j = 0; j < size; j++) {
+            w[i][j] = j <= i ? M[i * size + j] : 0.0;
+        }
+    }
+    UNROLLED
+    for (int k = 0; k < size; k++) {
+        UNROLLED
+        for (int i = 0; i < size; i++) {
+            UNROLLED
+            for (int j = 0; j < size; j++) {
+                if (k < j && j <= i) {
+                    w[i][j] = w[k][k] * w[i][j] - w[i][k] * w[j][k];
+                }
+            }
+        }
+    }
+    safe = w[size - 1][size - 1] < LARGEST_MULTIPLE;
+    UNROLLED
+    for (int k = 0; k < size; k++) {
+        double share = 1.0 / w[k][k];
+        safe = safe && w[k][k] > LEAST_MULTIPLE;
+        safe = safe && multiple > LEAST_MULTIPLE && multiple < LARGEST_MULTIPLE;
+        inverse[k] = multiple * share;
+        multiple *= w[k][k];
+        UNROLLED
+        for (int i = 0; i < size; i++) {
+            if (i > k) {
+                L[i * size + k] = w[i][k] * share;
+            }
+        }
+    }
+    return safe;
+}
+
+/* Put what belongs to a block, by pairs if it begins at an even place. */
+SIZED void put_block(int size, int start, const double *from, double *to) {
+    to += start;
+    if (start % PAIR != 0) {
+        UNROLLED
+        for (int i = 0; i < size; i++) {
+            to[i] = from[i];
+        }
+        return;
+    }
+    UNROLLED
+    for (int i = 0; i + 1 < size; i += PAIR) {
+        put_pair(to + i, from[i], from[i + 1]);
+    }
+    if (size % PAIR != 0) {
+        put_pair(to + size - 1, from[size - 1], to[size]);
+    }
+}
+
+/* b := L^-1 b and b := L^-T b within a block. */
+SIZED void block_forward(int size, const double *ALONE L, double *ALONE b) {
+    UNROLLED
+    for (int i = 1; i < size; i++) {
+        double sum = b[i];
+        const int columns = size <= SMALL ? size : i;
+        UNROLLED
+        for (int j = 0; j < columns; j++) {
+            sum = j < i ? sum - L[i * size + j] * b[j] : sum;
+        }
+        b[i] = sum;
+    }
+}
+
+SIZED void block_backward(int size, const double *ALONE L, double *ALONE b) {
+    UNROLLED
+    for (int k = 1; k < size; k++) {
+        int i = size - 1 - k;
+        double sum = b[i];
+        const int from = size <= SMALL ? 0 : i + 1;
+        UNROLLED
+        for (int j = from; j < size; j++) {
+            sum = j > i ? sum - L[j * size + i] * b[j] : sum;
+        }
+        b[i] = sum;
+    }
+}
+
+typedef enum { BACKWARD, FORWARD } Substitution;
+
+SIZED void block_solve(int size, const double *ALONE L, double *ALONE b, Substitution way) {
+    if (way == FORWARD) {
+        block_forward(size, L, b);
+    } else {
+        block_backward(size, L, b);
+    }
+}
+
+/* The same with a small block, of the coordinates from start. */
+SIZED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
+                       Substitution way) {
+    double b[SMALL];
+    UNROLLED
+    for (int i = 0; i < size; i++) {
+        b[i] = x[start + i];
+    }
+    block_solve(size, L, b, way);
+    put_block(size, start, b, x);
+}
+
+SIZED void solve_blocks(const Factors *factors, double *x, Substitution way) {
+    const double *L = factors->L;
+    for (int k = 0; k < factors->block_count; k++) {
+        int start = factors->blocks[k].start, size = factors->blocks[k].size;
+        switch (size) {
+        case 1: solve_small(1, start, L, x, way); break;
+        case 2: solve_small(2, start, L, x, way); break;
+        case 3: solve_small(3, start, L, x, way); break;
+        case 4: solve_small(4, start, L, x, way); break;
+        default: block_solve(size, L, x + start, way);
+        }
+        L += size * size;
+    }
+}
+
+static void forward_all(const Factors *factors, double *x) {
+    solve_blocks(factors, x, FORWARD);
+}
+
+static void backward_all(const Factors *factors, double *x) {
+    solve_blocks(factors, x, BACKWARD);
+}
+
+/* The lower triangle of S = Z D^-1 Z^T, and its factor with the inverse of its D behind it. */
+SIZED bool schur_of_size(int r, int even, Factors *factors) {
+    const double *Z = factors->Z, *inverse = factors->inverse;
+    double *S = factors->S, *L = S + r * r;
+    Lanes sum[SMALL * SMALL][SUMS] = {{NO_LANES}};
+    UNROLLED_BY_LANES
+    for (int j = 0; j < even; j += LANES) {
+        Lanes share = lanes_at(inverse + j);
+        UNROLLED
+        for (int i = 0; i < r; i++) {
+            Lanes Y = share * lanes_at(Z + i * even + j);
+            UNROLLED
+            for (int k = 0; k < r; k++) {
+                if (k <= i) {
+                    sum[i * r + k][SUM_OF(j)] += Y * lanes_at(Z + k * even + j);
+                }
+            }
+        }
+    }
+    UNROLLED
+    for (int i = 0; i < r * r; i++) {
+        S[i] = total(sum[i]);
+    }
+    return small_factor(r, S, L, L + r * r) || factor(r, S, L, L + r * r);
+}
+
+/* A stop that slides has a column that is not its row. */
+static bool factor_unsymmetric(Factors *factors) {
+    int even = factors->even, r = factors->r;
+    for (int i = 0; i < r; i++) {
+        for (int k = 0; k < r; k++) {
+            const double *row = factors->Z + i * even, *column = factors->Z_columns + k * even;
+            double sum = 0.0;
+            for (int j = 0; j < even; j++) {
+                sum += row[j] * factors->inverse[j] * column[j];
+            }
+            factors->S[i * r + k] = sum;
+        }
+    }
+    return lu_factor(r, factors->S, factors->pivots);
+}
+
+SIZED bool schur_to_length(int even, Factors *factors) {
+    factors->symmetric = factors->Z_columns == factors->Z && factors->r <= SMALL;
+    if (!factors->symmetric) {
+        return factor_unsymmetric(factors);
+    }
+    switch (factors->r) {
+    case 0: return true;
+    case 1: return schur_of_size(1, even, factors);
+    case 2: return schur_of_size(2, even, factors);
+    case 3: return schur_of_size(3, even, factors);
+    default: return schur_of_size(4, even, factors);
+    }
+}
+
+PRBM bool factor_schur(Factors *factors) {
+    return schur_to_length(factors->even, factors);
+}
+
+SIZED bool schur_of_length(int even, Factors *factors) {
+    return KNOWN(even) ? schur_to_length(even, factors) : factor_schur(factors);
+}
+
+/* The multipliers lam from what the rows ask for. */
+SIZED void multipliers_of_size(int r, const double *S, double *lam) {
+    const double *L = S + r * r, *inverse = L + r * r;
+    block_forward(r, L, lam);
+    UNROLLED
+    for (int k = 0; k < r; k++) {
+        lam[k] *= inverse[k];
+    }
+    block_backward(r, L, lam);
+}
+
+/* lam -= Z D^-1 x */
+SIZED void ask_multipliers(int count, int even, const double *ALONE Z, const double *ALONE x,
+                           const double *ALONE inverse, double *ALONE lam) {
+    Lanes sum[SMALL][SUMS] = {{NO_LANES}};
+    UNROLLED_BY_LANES
+    for (int j = 0; j < even; j += LANES) {
+        Lanes share = lanes_at(x + j) * lanes_at(inverse + j);
+        UNROLLED
+        for (int k = 0; k < count; k++) {
+            sum[k][SUM_OF(j)] += lanes_at(Z + k * even + j) * share;
+        }
+    }
+    UNROLLED
+    for (int k = 0; k < count; k++) {
+        lam[k] -= total(sum[k]);
+    }
+}
+
+/* From x = L^-1 f and what the rows ask for: lam and x := D^-1 (x + Z^T lam). */
+SIZED void constrain_of_size(int r, int even, const Factors *factors, double *ALONE x,
+                             double *ALONE lam) {
+    const double *ALONE Z = factors->Z, *ALONE columns = factors->Z_columns;
+    const double *ALONE inverse = factors->inverse;
+    const int together = r <= SMALL ? r : 1;
+    for (int k = 0; k < r; k += together) {
+        ask_multipliers(together, even, Z + k * even, x, inverse, lam + k);
+    }
+    if (factors->symmetric) {
+        multipliers_of_size(r, factors->S, lam);
+    } else {
+        lu_solve(r, factors->S, factors->pivots, lam);
+    }
+    UNROLLED_BY_LANES
+    for (int j = 0; j < even; j += LANES) {
+        Lanes sum = lanes_at(x + j);
+        UNROLLED
+        for (int k = 0; k < r; k++) {
+            sum += lam[k] * lanes_at(columns + k * even + j);
+        }
+        set_lanes(x + j, sum * lanes_at(inverse + j));
+    }
+}
+
+/* The solution from x = L^-1 f and what the rows ask for. */
+SIZED void finish_to_length(int even, const Factors *factors, double *x, double *lam) {
+    switch (factors->r) {
+    case 0: constrain_of_size(0, even, factors, x, lam); break;
+    case 1: constrain_of_size(1, even, factors, x, lam); break;
+    case 2: constrain_of_size(2, even, factors, x, lam); break;
+    case 3: constrain_of_size(3, even, factors, x, lam); break;
+    case 4: constrain_of_size(4, even, factors, x, lam); break;
+    default: constrain_of_size(factors->r, even, factors, x, lam);
+    }
+    backward_all(factors, x);
+}
+
+static void finish(const Factors *factors, double *x, double *lam) {
+    finish_to_length(factors->even, factors, x, lam);
+}
+
+SIZED void finish_of_length(int even, const Factors *factors, double *x, double *lam) {
+    if (KNOWN(even)) {
+        finish_to_length(even, factors, x, lam);
+    } else {
+        finish(factors, x, lam);
+    }
+}
+
+PRBM void solve_again(const Factors *factors, double *x, double *lam) {
+    forward_all(factors, x);
+    finish(factors, x, lam);
+}

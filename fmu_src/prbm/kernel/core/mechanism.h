@@ -1,0 +1,171 @@
+/* The description of a mechanism, its parameters and the vector of all values. */
+#ifndef PRBM_MECHANISM_H
+#define PRBM_MECHANISM_H
+
+#include "core/memory.h"
+
+/* constant + sum(factor * parameter) */
+typedef struct {
+    double constant;
+    int count;
+    const int *parameter;
+    const double *factor;
+} Expression;
+
+typedef struct {
+    const char *name, *unit;
+    double start, minimum, maximum;
+    bool tunable;
+} Parameter;
+
+typedef struct {
+    Expression x, y;
+} Point;
+
+typedef struct {
+    const char *name;
+    Expression mass, inertia;
+    Point centre;
+} Body;
+
+typedef struct {
+    const char *name;
+    bool lumped, rate_with_gamma, axial;
+    int pivots; /* of a cantilever; 0: a chain */
+    int links;  /* of a chain; 0: a set of coefficients */
+    Expression thickness, width, youngs_modulus, density;
+    const Expression *gamma, *K_theta; /* (pivots,) */
+} FlexureType;
+
+/* Two points of different bodies, GROUND or 1 ... */
+typedef struct {
+    int start, end;
+    Point start_point, end_point;
+} Connection;
+
+typedef struct {
+    const char *name;
+    int type;
+    Connection between;
+    int start_end, end_end; /* CLAMP, PIN or FREE */
+} Flexure;
+
+typedef struct {
+    const char *name;
+    Connection between;
+} Joint;
+
+typedef struct {
+    const char *name;
+    int body, on; /* 1 ...; the body that carries its wall, GROUND or 1 ... */
+    Point point;
+    double direction; /* deg */
+    Expression position, offset, restitution, friction, rest_speed;
+} Stop;
+
+typedef struct {
+    const char *name;
+    int body;
+    Point point;
+    double direction;
+    Expression coefficient, normal_force, normal_stiffness;
+} Friction;
+
+typedef struct {
+    const char *name;
+    int body;
+    Point point;
+} Force;
+
+typedef struct {
+    const char *name;
+    int body; /* GROUND or 1 ... */
+    Point point;
+} Probe;
+
+typedef struct {
+    int body;
+    double direction;
+    Expression displacement, velocity;
+} Release;
+
+/* A field of a part that is an expression, with the bounds of the parameter it stands for. */
+typedef struct {
+    const char *name, *unit;
+    Expression expression;
+    double minimum, maximum;
+} Bound;
+
+typedef struct {
+    uint32_t reference;
+    int type; /* REAL, INTEGER, BOOLEAN, CLOCK; a clock has the slot of its impact_count */
+    int slot; /* in the vector of all values, see Slots */
+    const char *name;
+} Variable;
+
+/* The vector of all values: where each group begins. */
+typedef struct {
+    int parameters, inputs, bodies, stops, base, energies, latched, links, stretches, probes,
+        frequency, calculated, derivatives, indicators, time, count;
+} Slots;
+
+/* Where the groups of inputs begin; the forces are the first. */
+typedef struct {
+    int walls, impulses, mobilities, base;
+} InputGroups;
+
+/* A part that the assembly walks along, from what is held already. */
+typedef struct {
+    const char *name;
+    const Connection *between;
+    const Flexure *flexure; /* NULL: a joint */
+    bool backwards;         /* from its end to its start */
+    bool closes;            /* a loop: what it leads to is held, too */
+    int first;              /* of the coordinates that it adds */
+} Step;
+
+/* A coordinate: the angle of a link, its stretch, or the angle of a body. */
+typedef struct {
+    int link, body; /* 0 ... or -1; 1 ... or 0 */
+    int arm;        /* whose arm it turns or stretches: its own, or that of a link */
+} Coordinate;
+
+typedef struct {
+    const char *token, *name;
+    int parameter_count, body_count, type_count, flexure_count, joint_count, stop_count,
+        friction_count, force_count, probe_count, ground_count, bound_count, variable_count,
+        independent_count, input_count;
+    const Parameter *parameters;
+    const Body *bodies; /* (body_count,): body k is bodies[k - 1] */
+    const FlexureType *types;
+    const Flexure *flexures;
+    const Joint *joints;
+    const Stop *stops;
+    const Friction *frictions;
+    const Force *forces;
+    const Probe *probes;
+    const Point *ground;
+    const Bound *bounds;
+    const Variable *variables; /* in rising order of their references */
+    const char *const *input_names;
+    const double *input_starts; /* (input_count,) */
+    InputGroups input;
+    const Step *steps;             /* flexures and joints in the order of the assembly */
+    const Coordinate *coordinates; /* (coordinate_count,) */
+    const int *links, *stretches;  /* coordinates that are angles and stretches of links */
+    const int *independent; /* coordinates that are states, with their rates, in model exchange */
+    Release release;
+    int gravity[2], tolerance, damping_zeta, damping_beta; /* parameters */
+    /* of the assembled system */
+    int coordinate_count, loop_count, link_count, stretch_count, mass_count, spring_count;
+    int longest; /* links of a flexure at most */
+    Slots slots;
+} Mechanism;
+
+PRBM double evaluate(Expression quantity, const double *values); /* twin: mechanism.Affine */
+PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
+/* Check all values and the fields that are expressions (Mechanism.values of the twin). */
+PRBM bool check_values(const Mechanism *mechanism, const double *values, Problem *problem);
+PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t reference);
+
+#endif

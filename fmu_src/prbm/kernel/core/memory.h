@@ -1,0 +1,43 @@
+/* Error messages, blocks of memory and scratch. */
+#ifndef PRBM_MEMORY_H
+#define PRBM_MEMORY_H
+
+#include "core/numbers.h"
+
+enum { PROBLEM_LENGTH = 640 };
+
+typedef struct {
+    char text[PROBLEM_LENGTH];
+} Problem;
+
+/* Write an error message and return false. */
+#if defined(__GNUC__)
+PRBM bool fail(Problem *problem, const char *format, ...) __attribute__((format(printf, 2, 3)));
+#else
+PRBM bool fail(Problem *problem, const char *format, ...);
+#endif
+
+/* A block of memory: laid out with base NULL to count its bytes, then again to place its parts. */
+typedef struct {
+    char *base;
+    size_t used;
+} Memory;
+
+PRBM void *place(Memory *memory, size_t count, size_t size);
+
+/* Working memory for one call: taken in order, given back by restoring the value of used.  A
+ * request for more than is left yields the spare block, which is as large as any single request,
+ * and sets exceeded: the results are then invalid, but nothing is overwritten. */
+typedef struct {
+    double *base, *spare;
+    size_t used, size, most;
+    bool exceeded;
+} Scratch;
+
+PRBM double *take(Scratch *scratch, size_t count);
+
+PRBM double *take_matrix(Scratch *scratch, int rows, int columns);
+PRBM Complex *take_complex(Scratch *scratch, int rows, int columns);
+PRBM int *take_integers(Scratch *scratch, int count);
+
+#endif

@@ -1,0 +1,18 @@
+/* Small vibrations about a static shape. */
+#ifndef PRBM_MODAL_H
+#define PRBM_MODAL_H
+
+#include "core/statics.h"
+
+/* Frequencies [Hz] (k,) and mass-normalised modes (n, k), k = n - r. */
+PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
+                Scratch *scratch, Problem *problem);
+PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
+                                Problem *problem);
+/* The fundamental mode phi (n,) at a shape and M (n, n) there. */
+PRBM bool fundamental_at(const System *system, const double *q, double *phi, double *M,
+                         Scratch *scratch, Problem *problem);
+PRBM double simulated_restitution(int n, const double *phi, const double *M, const double *before,
+                                  const double *after);
+
+#endif

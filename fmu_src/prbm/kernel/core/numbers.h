@@ -1,0 +1,35 @@
+/* Elementary functions, the same bits on every platform, and complex numbers. */
+#ifndef PRBM_NUMBERS_H
+#define PRBM_NUMBERS_H
+
+#include "core/platform.h"
+
+typedef struct {
+    double re, im;
+} Complex;
+
+/* Complex numbers with their parts apart, in vectors that are padded with zeros to an even length,
+ * so that they are worked on by pairs. */
+typedef struct {
+    double *re, *im;
+} Parts;
+
+PRBM void unit_vectors(int n, const double *q, Complex *e); /* exp(i q), as np.exp(1j * q) */
+PRBM double natural_log(double x);                          /* x > 0 */
+PRBM double exponential(double x);
+PRBM double power(double x, double y);                      /* x^y for x > 0 */
+PRBM double phase(Complex z);                               /* as cmath.phase, in (-pi, pi] */
+PRBM bool finite_number(double x);
+PRBM double largest(int n, const double *x);                /* max |x_i|, 0 for none */
+PRBM double greater(double a, double b); /* b unless a > b */
+PRBM double lesser(double a, double b);  /* b unless a < b */
+PRBM Complex unit(double degrees);
+PRBM Complex complex_of(double re, double im);
+PRBM Complex plus(Complex a, Complex b);
+PRBM Complex minus(Complex a, Complex b);
+PRBM Complex product(Complex a, Complex b);
+PRBM Complex conjugate(Complex a);
+PRBM Complex scaled(double x, Complex a);
+PRBM double modulus(Complex a);
+
+#endif

@@ -1,0 +1,103 @@
+/* Reading bytes that anybody may have tampered with: numbers, texts, counts and references. */
+#include <string.h>
+
+#include "core/tables.h"
+
+typedef struct {
+    const unsigned char *at;
+    size_t left;
+    const char *wrong; /* the first defect of the tables, or NULL */
+    Memory memory;
+    size_t room;
+} Reader;
+
+static void *kept(Reader *reader, size_t count, size_t size) {
+    size_t left = reader->room - reader->memory.used; /* place rounds up to less than 32 bytes */
+    if (reader->wrong || left < 32 || count > (left - 32) / size) {
+        reader->wrong = reader->wrong ? reader->wrong : "counts that its size does not bear";
+        return NULL;
+    }
+    return place(&reader->memory, count, size);
+}
+
+static bool has(Reader *reader, size_t bytes) {
+    if (!reader->wrong && reader->left < bytes) {
+        reader->wrong = "an end where there should be more";
+    }
+    return !reader->wrong;
+}
+
+static uint32_t read_u32(Reader *reader) {
+    uint32_t x = 0;
+    if (has(reader, 4)) {
+        for (int i = 3; i >= 0; i--) {
+            x = x << 8 | reader->at[i];
+        }
+        reader->at += 4;
+        reader->left -= 4;
+    }
+    return x;
+}
+
+static double read_f64(Reader *reader) {
+    uint64_t low = read_u32(reader), bits = low | (uint64_t)read_u32(reader) << 32;
+    double x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+static double read_bound(Reader *reader) {
+    double x = read_f64(reader);
+    if (x != x) {
+        reader->wrong = "a bound that is not a number";
+    }
+    return x;
+}
+
+static double read_finite(Reader *reader) {
+    double x = read_f64(reader);
+    if (!finite_number(x)) {
+        reader->wrong = "a number that is not finite";
+    }
+    return x;
+}
+
+static const char *read_text(Reader *reader) {
+    size_t length = read_u32(reader);
+    if (length >= reader->left || !has(reader, length + 1) || reader->at[length] != 0 ||
+        memchr(reader->at, 0, length)) {
+        reader->wrong = reader->wrong ? reader->wrong : "a text that does not end";
+        return "";
+    }
+    char *text = kept(reader, length + 1, 1);
+    if (text) {
+        memcpy(text, reader->at, length + 1);
+        reader->at += length + 1;
+        reader->left -= length + 1;
+    }
+    return text ? text : "";
+}
+
+/* An index below a count. */
+static int read_index(Reader *reader, int from, int count) {
+    uint32_t x = read_u32(reader);
+    if (x < (uint32_t)from || x >= (uint32_t)count) {
+        reader->wrong = reader->wrong ? reader->wrong : "a reference that leads nowhere";
+        return from;
+    }
+    return (int)x;
+}
+
+static bool read_flag(Reader *reader) {
+    return read_index(reader, 0, 2) == 1;
+}
+
+/* The number of records that follow, each of at least so many bytes. */
+static int read_count(Reader *reader, size_t bytes) {
+    uint32_t count = read_u32(reader);
+    if (count > reader->left / bytes) {
+        reader->wrong = reader->wrong ? reader->wrong : "counts that its size does not bear";
+        return 0;
+    }
+    return (int)count;
+}

@@ -1,0 +1,12 @@
+/* The reader of the tables of a mechanism. */
+#ifndef PRBM_TABLES_H
+#define PRBM_TABLES_H
+
+#include "core/mechanism.h"
+
+/* Read untrusted tables; NULL and an error message if they are invalid.  The result is one block
+ * and keeps no pointer to the bytes. */
+PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem *problem);
+PRBM void mechanism_close(Mechanism *mechanism);
+
+#endif

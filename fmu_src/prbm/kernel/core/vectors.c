@@ -1,0 +1,124 @@
+/* Pairs of numbers, and vectors that are padded with zeros to an even length. */
+#include "core/numbers.h"
+
+/* Two numbers at a time where the compiler has vectors, else one: the same operations on each. */
+#if VECTORS
+typedef double Lanes __attribute__((vector_size(16)));
+typedef uint64_t LaneBits __attribute__((vector_size(16)));
+typedef double LanesInMemory __attribute__((vector_size(16), aligned(8)));
+#define NO_LANES {0.0, 0.0}
+#define LANE(x, i) (x)[i]
+#else
+typedef double Lanes;
+typedef uint64_t LaneBits;
+typedef double LanesInMemory;
+#define NO_LANES 0.0
+#define LANE(x, i) (x)
+#endif
+enum { LANES = sizeof(Lanes) / sizeof(double), PAIR = 2, SUMS = PAIR / LANES };
+
+static Lanes lanes_at(const double *x) {
+    return *(const LanesInMemory *)x;
+}
+
+static Lanes all_lanes(double x) {
+    Lanes lanes = NO_LANES;
+    return x - lanes;
+}
+
+static void set_lanes(double *x, Lanes lanes) {
+    *(LanesInMemory *)x = lanes;
+}
+
+/* The sum of the even terms and that of the odd ones, added up in the end: Lanes sum[SUMS], whose
+ * part for the term i is sum[SUM_OF(i)]. */
+#define SUM_OF(i) ((i) / LANES % SUMS)
+
+static double total(const Lanes *sum) {
+    return LANE(sum[0], 0) + LANE(sum[SUMS - 1], LANES - 1);
+}
+
+static int even_length(int n) {
+    return n + n % PAIR;
+}
+
+/* What is loaded as a pair is stored as one, at the same even place: a load that finds its numbers
+ * in two stores waits until both are in the cache. */
+SIZED void put_pair(double *x, double a, double b) {
+#if VECTORS
+    Lanes pair = {a, b};
+    set_lanes(x, pair);
+#else
+    x[0] = a;
+    x[1] = b;
+#endif
+}
+
+SIZED void copy_pairs(int even, const double *from, double *to) {
+    UNROLLED_BY_LANES
+    for (int i = 0; i < even; i += LANES) {
+        set_lanes(to + i, lanes_at(from + i));
+    }
+}
+
+/* to = what begins behind the first number of from. */
+SIZED void copy_shifted(int even, const double *from, double *to) {
+    UNROLLED_BY_LANES
+    for (int i = 0; i < even; i += LANES) {
+#if VECTORS
+        Lanes here = lanes_at(from + i), next = lanes_at(from + i + PAIR);
+        put_pair(to + i, here[1], next[0]);
+#else
+        to[i] = from[i + 1];
+#endif
+    }
+}
+
+/* A vector padded with a zero to an even length. */
+SIZED void pad_of(int even, int n, const double *x, double *padded) {
+    copy_pairs(even - PAIR, x, padded);
+    put_pair(padded + even - PAIR, x[even - PAIR], n == even ? x[even - 1] : 0.0);
+}
+
+/* The second of two vectors of n, one behind the other. */
+SIZED void pad_second(int even, int n, const double *both, double *padded) {
+    if (n == even) {
+        pad_of(even, n, both + n, padded);
+    } else {
+        copy_shifted(even - PAIR, both + n - 1, padded);
+        put_pair(padded + even - PAIR, both[2 * n - 1], 0.0);
+    }
+}
+
+/* Two padded vectors of n, one behind the other without their paddings. */
+SIZED void join(int even, int n, const double *first, const double *second, double *both) {
+    copy_pairs(even - PAIR, first, both);
+    if (n == even) {
+        copy_pairs(PAIR, first + n - PAIR, both + n - PAIR);
+        copy_pairs(n, second, both + n);
+    } else {
+        put_pair(both + n - 1, first[n - 1], second[0]);
+        copy_shifted(even - PAIR, second, both + even);
+    }
+}
+
+static void pad(int n, const double *x, double *padded) {
+    if (n > 0) {
+        pad_of(even_length(n), n, x, padded);
+    }
+}
+
+static void pad_parts(int n, const Complex *z, Parts parts) {
+    parts.re[even_length(n) - 1] = parts.im[even_length(n) - 1] = 0.0;
+    for (int i = 0; i < n; i++) {
+        parts.re[i] = z[i].re;
+        parts.im[i] = z[i].im;
+    }
+}
+
+static void set_complex(Complex *z, Lanes re, Lanes im) {
+    for (int i = 0; i < LANES; i++) {
+        z[i].re = LANE(re, i);
+        z[i].im = LANE(im, i);
+    }
+}

@@ -1,0 +1,369 @@
+/* Instances: the state machine of the standards, refused values, life. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "fmi/fmu.h"
+
+#define TO_RESET "reset the instance to start again"
+
+/* --- the state machine ------------------------------------------------------------------------ */
+
+/* What to call next on the way to one of some modes, NULL if none leads there. */
+static const char *next_call(const Instance *instance, unsigned modes) {
+    const Way *ways = instance->standard->ways[instance->kind];
+    const Way *way = &ways[instance->mode];
+    for (int i = 0; i < MODES && way->function; i++) {
+        if (modes >> way->next & 1u) {
+            return ways[instance->mode].function;
+        }
+        way = &ways[way->next];
+    }
+    return NULL;
+}
+
+PRBM Instance *allowed(void *handle, const Rule *rule) {
+    Instance *instance = handle;
+    if (!instance) {
+        return NULL;
+    }
+    unsigned modes = rule->modes[instance->kind];
+    if (modes >> instance->mode & 1u) {
+        return instance;
+    }
+    const char *mode = instance->standard->modes[instance->mode];
+    const char *next = next_call(instance, modes);
+    if (modes == IN_NONE) {
+        bool exchange = instance->kind == MODEL_EXCHANGE;
+        refuse(instance, FMU_ERROR, "%s is for %s; this instance was made for %s", rule->function,
+               exchange ? "co-simulation" : "model exchange",
+               exchange ? "model exchange" : "co-simulation");
+    } else if (instance->mode == MODE_INTERMEDIATE) {
+        refuse(instance, FMU_ERROR, "%s cannot be called in %s: return from the callback first",
+               rule->function, mode);
+    } else if (next) {
+        refuse(instance, FMU_ERROR, "%s cannot be called in %s: call %s first", rule->function,
+               mode, next);
+    } else {
+        refuse(instance, FMU_ERROR, "%s cannot be called in %s: call %sReset first",
+               rule->function, mode, instance->standard->prefix);
+    }
+    return NULL;
+}
+
+PRBM bool given(const Instance *instance, const Rule *rule, size_t count, const void *pointer) {
+    if (count > 0 && !pointer) {
+        refuse(instance, FMU_ERROR, "%s was called with a pointer that is NULL", rule->function);
+        return false;
+    }
+    return true;
+}
+
+/* --- what was refused and not yet put right --------------------------------------------------- */
+
+static bool is_parameter(const Mechanism *mechanism, int slot) {
+    return slot >= mechanism->slots.parameters && slot < mechanism->slots.inputs;
+}
+
+static bool is_input(const Mechanism *mechanism, int slot) {
+    return slot >= mechanism->slots.inputs && slot < mechanism->slots.bodies;
+}
+
+static bool settable(const Mechanism *mechanism, int slot) {
+    return is_parameter(mechanism, slot) || is_input(mechanism, slot);
+}
+
+static const char *name_of(const Mechanism *mechanism, int slot) {
+    for (int i = 0; i < mechanism->variable_count; i++) {
+        if (mechanism->variables[i].slot == slot && mechanism->variables[i].type != CLOCK) {
+            return mechanism->variables[i].name;
+        }
+    }
+    return "a variable";
+}
+
+/* Tell that a set was refused and how to put it right. */
+static void tell_refused(const Instance *instance, int status, int slot) {
+    const Mechanism *mechanism = instance->mechanism;
+    const char *name = name_of(mechanism, slot), *unit = "";
+    Problem problem;
+    double present;
+    if (!settable(mechanism, slot) ||
+        !simulation_get(instance->simulation, slot, &present, &problem)) {
+        refuse(instance, status, "%s was set, which is refused: " TO_RESET, name);
+        return;
+    }
+    if (is_parameter(mechanism, slot)) {
+        unit = mechanism->parameters[slot].unit;
+    }
+    refuse(instance, status, "%s was set to what is refused and is still %.10g%s%s: set it to a "
+                             "value that it may have, or reset the instance",
+           name, present, *unit ? " " : "", unit);
+}
+
+/* Whether something was refused and still stands; it is told again. */
+static bool stands(const Instance *instance, int status) {
+    size_t count = (size_t)instance->mechanism->slots.count;
+    const unsigned char *first = memchr(instance->refused, 1, count);
+    if (first) {
+        tell_refused(instance, status, (int)(first - instance->refused));
+    } else if (instance->unknown_refused) {
+        refuse(instance, status, "value reference %lu was set, which is not in "
+                                 "modelDescription.xml: " TO_RESET,
+               (unsigned long)instance->unknown);
+    }
+    return first || instance->unknown_refused;
+}
+
+/* --- life ------------------------------------------------------------------------------------- */
+
+static char *place_text(Memory *memory, const char *text) {
+    size_t size = strlen(text) + 1;
+    char *copy = place(memory, size, 1);
+    if (copy) {
+        memcpy(copy, text, size);
+    }
+    return copy;
+}
+
+/* Lay out an instance and its arrays in one block; memory.base NULL: only count. */
+static Instance *place_instance(Memory *memory, const Request *request, const Mechanism *mechanism,
+                                const Simulation *simulation) {
+    Instance scrap, *instance = place(memory, 1, sizeof *instance);
+    Instance *it = instance ? instance : &scrap;
+    size_t slots = (size_t)mechanism->slots.count, states = (size_t)exchange_states(simulation);
+    it->journal.instance = place_text(memory, request->journal.instance);
+    it->required = place(memory, request->required_count, sizeof *it->required);
+    it->refused = place(memory, slots, 1);
+    it->acknowledged = place(memory, (size_t)mechanism->stop_count, sizeof(double));
+    it->state_of = place(memory, slots, sizeof(int));
+    it->before = place(memory, simulation_state_count(simulation), sizeof(double));
+    it->after = place(memory, simulation_state_count(simulation), sizeof(double));
+    it->x = place(memory, states, sizeof(double));
+    it->dx = place(memory, states, sizeof(double));
+    it->du = place(memory, (size_t)mechanism->input_count, sizeof(double));
+    it->dvalues = place(memory, slots, sizeof(double));
+    return instance;
+}
+
+static Instance *new_instance(const Request *request, const Mechanism *mechanism,
+                              const Simulation *simulation) {
+    Memory memory = {NULL, 0};
+    place_instance(&memory, request, mechanism, simulation);
+    memory.base = calloc(1, memory.used);
+    memory.used = 0;
+    return memory.base ? place_instance(&memory, request, mechanism, simulation) : NULL;
+}
+
+static void find_states(Instance *instance) {
+    for (int slot = 0; slot < instance->mechanism->slots.count; slot++) {
+        instance->state_of[slot] = -1;
+    }
+    for (int k = 0; k < instance->states; k++) {
+        instance->state_of[exchange_slot(instance->simulation, k)] = k;
+    }
+}
+
+static void fill_instance(Instance *instance, const Request *request, Mechanism *mechanism,
+                          Simulation *simulation) {
+    const char *name = instance->journal.instance;
+    instance->standard = request->standard;
+    instance->kind = request->kind;
+    instance->journal = request->journal;
+    instance->journal.instance = name;
+    instance->event_mode = request->event_mode;
+    instance->early_return = request->early_return;
+    instance->update = request->update;
+    instance->intermediate = request->intermediate;
+    instance->required_count = request->required_count;
+    if (request->required_count > 0) {
+        memcpy(instance->required, request->required,
+               request->required_count * sizeof *request->required);
+    }
+    instance->mechanism = mechanism;
+    instance->simulation = simulation;
+    instance->states = exchange_states(simulation);
+    instance->indicators = exchange_indicators(simulation);
+    for (int i = 0; i < mechanism->variable_count; i++) {
+        instance->clocks |= mechanism->variables[i].type == CLOCK;
+    }
+    find_states(instance);
+    simulation_listen(simulation, hear_impact, instance);
+}
+
+/* Whether the request and the tables fit each other; if not, it is told. */
+static bool suits(const Request *request, const Mechanism *mechanism) {
+    const Journal *journal = &request->journal;
+    if (!request->token || strcmp(request->token, mechanism->token) != 0) {
+        report(journal, FMU_ERROR,
+               "the %s %s is not the one of the tables in the FMU's folder resources, %s: "
+               "modelDescription.xml and the tables belong to different FMUs",
+               request->standard->version == 2 ? "GUID" : "instantiation token",
+               request->token ? request->token : "NULL", mechanism->token);
+        return false;
+    }
+    for (size_t i = 0; i < request->required_count; i++) {
+        if (!request->required || !find_variable(mechanism, request->required[i])) {
+            report(journal, FMU_ERROR,
+                   "requiredIntermediateVariables has an entry that is not in "
+                   "modelDescription.xml: pass value references of its variables");
+            return false;
+        }
+    }
+    bool clocks = false;
+    for (int i = 0; i < mechanism->variable_count; i++) {
+        clocks |= mechanism->variables[i].type == CLOCK;
+    }
+    if (clocks && request->kind == CO_SIMULATION && !request->event_mode) {
+        report(journal, FMU_ERROR, "this FMU has clocks, so its importer must handle events: "
+                                   "instantiate it with eventModeUsed = true, or use the FMU "
+                                   "without clocks");
+        return false;
+    }
+    return true;
+}
+
+PRBM Instance *instance_open(const Request *request) {
+    Problem problem;
+    Mechanism *mechanism = tables_read(request->resources, &problem);
+    if (!mechanism) {
+        report(&request->journal, FMU_ERROR, "%s", problem.text);
+        return NULL;
+    }
+    if (!suits(request, mechanism)) {
+        mechanism_close(mechanism);
+        return NULL;
+    }
+    Simulation *simulation = simulation_open(mechanism);
+    Instance *instance = simulation ? new_instance(request, mechanism, simulation) : NULL;
+    if (!instance) {
+        report(&request->journal, FMU_ERROR, "there is not enough memory for an instance");
+        if (simulation) {
+            simulation_close(simulation);
+        }
+        mechanism_close(mechanism);
+        return NULL;
+    }
+    fill_instance(instance, request, mechanism, simulation);
+    return instance;
+}
+
+PRBM void instance_close(Instance *instance) {
+    if (!instance) {
+        return;
+    }
+    if (instance->mode == MODE_INTERMEDIATE) { /* its step is still running */
+        refuse(instance, FMU_ERROR, "%sFreeInstance cannot be called in %s: return from the "
+                                    "callback first",
+               instance->standard->prefix, instance->standard->modes[instance->mode]);
+        return;
+    }
+    simulation_close(instance->simulation);
+    mechanism_close(instance->mechanism);
+    free(instance);
+}
+
+static bool sound_times(const Instance *instance, double start_time, bool stop_defined,
+                        double stop_time) {
+    if (!finite_number(start_time)) {
+        refuse(instance, FMU_ERROR, "startTime = %g s must be a finite number", start_time);
+        return false;
+    }
+    if (stop_defined && !(stop_time >= start_time)) {
+        refuse(instance, FMU_ERROR, "stopTime = %.9g s must not be before startTime = %.9g s",
+               stop_time, start_time);
+        return false;
+    }
+    return true;
+}
+
+/* What the importer wants of the whole run; a mistake has to be put right by another call. */
+PRBM int set_up(Instance *instance, bool tolerance_defined, double tolerance, double start_time,
+                bool stop_defined, double stop_time) {
+    const Mechanism *mechanism = instance->mechanism;
+    const Parameter *bounds = &mechanism->parameters[mechanism->tolerance];
+    Problem problem;
+    instance->experiment = instance->experiment_refused = true;
+    if (!sound_times(instance, start_time, stop_defined, stop_time)) {
+        return FMU_ERROR;
+    }
+    if (tolerance_defined && !check_parameter(bounds, tolerance, &problem)) {
+        return refuse(instance, FMU_ERROR, "the importer's relative tolerance: %s", problem.text);
+    }
+    instance->experiment_refused = false;
+    instance->tolerance_defined = tolerance_defined;
+    instance->tolerance = tolerance_defined ? tolerance : 0.0;
+    instance->start_time = start_time;
+    instance->stop_defined = stop_defined;
+    instance->stop_time = stop_defined ? stop_time : 0.0;
+    return FMU_OK;
+}
+
+static double impact_count(const Instance *instance, int stop) {
+    Problem problem;
+    double count = 0.0;
+    int slot = instance->mechanism->slots.latched + PER_LATCHED * stop + LATCHED_IMPACT_COUNT;
+    (void)simulation_get(instance->simulation, slot, &count, &problem);
+    return count;
+}
+
+/* The clocks have ticked for all impacts until now. */
+static void acknowledge(Instance *instance) {
+    for (int i = 0; i < instance->mechanism->stop_count; i++) {
+        instance->acknowledged[i] = impact_count(instance, i);
+    }
+}
+
+/* Start the motion if it has not; false, and told, if something stands against it. */
+static bool started(Instance *instance) {
+    Problem problem;
+    if (simulation_started(instance->simulation)) {
+        return true;
+    }
+    if (stands(instance, FMU_ERROR)) {
+        return false;
+    }
+    if (instance->mode != MODE_INITIALIZATION) {
+        refuse(instance, FMU_ERROR, "the instance was never initialized: there is no motion");
+        return false;
+    }
+    if (!simulation_start(instance->simulation, instance->start_time, instance->tolerance,
+                          instance->kind == MODEL_EXCHANGE, &problem)) {
+        refuse(instance, FMU_ERROR, "%s", problem.text);
+        return false;
+    }
+    acknowledge(instance);
+    return true;
+}
+
+PRBM int exit_initialization(Instance *instance) {
+    if (stands(instance, FMU_ERROR) || !started(instance)) {
+        return FMU_ERROR;
+    }
+    bool event_mode = instance->kind == MODEL_EXCHANGE || instance->event_mode;
+    instance->mode = event_mode ? MODE_EVENT : MODE_STEP;
+    instance->updated = instance->event_due = false;
+    instance->depth_told = 0.0;
+    return FMU_OK;
+}
+
+PRBM int end_run(Instance *instance) {
+    instance->mode = MODE_TERMINATED;
+    return FMU_OK;
+}
+
+PRBM int reset(Instance *instance) {
+    simulation_reset(instance->simulation);
+    instance->mode = MODE_INSTANTIATED;
+    instance->experiment = instance->experiment_refused = false;
+    instance->stop_defined = instance->tolerance_defined = false;
+    instance->start_time = instance->stop_time = instance->tolerance = 0.0;
+    instance->event_due = instance->updated = false;
+    instance->last_step = FMU_OK;
+    instance->unknown_refused = false;
+    instance->unknown = 0;
+    memset(instance->refused, 0, (size_t)instance->mechanism->slots.count);
+    for (int i = 0; i < instance->mechanism->stop_count; i++) {
+        instance->acknowledged[i] = 0.0;
+    }
+    return FMU_OK;
+}

@@ -1,0 +1,151 @@
+"""The constants of the C kernel come from Python, and from nowhere else."""
+
+import re
+from ctypes import c_double
+from functools import cache
+
+import numpy as np
+import pytest
+
+from kernel_library import KERNEL, compiled, constants
+from prbm.base import tolerances
+from prbm.hybrid.runge_kutta import BOGACKI_SHAMPINE, powers
+from prbm.interface import tables
+from prbm.kernel import header
+
+PLAIN = {"0.0", "0.25", "0.5", "1.0", "2.0", "3.0", "4.0"}  # Coefficients of formulas.
+PLAIN_INTEGER = 16
+WHOLE_FILES = {
+    "generated.h": "it is generated",
+    "core/numbers.c": "coefficients of series, and parts of pi and ln 2",
+    "hybrid.c": "it is being divided",
+    "exchange.c": "it is being divided",
+}
+ALLOWED = {
+    "core/assembly.c": {
+        "0.21132486540518708": "1/2 - 1/(2 sqrt 3): points of a rod with its mass and moments",
+        "0.7886751345948129": "1/2 + 1/(2 sqrt 3): the other one",
+    },
+    "core/factors.c": {
+        "1e-280": "smallest product of pivots that doubles hold with all digits, with a margin",
+        "1e280": "largest one",
+    },
+    "core/matrix.c": {"60": "sweeps of Jacobi's rotations, for which Python calls NumPy"},
+    "core/memory.h": {"640": "length of a message"},
+    "core/modal.c": {"6.283185307179586": "2 pi"},
+    "core/statics.c": {"1e-300": "any positive number: avoids a division by zero"},
+    "core/reader.c": {"32": "bits of a word, and bytes by which a block may be rounded up"},
+    "core/tables.c": {
+        "32": "bytes of memory for a coordinate, bits of a word",
+        "38": "least bytes of a parameter",
+    },
+    "fmi/fmu.h": {"31": "all bits of the categories"},
+    "fmi/journal.c": {"2048": "length of a message"},
+    "fmi/resources.c": {
+        "64": "kB a block", "248": "length of paths on Windows", "1024": "bytes a kB",
+    },
+    "fmi/state.c": {
+        "20": "offset", "24": "offset", "28": "offset",
+        "32": "offset or flag", "36": "offset", "64": "flag", "127": "all flags",
+    },
+}  # fmt: skip
+
+
+@cache
+def sources():
+    """Return the C files by their path, without comments, texts and preprocessor conditions."""
+    found = {}
+    for path in sorted(KERNEL.rglob("*.[ch]")):
+        text = re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.DOTALL)
+        text = re.sub(r'"(?:\\.|[^"\\])*"|' + r"'(?:\\.|[^'\\])+'", '""', text)
+        found[path.relative_to(KERNEL).as_posix()] = re.sub(r"(?m)^\s*#\s*if.*$", "", text)
+    return found
+
+
+def numbers(text):
+    """Return the numbers of a C text that a formula does not explain."""
+    floats = re.findall(r"(?<![\w.])(?:\d+\.\d*(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+)(?![\w.])", text)
+    integers = re.findall(r"(?<![\w.+-])\d+(?![\w.])", re.sub(r"\d[eE][+-]\d+", "", text))
+    return {x for x in floats if x not in PLAIN} | {x for x in integers if int(x) > PLAIN_INTEGER}
+
+
+def test_the_header_is_up_to_date():
+    assert header.main(["--check"]) == 0, "run python -m prbm.kernel.header"
+
+
+def test_a_stale_header_fails_the_check(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(header, "PATH", tmp_path / "generated.h")
+    assert header.main(["--check"]) == 1
+    assert "is stale" in capsys.readouterr().err
+    assert header.main() == 0
+    assert header.main(["--check"]) == 0
+    assert header.PATH.read_text() == header.header()
+
+
+@pytest.mark.parametrize("file", sources())
+def test_no_number_is_typed_again_in_c(file):
+    if file not in WHOLE_FILES:
+        assert numbers(sources()[file]) <= ALLOWED.get(file, {}).keys()
+
+
+def test_no_name_of_the_header_is_defined_again_in_c():
+    names = "|".join([*re.findall(r"#define (\w+) ", header.header()), *enumerators()])
+    again = re.compile(rf"#define ({names})\b|\b({names})\s*=[^=]")
+    for file, text in sources().items():
+        assert file == "generated.h" or not again.search(text)
+
+
+def enumerators():
+    """Return the integers of the header by name."""
+    return {
+        name: int(value) for name, value in re.findall(r"\b([A-Z]\w*) = (\d+)\b", header.header())
+    }
+
+
+def test_c_reads_the_integers_of_python():
+    found = constants()
+    for name, value in enumerators().items():
+        assert found[name] == value
+    for name, value in vars(tolerances).items():
+        if name.isupper() and isinstance(value, int):
+            assert found[name] == value
+    assert found["COORDINATES_MAX"] == tables.COORDINATES_MAX
+
+
+@pytest.fixture(scope="module")
+def exported():
+    """Return a library with the macros of the header as numbers, and their names in C."""
+    macros = re.findall(r"#define (\w+) [\d.]", header.header())
+    lines = [f"const double value_{name} = {name};" for name in macros]
+    arrays = {
+        "STAGE_WEIGHTS": BOGACKI_SHAMPINE.a,
+        "ERROR_WEIGHTS": BOGACKI_SHAMPINE.error,
+        "DENSE_WEIGHTS": BOGACKI_SHAMPINE.dense,
+        "LARGEST_WEIGHTS": header.largest_weights(BOGACKI_SHAMPINE),
+    }
+    for name, expected in arrays.items():
+        shape = "".join(f"[{count}]" for count in expected.shape)
+        lines.append(f"const double value_{name}{shape} = {name};")
+    return compiled(text="\n".join(lines)), macros, arrays
+
+
+def test_c_reads_the_bits_of_the_tolerances(exported):
+    library, macros, _ = exported
+    for name, value in vars(tolerances).items():
+        if name.isupper() and isinstance(value, float):
+            assert name in macros
+            assert c_double.in_dll(library, f"value_{name}").value == value
+
+
+def test_c_reads_the_bits_of_the_tableau(exported):
+    library, _, arrays = exported
+    for name, expected in arrays.items():
+        found = (c_double * expected.size).in_dll(library, f"value_{name}")
+        assert [*found] == expected.ravel().tolist()
+
+
+def test_the_bounds_of_the_dense_weights_hold_and_are_close():
+    found = np.abs(powers(BOGACKI_SHAMPINE, np.linspace(0.0, 1.0, 7001))).max(axis=0)
+    bounds = header.largest_weights(BOGACKI_SHAMPINE)
+    assert (found <= bounds).all()
+    assert (bounds <= found + 1.1e-3).all()
