@@ -56,6 +56,7 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define EVENT_CORRECTION_RTOL 0.01
 #define TOLERANCE_MIN 1e-13
 #define TOLERANCE_MAX 0.01
+#define TABLEAU_ATOL 1e-14
 #define STEP_SAFETY_FACTOR 0.9
 #define STEP_SHRINK_MIN 0.2
 #define STEP_GROWTH_MAX 5.0
@@ -101,7 +102,7 @@ enum EventKind {
 
 /* --- prbm.mechanism.parts ----------------------------------------------------------------------- */
 
-#define TINY_LENGTH 1e-09
+#define LENGTH_MIN 1e-09
 
 /* --- prbm.mechanism.flexure --------------------------------------------------------------------- */
 

@@ -35,7 +35,7 @@ from ..interface.variables import (
 from ..mechanics.contact_state import ContactMode
 from ..mechanics.inputs import BASE_AXES, LOADS, WALL_INPUTS
 from ..mechanism.flexure import ENDS
-from ..mechanism.parts import TINY_LENGTH
+from ..mechanism.parts import LENGTH_MIN
 
 PATH = Path(__file__).with_name("generated.h")
 INT_MAX = 2**31 - 1
@@ -63,7 +63,7 @@ def header() -> str:
             sys.modules[EventKind.__module__],
             [_enumeration("EventKind", "EVENT", {"NONE": 0} | {k.name: k for k in EventKind})],
         ),
-        _section("prbm.mechanism.parts", [_constant("TINY_LENGTH", TINY_LENGTH)]),
+        _section("prbm.mechanism.parts", [_constant("LENGTH_MIN", LENGTH_MIN)]),
         _section("prbm.mechanism.flexure", [_enumeration("End", "", _numbers(ENDS))]),
         _section(tables, _tables()),
         _section("prbm.interface.variables", _groups()),

@@ -100,7 +100,7 @@ static bool cut_flexure(const System *system, const Flexure *flexure, Segments *
     const Connection *between = &flexure->between;
     double L = modulus(minus(at_point(system, between->end_point),
                              at_point(system, between->start_point)));
-    if (!(L >= TINY_LENGTH)) {
+    if (!(L >= LENGTH_MIN)) {
         return fail(problem, "flexure %s has the length %g m: move its ends apart", flexure->name,
                     L);
     }
