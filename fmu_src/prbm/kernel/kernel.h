@@ -26,6 +26,7 @@
 #include "core/constraints.h"
 #include "core/factors.h"
 #include "core/forces.h"
+#include "core/contact_state.h"
 #include "core/equations.h"
 #include "core/evaluation.h"
 #include "core/dynamics.h"

@@ -25,9 +25,9 @@ PRBM size_t simulation_bytes(const Simulation *simulation); /* of its block, for
 /* As new: start values, not started. */
 PRBM void simulation_reset(Simulation *simulation);
 
-/* The complete state is one array of doubles: a copy of it, put back, continues to the bit. */
+/* The complete state as numbers: a simulation that restores them continues to the bit. */
 PRBM size_t simulation_state_count(const Simulation *simulation);
-PRBM const double *simulation_state(const Simulation *simulation);
+PRBM void simulation_save(const Simulation *simulation, double *state);
 /* False and a sentence, and nothing changed, if the numbers are no state of this mechanism. */
 PRBM bool simulation_restore(Simulation *simulation, const double *state, Problem *problem);
 

@@ -5,98 +5,80 @@
 #include "core/forces.h"
 #include "core/matrix.h"
 
-/* The power that friction takes out. */
-static double rubbing_power(const Equations *q, const double *v) {
+/* The power that friction dissipates. */
+static double rubbing_power(const Equations *q, const Evaluation *at, const double *v) {
     Rows rubs = rub_rows(q->system), walls = slide_rows(q->system);
     double power = 0.0;
-    for (int k = 0; k < q->rub_slide_count; k++) {
-        int i = q->rub_slides[k];
-        power -= rub_force(q, i) * row_rate(&rubs, i, q->e, v);
+    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
+        int i = q->slipping[k] - q->system->s;
+        power -= rub_force(q, i, at->at.e) * row_rate(&rubs, i, at->at.e, v);
     }
-    for (int k = 0; k < q->sliding_count; k++) {
-        int i = q->sliding[k];
-        double force = q->lam[q->first_hold + held_at(q, i)];
-        double speed = row_rate(&walls, i, q->e, v);
-        power += q->stop_friction[i] * force * q->discrete.slides[i] * speed;
+    for (int k = 0; k < q->slipping_stops; k++) {
+        int i = q->slipping[k];
+        double force = at->lam[q->first_hold + held_at(q, i)];
+        double speed = row_rate(&walls, i, at->at.e, v);
+        power += q->stop_friction[i] * force * slip_sign(q->contacts.modes[i]) * speed;
     }
     return power;
 }
 
-/* The power of the inputs and of the moving walls that hold. */
-static double input_power(const Equations *q, const double *v) {
+/* The power of the inputs and of the moving walls of closed stops. */
+static double input_power(const Equations *q, const Evaluation *at, const double *v) {
     int n = q->system->n;
     double power = 0.0;
     for (int j = 0; q->driven && j < n; j++) {
-        power += (product(q->w_input[j], q->e[j]).re + q->moment[j]) * v[j];
+        power += (product(q->w_input[j], at->at.e[j]).re + q->moment[j]) * v[j];
     }
     for (int k = 0; k < q->held_count; k++) {
-        power -= q->lam[q->first_hold + k] * q->inputs.walls[q->held[k]].rate;
+        power -= at->lam[q->first_hold + k] * q->inputs.walls[q->held[k]].rate;
     }
     return power;
 }
 
-static void trace_forces(Equations *q) {
-    const double *force = q->lam + q->first_hold;
-    for (int k = 0; k < q->held_count; k++) {
-        q->least[k] = lesser(force[k], q->least[k]);
-        q->most[k] = greater(force[k], q->most[k]);
-    }
-}
-
-PRBM void begin_trace(Equations *q) {
-    for (int k = 0; k < q->held_count; k++) {
-        q->least[k] = INFINITY;
-        q->most[k] = -INFINITY;
-    }
-}
-
-SIZED bool rates_of_length(int even, Equations *q, const double *y, bool turned, double *dy) {
+SIZED bool rates_of_length(int even, const Equations *q, const double *y, const Reference *near,
+                           Evaluation *result, double *dy) {
     int n = q->system->n;
-    pad_of(even, n, y, q->angle);
-    pad_second(even, n, y, q->speed);
-    if (!motion_of_length(even, q, turned)) {
+    pad_of(even, n, y, result->at.angle);
+    pad_second(even, n, y, result->at.speed);
+    if (!motion_of_length(even, q, near, result)) {
         return false;
     }
-    join(even, n, q->speed, q->x, dy);
+    join(even, n, result->at.speed, result->a, dy);
     return true;
 }
 
 /* The lengths of the guides' vectors are known where they are compiled, so that loops unroll. */
-static bool rates_of_motion(Equations *q, const double *y, bool turned, double *dy) {
+static bool rates_of_motion(const Equations *q, const double *y, const Reference *near,
+                            Evaluation *result, double *dy) {
     int even = q->system->even;
     switch (even) {
-    case 4: return rates_of_length(4, q, y, turned, dy);
-    case 8: return rates_of_length(8, q, y, turned, dy);
-    default: return rates_of_length(even, q, y, turned, dy);
+    case 4: return rates_of_length(4, q, y, near, result, dy);
+    case 8: return rates_of_length(8, q, y, near, result, dy);
+    default: return rates_of_length(even, q, y, near, result, dy);
     }
 }
 
-/* The rates of y; turned: near the start. */
-static bool rates_at(Equations *q, const double *y, bool turned, double *dy, Problem *problem) {
+/* The loads do not depend on the time; moving walls enter by the constraints only. */
+PRBM bool rate(const Equations *equations, const double *y, const Reference *near,
+               Evaluation *result, double *dy, Problem *problem) {
+    const Equations *q = equations;
     int n = q->system->n;
     const double *v = y + n;
-    if (!rates_of_motion(q, y, turned, dy)) {
+    if (!rates_of_motion(q, y, near, result, dy)) {
         return fail(problem, "%s", SINGULAR);
     }
-    trace_forces(q);
-    dy[2 * n] = q->spring_loss;
+    dy[2 * n] = result->spring_loss;
     dy[2 * n + 1] = 0.0;
     if (q->mass_damping != 0.0) {
-        dy[2 * n] += 2.0 * q->mass_damping * energy_here(q, v);
+        dy[2 * n] += 2.0 * q->mass_damping * kinetic_energy_of(q, result, v);
     }
-    if (q->rub_slide_count > 0 || q->sliding_count > 0) {
-        dy[2 * n] += rubbing_power(q, v);
+    if (q->slipping_count > 0) {
+        dy[2 * n] += rubbing_power(q, result, v);
     }
     if (q->driven || q->walls_push) {
-        dy[2 * n + 1] = input_power(q, v);
+        dy[2 * n + 1] = input_power(q, result, v);
     }
     return true;
-}
-
-/* The loads do not depend on the time; a moving wall is a matter of the constraints. */
-PRBM bool rate(Equations *equations, double t, const double *y, double *dy, Problem *problem) {
-    (void)t;
-    return rates_at(equations, y, false, dy, problem);
 }
 
 /* --- stops ------------------------------------------------------------------------------------ */

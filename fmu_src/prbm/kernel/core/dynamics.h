@@ -4,8 +4,9 @@
 
 #include "core/evaluation.h"
 
-PRBM bool rate(Equations *equations, double t, const double *y, double *dy, Problem *problem);
-PRBM void begin_trace(Equations *equations);
+/* The rates dy of y = (q, v, dissipated energy, work), and their evaluation. */
+PRBM bool rate(const Equations *equations, const double *y, const Reference *near,
+               Evaluation *result, double *dy, Problem *problem);
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e);
 PRBM double gap_rate(const Equations *equations, int i, const Complex *e, const double *v);
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,

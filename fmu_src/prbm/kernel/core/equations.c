@@ -17,14 +17,10 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     size_t r = (size_t)system->r + 2 * s + f, even = (size_t)system->even;
     Equations q = {0};
     q.system = system;
-    q.discrete.holds = place(memory, s, sizeof(int));
-    q.discrete.slides = place(memory, s, sizeof(int));
-    q.discrete.rubs = place(memory, f, sizeof(int));
+    q.contacts.modes = place(memory, s + f, sizeof(int));
     q.held = place(memory, s, sizeof(int));
-    q.stuck = place(memory, s, sizeof(int));
-    q.rubbing = place(memory, f, sizeof(int));
-    q.sliding = place(memory, s, sizeof(int));
-    q.rub_slides = place(memory, f, sizeof(int));
+    q.sticking = place(memory, s + f, sizeof(int));
+    q.slipping = place(memory, s + f, sizeof(int));
     q.stop_friction = place(memory, s, sizeof(double));
     q.rub_law = place(memory, 3 * f, sizeof(double));
     q.B = place(memory, r * n, sizeof(Complex));
@@ -32,39 +28,15 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.c = place(memory, r, sizeof(double));
     q.on = place(memory, r, sizeof(int));
     q.carried = place(memory, r, sizeof(int));
-    q.own = place(memory, n, sizeof(double));
     q.w = place(memory, n, sizeof(Complex));
     q.w_input = place(memory, n, sizeof(Complex));
     q.moment = place(memory, even, sizeof(double));
     q.B_conjugate = place_parts(memory, r * even);
     q.w_parts = place_parts(memory, even);
-    q.start = place(memory, even, sizeof(double));
-    q.e_at_start = place(memory, even, sizeof(Complex));
-    q.e_start = place_parts(memory, even);
-    q.angle = place(memory, even, sizeof(double));
-    q.speed = place(memory, even + 2, sizeof(double));
-    q.squares = place(memory, even, sizeof(double));
-    q.turns = place(memory, even + 2, sizeof(double));
-    q.e = place(memory, even, sizeof(Complex));
-    q.e_parts = place_parts(memory, even);
-    q.rows = place(memory, r * even, sizeof(double));
-    q.columns = place(memory, r * even, sizeof(double));
-    q.x = place(memory, even + 2, sizeof(double));
-    q.lam = place(memory, r, sizeof(double));
-    q.block = place(memory, n * n, sizeof(double));
-    q.least = place(memory, s, sizeof(double));
-    q.most = place(memory, s, sizeof(double));
-    q.factors.even = (int)even;
-    q.factors.blocks = system->blocks;
-    q.factors.L = place(memory, n * n, sizeof(double));
-    q.factors.inverse = place(memory, even, sizeof(double));
-    q.factors.Z = place(memory, r * even, sizeof(double));
-    q.factors.S = place(memory, 2 * r * r + r, sizeof(double));
-    q.factors.pivots = place(memory, r, sizeof(int));
     *equations = q;
 }
 
-/* --- what holds, sticks and slides ------------------------------------------------------------ */
+/* --- contacts --------------------------------------------------------------------------------- */
 
 /* Make the i-th of some rows the next active one, with the constant c. */
 static void add_row(Equations *q, const Rows *rows, int i, double c) {
@@ -79,6 +51,7 @@ static void add_row(Equations *q, const Rows *rows, int i, double c) {
     q->r++;
 }
 
+/* The rows of the loops, of the stops that are closed and of the contacts that stick. */
 static void set_rows(Equations *q) {
     const System *system = q->system;
     Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
@@ -88,33 +61,23 @@ static void set_rows(Equations *q) {
         add_row(q, &loops, k, system->loops_c[k]);
     }
     q->first_hold = q->r;
-    q->held_count = q->stuck_count = q->rubbing_count = q->sliding_count = 0;
+    q->held_count = q->sticking_count = q->slipping_count = 0;
     for (int i = 0; i < system->s; i++) {
-        if (q->discrete.holds[i]) {
+        if (q->contacts.modes[i] != CONTACT_OPEN) {
             q->held[q->held_count++] = i;
             add_row(q, &gaps, i, system->gaps_c[i] + q->inputs.walls[i].position);
         }
     }
     q->first_stick = q->r;
-    for (int k = 0; k < q->held_count; k++) {
-        int i = q->held[k], slides = q->discrete.slides[i];
-        if (slides == STICKS) {
-            q->stuck[q->stuck_count++] = i;
-            add_row(q, &walls, i, 0.0);
-        } else if (slides != IDLE) {
-            q->sliding[q->sliding_count++] = i;
+    for (int contact = 0; contact < system->s + system->f; contact++) {
+        int mode = q->contacts.modes[contact], point = contact - system->s;
+        if (mode == CONTACT_STICK) {
+            q->sticking[q->sticking_count++] = contact;
+            add_row(q, point < 0 ? &walls : &rubs, point < 0 ? contact : point, 0.0);
+        } else if (slip_sign(mode) != 0 && (point < 0 || q->rub_law[3 * point] > 0.0)) {
+            q->slipping[q->slipping_count++] = contact;
         }
-    }
-    q->first_rub = q->r;
-    q->rub_slide_count = 0;
-    for (int i = 0; i < system->f; i++) {
-        int slides = q->discrete.rubs[i];
-        if (slides == STICKS) {
-            q->rubbing[q->rubbing_count++] = i;
-            add_row(q, &rubs, i, 0.0);
-        } else if (slides != IDLE && q->rub_law[3 * i] > 0.0) {
-            q->rub_slides[q->rub_slide_count++] = i;
-        }
+        q->slipping_stops = point < 0 ? q->slipping_count : q->slipping_stops;
     }
     Rows active = {system, q->r, q->B, q->c, q->z, q->on};
     q->active = active;
@@ -126,8 +89,8 @@ static Parts parts_from(Parts parts, int start) {
     return parts;
 }
 
-/* What is behind the coordinates in padded vectors stays zero; the rows' parts are spread. */
-static void set_padding(Equations *q) {
+/* The parts of the rows, spread over stretches and padded. */
+static void set_row_parts(Equations *q) {
     int n = q->system->n, even = q->system->even;
     for (int k = 0; k < q->r; k++) {
         spread(q->system, 1, q->B + k * n, q->w); /* which the loads are put into later */
@@ -136,10 +99,6 @@ static void set_padding(Equations *q) {
     for (int i = 0; i < q->r * even; i++) {
         q->B_conjugate.im[i] = -q->B_conjugate.im[i];
     }
-    copy(n, q->system->own, q->own);
-    zeros(q->r * even, q->factors.Z);
-    zeros(even, q->factors.inverse);
-    q->speed[n] = q->turns[n] = 0.0;
 }
 
 /* Where an index stands in a list that has it. */
@@ -202,18 +161,17 @@ static void set_loads(Equations *q) {
     }
 }
 
-PRBM void set_equations(Equations *equations, const Inputs *inputs, const Discrete *discrete,
-                        double omega) {
+PRBM void set_equations(Equations *equations, const Inputs *inputs,
+                        const ContactState *contacts, double omega) {
     Equations *q = equations;
-    size_t s = (size_t)q->system->s, f = (size_t)q->system->f;
+    size_t count = (size_t)(q->system->s + q->system->f);
     q->inputs = *inputs;
     q->omega = omega;
-    memmove(q->discrete.holds, discrete->holds, s * sizeof(int));
-    memmove(q->discrete.slides, discrete->slides, s * sizeof(int));
-    memmove(q->discrete.rubs, discrete->rubs, f * sizeof(int));
+    q->slipping_stops = 0;
+    memmove(q->contacts.modes, contacts->modes, count * sizeof(int));
     set_laws(q);
     set_rows(q);
-    set_padding(q);
+    set_row_parts(q);
     set_loads(q);
 }
 

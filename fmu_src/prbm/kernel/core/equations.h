@@ -1,16 +1,9 @@
-/* The equations of motion in one discrete state: rows, loads and workspace. */
+/* The equations of motion in one contact state: rows and loads. */
 #ifndef PRBM_EQUATIONS_H
 #define PRBM_EQUATIONS_H
 
 #include "core/constraints.h"
-#include "core/factors.h"
-
-enum { SLIDES_BACK = -1, STICKS = 0, SLIDES = 1, IDLE = 2 };
-
-/* What holds (1 or 0), slides along its wall and rubs. */
-typedef struct {
-    int *holds, *slides, *rubs; /* (s,), (s,), (f,) */
-} Discrete;
+#include "core/contact_state.h"
 
 /* A wall in uniform motion: its position along the direction of the stop. */
 typedef struct {
@@ -24,15 +17,18 @@ typedef struct {
     const double *mobilities; /* (s,) inverse effective masses of the walls; 0: immovable */
 } Inputs;
 
-/* Accelerations, multipliers and powers of a system in one discrete state. */
+/* The equations of motion of a system in one contact state, with its inputs. */
 typedef struct {
     const System *system;
     Inputs inputs;
-    Discrete discrete;
+    ContactState contacts;
     double omega, beta, mass_damping;
-    int r, first_hold, first_stick, first_rub;
-    int held_count, stuck_count, rubbing_count, sliding_count, rub_slide_count;
-    int *held, *stuck, *rubbing, *sliding, *rub_slides; /* stops, stops, frictions, stops, ... */
+    int r, first_hold, first_stick;
+    int held_count, sticking_count, slipping_count;
+    int *held;              /* the stops that are closed */
+    int *sticking;          /* contacts; the k-th has the row first_stick + k */
+    int *slipping;          /* contacts; the first slipping_stops of them are stops */
+    int slipping_stops;
     double *stop_friction;  /* (s,) */
     double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
     Complex *B, *z;         /* (r, n), (r,) of the active rows */
@@ -45,27 +41,12 @@ typedef struct {
     bool driven, walls_push;
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
-    double *own;            /* (n,) the diagonal of M now */
-    /* where the present step began, or something else that others are near */
-    double *start;          /* (even,) its angles */
-    Complex *e_at_start;    /* (even,) */
-    Parts e_start;          /* (even,) the same */
-    /* at the state that was evaluated last; of the coordinates and, behind them, of the ground */
-    double *angle, *speed, *squares, *turns; /* (even + 2,) */
-    Complex *e;                              /* (n,) */
-    Parts e_parts;                           /* (even,) */
-    double *rows, *columns;                  /* (r, even) */
-    double *x, *lam;                         /* (even + 2,) accelerations; (r,) */
-    double *block;                           /* of M, below its diagonal */
-    double spring_loss;                      /* the power that the springs' damping takes */
-    double *least, *most;                    /* (held,) extremes of the forces since the trace */
-    Factors factors;
 } Equations;
 
 PRBM void equations_place(Equations *equations, const System *system, Memory *memory);
-/* Set up the rows and loads of a discrete state. */
-PRBM void set_equations(Equations *equations, const Inputs *inputs, const Discrete *discrete,
-                        double omega);
+/* Set up the rows and loads of a contact state. */
+PRBM void set_equations(Equations *equations, const Inputs *inputs,
+                        const ContactState *contacts, double omega);
 PRBM double wall_at(const Wall *wall, double t);
 
 #endif

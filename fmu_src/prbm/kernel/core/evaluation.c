@@ -1,43 +1,102 @@
 /* Accelerations and multipliers: loads, mass matrix, rows and their factors at a state. */
+#include <math.h>
+#include <string.h>
+
 #include "core/evaluation.h"
 #include "core/forces.h"
 #include "core/matrix.h"
 
-/* The angles from whose directions those near them are turned. */
-static void start_from(Equations *q, const double *angle) {
-    int even = q->system->even;
-    pad(q->system->n, angle, q->start);
-    unit_vectors(even, q->start, q->e_at_start);
-    pad_parts(even, q->e_at_start, q->e_start);
-    stretch(q->system, q->start, q->e_at_start);
+/* --- memory ----------------------------------------------------------------------------------- */
+
+PRBM void reference_place(Reference *reference, const System *system, Memory *memory) {
+    size_t even = (size_t)system->even;
+    reference->angle = place(memory, even, sizeof(double));
+    reference->e = place(memory, even, sizeof(Complex));
+    reference->e_parts = place_parts(memory, even);
+}
+
+static Kinematics place_kinematics(const System *system, Memory *memory) {
+    size_t even = (size_t)system->even;
+    Kinematics at;
+    at.angle = place(memory, even, sizeof(double));
+    at.speed = place(memory, even + 2, sizeof(double));
+    at.squares = place(memory, even, sizeof(double));
+    at.own = place(memory, (size_t)system->n, sizeof(double));
+    at.e = place(memory, even, sizeof(Complex));
+    at.e_parts = place_parts(memory, even);
+    return at;
+}
+
+/* Zero what has been placed since a beginning: the padding of vectors and rows stays zero. */
+static void zero_placed(const Memory *memory, size_t begin) {
+    if (memory->base != NULL) {
+        memset(memory->base + begin, 0, memory->used - begin);
+    }
+}
+
+PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory *memory) {
+    size_t n = (size_t)system->n, even = (size_t)system->even, begin = memory->used;
+    size_t r = (size_t)system->r + 2 * (size_t)system->s + (size_t)system->f;
+    Evaluation result = {0};
+    result.at = place_kinematics(system, memory);
+    result.turns = place(memory, even + 2, sizeof(double));
+    result.row = place(memory, even, sizeof(double));
+    result.columns = place(memory, r * even, sizeof(double));
+    result.a = place(memory, even + 2, sizeof(double));
+    result.lam = place(memory, r, sizeof(double));
+    result.block = place(memory, n * n, sizeof(double));
+    result.factors.even = (int)even;
+    result.factors.blocks = system->blocks;
+    result.factors.L = place(memory, n * n, sizeof(double));
+    result.factors.inverse = place(memory, even, sizeof(double));
+    result.factors.Z = place(memory, r * even, sizeof(double));
+    result.factors.S = place(memory, 2 * r * r + r, sizeof(double));
+    result.factors.pivots = place(memory, r, sizeof(int));
+    zero_placed(memory, begin);
+    *evaluation = result;
+}
+
+/* --- position and velocity --------------------------------------------------------------------- */
+
+PRBM void set_reference(Reference *reference, const System *system, const double *angle) {
+    int even = system->even;
+    pad(system->n, angle, reference->angle);
+    unit_vectors(even, reference->angle, reference->e);
+    pad_parts(even, reference->e, reference->e_parts);
+    stretch(system, reference->angle, reference->e);
 }
 
 /* The arms of links that stretch, and the diagonal of M, of which |E|^2 is a factor. */
-RARE void stretch_links(Equations *q) {
-    const System *system = q->system;
-    stretch(system, q->angle, q->e);
-    pad_parts(system->even, q->e, q->e_parts);
+RARE void stretch_links(const System *system, Kinematics *at) {
+    stretch(system, at->angle, at->e);
+    pad_parts(system->even, at->e, at->e_parts);
+    copy(system->n, system->own, at->own);
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);
-        double square = q->e[a].re * q->e[a].re + q->e[a].im * q->e[a].im;
-        q->own[a] = q->own[j] = system->own[a] * square;
+        double square = at->e[a].re * at->e[a].re + at->e[a].im * at->e[a].im;
+        at->own[a] = at->own[j] = system->own[a] * square;
     }
 }
 
-/* The directions at the angles: from those of the start, or afresh. */
-SIZED void directions_of(int even, Equations *q, bool turned) {
-    if (!turned ||
-        !turned_directions(even, q->angle, q->start, q->e_start, q->e_parts, q->e)) {
-        unit_vectors(even, q->angle, q->e);
-        pad_parts(even, q->e, q->e_parts);
+/* The diagonal of M: it depends on the position where links stretch. */
+static const double *own_inertia(const System *system, const Kinematics *at) {
+    return system->stretch_count > 0 ? at->own : system->own;
+}
+
+/* The directions at the angles, from those of a reference nearby if there is one. */
+SIZED void directions_of(int even, const System *system, const Reference *near, Kinematics *at) {
+    if (near == NULL ||
+        !turned_directions(even, at->angle, near->angle, near->e_parts, at->e_parts, at->e)) {
+        unit_vectors(even, at->angle, at->e);
+        pad_parts(even, at->e, at->e_parts);
     }
-    if (q->system->stretch_count > 0) {
-        stretch_links(q);
+    if (system->stretch_count > 0) {
+        stretch_links(system, at);
     }
 }
 
-static void find_directions(Equations *q, bool turned) {
-    directions_of(q->system->even, q, turned);
+static void find_directions(const System *system, const Reference *near, Kinematics *at) {
+    directions_of(system->even, system, near, at);
 }
 
 /* Re(w^2) of the complex rates w = theta' - i s' of arms, for the squares of all rates. */
@@ -49,11 +108,11 @@ RARE void stretch_squares(const System *system, double *squares) {
     }
 }
 
-/* x: the loads Re(w e) + moment. */
-SIZED void find_loads(int even, Equations *q) {
-    const double *moment = q->moment, *v = q->speed;
-    double *x = q->x, *squares = q->squares;
-    Parts w = q->w_parts, e = q->e_parts;
+/* a: the loads Re(w e) + moment. */
+SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
+    const double *moment = q->moment, *v = result->at.speed;
+    double *x = result->a, *squares = result->at.squares;
+    Parts w = q->w_parts, e = result->at.e_parts;
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes re = lanes_at(w.re + j) * lanes_at(e.re + j);
@@ -66,19 +125,21 @@ SIZED void find_loads(int even, Equations *q) {
     }
 }
 
+/* --- loads and rows ---------------------------------------------------------------------------- */
+
 /* What the rates of stretches add to the accelerations of angles: with Im(w^2) = -2 theta' s', all
  * that w^2 enters is solved for a - Im(w^2) as it is for a without stretches. */
-static double coriolis(const Equations *q, int stretch_coordinate) {
-    return -2.0 * q->speed[arm_of(q->system, stretch_coordinate)] * q->speed[stretch_coordinate];
+static double coriolis(const System *system, const double *v, int stretch_coordinate) {
+    return -2.0 * v[arm_of(system, stretch_coordinate)] * v[stretch_coordinate];
 }
 
 /* What springs and their damping take up: x -= K (q - q0 + beta v), spring by spring, and the
  * power beta v^T K v of the damping. */
-SIZED void add_springs(int even, Equations *q) {
+SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
     const System *system = q->system;
     const int n = system->n;
-    const double *angle = q->angle, *straight = system->straight, *v = q->speed;
-    double *turns = q->turns, *x = q->x, sum = 0.0; /* x has room for the ground's share */
+    const double *angle = result->at.angle, *straight = system->straight, *v = result->at.speed;
+    double *turns = result->turns, *x = result->a, sum = 0.0; /* a has room for the ground */
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes turn = lanes_at(angle + j) - lanes_at(straight + j);
@@ -93,7 +154,7 @@ SIZED void add_springs(int even, Equations *q) {
         sum += spring->rate * (swing * swing);
     }
     x[n] = 0.0;
-    q->spring_loss = q->beta * sum;
+    result->spring_loss = q->beta * sum;
 }
 
 /* Rows -Im(B e) and, in lam, their convective terms Re(B e) v^2; B is the conjugate. */
@@ -117,47 +178,54 @@ SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE sq
 }
 
 /* The rows that are seen from a body, and what is left of their convective terms. */
-RARE void carried_rows(Equations *q, double *rows) {
+RARE void carried_rows(const Equations *q, const Kinematics *at, double *rows,
+                       double *convective) {
     const System *system = q->system;
     for (int c = 0; c < q->carried_count; c++) {
         int k = q->carried[c];
         double *row = rows + k * system->even;
-        row_jacobian(&q->active, k, q->e, row);
-        q->lam[k] = row_convective(&q->active, k, q->e, q->speed);
+        row_jacobian(&q->active, k, at->e, row);
+        convective[k] = row_convective(&q->active, k, at->e, at->speed);
         for (int l = 0; l < system->stretch_count; l++) {
             int j = system->stretches[l];
-            q->lam[k] -= row[arm_of(system, j)] * coriolis(q, j);
+            convective[k] -= row[arm_of(system, j)] * coriolis(system, at->speed, j);
         }
     }
 }
 
-SIZED void rows_to_length(int even, Equations *q, double *rows) {
-    Parts B = q->B_conjugate, e = q->e_parts;
+SIZED void rows_to_length(int even, const Equations *q, const Kinematics *at, double *rows,
+                          double *convective) {
+    Parts B = q->B_conjugate, e = at->e_parts;
     switch (q->r) {
-    case 1: convect(1, even, B, e, q->squares, rows, q->lam); break;
-    case 2: convect(2, even, B, e, q->squares, rows, q->lam); break;
-    case 3: convect(3, even, B, e, q->squares, rows, q->lam); break;
+    case 1: convect(1, even, B, e, at->squares, rows, convective); break;
+    case 2: convect(2, even, B, e, at->squares, rows, convective); break;
+    case 3: convect(3, even, B, e, at->squares, rows, convective); break;
     default:
         for (int k = 0; k < q->r; k++) {
-            convect(1, even, parts_from(B, k * even), e, q->squares, rows + k * even, q->lam + k);
+            convect(1, even, parts_from(B, k * even), e, at->squares, rows + k * even,
+                    convective + k);
         }
     }
     if (q->carried_count > 0) {
-        carried_rows(q, rows);
+        carried_rows(q, at, rows, convective);
     }
 }
 
-static void rows_and_convection(Equations *q, double *rows) {
-    rows_to_length(q->system->even, q, rows);
+static void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
+                                double *convective) {
+    rows_to_length(q->system->even, q, at, rows, convective);
 }
 
-SIZED void rows_of_length(int even, Equations *q, double *rows) {
+SIZED void rows_of_length(int even, const Equations *q, const Kinematics *at, double *rows,
+                          double *convective) {
     if (KNOWN(even)) {
-        rows_to_length(even, q, rows);
+        rows_to_length(even, q, at, rows, convective);
     } else {
-        rows_and_convection(q, rows);
+        rows_and_convection(q, at, rows, convective);
     }
 }
+
+/* --- inertia ----------------------------------------------------------------------------------- */
 
 /* x -= c M v within a block. */
 SIZED void damp_mass(int size, double c, const double *ALONE M, const double *ALONE v,
@@ -193,70 +261,75 @@ SIZED void block_inertia(int size, const Complex *ALONE H, const double *ALONE o
     }
 }
 
-/* M in its block of the coordinates from start, and what its inertia and damping add to x. */
-SIZED void block_mass(Equations *q, int size, int start, const Complex *H, double *M) {
-    double *x = q->x + start;
-    block_inertia(size, H, q->own + start, parts_from(q->e_parts, start),
-                  q->squares + start, M, x);
+/* M in its block of the coordinates from start, and what its inertia and damping add to a. */
+SIZED void block_mass(const Equations *q, Evaluation *result, int size, int start,
+                      const Complex *H, double *M) {
+    const Kinematics *at = &result->at;
+    double *x = result->a + start;
+    block_inertia(size, H, own_inertia(q->system, at) + start, parts_from(at->e_parts, start),
+                  at->squares + start, M, x);
     if (q->mass_damping != 0.0) {
-        damp_mass(size, q->mass_damping, M, q->speed + start, x);
+        damp_mass(size, q->mass_damping, M, at->speed + start, x);
     }
 }
 
-/* The block of M in q->block, factored into L, and L^-1 of the loads and rows. */
-SIZED bool factor_any_block(Equations *q, int size, int start, double *L) {
-    const Factors *factors = &q->factors;
-    if (!factor_any(size, q->block, L, factors->inverse + start)) {
+/* The block of M in result->block, factored into L, and L^-1 of the loads and rows. */
+SIZED bool factor_any_block(const Equations *q, Evaluation *result, int size, int start,
+                            double *L) {
+    const Factors *factors = &result->factors;
+    if (!factor_any(size, result->block, L, factors->inverse + start)) {
         return false;
     }
-    block_forward(size, L, q->x + start);
+    block_forward(size, L, result->a + start);
     for (int k = 0; k < q->r; k++) {
         block_forward(size, L, factors->Z + k * q->system->even + start);
     }
     return true;
 }
 
-RARE bool factor_block(Equations *q, int size, int start, double *L) {
-    return factor_any_block(q, size, start, L);
+RARE bool factor_block(const Equations *q, Evaluation *result, int size, int start, double *L) {
+    return factor_any_block(q, result, size, start, L);
 }
 
-SIZED bool block_motion(Equations *q, int size, int start, const Complex *H, double *L) {
-    block_mass(q, size, start, H, q->block);
-    return factor_any_block(q, size, start, L);
+SIZED bool block_motion(const Equations *q, Evaluation *result, int size, int start,
+                        const Complex *H, double *L) {
+    block_mass(q, result, size, start, H, result->block);
+    return factor_any_block(q, result, size, start, L);
 }
 
 /* The same of a small block; one of tiny or huge numbers takes the longer way. */
-SIZED bool small_block_motion(Equations *q, int size, int start, const Complex *H, double *L) {
+SIZED bool small_block_motion(const Equations *q, Evaluation *result, int size, int start,
+                              const Complex *H, double *L) {
     const int even = q->system->even, r = q->r;
     double M[SMALL * SMALL], D[SMALL];
-    block_mass(q, size, start, H, M);
+    block_mass(q, result, size, start, H, M);
     if (!small_factor(size, M, L, D)) {
         UNROLLED
         for (int i = 0; i < size * size; i++) {
-            q->block[i] = i % size <= i / size ? M[i] : 0.0;
+            result->block[i] = i % size <= i / size ? M[i] : 0.0;
         }
-        return factor_block(q, size, start, L);
+        return factor_block(q, result, size, start, L);
     }
-    put_block(size, start, D, q->factors.inverse);
-    solve_small(size, start, L, q->x, FORWARD);
+    put_block(size, start, D, result->factors.inverse);
+    solve_small(size, start, L, result->a, FORWARD);
     for (int k = 0; k < r; k++) {
-        solve_small(size, start, L, q->factors.Z + k * even, FORWARD);
+        solve_small(size, start, L, result->factors.Z + k * even, FORWARD);
     }
     return true;
 }
 
-static bool blocks_motion(Equations *q) {
+static bool blocks_motion(const Equations *q, Evaluation *result) {
     bool regular = true;
     const Complex *H = q->system->coupling;
-    double *L = q->factors.L;
-    for (int k = 0; k < q->factors.block_count; k++) {
-        int start = q->factors.blocks[k].start, size = q->factors.blocks[k].size;
+    double *L = result->factors.L;
+    for (int k = 0; k < result->factors.block_count; k++) {
+        int start = result->factors.blocks[k].start, size = result->factors.blocks[k].size;
         switch (size) {
-        case 1: regular = small_block_motion(q, 1, start, H, L) && regular; break;
-        case 2: regular = small_block_motion(q, 2, start, H, L) && regular; break;
-        case 3: regular = small_block_motion(q, 3, start, H, L) && regular; break;
-        case 4: regular = small_block_motion(q, 4, start, H, L) && regular; break;
-        default: regular = block_motion(q, size, start, H, L) && regular;
+        case 1: regular = small_block_motion(q, result, 1, start, H, L) && regular; break;
+        case 2: regular = small_block_motion(q, result, 2, start, H, L) && regular; break;
+        case 3: regular = small_block_motion(q, result, 3, start, H, L) && regular; break;
+        case 4: regular = small_block_motion(q, result, 4, start, H, L) && regular; break;
+        default: regular = block_motion(q, result, size, start, H, L) && regular;
         }
         H += size * size;
         L += size * size;
@@ -265,14 +338,16 @@ static bool blocks_motion(Equations *q) {
 }
 
 /* v^T diag(e)^H H diag(e) v / 2 */
-PRBM double energy_here(const Equations *equations, const double *v) {
+PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation,
+                              const double *v) {
     const System *system = equations->system;
-    const Complex *e = equations->e;
+    const Complex *e = evaluation->at.e;
+    const double *own = own_inertia(system, &evaluation->at);
     double sum = 0.0;
     for (int k = 0; k < system->block_count; k++) {
         int start = system->blocks[k].start, end = start + system->blocks[k].size;
         for (int i = start; i < end; i++) {
-            double row = 0.5 * equations->own[i] * v[i];
+            double row = 0.5 * own[i] * v[i];
             for (int j = start; j < i; j++) {
                 Complex h = system->H[i * system->n + j];
                 row += product(product(conjugate(e[i]), h), e[j]).re * v[j];
@@ -283,6 +358,8 @@ PRBM double energy_here(const Equations *equations, const double *v) {
     return sum;
 }
 
+/* --- friction ---------------------------------------------------------------------------------- */
+
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e) {
     const System *system = equations->system;
     const double *law = equations->rub_law + 3 * i;
@@ -291,101 +368,115 @@ PRBM double rub_limit(const Equations *equations, int i, const Complex *e) {
     return law[0] * normal_force(lift, law[1], law[2]);
 }
 
-/* The friction force of a sliding friction point along its direction. */
-static double rub_force(const Equations *q, int i) {
-    return -q->discrete.rubs[i] * rub_limit(q, i, q->e);
+/* The force of a closed stop. */
+static double stop_force(const Equations *q, const double *lam, int stop) {
+    return lam[q->first_hold + held_at(q, stop)];
 }
 
-static void add_rubs(Equations *q) {
+/* The friction force of a sticking contact. */
+static double stick_force(const Equations *q, const double *lam, int contact) {
+    return lam[q->first_stick + place_in(q->sticking, contact)];
+}
+
+/* The largest friction force of a contact, by Coulomb's law. */
+static double friction_limit(const Equations *q, const Complex *e, const double *lam,
+                             int contact) {
+    return is_stop(q->system, contact) ? q->stop_friction[contact] * stop_force(q, lam, contact)
+                                       : rub_limit(q, contact - q->system->s, e);
+}
+
+/* The friction force of a slipping friction point along its direction. */
+static double rub_force(const Equations *q, int i, const Complex *e) {
+    return -slip_sign(q->contacts.modes[q->system->s + i]) * rub_limit(q, i, e);
+}
+
+static void add_rubs(const Equations *q, Evaluation *result) {
     Rows rubs = rub_rows(q->system);
-    for (int k = 0; k < q->rub_slide_count; k++) {
-        int i = q->rub_slides[k];
-        row_jacobian(&rubs, i, q->e, q->rows);
-        add_scaled(q->system->n, rub_force(q, i), q->rows, q->x);
+    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
+        int i = q->slipping[k] - q->system->s;
+        row_jacobian(&rubs, i, result->at.e, result->row);
+        add_scaled(q->system->n, rub_force(q, i, result->at.e), result->row, result->a);
     }
 }
 
-/* A stop that slides pushes along its gap and, by Coulomb's law, along its wall: its column differs
+/* A stop that slips pushes along its gap and, by Coulomb's law, along its wall: its column differs
  * from its row. */
-static void set_columns(Equations *q) {
+static void set_columns(const Equations *q, Evaluation *result) {
     const System *system = q->system;
     int n = system->n, even = system->even;
     Rows walls = slide_rows(system);
-    q->factors.Z_columns = q->factors.Z;
-    if (q->sliding_count == 0) {
+    result->factors.Z_columns = result->factors.Z;
+    if (q->slipping_stops == 0) {
         return;
     }
-    q->factors.Z_columns = q->columns;
-    copy(q->r * even, q->factors.Z, q->columns);
-    for (int k = 0; k < q->sliding_count; k++) {
-        int i = q->sliding[k], h = q->first_hold + held_at(q, i);
-        double share = -q->stop_friction[i] * q->discrete.slides[i];
-        double *column = q->columns + h * even;
-        row_jacobian(&q->active, h, q->e, column);
-        row_jacobian(&walls, i, q->e, q->rows);
-        add_scaled(n, share, q->rows, column);
-        forward_all(&q->factors, column);
+    result->factors.Z_columns = result->columns;
+    copy(q->r * even, result->factors.Z, result->columns);
+    for (int k = 0; k < q->slipping_stops; k++) {
+        int i = q->slipping[k], h = q->first_hold + held_at(q, i);
+        double share = -q->stop_friction[i] * slip_sign(q->contacts.modes[i]);
+        double *column = result->columns + h * even;
+        row_jacobian(&q->active, h, result->at.e, column);
+        row_jacobian(&walls, i, result->at.e, result->row);
+        add_scaled(n, share, result->row, column);
+        forward_all(&result->factors, column);
     }
 }
 
-/* The factors, and x := L^-1 x, from the rows in Z. */
-SIZED bool factor_motion(int even, Equations *q) {
-    q->factors.r = q->r;
-    q->factors.block_count = q->system->block_count;
-    if (!blocks_motion(q)) {
+/* --- accelerations ----------------------------------------------------------------------------- */
+
+/* The factors, and a := L^-1 a, from the rows in Z. */
+SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
+    result->factors.r = q->r;
+    result->factors.block_count = q->system->block_count;
+    if (!blocks_motion(q, result)) {
         return false;
     }
-    set_columns(q);
-    return schur_of_length(even, &q->factors);
+    set_columns(q, result);
+    return schur_of_length(even, &result->factors);
 }
 
-RARE void add_coriolis(Equations *q) {
-    for (int k = 0; k < q->system->stretch_count; k++) {
-        int j = q->system->stretches[k];
-        q->x[arm_of(q->system, j)] += coriolis(q, j);
+RARE void add_coriolis(const System *system, Evaluation *result) {
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        result->a[arm_of(system, j)] += coriolis(system, result->at.speed, j);
     }
 }
 
-/* Solve for x = a and lam at angle and speed; turned: near the start. */
-SIZED bool motion_of_length(int even, Equations *q, bool turned) {
-    directions_of(even, q, turned);
-    find_loads(even, q);
-    add_springs(even, q);
-    rows_of_length(even, q, q->factors.Z);
-    add_rubs(q);
-    if (!factor_motion(even, q)) {
+/* Solve for a and lam at the angles and rates of the evaluation. */
+SIZED bool motion_of_length(int even, const Equations *q, const Reference *near,
+                            Evaluation *result) {
+    directions_of(even, q->system, near, &result->at);
+    find_loads(even, q, result);
+    add_springs(even, q, result);
+    rows_of_length(even, q, &result->at, result->factors.Z, result->lam);
+    add_rubs(q, result);
+    if (!factor_motion(even, q, result)) {
         return false;
     }
-    finish_of_length(even, &q->factors, q->x, q->lam);
+    finish_of_length(even, &result->factors, result->a, result->lam);
     if (q->system->stretch_count > 0) {
-        add_coriolis(q);
+        add_coriolis(q->system, result);
     }
     return true;
 }
 
-static bool solve_motion(Equations *q, const double *angle, const double *v, bool turned) {
-    pad(q->system->n, angle, q->angle);
-    pad(q->system->n, v, q->speed);
-    return motion_of_length(q->system->even, q, turned);
+PRBM bool evaluate_equations(const Equations *equations, const double *q, const double *v,
+                             const Reference *near, Evaluation *result, Problem *problem) {
+    int n = equations->system->n;
+    pad(n, q, result->at.angle);
+    pad(n, v, result->at.speed);
+    return motion_of_length(equations->system->even, equations, near, result) ||
+           fail(problem, "%s", SINGULAR);
 }
 
-/* Only the factors, at a state that is then a start. */
-static bool factor_start(Equations *q, const double *angle, const double *v) {
-    start_from(q, angle);
-    pad(q->system->n, angle, q->angle);
-    pad(q->system->n, v, q->speed);
-    find_directions(q, true);
-    find_loads(q->system->even, q);
-    rows_and_convection(q, q->factors.Z);
-    return factor_motion(q->system->even, q);
-}
-
-PRBM bool accelerations(Equations *equations, const double *q, const double *v, double *a,
-                        double *lam, Problem *problem) {
-    if (!solve_motion(equations, q, v, false)) {
-        return fail(problem, "%s", SINGULAR);
-    }
-    copy(equations->system->n, equations->x, a);
-    copy(equations->r, equations->lam, lam);
-    return true;
+PRBM bool factor_equations(const Equations *equations, const double *q, const double *v,
+                           const Reference *near, Evaluation *result, Problem *problem) {
+    const System *system = equations->system;
+    pad(system->n, q, result->at.angle);
+    pad(system->n, v, result->at.speed);
+    find_directions(system, near, &result->at);
+    find_loads(system->even, equations, result);
+    rows_and_convection(equations, &result->at, result->factors.Z, result->lam);
+    return factor_motion(system->even, equations, result) ||
+           fail(problem, "%s", SINGULAR);
 }

@@ -1,14 +1,48 @@
-/* Accelerations and multipliers at a state. */
+/* The equations of motion, evaluated at a state. */
 #ifndef PRBM_EVALUATION_H
 #define PRBM_EVALUATION_H
 
 #include "core/equations.h"
+#include "core/factors.h"
 
-/* Accelerations a (n,) and multipliers lam (r,): loops, held stops (> 0 pushes), what sticks. */
-PRBM bool accelerations(Equations *equations, const double *q, const double *v, double *a,
-                        double *lam, Problem *problem);
-PRBM double energy_here(const Equations *equations, const double *v); /* kinetic, of what was
-                                                                         evaluated last */
+/* Angles and their directions: the directions at angles nearby are turned from these. */
+typedef struct {
+    double *angle; /* (even,) */
+    Complex *e;    /* (even,) */
+    Parts e_parts; /* (even,) without stretch */
+} Reference;
+
+/* Position and velocity of a system; of the coordinates and, behind them, of the ground. */
+typedef struct {
+    double *angle, *speed, *squares; /* (even,), (even + 2,), (even,): speed^2 */
+    Complex *e;                      /* (n,) */
+    Parts e_parts;                   /* (even,) */
+    double *own;                     /* (n,) the diagonal of M, if links stretch */
+} Kinematics;
+
+/* The equations of motion, evaluated at a state. */
+typedef struct {
+    Kinematics at;
+    double *turns;                   /* (even + 2,) deflections and damping of the springs */
+    double *row, *columns;           /* (even,), (r, even) */
+    double *a, *lam;                 /* (even + 2,) accelerations; (r,) */
+    double *block;                   /* of M, below its diagonal */
+    double spring_loss;              /* the power that the springs dissipate */
+    Factors factors;
+} Evaluation;
+
+PRBM void reference_place(Reference *reference, const System *system, Memory *memory);
+PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory *memory);
+PRBM void set_reference(Reference *reference, const System *system, const double *angle);
+/* Accelerations a (n,) and multipliers lam (r,): loops, closed stops (> 0 pushes), what sticks.
+ * near: a reference near q, or NULL. */
+PRBM bool evaluate_equations(const Equations *equations, const double *q, const double *v,
+                             const Reference *near, Evaluation *result, Problem *problem);
+/* Only the factors of the equations at a state. */
+PRBM bool factor_equations(const Equations *equations, const double *q, const double *v,
+                           const Reference *near, Evaluation *result, Problem *problem);
+PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation,
+                              const double *v);
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
 
 #endif

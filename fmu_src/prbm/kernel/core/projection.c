@@ -20,8 +20,9 @@ static double prescribed(const Equations *q, int k) {
     return holds ? q->inputs.walls[q->held[k - q->first_hold]].rate : 0.0;
 }
 
-PRBM bool project(Equations *equations, double t, double *y, Scratch *scratch, Problem *problem) {
-    Equations *q = equations;
+PRBM bool project(const Equations *equations, double t, double *y, Scratch *scratch,
+                  Problem *problem) {
+    const Equations *q = equations;
     size_t mark = scratch->used, n = (size_t)q->system->n, r = (size_t)q->r;
     double *c = take(scratch, r), *rates = take(scratch, r), *rows = take(scratch, r * n);
     double *M = take(scratch, n * n), *C = take(scratch, n * n);
@@ -42,12 +43,23 @@ PRBM bool project(Equations *equations, double t, double *y, Scratch *scratch, P
     return right;
 }
 
-/* The value of an active row, but for its constant, at the state that was evaluated last. */
-SIZED double active_value(int even, const Equations *q, int k) {
+PRBM void correction_place(Correction *correction, const System *system, Memory *memory) {
+    size_t even = (size_t)system->even, begin = memory->used;
+    size_t r = (size_t)system->r + 2 * (size_t)system->s + (size_t)system->f;
+    correction->at = place_kinematics(system, memory);
+    correction->rows = place(memory, r * even, sizeof(double));
+    correction->convective = place(memory, r, sizeof(double));
+    correction->residual = place(memory, r, sizeof(double));
+    correction->change = place(memory, even + 2, sizeof(double));
+    zero_placed(memory, begin);
+}
+
+/* The value of an active row without its constant. */
+SIZED double active_value(int even, const Equations *q, const Kinematics *at, int k) {
     if (q->system->stretch_count > 0 || q->on[k] != FIXED) {
-        return row_value(&q->active, k, q->e);
+        return row_value(&q->active, k, at->e);
     }
-    Parts B = parts_from(q->B_conjugate, k * even), e = q->e_parts;
+    Parts B = parts_from(q->B_conjugate, k * even), e = at->e_parts;
     Lanes sum[SUMS] = {NO_LANES};
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
@@ -58,82 +70,76 @@ SIZED double active_value(int even, const Equations *q, int k) {
     return total(sum);
 }
 
-/* The worst distance from the constraints, in what lam asks for. */
-SIZED double ask_positions(int even, Equations *q, double t) {
+/* The residuals of the positions; returns the largest. */
+SIZED double position_residuals(int even, const Equations *q, const Kinematics *at, double t,
+                                double *residual) {
     double worst = 0.0;
     for (int k = 0; k < q->r; k++) {
-        q->lam[k] = k < q->first_stick ? -(active_value(even, q, k) + offset(q, k, t)) : 0.0;
-        worst = fabs(q->lam[k]) <= worst ? worst : fabs(q->lam[k]); /* a NaN stays */
+        residual[k] = k < q->first_stick ? -(active_value(even, q, at, k) + offset(q, k, t)) : 0.0;
+        worst = fabs(residual[k]) <= worst ? worst : fabs(residual[k]); /* a NaN stays */
     }
     return worst;
 }
 
-SIZED void ask_velocities(int even, Equations *q) {
-    rows_of_length(even, q, q->rows);
+SIZED void velocity_residuals(int even, const Equations *q, Correction *c) {
+    rows_of_length(even, q, &c->at, c->rows, c->convective);
     for (int k = 0; k < q->r; k++) {
-        q->lam[k] = -(even_dot(even, q->rows + k * even, q->speed) + prescribed(q, k));
+        c->residual[k] = -(even_dot(even, c->rows + k * even, c->at.speed) + prescribed(q, k));
     }
 }
 
-/* y += what the rows ask for. */
-SIZED void correct(int even, Equations *q, double *y) {
+/* y += the least change that removes the residuals. */
+SIZED void correct(int even, const Equations *q, const Factors *factors, Correction *c,
+                   double *y) {
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
-        set_lanes(q->x + j, all_lanes(0.0));
+        set_lanes(c->change + j, all_lanes(0.0));
     }
-    finish_of_length(even, &q->factors, q->x, q->lam);
+    finish_of_length(even, factors, c->change, c->residual);
     for (int i = 0; i < q->system->n; i++) {
-        y[i] += q->x[i];
+        y[i] += c->change[i];
     }
 }
 
-/* One correction by the factors at hand; turned: near the start. */
-SIZED bool corrected_of_length(int even, Equations *q, double t, double *y, bool turned) {
+/* One correction of y by the factors of its evaluation. */
+SIZED bool corrected_of_length(int even, const Equations *q, const Evaluation *evaluation,
+                               const Reference *near, double t, double *y, Correction *c) {
     int n = q->system->n;
-    ask_positions(even, q, t); /* e is that of y: evaluated last */
-    correct(even, q, y);
-    pad_of(even, n, y, q->angle);
-    directions_of(even, q, turned);
-    if (!(ask_positions(even, q, t) <= CONSTRAINT_RTOL * q->system->length)) {
+    position_residuals(even, q, &evaluation->at, t, c->residual);
+    correct(even, q, &evaluation->factors, c, y);
+    pad_of(even, n, y, c->at.angle);
+    directions_of(even, q->system, near, &c->at);
+    if (!(position_residuals(even, q, &c->at, t, c->residual) <= CONSTRAINT_RTOL * q->system->length)) {
         return false;
     }
-    pad_second(even, n, y, q->speed);
-    ask_velocities(even, q);
-    correct(even, q, y + n);
+    pad_second(even, n, y, c->at.speed);
+    velocity_residuals(even, q, c);
+    correct(even, q, &evaluation->factors, c, y + n);
     return true;
 }
 
-static bool corrected(Equations *q, double t, double *y, bool turned) {
+static bool corrected(const Equations *q, const Evaluation *evaluation, const Reference *near,
+                      double t, double *y, Correction *c) {
     int even = q->system->even;
     switch (even) {
-    case 4: return corrected_of_length(4, q, t, y, turned);
-    case 8: return corrected_of_length(8, q, t, y, turned);
-    default: return corrected_of_length(even, q, t, y, turned);
+    case 4: return corrected_of_length(4, q, evaluation, near, t, y, c);
+    case 8: return corrected_of_length(8, q, evaluation, near, t, y, c);
+    default: return corrected_of_length(even, q, evaluation, near, t, y, c);
     }
 }
 
-static bool project_near(Equations *q, double t, double *y, bool turned, Scratch *scratch,
-                         Problem *problem) {
+PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
+                       const Reference *near, double t, double *y, Correction *correction,
+                       Scratch *scratch, Problem *problem) {
+    const Equations *q = equations;
     int n = q->system->n;
     size_t mark = scratch->used;
     double *kept = take(scratch, (size_t)n);
     copy(n, y, kept);
     scratch->used = mark;
-    if (q->sliding_count == 0 && corrected(q, t, y, turned)) {
+    if (q->slipping_stops == 0 && corrected(q, evaluation, near, t, y, correction)) {
         return true;
     }
     copy(n, kept, y); /* as if nothing had been tried */
     return project(q, t, y, scratch, problem);
-}
-
-/* The directions at angles near the start. */
-static const Complex *directions_near(Equations *q, const double *angle) {
-    pad(q->system->n, angle, q->angle);
-    find_directions(q, true);
-    return q->e;
-}
-
-PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *scratch,
-                            Problem *problem) {
-    return project_near(equations, t, y, false, scratch, problem);
 }

@@ -2,10 +2,22 @@
 #ifndef PRBM_PROJECTION_H
 #define PRBM_PROJECTION_H
 
-#include "core/equations.h"
+#include "core/evaluation.h"
 
-PRBM bool project(Equations *equations, double t, double *y, Scratch *scratch, Problem *problem);
-PRBM bool project_from_here(Equations *equations, double t, double *y, Scratch *scratch,
-                            Problem *problem);
+/* Working memory of a projection near an evaluated state. */
+typedef struct {
+    Kinematics at;                   /* of the corrected state */
+    double *rows, *convective;       /* (r, even), (r,) */
+    double *residual, *change;       /* (r,), (even + 2,) */
+} Correction;
+
+PRBM void correction_place(Correction *correction, const System *system, Memory *memory);
+/* Bring y onto the constraints at time t. */
+PRBM bool project(const Equations *equations, double t, double *y, Scratch *scratch,
+                  Problem *problem);
+/* The same with the factors of the evaluation of y, in one correction if that is enough. */
+PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
+                       const Reference *near, double t, double *y, Correction *correction,
+                       Scratch *scratch, Problem *problem);
 
 #endif

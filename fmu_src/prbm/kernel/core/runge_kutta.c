@@ -1,4 +1,6 @@
 /* The pair 5(4) of Bogacki and Shampine with a quartic: the data of hybrid/runge_kutta.py. */
+#include <math.h>
+
 #include "core/dynamics.h"
 #include "core/matrix.h"
 #include "core/runge_kutta.h"
@@ -50,16 +52,28 @@ static void combine(int n, int count, double h, const double *a, const double *k
     }
 }
 
-/* The stages k (STAGES, n), of which the first is given, and the new state y1. */
-PRBM bool stages(Equations *equations, int n, double t, const double *y, double h, double *k,
-                 double *y1, Problem *problem) {
-    (void)t; /* see rate */
-    start_from(equations, y);
+static void add_to_range(const Equations *q, const Evaluation *evaluation, ForceRange *range) {
+    const double *force = evaluation->lam + q->first_hold;
+    for (int k = 0; k < q->held_count; k++) {
+        range->least[k] = lesser(force[k], range->least[k]);
+        range->largest[k] = greater(force[k], range->largest[k]);
+    }
+}
+
+PRBM bool stages(const Equations *equations, int n, const double *y, double h, double *k,
+                 double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
+                 Problem *problem) {
+    for (int i = 0; i < equations->held_count; i++) {
+        forces->least[i] = HUGE_VAL;
+        forces->largest[i] = -HUGE_VAL;
+    }
+    set_reference(reference, equations->system, y);
     for (int i = 1; i < STAGES; i++) {
         combine(n, i, h, STAGE[i], k, y, y1);
-        if (!rates_at(equations, y1, true, k + i * n, problem)) {
+        if (!rate(equations, y1, reference, evaluation, k + i * n, problem)) {
             return false;
         }
+        add_to_range(equations, evaluation, forces);
     }
     return true;
 }

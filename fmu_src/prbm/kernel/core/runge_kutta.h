@@ -2,10 +2,18 @@
 #ifndef PRBM_RUNGE_KUTTA_H
 #define PRBM_RUNGE_KUTTA_H
 
-#include "core/equations.h"
+#include "core/evaluation.h"
 
-PRBM bool stages(Equations *equations, int n, double t, const double *y, double h, double *k,
-                 double *y1, Problem *problem);
+/* Least and largest forces of the closed stops at the stages of a step. */
+typedef struct {
+    double *least, *largest; /* (held_count,) */
+} ForceRange;
+
+/* The stages k (STAGES, n), of which the first is given, the new state y1 and its evaluation; the
+ * reference becomes that of y. */
+PRBM bool stages(const Equations *equations, int n, const double *y, double h, double *k,
+                 double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
+                 Problem *problem);
 PRBM void error_of(int n, const double *k, double h, double *error);
 PRBM void weights(double theta, double *b);
 PRBM void interpolate(int n, const double *y, const double *k, double h, double theta,

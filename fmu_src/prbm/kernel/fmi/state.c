@@ -99,9 +99,9 @@ static void put_state(const Instance *instance, unsigned char *bytes, size_t siz
     for (int i = 0; i < mechanism->stop_count; i++) {
         put_f64(&at, instance->acknowledged[i]);
     }
-    const double *state = simulation_state(instance->simulation);
+    simulation_save(instance->simulation, instance->before);
     for (size_t i = 0; i < simulation_state_count(instance->simulation); i++) {
-        put_f64(&at, state[i]);
+        put_f64(&at, instance->before[i]);
     }
 }
 

@@ -5,9 +5,7 @@
 
 /* Save the state of the simulation for go_back. */
 static void keep(Instance *instance) {
-    const Simulation *simulation = instance->simulation;
-    size_t bytes = simulation_state_count(simulation) * sizeof(double);
-    memcpy(instance->before, simulation_state(simulation), bytes);
+    simulation_save(instance->simulation, instance->before);
 }
 
 static void go_back(Instance *instance) {

@@ -1,0 +1,15 @@
+/* Modes of the contacts. */
+#ifndef PRBM_CONTACT_STATE_H
+#define PRBM_CONTACT_STATE_H
+
+#include "core/constraints.h"
+
+/* Contacts are numbered in one list: the stops, then the friction points, which are never open.
+ * CONTACT_FRICTIONLESS: closed, but other contacts carry the load, or without friction. */
+PRBM int slip_sign(int mode); /* of the sliding velocity: -1, 0 or +1 */
+
+typedef struct {
+    int *modes; /* (s + f,) */
+} ContactState;
+
+#endif

@@ -1,0 +1,57 @@
+/* The assembled mechanism and the scales of its motion: the twin of hybrid/configuration.py. */
+#include <math.h>
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+PRBM double zero_speed(const Configuration *configuration) {
+    const Scales *scales = &configuration->scales;
+    return ZERO_RATE_RTOL * scales->rate * scales->length;
+}
+
+/* The scale of rates is the fundamental frequency or, without one, that of the stiffest spring; the
+ * scale of energies is one radian against the stiffest torsion spring or, without one, a turn by one
+ * radian in a period. */
+PRBM void set_scales(Configuration *configuration, double frequency) {
+    const System *system = &configuration->system;
+    Scales *scales = &configuration->scales;
+    int n = system->n;
+    double torsion = 0.0, stiffest = largest(n * n, system->K), heaviest = 0.0;
+    for (int i = 0; i < n * n; i++) {
+        bool turns = arm_of(system, i / n) == i / n && arm_of(system, i % n) == i % n;
+        torsion = turns ? greater(torsion, fabs(system->K[i])) : torsion;
+        heaviest = greater(heaviest, modulus(system->H[i]));
+    }
+    double spring_rate = stiffest > 0.0 ? sqrt(stiffest / heaviest) : SPRINGLESS_RATE;
+    configuration->omega = TWO_PI * frequency;
+    scales->length = system->length;
+    scales->rate = configuration->omega > 0.0 ? configuration->omega : spring_rate;
+    scales->energy = torsion > 0.0 ? torsion : heaviest * (scales->rate * scales->rate);
+    scales->time = TWO_PI / scales->rate;
+}
+
+PRBM bool take_values(Simulation *sim, Problem *problem) {
+    Configuration *configuration = &sim->configuration;
+    const Mechanism *m = configuration->mechanism;
+    State *state = &sim->state;
+    copy(m->parameter_count, state->values, state->acting_values);
+    copy(m->input_count, state->given, state->acting_given);
+    configuration->assembled = check_values(m, state->acting_values, problem) &&
+                               assemble(&configuration->system, state->acting_values,
+                                        &sim->scratch, problem);
+    return configuration->assembled;
+}
+
+PRBM bool values_changed(const Simulation *sim) {
+    size_t bytes = (size_t)sim->configuration.mechanism->parameter_count * sizeof(double);
+    return memcmp(sim->state.values, sim->state.acting_values, bytes) != 0;
+}
+
+PRBM bool inputs_changed(const Simulation *sim) {
+    size_t bytes = (size_t)sim->configuration.mechanism->input_count * sizeof(double);
+    return memcmp(sim->state.given, sim->state.acting_given, bytes) != 0;
+}
+
+PRBM double stop_field(const Simulation *sim, Expression field) {
+    return evaluate(field, sim->state.acting_values);
+}

@@ -1,0 +1,276 @@
+/* The parts of a simulation; the event loop that co-simulation and model exchange share. */
+#ifndef PRBM_HYBRID_H
+#define PRBM_HYBRID_H
+
+#include "generated.h"
+#include "simulation.h"
+
+#define TWO_PI 6.283185307179586
+
+/* --- configuration.c -------------------------------------------------------------------------- */
+
+/* Units of the motion: the size, the fundamental frequency, one radian against the stiffest spring
+ * and the period. */
+typedef struct {
+    double length, rate, energy, time;
+} Scales;
+
+/* The assembled mechanism; constant between two changes of parameters. */
+typedef struct {
+    const Mechanism *mechanism;
+    System system;
+    double omega; /* of the fundamental mode; 0 without one */
+    Scales scales;
+    bool assembled; /* whether the system is that of the acting values */
+} Configuration;
+
+PRBM void set_scales(Configuration *configuration, double frequency);
+PRBM bool take_values(Simulation *sim, Problem *problem); /* the values set become acting ones */
+PRBM bool values_changed(const Simulation *sim);
+PRBM bool inputs_changed(const Simulation *sim);
+PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
+PRBM double stop_field(const Simulation *sim, Expression field);
+
+/* --- events.c --------------------------------------------------------------------------------- */
+
+typedef struct {
+    int kind, contact;
+    double time;
+} Event;
+
+/* A state at which guards are evaluated; lam may be NULL for guards without forces. */
+typedef struct {
+    double time;
+    const double *q, *v;
+    const Complex *e;
+    const double *lam;
+} Instant;
+
+typedef double Guard(const Equations *equations, const Instant *at, int contact);
+typedef bool Reset(Simulation *sim, const Event *event, Problem *problem);
+
+/* A kind of event: it occurs where the guard crosses zero in a direction; the reset applies it. */
+typedef struct {
+    const char *name;
+    Guard *guard;
+    bool forces; /* whether the guard needs multipliers */
+    int direction;
+    Reset *reset;
+} Transition;
+
+PRBM const Transition *transition(int kind);
+PRBM bool watched(const Equations *equations, int kind, int contact); /* whether it may occur */
+PRBM bool apply_event(Simulation *sim, const Event *event, Problem *problem);
+
+/* --- simulation.c: state and parts ------------------------------------------------------------ */
+
+/* Values of the latest impact at a stop, and sums over all impacts. */
+typedef struct {
+    int count;
+    double time, approach_speed, rebound_speed, impulse, energy_lost, modal_restitution;
+    double impulse_sum; /* of all impulses so far, captures included */
+} Latched;
+
+/* The latest step with its dense output. */
+typedef struct {
+    bool valid;
+    double start, h;
+    double *y, *k; /* (ny,), (STAGES, ny) */
+} Arc;
+
+/* The step sizes and errors that the controller remembers. */
+typedef struct {
+    double h, log_of_error; /* of the next step; of the latest, relative to the allowed one */
+    double growth_max;      /* 1 after a rejected step */
+} StepSizeController;
+
+/* Everything that a simulation continues from. */
+typedef struct {
+    bool started, exchange;
+    double time, tolerance, frequency;
+    double step_size, log_of_error; /* of the step size controller */
+    double front_time;
+    bool has_k1;          /* whether k1 holds the rates of the front */
+    Arc arc;
+    Event pending;        /* located, but not yet applied */
+    double window_since;  /* start of the window in which events are counted */
+    int window_count;
+    bool interrupted;     /* a communication step was left before its end */
+    double step_end;      /* of that communication step */
+    double planned, due;  /* times at which wall motions were planned and are to be complete */
+    bool walls_continue;  /* inputs came in an event within a step: walls move on to its end */
+    int *modes;           /* (s + f,) of the contacts */
+    bool *swift;          /* (s,): whether a wall has been given a velocity */
+    Latched *latched;     /* (s,) */
+    Wall *walls;          /* (s,) */
+    double *numbers;      /* the arrays below, one behind the other */
+    size_t number_count;
+    double *values, *given;               /* as they were set */
+    double *acting_values, *acting_given; /* since the last restart */
+    double *received;                     /* (3 b,): impulses that have acted */
+    double *front, *k1;                   /* (ny,): the end of the last step, its rates */
+    double *floors;                       /* (s,): gaps close this far below zero */
+    double *held_rates, *held_times;      /* (s,): of the walls at the last event, and its time */
+    double *states;                       /* model exchange: as they were set */
+} State;
+
+/* Equations in a contact state that is being tried, and evaluations of states other than the end
+ * of a step. */
+typedef struct {
+    Equations equations;
+    ContactState contacts;
+    Evaluation evaluation;
+} Trial;
+
+/* Working memory of a step and of the location of events in it. */
+typedef struct {
+    Evaluation evaluation; /* at the last stage */
+    Reference reference;   /* at the start */
+    Correction correction;
+    ForceRange forces;
+    double *end, *error;   /* (ny,) */
+    double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
+    double *sample_y, *sample_gap, *sample_rate;
+    Complex *sample_e;
+    double *located_y;     /* (ny,), (n,): a state of the dense output */
+    Complex *located_e;
+    double *reach;         /* (n,) largest changes of the arms */
+} Stepping;
+
+enum { NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8, MOBILITIES = 16 }; /* outputs */
+
+/* The present state and its outputs. */
+typedef struct {
+    double *y;             /* (ny,) */
+    Complex *e;            /* (n,) */
+    Reference reference;
+    Evaluation evaluation;
+    double *outputs;
+    int fresh;             /* the groups of outputs that are up to date */
+} Present;
+
+/* The rates of the present state, for derivatives and event indicators. */
+typedef struct {
+    const double *y;       /* the state */
+    double *rates;         /* (ny,) */
+    Evaluation evaluation;
+    bool evaluated;        /* model exchange: of the front as it is now */
+    bool stale;            /* model exchange: states, time or inputs have changed */
+} PresentRates;
+
+struct Simulation {
+    Configuration configuration;
+    State state;
+    double *backup; /* the state before an attempt, as numbers */
+    Equations equations;
+    double *forces; /* (3 b,) acting inputs */
+    Trial trial;
+    Stepping stepping;
+    Present present;
+    PresentRates rates;
+    Scratch scratch;
+    Hear *hear;
+    void *listener;
+    size_t bytes;
+};
+
+PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 */
+PRBM const System *system_of(const Simulation *sim);
+PRBM int contact_count(const Simulation *sim);
+PRBM Complex *directions_at(Simulation *sim, const double *q); /* in working memory */
+PRBM Instant instant_of(const Simulation *sim, double time, const double *y,
+                        const Evaluation *evaluation);
+PRBM void set_inputs(Simulation *sim); /* the equations of the present contacts and inputs */
+PRBM void set_contacts(Simulation *sim, const int *modes);
+PRBM void set_mode(Simulation *sim, int contact, int mode);
+PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, bool exchange,
+                       Problem *problem);
+
+/* --- arc.c ------------------------------------------------------------------------------------ */
+
+PRBM void arc_at(const Simulation *sim, double t, double *y);
+/* The state at the present time, on the constraints; the reference becomes one near it. */
+PRBM bool arc_state(Simulation *sim, double *y, Problem *problem);
+
+/* --- guards.c --------------------------------------------------------------------------------- */
+
+PRBM double gap_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double release_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double slip_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double reversal_guard(const Equations *equations, const Instant *at, int contact);
+/* The first event within the latest step, of kind EVENT_NONE without one. */
+PRBM bool first_event(Simulation *sim, Event *event, Problem *problem);
+
+/* --- walls.c ---------------------------------------------------------------------------------- */
+
+PRBM double given_velocity(const Simulation *sim, int i);
+PRBM double *acting_velocity(const Simulation *sim, int i);
+PRBM double wall_target(const Simulation *sim, int i);
+PRBM void place_walls(Simulation *sim, bool moving);
+PRBM double due_walls(const Simulation *sim);
+PRBM bool within_step(const Simulation *sim, double time);
+PRBM bool plan_walls(const Simulation *sim, double time, Wall *planned);
+PRBM void push_wall(Simulation *sim, int i, double P);
+PRBM void walls_at_event(Simulation *sim, double *acted);
+PRBM bool check_walls(Simulation *sim, Problem *problem);
+PRBM bool settle_walls(Simulation *sim, Problem *problem);
+
+/* --- impacts.c -------------------------------------------------------------------------------- */
+
+/* Directions, mass matrix and Jacobian of the loops at a position, in working memory. */
+typedef struct {
+    Complex *e;
+    double *M, *loops;
+} Inertia;
+
+PRBM Inertia inertia_at(Simulation *sim, const double *q);
+PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held,
+                   const double *row, double *result, Problem *problem);
+PRBM bool impact(Simulation *sim, int hit, Problem *problem);
+PRBM bool impulses_changed(const Simulation *sim);
+PRBM const double *given_impulses(const Simulation *sim);
+PRBM bool receive_impulses(Simulation *sim, Problem *problem);
+
+/* --- contact_modes.c -------------------------------------------------------------------------- */
+
+/* The stops that stay closed, and the acceleration at which the others open. */
+typedef struct {
+    int count, stops[RESTING_SETS_MAX];
+    double opening;
+} RestingSet;
+
+PRBM bool find_resting(Simulation *sim, int count, const int *candidates, const double *q,
+                       const double *v, RestingSet *resting, Problem *problem);
+PRBM void try_resting(Simulation *sim, const RestingSet *resting, const double *q,
+                      const double *v);
+PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
+                 Problem *problem);
+
+/* --- stepping.c ------------------------------------------------------------------------------- */
+
+PRBM double longest_step(const Simulation *sim);
+PRBM bool take_step(Simulation *sim, Problem *problem);
+
+/* --- snapshot.c ------------------------------------------------------------------------------- */
+
+PRBM void keep_backup(Simulation *sim);
+PRBM bool attempt(Simulation *sim, bool right, Problem *problem); /* back to the backup, or right */
+
+/* --- outputs.c -------------------------------------------------------------------------------- */
+
+PRBM int output_groups(const Simulation *sim, int slot);
+PRBM bool compute_outputs(Simulation *sim, int groups, bool near, Problem *problem);
+
+/* --- model_exchange.c ------------------------------------------------------------------------- */
+
+PRBM void exchange_begin(Simulation *sim);
+PRBM bool exchange_refresh(Simulation *sim, Problem *problem);
+PRBM bool exchange_rates(Simulation *sim, Problem *problem);
+PRBM void event_indicators(const Simulation *sim, double *z);
+
+/* --- values.c --------------------------------------------------------------------------------- */
+
+PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem);
+PRBM bool present_rates(Simulation *sim, Problem *problem);
+
+#endif

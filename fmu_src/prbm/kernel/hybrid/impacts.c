@@ -1,0 +1,564 @@
+/* Impacts at the stops and impulses at the forces: the twin of hybrid/impacts.py. */
+#include <math.h>
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+/* --- mobility --------------------------------------------------------------------------------- */
+
+PRBM Inertia inertia_at(Simulation *sim, const double *q) {
+    const System *system = system_of(sim);
+    Inertia at = {take_complex(&sim->scratch, system->n, 1),
+                  take_matrix(&sim->scratch, system->n, system->n),
+                  take_matrix(&sim->scratch, system->r, system->n)};
+    double *C = take_matrix(&sim->scratch, system->n, system->n);
+    Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
+    directions(system, q, at.e);
+    inertia(system->n, system->H, system->J, at.e, at.M, C);
+    jacobian(&loops, at.e, at.loops);
+    return at;
+}
+
+/* The inverse mass along a row while the rows of held (r, n) do not move. */
+PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held,
+                   const double *row, double *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n;
+    double *X = take(&sim->scratch, (size_t)n);
+    bool right = response(n, r, 1, at->M, held, row, X, &sim->scratch, problem);
+    *result = right ? dot(n, row, X) : 0.0;
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* The inverse mass in contact space, W = rows X (k, k), of rows (k, n) and their response X. */
+static void contact_mobility(int k, int n, const double *rows, const double *X, double *W) {
+    for (int a = 0; a < k; a++) {
+        for (int b = 0; b < k; b++) {
+            W[a * k + b] = 0.0;
+            for (int j = 0; j < n; j++) {
+                W[a * k + b] += rows[a * n + j] * X[j * k + b];
+            }
+        }
+    }
+}
+
+/* after = v + X P */
+static void add_impulses(int k, int n, const double *v, const double *X, const double *P,
+                         double *after) {
+    copy(n, v, after);
+    for (int j = 0; j < n; j++) {
+        for (int a = 0; a < k; a++) {
+            after[j] += X[j * k + a] * P[a];
+        }
+    }
+}
+
+/* --- impulses of an impact -------------------------------------------------------------------- */
+
+/* An impact that is being resolved: the stops struck and held, velocities after, impulses. */
+typedef struct {
+    int struck_count, held_count, struck[STOPS_MAX], held[STOPS_MAX];
+    double restitution[STOPS_MAX];
+    double *after;                                     /* (n,) */
+    double normal[STOPS_MAX], tangential[STOPS_MAX]; /* by stop */
+    bool with_normal[STOPS_MAX];                      /* whether the stop takes part */
+} Hits;
+
+/* The state before an impact. */
+typedef struct {
+    const Inertia *at;
+    const double *v;
+    double rates[STOPS_MAX], friction[STOPS_MAX]; /* of the gaps; of the stops struck */
+} Approach;
+
+/* The a-th of the stops that take part: those that are struck, then those that hold. */
+static int partner(const Hits *hits, int a) {
+    return a < hits->struck_count ? hits->struck[a] : hits->held[a - hits->struck_count];
+}
+
+static bool impulses_without_friction(Simulation *sim, const Approach *approach, Hits *hits,
+                                      Problem *problem) {
+    const System *system = system_of(sim);
+    const Inertia *at = approach->at;
+    int n = system->n, k = hits->struck_count + hits->held_count;
+    double *G = take_matrix(&sim->scratch, k, n), *X = take_matrix(&sim->scratch, n, k);
+    double *W = take_matrix(&sim->scratch, k, k), *rates = take(&sim->scratch, (size_t)k);
+    double *eps = take(&sim->scratch, (size_t)k), *P = take(&sim->scratch, (size_t)k);
+    Rows gaps = gap_rows(system);
+    for (int a = 0; a < k; a++) {
+        int i = partner(hits, a);
+        row_jacobian(&gaps, i, at->e, G + a * n);
+        rates[a] = lesser(approach->rates[i], 0.0);
+        eps[a] = a < hits->struck_count ? hits->restitution[a] : 0.0;
+    }
+    if (!response(n, system->r, k, at->M, at->loops, G, X, &sim->scratch, problem)) {
+        return false;
+    }
+    contact_mobility(k, n, G, X, W);
+    for (int a = 0; a < k; a++) {
+        W[a * k + a] += sim->equations.inputs.mobilities[partner(hits, a)];
+    }
+    newton(k, W, rates, eps, P, &sim->scratch);
+    add_impulses(k, n, approach->v, X, P, hits->after);
+    for (int a = 0; a < k; a++) {
+        int i = partner(hits, a);
+        hits->normal[i] = P[a];
+        hits->with_normal[i] = true;
+    }
+    return true;
+}
+
+/* The impulses along rows (r, n), M (v+ - v-) - GT^T P = rows^T reaction; GT (k, n). */
+static void reaction_impulses(Simulation *sim, const Approach *approach, const double *after,
+                              int k, const double *GT, const double *P, int r,
+                              const double *rows, double *reaction) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n;
+    const double *M = approach->at->M;
+    double *left = take(&sim->scratch, (size_t)n);
+    double *columns = take_matrix(&sim->scratch, n, r);
+    for (int j = 0; j < n; j++) {
+        left[j] = 0.0;
+        for (int i = 0; i < n; i++) {
+            left[j] += M[j * n + i] * (after[i] - approach->v[i]);
+        }
+        for (int a = 0; a < k; a++) {
+            left[j] -= GT[a * n + j] * P[a];
+        }
+        for (int a = 0; a < r; a++) {
+            columns[j * r + a] = rows[a * n + j];
+        }
+    }
+    if (r > 0) {
+        least_squares(n, r, columns, left, REACTION_RANK_RTOL, reaction, &sim->scratch);
+    }
+    sim->scratch.used = mark;
+}
+
+/* The normal and tangential rows GT (2 k, n) of the stops struck, their rates before the impact,
+ * and the rows (r, n) of the loops and of the kept stops. */
+static void impact_rows(Simulation *sim, const Approach *approach, const Hits *hits,
+                        int kept_count, const int *kept, double *rows, double *GT,
+                        double *rates) {
+    const System *system = system_of(sim);
+    const Inertia *at = approach->at;
+    int n = system->n, k = hits->struck_count;
+    Rows gaps = gap_rows(system), walls = slide_rows(system);
+    copy(system->r * n, at->loops, rows);
+    for (int a = 0; a < kept_count; a++) {
+        row_jacobian(&gaps, kept[a], at->e, rows + (system->r + a) * n);
+    }
+    for (int a = 0; a < k; a++) {
+        int i = hits->struck[a];
+        row_jacobian(&gaps, i, at->e, GT + a * n);
+        row_jacobian(&walls, i, at->e, GT + (k + a) * n);
+        rates[a] = approach->rates[i];
+        rates[k + a] = dot(n, GT + (k + a) * n, approach->v);
+    }
+}
+
+/* Remove the kept stops that would pull; returns whether there are any. */
+static bool remove_pulling(int *kept_count, int *kept, double *reaction) {
+    int staying = 0;
+    for (int a = 0; a < *kept_count; a++) {
+        if (!(reaction[a] < 0.0)) {
+            reaction[staying] = reaction[a];
+            kept[staying++] = kept[a];
+        }
+    }
+    bool pulling = staying < *kept_count;
+    *kept_count = staying;
+    return pulling;
+}
+
+static void set_impulses(Hits *hits, const double *P, int kept_count, const int *kept,
+                         const double *reaction) {
+    int k = hits->struck_count;
+    for (int a = 0; a < k; a++) {
+        hits->normal[hits->struck[a]] = P[a];
+        hits->tangential[hits->struck[a]] = P[k + a];
+        hits->with_normal[hits->struck[a]] = true;
+    }
+    for (int a = 0; a < kept_count; a++) {
+        hits->normal[kept[a]] = reaction[a];
+        hits->with_normal[kept[a]] = true;
+    }
+}
+
+/* One round with friction: kept stops are constraints.  Those that would pull are removed, and
+ * *pulling is set: then another round is needed. */
+static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hits *hits,
+                                   int *kept_count, int *kept, bool *pulling, Problem *problem) {
+    const System *system = system_of(sim);
+    const Inertia *at = approach->at;
+    int n = system->n, k = hits->struck_count, r = system->r + *kept_count;
+    double *rows = take_matrix(&sim->scratch, r, n), *GT = take_matrix(&sim->scratch, 2 * k, n);
+    double *X = take_matrix(&sim->scratch, n, 2 * k);
+    double *W = take_matrix(&sim->scratch, 2 * k, 2 * k);
+    double *rates = take(&sim->scratch, 2 * (size_t)k), *P = take(&sim->scratch, 2 * (size_t)k);
+    double *reaction = take(&sim->scratch, (size_t)r);
+    impact_rows(sim, approach, hits, *kept_count, kept, rows, GT, rates);
+    if (!response(n, r, 2 * k, at->M, rows, GT, X, &sim->scratch, problem)) {
+        return false;
+    }
+    contact_mobility(2 * k, n, GT, X, W);
+    for (int a = 0; a < k; a++) {
+        W[a * 2 * k + a] += sim->equations.inputs.mobilities[hits->struck[a]];
+    }
+    if (k == 1) {
+        stronge(W, rates, approach->friction[0], hits->restitution[0], &P[0], &P[1]);
+    } else if (!several(k, W, rates, approach->friction, hits->restitution, P, &sim->scratch,
+                        problem)) {
+        return false;
+    }
+    add_impulses(2 * k, n, approach->v, X, P, hits->after);
+    reaction_impulses(sim, approach, hits->after, 2 * k, GT, P, r, rows, reaction);
+    *pulling = remove_pulling(kept_count, kept, reaction + system->r);
+    if (!*pulling) {
+        set_impulses(hits, P, *kept_count, kept, reaction + system->r);
+    }
+    return true;
+}
+
+/* The velocities after an impact, the normal and the tangential impulses by stop.  Held stops take
+ * part: without friction as partners of the complementarity problem, with friction as constraints
+ * that are removed if they would pull.  Their own friction, and that of friction points, is finite
+ * and has no impulse. */
+static bool impact_impulses(Simulation *sim, const double *q, const double *v, Hits *hits,
+                            Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int kept_count = hits->held_count, kept[STOPS_MAX];
+    bool rough = false, pulling = true, right = true;
+    Inertia at = inertia_at(sim, q);
+    Approach approach = {&at, v, {0.0}, {0.0}};
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        approach.rates[i] = gap_rate(&sim->equations, i, at.e, v);
+        hits->normal[i] = hits->tangential[i] = 0.0;
+        hits->with_normal[i] = false;
+    }
+    for (int a = 0; a < hits->struck_count; a++) {
+        const Stop *stop = &sim->configuration.mechanism->stops[hits->struck[a]];
+        approach.friction[a] = stop_field(sim, stop->friction);
+        rough = rough || approach.friction[a] != 0.0;
+    }
+    if (!rough) {
+        right = impulses_without_friction(sim, &approach, hits, problem);
+    } else {
+        memcpy(kept, hits->held, (size_t)hits->held_count * sizeof(int));
+        while (right && pulling) {
+            size_t round_mark = sim->scratch.used;
+            right = impulses_with_friction(sim, &approach, hits, &kept_count, kept, &pulling,
+                                           problem);
+            sim->scratch.used = round_mark;
+        }
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* --- captures --------------------------------------------------------------------------------- */
+
+/* Whether a resting stop is pressed so strongly that a bounce would be shorter than
+ * SHORTEST_FLIGHT_RTOL or, in model exchange, lower than LOWEST_BOUNCE_RTOL: by closing late, it
+ * would gain what it loses by the impact. */
+static bool bounce_vanishes(Simulation *sim, int stop, const RestingSet *resting, const double *q,
+                            const double *v, double speed, bool *result, Problem *problem) {
+    const System *system = system_of(sim);
+    const Evaluation *tried = &sim->trial.evaluation;
+    double *G = take(&sim->scratch, (size_t)system->n), free;
+    Rows gaps = gap_rows(system);
+    try_resting(sim, resting, q, v);
+    if (!evaluate_equations(&sim->trial.equations, q, v, NULL, &sim->trial.evaluation, problem)) {
+        return false;
+    }
+    Inertia at = inertia_at(sim, q);
+    row_jacobian(&gaps, stop, at.e, G);
+    if (!mobility(sim, &at, system->r, at.loops, G, &free, problem)) {
+        return false;
+    }
+    double pressing = stop_force(&sim->trial.equations, tried->lam, stop) * free;
+    double lowest = (sim->state.exchange ? LOWEST_BOUNCE_RTOL : 0.0) * system->length;
+    double period = sim->configuration.scales.time;
+    *result = 2.0 * speed < pressing * SHORTEST_FLIGHT_RTOL * period ||
+              speed * speed < 2.0 * pressing * lowest;
+    return true;
+}
+
+/* Whether a stop that is struck slowly comes to rest: after an impact without restitution it is
+ * pressed, and its speed is below rest_speed or its bounce vanishes.  A speed that is round-off is
+ * neither counted nor returned. */
+static bool captured(Simulation *sim, int stop, const Hits *hits, const double *q,
+                     const double *v, double speed, bool *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int candidates[1 + STOPS_MAX];
+    *result = speed <= zero_speed(&sim->configuration);
+    if (*result) {
+        return true;
+    }
+    Hits soft;
+    soft.after = take(&sim->scratch, (size_t)system_of(sim)->n);
+    soft.struck_count = 1;
+    soft.struck[0] = stop;
+    soft.restitution[0] = 0.0;
+    soft.held_count = hits->held_count;
+    memcpy(soft.held, hits->held, sizeof soft.held);
+    RestingSet resting = {0, {0}, 0.0};
+    candidates[0] = stop;
+    memcpy(candidates + 1, hits->held, (size_t)hits->held_count * sizeof(int));
+    bool rests = false;
+    bool right = impact_impulses(sim, q, v, &soft, problem) &&
+                 find_resting(sim, 1 + hits->held_count, candidates, q, soft.after, &resting,
+                              problem);
+    for (int k = 0; right && k < resting.count; k++) {
+        rests = rests || resting.stops[k] == stop;
+    }
+    if (right && rests) {
+        *result = speed < stop_field(sim, sim->configuration.mechanism->stops[stop].rest_speed);
+        right = *result || bounce_vanishes(sim, stop, &resting, q, soft.after, speed, result,
+                                           problem);
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* --- bookkeeping ------------------------------------------------------------------------------ */
+
+static void report_impact(const Simulation *sim, int i) {
+    const Latched *last = &sim->state.latched[i];
+    Impact report = {sim->configuration.mechanism->stops[i].name,
+                     last->time,
+                     last->approach_speed,
+                     last->rebound_speed,
+                     last->impulse,
+                     last->energy_lost,
+                     last->count};
+    if (sim->hear) {
+        sim->hear(sim->listener, &report);
+    }
+}
+
+/* Gap rates before and after an impact, and losses of energy, by stop. */
+typedef struct {
+    double before[STOPS_MAX], after[STOPS_MAX], lost[STOPS_MAX];
+} Account;
+
+/* Move the walls, sum up the impulses and add the energies to the state.  At each stop -P (u- +
+ * u+)/2 is lost, and as much along the wall; the wall does -P (w- + w+)/2, where an impulse changes
+ * the velocity w of a wall by its mobility times P. */
+static void book_energies(Simulation *sim, const Hits *hits, const double *q, const double *v,
+                          Account *account) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    Rows walls = slide_rows(system);
+    double lost = 0.0, work = 0.0, *front = sim->state.front;
+    Complex *e = directions_at(sim, q);
+    for (int i = 0; i < system->s; i++) {
+        double wall = sim->state.walls[i].rate, P = hits->normal[i];
+        account->before[i] = gap_rate(&sim->equations, i, e, v);
+        if (hits->with_normal[i]) {
+            push_wall(sim, i, P);
+            sim->state.latched[i].impulse_sum += P;
+        }
+        account->after[i] = gap_rate(&sim->equations, i, e, hits->after);
+        double slid = row_rate(&walls, i, e, v) + row_rate(&walls, i, e, hits->after);
+        account->lost[i] = -P * (account->before[i] + account->after[i]) / 2 -
+                           hits->tangential[i] * slid / 2;
+        lost += hits->with_normal[i] ? account->lost[i] : 0.0;
+        work -= hits->with_normal[i] ? P * (wall + sim->state.walls[i].rate) / 2 : 0.0;
+    }
+    copy(system->n, hits->after, front + system->n);
+    front[2 * system->n] += lost;
+    front[2 * system->n + 1] += work;
+    sim->scratch.used = mark;
+}
+
+/* Latch the values of the counted impacts and report them. */
+static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *account,
+                          const bool *counted, const double *q, const double *v,
+                          Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int n = system->n;
+    bool any = false;
+    double *phi = take(&sim->scratch, (size_t)n), *M = take_matrix(&sim->scratch, n, n);
+    double modal = 0.0;
+    for (int i = 0; i < system->s; i++) {
+        any = any || counted[i];
+    }
+    bool right = !any || fundamental_at(system, q, phi, M, &sim->scratch, problem);
+    if (any && right) {
+        modal = simulated_restitution(n, phi, M, v, hits->after);
+    }
+    for (int i = 0; right && i < system->s; i++) {
+        if (counted[i]) {
+            Latched *latched = &sim->state.latched[i];
+            latched->count += latched->count < IMPACT_COUNT_MAX;
+            latched->time = sim->state.front_time;
+            latched->approach_speed = -account->before[i];
+            latched->rebound_speed = account->after[i];
+            latched->impulse = hits->normal[i];
+            latched->energy_lost = account->lost[i];
+            latched->modal_restitution = modal;
+            report_impact(sim, i);
+        }
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* --- impacts ---------------------------------------------------------------------------------- */
+
+/* The stops that are struck together with one, and those that are held. */
+static void find_partners(Simulation *sim, int hit, const double *q, const double *v, Hits *hits,
+                          double *rates) {
+    size_t mark = sim->scratch.used;
+    double near = TOUCHING_RTOL * system_of(sim)->length;
+    Complex *e = directions_at(sim, q);
+    hits->struck_count = hits->held_count = 0;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        double distance = gap(&sim->equations, i, sim->state.front_time, e);
+        rates[i] = gap_rate(&sim->equations, i, e, v);
+        if (sim->state.modes[i] != CONTACT_OPEN) {
+            hits->held[hits->held_count++] = i;
+        } else if (rates[i] < 0.0 && (i == hit || distance <= near)) {
+            hits->struck[hits->struck_count++] = i;
+        }
+    }
+    sim->scratch.used = mark;
+}
+
+/* The restitution of each stop struck, 0 for one that comes to rest, which is not counted. */
+static bool choose_restitutions(Simulation *sim, const double *q, const double *v,
+                                const double *rates, Hits *hits, bool *counted,
+                                Problem *problem) {
+    bool right = true;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        counted[i] = false;
+    }
+    for (int k = 0; right && k < hits->struck_count; k++) {
+        int i = hits->struck[k];
+        const Stop *stop = &sim->configuration.mechanism->stops[i];
+        bool soft = false;
+        right = captured(sim, i, hits, q, v, -rates[i], &soft, problem);
+        counted[i] = !soft;
+        hits->restitution[k] = soft ? 0.0 : stop_field(sim, stop->restitution);
+    }
+    return right;
+}
+
+/* Open all stops; returns how many of those that took part do not separate. */
+static int open_all(Simulation *sim, const Hits *hits, int *touching) {
+    size_t mark = sim->scratch.used;
+    double bound = zero_speed(&sim->configuration);
+    int count = 0;
+    Complex *e = directions_at(sim, sim->state.front);
+    for (int k = 0; k < hits->struck_count + hits->held_count; k++) {
+        int i = partner(hits, k);
+        if (gap_rate(&sim->equations, i, e, hits->after) <= bound) {
+            touching[count++] = i;
+        }
+    }
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        sim->state.modes[i] = CONTACT_OPEN;
+    }
+    set_inputs(sim);
+    sim->scratch.used = mark;
+    return count;
+}
+
+/* Resolve the impact of a stop and of all that touch with it. */
+PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n, touching[STOPS_MAX], touching_count = 0;
+    double rates[STOPS_MAX];
+    bool counted[STOPS_MAX];
+    double *q = take(&sim->scratch, (size_t)n), *v = take(&sim->scratch, (size_t)n);
+    Hits hits;
+    Account account;
+    hits.after = take(&sim->scratch, (size_t)n);
+    copy(n, sim->state.front, q);
+    copy(n, sim->state.front + n, v);
+    find_partners(sim, hit, q, v, &hits, rates);
+    if (hits.struck_count == 0) {
+        sim->scratch.used = mark;
+        return settle(sim, &hit, fabs(rates[hit]) <= zero_speed(&sim->configuration), NULL,
+                      problem);
+    }
+    bool right = choose_restitutions(sim, q, v, rates, &hits, counted, problem) &&
+                 impact_impulses(sim, q, v, &hits, problem);
+    if (right) {
+        book_energies(sim, &hits, q, v, &account);
+        right = latch_impacts(sim, &hits, &account, counted, q, v, problem);
+    }
+    if (right) {
+        touching_count = open_all(sim, &hits, touching);
+    }
+    sim->scratch.used = mark;
+    return right && settle(sim, touching, touching_count, NULL, problem);
+}
+
+/* --- impulses of the inputs ------------------------------------------------------------------- */
+
+/* The impulses so far, of each force (b, 3). */
+PRBM const double *given_impulses(const Simulation *sim) {
+    return sim->state.given + sim->configuration.mechanism->input.impulses;
+}
+
+PRBM bool impulses_changed(const Simulation *sim) {
+    size_t count = LOADS * (size_t)sim->configuration.mechanism->force_count;
+    return memcmp(given_impulses(sim), sim->state.received, count * sizeof(double)) != 0;
+}
+
+static void free_sticking(Simulation *sim) {
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        int *mode = &sim->state.modes[contact];
+        *mode = *mode == CONTACT_STICK ? CONTACT_FRICTIONLESS : *mode;
+    }
+    set_contacts(sim, sim->state.modes);
+}
+
+/* Apply the impulses (3,) of the i-th force: each component P changes the rate u of the point along
+ * it, and its work is P (u- + u+)/2. */
+static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int n = system->n;
+    double *front = sim->state.front, *v = front + n;
+    double *rows = take_matrix(&sim->scratch, LOADS, n), *X = take_matrix(&sim->scratch, n, LOADS);
+    double *after = take(&sim->scratch, (size_t)n);
+    Inertia at = inertia_at(sim, front);
+    load_rows(system, &system->pushed[i], at.e, rows, &sim->scratch);
+    bool right = response(n, system->r, LOADS, at.M, at.loops, rows, X, &sim->scratch, problem);
+    if (right) {
+        add_impulses(LOADS, n, v, X, P, after);
+        for (int k = 0; k < LOADS; k++) {
+            front[2 * n + 1] += P[k] * (dot(n, rows + k * n, v) + dot(n, rows + k * n, after)) / 2;
+        }
+        copy(n, after, v);
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* Apply the growth of the impulses since they were received.  The loops take part, stops follow: see
+ * settle_walls.  Friction is finite and bears no impulse: a sticking contact becomes free to slide
+ * or to stick again. */
+PRBM bool receive_impulses(Simulation *sim, Problem *problem) {
+    int forces = sim->configuration.mechanism->force_count;
+    const double *given = given_impulses(sim);
+    bool right = true;
+    if (!impulses_changed(sim)) {
+        return true;
+    }
+    for (int i = 0; right && i < forces; i++) {
+        double grown[LOADS];
+        for (int k = 0; k < LOADS; k++) {
+            grown[k] = given[LOADS * i + k] - sim->state.received[LOADS * i + k];
+        }
+        right = apply_impulses(sim, i, grown, problem);
+    }
+    copy(LOADS * forces, given, sim->state.received);
+    free_sticking(sim);
+    return right;
+}

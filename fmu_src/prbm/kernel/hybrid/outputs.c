@@ -1,0 +1,198 @@
+/* The outputs at the present state: the twin of hybrid/outputs.py. */
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+static void output_bodies(const Simulation *sim, double *out) {
+    const System *system = system_of(sim);
+    const Present *present = &sim->present;
+    const double *v = present->y + system->n;
+    for (int i = 0; i < system->b; i++) {
+        const BodyFrame *frame = &system->bodies[i];
+        double *values = out + PER_BODY * i;
+        Complex at, speed;
+        motion(system, frame, present->e, v, &at, &speed);
+        values[BODY_X] = at.re;
+        values[BODY_Y] = at.im;
+        values[BODY_ANGLE] = present->y[frame->j];
+        values[BODY_VX] = speed.re;
+        values[BODY_VY] = speed.im;
+        values[BODY_OMEGA] = v[frame->j];
+    }
+}
+
+static void output_probes(const Simulation *sim, double *out) {
+    const System *system = system_of(sim);
+    const Present *present = &sim->present;
+    for (int i = 0; i < system->mechanism->probe_count; i++) {
+        double *values = out + PER_PROBE * i;
+        Complex at, speed;
+        motion(system, &system->probes[i], present->e, present->y + system->n, &at, &speed);
+        values[PROBE_X] = at.re;
+        values[PROBE_Y] = at.im;
+        values[PROBE_VX] = speed.re;
+        values[PROBE_VY] = speed.im;
+    }
+}
+
+static void output_stops(const Simulation *sim, double *out) {
+    const System *system = system_of(sim);
+    const Complex *e = sim->present.e;
+    const double *v = sim->present.y + system->n;
+    Rows gaps = gap_rows(system);
+    for (int i = 0; i < system->s; i++) {
+        double *values = out + PER_STOP * i;
+        values[STOP_GAP] = gap(&sim->equations, i, sim->state.time, e);
+        values[STOP_GAP_RATE] = gap_rate(&sim->equations, i, e, v);
+        values[STOP_POINT_DISPLACEMENT] = -(row_value(&gaps, i, e) + gaps.c[i]) -
+                    stop_field(sim, system->mechanism->stops[i].position);
+        values[STOP_POINT_VELOCITY] = -row_rate(&gaps, i, e, v);
+    }
+}
+
+static void output_latched(const Simulation *sim, double *out) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        const Latched *last = &sim->state.latched[i];
+        const double values[PER_LATCHED] = {
+            sim->state.modes[i] != CONTACT_OPEN,
+            last->count,
+            last->time,
+            last->approach_speed,
+            last->rebound_speed,
+            last->impulse,
+            last->energy_lost,
+            last->modal_restitution,
+            last->impulse_sum,
+        };
+        memcpy(out + PER_LATCHED * i, values, sizeof values);
+    }
+}
+
+static void output_links(const Simulation *sim, double *links, double *stretches) {
+    const System *system = system_of(sim);
+    const double *q = sim->present.y, *v = q + system->n;
+    for (int k = 0; k < system->mechanism->link_count; k++) {
+        int j = system->mechanism->links[k];
+        links[PER_LINK * k + LINK_ANGLE] = q[j];
+        links[PER_LINK * k + LINK_OMEGA] = v[j];
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        stretches[PER_STRETCH * k + STRETCH_STRAIN] = q[j];
+        stretches[PER_STRETCH * k + STRETCH_STRAIN_RATE] = v[j];
+    }
+}
+
+static void output_places(Simulation *sim) {
+    const System *system = system_of(sim);
+    const Slots *slots = &system->mechanism->slots;
+    double *out = sim->present.outputs;
+    output_bodies(sim, out + slots->bodies);
+    output_probes(sim, out + slots->probes);
+    output_stops(sim, out + slots->stops);
+    output_latched(sim, out + slots->latched);
+    output_links(sim, out + slots->links, out + slots->stretches);
+    out[slots->energies + ENERGY_DISSIPATED] = sim->present.y[2 * system->n];
+    out[slots->energies + ENERGY_WORK] = sim->present.y[2 * system->n + 1];
+    out[slots->frequency] = sim->state.frequency;
+    copy(slots->derivatives - slots->calculated, system->calculated, out + slots->calculated);
+    out[slots->time] = sim->state.time;
+}
+
+/* near: whether the reference is near the present state. */
+static bool output_motion(Simulation *sim, bool near, Problem *problem) {
+    const Slots *slots = &sim->configuration.mechanism->slots;
+    const Equations *q = &sim->equations;
+    Present *present = &sim->present;
+    double *out = present->outputs, *v = present->y + system_of(sim)->n;
+    if (!evaluate_equations(q, present->y, v, near ? &present->reference : NULL,
+                            &present->evaluation, problem)) {
+        return false;
+    }
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        out[slots->stops + PER_STOP * i + STOP_FORCE] = 0.0;
+    }
+    for (int k = 0; k < q->held_count; k++) {
+        double force = present->evaluation.lam[q->first_hold + k];
+        out[slots->stops + PER_STOP * q->held[k] + STOP_FORCE] = force;
+    }
+    out[slots->energies + ENERGY_KINETIC] = kinetic_energy_of(q, &present->evaluation, v);
+    return true;
+}
+
+static void output_base(Simulation *sim) {
+    const Present *present = &sim->present;
+    double *out = present->outputs + sim->configuration.mechanism->slots.base;
+    Complex force;
+    base_reaction(&sim->equations, present->e, present->y + system_of(sim)->n,
+                  present->evaluation.a, &force, out + BASE_MOMENT, &sim->scratch);
+    out[BASE_FORCE_X] = force.re;
+    out[BASE_FORCE_Y] = force.im;
+}
+
+static void output_energies(Simulation *sim) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int n = system->n;
+    double *out = sim->present.outputs + system->mechanism->slots.energies;
+    double *deflection = take(&sim->scratch, (size_t)n);
+    for (int j = 0; j < n; j++) {
+        deflection[j] = sim->present.y[j] - system->q0[j];
+    }
+    out[ENERGY_ELASTIC] = elastic_energy(n, system->K, deflection);
+    out[ENERGY_GRAVITATIONAL] = gravitational_energy(system, sim->present.e);
+    sim->scratch.used = mark;
+}
+
+static bool output_mobilities(Simulation *sim, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    double *out = sim->present.outputs + system->mechanism->slots.stops;
+    double *G = take(&sim->scratch, (size_t)system->n);
+    Inertia at = inertia_at(sim, sim->present.y);
+    Rows gaps = gap_rows(system);
+    bool right = true;
+    for (int i = 0; right && i < system->s; i++) {
+        row_jacobian(&gaps, i, at.e, G);
+        right = mobility(sim, &at, system->r, at.loops, G, out + PER_STOP * i + STOP_POINT_MOBILITY,
+                         problem);
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* Compute groups of outputs at the present y and e. */
+PRBM bool compute_outputs(Simulation *sim, int groups, bool near, Problem *problem) {
+    if (groups & PLACES) {
+        output_places(sim);
+    }
+    if ((groups & MOTION) && !output_motion(sim, near, problem)) {
+        return false;
+    }
+    if (groups & BASE) {
+        output_base(sim);
+    }
+    if (groups & ENERGIES) {
+        output_energies(sim);
+    }
+    return !(groups & MOBILITIES) || output_mobilities(sim, problem);
+}
+
+/* The groups that a value belongs to or follows from. */
+PRBM int output_groups(const Simulation *sim, int slot) {
+    const Slots *slots = &sim->configuration.mechanism->slots;
+    bool of_stop = slot >= slots->stops && slot < slots->base;
+    bool force = of_stop && (slot - slots->stops) % PER_STOP == STOP_FORCE;
+    if (force || slot == slots->energies + ENERGY_KINETIC) {
+        return PLACES | MOTION;
+    }
+    if (of_stop && (slot - slots->stops) % PER_STOP == STOP_POINT_MOBILITY) {
+        return PLACES | MOBILITIES;
+    }
+    if (slot >= slots->base && slot < slots->energies) {
+        return PLACES | MOTION | BASE;
+    }
+    bool potential = slot == slots->energies + ENERGY_ELASTIC ||
+                     slot == slots->energies + ENERGY_GRAVITATIONAL;
+    return potential ? PLACES | ENERGIES : PLACES;
+}

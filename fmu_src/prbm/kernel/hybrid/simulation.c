@@ -1,0 +1,373 @@
+/* The parts of a simulation, its values and its start: the twin of hybrid/simulation.py. */
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+/* --- access ----------------------------------------------------------------------------------- */
+
+PRBM const System *system_of(const Simulation *sim) {
+    return &sim->configuration.system;
+}
+
+PRBM int state_size(const Simulation *sim) {
+    return 2 * sim->configuration.mechanism->coordinate_count + 2;
+}
+
+PRBM int contact_count(const Simulation *sim) {
+    const Mechanism *m = sim->configuration.mechanism;
+    return m->stop_count + m->friction_count;
+}
+
+PRBM Complex *directions_at(Simulation *sim, const double *q) {
+    Complex *e = take_complex(&sim->scratch, system_of(sim)->n, 1);
+    directions(system_of(sim), q, e);
+    return e;
+}
+
+PRBM Instant instant_of(const Simulation *sim, double time, const double *y,
+                        const Evaluation *evaluation) {
+    Instant at = {time, y, y + system_of(sim)->n, evaluation->at.e, evaluation->lam};
+    return at;
+}
+
+/* --- memory ----------------------------------------------------------------------------------- */
+
+/* The arrays of numbers of the state, one behind the other. */
+static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
+    size_t ny = 2 * (size_t)m->coordinate_count + 2, s = (size_t)m->stop_count;
+    size_t np = (size_t)m->parameter_count, nu = (size_t)m->input_count;
+    struct {
+        double **array;
+        size_t count;
+    } parts[] = {
+        {&state->values, np},        {&state->given, nu},
+        {&state->acting_values, np}, {&state->acting_given, nu},
+        {&state->received, LOADS * (size_t)m->force_count},
+        {&state->front, ny},         {&state->k1, ny},
+        {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
+        {&state->floors, s},         {&state->held_rates, s},
+        {&state->held_times, s},     {&state->states, 2 * (size_t)m->independent_count + 2},
+    };
+    state->number_count = 0;
+    for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
+        state->number_count += parts[i].count;
+    }
+    state->numbers = place(memory, state->number_count, sizeof(double));
+    double *next_part = state->numbers;
+    for (size_t i = 0; memory->base && i < sizeof parts / sizeof *parts; i++) {
+        *parts[i].array = next_part;
+        next_part += parts[i].count;
+    }
+}
+
+static void place_state(State *state, const Mechanism *m, Memory *memory) {
+    size_t s = (size_t)m->stop_count;
+    place_numbers(state, m, memory);
+    state->modes = place(memory, s + (size_t)m->friction_count, sizeof(int));
+    state->swift = place(memory, s, sizeof(bool));
+    state->latched = place(memory, s, sizeof(Latched));
+    state->walls = place(memory, s, sizeof(Wall));
+}
+
+static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) {
+    size_t n = (size_t)m->coordinate_count, s = (size_t)m->stop_count;
+    size_t size = n + (size_t)m->loop_count + 2 * s + (size_t)m->friction_count + 2;
+    size_t drawn = (size_t)m->ground_count + (size_t)m->body_count, pieces = (size_t)m->longest;
+    for (int i = 0; i < m->type_count; i++) {
+        size_t pivots = (size_t)m->types[i].pivots;
+        pieces = pivots > pieces ? pivots : pieces;
+    }
+    size_t single = size * size + 4 * size + 2 * drawn + 4 * pieces + 16;
+    scratch->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64;
+    scratch->base = place(memory, scratch->size, sizeof(double));
+    scratch->spare = place(memory, single, sizeof(double));
+    scratch->used = scratch->most = 0;
+    scratch->exceeded = false;
+}
+
+static void place_stepping(Stepping *stepping, const System *system, Memory *memory) {
+    size_t n = (size_t)system->n, s = (size_t)system->s, ny = 2 * n + 2, d = sizeof(double);
+    size_t samples = GUARD_INTERVALS + 1;
+    evaluation_place(&stepping->evaluation, system, memory);
+    reference_place(&stepping->reference, system, memory);
+    correction_place(&stepping->correction, system, memory);
+    stepping->forces.least = place(memory, s, d);
+    stepping->forces.largest = place(memory, s, d);
+    stepping->end = place(memory, ny, d);
+    stepping->error = place(memory, ny, d);
+    stepping->sample_y = place(memory, samples * 2 * n, d);
+    stepping->sample_e = place(memory, samples * n, sizeof(Complex));
+    stepping->sample_gap = place(memory, samples, d);
+    stepping->sample_rate = place(memory, samples, d);
+    stepping->located_y = place(memory, ny, d);
+    stepping->located_e = place(memory, n, sizeof(Complex));
+    stepping->reach = place(memory, n, d);
+}
+
+static void place_present(Simulation *sim, const System *system, Memory *memory) {
+    size_t n = (size_t)system->n, ny = 2 * n + 2, d = sizeof(double);
+    Present *present = &sim->present;
+    present->y = place(memory, ny, d);
+    present->e = place(memory, n, sizeof(Complex));
+    present->outputs = place(memory, (size_t)system->mechanism->slots.count, d);
+    reference_place(&present->reference, system, memory);
+    evaluation_place(&present->evaluation, system, memory);
+    sim->rates.rates = place(memory, ny, d);
+    evaluation_place(&sim->rates.evaluation, system, memory);
+}
+
+static void place_all(Simulation *sim, Memory *memory) {
+    const Mechanism *m = sim->configuration.mechanism;
+    System *system = &sim->configuration.system;
+    place_state(&sim->state, m, memory);
+    sim->backup = place(memory, simulation_state_count(sim), sizeof(double));
+    system_place(system, m, memory);
+    equations_place(&sim->equations, system, memory);
+    equations_place(&sim->trial.equations, system, memory);
+    sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim), sizeof(int));
+    evaluation_place(&sim->trial.evaluation, system, memory);
+    place_stepping(&sim->stepping, system, memory);
+    place_present(sim, system, memory);
+    place_scratch(&sim->scratch, m, memory);
+    sim->forces = place(memory, LOADS * (size_t)m->force_count, sizeof(double));
+}
+
+PRBM Simulation *simulation_open(const Mechanism *mechanism) {
+    Simulation counted = {0};
+    counted.configuration.mechanism = mechanism;
+    Memory memory = {NULL, 0};
+    place(&memory, 1, sizeof(Simulation));
+    place_all(&counted, &memory);
+    size_t bytes = memory.used;
+    memory.base = bytes < SIZE_MAX ? calloc(1, bytes) : NULL;
+    memory.used = 0;
+    if (!memory.base) {
+        return NULL;
+    }
+    Simulation *sim = place(&memory, 1, sizeof(Simulation));
+    sim->configuration.mechanism = mechanism;
+    sim->bytes = bytes;
+    place_all(sim, &memory);
+    for (int i = 0; i <= GUARD_INTERVALS; i++) {
+        weights((double)i / GUARD_INTERVALS, sim->stepping.weights[i]);
+    }
+    simulation_reset(sim);
+    return sim;
+}
+
+PRBM void simulation_close(Simulation *simulation) {
+    free(simulation);
+}
+
+PRBM void simulation_listen(Simulation *simulation, Hear *hear, void *listener) {
+    simulation->hear = hear;
+    simulation->listener = listener;
+}
+
+PRBM const Mechanism *simulation_mechanism(const Simulation *simulation) {
+    return simulation->configuration.mechanism;
+}
+
+PRBM size_t simulation_bytes(const Simulation *simulation) {
+    return simulation->bytes;
+}
+
+PRBM void simulation_unstart(Simulation *simulation) {
+    simulation->state.started = false;
+    simulation->present.fresh = NOTHING;
+}
+
+PRBM bool simulation_started(const Simulation *simulation) {
+    return simulation->state.started;
+}
+
+PRBM double simulation_time(const Simulation *simulation) {
+    return simulation->state.time;
+}
+
+/* --- contact state and inputs ----------------------------------------------------------------- */
+
+PRBM void set_inputs(Simulation *sim) {
+    const Mechanism *m = sim->configuration.mechanism;
+    const double *given = sim->state.acting_given, *base = given + m->input.base;
+    Inputs inputs = {sim->forces, {base[0], base[1]}, sim->state.walls,
+                     given + m->input.mobilities};
+    ContactState contacts = {sim->state.modes};
+    copy(LOADS * m->force_count, given, sim->forces);
+    set_equations(&sim->equations, &inputs, &contacts, sim->configuration.omega);
+    sim->present.fresh = NOTHING;
+}
+
+PRBM void set_contacts(Simulation *sim, const int *modes) {
+    memmove(sim->state.modes, modes, (size_t)contact_count(sim) * sizeof *modes);
+    sim->state.has_k1 = false;
+    set_inputs(sim);
+}
+
+PRBM void set_mode(Simulation *sim, int contact, int mode) {
+    sim->state.modes[contact] = mode;
+    set_contacts(sim, sim->state.modes);
+}
+
+static void free_contacts(Simulation *sim) {
+    const Mechanism *m = sim->configuration.mechanism;
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        bool stop = contact < m->stop_count;
+        sim->state.modes[contact] = stop ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
+    }
+}
+
+/* The contacts, walls and impacts of a simulation that has not moved. */
+static void clear_stops(Simulation *sim) {
+    State *state = &sim->state;
+    size_t s = (size_t)sim->configuration.mechanism->stop_count;
+    memset(state->latched, 0, s * sizeof *state->latched);
+    memset(state->walls, 0, s * sizeof *state->walls);
+    memset(state->swift, 0, s * sizeof *state->swift);
+    free_contacts(sim);
+}
+
+/* The scalars of a simulation that has not started. */
+static void clear_progress(State *state, double start_time) {
+    const Event none = {EVENT_NONE, 0, 0.0};
+    state->started = state->exchange = state->has_k1 = state->arc.valid = false;
+    state->interrupted = state->walls_continue = false;
+    state->time = state->front_time = state->window_since = start_time;
+    state->planned = state->due = start_time;
+    state->step_end = state->arc.start = state->arc.h = 0.0;
+    state->step_size = state->log_of_error = 0.0;
+    state->tolerance = state->frequency = 0.0;
+    state->window_count = 0;
+    state->pending = none;
+}
+
+/* --- parameters and inputs -------------------------------------------------------------------- */
+
+PRBM void simulation_reset(Simulation *simulation) {
+    Simulation *sim = simulation;
+    const Mechanism *m = sim->configuration.mechanism;
+    clear_progress(&sim->state, 0.0);
+    clear_stops(sim);
+    memset(sim->state.numbers, 0, sim->state.number_count * sizeof *sim->state.numbers);
+    for (int i = 0; i < m->parameter_count; i++) {
+        sim->state.values[i] = m->parameters[i].start;
+    }
+    for (int i = 0; i < m->input_count; i++) {
+        sim->state.given[i] = m->input_starts[i];
+    }
+    sim->present.fresh = NOTHING;
+    sim->rates.stale = false;
+}
+
+static bool set_parameter(Simulation *sim, int slot, double x, Problem *problem) {
+    const Parameter *parameter = &sim->configuration.mechanism->parameters[slot];
+    if (!check_parameter(parameter, x, problem)) {
+        return false;
+    }
+    if (sim->state.started && !parameter->tunable && x != sim->state.values[slot]) {
+        return fail(problem, "%s is fixed once the motion has started; set it before",
+                    parameter->name);
+    }
+    sim->state.values[slot] = x;
+    return true;
+}
+
+static bool set_input(Simulation *sim, int i, double x, Problem *problem) {
+    const Mechanism *m = sim->configuration.mechanism;
+    if (i < 0 || i >= m->input_count) {
+        return fail(problem, "what the model computes cannot be set; parameters and inputs can");
+    }
+    if (!finite_number(x)) {
+        return fail(problem, "%s = %g must be a finite number", m->input_names[i], x);
+    }
+    bool mobile_wall = i >= m->input.mobilities && i < m->input.base;
+    if (mobile_wall && x > WALL_MOBILITY_MAX) {
+        return fail(problem, "%s = %g 1/kg must be at most %g 1/kg", m->input_names[i], x,
+                    WALL_MOBILITY_MAX);
+    }
+    if (mobile_wall && x < 0.0) {
+        return fail(problem,
+                    "%s = %g 1/kg must not be negative: it is the inverse effective mass of "
+                    "the wall, 0 for a wall that does not move when it is hit",
+                    m->input_names[i], x);
+    }
+    sim->state.given[i] = x;
+    return true;
+}
+
+PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *problem) {
+    Simulation *sim = simulation;
+    const Mechanism *m = sim->configuration.mechanism;
+    bool right = slot < m->parameter_count ? set_parameter(sim, slot, x, problem)
+                                           : set_input(sim, slot - m->slots.inputs, x, problem);
+    if (right && sim->state.exchange) {
+        sim->rates.stale = true;
+        sim->present.fresh = NOTHING;
+    }
+    return right;
+}
+
+/* --- start ------------------------------------------------------------------------------------ */
+
+static bool check_tolerance(double x, Problem *problem) {
+    if (!(x >= TOLERANCE_MIN && x <= TOLERANCE_MAX)) {
+        return fail(problem, "tolerance = %g must lie between 1e-13 and 1e-2", x);
+    }
+    return true;
+}
+
+static bool start_shape(Simulation *sim, Problem *problem) {
+    const Mechanism *m = sim->configuration.mechanism;
+    const System *system = system_of(sim);
+    size_t mark = sim->scratch.used, n = (size_t)system->n;
+    double *front = sim->state.front;
+    Equilibrium shape = {take(&sim->scratch, n), take(&sim->scratch, (size_t)system->r + 1), 0.0};
+    double displacement = evaluate(m->release.displacement, sim->state.acting_values);
+    double speed = evaluate(m->release.velocity, sim->state.acting_values);
+    bool right = equilibrium(system, true, displacement, &shape, &sim->scratch, problem);
+    if (right) {
+        zeros(state_size(sim), front);
+        copy((int)n, shape.q, front);
+        right = release_velocity(system, shape.q, speed, front + n, &sim->scratch, problem);
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* Release the mechanism in its start shape, and choose the contact state there. */
+static bool release_mechanism(Simulation *sim, Problem *problem) {
+    int every[STOPS_MAX];
+    State *state = &sim->state;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        every[i] = i;
+    }
+    clear_stops(sim);
+    place_walls(sim, false);
+    copy(LOADS * sim->configuration.mechanism->force_count, given_impulses(sim), state->received);
+    set_inputs(sim);
+    return start_shape(sim, problem) &&
+           project(&sim->equations, state->time, state->front, &sim->scratch, problem) &&
+           check_walls(sim, problem) && settle(sim, every, system_of(sim)->s, NULL, problem);
+}
+
+/* Start the simulation; the caller keeps a backup for the case of failure. */
+PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, bool exchange,
+                       Problem *problem) {
+    State *state = &sim->state;
+    Configuration *configuration = &sim->configuration;
+    int parameter = configuration->mechanism->tolerance;
+    clear_progress(state, start_time);
+    state->tolerance = tolerance == 0.0 ? state->values[parameter] : tolerance;
+    state->exchange = exchange;
+    state->log_of_error = natural_log(STEP_ERROR_MIN);
+    if (!check_tolerance(state->tolerance, problem) || !take_values(sim, problem) ||
+        !fundamental_frequency(&configuration->system, &state->frequency, &sim->scratch,
+                               problem)) {
+        return false;
+    }
+    set_scales(configuration, state->frequency);
+    state->started = release_mechanism(sim, problem);
+    return state->started;
+}

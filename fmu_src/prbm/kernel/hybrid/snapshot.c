@@ -1,0 +1,207 @@
+/* The state as numbers, to save and restore it: the twin of hybrid/snapshot.py. */
+#include <math.h>
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+enum { SCALARS = 22, PER_STOP_STATE = 13 }; /* numbers of a simulation and of a stop */
+
+PRBM size_t simulation_state_count(const Simulation *simulation) {
+    const Mechanism *m = simulation->configuration.mechanism;
+    return SCALARS + PER_STOP_STATE * (size_t)m->stop_count + (size_t)m->friction_count +
+           simulation->state.number_count;
+}
+
+/* --- to numbers ------------------------------------------------------------------------------- */
+
+static double *put_stop(const State *state, int i, double *to) {
+    const Latched *last = &state->latched[i];
+    const Wall *wall = &state->walls[i];
+    const double stop[PER_STOP_STATE] = {
+        state->modes[i],      state->swift[i],     wall->position,
+        wall->rate,           wall->since,         last->count,
+        last->time,           last->approach_speed, last->rebound_speed,
+        last->impulse,        last->energy_lost,   last->modal_restitution,
+        last->impulse_sum,
+    };
+    memcpy(to, stop, sizeof stop);
+    return to + PER_STOP_STATE;
+}
+
+PRBM void simulation_save(const Simulation *simulation, double *to) {
+    const State *state = &simulation->state;
+    const Mechanism *m = simulation->configuration.mechanism;
+    const double scalars[SCALARS] = {
+        state->started,      state->exchange,       state->has_k1,       state->arc.valid,
+        state->interrupted,  state->walls_continue, state->pending.kind, state->pending.contact,
+        state->window_count, state->pending.time,   state->time,         state->tolerance,
+        state->frequency,    state->step_size,      state->log_of_error, state->front_time,
+        state->arc.start,    state->arc.h,          state->window_since, state->step_end,
+        state->planned,      state->due,
+    };
+    memcpy(to, scalars, sizeof scalars);
+    to += SCALARS;
+    for (int i = 0; i < m->stop_count; i++) {
+        to = put_stop(state, i, to);
+    }
+    for (int i = 0; i < m->friction_count; i++) {
+        *to++ = state->modes[m->stop_count + i];
+    }
+    memcpy(to, state->numbers, state->number_count * sizeof *to);
+}
+
+/* --- from numbers ----------------------------------------------------------------------------- */
+
+/* A place among the numbers, and whether all so far are ones that simulation_save writes. */
+typedef struct {
+    const double *at;
+    bool sound;
+} StateReader;
+
+static double get_number(StateReader *reader) {
+    double x = *reader->at++;
+    reader->sound = reader->sound && finite_number(x);
+    return x;
+}
+
+static int get_integer(StateReader *reader, int low, int high) {
+    double x = *reader->at++;
+    bool whole = x >= low && x <= high && x == floor(x);
+    reader->sound = reader->sound && whole;
+    return whole ? (int)x : low;
+}
+
+static bool get_flag(StateReader *reader) {
+    return get_integer(reader, 0, 1) == 1;
+}
+
+static void get_scalars(State *state, StateReader *reader) {
+    state->started = get_flag(reader);
+    state->exchange = get_flag(reader);
+    state->has_k1 = get_flag(reader);
+    state->arc.valid = get_flag(reader);
+    state->interrupted = get_flag(reader);
+    state->walls_continue = get_flag(reader);
+    state->pending.kind = get_integer(reader, EVENT_NONE, EVENT_REVERSAL);
+    state->pending.contact = get_integer(reader, 0, 2 * STOPS_MAX);
+    state->window_count = get_integer(reader, 0, EVENTS_MAX);
+    state->pending.time = get_number(reader);
+    state->time = get_number(reader);
+    state->tolerance = get_number(reader);
+    state->frequency = get_number(reader);
+    state->step_size = get_number(reader);
+    state->log_of_error = get_number(reader);
+    state->front_time = get_number(reader);
+    state->arc.start = get_number(reader);
+    state->arc.h = get_number(reader);
+    state->window_since = get_number(reader);
+    state->step_end = get_number(reader);
+    state->planned = get_number(reader);
+    state->due = get_number(reader);
+}
+
+static void get_stop(State *state, int i, StateReader *reader) {
+    Latched *last = &state->latched[i];
+    Wall *wall = &state->walls[i];
+    state->modes[i] = get_integer(reader, CONTACT_OPEN, CONTACT_SLIP_NEGATIVE);
+    state->swift[i] = get_flag(reader);
+    wall->position = get_number(reader);
+    wall->rate = get_number(reader);
+    wall->since = get_number(reader);
+    last->count = get_integer(reader, 0, IMPACT_COUNT_MAX);
+    last->time = get_number(reader);
+    last->approach_speed = get_number(reader);
+    last->rebound_speed = get_number(reader);
+    last->impulse = get_number(reader);
+    last->energy_lost = get_number(reader);
+    last->modal_restitution = get_number(reader);
+    last->impulse_sum = get_number(reader);
+}
+
+/* Read the state; returns whether its numbers are ones that simulation_save writes.  The states of
+ * model exchange, which are the last, may be any numbers: an importer's solver has set them. */
+static bool read_state(Simulation *sim, const double *from) {
+    State *state = &sim->state;
+    const Mechanism *m = sim->configuration.mechanism;
+    StateReader reader = {from, true};
+    get_scalars(state, &reader);
+    for (int i = 0; i < m->stop_count; i++) {
+        get_stop(state, i, &reader);
+    }
+    for (int i = 0; i < m->friction_count; i++) {
+        state->modes[m->stop_count + i] =
+            get_integer(&reader, CONTACT_FRICTIONLESS, CONTACT_SLIP_NEGATIVE);
+    }
+    for (double *x = state->numbers; x < state->states; x++) {
+        *x = get_number(&reader);
+    }
+    copy(exchange_states(sim), reader.at, state->states);
+    return reader.sound;
+}
+
+/* Whether the numbers of a state agree with each other and with the mechanism. */
+static bool consistent(const Simulation *sim) {
+    const State *state = &sim->state;
+    const Mechanism *m = sim->configuration.mechanism;
+    int kind = state->pending.kind;
+    bool friction = kind == EVENT_SLIP || kind == EVENT_REVERSAL;
+    int contacts = friction ? contact_count(sim) : m->stop_count;
+    if (state->step_size < 0.0 || (kind != EVENT_NONE && state->pending.contact >= contacts)) {
+        return false;
+    }
+    return !state->started ||
+           (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_MAX && state->frequency >= 0.0 &&
+            (!state->arc.valid || state->arc.h > 0.0) &&
+            (state->exchange || state->front_time >= state->time));
+}
+
+/* --- attempts --------------------------------------------------------------------------------- */
+
+/* Bring the configuration and the equations in line with a state that has been read. */
+static bool rebuild(Simulation *sim, Problem *problem) {
+    Configuration *configuration = &sim->configuration;
+    if (!sim->state.started) {
+        return true;
+    }
+    configuration->assembled = assemble(&configuration->system, sim->state.acting_values,
+                                        &sim->scratch, problem);
+    set_scales(configuration, sim->state.frequency);
+    set_inputs(sim);
+    return configuration->assembled;
+}
+
+PRBM void keep_backup(Simulation *sim) {
+    simulation_save(sim, sim->backup);
+}
+
+PRBM bool attempt(Simulation *sim, bool right, Problem *problem) {
+    if (sim->scratch.exceeded) {
+        right = fail(problem, "the working memory of the simulation was too small; please report");
+        sim->scratch.exceeded = false;
+    }
+    if (!right) {
+        Problem ignored;
+        (void)read_state(sim, sim->backup);
+        sim->scratch.used = 0;
+        sim->present.fresh = NOTHING;
+        (void)rebuild(sim, &ignored);
+    }
+    return right;
+}
+
+PRBM bool simulation_restore(Simulation *simulation, const double *state, Problem *problem) {
+    Simulation *sim = simulation;
+    const Mechanism *m = sim->configuration.mechanism;
+    Problem ignored;
+    keep_backup(sim);
+    bool right = read_state(sim, state) && consistent(sim) &&
+                 check_values(m, sim->state.values, &ignored) &&
+                 (!sim->state.started || check_values(m, sim->state.acting_values, &ignored)) &&
+                 rebuild(sim, &ignored);
+    sim->rates.stale = true;
+    sim->present.fresh = NOTHING;
+    if (!right) {
+        fail(problem, "the saved state is damaged: its numbers are not those of a motion");
+    }
+    return attempt(sim, right, problem);
+}

@@ -1,0 +1,163 @@
+/* Steps of variable size: the twin of hybrid/stepping.py. */
+#include <math.h>
+
+#include "hybrid/hybrid.h"
+
+#define STEP_ERROR_EXPONENT (1.0 / ORDER)
+#define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT)
+
+/* --- errors ----------------------------------------------------------------------------------- */
+
+/* The sum of the squares of errors x against the sizes of y and y1, which count as no less than the
+ * least. */
+static double squares_of(int n, const double *x, const double *y, const double *y1, double least) {
+    double sum = 0.0;
+    for (int i = 0; i < n; i++) {
+        double ratio = x[i] / greater(least, greater(fabs(y[i]), fabs(y1[i])));
+        sum += ratio * ratio;
+    }
+    return sum;
+}
+
+/* The root mean square of differences in units of the scales of angles, their rates, energies. */
+static double relative_size(const Simulation *sim, const double *x, const double *y,
+                            const double *y1) {
+    const Scales *scales = &sim->configuration.scales;
+    int n = system_of(sim)->n;
+    double sum = dot(n, x, x) + squares_of(n, x + n, y + n, y1 + n, scales->rate) +
+                 squares_of(2, x + 2 * n, y + 2 * n, y1 + 2 * n, scales->energy);
+    return sqrt(sum / state_size(sim));
+}
+
+/* --- step sizes ------------------------------------------------------------------------------- */
+
+PRBM double longest_step(const Simulation *sim) {
+    return STEP_MAX_RTOL * sim->configuration.scales.time;
+}
+
+/* A first step size from the size of the rates (Hairer, II.4). */
+static double first_step(const Simulation *sim) {
+    const State *state = &sim->state;
+    double size = greater(relative_size(sim, state->k1, state->front, state->front), FIRST_RATE_MIN);
+    return lesser(longest_step(sim), FIRST_STEP_FACTOR * power(state->tolerance, FIRST_STEP_EXPONENT) / size);
+}
+
+/* Choose the next step size from an error relative to the allowed one; returns whether the step is
+ * accepted.  A rejected step is not followed by a longer one (Hairer, IV.2). */
+static bool next(StepSizeController *controller, double error) {
+    if (!(error <= 1.0)) {
+        double factor = finite_number(error)
+                            ? STEP_SAFETY_FACTOR * power(error, -STEP_ERROR_EXPONENT)
+                            : STEP_SHRINK_MIN;
+        controller->growth_max = 1.0;
+        controller->h *= greater(STEP_SHRINK_MIN, factor);
+        return false;
+    }
+    double log_of_error = natural_log(greater(error, STEP_ERROR_MIN));
+    double trend =
+        STEP_MEMORY_EXPONENT * controller->log_of_error - STEP_TREND_EXPONENT * log_of_error;
+    double growth = lesser(controller->growth_max, STEP_SAFETY_FACTOR * exponential(trend));
+    controller->h = controller->h * greater(STEP_SHRINK_MIN, growth);
+    controller->log_of_error = log_of_error;
+    return true;
+}
+
+static bool check_step_size(const State *state, double h, Problem *problem) {
+    if (h < STEP_MIN_ATOL) {
+        return fail(problem,
+                    "the step size fell below %g s at t = %.9g s: the motion is too violent "
+                    "for the model, or its links lie flat, where it ends; check the inputs and "
+                    "parameters, or add damping.beta",
+                    STEP_MIN_ATOL, state->front_time);
+    }
+    if (state->front_time + h == state->front_time) {
+        return fail(problem,
+                    "at t = %.9g s a step of %.3g s is lost in the rounding of the time: start "
+                    "the simulation nearer to zero",
+                    state->front_time, h);
+    }
+    return true;
+}
+
+/* The error of a step of the arc, relative to the allowed one; infinite if a stage fails. */
+static double step_error(Simulation *sim, double h, Problem *problem) {
+    Stepping *stepping = &sim->stepping;
+    const Arc *arc = &sim->state.arc;
+    int ny = state_size(sim);
+    if (!stages(&sim->equations, ny, arc->y, h, arc->k, stepping->end, &stepping->reference,
+                &stepping->evaluation, &stepping->forces, problem)) {
+        return HUGE_VAL;
+    }
+    error_of(ny, arc->k, h, stepping->error);
+    return relative_size(sim, stepping->error, arc->y, stepping->end) /
+           (STEP_ERROR_FACTOR * sim->state.tolerance);
+}
+
+/* Find a step that keeps the tolerance: its stages in the arc, its end in stepping. */
+static bool find_step(Simulation *sim, double *h, Problem *problem) {
+    State *state = &sim->state;
+    int ny = state_size(sim);
+    double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
+    StepSizeController controller = {lesser(wanted, longest_step(sim)), state->log_of_error,
+                                     STEP_GROWTH_MAX};
+    copy(ny, state->front, state->arc.y);
+    copy(ny, state->k1, state->arc.k);
+    do {
+        *h = controller.h;
+        if (!check_step_size(state, *h, problem)) {
+            return false;
+        }
+    } while (!next(&controller, step_error(sim, *h, problem)));
+    state->step_size = controller.h;
+    state->log_of_error = controller.log_of_error;
+    return true;
+}
+
+/* --- steps ------------------------------------------------------------------------------------ */
+
+/* End the step at an event. */
+static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
+    State *state = &sim->state;
+    state->step_size = state->arc.h; /* an interrupted step says little about the next one */
+    state->front_time = event->time;
+    state->pending = *event;
+    state->has_k1 = false;
+    arc_at(sim, event->time, state->front);
+    return project(&sim->equations, event->time, state->front, &sim->scratch, problem);
+}
+
+/* Take one step from the front, up to its first event. */
+PRBM bool take_step(Simulation *sim, Problem *problem) {
+    State *state = &sim->state;
+    Stepping *stepping = &sim->stepping;
+    int ny = state_size(sim);
+    double h = 0.0;
+    if (!state->has_k1 && !rate(&sim->equations, state->front, NULL, &stepping->evaluation,
+                                state->k1, problem)) {
+        return false;
+    }
+    if (!find_step(sim, &h, problem)) {
+        return false;
+    }
+    double start = state->front_time, end = start + h;
+    state->arc.start = start;
+    state->arc.h = h;
+    state->pending.kind = EVENT_NONE;
+    copy(ny, stepping->end, state->front); /* the state of the last stage */
+    if (!project_near(&sim->equations, &stepping->evaluation, &stepping->reference, end,
+                      state->front, &stepping->correction, &sim->scratch, problem)) {
+        return false;
+    }
+    Event event;
+    if (!first_event(sim, &event, problem)) {
+        return false;
+    }
+    state->arc.valid = true;
+    if (event.kind != EVENT_NONE) {
+        return cut_step(sim, &event, problem);
+    }
+    state->front_time = end;
+    state->has_k1 = true;
+    copy(ny, state->arc.k + (STAGES - 1) * ny, state->k1);
+    return true;
+}

@@ -1,0 +1,668 @@
+/* Model exchange: an importer integrates the independent angles and rates.
+ *
+ * The loops tie the n coordinates together; r of them are solved from the other n - r, so that a
+ * solver without constraints stays on them (mechanics/independent.py chooses them).  A stop that is
+ * closed is a constraint of the accelerations; its drift by a solver's errors is corrected in events.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+/* --- independent and dependent coordinates ---------------------------------------------------- */
+
+PRBM int exchange_states(const Simulation *simulation) {
+    return 2 * simulation->configuration.mechanism->independent_count + 2;
+}
+
+PRBM int exchange_indicators(const Simulation *simulation) {
+    const Mechanism *m = simulation->configuration.mechanism;
+    return STOP_INDICATORS * m->stop_count + m->friction_count;
+}
+
+/* The coordinates that the loops determine, in rising order. */
+static void dependents(const Mechanism *m, int *result) {
+    int k = 0, count = 0;
+    for (int j = 0; j < m->coordinate_count; j++) {
+        if (k < m->independent_count && m->independent[k] == j) {
+            k++;
+        } else {
+            result[count++] = j;
+        }
+    }
+}
+
+/* The slot of a coordinate: of its angle or strain, of its rate behind it. */
+static int slot_of(const Mechanism *m, int j, bool rate) {
+    const Coordinate *coordinate = &m->coordinates[j];
+    if (coordinate->arm != j) {
+        int k = 0;
+        while (m->stretches[k] != j) {
+            k++;
+        }
+        return m->slots.stretches + PER_STRETCH * k + (rate ? STRETCH_STRAIN_RATE : STRETCH_STRAIN);
+    }
+    if (coordinate->link >= 0) {
+        return m->slots.links + PER_LINK * coordinate->link + (rate ? LINK_OMEGA : LINK_ANGLE);
+    }
+    return m->slots.bodies + PER_BODY * (coordinate->body - 1) + (rate ? BODY_OMEGA : BODY_ANGLE);
+}
+
+PRBM int exchange_slot(const Simulation *simulation, int k) {
+    const Mechanism *m = simulation->configuration.mechanism;
+    int count = m->independent_count;
+    if (k >= 2 * count) {
+        return m->slots.energies + ENERGY_DISSIPATED + (k - 2 * count);
+    }
+    return slot_of(m, m->independent[k % count], k >= count);
+}
+
+static const char *coordinate_name(const Mechanism *m, int j, char *text, size_t size) {
+    const Coordinate *coordinate = &m->coordinates[j];
+    if (coordinate->link >= 0) {
+        const char *quantity = coordinate->arm == j ? "angle" : "strain";
+        (void)snprintf(text, size, "link[%d].%s", coordinate->link + 1, quantity);
+    } else {
+        (void)snprintf(text, size, "%s.angle", m->bodies[coordinate->body - 1].name);
+    }
+    return text;
+}
+
+static bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem) {
+    char name[80] = "";
+    return fail(problem,
+                "the states of model exchange do not determine the other angles (%s and %d more) "
+                "at t = %.9g s: the shape is too far from the one at the start, or the solver has "
+                "left it; shorten its steps, or use co-simulation, which has no such limit",
+                coordinate_name(sim->configuration.mechanism, dependent[0], name, sizeof name), system_of(sim)->r - 1,
+                sim->state.time);
+}
+
+/* The loops' Jacobian in the dependent coordinates, factored. */
+static bool factor_dependents(const Simulation *sim, const double *rows, const int *dependent,
+                              double *a, int *pivot) {
+    int r = system_of(sim)->r, n = system_of(sim)->n;
+    double least = HUGE_VAL, most = largest(r * n, rows);
+    for (int i = 0; i < r; i++) {
+        for (int k = 0; k < r; k++) {
+            a[i * r + k] = rows[i * n + dependent[k]];
+        }
+    }
+    if (!lu_factor(r, a, pivot)) {
+        return false;
+    }
+    for (int i = 0; i < r; i++) {
+        least = lesser(least, 1.0 / fabs(a[i * r + i])); /* its diagonal is inverted */
+    }
+    return least > DEPENDENT_PIVOT_RTOL * most;
+}
+
+/* The loops in the dependent coordinates, in working memory. */
+typedef struct {
+    int *dependent, *pivot; /* (r,) */
+    double *rows, *a, *s;   /* (r, n), (r, r) factored, (r,) residuals */
+} Loops;
+
+static Loops take_loops(Simulation *sim) {
+    Scratch *scratch = &sim->scratch;
+    int r = system_of(sim)->r, n = system_of(sim)->n;
+    Loops loops = {take_integers(scratch, r), take_integers(scratch, r),
+                   take_matrix(scratch, r, n), take_matrix(scratch, r, r),
+                   take(scratch, (size_t)r)};
+    dependents(sim->configuration.mechanism, loops.dependent);
+    return loops;
+}
+
+/* Solve the loops for the dependent angles, from those in q. */
+static bool complete_angles(Simulation *sim, Loops *x, double *q) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int r = system->r;
+    double best = HUGE_VAL, length = system->length;
+    bool closed = false, regular = true;
+    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
+    Complex *e = take_complex(&sim->scratch, system->n, 1);
+    for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && regular && !closed; step++) {
+        directions(system, q, e);
+        scalars(&loops, e, x->s);
+        double error = largest(r, x->s);
+        closed = error <= CONSTRAINT_RTOL * length ||
+                 (CONSTRAINT_STALLED_RTOL * length >= best && best <= error);
+        best = lesser(best, error);
+        jacobian(&loops, e, x->rows);
+        regular = factor_dependents(sim, x->rows, x->dependent, x->a, x->pivot);
+        if (regular && !closed) {
+            lu_solve(r, x->a, x->pivot, x->s);
+            for (int k = 0; k < r; k++) {
+                q[x->dependent[k]] -= x->s[k];
+            }
+        }
+    }
+    sim->scratch.used = mark;
+    return closed && regular;
+}
+
+/* Solve the loops for the dependent rates. */
+static void complete_rates(const Simulation *sim, Loops *x, double *v) {
+    int n = system_of(sim)->n, r = system_of(sim)->r;
+    for (int k = 0; k < r; k++) {
+        v[x->dependent[k]] = 0.0;
+    }
+    for (int i = 0; i < r; i++) {
+        x->s[i] = -dot(n, x->rows + i * n, v);
+    }
+    lu_solve(r, x->a, x->pivot, x->s);
+    for (int k = 0; k < r; k++) {
+        v[x->dependent[k]] = x->s[k];
+    }
+}
+
+/* Solve the loops for the dependent angles and rates, from the angles of the last step. */
+static bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    Loops loops = take_loops(sim);
+    bool right = complete_angles(sim, &loops, q);
+    if (right) {
+        complete_rates(sim, &loops, v);
+    }
+    sim->scratch.used = mark;
+    return right || (system_of(sim)->r > 0
+                         ? singular_choice(sim, loops.dependent, problem)
+                         : fail(problem, "the states are not finite numbers"));
+}
+
+/* The independent part of y = (q, v, dissipated energy, work). */
+static void states_of(const Simulation *sim, const double *y, double *x) {
+    const Mechanism *m = sim->configuration.mechanism;
+    int n = m->coordinate_count, count = m->independent_count;
+    for (int k = 0; k < count; k++) {
+        x[k] = y[m->independent[k]];
+        x[count + k] = y[n + m->independent[k]];
+    }
+    x[2 * count] = y[2 * n];
+    x[2 * count + 1] = y[2 * n + 1];
+}
+
+/* --- time, states, inputs --------------------------------------------------------------------- */
+
+/* Bring the front and the equations up to date with time, states and inputs. */
+PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
+    const Mechanism *m = sim->configuration.mechanism;
+    State *state = &sim->state;
+    int n = system_of(sim)->n, count = m->independent_count;
+    if (!sim->rates.stale) {
+        return true;
+    }
+    if ((!sim->configuration.assembled || values_changed(sim)) && !take_values(sim, problem)) {
+        return false;
+    }
+    copy(m->input_count, state->given, state->acting_given);
+    place_walls(sim, true);
+    state->front_time = state->time;
+    set_inputs(sim);
+    copy(n, state->arc.y, state->front); /* angles of the last step: the shape is near them */
+    for (int k = 0; k < count; k++) {
+        state->front[m->independent[k]] = state->states[k];
+        state->front[n + m->independent[k]] = state->states[count + k];
+    }
+    state->front[2 * n] = state->states[2 * count];
+    state->front[2 * n + 1] = state->states[2 * count + 1];
+    if (!complete(sim, state->front, state->front + n, problem)) {
+        return false;
+    }
+    sim->rates.stale = sim->rates.evaluated = false;
+    sim->present.fresh = NOTHING;
+    return true;
+}
+
+/* Bring the rates of the front up to date. */
+PRBM bool exchange_rates(Simulation *sim, Problem *problem) {
+    PresentRates *rates = &sim->rates;
+    if (!exchange_refresh(sim, problem)) {
+        return false;
+    }
+    rates->y = sim->state.front;
+    if (!rates->evaluated) {
+        rates->evaluated = rate(&sim->equations, rates->y, NULL, &rates->evaluation, rates->rates,
+                                problem);
+    }
+    return rates->evaluated;
+}
+
+PRBM void exchange_set_time(Simulation *simulation, double time) {
+    if (time != simulation->state.time) {
+        simulation->state.time = time;
+        simulation->rates.stale = true;
+        simulation->present.fresh = NOTHING;
+    }
+}
+
+PRBM void exchange_set(Simulation *simulation, const double *x) {
+    copy(exchange_states(simulation), x, simulation->state.states);
+    simulation->rates.stale = true;
+    simulation->present.fresh = NOTHING;
+}
+
+PRBM void exchange_get(const Simulation *simulation, double *x) {
+    copy(exchange_states(simulation), simulation->state.states, x);
+}
+
+/* The next power of ten that is not below: modelDescription.xml has it as nominal value.  A solver's
+ * absolute tolerance follows from it; below the scale of the motion it would resolve round-off. */
+static double next_power_of_ten(double value) {
+    double power = 1.0; /* exact to 1e22 */
+    if (value <= 1.0) {
+        while (value * power * 10.0 <= 1.0) {
+            power *= 10.0;
+        }
+        return 1.0 / power;
+    }
+    while (power < value) {
+        power *= 10.0;
+    }
+    return power;
+}
+
+PRBM void exchange_nominals(const Simulation *simulation, double *x) {
+    const Scales *scales = &simulation->configuration.scales;
+    int count = simulation->configuration.mechanism->independent_count;
+    double rate = next_power_of_ten(scales->rate);
+    for (int k = 0; k < count; k++) {
+        x[k] = 1.0;
+        x[count + k] = rate;
+    }
+    x[2 * count] = x[2 * count + 1] = next_power_of_ten(scales->energy);
+}
+
+PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *problem) {
+    if (!exchange_rates(simulation, problem)) {
+        return false;
+    }
+    states_of(simulation, simulation->rates.rates, dx);
+    return true;
+}
+
+/* --- event indicators ------------------------------------------------------------------------- */
+
+static double force_scale(const Simulation *sim) {
+    return sim->configuration.scales.energy / sim->configuration.scales.length;
+}
+
+static double speed_scale(const Simulation *sim) {
+    return sim->configuration.scales.rate * sim->configuration.scales.length;
+}
+
+/* The unit of the guard of a kind of event. */
+static double guard_scale(const Simulation *sim, int kind) {
+    switch (kind) {
+    case EVENT_IMPACT: return sim->configuration.scales.length;
+    case EVENT_REVERSAL: return speed_scale(sim);
+    default: return force_scale(sim);
+    }
+}
+
+/* The indicator that a kind of event has at a contact: three for each stop, then one for each
+ * friction point. */
+static int indicator_place(const Simulation *sim, int kind, int contact) {
+    int s = system_of(sim)->s, offset = kind == EVENT_IMPACT ? 0 : kind == EVENT_RELEASE ? 1 : 2;
+    return contact < s ? STOP_INDICATORS * contact + offset
+                       : STOP_INDICATORS * s + contact - s;
+}
+
+static Instant present_instant(const Simulation *sim) {
+    return instant_of(sim, sim->state.time, sim->rates.y, &sim->rates.evaluation);
+}
+
+/* A guard, lifted by the value below which its event is due: gaps close a little late, and speeds
+ * within round-off have fallen to zero. */
+static double lifted_guard(const Simulation *sim, int kind, int contact) {
+    Instant at = present_instant(sim);
+    double z = transition(kind)->guard(&sim->equations, &at, contact);
+    if (kind == EVENT_IMPACT) {
+        return z + sim->state.floors[contact];
+    }
+    return kind == EVENT_REVERSAL ? z + 0.5 * zero_speed(&sim->configuration) : z;
+}
+
+/* How much the velocity of a wall may change under a resting body before that is an event: the
+ * wall's acceleration is unknown, and an impact slower than rest_speed ends in rest. */
+static double turn_allowed(const Simulation *sim, int i) {
+    const Stop *stop = &sim->configuration.mechanism->stops[i];
+    return greater(0.5 * stop_field(sim, stop->rest_speed),
+                   10.0 * zero_speed(&sim->configuration));
+}
+
+/* The change of a wall's velocity since the last event. */
+static double wall_turn(const Simulation *sim, int i) {
+    return sim->state.walls[i].rate - sim->state.held_rates[i];
+}
+
+/* Positive while an open gap stays open.  An opening gap is lifted off zero, so that its indicator
+ * is positive right after an impact, where the gap is zero up to round-off. */
+static double impact_indicator(const Simulation *sim, int i) {
+    Instant at = present_instant(sim);
+    double speed = gap_rate(&sim->equations, i, at.e, at.v);
+    double ahead = INDICATOR_LEAD_RTOL * sim->configuration.scales.time * greater(speed, 0.0);
+    return (lifted_guard(sim, EVENT_IMPACT, i) + ahead) / sim->configuration.scales.length;
+}
+
+/* Positive while a closed stop is pressed and its wall keeps its velocity. */
+static double release_indicator(const Simulation *sim, int i) {
+    double pressed = lifted_guard(sim, EVENT_RELEASE, i) / force_scale(sim);
+    double steady = (turn_allowed(sim, i) - fabs(wall_turn(sim, i))) / speed_scale(sim);
+    return lesser(pressed, steady);
+}
+
+static double indicator(const Simulation *sim, int kind, int contact) {
+    switch (kind) {
+    case EVENT_IMPACT: return impact_indicator(sim, contact);
+    case EVENT_RELEASE: return release_indicator(sim, contact);
+    default: return lifted_guard(sim, kind, contact) / guard_scale(sim, kind);
+    }
+}
+
+/* All indicators at the present rates; 1 where an event is impossible. */
+PRBM void event_indicators(const Simulation *sim, double *z) {
+    for (int i = 0; i < exchange_indicators(sim); i++) {
+        z[i] = 1.0;
+    }
+    for (int kind = EVENT_IMPACT; kind <= EVENT_REVERSAL; kind++) {
+        for (int contact = 0; contact < contact_count(sim); contact++) {
+            if (watched(&sim->equations, kind, contact)) {
+                z[indicator_place(sim, kind, contact)] = indicator(sim, kind, contact);
+            }
+        }
+    }
+}
+
+PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *problem) {
+    if (!exchange_rates(simulation, problem)) {
+        return false;
+    }
+    event_indicators(simulation, z);
+    return true;
+}
+
+/* --- drift ------------------------------------------------------------------------------------ */
+
+/* The drift of a closed stop off its wall and off the velocity at which it was closed, in units of
+ * size and speed.  While the wall changes its velocity its position does not count. */
+static double stop_drift(const Simulation *sim, int i) {
+    Instant at = present_instant(sim);
+    double turn = wall_turn(sim, i);
+    double off = fabs(gap(&sim->equations, i, at.time, at.e)) / system_of(sim)->length;
+    double speed = fabs(gap_rate(&sim->equations, i, at.e, at.v) - turn);
+    bool turned = fabs(turn) > zero_speed(&sim->configuration);
+    return greater(turned ? 0.0 : off, speed / speed_scale(sim));
+}
+
+/* The largest drift of the closed stops and the sticking contacts. */
+static double drift(const Simulation *sim) {
+    const Equations *q = &sim->equations;
+    Instant at = present_instant(sim);
+    double most = 0.0;
+    for (int k = 0; k < q->held_count; k++) {
+        most = greater(most, stop_drift(sim, q->held[k]));
+    }
+    for (int k = q->first_stick; k < q->r; k++) {
+        double speed = fabs(row_rate(&q->active, k, at.e, at.v));
+        most = greater(most, speed / speed_scale(sim));
+    }
+    return most;
+}
+
+PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *problem) {
+    Simulation *sim = simulation;
+    *event = false;
+    if (!exchange_rates(sim, problem)) {
+        return false;
+    }
+    copy(state_size(sim), sim->state.front, sim->state.arc.y);
+    *event = drift(sim) > DRIFT_RTOL;
+    return true;
+}
+
+/* --- walls that change their velocity --------------------------------------------------------- */
+
+/* The front has changed: its rates and outputs are no longer up to date. */
+static void changed_front(Simulation *sim) {
+    sim->rates.evaluated = false;
+    sim->present.fresh = NOTHING;
+}
+
+/* Whether an impulse on a closed stop pulls more than it was pressed since the last event: then its
+ * wall has retreated faster than the body could follow. */
+static bool left_behind(const Simulation *sim, int stop, double P) {
+    double since = sim->state.time - sim->state.held_times[stop];
+    return -P > greater(lifted_guard(sim, EVENT_RELEASE, stop), 0.0) * since;
+}
+
+/* Solve for the changes of velocities, and minus the impulses behind them, that bring the active
+ * rows (r, n) to their prescribed rates. */
+static bool following_impulses(Simulation *sim, double *rows, double *x, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const Equations *q = &sim->equations;
+    const System *system = system_of(sim);
+    const double *v = sim->state.front + system->n;
+    int n = system->n, r = q->r, size = n + r;
+    Instant at = present_instant(sim);
+    double *M = take_matrix(&sim->scratch, n, n), *C = take_matrix(&sim->scratch, n, n);
+    double *kkt = take_matrix(&sim->scratch, size, size);
+    jacobian(&q->active, at.e, rows);
+    inertia(n, system->H, system->J, at.e, M, C);
+    saddle(n, r, M, rows, rows, kkt);
+    zeros(n, x);
+    for (int k = 0; k < r; k++) {
+        x[n + k] = -(dot(n, rows + k * n, v) + prescribed(q, k));
+    }
+    bool right = solve(size, kkt, x, &sim->scratch, problem);
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* The energies of the impulses P = -x on the closed stops, as at an impact. */
+static void book_following(Simulation *sim, const double *rows, const double *x) {
+    const Equations *q = &sim->equations;
+    int n = system_of(sim)->n;
+    double *y = sim->state.front;
+    for (int k = 0; k < q->held_count; k++) {
+        int row = q->first_hold + k;
+        double P = -x[row], wall = sim->state.walls[q->held[k]].rate;
+        double before = dot(n, rows + row * n, y + n) + wall;
+        y[2 * n] -= P * before / 2; /* and nothing after */
+        y[2 * n + 1] -= P * wall;
+    }
+}
+
+/* Give the closed stops the present velocities of their walls, if the forces since the last event
+ * bear the change.  The impulses, which may pull a little, are booked as at an impact. */
+static bool follow(Simulation *sim, bool *followed, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const Equations *q = &sim->equations;
+    int n = system_of(sim)->n;
+    double *y = sim->state.front, *rows = take_matrix(&sim->scratch, q->r, n);
+    double *x = take(&sim->scratch, (size_t)(n + q->r));
+    bool right = following_impulses(sim, rows, x, problem);
+    *followed = right;
+    for (int k = 0; right && k < q->held_count; k++) {
+        int i = q->held[k];
+        bool turned = fabs(wall_turn(sim, i)) > zero_speed(&sim->configuration);
+        *followed = *followed && !(turned && left_behind(sim, i, -x[n + q->first_hold + k]));
+    }
+    if (*followed) {
+        book_following(sim, rows, x + n);
+        add_scaled(n, 1.0, x, y + n);
+    }
+    sim->scratch.used = mark;
+    return right && (!*followed || project(q, sim->state.time, y, &sim->scratch, problem));
+}
+
+/* Bring closed stops back onto their walls, open or strike them where a wall has changed its
+ * velocity at once; bring sticking contacts back to rest. */
+static bool follow_walls(Simulation *sim, Problem *problem) {
+    bool turned = false, jumped = false, followed = false;
+    bool drifted = drift(sim) > DRIFT_CORRECTED_RTOL;
+    for (int k = 0; k < sim->equations.held_count; k++) {
+        int i = sim->equations.held[k];
+        double turn = fabs(wall_turn(sim, i));
+        turned = turned || turn > zero_speed(&sim->configuration);
+        jumped = jumped || turn > 2.0 * turn_allowed(sim, i);
+    }
+    if (!jumped && (turned || drifted) && !follow(sim, &followed, problem)) {
+        return false;
+    }
+    if (turned || drifted) {
+        changed_front(sim);
+    }
+    return followed || !turned || settle_walls(sim, problem);
+}
+
+/* --- events ----------------------------------------------------------------------------------- */
+
+/* Bring a contact whose sliding has ended to rest: a solver overshoots by its own resolution of
+ * time, which must not look like sliding back. */
+static void stop_sliding(Simulation *sim, int contact) {
+    Instant at = present_instant(sim);
+    double speed = sliding_velocity(system_of(sim), contact, at.e, at.v);
+    if (fabs(speed) <= DRIFT_RTOL * speed_scale(sim)) {
+        Problem ignored; /* closed and sticking may be one constraint too many: then it stays */
+        set_mode(sim, contact, CONTACT_STICK);
+        (void)project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch,
+                      &ignored);
+    }
+}
+
+/* Whether the gap of an open stop closes here. */
+static bool closes_here(const Simulation *sim, int stop) {
+    Instant at = present_instant(sim);
+    double distance = gap(&sim->equations, stop, at.time, at.e);
+    double speed = gap_rate(&sim->equations, stop, at.e, at.v);
+    bool touches = distance <= TOUCHING_RTOL * system_of(sim)->length;
+    return (touches && speed < -zero_speed(&sim->configuration)) ||
+           (lifted_guard(sim, EVENT_IMPACT, stop) <= 0.0 && speed < 0.0);
+}
+
+/* The next event that is due at the front: releases, slips and reversals, then impacts of stops that
+ * have not been struck in this event. */
+static Event due_here(const Simulation *sim, bool *struck) {
+    static const int order[] = {EVENT_RELEASE, EVENT_SLIP, EVENT_REVERSAL, EVENT_IMPACT};
+    Event event = {EVENT_NONE, 0, sim->state.time};
+    for (size_t k = 0; k < sizeof order / sizeof *order; k++) {
+        int kind = order[k];
+        for (int contact = 0; contact < contact_count(sim); contact++) {
+            if (watched(&sim->equations, kind, contact) &&
+                (kind == EVENT_IMPACT ? !struck[contact] && closes_here(sim, contact)
+                                      : lifted_guard(sim, kind, contact) <= 0.0)) {
+                event.kind = kind;
+                event.contact = contact;
+                return event;
+            }
+        }
+    }
+    return event;
+}
+
+/* After an event: the gaps at which stops close from here on, and the velocities of the walls. */
+static void arm(Simulation *sim) {
+    State *state = &sim->state;
+    Instant at = present_instant(sim);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        state->floors[i] = GAP_CLOSED_RTOL * system_of(sim)->length;
+        if (state->modes[i] == CONTACT_OPEN) {
+            state->floors[i] += greater(0.0, -gap(&sim->equations, i, at.time, at.e));
+        }
+        state->held_rates[i] = state->walls[i].rate;
+        state->held_times[i] = state->time;
+    }
+}
+
+/* Apply the impulses and the changes of the walls. */
+static bool apply_inputs(Simulation *sim, Problem *problem) {
+    bool impulses = impulses_changed(sim);
+    if (!exchange_rates(sim, problem) || !receive_impulses(sim, problem)) {
+        return false;
+    }
+    if (!impulses) {
+        return follow_walls(sim, problem);
+    }
+    changed_front(sim);
+    return exchange_rates(sim, problem) && settle_walls(sim, problem);
+}
+
+static bool apply_due_events(Simulation *sim, Problem *problem) {
+    enum { EVENTS_AT_ONCE_MAX = 16 };
+    bool struck[STOPS_MAX] = {false};
+    for (int i = 0; i < EVENTS_AT_ONCE_MAX; i++) {
+        if (!exchange_rates(sim, problem)) {
+            return false;
+        }
+        Event event = due_here(sim, struck);
+        if (event.kind == EVENT_NONE) {
+            break;
+        }
+        changed_front(sim);
+        if (event.kind == EVENT_IMPACT) {
+            struck[event.contact] = true;
+        } else if (event.kind == EVENT_REVERSAL) {
+            stop_sliding(sim, event.contact);
+        }
+        if (!apply_event(sim, &event, problem)) {
+            return false;
+        }
+    }
+    return exchange_rates(sim, problem);
+}
+
+PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem) {
+    Simulation *sim = simulation;
+    State *state = &sim->state;
+    size_t mark = sim->scratch.used;
+    int nx = exchange_states(sim);
+    double *before = take(&sim->scratch, (size_t)nx);
+    *changed = false;
+    copy(nx, state->states, before);
+    keep_backup(sim);
+    bool right = apply_inputs(sim, problem) && apply_due_events(sim, problem);
+    if (right) {
+        arm(sim);
+        copy(state_size(sim), state->front, state->arc.y);
+        states_of(sim, state->front, state->states);
+        *changed = memcmp(before, state->states, (size_t)nx * sizeof *before) != 0;
+    }
+    sim->scratch.used = mark;
+    right = attempt(sim, right, problem);
+    sim->rates.stale = !right;
+    return right;
+}
+
+/* The stop that is penetrated most, if more than by a solver's errors; or NULL. */
+PRBM const char *exchange_deepest(Simulation *simulation, double *depth) {
+    Simulation *sim = simulation;
+    const char *found = NULL;
+    Problem ignored;
+    *depth = PENETRATION_WARNING_RTOL * system_of(sim)->length;
+    if (!exchange_rates(sim, &ignored)) {
+        return NULL;
+    }
+    Instant at = present_instant(sim);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        double inside = -gap(&sim->equations, i, at.time, at.e);
+        if (inside > *depth) {
+            *depth = inside;
+            found = sim->configuration.mechanism->stops[i].name;
+        }
+    }
+    return found;
+}
+
+PRBM void exchange_begin(Simulation *sim) {
+    Problem ignored;
+    copy(state_size(sim), sim->state.front, sim->state.arc.y);
+    states_of(sim, sim->state.front, sim->state.states);
+    sim->rates.stale = true;
+    if (exchange_rates(sim, &ignored)) {
+        arm(sim);
+    }
+    sim->rates.stale = true;
+}

@@ -1,0 +1,694 @@
+/* Directional derivatives: exact changes of all values along changes of states and inputs. */
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+/* A change of everything with the states and inputs: dq, dv, da, dlam.  With the complex changes
+ * dphi = dtheta - i ds of an arm E, and dw of its rate, dE = i E dphi, d(E w) = E (i dphi w + dw), and
+ * so on: the formulas of an angle hold for a stretch, too. */
+typedef struct {
+    Simulation *sim;
+    const Equations *q;
+    const Complex *e;
+    const Factors *factors;
+    const double *y, *v, *a, *lam, *du;
+    double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,) = da, (r,) */
+    Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
+    Complex *dE;                    /* (n,) i E dphi */
+    Complex *swing, *dswing;        /* (n,) E w */
+    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); at first without the change of w' */
+    Complex *pull;                  /* (n,) torques on the arms and, -i times, forces along them */
+} Tangent;
+
+static Complex times_i(Complex z) {
+    return complex_of(-z.im, z.re);
+}
+
+static double multiplier(const Tangent *t, int k) {
+    return t->lam[k];
+}
+
+static double multiplier_change(const Tangent *t, int k) {
+    return t->dlam[k];
+}
+
+/* --- of rows --- */
+
+/* A vector that turns, and its motion. */
+typedef struct {
+    Complex E, w, alpha, dphi, dw;
+} Arm;
+
+static Arm arm_at(const Tangent *t, int j) {
+    Complex none = {0.0, 0.0}, one = {1.0, 0.0};
+    Arm still_one = {one, none, none, none, none};
+    if (j == FIXED) {
+        return still_one;
+    }
+    Arm arm = {t->e[j], t->w[j], t->alpha[j], t->dphi[j], t->dw[j]};
+    return arm;
+}
+
+/* A part of a row as it is seen from where the row is: f B_j E_j, and f z for j = n; false if it has
+ * no such part. */
+static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
+    int n = rows->system->n, on = seen_from(rows, i);
+    Complex size = {0.0, 0.0};
+    if (j < n) {
+        size = rows->B[i * n + j];
+    } else if (on != FIXED) {
+        size = rows->z[i];
+    }
+    Arm arm = arm_at(t, j < n ? j : FIXED), body = arm_at(t, on);
+    seen->E = product(product(conjugate(body.E), arm.E), size);
+    seen->w = minus(arm.w, body.w);
+    seen->alpha = minus(arm.alpha, body.alpha);
+    seen->dphi = minus(arm.dphi, body.dphi);
+    seen->dw = minus(arm.dw, body.dw);
+    return size.re != 0.0 || size.im != 0.0;
+}
+
+/* E (i dphi w + dw) */
+static Complex swing_change(const Arm *arm) {
+    return product(arm->E, plus(times_i(product(arm->dphi, arm->w)), arm->dw));
+}
+
+/* i w' - w^2 */
+static Complex bend_of(const Arm *arm) {
+    return minus(times_i(arm->alpha), product(arm->w, arm->w));
+}
+
+/* E (i dphi (i w' - w^2) - 2 w dw) */
+static Complex bend_change(const Arm *arm) {
+    Complex turned = times_i(product(arm->dphi, bend_of(arm)));
+    return product(arm->E, minus(turned, scaled(2.0, product(arm->w, arm->dw))));
+}
+
+static double value_change(const Tangent *t, const Rows *rows, int i) {
+    double sum = 0.0;
+    Arm part;
+    for (int j = 0; j <= rows->system->n; j++) {
+        sum -= seen_part(t, rows, i, j, &part) ? product(part.E, part.dphi).im : 0.0;
+    }
+    return sum;
+}
+
+static double rate_change(const Tangent *t, const Rows *rows, int i) {
+    double sum = 0.0;
+    Arm part;
+    for (int j = 0; j <= rows->system->n; j++) {
+        sum -= seen_part(t, rows, i, j, &part) ? swing_change(&part).im : 0.0;
+    }
+    return sum;
+}
+
+/* Of the second derivative, as far as it is not one of the accelerations. */
+static double second_change(const Tangent *t, const Rows *rows, int i) {
+    double sum = 0.0;
+    Arm part;
+    for (int j = 0; j <= rows->system->n; j++) {
+        sum += seen_part(t, rows, i, j, &part) ? bend_change(&part).re : 0.0;
+    }
+    return sum;
+}
+
+/* A force along a row, whose gradient i f B E turns: the body of the wall bears the reaction. */
+static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
+    int n = rows->system->n, on = seen_from(rows, i);
+    Arm part;
+    for (int j = 0; j <= n; j++) {
+        if (seen_part(t, rows, i, j, &part)) {
+            Complex change = scaled(force, product(part.E, part.dphi));
+            if (j < n) {
+                t->pull[j] = minus(t->pull[j], change);
+            }
+            if (on != FIXED) {
+                t->pull[on] = plus(t->pull[on], change);
+            }
+        }
+    }
+}
+
+/* --- of coordinates --- */
+
+/* The changes of the arms that follow from dq and dv. */
+static void move_arms(const Tangent *t) {
+    const System *system = t->q->system;
+    turning(system, t->dq, t->dphi);
+    turning(system, t->dv, t->dw);
+    for (int j = 0; j < system->n; j++) {
+        Arm arm = arm_at(t, j);
+        t->dE[j] = times_i(product(arm.E, arm.dphi));
+        t->swing[j] = product(arm.E, arm.w);
+        t->dswing[j] = swing_change(&arm);
+        t->bend[j] = product(arm.E, bend_of(&arm));
+        t->dbend[j] = bend_change(&arm);
+    }
+}
+
+/* Solve the loops for the changes of the dependent coordinates, whose residuals are -s. */
+static void solve_dependents(const Tangent *t, const Loops *loops, double *changes) {
+    int r = t->q->system->r;
+    lu_solve(r, loops->a, loops->pivot, loops->s);
+    for (int k = 0; k < r; k++) {
+        changes[loops->dependent[k]] = loops->s[k];
+    }
+}
+
+/* dq and dv from the changes of the independent ones: the loops and their rates do not change. */
+static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) {
+    Simulation *sim = t->sim;
+    const System *system = system_of(sim);
+    const Mechanism *m = system->mechanism;
+    int n = system->n, r = system->r, count = m->independent_count;
+    Loops x = take_loops(sim);
+    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
+    jacobian(&loops, t->e, x.rows);
+    if (!factor_dependents(sim, x.rows, x.dependent, x.a, x.pivot)) {
+        return singular_choice(sim, x.dependent, problem);
+    }
+    zeros(n, t->dq);
+    zeros(n, t->dv);
+    for (int k = 0; k < count; k++) {
+        t->dq[m->independent[k]] = dx[k];
+        t->dv[m->independent[k]] = dx[count + k];
+    }
+    for (int i = 0; i < r; i++) {
+        x.s[i] = -dot(n, x.rows + i * n, t->dq);
+    }
+    solve_dependents(t, &x, t->dq);
+    move_arms(t);
+    for (int i = 0; i < r; i++) {
+        x.s[i] = -rate_change(t, &loops, i);
+    }
+    solve_dependents(t, &x, t->dv);
+    move_arms(t);
+    return true;
+}
+
+/* --- of loads --- */
+
+/* (H x)_i over the arms */
+static Complex through_mass(const Tangent *t, int i, const Complex *x) {
+    int n = t->q->system->n;
+    return along_arms(n, t->q->system->H + i * n, x);
+}
+
+/* Change of the row of loads of the inputs. */
+static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
+    const System *system = t->q->system;
+    const Mechanism *m = system->mechanism;
+    const double *base = t->du + m->input.base;
+    int n = system->n;
+    size_t mark = t->sim->scratch.used;
+    Complex *one = take_complex(&t->sim->scratch, n, 1);
+    field_row(n, system->S, complex_of(-base[0], -base[1]), dw);
+    zeros(n, dmoment);
+    for (int i = 0; i < m->force_count; i++) {
+        const BodyFrame *frame = &system->pushed[i];
+        const double *given = t->du + LOADS * i;
+        force_row(n, frame->A, complex_of(given[0], given[1]), one);
+        for (int j = 0; j < n; j++) {
+            dw[j] = plus(dw[j], one[j]);
+        }
+        dmoment[frame->j] += given[2];
+    }
+    t->sim->scratch.used = mark;
+}
+
+/* Momentum of an arm, E conj(H (E w)), and its change. */
+static Complex momentum_change(const Tangent *t, int j) {
+    Complex momentum = product(t->e[j], conjugate(through_mass(t, j, t->swing)));
+    Complex turned = times_i(product(t->dphi[j], momentum));
+    return plus(turned, product(t->e[j], conjugate(through_mass(t, j, t->dswing))));
+}
+
+/* Change of the inertial load -i E conj(H bend) of an arm. */
+static Complex inertial_change(const Tangent *t, int j) {
+    Complex load = product(t->e[j], conjugate(through_mass(t, j, t->bend)));
+    Complex turned = times_i(product(t->dphi[j], load));
+    Complex change = plus(turned, product(t->e[j], conjugate(through_mass(t, j, t->dbend))));
+    return scaled(-1.0, times_i(change));
+}
+
+/* Loads, inertia and damping in proportion to mass: change of the pull on the arms. */
+static void arm_load_change(const Tangent *t, const Complex *dw) {
+    const Equations *q = t->q;
+    for (int j = 0; j < q->system->n; j++) {
+        if (arm_of(q->system, j) == j) {
+            Complex load = plus(product(dw[j], t->e[j]), product(q->w[j], t->dE[j]));
+            Complex lost = scaled(-q->mass_damping, momentum_change(t, j));
+            t->pull[j] = plus(plus(load, inertial_change(t, j)), lost);
+        }
+    }
+}
+
+/* Springs, moments and damping of the bodies' own inertia. */
+static void coordinate_load_change(const Tangent *t, const double *dmoment) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    int n = system->n;
+    for (int i = 0; i < n; i++) {
+        double sum = dmoment[i] - q->mass_damping * system->J[i] * t->dv[i];
+        for (int j = 0; j < n; j++) {
+            sum -= system->K[i * n + j] * (t->dq[j] + q->beta * t->dv[j]);
+        }
+        t->dx[i] += sum;
+    }
+}
+
+static double lift_change(const Tangent *t, int i) {
+    const System *system = t->q->system;
+    Rows lifts = plain_rows(system, system->f, system->lifts, system->lifts_c);
+    return value_change(t, &lifts, i);
+}
+
+/* Change of the limit of friction of a friction point. */
+static double limit_change(const Tangent *t, int i) {
+    const double *law = t->q->rub_law + 3 * i;
+    return rub_limit(t->q, i, t->e) > 0.0 ? law[0] * law[2] * lift_change(t, i) : 0.0;
+}
+
+/* The sign of the sliding velocity of a contact. */
+static int sliding_sign(const Tangent *t, int contact) {
+    return slip_sign(t->q->contacts.modes[contact]);
+}
+
+static void rub_change(const Tangent *t) {
+    const Equations *q = t->q;
+    Scratch *scratch = &t->sim->scratch;
+    size_t mark = scratch->used;
+    int s = q->system->s;
+    double *row = take(scratch, (size_t)q->system->n);
+    Rows rubs = rub_rows(q->system);
+    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
+        int i = q->slipping[k] - s;
+        row_jacobian(&rubs, i, t->e, row);
+        add_scaled(q->system->n, -sliding_sign(t, s + i) * limit_change(t, i), row, t->dx);
+        add_pull(t, &rubs, i, rub_force(q, i, t->e));
+    }
+    scratch->used = mark;
+}
+
+/* Rows and columns: change of the right side by dR^T lam, -dR a and what convects. */
+static void row_change(const Tangent *t) {
+    const Equations *q = t->q;
+    Rows walls = slide_rows(q->system);
+    for (int k = 0; k < q->r; k++) {
+        add_pull(t, &q->active, k, multiplier(t, k));
+        t->dlam[k] = -second_change(t, &q->active, k);
+    }
+    for (int k = 0; k < q->slipping_stops; k++) {
+        int i = q->slipping[k];
+        double share = -q->stop_friction[i] * sliding_sign(t, i);
+        add_pull(t, &walls, i, share * stop_force(q, t->lam, i));
+    }
+}
+
+/* The pull on an arm is a torque; -i times it, along a stretch. */
+static void apply_pull(const Tangent *t) {
+    const System *system = t->q->system;
+    for (int j = 0; j < system->n; j++) {
+        int a = arm_of(system, j);
+        t->dx[j] += a == j ? t->pull[j].re : t->pull[a].im;
+    }
+}
+
+/* --- their outputs --- */
+
+static void point_changes(const Tangent *t, const BodyFrame *frame, Complex *moved,
+                          Complex *speed) {
+    int n = t->q->system->n;
+    *moved = along_arms(n, frame->A, t->dE);
+    *speed = times_i(along_arms(n, frame->A, t->dswing));
+}
+
+static void body_changes(const Tangent *t, double *out) {
+    for (int i = 0; i < t->q->system->b; i++) {
+        const BodyFrame *frame = &t->q->system->bodies[i];
+        double *d = out + PER_BODY * i;
+        Complex moved, speed;
+        point_changes(t, frame, &moved, &speed);
+        d[BODY_X] = moved.re;
+        d[BODY_Y] = moved.im;
+        d[BODY_ANGLE] = t->dq[frame->j];
+        d[BODY_VX] = speed.re;
+        d[BODY_VY] = speed.im;
+        d[BODY_OMEGA] = t->dv[frame->j];
+    }
+}
+
+static void probe_changes(const Tangent *t, double *out) {
+    for (int i = 0; i < t->sim->configuration.mechanism->probe_count; i++) {
+        double *d = out + PER_PROBE * i;
+        Complex moved, speed;
+        point_changes(t, &t->q->system->probes[i], &moved, &speed);
+        d[PROBE_X] = moved.re;
+        d[PROBE_Y] = moved.im;
+        d[PROBE_VX] = speed.re;
+        d[PROBE_VY] = speed.im;
+    }
+}
+
+static void link_changes(const Tangent *t, double *links, double *stretches_out) {
+    const Mechanism *m = t->sim->configuration.mechanism;
+    for (int k = 0; k < m->link_count; k++) {
+        links[PER_LINK * k + LINK_ANGLE] = t->dq[m->links[k]];
+        links[PER_LINK * k + LINK_OMEGA] = t->dv[m->links[k]];
+    }
+    for (int k = 0; k < m->stretch_count; k++) {
+        stretches_out[PER_STRETCH * k + STRETCH_STRAIN] = t->dq[m->stretches[k]];
+        stretches_out[PER_STRETCH * k + STRETCH_STRAIN_RATE] = t->dv[m->stretches[k]];
+    }
+}
+
+/* Changes of displacement and velocity of a wall. */
+static const double *wall_change(const Tangent *t, int i) {
+    return wall_inputs(t->q->system->mechanism, t->du, i);
+}
+
+static double gap_change(const Tangent *t, int i) {
+    const System *system = t->q->system;
+    Rows gaps = gap_rows(system);
+    return value_change(t, &gaps, i) + wall_change(t, i)[0];
+}
+
+static double gap_rate_change(const Tangent *t, int i) {
+    const System *system = t->q->system;
+    Rows gaps = gap_rows(system);
+    return rate_change(t, &gaps, i) + wall_change(t, i)[1];
+}
+
+static void stop_changes(const Tangent *t, double *out) {
+    for (int i = 0; i < t->q->system->s; i++) {
+        const double *wall = wall_change(t, i);
+        double *d = out + PER_STOP * i;
+        d[STOP_GAP] = gap_change(t, i);
+        d[STOP_GAP_RATE] = gap_rate_change(t, i);
+        d[STOP_POINT_DISPLACEMENT] = wall[0] - d[STOP_GAP];
+        d[STOP_POINT_VELOCITY] = wall[1] - d[STOP_GAP_RATE];
+    }
+    for (int k = 0; k < t->q->held_count; k++) {
+        double change = multiplier_change(t, t->q->first_hold + k);
+        out[PER_STOP * t->q->held[k] + STOP_FORCE] = change;
+    }
+}
+
+/* dbend, complete with the change of the accelerations. */
+static void bend_arms(const Tangent *t) {
+    Complex *dalpha = t->pull; /* which has been applied */
+    turning(t->q->system, t->dx, dalpha);
+    for (int j = 0; j < t->q->system->n; j++) {
+        t->dbend[j] = plus(t->dbend[j], times_i(product(t->e[j], dalpha[j])));
+    }
+}
+
+static void base_changes(const Tangent *t, double *out) {
+    const System *system = t->q->system;
+    const Mechanism *m = system->mechanism;
+    int n = system->n;
+    const double *base = t->du + m->input.base, *given = t->q->inputs.forces;
+    Complex field = minus(system->gravity, t->q->inputs.base), force = {0.0, 0.0};
+    double moment = 0.0;
+    for (int i = 0; i < system->p; i++) {
+        const Complex *A = system->A + i * n;
+        Complex z = plus(along_arms(n, A, t->e), minus(system->c[i], system->anchor));
+        Complex dz = along_arms(n, A, t->dE), dbend = along_arms(n, A, t->dbend);
+        Complex load = scaled(system->m[i], minus(field, along_arms(n, A, t->bend)));
+        Complex change = scaled(-system->m[i], plus(complex_of(base[0], base[1]), dbend));
+        force = plus(force, change);
+        moment += product(conjugate(dz), load).im + product(conjugate(z), change).im;
+    }
+    for (int j = 0; j < n; j++) {
+        moment -= system->J[j] * t->dx[j];
+    }
+    for (int i = 0; i < m->force_count; i++) {
+        const BodyFrame *frame = &system->pushed[i];
+        const double *df = t->du + LOADS * i, *f = given + LOADS * i;
+        Complex z = plus(along_arms(n, frame->A, t->e), minus(frame->c, system->anchor));
+        Complex dz = along_arms(n, frame->A, t->dE);
+        force = plus(force, complex_of(df[0], df[1]));
+        moment += product(conjugate(dz), complex_of(f[0], f[1])).im +
+                  product(conjugate(z), complex_of(df[0], df[1])).im + df[2];
+    }
+    out[BASE_FORCE_X] = force.re;
+    out[BASE_FORCE_Y] = force.im;
+    out[BASE_MOMENT] = moment;
+}
+
+/* Change of the kinetic energy, Re(d(E w)^H H (E w)) and what the bodies' own inertia adds. */
+static double kinetic_change(const Tangent *t) {
+    double sum = 0.0;
+    for (int i = 0; i < t->q->system->n; i++) {
+        sum += product(conjugate(t->dswing[i]), through_mass(t, i, t->swing)).re;
+        sum += t->q->system->J[i] * t->v[i] * t->dv[i];
+    }
+    return sum;
+}
+
+static void energy_changes(const Tangent *t, const double *dx, double *out) {
+    const System *system = t->q->system;
+    int n = system->n, count = system->mechanism->independent_count;
+    out[ENERGY_KINETIC] = kinetic_change(t);
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            out[ENERGY_ELASTIC] += (t->y[i] - system->q0[i]) * system->K[i * n + j] * t->dq[j];
+        }
+    }
+    out[ENERGY_GRAVITATIONAL] = -product(conjugate(system->gravity), along_arms(n, system->S, t->dE)).re;
+    out[ENERGY_DISSIPATED] = dx[2 * count];
+    out[ENERGY_WORK] = dx[2 * count + 1];
+}
+
+/* The same arms, which move at the rates x (n,) that do not change. */
+static Tangent at_rates(const Tangent *t, const double *x) {
+    Scratch *scratch = &t->sim->scratch;
+    int n = t->q->system->n;
+    Tangent u = *t;
+    Complex **arrays[] = {&u.w, &u.dw, &u.swing, &u.dswing};
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        *arrays[i] = take_complex(scratch, n, 1);
+    }
+    u.v = x;
+    u.dv = take(scratch, (size_t)n);
+    zeros(n, u.dv);
+    turning(t->q->system, x, u.w);
+    turning(t->q->system, u.dv, u.dw);
+    for (int j = 0; j < n; j++) {
+        Arm arm = arm_at(&u, j);
+        u.swing[j] = product(arm.E, arm.w);
+        u.dswing[j] = swing_change(&arm);
+    }
+    return u;
+}
+
+/* Change of the mobility G X of a hit point, M X + R^T mu = G^T, R X = 0 with the rows R of the
+ * loops: 2 dG X - X^T dM X - 2 mu^T dR X. */
+static bool mobility_change(const Tangent *t, int i, double *result, Problem *problem) {
+    Simulation *sim = t->sim;
+    const System *system = system_of(sim);
+    size_t mark = sim->scratch.used;
+    int n = system->n, r = system->r, size = n + r;
+    double *kkt = take_matrix(&sim->scratch, size, size), *x = take(&sim->scratch, (size_t)size);
+    Rows gaps = gap_rows(system), loops = plain_rows(system, r, system->loops, system->loops_c);
+    Inertia at = inertia_at(sim, t->y);
+    row_jacobian(&gaps, i, at.e, x);
+    zeros(r, x + n);
+    saddle(n, r, at.M, at.loops, at.loops, kkt);
+    bool right = solve(size, kkt, x, &sim->scratch, problem);
+    if (right) {
+        Tangent u = at_rates(t, x);
+        double change = rate_change(&u, &gaps, i) - kinetic_change(&u);
+        for (int k = 0; k < r; k++) {
+            change -= x[n + k] * rate_change(&u, &loops, k);
+        }
+        *result = 2.0 * change;
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+static double dissipation_change(const Tangent *t) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    Rows walls = slide_rows(system), rubs = rub_rows(system);
+    int n = system->n;
+    double sum = 2.0 * q->mass_damping * kinetic_change(t);
+    for (int i = 0; i < n; i++) {
+        for (int j = 0; j < n; j++) {
+            sum += 2.0 * q->beta * t->v[i] * system->K[i * n + j] * t->dv[j];
+        }
+    }
+    for (int k = q->slipping_stops; k < q->slipping_count; k++) {
+        int i = q->slipping[k] - system->s;
+        double change = -sliding_sign(t, system->s + i) * limit_change(t, i);
+        sum -= change * row_rate(&rubs, i, t->e, t->v) +
+               rub_force(q, i, t->e) * rate_change(t, &rubs, i);
+    }
+    for (int k = 0; k < q->slipping_stops; k++) {
+        int i = q->slipping[k], h = q->first_hold + held_at(q, i);
+        sum += q->stop_friction[i] * sliding_sign(t, i) *
+               (multiplier_change(t, h) * row_rate(&walls, i, t->e, t->v) +
+                multiplier(t, h) * rate_change(t, &walls, i));
+    }
+    return sum;
+}
+
+static double power_change(const Tangent *t, const Complex *dw, const double *dmoment) {
+    const Equations *q = t->q;
+    const System *system = q->system;
+    int n = system->n;
+    double sum = along_arms(n, dw, t->swing).re + along_arms(n, q->w_input, t->dswing).re;
+    for (int j = 0; j < n; j++) {
+        sum += dmoment[j] * t->v[j] + q->moment[j] * t->dv[j];
+    }
+    for (int k = 0; k < q->held_count; k++) {
+        int i = q->held[k], h = q->first_hold + k;
+        double velocity = wall_change(t, i)[1];
+        sum -= multiplier_change(t, h) * q->inputs.walls[i].rate + multiplier(t, h) * velocity;
+    }
+    return sum;
+}
+
+/* Change of |x|; at zero, where it has two, their mean. */
+static double sign_times(double x, double change) {
+    return x < 0.0 ? -change : x > 0.0 ? change : 0.0;
+}
+
+static double impact_indicator_change(const Tangent *t, int i) {
+    const Scales *scales = &t->sim->configuration.scales;
+    bool opens = gap_rate(t->q, i, t->e, t->v) > 0.0;
+    double ahead = opens ? INDICATOR_LEAD_RTOL * scales->time * gap_rate_change(t, i) : 0.0;
+    return (gap_change(t, i) + ahead) / scales->length;
+}
+
+static double release_indicator_change(const Tangent *t, int i) {
+    const Simulation *sim = t->sim;
+    double velocity = wall_change(t, i)[1];
+    double pressed = lifted_guard(sim, EVENT_RELEASE, i) / force_scale(sim);
+    return pressed <= release_indicator(sim, i)
+               ? multiplier_change(t, t->q->first_hold + held_at(t->q, i)) / force_scale(sim)
+               : -sign_times(wall_turn(sim, i), velocity) / speed_scale(sim);
+}
+
+static double slip_indicator_change(const Tangent *t, int contact) {
+    const Equations *q = t->q;
+    int row = q->first_stick + place_in(q->sticking, contact);
+    double friction = sign_times(multiplier(t, row), multiplier_change(t, row)), limit;
+    if (is_stop(q->system, contact)) {
+        int held = q->first_hold + held_at(q, contact);
+        limit = q->stop_friction[contact] * multiplier_change(t, held);
+    } else {
+        limit = limit_change(t, contact - q->system->s);
+    }
+    return ((1.0 + FRICTION_EXCESS_RTOL) * limit - friction) / force_scale(t->sim);
+}
+
+static double reversal_indicator_change(const Tangent *t, int contact) {
+    int i;
+    Rows rows = tangential_rows(t->q->system, contact, &i);
+    return sliding_sign(t, contact) * rate_change(t, &rows, i) / speed_scale(t->sim);
+}
+
+static double indicator_change(const Tangent *t, int kind, int contact) {
+    switch (kind) {
+    case EVENT_IMPACT: return impact_indicator_change(t, contact);
+    case EVENT_RELEASE: return release_indicator_change(t, contact);
+    case EVENT_SLIP: return slip_indicator_change(t, contact);
+    default: return reversal_indicator_change(t, contact);
+    }
+}
+
+static void indicator_changes(const Tangent *t, double *out) {
+    for (int kind = EVENT_IMPACT; kind <= EVENT_REVERSAL; kind++) {
+        for (int contact = 0; contact < contact_count(t->sim); contact++) {
+            if (watched(t->q, kind, contact)) {
+                out[indicator_place(t->sim, kind, contact)] = indicator_change(t, kind, contact);
+            }
+        }
+    }
+}
+
+static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
+                        const double *dmoment, double *out) {
+    const Mechanism *m = t->sim->configuration.mechanism;
+    const Slots *slots = &m->slots;
+    zeros(slots->count, out);
+    copy(m->input_count, t->du, out + slots->inputs);
+    body_changes(t, out + slots->bodies);
+    probe_changes(t, out + slots->probes);
+    link_changes(t, out + slots->links, out + slots->stretches);
+    stop_changes(t, out + slots->stops);
+    base_changes(t, out + slots->base);
+    energy_changes(t, dx, out + slots->energies);
+    for (int k = 0; k < m->independent_count; k++) {
+        out[slots->derivatives + k] = t->dx[m->independent[k]];
+    }
+    double *powers = out + slots->derivatives + m->independent_count;
+    powers[0] = dissipation_change(t);
+    powers[1] = power_change(t, dw, dmoment);
+    indicator_changes(t, out + slots->indicators);
+}
+
+/* Room for the changes, at the present state and its rates. */
+static Tangent begin_tangent(Simulation *sim, const double *du) {
+    const System *system = system_of(sim);
+    const Evaluation *at = &sim->rates.evaluation;
+    Scratch *scratch = &sim->scratch;
+    int n = system->n;
+    Tangent t = {0};
+    Complex **arrays[] = {&t.w, &t.alpha, &t.dphi, &t.dw, &t.dE,
+                          &t.swing, &t.dswing, &t.bend, &t.dbend, &t.pull};
+    t.sim = sim;
+    t.q = &sim->equations;
+    t.e = at->at.e;
+    t.factors = &at->factors;
+    t.y = sim->rates.y;
+    t.v = t.y + n;
+    t.a = at->a;
+    t.lam = at->lam;
+    t.du = du;
+    for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
+        *arrays[i] = take_complex(scratch, n, 1);
+    }
+    t.dq = take(scratch, (size_t)n);
+    t.dv = take(scratch, (size_t)n);
+    t.dx = take(scratch, (size_t)system->even);
+    t.dlam = take(scratch, (size_t)t.q->r);
+    zeros(system->even, t.dx);
+    memset(t.pull, 0, (size_t)n * sizeof *t.pull);
+    turning(system, t.v, t.w);
+    turning(system, t.a, t.alpha);
+    return t;
+}
+
+PRBM bool exchange_directional(Simulation *simulation, const double *dx, const double *du,
+                               double *dvalues, Problem *problem) {
+    Simulation *sim = simulation;
+    size_t mark = sim->scratch.used;
+    int stops = sim->configuration.mechanism->slots.stops;
+    if (!present_rates(sim, problem)) {
+        return false;
+    }
+    Tangent t = begin_tangent(sim, du);
+    double *dmoment = take(&sim->scratch, (size_t)system_of(sim)->n);
+    Complex *dw = take_complex(&sim->scratch, system_of(sim)->n, 1);
+    bool right = tangent_coordinates(&t, dx, problem);
+    if (right) {
+        load_row_change(&t, dw, dmoment);
+        arm_load_change(&t, dw);
+        coordinate_load_change(&t, dmoment);
+        rub_change(&t);
+        row_change(&t);
+        apply_pull(&t);
+        solve_again(t.factors, t.dx, t.dlam);
+        bend_arms(&t);
+        all_changes(&t, dx, dw, dmoment, dvalues);
+    }
+    for (int i = 0; right && i < system_of(sim)->s; i++) {
+        right = mobility_change(&t, i, dvalues + stops + PER_STOP * i + STOP_POINT_MOBILITY,
+                                problem);
+    }
+    sim->scratch.used = mark;
+    return right;
+}

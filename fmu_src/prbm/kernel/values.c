@@ -1,0 +1,109 @@
+/* The values of a simulation in either mode: co-simulation or model exchange. */
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
+                           bool exchange, Problem *problem) {
+    Simulation *sim = simulation;
+    keep_backup(sim);
+    bool right = start_motion(sim, start_time, tolerance, exchange, problem);
+    if (right && exchange) {
+        exchange_begin(sim);
+    }
+    return attempt(sim, right, problem);
+}
+
+/* Bring y and e of the present up to date. */
+static bool load_present(Simulation *sim, Problem *problem) {
+    const System *system = system_of(sim);
+    Present *present = &sim->present;
+    if (sim->state.exchange) {
+        copy(state_size(sim), sim->state.front, present->y);
+        directions(system, present->y, present->e);
+        return true;
+    }
+    if (!arc_state(sim, present->y, problem)) {
+        return false;
+    }
+    pad(system->n, present->y, present->evaluation.at.angle);
+    find_directions(system, &present->reference, &present->evaluation.at);
+    memcpy(present->e, present->evaluation.at.e, (size_t)system->n * sizeof *present->e);
+    return true;
+}
+
+/* Bring groups of outputs up to date. */
+PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem) {
+    if (sim->state.exchange && !exchange_refresh(sim, problem)) {
+        return false;
+    }
+    int missing = groups & ~sim->present.fresh;
+    if (((missing & PLACES) && !load_present(sim, problem)) ||
+        !compute_outputs(sim, missing, !sim->state.exchange, problem)) {
+        return false;
+    }
+    sim->present.fresh |= groups;
+    return true;
+}
+
+/* Bring the rates of the present state up to date. */
+PRBM bool present_rates(Simulation *sim, Problem *problem) {
+    PresentRates *rates = &sim->rates;
+    if (sim->state.exchange) {
+        return exchange_rates(sim, problem);
+    }
+    rates->y = sim->present.y;
+    rates->evaluated = false;
+    return update_outputs(sim, PLACES, problem) &&
+           rate(&sim->equations, rates->y, NULL, &rates->evaluation, rates->rates, problem);
+}
+
+/* A derivative of a state. */
+static bool get_derivative(Simulation *sim, int k, double *x, Problem *problem) {
+    const Mechanism *m = sim->configuration.mechanism;
+    int n = m->coordinate_count, count = m->independent_count;
+    if (!present_rates(sim, problem)) {
+        return false;
+    }
+    *x = sim->rates.rates[k < count ? n + m->independent[k] : 2 * n + k - count];
+    return true;
+}
+
+static bool get_indicator(Simulation *sim, int k, double *x, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    if (!present_rates(sim, problem)) {
+        return false;
+    }
+    double *z = take(&sim->scratch, (size_t)exchange_indicators(sim));
+    event_indicators(sim, z);
+    *x = z[k];
+    sim->scratch.used = mark;
+    return true;
+}
+
+PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *problem) {
+    Simulation *sim = simulation;
+    const Slots *slots = &sim->configuration.mechanism->slots;
+    if (slot < slots->inputs) {
+        *x = sim->state.values[slot];
+        return true;
+    }
+    if (slot < slots->bodies) {
+        *x = sim->state.given[slot - slots->inputs];
+        return true;
+    }
+    if (!sim->state.started) {
+        return fail(problem, "it is computed when the model is initialized, and not known before");
+    }
+    if (slot >= slots->derivatives && slot < slots->indicators) {
+        return get_derivative(sim, slot - slots->derivatives, x, problem);
+    }
+    if (slot >= slots->indicators && slot < slots->time) {
+        return get_indicator(sim, slot - slots->indicators, x, problem);
+    }
+    if (!update_outputs(sim, output_groups(sim, slot), problem)) {
+        return false;
+    }
+    *x = sim->present.outputs[slot];
+    return true;
+}
