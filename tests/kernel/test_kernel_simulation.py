@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from kernel_library import constants
 from kernel_simulation import KernelMistake, KernelSimulation, library
 from many_parts import anvil, elastic, two_stops
 from prbm.base.errors import PrbmError
@@ -269,15 +270,31 @@ def test_a_communication_step_in_pieces_is_the_same_step(model):
         assert it.impacts(whole.outputs()) > 0
 
 
-def test_more_stops_than_can_be_searched_are_resolved():
-    """Twenty along a wall, hit at once: they carry the weight together."""
+def many_stops(count):
+    """Return a guide with stops along one wall."""
     (stop,) = mechanism("PRBDM2R").stops
-    stops = tuple(replace(stop, name=f"s{i}", offset=1e-3 * (i - 9.5)) for i in range(20))
-    guide = replace(mechanism("PRBDM2R"), name="Many", stops=stops)
+    middle = (count - 1) / 2
+    stops = tuple(
+        replace(stop, name=f"s{i}", offset=1e-3 * (i - middle)) for i in range(count)
+    )
+    return replace(mechanism("PRBDM2R"), name="Many", stops=stops)
+
+
+def test_as_many_resting_stops_as_can_be_resolved_carry_the_weight_together():
+    guide = many_stops(constants()["RESTING_SETS_MAX"])
     kernel = KernelSimulation(guide, {"release.displacement": -2e-3})
     kernel.advance(0.2)
     one = KernelSimulation(mechanism("PRBDM2R"), {"release.displacement": -2e-3})
     one.advance(0.2)
-    assert min(kernel.get(f"{s.name}.gap") for s in stops) > -1e-9
-    carried = sum(kernel.get(f"{s.name}.force") for s in stops)
+    assert min(kernel.get(f"{s.name}.gap") for s in guide.stops) > -1e-9
+    carried = sum(kernel.get(f"{s.name}.force") for s in guide.stops)
     assert carried == pytest.approx(one.get("stop.force"), rel=0.02)
+
+
+def test_more_resting_stops_than_can_be_resolved_are_named_and_rejected():
+    count = constants()["RESTING_SETS_MAX"] + 1
+    kernel = KernelSimulation(many_stops(count), {"release.displacement": -2e-3})
+    before = kernel.state
+    with pytest.raises(KernelMistake, match=rf"{count} stops rest .*\(s0, s1, .*s12\): remove"):
+        kernel.advance(0.2)
+    assert kernel.state.tobytes() == before.tobytes()

@@ -896,29 +896,65 @@ def test_simulated_restitutions_are_the_same():
 
 
 class KernelEquations:
-    """The kernel's equations of a system in one discrete state, and the arrays behind them."""
+    """The kernel's equations of a system in one contact state, and the arrays behind them."""
 
     def __init__(self, ours, inputs, contacts, omega):
-        signs = {ContactMode.STICK: 0, ContactMode.SLIP_POSITIVE: 1, ContactMode.SLIP_NEGATIVE: -1}
-        marks = [signs.get(mode, 2) for mode in contacts.modes]
-        holds = [mode.closed for mode in contacts.modes[: contacts.stops]]
         self.ours, self.structure = ours, structures()["Equations"]()
-        self.block = placed(
-            lambda memory: kernel().equations_place(self.structure, ours.structure, memory)
+        self.evaluation, self.reference, self.correction = (
+            structures()[name]() for name in ("Evaluation", "Reference", "Correction")
         )
+        self.blocks = [
+            placed(lambda memory, lay_out=lay_out, part=part: lay_out(part, ours.structure, memory))
+            for lay_out, part in (
+                (kernel().equations_place, self.structure),
+                (kernel().evaluation_place, self.evaluation),
+                (kernel().reference_place, self.reference),
+                (kernel().correction_place, self.correction),
+            )
+        ]
         given = [(f.real, f.imag, m) for f, m in zip(inputs.forces, inputs.moments, strict=True)]
         walls = [(wall.position, wall.rate, wall.since) for wall in inputs.walls]
         self.arrays = [np.array(part, float) for part in (given, walls, inputs.mobilities)]
-        self.states = [
-            np.array(part, np.int32)
-            for part in (holds, marks[: contacts.stops], marks[contacts.stops :])
-        ]
+        self.modes = np.array(contacts.modes, np.int32)
         base = structures()["Complex"](inputs.base.real, inputs.base.imag)
         self.inputs = structures()["Inputs"](
             self.arrays[0].ctypes.data, base, *(part.ctypes.data for part in self.arrays[1:])
         )
-        known = structures()["Discrete"](*(state.ctypes.data for state in self.states))
-        kernel().set_equations(self.structure, self.inputs, known, omega)
+        state = structures()["ContactState"](self.modes.ctypes.data)
+        kernel().set_equations(self.structure, self.inputs, state, omega)
+
+    def evaluate(self, q, v):
+        """Return accelerations and multipliers."""
+        kernel().evaluate_equations(self.structure, q, v, None, self.evaluation)
+        return self.multiplied(len(q))
+
+    def multiplied(self, n):
+        """Return the accelerations and multipliers of the evaluation."""
+        return array(self.evaluation.a, n), array(self.evaluation.lam, self.structure.r)
+
+    def rate(self, y):
+        """Return the rates of a state."""
+        dy = np.full(len(y), np.nan)
+        kernel().rate(self.structure, y, None, self.evaluation, dy)
+        return dy
+
+    def project_near(self, t, y, reference=None):
+        """Return a state, projected with the factors of its own evaluation."""
+        n, near = (len(y) - 2) // 2, y.copy()
+        kernel().factor_equations(self.structure, y[:n], y[n : 2 * n], None, self.evaluation)
+        kernel().project_near(
+            self.structure, self.evaluation, reference, t, near, self.correction
+        )
+        return near
+
+    def stages(self, y, h, k):
+        """Fill the stages of which the first is given; return the new state and the force range."""
+        y1, forces = np.full(len(y), np.nan), np.full((2, 8), np.nan)
+        span = structures()["ForceRange"](*(row.ctypes.data for row in forces))
+        kernel().stages(
+            self.structure, len(y), y, h, k, y1, self.reference, self.evaluation, span
+        )
+        return y1, forces[:, : self.structure.held_count]
 
 
 def contact_states(system):
@@ -986,28 +1022,49 @@ def condition(evaluation):
 
 @twin(
     set_equations=dynamics.Equations.__init__,
-    accelerations=dynamics.Equations.evaluate,
+    evaluate_equations=dynamics.Equations.evaluate,
     rate=dynamics.Equations.rate,
 )
 @each_mechanism
 def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
     for theirs, mine, y, _ in equations(name):
         n, r = theirs.n, len(theirs.rows)
-        a, lam, dy = np.full(n, np.nan), np.full(r, np.nan), np.full(2 * n + 2, np.nan)
-        kernel().accelerations(mine.structure, y[:n], y[n : 2 * n], a, lam)
+        a, lam = mine.evaluate(y[:n], y[n : 2 * n])
         evaluation = theirs.evaluate(y[:n], y[n : 2 * n])
         a_expected, lam_expected, M, _ = evaluation
-        rel = spread(condition(evaluation))
+        dy, rel = mine.rate(y), spread(condition(evaluation))
         assert mine.structure.r == r
         assert_same(a, a_expected, rel)
         assert_same(lam, lam_expected, rel)
-        kernel().rate(mine.structure, 0.3, y, dy)
+        dy = mine.rate(y)
         expected = theirs.rate(0.3, y)
         assert_same(dy[: 2 * n], expected[: 2 * n], rel)
         power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # what the powers add up to
         assert_same(dy[2 * n :], expected[2 * n :], rel, scale=power)
-        energy = kernel().energy_here(mine.structure, y[n : 2 * n])
+        energy = kernel().kinetic_energy_of(mine.structure, mine.evaluation, y[n : 2 * n])
         assert_same(energy, kinetics.kinetic_energy(M, y[n : 2 * n]))
+
+
+@each_mechanism
+def test_evaluations_do_not_depend_on_the_state_evaluated_before(name):
+    for _, mine, y, rng in equations(name):
+        first, projected = mine.rate(y), mine.project_near(0.0, y)
+        mine.rate(y + 0.1 * rng.normal(size=len(y)))
+        assert mine.project_near(0.0, y).tobytes() == projected.tobytes()
+        assert mine.rate(y).tobytes() == first.tobytes()
+
+
+@each_mechanism
+def test_a_reference_nearby_changes_evaluations_by_round_off(name):
+    for theirs, mine, y, _ in equations(name):
+        n = theirs.n
+        q, v = y[:n], y[n : 2 * n]
+        expected = mine.evaluate(q, v)
+        theirs.accelerations(q, v)
+        kernel().set_reference(mine.reference, mine.ours.structure, q + 1e-3)
+        kernel().evaluate_equations(mine.structure, q, v, mine.reference, mine.evaluation)
+        for found, one in zip(mine.multiplied(n), expected, strict=True):
+            assert_same(found, one, spread(condition(theirs)))
 
 
 HEAVY = ("density", "youngs_modulus", "shuttle.mass", "shuttle.inertia")
@@ -1018,16 +1075,14 @@ def test_accelerations_do_not_depend_on_the_size_of_masses_and_stiffnesses(facto
     """Although products of eight of them are beyond what doubles hold."""
     guide, ours = both("PRBDM2R")
     found, rng = [], np.random.default_rng(3)
-    values, nothing = guide.values({"release.displacement": 0.0}), np.zeros(2)
+    values = guide.values({"release.displacement": 0.0})
     state = random_state(assembly.assemble(guide, values), rng)
     for s in (1.0, factor):
         scaled = {k: x * (s if k.endswith(HEAVY) else 1.0) for k, x in values.items()}
         ours.assemble(scaled)
         inputs = input_data.Inputs((0j,), (0.0,), 0j, (input_data.Wall(1.0),), (0.0,))
         mine = KernelEquations(ours, inputs, ContactState.free(1, 1), 80.0)
-        a = np.full(len(state[0]), np.nan)
-        kernel().accelerations(mine.structure, *state, a, nothing)
-        found.append(a)
+        found.append(mine.evaluate(*state)[0])
     assert np.all(np.isfinite(found[0]))
     np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
 
@@ -1060,7 +1115,7 @@ def test_limits_of_friction_are_the_same(name):
         assert_same(limits, [theirs.friction_limit(theirs.contacts.stops + i, e) for i in points])
 
 
-@twin(project=dynamics.Equations.project, project_from_here=dynamics.Equations.project_near)
+@twin(project=dynamics.Equations.project, project_near=dynamics.Equations.project_near)
 @each_mechanism
 def test_states_are_projected_alike(name):
     """From near, with the factors at hand, and from further."""
@@ -1077,11 +1132,8 @@ def test_states_are_projected_alike(name):
         for distance in (1e-9, 1e-5):  # one correction is enough, or not
             start = projected.copy()
             start[: 2 * n] += distance * rng.normal(size=2 * n)
-            a, lam = np.zeros(n), np.zeros(len(theirs.rows))
             factors = theirs.evaluate(start[:n], start[n : 2 * n]).factors
-            expected, near = theirs.project_near(t, start, factors), start.copy()
-            kernel().accelerations(mine.structure, start[:n], start[n : 2 * n], a, lam)
-            kernel().project_from_here(mine.structure, t, near)
+            expected, near = theirs.project_near(t, start, factors), mine.project_near(t, start)
             assert_same_turn(near[:n], expected[:n], start[:n], theirs.system, M, rows)
             assert_same(near[n:], expected[n:], rel, scale=np.abs(y[n:]).max())
 
@@ -1110,14 +1162,15 @@ def test_steps_of_the_integration_are_the_same(name):
     count = constants()["STAGES"]
     for theirs, mine, y, _ in equations(name, 1):
         h, size = 1e-5, len(y)
-        k, y1, error = np.full((count, size), np.nan), np.full(size, np.nan), np.full(size, np.nan)
+        k, error = np.full((count, size), np.nan), np.full(size, np.nan)
         k[0] = theirs.rate(0.0, y)
         expected, y1_expected = runge_kutta.stages(PAIR, theirs.rate, 0.0, y, h, k[0])
         n = theirs.n
         rel = 10 * spread(condition(theirs.evaluate(y[:n], y[n : 2 * n])))
-        kernel().stages(mine.structure, size, 0.0, y, h, k, y1)
+        y1, forces = mine.stages(y, h, k)
         assert_same(k, expected, rel)
         assert_same(y1, y1_expected, rel)
+        assert np.all(forces[0] <= forces[1])
         kernel().error_of(size, expected, h, error)
         assert_same(error, h * (PAIR.error @ expected), scale=h * np.abs(expected).max())
         for theta in (0.0, 0.3, 1.0):
@@ -1177,9 +1230,13 @@ OWN = {
     "flexure.c": {"links_of", "reverse", "stretches"},
     "system.c": {"arm_of", "system_place"},
     "constraints.c": {"plain_rows", "row_jacobian", "row_value"},
+    "contact_state.c": {"slip_sign"},
     "equations.c": {"equations_place"},
-    "evaluation.c": {"energy_here"},
-    "dynamics.c": {"begin_trace"},
+    "evaluation.c": {
+        "reference_place", "evaluation_place", "set_reference", "factor_equations",
+        "kinetic_energy_of",
+    },
+    "projection.c": {"correction_place"},
     "runge_kutta.c": {"error_of"},
     "statics.c": {"stack_release"},
 }  # fmt: skip

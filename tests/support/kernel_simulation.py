@@ -30,7 +30,7 @@ FUNCTIONS = {
     "simulation_open": (POINTER, POINTER),
     "simulation_bytes": (ctypes.c_size_t, POINTER),
     "simulation_state_count": (ctypes.c_size_t, POINTER),
-    "simulation_state": (POINTER, POINTER),
+    "simulation_save": (None, POINTER, POINTER),
     "simulation_time": (DOUBLE, POINTER),
     "mechanism_open": (POINTER, POINTER, ctypes.c_size_t, POINTER),
     "mechanism_close": (None, POINTER),
@@ -139,9 +139,9 @@ class KernelSimulation:
 
     @property
     def state(self) -> np.ndarray:
-        count = self.library.simulation_state_count(self.inner)
-        address = self.library.simulation_state(self.inner)
-        return np.ctypeslib.as_array((DOUBLE * count).from_address(address)).copy()
+        numbers = np.empty(self.library.simulation_state_count(self.inner))
+        self.library.simulation_save(self.inner, pointer(numbers))
+        return numbers
 
     def restore(self, state: np.ndarray) -> None:
         self.call("simulation_restore", pointer(state))

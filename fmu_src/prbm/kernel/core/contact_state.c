@@ -5,7 +5,7 @@ PRBM int slip_sign(int mode) {
     return (mode == CONTACT_SLIP_POSITIVE) - (mode == CONTACT_SLIP_NEGATIVE);
 }
 
-static int slip_mode(double sign) {
+static int slipping_mode(double sign) {
     return sign > 0.0 ? CONTACT_SLIP_POSITIVE : CONTACT_SLIP_NEGATIVE;
 }
 

@@ -26,9 +26,9 @@ static bool evaluate_trial(Simulation *sim, const double *q, const double *v, Pr
 }
 
 /* The mode of a closed contact with a sliding velocity, CONTACT_FRICTIONLESS at round-off. */
-static int mode_of_speed(const Simulation *sim, double speed) {
+static int slip_mode(const Simulation *sim, double speed) {
     return fabs(speed) <= zero_speed(&sim->configuration) ? CONTACT_FRICTIONLESS
-                                                          : slip_mode(speed);
+                                                          : slipping_mode(speed);
 }
 
 /* --- resting stops ---------------------------------------------------------------------------- */
@@ -71,7 +71,7 @@ static bool independent_rows(Simulation *sim, int count, const double *rows, con
 }
 
 /* Set up the trial equations in which a set of stops is closed; what slides has friction. */
-PRBM void try_resting(Simulation *sim, const RestingSet *resting, const double *q,
+PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const double *q,
                       const double *v) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
@@ -80,14 +80,14 @@ PRBM void try_resting(Simulation *sim, const RestingSet *resting, const double *
         bool open = is_stop(system, contact) &&
                     !has_stop(resting->count, resting->stops, contact);
         double speed = sliding_velocity(system, contact, e, v);
-        sim->trial.contacts.modes[contact] = open ? CONTACT_OPEN : mode_of_speed(sim, speed);
+        sim->trial.contacts.modes[contact] = open ? CONTACT_OPEN : slip_mode(sim, speed);
     }
     sim->scratch.used = mark;
     try_contacts(sim);
 }
 
 /* Whether all stops of a set are pressed, and at which acceleration the other stops open. */
-static bool try_set(Simulation *sim, const Touching *touching, RestingSet *tried, bool *pressed,
+static bool try_set(Simulation *sim, const Touching *touching, HoldingSet *tried, bool *pressed,
                     Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->trial.equations;
@@ -105,7 +105,7 @@ static bool try_set(Simulation *sim, const Touching *touching, RestingSet *tried
     if (!right || !independent) {
         return right;
     }
-    try_resting(sim, tried, touching->q, touching->v);
+    equations_holding(sim, tried, touching->q, touching->v);
     if (!evaluate_trial(sim, touching->q, touching->v, problem)) {
         return false;
     }
@@ -126,10 +126,10 @@ static bool try_set(Simulation *sim, const Touching *touching, RestingSet *tried
 
 /* The set of a size whose stops are all pressed and whose other stops open fastest; of count 0
  * without one. */
-static bool best_set(Simulation *sim, const Touching *touching, int size, RestingSet *best,
+static bool best_set(Simulation *sim, const Touching *touching, int size, HoldingSet *best,
                      Problem *problem) {
     int members[RESTING_SETS_MAX];
-    RestingSet none = {0, {0}, -HUGE_VAL}, tried;
+    HoldingSet none = {0, {0}, -HUGE_VAL}, tried;
     bool right = true;
     *best = none;
     for (int k = 0; k < size; k++) {
@@ -178,9 +178,10 @@ static bool too_many_resting(const Simulation *sim, int count, const int *stops,
     }
     list_stops(sim->configuration.mechanism, count, stops, names, sizeof names);
     return fail(problem,
-                "%d stops rest at the same time at t = %.9g s, more than the %d that are resolved "
-                "(%s): remove stops that touch together, or give them different positions",
-                many, sim->state.front_time, (int)RESTING_SETS_MAX, names);
+                "%d stops rest at once at t = %.9g s (%s), more than the %d of which every "
+                "combination can be tried; replace stops that touch together by one, or move them "
+                "apart",
+                many, sim->state.front_time, names, (int)RESTING_SETS_MAX);
 }
 
 static bool find_touching(Simulation *sim, int count, const int *candidates, Touching *touching,
@@ -209,12 +210,12 @@ static bool find_touching(Simulation *sim, int count, const int *candidates, Tou
 /* The largest set of the candidates whose stops are pressed while the others open; what slides has
  * friction.  Of stops that can move only together one stays closed: that which keeps the others from
  * closing. */
-PRBM bool find_resting(Simulation *sim, int count, const int *candidates, const double *q,
-                       const double *v, RestingSet *resting, Problem *problem) {
+PRBM bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
+                       const double *v, HoldingSet *resting, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Scales *scales = &sim->configuration.scales;
     double closes = -ZERO_RATE_RTOL * scales->rate * scales->rate * scales->length;
-    RestingSet none = {0, {0}, 0.0}, pressed_only = none, best = none;
+    HoldingSet none = {0, {0}, 0.0}, pressed_only = none, best = none;
     Touching touching;
     touching.q = q;
     touching.v = v;
@@ -278,12 +279,12 @@ static bool mode_at_rest(Simulation *sim, int contact, const Inertia *at, const 
     int first = friction > 0.0 ? -1 : 1;
     for (int attempts = 0; attempts < 2; attempts++) {
         int sign = attempts == 0 ? first : -first;
-        try_mode(sim, contact, slip_mode(sign));
+        try_mode(sim, contact, slipping_mode(sign));
         if (!evaluate_trial(sim, q, v, problem)) {
             return false;
         }
         if (sign * (dot(system->n, row, tried->a) - convective) > 0.0) {
-            *mode = slip_mode(sign);
+            *mode = slipping_mode(sign);
             return true;
         }
     }
@@ -304,7 +305,7 @@ static bool choose_mode(Simulation *sim, int contact, const FrictionEvent *event
     Inertia at = inertia_at(sim, sim->state.front);
     tangential_row(system, contact, at.e, row);
     double speed = dot(system->n, row, sim->state.front + system->n);
-    int mode = fabs(speed) > slow ? mode_of_speed(sim, speed) : CONTACT_FRICTIONLESS;
+    int mode = fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
     if (mode == CONTACT_FRICTIONLESS) {
         right = has_mobility(sim, contact, &at, row, &mobile, problem);
         if (right && mobile) {
@@ -389,7 +390,7 @@ static bool mobile_at_rest(Simulation *sim, int count, const int *contacts,
         tangential_row(system, contacts[k], e, row);
         double speed = dot(n, row, sim->state.front + n);
         double slow = event->contact == contacts[k] ? event->slow : 0.0;
-        if (fabs(speed) <= slow || mode_of_speed(sim, speed) == CONTACT_FRICTIONLESS) {
+        if (fabs(speed) <= slow || slip_mode(sim, speed) == CONTACT_FRICTIONLESS) {
             at_rest[resting++] = contacts[k];
         }
     }
@@ -555,13 +556,13 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
     const System *system = system_of(sim);
     const double *front = sim->state.front;
     FrictionEvent friction;
-    RestingSet resting;
+    HoldingSet resting;
     int candidates[2 * STOPS_MAX], modes[CONTACTS_MAX];
     if (!friction_event(sim, event, &friction, problem)) {
         return false;
     }
     int count = resting_candidates(sim, touching, touching_count, candidates);
-    if (!find_resting(sim, count, candidates, front, front + system->n, &resting, problem)) {
+    if (!holding_stops(sim, count, candidates, front, front + system->n, &resting, problem)) {
         return false;
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {

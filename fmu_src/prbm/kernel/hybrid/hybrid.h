@@ -237,11 +237,11 @@ PRBM bool receive_impulses(Simulation *sim, Problem *problem);
 typedef struct {
     int count, stops[RESTING_SETS_MAX];
     double opening;
-} RestingSet;
+} HoldingSet;
 
-PRBM bool find_resting(Simulation *sim, int count, const int *candidates, const double *q,
-                       const double *v, RestingSet *resting, Problem *problem);
-PRBM void try_resting(Simulation *sim, const RestingSet *resting, const double *q,
+PRBM bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
+                       const double *v, HoldingSet *resting, Problem *problem);
+PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const double *q,
                       const double *v);
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem);

@@ -262,13 +262,13 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
 /* Whether a resting stop is pressed so strongly that a bounce would be shorter than
  * SHORTEST_FLIGHT_RTOL or, in model exchange, lower than LOWEST_BOUNCE_RTOL: by closing late, it
  * would gain what it loses by the impact. */
-static bool bounce_vanishes(Simulation *sim, int stop, const RestingSet *resting, const double *q,
+static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting, const double *q,
                             const double *v, double speed, bool *result, Problem *problem) {
     const System *system = system_of(sim);
     const Evaluation *tried = &sim->trial.evaluation;
     double *G = take(&sim->scratch, (size_t)system->n), free;
     Rows gaps = gap_rows(system);
-    try_resting(sim, resting, q, v);
+    equations_holding(sim, resting, q, v);
     if (!evaluate_equations(&sim->trial.equations, q, v, NULL, &sim->trial.evaluation, problem)) {
         return false;
     }
@@ -303,12 +303,12 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
     soft.restitution[0] = 0.0;
     soft.held_count = hits->held_count;
     memcpy(soft.held, hits->held, sizeof soft.held);
-    RestingSet resting = {0, {0}, 0.0};
+    HoldingSet resting = {0, {0}, 0.0};
     candidates[0] = stop;
     memcpy(candidates + 1, hits->held, (size_t)hits->held_count * sizeof(int));
     bool rests = false;
     bool right = impact_impulses(sim, q, v, &soft, problem) &&
-                 find_resting(sim, 1 + hits->held_count, candidates, q, soft.after, &resting,
+                 holding_stops(sim, 1 + hits->held_count, candidates, q, soft.after, &resting,
                               problem);
     for (int k = 0; right && k < resting.count; k++) {
         rests = rests || resting.stops[k] == stop;

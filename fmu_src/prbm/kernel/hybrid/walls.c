@@ -156,7 +156,7 @@ PRBM bool check_walls(Simulation *sim, Problem *problem) {
 /* Open the closed stops whose gaps change, by a wall's velocity or an impulse: a wall that retreats
  * leaves the body; one that advances strikes, as does a body that is thrown against a wall that it
  * touches.  Returns a stop that is struck, or -1. */
-static int open_moving_stops(Simulation *sim) {
+static int release_moving(Simulation *sim) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     int struck = -1;
@@ -181,7 +181,7 @@ static int open_moving_stops(Simulation *sim) {
 
 /* The contact state after changes of wall velocities or impulses. */
 PRBM bool settle_walls(Simulation *sim, Problem *problem) {
-    int struck = open_moving_stops(sim);
+    int struck = release_moving(sim);
     if (struck >= 0) {
         return impact(sim, struck, problem);
     }
