@@ -159,7 +159,7 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* --- event mode ------------------------------------------------------------------------------- */
 
-/* Apply the pending event, if there is one, with the inputs that have been set, and the impulses. */
+/* Apply the pending event, if any, with the inputs that have been set, and the impulses. */
 static bool apply_here(Simulation *sim, bool event, bool inputs, bool impulses, Problem *problem) {
     State *state = &sim->state;
     int s = system_of(sim)->s;

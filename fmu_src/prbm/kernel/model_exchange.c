@@ -1,9 +1,9 @@
 /* Model exchange: an importer integrates the independent angles and rates.
  *
  * The loops tie the n coordinates together; r of them are solved from the other n - r, so that a
- * solver without constraints stays on them (mechanics/independent.py chooses them).  A stop that is
- * closed is a constraint of the accelerations; its drift by a solver's errors is corrected in events.
- */
+ * solver without constraints stays on them (mechanics/independent.py chooses them). A stop that
+ * is closed is a constraint of the accelerations; its drift by a solver's errors is corrected in
+ * events. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -75,8 +75,8 @@ static bool singular_choice(const Simulation *sim, const int *dependent, Problem
                 "the states of model exchange do not determine the other angles (%s and %d more) "
                 "at t = %.9g s: the shape is too far from the one at the start, or the solver has "
                 "left it; shorten its steps, or use co-simulation, which has no such limit",
-                coordinate_name(sim->configuration.mechanism, dependent[0], name, sizeof name), system_of(sim)->r - 1,
-                sim->state.time);
+                coordinate_name(sim->configuration.mechanism, dependent[0], name, sizeof name),
+                system_of(sim)->r - 1, sim->state.time);
 }
 
 /* The loops' Jacobian in the dependent coordinates, factored. */
@@ -248,8 +248,9 @@ PRBM void exchange_get(const Simulation *simulation, double *x) {
     copy(exchange_states(simulation), simulation->state.states, x);
 }
 
-/* The next power of ten that is not below: modelDescription.xml has it as nominal value.  A solver's
- * absolute tolerance follows from it; below the scale of the motion it would resolve round-off. */
+/* The next power of ten that is not below: modelDescription.xml has it as nominal value.  A
+ * solver's absolute tolerance follows from it; below the scale of the motion it would resolve
+ * round-off. */
 static double next_power_of_ten(double value) {
     double power = 1.0; /* exact to 1e22 */
     if (value <= 1.0) {
@@ -543,8 +544,8 @@ static bool closes_here(const Simulation *sim, int stop) {
            (lifted_guard(sim, EVENT_IMPACT, stop) <= 0.0 && speed < 0.0);
 }
 
-/* The next event that is due at the front: releases, slips and reversals, then impacts of stops that
- * have not been struck in this event. */
+/* The next event that is due at the front: releases, slips and reversals, then impacts of stops
+ * that have not been struck in this event. */
 static Event due_here(const Simulation *sim, bool *struck) {
     static const int order[] = {EVENT_RELEASE, EVENT_SLIP, EVENT_REVERSAL, EVENT_IMPACT};
     Event event = {EVENT_NONE, 0, sim->state.time};

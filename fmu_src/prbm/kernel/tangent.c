@@ -4,8 +4,8 @@
 #include "hybrid/hybrid.h"
 
 /* A change of everything with the states and inputs: dq, dv, da, dlam.  With the complex changes
- * dphi = dtheta - i ds of an arm E, and dw of its rate, dE = i E dphi, d(E w) = E (i dphi w + dw), and
- * so on: the formulas of an angle hold for a stretch, too. */
+ * dphi = dtheta - i ds of an arm E, and dw of its rate, dE = i E dphi, d(E w) = E (i dphi w +
+ * dw), and so on: the formulas of an angle hold for a stretch, too. */
 typedef struct {
     Simulation *sim;
     const Equations *q;
@@ -49,8 +49,8 @@ static Arm arm_at(const Tangent *t, int j) {
     return arm;
 }
 
-/* A part of a row as it is seen from where the row is: f B_j E_j, and f z for j = n; false if it has
- * no such part. */
+/* A part of a row as it is seen from where the row is: f B_j E_j, and f z for j = n; false if it
+ * has no such part. */
 static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
     int n = rows->system->n, on = seen_from(rows, i);
     Complex size = {0.0, 0.0};
@@ -455,7 +455,8 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
             out[ENERGY_ELASTIC] += (t->y[i] - system->q0[i]) * system->K[i * n + j] * t->dq[j];
         }
     }
-    out[ENERGY_GRAVITATIONAL] = -product(conjugate(system->gravity), along_arms(n, system->S, t->dE)).re;
+    Complex moved = along_arms(n, system->S, t->dE);
+    out[ENERGY_GRAVITATIONAL] = -product(conjugate(system->gravity), moved).re;
     out[ENERGY_DISSIPATED] = dx[2 * count];
     out[ENERGY_WORK] = dx[2 * count + 1];
 }

@@ -56,7 +56,7 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     *evaluation = result;
 }
 
-/* --- position and velocity --------------------------------------------------------------------- */
+/* --- position and velocity -------------------------------------------------------------------- */
 
 PRBM void set_reference(Reference *reference, const System *system, const double *angle) {
     int even = system->even;
@@ -125,7 +125,7 @@ SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
     }
 }
 
-/* --- loads and rows ---------------------------------------------------------------------------- */
+/* --- loads and rows --------------------------------------------------------------------------- */
 
 /* What the rates of stretches add to the accelerations of angles: with Im(w^2) = -2 theta' s', all
  * that w^2 enters is solved for a - Im(w^2) as it is for a without stretches. */
@@ -225,7 +225,7 @@ SIZED void rows_of_length(int even, const Equations *q, const Kinematics *at, do
     }
 }
 
-/* --- inertia ----------------------------------------------------------------------------------- */
+/* --- inertia ---------------------------------------------------------------------------------- */
 
 /* x -= c M v within a block. */
 SIZED void damp_mass(int size, double c, const double *ALONE M, const double *ALONE v,
@@ -358,7 +358,7 @@ PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *eval
     return sum;
 }
 
-/* --- friction ---------------------------------------------------------------------------------- */
+/* --- friction --------------------------------------------------------------------------------- */
 
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e) {
     const System *system = equations->system;
@@ -422,7 +422,7 @@ static void set_columns(const Equations *q, Evaluation *result) {
     }
 }
 
-/* --- accelerations ----------------------------------------------------------------------------- */
+/* --- accelerations ---------------------------------------------------------------------------- */
 
 /* The factors, and a := L^-1 a, from the rows in Z. */
 SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {

@@ -109,7 +109,8 @@ SIZED bool corrected_of_length(int even, const Equations *q, const Evaluation *e
     correct(even, q, &evaluation->factors, c, y);
     pad_of(even, n, y, c->at.angle);
     directions_of(even, q->system, near, &c->at);
-    if (!(position_residuals(even, q, &c->at, t, c->residual) <= CONSTRAINT_RTOL * q->system->length)) {
+    double worst = position_residuals(even, q, &c->at, t, c->residual);
+    if (!(worst <= CONSTRAINT_RTOL * q->system->length)) {
         return false;
     }
     pad_second(even, n, y, c->at.speed);

@@ -10,7 +10,8 @@ static const double ERROR_WEIGHT[STAGES] = ERROR_WEIGHTS;
 static const double DENSE_WEIGHT[STAGES][DENSE] = DENSE_WEIGHTS;
 static const double LARGEST_WEIGHT[STAGES] = LARGEST_WEIGHTS;
 
-/* result = y + h sum(a_i k_i) for n even, as it is with two rates for each angle and two energies. */
+/* result = y + h sum(a_i k_i) for n even, as it is with two rates for each angle and two
+ * energies. */
 SIZED void combine_of(int count, int n, int stride, double h, const double *a, const double *k,
                       const double *y, double *result) {
     Lanes weight[STAGES];

@@ -9,9 +9,9 @@ PRBM double zero_speed(const Configuration *configuration) {
     return ZERO_RATE_RTOL * scales->rate * scales->length;
 }
 
-/* The scale of rates is the fundamental frequency or, without one, that of the stiffest spring; the
- * scale of energies is one radian against the stiffest torsion spring or, without one, a turn by one
- * radian in a period. */
+/* The scale of rates is the fundamental frequency or, without one, that of the stiffest spring;
+ * the scale of energies is one radian against the stiffest torsion spring or, without one, a turn
+ * by one radian in a period. */
 PRBM void set_scales(Configuration *configuration, double frequency) {
     const System *system = &configuration->system;
     Scales *scales = &configuration->scales;

@@ -1,4 +1,4 @@
-/* Resting stops and friction: the choice of the contact state: the twin of hybrid/contact_modes.py. */
+/* The choice of the contact state: the twin of hybrid/contact_modes.py. */
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -207,9 +207,9 @@ static bool find_touching(Simulation *sim, int count, const int *candidates, Tou
     return true;
 }
 
-/* The largest set of the candidates whose stops are pressed while the others open; what slides has
- * friction.  Of stops that can move only together one stays closed: that which keeps the others from
- * closing. */
+/* The largest set of the candidates whose stops are pressed while the others open; what slides
+ * has friction.  Of stops that can move only together one stays closed: that which keeps the
+ * others from closing. */
 PRBM bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                        const double *v, HoldingSet *resting, Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -292,10 +292,10 @@ static bool mode_at_rest(Simulation *sim, int contact, const Inertia *at, const 
     return true;
 }
 
-/* The mode of a closed contact with friction.  It slips if it moves faster than slow.  At rest it is
- * frictionless where the loops and the closed stops leave it no mobility of its own: they carry
- * all of the load.  Else it sticks as far as Coulomb's law allows, and beyond slips in the direction
- * in which sliding accelerates it. */
+/* The mode of a closed contact with friction.  It slips if it moves faster than slow.  At rest it
+ * is frictionless where the loops and the closed stops leave it no mobility of its own: they
+ * carry all of the load.  Else it sticks as far as Coulomb's law allows, and beyond slips in the
+ * direction in which sliding accelerates it. */
 static bool choose_mode(Simulation *sim, int contact, const FrictionEvent *event,
                         Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -319,7 +319,7 @@ static bool choose_mode(Simulation *sim, int contact, const FrictionEvent *event
     return right;
 }
 
-/* --- friction of several contacts -------------------------------------------------------------- */
+/* --- friction of several contacts ------------------------------------------------------------- */
 
 /* Whether a contact at rest has a mobility of its own beside what is closed and sticks now. */
 static bool is_mobile(Simulation *sim, int contact, bool *result, Problem *problem) {
@@ -550,7 +550,8 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
 }
 
 /* Choose the contact state at the front from its positions and velocities.  touching: open stops
- * that touch without closing or opening; event: a slip or reversal that has just occurred, or NULL. */
+ * that touch without closing or opening; event: a slip or reversal that has just occurred, or
+ * NULL. */
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem) {
     const System *system = system_of(sim);

@@ -541,9 +541,9 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
     return right;
 }
 
-/* Apply the growth of the impulses since they were received.  The loops take part, stops follow: see
- * settle_walls.  Friction is finite and bears no impulse: a sticking contact becomes free to slide
- * or to stick again. */
+/* Apply the growth of the impulses since they were received.  The loops take part, stops follow:
+ * see settle_walls.  Friction is finite and bears no impulse: a sticking contact becomes free to
+ * slide or to stick again. */
 PRBM bool receive_impulses(Simulation *sim, Problem *problem) {
     int forces = sim->configuration.mechanism->force_count;
     const double *given = given_impulses(sim);

@@ -150,8 +150,8 @@ static bool consistent(const Simulation *sim) {
         return false;
     }
     return !state->started ||
-           (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_MAX && state->frequency >= 0.0 &&
-            (!state->arc.valid || state->arc.h > 0.0) &&
+           (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_MAX &&
+            state->frequency >= 0.0 && (!state->arc.valid || state->arc.h > 0.0) &&
             (state->exchange || state->front_time >= state->time));
 }
 

@@ -38,8 +38,9 @@ PRBM double longest_step(const Simulation *sim) {
 /* A first step size from the size of the rates (Hairer, II.4). */
 static double first_step(const Simulation *sim) {
     const State *state = &sim->state;
-    double size = greater(relative_size(sim, state->k1, state->front, state->front), FIRST_RATE_MIN);
-    return lesser(longest_step(sim), FIRST_STEP_FACTOR * power(state->tolerance, FIRST_STEP_EXPONENT) / size);
+    double size = relative_size(sim, state->k1, state->front, state->front);
+    double allowed = FIRST_STEP_FACTOR * power(state->tolerance, FIRST_STEP_EXPONENT);
+    return lesser(longest_step(sim), allowed / greater(size, FIRST_RATE_MIN));
 }
 
 /* Choose the next step size from an error relative to the allowed one; returns whether the step is

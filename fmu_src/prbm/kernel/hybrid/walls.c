@@ -50,9 +50,10 @@ PRBM double due_walls(const Simulation *sim) {
     return greater(sim->state.due, 2.0 * sim->state.time - sim->state.planned);
 }
 
-/* The rate of a wall in a step.  It reaches the prescribed position within the step.  A wall that has
- * been given a velocity does not hurry in a step that is shorter than the one before: its rate is
- * limited to that of the longer step, to the change of its velocity or to half of rest_speed. */
+/* The rate of a wall in a step.  It reaches the prescribed position within the step.  A wall that
+ * has been given a velocity does not hurry in a step that is shorter than the one before: its
+ * rate is limited to that of the longer step, to the change of its velocity or to half of
+ * rest_speed. */
 static double wall_rate(const Simulation *sim, int i, double time) {
     double now = sim->state.time, due = due_walls(sim), velocity = given_velocity(sim, i);
     double off = wall_target(sim, i) - wall_at(&sim->state.walls[i], now);
@@ -101,10 +102,11 @@ PRBM void push_wall(Simulation *sim, int i, double P) {
     }
 }
 
-/* Inputs that are set while an event is pending act in it: a wall hits with the velocity that it has
- * there, not with its mean over the communication step.  If the closing speed is below rest_speed,
- * the wall keeps its mean velocity, and the body rests on it.  The velocity of a wall that carries a
- * closed stop changes after the event, as at the start of any step.  acted: acting velocities. */
+/* Inputs that are set while an event is pending act in it: a wall hits with the velocity that it
+ * has there, not with its mean over the communication step.  If the closing speed is below
+ * rest_speed, the wall keeps its mean velocity, and the body rests on it.  The velocity of a wall
+ * that carries a closed stop changes after the event, as at the start of any step.  acted: acting
+ * velocities. */
 PRBM void walls_at_event(Simulation *sim, double *acted) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
