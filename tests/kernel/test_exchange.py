@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from kernel_library import constants
 from kernel_simulation import KernelMistake, KernelSimulation
 from many_parts import anvil, elastic
 from prbm.mechanics.assembly import assemble
@@ -20,7 +21,6 @@ FRICTION = {
     "stop.friction": 0.3, "friction.coefficient": 0.4, "friction.normal_force": 0.5,
     "friction.normal_stiffness": 30.0, "damping.zeta": 0.05,
 }  # fmt: skip
-SCALARS = 23  # numbers before the values in the array of the state
 
 
 @each_shipped
@@ -51,6 +51,15 @@ def discrete_states():
                 yield "PRBDM", (1, slides, rubs)
 
 
+def contact_modes(guide, discrete):
+    """Return the modes of the contacts of which some hold, slide and rub."""
+    number, stops = constants(), len(guide.stops)
+    names = {0: "STICK", 1: "SLIP_POSITIVE", -1: "SLIP_NEGATIVE", 2: "FRICTIONLESS"}
+    holds, marks = discrete[:stops], discrete[stops:]
+    chosen = [names[m] if h else "OPEN" for h, m in zip(holds, marks[:stops], strict=True)]
+    return [number[f"CONTACT_{name}"] for name in chosen + [names[m] for m in marks[stops:]]]
+
+
 def put(kernel, time, x, values):
     kernel.set(values)
     kernel.exchange_set(time, x)
@@ -66,10 +75,7 @@ def moving(guide, parameters, inputs, discrete, rng):
     x[:count] += np.where(stretches, 0.002, 0.02) * rng.standard_normal(count)
     x[count : 2 * count] = np.where(stretches, 0.3, 3.0) * rng.standard_normal(count)
     put(kernel, 0.0, x, inputs)
-    state = kernel.state
-    at = SCALARS + 2 * (len(guide.parameters) + len(input_names(guide))) + 3 * len(guide.stops)
-    state[at : at + len(discrete)] = discrete
-    kernel.restore(state)
+    kernel.set_modes(contact_modes(guide, discrete))
     put(kernel, 0.0, x, inputs)
     return kernel, x
 

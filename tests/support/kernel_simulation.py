@@ -1,6 +1,7 @@
 """A simulation in the C kernel, with the interface of the engine's own."""
 
 import ctypes
+import re
 import shutil
 import subprocess
 from functools import cache
@@ -95,6 +96,7 @@ class KernelSimulation:
         self.library = library()
         self.sentence = ctypes.create_string_buffer(SENTENCE)
         self.inner, self.states_of = None, None
+        self.stops = mechanism.stops
         chosen = independent(mechanism)
         self.slots = slots(mechanism, chosen)
         data = tables(mechanism, interface(mechanism, {}), "token", chosen)
@@ -145,6 +147,18 @@ class KernelSimulation:
 
     def restore(self, state: np.ndarray) -> None:
         self.call("simulation_restore", pointer(state))
+
+    def set_modes(self, modes: list[int]) -> None:
+        """Set the modes of all contacts."""
+        text = (KERNEL / "hybrid" / "snapshot.c").read_text()
+        scalars, per_stop = (
+            int(re.search(rf"\b{name} = (\d+)", text)[1]) for name in ("SCALARS", "PER_STOP_STATE")
+        )
+        state, stops = self.state, len(self.stops)
+        state[scalars : scalars + per_stop * stops : per_stop] = modes[:stops]
+        points = scalars + per_stop * stops
+        state[points : points + len(modes) - stops] = modes[stops:]
+        self.restore(state)
 
     # -- model exchange --
 
