@@ -75,7 +75,8 @@ def moving(guide, parameters, inputs, discrete, rng):
     x[:count] += np.where(stretches, 0.002, 0.02) * rng.standard_normal(count)
     x[count : 2 * count] = np.where(stretches, 0.3, 3.0) * rng.standard_normal(count)
     put(kernel, 0.0, x, inputs)
-    kernel.set_modes(contact_modes(guide, discrete))
+    if discrete:
+        kernel.set_modes(contact_modes(guide, discrete))
     put(kernel, 0.0, x, inputs)
     return kernel, x
 

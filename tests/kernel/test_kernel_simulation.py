@@ -274,9 +274,7 @@ def many_stops(count):
     """Return a guide with stops along one wall."""
     (stop,) = mechanism("PRBDM2R").stops
     middle = (count - 1) / 2
-    stops = tuple(
-        replace(stop, name=f"s{i}", offset=1e-3 * (i - middle)) for i in range(count)
-    )
+    stops = tuple(replace(stop, name=f"s{i}", offset=1e-3 * (i - middle)) for i in range(count))
     return replace(mechanism("PRBDM2R"), name="Many", stops=stops)
 
 

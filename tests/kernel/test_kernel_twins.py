@@ -942,18 +942,14 @@ class KernelEquations:
         """Return a state, projected with the factors of its own evaluation."""
         n, near = (len(y) - 2) // 2, y.copy()
         kernel().factor_equations(self.structure, y[:n], y[n : 2 * n], None, self.evaluation)
-        kernel().project_near(
-            self.structure, self.evaluation, reference, t, near, self.correction
-        )
+        kernel().project_near(self.structure, self.evaluation, reference, t, near, self.correction)
         return near
 
     def stages(self, y, h, k):
         """Fill the stages of which the first is given; return the new state and the force range."""
         y1, forces = np.full(len(y), np.nan), np.full((2, 8), np.nan)
         span = structures()["ForceRange"](*(row.ctypes.data for row in forces))
-        kernel().stages(
-            self.structure, len(y), y, h, k, y1, self.reference, self.evaluation, span
-        )
+        kernel().stages(self.structure, len(y), y, h, k, y1, self.reference, self.evaluation, span)
         return y1, forces[:, : self.structure.held_count]
 
 
@@ -1032,7 +1028,7 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         a, lam = mine.evaluate(y[:n], y[n : 2 * n])
         evaluation = theirs.evaluate(y[:n], y[n : 2 * n])
         a_expected, lam_expected, M, _ = evaluation
-        dy, rel = mine.rate(y), spread(condition(evaluation))
+        rel = spread(condition(evaluation))
         assert mine.structure.r == r
         assert_same(a, a_expected, rel)
         assert_same(lam, lam_expected, rel)
