@@ -6,7 +6,7 @@
 
 typedef struct Simulation Simulation;
 
-/* What an impact was like, for the log. */
+/* An impact, for the log. */
 typedef struct {
     const char *stop;
     double time, approach_speed, rebound_speed, impulse, energy_lost;
@@ -31,7 +31,7 @@ PRBM void simulation_save(const Simulation *simulation, double *state);
 /* False and a sentence, and nothing changed, if the numbers are no state of this mechanism. */
 PRBM bool simulation_restore(Simulation *simulation, const double *state, Problem *problem);
 
-/* Parameters and inputs, by their slot; what is refused changes nothing.  Before the start fixed
+/* Parameters and inputs, by their slot; a rejected value changes nothing.  Before the start fixed
  * and tunable parameters may be set, after it inputs and tunable parameters; they act from the
  * present time on. */
 PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *problem);
@@ -42,8 +42,8 @@ PRBM void simulation_unstart(Simulation *simulation);
 PRBM bool simulation_started(const Simulation *simulation);
 PRBM double simulation_time(const Simulation *simulation);
 
-/* Start the motion.  tolerance 0: solver.tolerance.  exchange: for model exchange, where somebody
- * else integrates. */
+/* Start the motion.  tolerance 0: solver.tolerance.  exchange: model exchange, in which
+ * the importer integrates. */
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
                            bool exchange, Problem *problem);
 
@@ -52,11 +52,11 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
 /* Continue to a time, events included. */
 PRBM bool simulation_advance(Simulation *simulation, double time, Problem *problem);
 /* Continue to a time, but stop before the first event (its values still those before it) and,
- * if each is set, after each internal step.  simulation_time tells how far it came; the wall's
- * motion is the one towards the given time.  *event: an event waits for simulation_happen. */
+ * if each is set, after each internal step.  simulation_time returns the time reached; the
+ * walls move as planned for the given time.  *event: an event is pending, see simulation_happen. */
 PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, bool *event,
                                   Problem *problem);
-/* Let the waiting event happen (event mode); does nothing if none waits. */
+/* Apply the pending event (event mode); without one, do nothing. */
 PRBM bool simulation_happen(Simulation *simulation, Problem *problem);
 
 /* --- model exchange --- */
@@ -74,11 +74,11 @@ PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *prob
 PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *problem);
 /* A step was accepted; *event: enter event mode (the contact has drifted, a wall has turned). */
 PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *problem);
-/* Event mode: let what is due happen.  *changed: the states have new values. */
+/* Event mode: apply all events that are due.  *changed: the states have new values. */
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem);
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth);
 /* Derivative of all values (slots.count) along a change of states dx and of inputs du, by exact
- * differentiation, at the present time; discrete and constant values have none. */
+ * differentiation, at the present time; zero for discrete and constant values. */
 PRBM bool exchange_directional(Simulation *simulation, const double *dx, const double *du,
                                double *dvalues, Problem *problem);
 
