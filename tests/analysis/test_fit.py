@@ -29,7 +29,7 @@ from prbm.drawing.style import png
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modal_restitution, modes
 from prbm.mechanics.statics import equilibrium
-from prbm.plots.fit_figures import force_figure, response_figure, valley_figure
+from prbm.plots.fit import force_figure, response_figure, valley_figure
 from support import PMMA, ScalarGuide, mechanism
 
 RATE, NOISE = 750.0, 4e-6  # Hz, m: the source's laser
@@ -443,7 +443,7 @@ REFUSED = {
     ),
     "starts": (lambda m: fit(m, [K], F5, starts=500), "choose fewer"),
     "valley of one": (lambda m: valley(fit(m, [K], F5)), "two parameters or more"),
-    "no response": (lambda m: response_figure(fit(m, [K], F5)), "was not to a response"),
+    "no response": (lambda m: response_figure(fit(m, [K], F5)), "the fit has no response"),
 }  # fmt: skip
 
 

@@ -379,7 +379,7 @@ MISTAKES = [
     ("picture PRBDM --out taken/a.png", "cannot write to taken: taken is a file; choose another"),
     ("animate PRBDM taken/a.gif", "cannot write to taken: taken is a file; choose another folder"),
     ("animate PRBDM new/a.gif --slow -1", "slow = -1 must be positive"),
-    ("animate out.gif", "name what to show"),
+    ("animate out.gif", "name the source of the film"),
     ("animate PRBDM out.txt", "end the name in .gif or .mp4"),
     ("measure", "required: QUANTITY"),
     ("validate --measured f=1", "--measured goes with a mechanism"),

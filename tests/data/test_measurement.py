@@ -18,7 +18,7 @@ from prbm.data.measurement import (
 )
 from prbm.data.series import Series
 from prbm.data.uncertainty import Estimate, EvaluationError, line, power_law
-from prbm.plots.fit_figures import bending_figure
+from prbm.plots.measurement import bending_figure
 
 E, LENGTH, WIDTH, THICKNESS = 181.5e9, 40e-3, 8e-3, 0.1e-3  # the steel flexures of the source
 CELL = 1e-3  # N of noise of the load cell for 0 to 0.5 N, 0.2 % of its range

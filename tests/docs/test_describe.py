@@ -63,7 +63,9 @@ def test_the_page_from_a_sketch_to_a_simulation(
     for block in blocks("sh"):
         for line in block.splitlines():
             program, *words = shlex.split(line)
-            assert program == "python"
+            assert program in ("python", "prbm")
+            if program == "prbm":
+                words = ["-m", "prbm", *words]
             words = [str(ROOT / word) if word == "build_fmu.py" else word for word in words]
             subprocess.run(
                 [sys.executable, *words], check=True, env=os.environ | {"PYTHONPATH": paths}

@@ -378,8 +378,8 @@ def cluster(**options) -> LocalCluster:
     )
 
 
-def test_a_scheduler_that_does_not_answer_is_told(mishap, log, monkeypatch):
-    monkeypatch.setattr(sweeps, "CONNECT", 0.5)
+def test_a_scheduler_without_an_answer_is_reported(mishap, log, monkeypatch):
+    monkeypatch.setattr(sweeps, "CONNECTION_TIMEOUT", 0.5)
     table = pd.DataFrame({"x": [1.0]})
     with pytest.raises(SweepError, match=r"no scheduler answers at tcp://127.*dask scheduler"):
         sweep(mishap, table, scheduler="tcp://127.0.0.1:1")
@@ -506,7 +506,7 @@ def test_what_is_no_fmu_is_told(native, tmp_path, capsys):
     Path("text.fmu").write_text("no archive")
     for name, sentence in (
         ("none.fmu", "none.fmu cannot be read (No such file or directory); give an FMU"),
-        ("text.fmu", "text.fmu is no FMU that can be read"),
+        ("text.fmu", "text.fmu is not a readable FMU"),
     ):
         assert main(["sweep", name, "t.csv"]) == 2
         assert sentence in capsys.readouterr().err

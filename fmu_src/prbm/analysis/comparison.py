@@ -1,15 +1,15 @@
-"""Any mechanism beside finite elements and, if there are any, measurements.
+"""A mechanism beside finite elements and measurements.
 
 :func:`compare` evaluates the same quantities by the pseudo-rigid-body model and by finite elements
-of the same file, and puts measured values with their uncertainties beside them:
+of the same file, and compares them with measured values and their uncertainties:
 
-* where the released body rests, and the lowest frequencies about that shape;
-* the force that holds it in the drawn shape, the stiffness and the frequencies there;
-* the modal restitution of an arriving fundamental mode at every wall that a force on the released
+* the place of rest of the released body, and the lowest frequencies about that shape;
+* the holding force in the drawn shape, the stiffness and the frequencies there;
+* the modal restitution of an arriving fundamental mode, for every wall that a force on the released
   body reaches.
 
-Loads and holding force are the same on both sides.  Friction and damping in proportion to mass,
-which the elements do not have and which none of these quantities depends on, are left out.
+Loads and holding forces are equal on both sides.  Friction and damping in proportion to mass are
+set to zero: the elements do not have them, and no compared quantity depends on them.
 """
 
 import csv
@@ -32,9 +32,9 @@ from ..references.finite_elements import FiniteElements
 from .impact_map import algebraic, by_elements
 from .stretching import notes as stretching_notes
 
-FREQUENCIES = 3  # the lowest that are compared
-NUDGE = 1e-4  # of the mechanism's length: displacements between which a stiffness is taken
-ROUNDING = 1e-9  # of that length, and of the force that it costs: less is 0
+FREQUENCIES = 3  # Number of the lowest frequencies that are compared.
+DIFFERENCE_STEP = 1e-4  # Step of the stiffness, as a share of the size of the mechanism.
+ZERO_RTOL = 1e-9  # Smaller displacements, relative to the size, and their forces are round-off.
 Quantities = dict[str, float]
 
 
@@ -45,7 +45,7 @@ class Row:
     Parameters
     ----------
     name, unit : str
-        What it is; SI.
+        Name of the quantity; its SI unit.
     model, elements : float
         By the pseudo-rigid-body model and by finite elements.
     measured : Estimate or None
@@ -70,11 +70,11 @@ class Row:
 
     @property
     def scale(self) -> float:
-        """What differences are told in: the elements' magnitude, 1 for a ratio."""
+        """Scale of differences: the magnitude of the elements' value; 1 for a ratio."""
         return abs(self.elements) if self.unit else 1.0
 
     def away(self, found: float) -> float:
-        """Return how far a value is from the measured one, in its standard uncertainties [-]."""
+        """Return the difference from the measured value in its standard uncertainties [-]."""
         if self.measured is None or not 0.0 < self.measured.uncertainty < math.inf:
             return math.nan
         return (found - self.measured.value) / self.measured.uncertainty
@@ -87,13 +87,13 @@ class Comparison:
     Parameters
     ----------
     title : str
-        Of the mechanism.
+        Title of the mechanism.
     elements : int
-        Cable elements a flexure.
+        Number of cable elements per flexure.
     rows : tuple of Row
-        Of what both the model and the elements can say, and of all that was measured.
+        Quantities that both the model and the elements have.
     notes : tuple of str
-        What could not be compared, and why; what the model hides.
+        Quantities that could not be compared, with reasons; effects that the model neglects.
     """
 
     title: str
@@ -114,14 +114,14 @@ class Comparison:
         measured = any(row.measured for row in self.rows)
         if measured:
             head += f"  {'measured':<22}{'model':>8}{'elements':>10}"
-        lines = [f"{self.title}, {self.elements} elements a flexure", head]
+        lines = [f"{self.title}, {self.elements} elements per flexure", head]
         lines += [_line(row, measured) for row in self.rows]
         if measured:
             lines.append("the last two columns: distances in the measurement's uncertainties")
         return "\n".join([*lines, *self.notes])
 
     def csv(self) -> str:
-        """Return the rows as CSV, in SI units; empty where there is nothing."""
+        """Return the rows as CSV, in SI units; unknown values are empty."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
         writer.writerow(
@@ -149,9 +149,9 @@ def _shown(x: float, form: str = ".5g") -> str:
 
 
 def _line(row: Row, measured: bool) -> str:
-    """Return a row as a line of the table: the difference in percent, where it has a meaning.
+    """Return a row as a line of the table.
 
-    It has none for ratios, nor where it is more than the quantity itself.
+    The difference is in percent, except for ratios and for differences above 100 %.
     """
     percent = row.unit and abs(row.relative) <= 1.0
     off = (
@@ -221,43 +221,43 @@ def compare(
     Parameters
     ----------
     mechanism : Mechanism
-        With a release, any flexures, any stops.
+        The mechanism.
     values : mapping
         Parameters that differ from their defaults.
     elements : int
-        Cable elements a flexure.
+        Number of cable elements per flexure.
     measured : mapping
         Measured values by the name of the quantity, in SI units: ``"frequency 1 at rest"``,
         ``"rest position"``, ``"stiffness, straight"``, ``"modal restitution, stop"``, ...
     progress : callable or None
-        Told the fraction that is done, from 0 to 1.
+        Called with the completed fraction, from 0 to 1.
 
     Returns
     -------
     Comparison
-        A quantity that the model has not (a third mode of one degree of freedom) is left out.
+        Without quantities that the model does not have (a third mode of one degree of freedom).
 
     Raises
     ------
     FiniteElementError
         If Exudyn is not installed.
     ParameterError
-        If a value is out of bounds, or something was measured that is not compared.
+        If a value is out of bounds, or a measured quantity is not compared.
     EquilibriumError
         If there is no shape at rest, or none held straight.
     """
-    tell = progress or (lambda _: None)
+    report = progress or (lambda _: None)
     given = dict(values or {}) | _without(mechanism)
     system = assemble(mechanism, mechanism.values(given))
-    step = NUDGE * system.length
+    step = DIFFERENCE_STEP * system.length
     model = _of_model(system, step)
-    tell(0.1)
+    report(0.1)
     found = _of_elements(FiniteElements(mechanism, given, elements=elements), step)
-    tell(0.5)
+    report(0.5)
     notes: list[str] = []
     for i, (name, pair) in enumerate(_restitutions(mechanism, given, elements, notes)):
         model[name], found[name] = pair
-        tell(0.5 + 0.5 * (i + 1) / len(mechanism.stops))
+        report(0.5 + 0.5 * (i + 1) / len(mechanism.stops))
     notes += stretching_notes(mechanism, given)
     known = dict(measured or {})
     for name in known:
@@ -265,7 +265,7 @@ def compare(
             raise ParameterError(
                 f"{name!r} was measured but is not compared; there are {', '.join(model)}"
             )
-    least = ROUNDING * system.length
+    least = ZERO_RTOL * system.length
     small = {"m": least, "N": least * abs(found["stiffness, straight"])}
 
     def row(name: str) -> Row:
@@ -276,12 +276,12 @@ def compare(
         return Row(name, unit, ours, theirs, known.get(name))
 
     rows = [row(name) for name in model]
-    tell(1.0)
+    report(1.0)
     return Comparison(mechanism.title, elements, tuple(rows), tuple(notes))
 
 
 def _without(mechanism: Mechanism) -> dict[str, float]:
-    """Return friction and damping in proportion to mass, off."""
+    """Return zeros for friction and for damping in proportion to mass."""
     off = {f"{f.name}.coefficient": 0.0 for f in mechanism.frictions}
     off |= {f"{s.name}.friction": 0.0 for s in mechanism.stops}
     return off | {"damping.zeta": 0.0}
@@ -290,7 +290,7 @@ def _without(mechanism: Mechanism) -> dict[str, float]:
 def _restitutions(
     mechanism: Mechanism, values: Mapping[str, float], elements: int, notes: list[str]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Give the modal restitution at each stop by both; a note where there is none."""
+    """Yield the modal restitution at each stop by both; add a note where there is none."""
     known = mechanism.values(values)
     for stop in mechanism.stops:
         place, d = value(stop, "position", known), value(stop, "offset", known)
@@ -299,7 +299,7 @@ def _restitutions(
                 algebraic(mechanism, [place], [d], values, stop=stop.name),
                 by_elements(mechanism, [place], [d], values, stop=stop.name, elements=elements),
             )
-        except (EquilibriumError, ParameterError) as error:  # out of reach, or a place of its own
+        except (EquilibriumError, ParameterError) as error:  # Out of reach, or an expression.
             notes.append(f"no modal restitution at {stop.name}: {error}")
             continue
         name = f"modal restitution, {stop.name}"

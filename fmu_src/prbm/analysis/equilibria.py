@@ -1,7 +1,7 @@
-"""Force over displacement of a held body, and where it would rest if it were let go.
+"""Force over displacement of a held body, and its places of rest without a force.
 
-The body is held at a displacement, not by a given force: so one follows the curve through the
-extrema of the force, where a mechanism under a given load snaps.
+The displacement is given, not the force.  The curve then continues through the extrema of the
+force, where a mechanism under a given load snaps through.
 """
 
 from collections.abc import Sequence
@@ -16,19 +16,19 @@ from ..mechanics.modal import modes
 from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System
 
-RESTS = 1e-12  # of the size of the mechanism: how well a place of rest is located
+REST_RTOL = 1e-12  # Tolerance of a place of rest, relative to the size of the mechanism.
 
 
 @dataclass(frozen=True)
 class Rest:
-    """A place where the released body rests without a holding force.
+    """A place of rest of the released body without a holding force.
 
     Parameters
     ----------
     displacement : float
         Along the direction of the release, from the drawn shape [m].
     stable : bool
-        Whether it stays there when it is touched.
+        Whether the rest is stable.
     shape : Equilibrium
         The shape.
     """
@@ -66,10 +66,10 @@ def rests(
     system : System
         The mechanism.
     displacements : (k,)
-        Increasing [m], so close together that the force changes its sign at most once between two.
-        At the first and the last it may not be zero.
+        Increasing [m], with at most one change of sign of the force between two of them, and a
+        force other than zero at the first and the last.
     forces : (k,) or None
-        The holding forces there, if they are known [N].
+        Holding forces, if known [N].
 
     Raises
     ------
@@ -82,7 +82,7 @@ def rests(
     for (a, b), (low, high) in zip(pairwise(displacements), pairwise(forces), strict=True):
         if (low > 0.0) != (high > 0.0):
             place = brentq(
-                lambda d: holding_force(system, d), a, b, xtol=RESTS * system.length, rtol=1e-15
+                lambda d: holding_force(system, d), a, b, xtol=REST_RTOL * system.length, rtol=1e-15
             )
             shape = equilibrium(system, place)
             found.append(Rest(float(place), bool(modes(system, shape).frequency[0] > 0.0), shape))
@@ -90,7 +90,7 @@ def rests(
 
 
 def snap(system: System, low: float, high: float) -> tuple[float, float]:
-    """Return where the holding force is largest in magnitude between two places of rest.
+    """Return the holding force of largest magnitude between two places of rest.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def snap(system: System, low: float, high: float) -> tuple[float, float]:
     Returns
     -------
     displacement, force : float
-        There the mechanism snaps when it is loaded by a force [m], [N].
+        Displacement [m] and force [N] at which the mechanism snaps through under a force.
     """
     found = minimize_scalar(
         lambda d: -abs(holding_force(system, d)), bounds=(low, high), method="bounded",

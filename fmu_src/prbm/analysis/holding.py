@@ -5,7 +5,7 @@ u that direction, z(d) the shape held at the displacement d and F(d) the force,
 
     stiffness = dF/dd,    across = Im(conj(u) (z - z_straight)),
 
-the second being what a straight-line guide should not do.
+where ``across`` is the error of a straight-line guide.
 """
 
 import math
@@ -23,29 +23,30 @@ from ..mechanics.statics import Equilibrium, equilibrium, free_displacement, hel
 from ..mechanics.system import System, unit
 from .equilibria import Rest, holding_force, rests, snap
 
-DIFFERENCE = 1e-5  # of the size of the mechanism: step of the stiffness, whose error is its square
+DIFFERENCE_STEP = 1e-5  # Step of the stiffness, as a share of the size of the mechanism.
 
 
 @dataclass(frozen=True)
 class Held:
-    """A shape that a force holds.
+    """A shape held by a force.
 
     Parameters
     ----------
     displacement : float
-        Of the released body along the direction of the release, from the drawn shape [m].
+        Displacement of the released body along the direction of the release, from the drawn shape
+        [m].
     force : float
-        On the body along that direction [N]; 0 if it rests there by itself.
+        Holding force on the body along that direction [N]; 0 at a place of rest.
     stiffness : float
-        Change of the force with the displacement [N/m]; NaN where the loops let the body move
-        no further along that direction.
+        Derivative of the force by the displacement [N/m]; NaN where the loops prevent a further
+        motion along that direction.
     across : float
         Displacement of the body to the left of that direction [m].
     angle : float
         Its rotation, counter-clockwise [rad].
     frequency : float
-        Fundamental frequency about the shape, body and force let go of [Hz]; negative where that
-        is unstable.
+        Fundamental frequency of the free body about the shape, with the force as a constant load
+        [Hz]; negative if unstable.
     """
 
     displacement: float
@@ -57,7 +58,7 @@ class Held:
 
 
 def _described(system: System, displacement: float, shape: Equilibrium) -> Held:
-    """Return what there is to know about a shape."""
+    """Return a held shape with its stiffness and frequency."""
     release = system.mechanism.release
     frame, e = system.bodies[release.body], system.directions(shape.q)
     moved = unit(release.direction).conjugate() * complex(frame.c + frame.A @ e - frame.drawn)
@@ -68,8 +69,8 @@ def _described(system: System, displacement: float, shape: Equilibrium) -> Held:
 
 
 def _stiffness(system: System, displacement: float) -> float:
-    """Return the change of the holding force with the displacement [N/m]."""
-    step = DIFFERENCE * system.length
+    """Return the derivative of the holding force by the displacement [N/m]."""
+    step = DIFFERENCE_STEP * system.length
     try:
         behind, ahead = (holding_force(system, displacement + k * step) for k in (-1, 1))
     except EquilibriumError:
@@ -91,7 +92,7 @@ def held(system: System, displacement: float) -> Held:
 
 
 def free(system: System) -> Held:
-    """Return the shape in which it rests by itself, loaded slowly by gravity, without stops.
+    """Return the shape at rest under gravity without stops or holding force.
 
     Raises
     ------
@@ -108,12 +109,12 @@ class Curve:
     Parameters
     ----------
     points : tuple of Held
-        In order.
+        Points in the order of the displacements.
     rests : tuple of Rest
-        Where the body rests without a force.
+        Places of rest without a holding force.
     snaps : tuple of (float, float)
-        Displacement and force between neighbouring places of rest at which the force is largest:
-        there the mechanism snaps through under a force [m], [N].
+        Displacement [m] and force [N] of the largest force between neighbouring places of rest:
+        there the mechanism snaps through under a force.
     """
 
     points: tuple[Held, ...]
@@ -124,7 +125,7 @@ class Curve:
 def curve(
     system: System, displacements: Sequence[float] | Real, progress: Progress | None = None
 ) -> Curve:
-    """Return the holding force at displacements, the places of rest between them, the snaps.
+    """Return the holding forces at displacements, with the places of rest and the snaps.
 
     Parameters
     ----------
@@ -133,7 +134,7 @@ def curve(
     displacements : (k,)
         Increasing [m], so close together that the force changes its sign at most once between two.
     progress : callable or None
-        Told the fraction that is done, from 0 to 1.
+        Called with the completed fraction, from 0 to 1.
 
     Raises
     ------

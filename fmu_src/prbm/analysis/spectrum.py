@@ -1,15 +1,15 @@
 r"""Frequency content of the motion after an impact, beside the modes at the impact shape.
 
-The wall is taken away after the first impact, so that nothing but the mechanism is heard.  The
-modes are those about the shape of the impact: where they depend on the shape, as the vertical and
-pitch modes of a parallel guide do, the motion leaves them behind and their lines are smeared
-towards the frequencies that follow.
+The wall is removed after the first impact, so that the motion is that of the mechanism alone.  The
+modes are those about the shape of the impact.  Some modes depend on the shape, for instance the
+vertical and pitch modes of a parallel guide: their lines spread towards the frequencies at the
+later shapes.
 
-The amplitude of a line is that of the sine which it stands for,
+The amplitude of a line is the amplitude of a sine of this frequency,
 
     a(f) = 2 |sum_k w_k x_k exp(-2 pi i f t_k)| / sum_k w_k,
 
-with Hann's window w, after the straight line through x has been taken out.
+with Hann's window w, after subtraction of the straight line through x.
 """
 
 from collections.abc import Mapping
@@ -29,8 +29,9 @@ from ..mechanism.description import Mechanism
 from ..runs.result import Result
 from .impact_map import first_impact
 
-FAR = 10.0  # sizes of the mechanism, to which a wall is taken away
-FEWEST = 16  # samples of a spectrum
+REMOVED_WALL = 10.0  # Displacement of a removed wall, in sizes of the mechanism.
+SAMPLES_MIN = 16  # Least number of samples of a spectrum.
+STEP_RTOL = 1e-6  # Largest relative difference between equal steps.
 MODES_SHOWN = 6
 SIGNALS = {
     "along": "velocity along the impact [m/s]",
@@ -46,11 +47,11 @@ class AfterImpact:
     Parameters
     ----------
     title : str
-        Of the mechanism.
+        Title of the mechanism.
     impact : Impact
-        What came before.
+        The impact.
     time : (m,)
-        Since the impact, in equal steps [s].
+        Time since the impact, in equal steps [s].
     along, across, turning : (m,)
         Velocity of the body's centre of mass along the direction of the stop and to the left of
         it [m/s], its angular velocity [rad/s].
@@ -76,20 +77,20 @@ def after_impact(
     stop: int = 0,
     tolerance: float = 1e-8,
 ) -> AfterImpact:
-    """Simulate from the release to the first impact, and on without the wall.
+    """Simulate from the release to the first impact, then without the wall.
 
     Parameters
     ----------
     mechanism : Mechanism
-        What moves.
+        The mechanism.
     values : mapping
         Parameters that differ from their defaults.
     duration, step : float
-        Of what is recorded after the impact [s]; frequencies up to 1/(2 step) are seen.
+        Length and step of the record after the impact [s]; its frequencies reach 1/(2 step).
     stop : int
-        Which stop; the walls of the others stay.
+        Index of the stop; the walls of other stops remain.
     tolerance : float
-        Of the integration.
+        Relative tolerance of the integration.
 
     Raises
     ------
@@ -99,15 +100,15 @@ def after_impact(
         If the wall is not reached.
     """
     count = round(duration / step) if step > 0.0 else 0
-    if count < FEWEST:
+    if count < SAMPLES_MIN:
         raise ParameterError(
             f"duration = {duration:g} s and step = {step:g} s give {count} samples; a spectrum "
-            f"needs at least {FEWEST}"
+            f"needs at least {SAMPLES_MIN}"
         )
     simulation = Simulation(mechanism, values, tolerance=tolerance)
     impact = first_impact(simulation, stop)
     s = mechanism.stops[stop]
-    simulation.set({f"{s.name}.displacement": FAR * simulation.system.length})
+    simulation.set({f"{s.name}.displacement": REMOVED_WALL * simulation.system.length})
     u = unit(s.direction).conjugate()
     moved = np.zeros((count, 3))
     times = np.linspace(0.0, (count - 1) * step, count)
@@ -124,9 +125,9 @@ def after_impact(
 
 
 def after_last_impact(result: Result) -> AfterImpact:
-    """Return what a result holds of the motion after its last impact, in its equal steps.
+    """Return the motion of a result after its last impact, in its equal steps.
 
-    The wall is where it is: nothing but the mechanism is heard for as long as it is not touched.
+    The wall remains.  The motion is that of the mechanism alone until the next contact.
 
     Raises
     ------
@@ -140,16 +141,16 @@ def after_last_impact(result: Result) -> AfterImpact:
     later = columns[columns["time"] > impact.time]
     if len(later) and (later[f"{s.name}.contact"] != 0).any():
         raise ParameterError(
-            f"after the last impact, at t = {impact.time:.6g} s, {s.body} rests on {s.name}: there "
-            "is nothing to hear; listen after the first one, or simulate less long"
+            f"after the last impact, at t = {impact.time:.6g} s, {s.body} rests on {s.name}: "
+            "there is no free motion; choose the first impact, or a shorter simulation"
         )
     steps = np.diff(later["time"])
-    if len(steps) and abs(steps[-1] - steps[0]) > 1e-6 * steps[0]:
-        later = later[:-1]  # the last step may be shorter
-    if len(later) < FEWEST:
+    if len(steps) and abs(steps[-1] - steps[0]) > STEP_RTOL * steps[0]:
+        later = later[:-1]  # The last step may be shorter.
+    if len(later) < SAMPLES_MIN:
         raise ParameterError(
             f"{len(later)} samples follow the last impact, at t = {impact.time:.6g} s; a spectrum "
-            f"needs at least {FEWEST}: simulate longer, or in smaller steps"
+            f"needs at least {SAMPLES_MIN}: simulate longer, or in smaller steps"
         )
     v = unit(s.direction).conjugate() * (later[f"{s.body}.vx"] + 1j * later[f"{s.body}.vy"])
     own = {p.name for p in result.mechanism.parameters}
@@ -191,9 +192,9 @@ def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
     (50.0, 3.0)
     """
     steps = np.diff(time)
-    if len(time) < FEWEST or np.ptp(steps) > 1e-6 * abs(float(steps.mean())):
+    if len(time) < SAMPLES_MIN or np.ptp(steps) > STEP_RTOL * abs(float(steps.mean())):
         raise ParameterError(
-            f"a spectrum needs at least {FEWEST} samples in equal steps; here are {len(time)}"
+            f"a spectrum needs at least {SAMPLES_MIN} samples in equal steps; here are {len(time)}"
         )
     window = hann(len(time), sym=False)
     lines = np.fft.rfft(window * detrend(signal))
@@ -203,14 +204,14 @@ def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
 
 
 def peaks(frequency: Real, amplitude: Real, share: float = 0.02) -> Real:
-    """Return the frequencies of the lines that stand out, by a parabola through their logarithm.
+    """Return the frequencies of peaks, by parabolas through the logarithm of the amplitude.
 
     Parameters
     ----------
     frequency, amplitude : (m,)
-        As :func:`spectrum` gives them.
+        As from :func:`spectrum`.
     share : float
-        Of the largest amplitude: what is lower is none.
+        Least height of a peak, as a share of the largest amplitude.
 
     Returns
     -------
@@ -232,7 +233,7 @@ def peaks(frequency: Real, amplitude: Real, share: float = 0.02) -> Real:
 
 
 def numbered(modes: Real) -> list[tuple[int, float]]:
-    """Return the first modes with their numbers, those that vibrate.
+    """Return the first modes with their numbers, without unstable ones.
 
     Examples
     --------

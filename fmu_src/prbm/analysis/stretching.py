@@ -1,9 +1,9 @@
-"""What flexures that do not stretch hide of an impact off the centre of mass.
+"""The effect of stretching flexures on an impact off the centre of mass.
 
-Such an impact turns the body that hits.  Flexures that cannot stretch may leave it a single way to
-move, turning or not, and then it rebounds as if it had been hit there and nowhere else; those that
-stretch give way.  Whether that matters is found by looking: :func:`note` compares the modal
-restitution of the mechanism as it is with that of the same one with ``axial = true``.
+Such an impact turns the body.  Inextensible flexures may leave the body a single degree of freedom,
+with or without rotation, and the rebound then does not depend on the place of the hit.  Stretching
+flexures permit the rotation.  :func:`note` compares the modal restitution of the mechanism with
+that of the same mechanism with ``axial = true``.
 """
 
 from collections.abc import Mapping
@@ -16,23 +16,23 @@ from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .touching import impact_shape, lever
 
-OFF_CENTRE = 0.01  # of the size: a lever of the impact that is told of
-MATTERS = 0.02  # modal restitution: less of a difference is not told
+LEVER_MIN = 0.01  # Least lever of an impact in a note, as a share of the size.
+DIFFERENCE_MIN = 0.02  # Least difference of the modal restitution in a note.
 
 
 def stretching(mechanism: Mechanism) -> Mechanism:
-    """Return a mechanism with flexures that stretch, their models the same."""
+    """Return a mechanism with axial flexures and the same models of bending."""
     kinds = tuple(replace(kind, axial=True) for kind in mechanism.flexure_types)
     return replace(mechanism, flexure_types=kinds)
 
 
 def restitution(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> float:
-    """Return the modal restitution of a pure fundamental mode at a stop where it is [-].
+    """Return the modal restitution of a pure fundamental mode at a stop [-].
 
     Raises
     ------
     EquilibriumError
-        If a force on the released body does not bring it there.
+        If no force on the released body reaches the stop.
     """
     system = assemble(mechanism, mechanism.values(values))
     s = mechanism.stops[stop]
@@ -41,34 +41,34 @@ def restitution(mechanism: Mechanism, values: Mapping[str, float], stop: int) ->
 
 
 def note(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> str | None:
-    """Return a sentence if a stop is off the centre of mass and stretching would matter there.
+    """Return a sentence if a stop is off the centre of mass and stretching has an effect there.
 
     Parameters
     ----------
     mechanism : Mechanism
-        Any.
+        The mechanism.
     values : mapping
         Parameters that differ from their defaults.
     stop : int
-        Which stop.
+        Index of the stop.
 
     Returns
     -------
     str or None
-        None too if a flexure stretches already, or a force cannot bring the body to the stop.
+        Also None if a flexure is axial already, or no force reaches the stop.
     """
     if not mechanism.flexures or any(kind.axial for kind in mechanism.flexure_types):
         return None
     system = assemble(mechanism, mechanism.values(values))
     off, s = lever(system, stop), mechanism.stops[stop]
-    if abs(off) <= OFF_CENTRE * system.length:
+    if abs(off) <= LEVER_MIN * system.length:
         return None
     try:
         as_it_is = restitution(mechanism, values, stop)
         stretched = restitution(stretching(mechanism), values, stop)
     except PrbmError:
         return None
-    if not abs(as_it_is - stretched) > MATTERS:  # or not a number
+    if not abs(as_it_is - stretched) > DIFFERENCE_MIN:  # Or one is not a number.
         return None
     place = value(s, "position", system.values)
     return (
@@ -79,6 +79,6 @@ def note(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> str | 
 
 
 def notes(mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
-    """Return the notes of all stops; parameters as :func:`note` has them."""
+    """Return the notes of all stops; parameters as for :func:`note`."""
     found = (note(mechanism, values, stop) for stop in range(len(mechanism.stops)))
     return [f"note: {sentence}" for sentence in found if sentence is not None]

@@ -1,4 +1,4 @@
-"""Which stop is hit, and shapes, held by a force on the released body, in which it touches."""
+"""Stops by name, and shapes held by a force in which a stop touches its wall."""
 
 import math
 from collections.abc import Callable
@@ -12,8 +12,8 @@ from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.parts import value
 
-TOUCHES = 1e-9  # of the size: gap at which a held shape touches the wall
-SECANTS = 20
+GAP_CLOSED_RTOL = 1e-9  # Gap at which a held shape touches the wall, relative to the size.
+SECANT_STEPS_MAX = 20
 
 S = TypeVar("S")
 
@@ -24,7 +24,7 @@ def stop_index(mechanism: Mechanism, name: str | None) -> int:
     Raises
     ------
     ParameterError
-        If there is none, or none of that name.
+        If there is no stop, or none with that name.
     """
     names = [stop.name for stop in mechanism.stops]
     if not names or (name is not None and name not in names):
@@ -45,15 +45,15 @@ def touching(
     Parameters
     ----------
     hold : callable
-        Of a displacement [m] and a shape near by: the shape held there.
+        Returns the shape held at a displacement [m], near a given shape.
     gap : callable
-        Of a shape: how far the stop is from its wall [m].
+        Returns the gap of the stop in a shape [m].
     height : float
         Position of the wall [m].
     size : float
-        Of the mechanism [m].
+        Size of the mechanism [m].
     near : shape or None
-        Where to begin.
+        Start of the search.
 
     Raises
     ------
@@ -63,8 +63,8 @@ def touching(
     x, shape = height, hold(height, near)
     g = gap(shape)
     last_x, last_g = x - g, math.nan
-    for _ in range(SECANTS):
-        if abs(g) <= TOUCHES * size:
+    for _ in range(SECANT_STEPS_MAX):
+        if abs(g) <= GAP_CLOSED_RTOL * size:
             return shape
         slope = (g - last_g) / (x - last_x) if math.isfinite(last_g) else -1.0
         last_x, last_g = x, g
@@ -93,9 +93,9 @@ def impact_shape(system: System, stop: int, height: float) -> Equilibrium:
 
 
 def lever(system: System, stop: int) -> float:
-    """Return how far the line of an impact passes the centre of mass of the body that hits [m].
+    """Return the distance from the centre of mass of a body to the line of an impact [m].
 
-    In the drawn shape, positive to the left of the direction of the stop.
+    It is that in the drawn shape, positive to the left of the direction of the stop.
     """
     s = system.mechanism.stops[stop]
     point = complex(*(affine(coordinate)(system.values) for coordinate in s.point))

@@ -10,7 +10,7 @@ def unknown(name: str, known: Mapping[str, object]) -> str:
 
     Examples
     --------
-    >>> unknown("stop.restitutoin", {"stop.restitution": 0.6, "stop.friction": 0.0})
+    >>> unknown("stop.restitutoin", {"stop.restitution": 0.6, "gravity.x": 0.0})
     "there is no variable 'stop.restitutoin'; did you mean stop.restitution?"
     """
     return f"there is no variable {name!r}; {proposal(name, known)}"

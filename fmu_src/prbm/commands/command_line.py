@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
+from ..base.errors import EquilibriumError, PrbmError, SimulationError
 from .arguments import (
     ANIMATION_USAGE,
     animation_arguments,
@@ -23,6 +24,7 @@ from .arguments import (
     stop_time_argument,
 )
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
+from .remedies import in_options
 
 WIDTH = 79  # columns of a description
 NEGATIVE = re.compile(r"-\.?\d")
@@ -518,8 +520,6 @@ def _run(words: Sequence[str]) -> int:
         status = _status(error)
         if status is None:
             raise
-        from ..files.settings import in_options
-
         return _told(f"{name}: {in_options(str(error))}", status)
 
 
@@ -544,8 +544,6 @@ def _function(run: str) -> Callable[[argparse.Namespace], None]:
 
 def _status(error: Exception) -> int | None:
     """Return the status of a mistake or a failed computation; None if it is an error of ours."""
-    from ..base.errors import EquilibriumError, PrbmError, SimulationError
-
     if isinstance(error, EquilibriumError | SimulationError):
         return FAILED
     return MISTAKE if isinstance(error, PrbmError) else None

@@ -7,7 +7,7 @@ from ..base.progress import reporter
 from ..files.mechanism_file import find
 from ..files.settings import UserMistake, quantity, settings
 from ..mechanism.description import Mechanism
-from ..plots import fit_figures
+from ..plots import fit as figures
 from .data import check_size, only, output_unit, record, series
 from .output import Output
 from .words import free, frequency
@@ -92,14 +92,14 @@ def tell(found: Fit, output: Output, name: str) -> None:
                 ["time [s]", f"measured [{target.unit}]", f"model [{target.unit}]"],
                 zip(target.series.time, target.data, found.model[part], strict=True),
             )
-            output.figure(f"{name}-response.png", lambda: fit_figures.response_figure(found))
+            output.figure(f"{name}-response.png", lambda: figures.response_figure(found))
         if isinstance(target, ForceDeflection):
             output.table(
                 f"{name}-force.csv",
                 ["deflection [m]", "measured [N]", "model [N]"],
                 zip(target.displacement, target.data, found.model[part], strict=True),
             )
-            output.figure(f"{name}-force.png", lambda: fit_figures.force_figure(found))
+            output.figure(f"{name}-force.png", lambda: figures.force_figure(found))
     if found.valleys and len(problem.names) > 1:
         _tell_valley(found, output, name)
 
@@ -119,4 +119,4 @@ def _tell_valley(found: Fit, output: Output, name: str) -> None:
         [*along.names, "misfit"],
         [[*map(float, p), float(x)] for p, x in zip(along.points, along.misfit, strict=True)],
     )
-    output.figure(f"{name}-valley.png", lambda: fit_figures.valley_figure(along))
+    output.figure(f"{name}-valley.png", lambda: figures.valley_figure(along))

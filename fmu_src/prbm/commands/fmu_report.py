@@ -24,28 +24,28 @@ from ..fmu.unpack import unpacked
 from ..interface.variables import CLOCK
 from ..mechanism.description import Mechanism
 from ..plots.figures import response
-from ..runs.headline import FREQUENCY, told
+from ..runs import headline as results
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
 
 
 @dataclass(frozen=True)
 class Run:
-    """What an FMU did.
+    """A simulation of an FMU.
 
     Parameters
     ----------
     name : str
-        Of the model.
+        Name of the model.
     mechanism : Mechanism
-        What it is a model of.
+        The mechanism in it.
     values : dict of str to float
         Its parameters and inputs at the start.
     record : structured array
         Time, all outputs and the fundamental frequency.
     stop_time : float
-        Until when it was to run [s].
+        End of the default experiment [s].
     seconds : float
-        What that took.
+        Computing time [s].
     """
 
     name: str
@@ -57,7 +57,7 @@ class Run:
 
     @property
     def finished(self) -> bool:
-        """Whether the simulation came to its end."""
+        """Whether the simulation reached its stop time."""
         return bool(np.isclose(self.record["time"][-1], self.stop_time))
 
 
@@ -67,7 +67,7 @@ def simulate(fmu: Path, progress: Progress) -> Run:
     Raises
     ------
     KeyboardInterrupt
-        If the user wants no more of it; the FMU has finished its step then, undisturbed.
+        If the user has interrupted it; the FMU has finished its step.
     """
     with unpacked(fmu) as folder, interruptible() as wanted:
         description = fmpy.read_model_description(str(folder))
@@ -85,7 +85,7 @@ def simulate(fmu: Path, progress: Progress) -> Run:
         record = fmpy.simulate_fmu(
             str(folder),
             model_description=description,
-            output=[*outputs, FREQUENCY],
+            output=[*outputs, results.FREQUENCY],
             use_event_mode=clocks,
             early_return_allowed=clocks,
             step_finished=step_finished,
@@ -100,7 +100,7 @@ def simulate(fmu: Path, progress: Progress) -> Run:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Have Ctrl-C noted, and the second one obeyed; give what tells whether to go on."""
+    """Return a function that is false after Ctrl-C; a second Ctrl-C interrupts the process."""
     interrupted: list[int] = []
 
     def note(number: int, _: object) -> None:
@@ -115,11 +115,11 @@ def interruptible() -> Iterator[Callable[[], bool]]:
 
 
 def headline(run: Run) -> list[str]:
-    """Return what happened, line by line."""
+    """Return a summary of a simulation, line by line."""
     record = run.record
     lines = [
         f"simulated            {record['time'][-1]:g} s in {run.seconds:.2f} s",
-        *told(record, run.mechanism, run.values),
+        *results.headline(record, run.mechanism, run.values),
     ]
     if not run.finished:
         lines.append(

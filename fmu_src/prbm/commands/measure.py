@@ -11,7 +11,7 @@ from ..data.uncertainty import Estimate
 from ..data.vibration import free_vibration
 from ..files.mechanism_file import find
 from ..files.settings import UserMistake, settings
-from ..plots import fit_figures
+from ..plots import measurement as figures
 from . import data, fitting
 from .output import Output
 from .words import estimate, free, stem
@@ -50,7 +50,7 @@ def modulus(options: argparse.Namespace) -> None:
 
 
 def _bending(one: YoungsModulus):  # type: ignore[no-untyped-def]
-    return lambda: fit_figures.bending_figure(one)
+    return lambda: figures.bending_figure(one)
 
 
 def _row(one: YoungsModulus) -> list[object]:
@@ -98,7 +98,7 @@ def calibration(options: argparse.Namespace) -> None:
     )
     output.figure(
         f"{name}-calibration.png",
-        lambda: fit_figures.calibration_figure(sensor, quantity, reading),
+        lambda: figures.calibration_figure(sensor, quantity, reading),
     )
     output.write()
 
@@ -127,7 +127,7 @@ def frequency(options: argparse.Namespace) -> None:
         ESTIMATE_HEAD,
         [_estimate(key, x) for key, x in known.items() if x is not None],
     )
-    output.figure(f"{name}-frequency.png", lambda: fit_figures.vibration_figure(signal, found))
+    output.figure(f"{name}-frequency.png", lambda: figures.vibration_figure(signal, found))
     output.write()
 
 

@@ -14,7 +14,7 @@ from ..files.settings import UserMistake, quantity, settings
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
-from ..runs.headline import told
+from ..runs.headline import headline
 from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
 from .duration import span
@@ -46,7 +46,7 @@ def simulated(options: argparse.Namespace) -> None:
         tolerance=_tolerance(options.tolerance), progress=reporter(),
     )  # fmt: skip
     print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")
-    for line in told(result.columns, mechanism, result.values):
+    for line in headline(result.columns, mechanism, result.values):
         print(line)
     columns = names(result.columns)
     output.table(f"{mechanism.name}.csv", columns, (list(row) for row in result.columns.tolist()))
@@ -129,7 +129,7 @@ def _spectrum(
 
 def _tell_peaks(lines: Mapping[str, tuple[Real, Real]], size: float) -> None:
     """Print the peaks of every signal that is more than rounding."""
-    from ..analysis.spectrum import peaks
+    from ..analysis.spectrum import peaks  # here, because it takes two seconds
 
     loudest = float(lines["along"][1].max())
     for name, (frequency, amplitude) in lines.items():

@@ -1,6 +1,6 @@
 """Measured data from text files: channels by name, in SI, checked.
 
-What is read without being told more:
+Recognized without further arguments:
 
 * columns separated by tabs, semicolons, commas or blanks; decimal point, or decimal comma where
   commas do not separate; quoted cells; UTF-8 with or without a byte order mark, UTF-16 with one,
@@ -18,9 +18,9 @@ That covers plain tables and spreadsheets' CSV, and these layouts of vendors:
 * Keysight oscilloscopes: ``x-axis,1`` above ``second,Volt``;
 * Tektronix oscilloscopes: lines ``Horizontal Units`` and ``Vertical Units`` above the table.
 
-Whatever has no unit can be given one (``units``), and a table without a head its names
-(``columns``).  A record is refused with one sentence that names the file, the line, the column,
-the value and what to do.
+A column without a unit can be given one (``units``), and a table without a head its names
+(``columns``).  An invalid record is rejected with a sentence that names the file, the line, the
+column, the value and a remedy.
 """
 
 import difflib
@@ -54,7 +54,7 @@ class Channel:
     name : str
         As in the file, without the unit.
     written : str
-        The unit as in the file; empty if there is none.
+        The unit as in the file, or an empty text.
     unit : str or None
         SI unit of the values; None if the unit is missing or unknown.
     values : (m,)
@@ -99,7 +99,7 @@ class Record:
         Raises
         ------
         RecordError
-            If there is none, or several.
+            If no channel has this name, or several have it.
         """
         found = [c for c in self.channels if c.name == name]
         found = found or [c for c in self.channels if c.name.lower() == name.lower()]
@@ -115,20 +115,20 @@ class Record:
         raise RecordError(f"{self.source}: there is no column {name!r}; {hint}")
 
     def column(self, name: str, unit: str) -> Real:
-        """Return a column in SI that measures what a unit does.
+        """Return a column in SI, of the dimension of a unit.
 
         Parameters
         ----------
         name : str
             Of the column.
         unit : str
-            For instance ``m`` or ``mm`` for a length; the values are in SI all the same.
+            For instance ``m`` or ``mm`` for a length; the values are in SI in either case.
 
         Raises
         ------
         RecordError
-            If there is no such column, its unit is missing or unknown, or it measures something
-            else.
+            If there is no such column, its unit is missing or unknown, or it has another
+            dimension.
         """
         channel = self.channel(name)
         if channel.unit is None:
@@ -213,16 +213,16 @@ def read_record(
     columns : sequence of str or None
         Names, with units as in ``"t [s]"``, in place of the head or where there is none.
     units : mapping
-        Units of columns by name, where the file has none or a wrong one.
+        Units of columns by name, where they are missing or wrong in the file.
     delimiter : {"\t", ";", ",", " "} or None
-        What separates the cells; None: recognised.
+        Separator of the cells (default: recognized).
     decimal : {".", ","} or None
-        The decimal sign; None: recognised.
+        The decimal sign (default: recognized).
 
     Raises
     ------
     RecordError
-        If the file cannot be read or is no table of numbers.
+        If the file cannot be read or does not hold a table of numbers.
     """
     path = Path(path)
     source = path.name
@@ -317,7 +317,7 @@ def _numbers(source: str, heads: list[tuple[str, str]], table: Table) -> Real:
 
 
 def _quickly(table: Table, width: int) -> Real | None:
-    """Return the rows as numbers if all are plain ones, else None; the slow way says why."""
+    """Return the rows as numbers; None if a cell needs the slower parser, which names errors."""
     if any(len(row) != width for row in table.rows):
         return None
     text = "\n".join("\n".join(row) for row in table.rows)
@@ -352,7 +352,7 @@ def _parsed(source: str, heads: list[tuple[str, str]], table: Table) -> Iterator
 
 
 def _advice(cell: str, decimal: str) -> str:
-    """Return what is wrong with a cell that is no number, and what to do."""
+    """Return the error in a cell that is not a number, and a remedy."""
     if cell.lower() in MISSING:
         return "is no value: take the row out, or interpolate over it"
     if any(is_number(cell, other) for other in ".,"):

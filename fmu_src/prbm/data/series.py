@@ -11,11 +11,11 @@ from ..mechanics.arrays import Real
 
 FEWEST_SAMPLES = 16  # of a signal over time
 GAP = 1.8  # times the usual step; a sample that is missing makes 2, rounded times up to 1.5
-LONG = 3.0  # times the median step: what does not belong to the usual steps
+LONG = 3.0  # times the median step; longer steps do not count for the usual one
 
 
 class RecordError(PrbmError, ValueError):
-    """A file of measured data cannot be read, or does not hold what was asked for."""
+    """A file of measured data cannot be read, or lacks a column, a unit or samples."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Pictures of a mechanism, from its description alone."""
+"""The icon of a mechanism, and its drawing in a shape."""
 
 from collections.abc import Mapping
 
@@ -19,7 +19,7 @@ from .style import CHAIN, own_style, png
 STEEL, BODY, WALL, GHOST = "#1f4e79", "#9dc3e6", "#595959", "#d0d0d0"
 PIXELS = 256
 DPI = 128
-MANY = 4  # flexures; lines of more are drawn thinner
+MANY = 4  # flexures; more of them are drawn with thinner lines
 
 
 @own_style()
@@ -29,9 +29,9 @@ def icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
     Parameters
     ----------
     mechanism : Mechanism
-        What is drawn.
+        The mechanism.
     sample : mapping
-        Outputs that give the angles of the links and the places of the bodies.
+        Outputs: the angles of the links and the positions of the bodies.
     """
     figure = Figure(figsize=(PIXELS / DPI, PIXELS / DPI), dpi=DPI)
     axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
@@ -46,7 +46,7 @@ def icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
 
 
 def shape(system: System, sample: Mapping[str, float]) -> Real:
-    """Return the coordinates that outputs tell of: angles, and stretches that close the loops."""
+    """Return the coordinates of outputs: angles, and stretches that close the loops."""
     q = np.array(system.q0)
     for name, j in angles(system).items():
         q[j] = sample[name]

@@ -1,4 +1,4 @@
-"""Shapes of a mechanism whose loops are closed and whose flexures are stretched."""
+"""Shapes of a mechanism from its angles: closed loops, stretches of its flexures."""
 
 from collections.abc import Mapping
 
@@ -8,11 +8,11 @@ from ..mechanics.arrays import Complex, Real
 from ..mechanics.constraints import Rows, project_positions
 from ..mechanics.system import FIXED, System
 
-STRETCHING = 4  # corrections of stretches: they are small, and convergence is quadratic
+STRETCH_ITERATIONS = 4  # They converge quadratically, and stretches are small.
 
 
 def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) -> Real:
-    """Return the nearest shape whose loops are closed, and which touches a wall if asked to.
+    """Return the nearest shape with closed loops, which touches a wall if ``stop`` is given.
 
     Parameters
     ----------
@@ -21,9 +21,9 @@ def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) 
     q : (n,)
         Angles near that shape [rad].
     stop : int or None
-        The stop that touches.
+        The stop that touches its wall.
     wall : float
-        Where its wall is [m].
+        Position of the wall [m].
     """
     touching = [] if stop is None else [stop]
     B = np.vstack([system.loops, system.gaps[touching]])
@@ -36,14 +36,14 @@ def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) 
 def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
     """Return shapes of given angles with the stretches that close the loops and place the bodies.
 
-    The least ones, where several do (Gauss-Newton).
+    If these are not unique, they are the smallest ones (Gauss-Newton with the pseudoinverse).
 
     Parameters
     ----------
     system : System
         The mechanism.
     q : (m, n)
-        Angles [rad]; what stands for stretches is not used.
+        Angles [rad]; the entries of stretches are ignored.
     placed : mapping of str to (m,)
         Displacements of bodies from the straight shape [m].
     """
@@ -59,7 +59,7 @@ def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
         B += [frame.A[None], -1j * frame.A[None]]
         c += [short.real[:, None], short.imag[:, None]]
     rows, constants = np.vstack(B), np.hstack(c)
-    for _ in range(STRETCHING):
+    for _ in range(STRETCH_ITERATIONS):
         E = system.directions(q)
         x = (E @ rows.T).real + constants
         change = np.linalg.pinv((rows[:, arms] * E[:, None, arms]).real) @ x[:, :, None]
@@ -68,6 +68,6 @@ def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
 
 
 def angles(system: System) -> dict[str, int]:
-    """Return the coordinates by the names of their angles."""
+    """Return the indices of the coordinates by the names of their angles."""
     links = {f"link[{i}].angle": j for i, j in enumerate(system.links, start=1)}
     return links | {f"{name}.angle": frame.j for name, frame in system.bodies.items()}

@@ -1,4 +1,8 @@
-"""Colours and style of all drawings."""
+"""Colours and style of all drawings: the icon here, figures and films in ``prbm.plots``.
+
+They share colours, so that a body, a flexure or a wall looks the same in each of them, and the
+PNG encoder.  That is why this module is in ``prbm.drawing``, the lowest package that draws.
+"""
 
 import io
 from functools import partial
@@ -9,8 +13,9 @@ from matplotlib.figure import Figure
 LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
 STRAIGHT, GRID, PROBE = "#b4bcc6", "#eeeeee", "#cc79a7"
 PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
-own_style = partial(matplotlib.style.context, "default")  # whatever matplotlibrc says
-CHAIN = 9  # pivots; a flexure of more is a smooth curve already
+CHAIN = 9  # pivots; a flexure with more of them is drawn with straight lines between them
+
+own_style = partial(matplotlib.style.context, "default")  # independent of the user's matplotlibrc
 
 
 @own_style()

@@ -46,7 +46,7 @@ def _registry() -> Any:
 @cache
 def _unit(text: str) -> Any:
     """Return pint's unit for what is written; None if it is none."""
-    import pint
+    import pint  # here, because it takes a third of a second
 
     written = text.strip().translate(_SUPERSCRIPTS)
     written = PLAIN.get(written, written)

@@ -1,4 +1,4 @@
-"""Quantities with units on a command line, and the parameters and inputs that they set."""
+"""Quantities with units, written by users, and the parameters and inputs that they set."""
 
 import math
 import re
@@ -14,34 +14,8 @@ PERCENT = re.compile(r"(.*\d)\s*%")
 UNIT_ALONE = re.compile(r"[A-Za-zµμ°][^=]*|1/.*")
 
 
-REMEDIES = (  # of the library, in words of the command line
-    (re.compile(r"units=\{'([^']*)': '([^']*)'\}"), r'--unit "\1=\2"'),
-    (re.compile(r"columns=\[\.\.\.\]"), "--columns"),
-    (re.compile(r"columns=\[([^\]]*\][^\]]*\][^\]]*)\]"), r"--columns \1"),
-    (re.compile(r"(?<=\[s\]\"), (?=\"x)"), " "),
-    (re.compile(r"\(Series\.between\)"), "(--from, --to)"),
-    (re.compile(r"give Free\('([^']*)', lower, upper\)"), r"give --free \1=LOW:HIGH"),
-    (re.compile(r"fit_range = "), "--fit-range "),
-)  # fmt: skip
-
-
 class UserMistake(PrbmError, ValueError):
-    """What the user asked for cannot be done; the message says why and what to do."""
-
-
-def in_options(sentence: str) -> str:
-    r"""Return a sentence of the library with its remedies as options of the command.
-
-    Examples
-    --------
-    >>> in_options("the column 'x' has no unit: give it, units={'x': 'm'}")
-    'the column \'x\' has no unit: give it, --unit "x=m"'
-    >>> in_options('write a head, or give columns=["t [s]", "x [mm]"] and the like')
-    'write a head, or give --columns "t [s]" "x [mm]" and the like'
-    """
-    for pattern, words in REMEDIES:
-        sentence = pattern.sub(words, sentence)
-    return sentence
+    """A request of the user cannot be fulfilled; the message says why and names a remedy."""
 
 
 def quantity(text: str, unit: str, what: str) -> float:

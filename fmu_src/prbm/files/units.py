@@ -231,7 +231,7 @@ def _registry() -> Any:
 @cache
 def _unit(text: str) -> Any:
     """Return pint's unit for a unit as it is written here."""
-    import pint
+    import pint  # here, because it takes a third of a second
 
     powers = re.sub(r"(?<=[A-Za-zµμ°])\^?(-?\d+)", r"**\1", text)
     product = re.sub(r"\s*[·⋅.]\s*|(?<=[\wµμ°])\s+(?=[A-Za-zµμ°])", "*", powers.strip())

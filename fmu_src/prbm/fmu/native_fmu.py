@@ -61,9 +61,7 @@ def build(
         If the mechanism cannot start with these values, one of them makes no sense, or there is no
         compiler for a platform.
     """
-    from ..drawing import (
-        icon as picture,  # which takes matplotlib: half a second, spared until it is needed
-    )
+    from ..drawing.icon import icon  # here, because Matplotlib takes half a second
 
     changes = dict(changes or {})
     progress("checking that it starts")
@@ -91,10 +89,10 @@ def build(
     results = reference(mechanism, changes, native.variables, run, progress)
     contents |= results
     progress("drawing the icon and writing the documentation")
-    icon = picture.icon(mechanism, start_sample(mechanism, changes))
-    contents["terminalsAndIcons/icon.png"] = icon
+    png = icon(mechanism, start_sample(mechanism, changes))
+    contents["terminalsAndIcons/icon.png"] = png
     if fmi == 2:
-        contents["model.png"] = icon
+        contents["model.png"] = png
     names = sorted(platform.name for platform in compiled)
     contents["documentation/index.html"] = documentation.native_page(
         mechanism, native, fmi, names, run, bool(results)

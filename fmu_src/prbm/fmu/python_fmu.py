@@ -26,7 +26,7 @@ ROOT = __package__.rpartition(".")[0]  # the package that this one is part of
 SLAVE = "fmu.slave.slave"  # the module that the script of an FMU imports
 ENGINE = "engine"  # stands for the name of the shipped package until that is known
 INIT = '"""The engine and the slave of this FMU, with relative imports only."""\n'
-SHORT = 10  # hexadecimal digits that tell one content from another within a process
+TOKEN_DIGITS = 10  # hexadecimal digits that distinguish two contents in one process
 
 SCRIPT = '''\
 """{title}.
@@ -77,27 +77,25 @@ def build(
     Parameters
     ----------
     mechanism : Mechanism
-        What is exported.
+        The mechanism to export.
     changes : mapping
         Start values of parameters and inputs that differ from the mechanism's own.
     progress : callable
-        Is told what is being done.
+        Called with the name of each stage of the build.
 
     Raises
     ------
     PrbmError
-        If the mechanism cannot start with these values, or one of them makes no sense.
+        If the mechanism cannot start with these values, or one of them is out of bounds.
     """
-    from ..drawing import (
-        icon as picture,  # which takes matplotlib: half a second, spared until it is needed
-    )
+    from ..drawing.icon import icon  # here, because Matplotlib takes half a second
 
     changes = dict(changes or {})
     progress("checking that it starts")
     listed = interface(mechanism, changes)
     progress(f"collecting {len(listed)} variables and the engine")
     sources = dict(_sources(mechanism, listed))
-    token = f"{mechanism.name}_{_digest(sources | {'': SCRIPT.encode()})[:SHORT]}"
+    token = f"{mechanism.name}_{_digest(sources | {'': SCRIPT.encode()})[:TOKEN_DIGITS]}"
     progress("drawing the icon and writing the documentation")
     contents = {f"resources/{path}": text for path, text in _named(mechanism, token, sources)}
     contents |= dict(_binaries(mechanism.name))
@@ -108,7 +106,7 @@ def build(
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
     contents["documentation/index.html"] = documentation.page(mechanism, listed, run).encode()
-    contents["model.png"] = picture.icon(mechanism, start_sample(mechanism, changes))
+    contents["model.png"] = icon(mechanism, start_sample(mechanism, changes))
     progress("packing")
     return zipped(contents)
 
@@ -122,7 +120,7 @@ def _digest(files: Mapping[str, bytes]) -> str:
 
 
 def _sources(mechanism: Mechanism, listed: tuple[Variable, ...]) -> Iterator[tuple[str, bytes]]:
-    """Yield what the FMU computes with: its name depends on all of this."""
+    """Yield the data and modules of the simulation; the name of the package depends on them."""
     data = json.dumps(resolved(mechanism, listed), indent=1, sort_keys=True)
     yield FILE, data.encode()
     yield f"{ENGINE}/__init__.py", INIT.encode()
@@ -166,7 +164,7 @@ def _imported(source: bytes, package: Sequence[str]) -> Iterator[str]:
 def _named(
     mechanism: Mechanism, token: str, sources: Mapping[str, bytes]
 ) -> Iterator[tuple[str, bytes]]:
-    """Yield the resources under names that no other FMU in the process has."""
+    """Yield the resources under names that are unique to the FMU and its content."""
     package = f"prbm_{token}"
     for path, content in sources.items():
         first, slash, rest = path.partition("/")
@@ -183,7 +181,7 @@ def _named(
 
 
 def _plain(title: str) -> str:
-    """Return a title that cannot leave the docstring it is put into."""
+    """Return a title without characters that would end the docstring around it."""
     return printable(title).replace("\\", "/").replace('"', "'").rstrip(".")
 
 
@@ -200,7 +198,7 @@ def _folder(package: str, *parts: str) -> Traversable:
 
 
 def _licenses() -> Iterator[tuple[str, bytes]]:
-    """Yield the licences of all that is inside."""
+    """Yield the licences of the engine and of pythonfmu."""
     for name in ("prbm-impact.txt", "pythonfmu.txt"):
         text = _folder(__package__, "licenses", name).read_bytes()
         yield f"documentation/licenses/{name}", text

@@ -1,4 +1,4 @@
-"""Figures of results, for reports: they belong to no window and follow no matplotlibrc."""
+"""Figures of results for reports, without a window and independent of any matplotlibrc."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,14 +17,14 @@ from ..runs.marks import Mark, marks
 from ..runs.result import Columns, Result, ResultError, column, names
 from .scene import plain
 
-ENERGIES = {  # one colour each, also for those who see colours differently
+ENERGIES = {  # Colours that colour-blind readers can distinguish.
     "kinetic": "#0072b2",
     "elastic": "#d55e00",
     "gravitational": "#009e73",
     "dissipated": "#cc79a7",
     "work": "#e69f00",
 }
-PANEL_HEIGHT, WIDTH = 1.9, 8.0  # inches
+PANEL_HEIGHT, WIDTH = 1.9, 8.0  # Inches.
 
 Panel = Callable[[Axes, "_Plot"], None]
 
@@ -41,7 +41,7 @@ def panels(
 
 
 class _Plot:
-    """What the panels of a figure share."""
+    """Data shared by the panels of a figure."""
 
     def __init__(self, result: Result | Columns, mechanism: Mechanism) -> None:
         self.columns = result.columns if isinstance(result, Result) else result
@@ -52,7 +52,7 @@ class _Plot:
         self.time: Real = self.factor * self.columns["time"]
 
     def has(self, *wanted: str) -> bool:
-        """Tell whether columns were recorded."""
+        """Return whether columns were recorded."""
         return all(name in names(self.columns) for name in wanted)
 
     def along(self, x: str, y: str) -> Real:
@@ -69,27 +69,28 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
     Parameters
     ----------
     result : Result or structured array
-        Of :func:`prbm.runs.run.simulate`, or of FMPy.
+        Result of :func:`prbm.runs.run.simulate`, or of FMPy.
     mechanism : Mechanism or None
-        What moved; a :class:`~prbm.runs.result.Result` knows it.
+        The mechanism; not needed for a :class:`~prbm.runs.result.Result`.
 
     Returns
     -------
     Figure
-        With a panel for everything that was recorded: displacement and velocity of the
-        released body along the direction of its release, closing and opening speeds of the
-        impacts, energies.  The sum of the energies less the work is constant.  Times at which
-        a stop holds are shaded.
+        One panel for each recorded quantity: displacement and velocity of the released body along
+        the direction of its release, closing and opening speeds of the impacts, energies.  The sum
+        of the energies less the work is constant.  Times at which a stop holds are shaded.
 
     Raises
     ------
     ResultError
-        If the mechanism is not given, or nothing of this was recorded.
+        If the mechanism is not given, or none of these quantities was recorded.
     """
     if isinstance(result, Result):
         mechanism = result.mechanism
     if mechanism is None:
-        raise ResultError("whose result is it? give the mechanism: response(result, mechanism)")
+        raise ResultError(
+            "the result has no mechanism; give the mechanism: response(result, mechanism)"
+        )
     plot = _Plot(result, mechanism)
     body = mechanism.release.body
     drawn: list[Panel] = []
@@ -112,7 +113,7 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
         _shade_rest(axes, plot)
         panel(axes, plot)
         plain(axes)
-    above = 20.0 if drawn[0] is _energies else None  # points; its legend is there
+    above = 20.0 if drawn[0] is _energies else None  # Room for the legend [points].
     every[0].set_title(mechanism.title, fontsize=11, loc="left", pad=above)
     every[-1].set_xlabel(f"time [{plot.unit}]")
     every[-1].set_xlim(plot.time[0], plot.time[-1])
@@ -121,7 +122,7 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
 
 
 def save(figure: Figure, path: str | Path) -> Path:
-    """Write a figure to a PNG file, whole or not at all; return its path.
+    """Write a figure to a PNG file, completely or not at all; return its path.
 
     Raises
     ------
@@ -162,7 +163,7 @@ def _velocity(axes: Axes, plot: _Plot) -> None:
 
 
 def _speeds(axes: Axes, plot: _Plot) -> None:
-    """Plot the speeds of the impacts; equal ratios are equal distances."""
+    """Plot the speeds of the impacts on a logarithmic scale."""
     kinds: dict[str, tuple[str, str, Callable[[Mark], float]]] = {
         "closing": ("v", IMPACT, lambda mark: mark.speed),
         "opening": ("^", PAST, lambda mark: mark.rebound),
@@ -186,7 +187,7 @@ def _energies(axes: Axes, plot: _Plot) -> None:
             axes.plot(plot.time, energy, color=color, linewidth=1.2, label=name)
     axes.plot(plot.time, total, "--", color="black", linewidth=1.0, label="sum - work")
     axes.set_ylabel("energy [mJ]")
-    axes.legend(  # above: six curves leave no room between them
+    axes.legend(  # Above the panel: there is no room between six curves.
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, fontsize=9, frameon=False,
         borderaxespad=0.0, columnspacing=1.4, handlelength=1.6,
     )  # fmt: skip

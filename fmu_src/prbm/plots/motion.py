@@ -1,8 +1,8 @@
-"""The motion in a result, and which of its times a film shows.
+"""The motion in a result, and the times of the frames of a film.
 
-The angles of the links and bodies are all there is to know about a shape whose links do not
-stretch; stretches follow from the loops and the places of the bodies.  So a result of the engine
-and one of FMPy give the same motion, if FMPy recorded what is :func:`needed`.
+The angles of links and bodies determine the shape of a mechanism without stretching links.
+Stretches follow from the loops and the displacements of the bodies.  A result of FMPy with the
+variables of :func:`needed` therefore gives the same motion as a result of the engine.
 """
 
 import math
@@ -23,13 +23,13 @@ from ..mechanism.parts import value
 from ..runs.marks import Mark, marks
 from ..runs.result import Columns, Result, ResultError, column, names
 
-PREFERRED_LENGTH = 10.0  # s of film, if the factor of slow motion is not given
-FPS = 25.0  # frames per second
-FASTEST = 50.0  # frames per second; viewers of GIF files slow down what is faster
-MOST_FRAMES = 5000
-MOVES = 5e-3  # of the largest turn: less than that, which is a pixel or two, is no motion
-STAYS = 0.15  # of the motion, how long its end is shown
-OPEN = 1e-6  # of the size: loops that stand open by more are those of another mechanism
+FILM_LENGTH = 10.0  # Length of a film without a given factor of slow motion [s].
+FPS = 25.0  # Frames per second.
+FPS_MAX = 50.0  # Viewers of GIF files slow down faster films.
+FRAMES_MAX = 5000
+MOTION_RTOL = 5e-3  # Smaller motions, relative to the largest rotation, are a pixel or two.
+END_SHARE = 0.15  # Time after the end of the motion, as a share of the motion.
+LOOP_OPEN_RTOL = 1e-6  # Larger openings of the loops, relative to the size: another mechanism.
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Motion:
     Parameters
     ----------
     system : System
-        The mechanism that moves.
+        The moving mechanism.
     time : (m,)
         Increasing [s].
     q : (m, n)
@@ -47,7 +47,7 @@ class Motion:
     walls : (m, s)
         Positions of the walls along the directions of their stops, from straight [m].
     holds : (m, s) bool
-        Which stops hold (resting contact).
+        Whether each stop holds (resting contact).
     marks : tuple of Mark
         The impacts, in order.
     """
@@ -60,13 +60,13 @@ class Motion:
     marks: tuple[Mark, ...]
 
     def shape(self, t: float) -> tuple[Real, Real]:
-        """Return the angles and the positions of the walls at a time, the loops closed."""
+        """Return angles that close the loops, and the positions of the walls, at a time."""
         q = np.array([np.interp(t, self.time, x) for x in self.q.T])
         walls = np.array([np.interp(t, self.time, x) for x in self.walls.T])
         return closed(self.system, q), walls
 
     def holding(self, t: float) -> NDArray[np.bool_]:
-        """Return which stops hold at a time."""
+        """Return whether each stop holds at a time."""
         row = int(np.searchsorted(self.time, t, side="right")) - 1
         held: NDArray[np.bool_] = self.holds[max(row, 0)]
         return held
@@ -83,22 +83,22 @@ def _gaps(system: System, q: Real) -> Real:
 
 
 def needed(mechanism: Mechanism) -> list[str]:
-    """Return the variables that an animation of a mechanism needs, for FMPy's ``output``."""
+    """Return the variables for an animation of a mechanism, for FMPy's ``output``."""
     system = assemble(mechanism, mechanism.values())
     places = [f"{name}.{axis}" for name in system.bodies for axis in "xy"]
     return (
         list(angles(system))
         + (places if len(system.stretches) else [])
         + [
-            f"{stop.name}.{what}"
+            f"{stop.name}.{variable}"
             for stop in mechanism.stops
-            for what in ("gap", "contact", "impact_count", "impact_time", "approach_speed")
+            for variable in ("gap", "contact", "impact_count", "impact_time", "approach_speed")
         ]
     )
 
 
 def fmpy_command(mechanism: Mechanism) -> str:
-    """Return the command with which FMPy records what an animation of a mechanism needs."""
+    """Return the command with which FMPy records the variables for an animation."""
     variables = " ".join(f'"{name}"' for name in needed(mechanism))
     return (
         f"fmpy simulate {mechanism.name}.fmu --output-file result.csv "
@@ -116,23 +116,25 @@ def motion(
     Parameters
     ----------
     result : Result or structured array
-        Of :func:`prbm.runs.run.simulate`, or of FMPy.
+        Result of :func:`prbm.runs.run.simulate`, or of FMPy.
     mechanism : Mechanism or None
-        What moved; a :class:`Result` knows it.
+        The mechanism; not needed for a :class:`Result`.
     values : mapping or None
-        Parameters that differed from their defaults; a :class:`Result` knows them.
+        Parameters that differed from their defaults; not needed for a :class:`Result`.
 
     Raises
     ------
     ResultError
-        If the mechanism is not given, columns are missing or the shapes are not its own.
+        If the mechanism is not given, columns are missing, or the shapes do not fit to it.
     """
     if isinstance(result, Result):
         columns, mechanism, values = result.columns, result.mechanism, result.values
     else:
         columns = result
     if mechanism is None:
-        raise ResultError("whose result is it? give the mechanism: motion(result, mechanism)")
+        raise ResultError(
+            "the result has no mechanism; give the mechanism: motion(result, mechanism)"
+        )
     known = mechanism.values()
     system = assemble(
         mechanism, mechanism.values({k: x for k, x in (values or {}).items() if k in known})
@@ -144,15 +146,15 @@ def motion(
     missing = [name for name in columns_of if name not in names(columns)]
     if missing:
         raise ResultError(
-            f"the result lacks {', '.join(missing)}; record what an animation needs, in Python "
-            "with simulate_fmu(..., output=prbm.plots.motion.needed(mechanism)), on the command "
-            f"line with\n{fmpy_command(mechanism)}"
+            f"the result lacks {', '.join(missing)}; record the variables for an animation, in "
+            "Python with simulate_fmu(..., output=prbm.plots.motion.needed(mechanism)), on the "
+            f"command line with\n{fmpy_command(mechanism)}"
         )
     q = np.zeros((len(time), system.n))
     for name, j in columns_of.items():
         q[:, j] = columns[name]
     if not np.isfinite(q).all():
-        raise ResultError("the result holds angles that are no numbers")
+        raise ResultError("the result has angles that are not finite numbers")
     q = stretched(system, q, _placed(system, columns))
     _check_loops(system, q)
     stops = range(len(mechanism.stops))
@@ -163,7 +165,7 @@ def motion(
 
 
 def _placed(system: System, columns: Columns) -> dict[str, Complex]:
-    """Return the displacements of the bodies that were recorded [m]."""
+    """Return the recorded displacements of bodies [m]."""
     return {
         name: columns[f"{name}.x"] + 1j * columns[f"{name}.y"]
         for name in system.bodies
@@ -172,9 +174,9 @@ def _placed(system: System, columns: Columns) -> dict[str, Complex]:
 
 
 def _check_loops(system: System, q: Real) -> None:
-    """Refuse shapes that are not closed: the result of another mechanism or other lengths."""
+    """Reject shapes with open loops: the mechanism or its lengths are different ones."""
     opened = np.abs((system.directions(q) @ system.loops.T).real + system.loops_c)
-    if opened.size and opened.max() > OPEN * system.length:
+    if opened.size and opened.max() > LOOP_OPEN_RTOL * system.length:
         raise ResultError(
             f"the loops of {system.mechanism.name} stand open by {opened.max():.3g} m in the "
             "result: is it of this mechanism, and were all lengths given that differ from the "
@@ -183,7 +185,7 @@ def _check_loops(system: System, q: Real) -> None:
 
 
 def _wall(system: System, i: int, columns: Columns, q: Real) -> Real:
-    """Return where a wall is, from the gap if it was recorded."""
+    """Return the positions of a wall, from the gap if it was recorded."""
     stop = system.mechanism.stops[i]
     if f"{stop.name}.gap" in names(columns):
         recorded: Real = columns[f"{stop.name}.gap"] - _gaps(system, q)[:, i]
@@ -202,7 +204,7 @@ def _holds(system: System, i: int, columns: Columns) -> NDArray[np.bool_]:
 
 
 def _with_impacts(motion: Motion, result: Result | Columns) -> Motion:
-    """Return the motion with the shapes at the impacts, which touch, among the others."""
+    """Return the motion with additional shapes at the impacts, in which the stops touch."""
     if not motion.marks:
         return motion
     exact = {}
@@ -226,18 +228,18 @@ def _with_impacts(motion: Motion, result: Result | Columns) -> Motion:
 
 @dataclass(frozen=True)
 class Film:
-    """Which times a film shows.
+    """Times of the frames of a film.
 
     Parameters
     ----------
     times : (k,)
-        Time of each frame [s]; impacts move the frame nearest to them onto themselves.
+        Time of each frame [s]; the frame nearest to an impact is at the time of the impact.
     slow : float
         Factor of slow motion [-].
     fps : float
         Frames per second.
     hits : dict of int to Mark
-        The impacts that are seen, by frame: the fastest, where several fall on one.
+        The visible impacts by frame; of several impacts in one frame, the fastest.
     """
 
     times: Real
@@ -258,19 +260,19 @@ def film(
     Parameters
     ----------
     motion : Motion
-        What is shown.
+        The motion.
     slow : float or None
-        Factor of slow motion [-]; None: a round one for a film of about ten seconds.
+        Factor of slow motion [-]; None: a round factor for a film of about ten seconds.
     fps : float
         Frames per second.
     start, stop : float or None
-        Part of the motion that is shown [s]; None: from its start, to its end or until shortly
-        after nothing moves any longer.
+        Part of the motion [s]; None: from its start, to its end or until shortly after the
+        mechanism comes to rest.
 
     Raises
     ------
     ParameterError
-        If there is nothing to show, or too much.
+        If the film has fewer than two or more than :data:`FRAMES_MAX` frames.
     """
     first, last = float(motion.time[0]), float(motion.time[-1])
     a = first if start is None else start
@@ -279,17 +281,17 @@ def film(
         raise ParameterError(
             f"start = {a:g} s, stop = {b:g} s: choose a span within {first:g} s to {last:g} s"
         )
-    if not 1.0 <= fps <= FASTEST:
-        raise ParameterError(f"fps = {fps:g} must lie between 1 and {FASTEST:g} per second")
+    if not 1.0 <= fps <= FPS_MAX:
+        raise ParameterError(f"fps = {fps:g} must lie between 1 and {FPS_MAX:g} per second")
     if slow is None:
-        slow = round_factor(PREFERRED_LENGTH / (b - a))
+        slow = round_factor(FILM_LENGTH / (b - a))
     if not (math.isfinite(slow) and slow > 0.0):
         raise ParameterError(f"slow = {slow:g} must be positive and finite")
     count = math.floor((b - a) * slow * fps * (1.0 + 1e-12)) + 1
-    if not 2 <= count <= MOST_FRAMES:
+    if not 2 <= count <= FRAMES_MAX:
         raise ParameterError(
             f"slow = {slow:g} makes a film of {count} frames; choose a factor that makes 2 to "
-            f"{MOST_FRAMES}, about {round_factor(PREFERRED_LENGTH / (b - a)):g} for ten seconds"
+            f"{FRAMES_MAX}, about {round_factor(FILM_LENGTH / (b - a)):g} for ten seconds"
         )
     spacing = 1.0 / (slow * fps)
     times = a + spacing * np.arange(count, dtype=np.float64)
@@ -304,19 +306,19 @@ def film(
 
 
 def _ending(motion: Motion, start: float) -> float:
-    """Return when a film that begins at a time may end: shortly after the last that moves [s]."""
+    """Return the end of a film: shortly after the last motion [s]."""
     time, last = motion.time, float(motion.time[-1])
     places = np.hstack([motion.q, motion.walls / motion.system.length])
-    least = MOVES * float(np.ptp(motion.q, axis=0).max())
+    least = MOTION_RTOL * float(np.ptp(motion.q, axis=0).max())
     moving = np.flatnonzero(np.abs(places - places[-1]).max(axis=1) > least)
     if not len(moving):
         return last
     end = float(time[moving[-1]])
-    return min(last, end + STAYS * (end - start)) if end > start else last
+    return min(last, end + END_SHARE * (end - start)) if end > start else last
 
 
 def round_factor(x: float) -> float:
-    """Return the power of ten times 1, 2 or 5 that is nearest in ratio.
+    """Return the number 1, 2 or 5 times a power of ten that is nearest in ratio.
 
     Examples
     --------

@@ -48,14 +48,14 @@ COLOURS = (
     "#ffffff",
     "#000000",
 )
-MARGIN = 0.06  # of the mechanism's size, around the motion
-FLASH = 0.28  # s of the film that a flash takes to fade
-SMALLEST_FLASH, LARGEST_FLASH = 8.0, 34.0  # points
-SIZE, DPI = (8.0, 6.4), 100  # inches; even numbers of pixels, which video codecs want
+MARGIN = 0.06  # Around the motion, as a share of the size of the mechanism.
+FLASH = 0.28  # Time of the film in which a flash fades [s].
+FLASH_MIN, FLASH_MAX = 8.0, 34.0  # Sizes of flashes [points].
+SIZE, DPI = (8.0, 6.4), 100  # Inches; video codecs need even numbers of pixels.
 
 
 def quiet(axes: Axes) -> None:
-    """Keep the frame of a plot in the background."""
+    """Draw the frame and the grid of a plot in pale colours."""
     axes.tick_params(labelsize=8, colors="#606060")
     axes.set_axisbelow(True)
     axes.grid(color=GRID, linewidth=0.6)
@@ -76,16 +76,16 @@ class Scene:
     Parameters
     ----------
     motion : Motion
-        What moves.
+        The motion.
     film : Film
-        Which times are shown.
+        Times of the frames.
     figure : Figure or None
-        Where to draw; None: a new figure, which belongs to no window.
+        Figure to draw in; None: a new figure without a window.
 
     Attributes
     ----------
     links, curves, bodies, hits, walls : dict of str to artist
-        What moves, by the names of flexures, bodies and stops, in the unit of the axes.
+        Moving artists by the names of flexures, bodies and stops, in the unit of the axes.
     """
 
     @own_style()
@@ -116,7 +116,7 @@ class Scene:
         self.moving.append(self.text)
         self.moving.sort(key=lambda artist: artist.get_zorder())
 
-    # -- what stands still --
+    # -- fixed parts --
 
     def _set_stage(self) -> None:
         stage = self.stage
@@ -199,7 +199,7 @@ class Scene:
         return line
 
     def _set_limits(self) -> None:
-        """Make room for everything that the film shows."""
+        """Set limits of the axes that contain the whole film."""
         rows = np.unique(np.linspace(0, len(self.film.times) - 1, 60).astype(int))
         places = []
         for t in (self.film.times[0], self.film.times[-1], *self.film.times[rows]):
@@ -268,10 +268,10 @@ class Scene:
                     color=REST, alpha=0.13, linewidth=0, zorder=0,
                 )  # fmt: skip
 
-    # -- what moves --
+    # -- moving parts --
 
     def frame(self, k: int) -> list[Artist]:
-        """Draw a frame and return what moves, the lowest first."""
+        """Draw a frame; return the moving artists, the lowest first."""
         t = float(self.film.times[k])
         q, walls = self.motion.shape(t)
         holding = self.motion.holding(t)
@@ -302,7 +302,7 @@ class Scene:
         line.set_data(z.real, z.imag)
 
     def _flash(self, flash: Line2D, stop: int, k: int, place: Complex) -> None:
-        """Show the last impact at a stop while it fades, larger if it was fast."""
+        """Draw a fading flash after an impact at a stop; faster impacts have larger flashes."""
         fade = max(2, round(FLASH * self.film.fps))
         fastest = max((mark.speed for mark in self.film.hits.values()), default=0.0)
         flash.set_visible(False)
@@ -310,7 +310,7 @@ class Scene:
             mark = self.film.hits.get(k - age)
             if mark is not None and mark.stop == stop:
                 strength = math.sqrt(mark.speed / fastest) if fastest else 1.0
-                size = SMALLEST_FLASH + (LARGEST_FLASH - SMALLEST_FLASH) * strength
+                size = FLASH_MIN + (FLASH_MAX - FLASH_MIN) * strength
                 self._move(flash, place)
                 flash.set_markersize(size * (1.0 - 0.5 * age / fade))
                 flash.set_alpha(1.0 - age / fade)
@@ -342,12 +342,12 @@ class Scene:
 
 
 def pictures(scene: Scene, frames: Iterable[int] | None = None) -> Iterator[NDArray[np.uint8]]:
-    """Yield frames of a scene, all of them or the given ones, as (height, width, 3) arrays."""
+    """Yield all or the given frames of a scene as arrays of shape (height, width, 3)."""
     canvas = scene.figure.canvas
     assert isinstance(canvas, FigureCanvasAgg)
     for artist in scene.moving:
         artist.set_animated(True)
-    with own_style():  # here axes make their ticks
+    with own_style():  # The axes create their ticks here.
         canvas.draw()  # type: ignore[no-untyped-call]
     background = canvas.copy_from_bbox(scene.figure.bbox)  # type: ignore[no-untyped-call]
     for k in range(len(scene.film.times)) if frames is None else frames:

@@ -1,1 +1,1 @@
-"""Simulations of a mechanism: default experiment, result, headline."""
+"""Simulations of a mechanism: default experiment, result, impacts, headline."""

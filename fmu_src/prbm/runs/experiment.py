@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from ..hybrid.simulation import Simulation
 from ..mechanism.description import Mechanism
 
-MOST_PERIODS = 1000.0  # of the time scale of a mechanism in the default experiment of one second
-PERIODS = 10.0  # in that of a mechanism that is slower than one, or faster than the other
-POINTS = 1000  # communication steps of the default experiment
+PERIODS_MAX = 1000.0  # of the fundamental mode in a default experiment of one second
+PERIODS = 10.0  # about as many for mechanisms with less than one period, or more, in a second
+STEPS = 1000  # communication steps of the default experiment
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """How long a mechanism is simulated unless one says otherwise.
+    """Duration and communication step of a simulation.
 
     Parameters
     ----------
@@ -26,42 +26,43 @@ class Experiment:
 
     @property
     def step(self) -> float:
-        """Distance of the communication points [s]."""
-        return float(f"{self.stop_time / POINTS:.12g}")
+        """Communication step [s]."""
+        return float(f"{self.stop_time / STEPS:.12g}")
 
 
 def experiment(mechanism: Mechanism, values: Mapping[str, float] | None = None) -> Experiment:
-    """Return the default experiment of a mechanism: a second, if that shows its motion.
+    """Return the default experiment of a mechanism.
 
-    A second of what has less than one period in it, or more than a thousand, would show too little
-    of the motion, or nothing but vibrations: there it is about ten periods, 1, 2 or 5 times a
-    power of ten.
+    It takes one second if that is between one and a thousand periods of the fundamental mode.
+    Otherwise it takes about ten periods: 1, 2 or 5 times a power of ten.
 
     Parameters
     ----------
-    mechanism, values
-        As :func:`simulate` has them.
+    mechanism : Mechanism
+        The mechanism.
+    values : mapping or None
+        Parameters and inputs that differ from their defaults.
 
     Raises
     ------
     ParameterError, EquilibriumError
-        If it cannot start with these values.
+        If the mechanism cannot start with these values.
     """
     _, rate, _ = Simulation(mechanism, values).magnitudes()
-    return Experiment(_span(rate / (2 * math.pi)))
+    return Experiment(_duration(rate / (2 * math.pi)))
 
 
-def _span(frequency: float) -> float:
-    """Return the duration of the default experiment at a frequency [Hz], [s].
+def _duration(frequency: float) -> float:
+    """Return the duration of the default experiment [s] at a fundamental frequency [Hz].
 
     Examples
     --------
-    >>> _span(4.9), _span(0.9), _span(9.2e4)
+    >>> _duration(4.9), _duration(0.9), _duration(9.2e4)
     (1.0, 10.0, 0.0001)
     """
-    if 1.0 <= frequency <= MOST_PERIODS:
+    if 1.0 <= frequency <= PERIODS_MAX:
         return 1.0
     wanted = math.log10(PERIODS / frequency)
     exponents = range(math.floor(wanted), math.floor(wanted) + 2)
-    round_ones = [float(f"{digit}e{k}") for k in exponents for digit in (1, 2, 5)]
-    return min(round_ones, key=lambda span: abs(math.log10(span) - wanted))
+    round_numbers = [float(f"{digit}e{k}") for k in exponents for digit in (1, 2, 5)]
+    return min(round_numbers, key=lambda x: abs(math.log10(x) - wanted))

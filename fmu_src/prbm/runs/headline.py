@@ -1,4 +1,4 @@
-"""What a result says, line by line: frequency, place of rest, impacts, rest on a stop."""
+"""The headline of a result: frequency, free rest position, impacts, rest on a stop."""
 
 from collections.abc import Mapping
 
@@ -11,13 +11,20 @@ from .marks import marks
 from .result import Columns, column, rest_time
 
 FREQUENCY = "mode.frequency"
-SHORT = 0.1  # s; the times of a run that is shorter are not told in seconds
+SECONDS_MIN = 0.1  # s; the times of a shorter run have a smaller unit
 
 
 def length(x: float, size: float) -> str:
-    """Return a length in mm, or what is handy in a smaller mechanism, to a hundredth.
+    """Return a length [m] with two decimals, in mm or in the unit of a smaller mechanism.
 
-    There is no negative zero.
+    A negative zero loses its sign.
+
+    Parameters
+    ----------
+    x : float
+        The length [m].
+    size : float
+        Size of the mechanism [m].
 
     Examples
     --------
@@ -29,26 +36,33 @@ def length(x: float, size: float) -> str:
 
 
 def instant(t: float, span: float, digits: int) -> str:
-    """Return a time of a run in seconds, or what is handy if that is short.
+    """Return a time of a run in seconds, or in a smaller unit if the run is short.
+
+    Parameters
+    ----------
+    t, span : float
+        The time, and the duration of the run [s].
+    digits : int
+        Number of decimals.
 
     Examples
     --------
     >>> instant(0.0349812, 1.0, 5), instant(2.71034e-6, 1e-4, 3)
     ('0.03498 s', '2.710 µs')
     """
-    factor, unit = (1.0, "s") if span >= SHORT else time_unit(span)
+    factor, unit = (1.0, "s") if span >= SECONDS_MIN else time_unit(span)
     return f"{factor * t:.{digits}f} {unit}"
 
 
-def told(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
-    """Return what happened, line by line.
+def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
+    """Return a summary of a result, line by line.
 
     Parameters
     ----------
     columns : structured array
         Of :func:`prbm.runs.run.simulate`, or of FMPy, with all outputs.
     mechanism : Mechanism
-        What moved.
+        The mechanism that was simulated.
     values : mapping
         Its parameters and inputs at the start.
 
@@ -82,7 +96,7 @@ def told(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]) ->
 
 
 def _free(columns: Columns, system: System) -> list[str]:
-    """Tell about the equilibrium without stops, if it is one that lasts."""
+    """Return the lines about the equilibrium without stops."""
     frequency = column(columns, FREQUENCY)[0]
     if frequency == 0.0:
         weight = " under gravity" if system.gravity else ""
@@ -99,11 +113,12 @@ def _free(columns: Columns, system: System) -> list[str]:
 
 
 def _along(direction: float) -> str:
+    """Return the direction of a displacement [degrees] in words, nothing for that of x."""
     return "" if direction == 0.0 else f" along {direction:g} degrees"
 
 
 def _place(columns: Columns, system: System) -> str:
-    """Tell where the released body is at the end."""
+    """Return the position of the released body at the end."""
     body, direction = system.mechanism.release.body, system.mechanism.release.direction
     x, y = (float(column(columns, f"{body}.{axis}")[-1]) for axis in "xy")
     u = unit(direction)

@@ -11,18 +11,18 @@ from .result import Columns, Result, names
 
 @dataclass(frozen=True)
 class Mark:
-    """An impact to mark.
+    """An impact, for figures and headlines.
 
     Parameters
     ----------
     stop : int
-        Which stop.
+        Number of the stop.
     time : float
-        [s].
+        Time of the impact [s].
     speed, rebound : float
-        How fast it closed, and opened afterwards [m/s]; the latter NaN if not recorded.
+        Closing speed before and opening speed after it [m/s]; the latter is NaN if not recorded.
     count : int
-        Number of impacts at the stop, up to this one.
+        Number of impacts at the stop, including this one.
     """
 
     stop: int
@@ -35,8 +35,8 @@ class Mark:
 def marks(result: Result | Columns, mechanism: Mechanism) -> tuple[Mark, ...]:
     """Return the impacts of a result in order.
 
-    All of them if they were recorded; of FMPy's columns, the last one in each step.  Without
-    the columns for it, none.
+    A result of the engine has all of them; columns of FMPy have the last one of each step, or none
+    if the outputs of the impacts were not recorded.
     """
     if isinstance(result, Result) and result.impacts:
         numbers = {stop.name: i for i, stop in enumerate(mechanism.stops)}
@@ -56,7 +56,7 @@ def marks(result: Result | Columns, mechanism: Mechanism) -> tuple[Mark, ...]:
 
 
 def _latched(i: int, columns: Columns, mechanism: Mechanism) -> Iterator[Mark]:
-    """Yield the impacts at a stop that its latched outputs show."""
+    """Yield the impacts at a stop that changed its latched outputs."""
     stop = mechanism.stops[i].name
     needed = [f"{stop}.{what}" for what in ("impact_count", "impact_time", "approach_speed")]
     if any(name not in names(columns) for name in needed):

@@ -14,26 +14,29 @@ from ..hybrid.simulation import Impact
 from ..mechanism.description import Mechanism
 
 Columns = NDArray[Any]
+BOOLEANS = {"true": 1.0, "false": 0.0}  # as some tools write them
 
 
 class ResultError(PrbmError, ValueError):
-    """A result lacks what is asked of it, or is no result of the mechanism."""
+    """A result lacks a column, cannot be read, or belongs to another mechanism."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """A mechanism, what it was given, and what it did.
+    """The result of a simulation.
+
+    ``result["shuttle.x"]`` is a column by its name.
 
     Parameters
     ----------
     mechanism : Mechanism
-        What moved.
+        The mechanism that was simulated.
     values : mapping
         All its parameters at the start, and the inputs that were given then.
     columns : (m,) structured array
-        ``time`` and the variables by name, in SI units, one row a communication point.
+        ``time`` and the variables by name, in SI units, one row per communication point.
     impacts : tuple of Impact
-        All impacts in order, with the state around each, as far as they were recorded.
+        All impacts in order, with the states before and after each; empty for results of FMPy.
     """
 
     mechanism: Mechanism
@@ -52,7 +55,7 @@ def column(columns: Columns, name: str) -> Columns:
     Raises
     ------
     ResultError
-        If there is none of that name.
+        If there is no column of that name.
     """
     if name not in names(columns):
         raise ResultError(
@@ -82,16 +85,13 @@ def structured(rows: Iterable[Mapping[str, float | int | bool]]) -> Columns:
     return np.array([tuple(row.values()) for row in table], dtype)
 
 
-WORDS = {"true": 1.0, "false": 0.0}
-
-
 def read_csv(path: str | Path) -> Columns:
-    """Read a result from a CSV file as FMPy writes it: names, then a row for every time.
+    """Read a result from a CSV file as FMPy writes it: names, then one row per time.
 
     Raises
     ------
     ResultError
-        If the file cannot be read or is no such table; the message names the line.
+        If the file cannot be read or has another layout; the message names the line.
     """
     path = Path(path)
     try:
@@ -116,16 +116,21 @@ def read_csv(path: str | Path) -> Columns:
                 f"{path}: row {number} has {len(line)} values for {len(header)} columns"
             )
         try:
-            rows.append(tuple(WORDS[x.lower()] if x.lower() in WORDS else float(x) for x in line))
+            rows.append(tuple(_number(x) for x in line))
         except ValueError:
             raise ResultError(f"{path}: row {number} holds what is no number") from None
     return np.array(rows, [(name, np.float64) for name in header])
 
 
-def rest_time(columns: Columns, stop: str = "stop") -> float | None:
-    """Return the first recorded time from which on a stop holds to the end of the result [s].
+def _number(cell: str) -> float:
+    """Return the number in a cell, 1 or 0 for a Boolean."""
+    return BOOLEANS[cell.lower()] if cell.lower() in BOOLEANS else float(cell)
 
-    None if it does not hold at the end.
+
+def rest_time(columns: Columns, stop: str = "stop") -> float | None:
+    """Return the first recorded time of the last hold at a stop [s].
+
+    It is None if the stop does not hold at the end of the result.
 
     Examples
     --------

@@ -11,7 +11,7 @@ from .experiment import experiment
 from .result import Result, structured
 
 Source = Callable[[float], Mapping[str, float]]
-STEPS_MAX = 10_000_000  # More steps than this are a mistake in the unit of the step.
+ROWS_MAX = 10_000_000  # More communication points are a mistake in the unit of the step.
 LAST_STEP_RTOL = 1e-9  # A last step below this fraction of a communication step is round-off.
 
 
@@ -101,7 +101,7 @@ def communication_points(stop_time: float, step: float) -> list[float]:
         if not (math.isfinite(value) and value > 0.0):
             raise ParameterError(f"{name} = {value:g} s must be positive and finite")
     steps = math.ceil(stop_time / step - LAST_STEP_RTOL)
-    if steps > STEPS_MAX:
+    if steps > ROWS_MAX:
         raise ParameterError(
             f"step = {step:g} s makes {steps} steps in {stop_time:g} s: choose a larger one"
         )

@@ -2,9 +2,9 @@
 
     prbm sweep PRBDM2R.fmu table.csv --output "max(shuttle.x)" --stop-time 1
 
-A row of the table is a run of the FMU, a column a variable that it is started with.  The runs are
-spread over the cores of this machine, or over the workers of a ``distributed`` scheduler by its
-address.  What is done is on disk: a sweep that was killed goes on where it was.  A run that fails
+A row of the table is a run of the FMU, and a column is the start value of a variable.  The runs are
+distributed over the cores of this machine, or over the workers of a ``distributed`` scheduler at a
+given address.  Completed runs are on disk: an interrupted sweep continues from there.  A failed run
 is a row with its message.
 """
 
@@ -29,7 +29,7 @@ import fmpy  # type: ignore[import-untyped]
 
 from ..base.errors import ParameterError, PrbmError
 from ..base.progress import Progress
-from ..runs.run import STEPS_MAX
+from ..runs.run import ROWS_MAX
 from .runs import CRASHED, GOOD, Job, Outcome, Output, SpecificationError, parsed
 
 if TYPE_CHECKING:
@@ -38,24 +38,25 @@ if TYPE_CHECKING:
     from .results import Results
 
 EXTRA = ("distributed", "pandas", "pyarrow")
-REMEDY = "install what sweeps need with: python -m pip install 'prbm-impact[sweep]'"
+REMEDY = "install the packages for sweeps with: python -m pip install 'prbm-impact[sweep]'"
 
-SHORTEST, LONGEST, SHARE = 1.0, 30.0, 0.02  # s, s, of the time so far: how long a batch takes
-AHEAD = 2  # batches a thread that are under way, so that none waits for work
-ENOUGH = 20  # runs a process from which on it is worth finding out whether resets may be trusted
-POINTS = 1000  # communication points where the FMU proposes no step
-CONNECT = 10.0  # s for a scheduler and its workers to answer
+BATCH_MIN, BATCH_MAX = 1.0, 30.0  # Limits of the duration of a batch [s].
+BATCH_SHARE = 0.02  # Duration of a batch, as a share of the time so far.
+BATCHES_PER_THREAD = 2  # Batches under way per thread: no thread waits for work.
+RESET_RUNS_MIN = 20  # Least runs per process at which a check of the FMU's reset is worthwhile.
+STEPS = 1000  # Communication steps for an FMU without a proposed step.
+CONNECTION_TIMEOUT = 10.0  # For the answer of a scheduler and its workers [s].
 FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".xls", ".xlsx")
-"""Ends of names that say of the results what they are not: one file."""
-RECENT = 50  # runs whose median duration sizes the next batch
+"""Suffixes that are rejected for the results, which are a folder."""
+RECENT_RUNS = 50  # Runs whose median duration determines the size of the next batch.
 
-ABSENT = "No module named"  # what Python says of a package that is not installed
+ABSENT = "No module named"  # Python's message for a package that is not installed.
 
 Outputs = Sequence[str] | Mapping[str, str]
 
 
 class SweepError(PrbmError, RuntimeError):
-    """A sweep cannot be done, whatever its table."""
+    """A sweep is impossible, for all tables."""
 
 
 def sweep(
@@ -83,55 +84,60 @@ def sweep(
     fmu : str or Path
         An FMU of FMI 2.0 or 3.0 with co-simulation.
     table : DataFrame, str or Path
-        A column for each variable that is set, under its name, a row for each run; or a CSV or
-        Parquet file of it. All in the FMU's units, which are SI for those of this project.
+        One column per variable, with its name, and one row per run; or a CSV or Parquet file of
+        such a table.  The units are those of the FMU: SI for the FMUs of this project.
     out : str or Path
-        Folder of the results, a Parquet dataset. If it holds part of the same sweep, only the rest
-        is done; rows may have been added to the table.
+        Folder of the results, a Parquet dataset.  If it has a part of the same sweep, only the rest
+        is computed.  Rows may have been added to the table.
     outputs : sequence of str, or mapping of str to str
-        What is kept of a run: a variable for its final value, or ``max(x)``, ``min(x)``,
-        ``mean(x)`` over the communication points; ``first(x)`` and ``since(x)``: the first
-        communication point at which x is true, or from which on it is to the end [s], NaN if none;
-        with numbers ``first(x > 0.001)``. A mapping gives columns names of their own. None: the
-        final values of all outputs of the FMU.
+        Recorded outputs of a run:
+
+        * a variable, for its final value;
+        * ``max(x)``, ``min(x)``, ``mean(x)`` over the communication points;
+        * ``first(x)``, the first communication point at which x is true [s], and ``since(x)``, the
+          point from which x is true to the end [s]; NaN if there is no such point.  Numbers are
+          compared, as in ``first(x > 0.001)``.
+
+        The keys of a mapping are the names of the columns.  None: the final values of all outputs
+        of the FMU.
     values : mapping
-        Start values that all runs have.
+        Start values of all runs.
     stop_time, step, tolerance : float
-        End of the runs [s], distance of the communication points [s], relative tolerance; None:
-        of the FMU's default experiment, or 1 s, a thousandth of the run, none.
+        End of the runs [s], communication step [s], relative tolerance; None: those of the FMU's
+        default experiment, or else 1 s, a thousandth of the run, no tolerance.
     scheduler : str or None
-        Address of a ``distributed`` scheduler, as ``tcp://host:8786``; its workers need this
-        package, too. None: this machine.
+        Address of a ``distributed`` scheduler, as ``tcp://host:8786``, whose workers need this
+        package; None: this machine.
     workers : int or None
-        Runs at a time on this machine; None: one a core.
+        Number of parallel runs on this machine; None: one per core.
     retries : int
-        How often a run whose process died is tried again.
+        Number of repetitions of a run whose process crashed.
     timeout : float or None
-        A run that takes longer fails [s of the clock].
+        Longest duration of a run [s]; None: no limit.
     anew : bool
-        Whether to forget what ``out`` holds.
+        Whether to delete earlier results in ``out``.
     failed : bool
-        Whether to do again what failed before.
+        Whether to repeat failed runs.
     progress : callable or None
-        Told the fraction that is done, from 0 to 1.
+        Called with the completed fraction, from 0 to 1.
 
     Returns
     -------
     DataFrame
         In the order of the table: ``row`` (from 0), its parameters, the outputs (float64; NaN
-        where the run failed), ``status`` (``ok``; ``ended``: by the FMU, before ``stop_time``;
-        ``failed``, ``crashed``, ``timeout``), ``message`` and ``seconds`` that the run took.
+        for a failed run), ``status`` (``ok``; ``ended``: by the FMU, before ``stop_time``;
+        ``failed``, ``crashed``, ``timeout``), ``message`` and the duration in ``seconds``.
 
     Raises
     ------
     ParameterError
-        If the table, an output, a setting or ``out`` is not what it should be, or ``out`` holds
+        If the table, an output, a setting or ``out`` is invalid, or ``out`` has the results of
         another sweep.
     SweepError
-        If the FMU cannot be read or loaded, the scheduler does not answer, or something is not
+        If the FMU cannot be read or loaded, the scheduler does not answer, or a package is not
         installed.
     KeyboardInterrupt
-        After Ctrl-C; it says what is done, which is kept.
+        After Ctrl-C, with the number of completed runs, which are kept.
     """
     _needed()
     _check_name(Path(out))
@@ -139,7 +145,7 @@ def sweep(
     _check_counts(workers, retries, timeout)
     results = _results(plan, Path(out))
     tell = progress or (lambda fraction: None)
-    with ExitStack() as stack:  # nothing is thrown away before there is who does it again
+    with ExitStack() as stack:  # Keep earlier results until there is a client.
         client = stack.enter_context(_client(scheduler, workers)) if anew else None
         results.begin(anew)
         done = results.read()
@@ -165,12 +171,12 @@ def samples(
     return sweep_table.samples(distributions, n, seed, method)
 
 
-# --- what is to be done -------------------------------------------------------------------------
+# --- plan -------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep that makes sense.
+    """A checked sweep.
 
     ``digest`` is the SHA-256 of the FMU's bytes; ``rows`` are the values of each run.
     """
@@ -184,11 +190,12 @@ class Plan:
 
 
 def _needed() -> None:
-    """Refuse to begin without the packages of the extra.
+    """Check for the packages of the extra.
 
     Raises
     ------
     SweepError
+        If one is not installed.
     """
     for name in EXTRA:
         if importlib.util.find_spec(name) is None:
@@ -241,9 +248,9 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
         raise SweepError(f"{path} cannot be read ({error.strerror}); give an FMU") from None
     try:
         description = fmpy.read_model_description(io.BytesIO(data), validate=False)
-    except Exception as error:  # FMPy raises Exception itself, and what zipfile and lxml do
+    except Exception as error:  # FMPy has no exceptions of its own.
         reason = " ".join(str(error).split())
-        raise SweepError(f"{path} is no FMU that can be read: {reason}") from None
+        raise SweepError(f"{path} is not a readable FMU: {reason}") from None
     if not description.fmiVersion.startswith(("2", "3")) or description.coSimulation is None:
         raise SweepError(
             f"{path} is an FMU of FMI {description.fmiVersion} without co-simulation or older than "
@@ -286,7 +293,7 @@ def _unambiguous(parameters: Sequence[str], outputs: Sequence[str]) -> None:
 def _times(
     description: Any, stop_time: float | None, step: float | None, tolerance: float | None
 ) -> dict[str, Any]:
-    """Return start, stop, step and tolerance, from the default experiment where they are None."""
+    """Return start, stop, step and tolerance; None is replaced by the default experiment."""
     default, co_simulation = description.defaultExperiment, description.coSimulation
 
     def proposed(name: str) -> float | None:
@@ -299,7 +306,7 @@ def _times(
     size = step if step is not None else proposed("stepSize")
     if size is None and co_simulation.fixedInternalStepSize is not None:
         size = float(co_simulation.fixedInternalStepSize)
-    size = (stop - start) / POINTS if size is None else float(size)
+    size = (stop - start) / STEPS if size is None else float(size)
     tolerance = tolerance if tolerance is not None else proposed("tolerance")
     if not (math.isfinite(stop) and stop > start):
         raise ParameterError(f"stop_time = {stop:g} s must be finite and after {start:g} s")
@@ -307,7 +314,7 @@ def _times(
         if x is not None and not (math.isfinite(x) and x > 0.0):
             raise ParameterError(f"{name} = {x:g}{unit} must be positive and finite")
     steps = (stop - start) / size
-    if steps > STEPS_MAX:
+    if steps > ROWS_MAX:
         raise ParameterError(
             f"step = {size:g} s makes {steps:.0f} steps in {stop - start:g} s: choose a larger one"
         )
@@ -357,7 +364,7 @@ def _results(plan: Plan, folder: Path) -> "Results":
 
 
 def _same_rows(plan: Plan, done: "pd.DataFrame", folder: Path) -> None:
-    """Refuse to go on if a row that is done is not what the table has there now."""
+    """Reject results whose rows differ from the rows of the table."""
     for k, *values in done[["row", *plan.parameters]].itertuples(index=False):
         now = [*plan.rows[k].values()] if k < len(plan.rows) else None
         if now != values:
@@ -368,14 +375,14 @@ def _same_rows(plan: Plan, done: "pd.DataFrame", folder: Path) -> None:
             )
 
 
-# --- doing it -----------------------------------------------------------------------------------
+# --- execution -----------------------------------------------------------------------------------
 
 
 @contextmanager
 def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
-    """Give a client of the scheduler at an address, or of one in this process.
+    """Yield a client of the scheduler at an address, or of one in this process.
 
-    In this process a worker with threads is enough: the FMU runs in processes of its own.
+    In this process one worker with threads suffices: the FMU runs in separate processes.
     """
     from dask.system import CPU_COUNT
     from distributed import Client, LocalCluster
@@ -386,7 +393,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
                 n_workers=1,
                 threads_per_worker=workers or CPU_COUNT,
                 processes=False,
-                dashboard_address="127.0.0.1:0",  # None would take a port of all interfaces
+                dashboard_address="127.0.0.1:0",  # None would use a port of all interfaces.
                 worker_dashboard_address="127.0.0.1:0",
                 memory_limit=0,
                 silence_logs=logging.CRITICAL,
@@ -397,7 +404,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         return
     try:
         client = Client(  # type: ignore[no-untyped-call]
-            scheduler, timeout=CONNECT, set_as_default=False
+            scheduler, timeout=CONNECTION_TIMEOUT, set_as_default=False
         )
     except (TimeoutError, OSError, ValueError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
@@ -406,7 +413,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
         ) from None
     with client:
         try:
-            client.wait_for_workers(1, timeout=CONNECT)
+            client.wait_for_workers(1, timeout=CONNECTION_TIMEOUT)
         except (TimeoutError, OSError):
             raise SweepError(
                 f"the scheduler at {scheduler} has no workers; start one with: "
@@ -416,17 +423,17 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
 
 
 class _Sweep:
-    """Batches of rows on their way to the workers and back."""
+    """Sends batches of rows to the workers and writes their results."""
 
     def __init__(self, client: Any, plan: Plan, results: "Results", progress: Progress) -> None:
         self.client, self.plan, self.results, self.progress = client, plan, results, progress
         self.plugin = f"prbm-sweep-{uuid.uuid4().hex}"
         self.begin = time.monotonic()
-        self.recent: deque[float] = deque(maxlen=RECENT)
+        self.recent: deque[float] = deque(maxlen=RECENT_RUNS)
         self.done = 0
 
     def run(self, rows: Sequence[int], retries: int, timeout: float | None) -> None:
-        """Do the rows, and write each batch as it comes."""
+        """Run the rows, and write each batch on completion."""
         self.done = len(self.plan.rows) - len(rows)
         try:
             self._install(rows, retries, timeout)
@@ -438,23 +445,27 @@ class _Sweep:
                 f"{self.results.folder}, and the same call does the rest"
             ) from None
         finally:
-            with suppress(OSError, KeyError):  # of a scheduler that is gone, a worker without it
+            with suppress(
+                OSError,
+                KeyError,
+                # The scheduler may be gone, or a worker without the plugin.
+            ):
                 self.client.unregister_worker_plugin(self.plugin)
 
     def _install(self, rows: Sequence[int], retries: int, timeout: float | None) -> None:
-        """Bring the FMU to the workers."""
+        """Send the FMU to the workers."""
         from dataclasses import replace
 
         from .worker import FmuPlugin
 
-        # to find out takes a run twice as long, which a timeout might end
-        reuse = timeout is None and len(rows) >= ENOUGH * self._threads()
+        # The check of a reset doubles the duration of a run, which may exceed a timeout.
+        reuse = timeout is None and len(rows) >= RESET_RUNS_MIN * self._threads()
         job = replace(self.plan.job, reuse=reuse)
         try:
             self.client.register_plugin(
                 FmuPlugin(self.plan.fmu, job, retries, timeout), name=self.plugin
             )
-        except Exception as error:  # distributed wraps what a worker raises
+        except Exception as error:  # distributed wraps the errors of workers.
             if ABSENT not in str(error):
                 raise
             raise SweepError(
@@ -470,7 +481,7 @@ class _Sweep:
         from distributed import as_completed
 
         running: dict[Any, list[int]] = {}
-        deaths: dict[int, int] = {}  # of workers, by rows that were alone with them
+        deaths: dict[int, int] = {}  # Crashed workers per row.
         suspects: deque[int] = deque()
         completed = as_completed(loop=self.client.loop)  # type: ignore[no-untyped-call]
         self._submit(rest, running, completed)
@@ -488,10 +499,10 @@ class _Sweep:
     def _after_death(
         self, rows: list[int], deaths: dict[int, int], suspects: deque[int], retries: int
     ) -> list[Outcome]:
-        """Return the outcome of a row whose workers died too often, or have the rows done again.
+        """Return the outcome of a row whose workers crashed too often; otherwise repeat the rows.
 
-        Not only the row that kills a worker is lost with it. So all that were are done again in
-        the end, one by one, with nothing else under way: then it is clear which one it is.
+        A crashed worker loses all of its rows, not only the row that caused the crash.  At the end
+        these rows are repeated one by one, with no other batch under way, to find the cause.
         """
         for row in rows:
             deaths[row] = deaths.get(row, -1) + 1
@@ -507,18 +518,18 @@ class _Sweep:
         self.progress(self.done / len(self.plan.rows))
 
     def _submit(self, rest: deque[int], running: dict[Any, list[int]], completed: Any) -> None:
-        """Have enough batches under way."""
+        """Submit batches until :data:`BATCHES_PER_THREAD` are under way."""
         threads = self._threads()
-        while rest and len(running) < AHEAD * threads:
+        while rest and len(running) < BATCHES_PER_THREAD * threads:
             size = self._size(len(rest), threads)
             self._send([rest.popleft() for _ in range(size)], running, completed)
 
     def _size(self, rest: int, threads: int) -> int:
-        """Return how many rows the next batch has: few at first, and few at the end."""
+        """Return the number of rows of the next batch: small at the start and at the end."""
         if not self.recent:
             return 1
-        seconds = min(max(SHARE * (time.monotonic() - self.begin), SHORTEST), LONGEST)
-        fair = math.ceil(rest / (AHEAD * threads))
+        seconds = min(max(BATCH_SHARE * (time.monotonic() - self.begin), BATCH_MIN), BATCH_MAX)
+        fair = math.ceil(rest / (BATCHES_PER_THREAD * threads))
         return max(1, min(int(seconds / median(self.recent)), fair))
 
     def _send(self, rows: list[int], running: dict[Any, list[int]], completed: Any) -> None:
@@ -530,7 +541,7 @@ class _Sweep:
         completed.add(future)
 
     def _outcomes(self, future: Any) -> list[Outcome] | None:
-        """Return what became of a batch; None if its workers died."""
+        """Return the outcomes of a batch; None if its workers crashed."""
         from distributed import KilledWorker
 
         from .worker import Unusable
@@ -549,7 +560,7 @@ class _Sweep:
 
 
 def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
-    """Return in a few lines how the runs of a sweep went."""
+    """Return a summary of the runs of a sweep in a few lines."""
     good = results["status"].isin(GOOD)
     lines = [f"{len(results)} runs, {int((~good).sum())} failed: {out}"]
     for row, status, message in results.loc[~good, ["row", "status", "message"]].head(3).values:

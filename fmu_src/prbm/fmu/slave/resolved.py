@@ -37,7 +37,7 @@ EMPTY: dict[str, Any] = {"Real": float("nan"), "Integer": 0, "Boolean": False, "
 
 @dataclass(frozen=True)
 class Model:
-    """What an FMU is made of.
+    """The mechanism and the variables of an FMU.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Model:
     parameters : dict of str to Parameter
         Their bounds and units.
     computed : dict of str to number
-        All other variables, with what stands for "no value".
+        All other variables, with the values that they have without a simulation.
     """
 
     mechanism: Mechanism

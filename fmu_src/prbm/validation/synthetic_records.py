@@ -1,0 +1,34 @@
+"""Synthetic records: known motions with the noise of the sensors in the source."""
+
+import math
+
+import numpy as np
+
+from ..data.series import Series
+from ..mechanics.arrays import Real
+from .common import LASER, RATE
+
+
+def bent(
+    rng: np.random.Generator,
+    samples: int,
+    cycles: int,
+    stiffness: float,
+    largest: float,
+    noise: float,
+    loss: float = 0.0,
+) -> tuple[Real, Real]:
+    """Return deflection [m] and force [N] of a beam bent and let back; loss of work on the way."""
+    phase = np.linspace(0.0, 2 * np.pi * cycles, samples)
+    d = largest * (1 - np.cos(phase)) / 2
+    fall = np.where(np.sin(phase) < 0.0, 1 - 3 * loss * (1 - d / largest), 1.0)
+    return d, stiffness * d * fall + noise * rng.standard_normal(samples)
+
+
+def vibration(rng: np.random.Generator, zeta: float, duration: float, amplitude: float) -> Series:
+    """Return a record of a damped sine of 4.82 Hz with the laser's noise."""
+    t = np.arange(round(duration * RATE)) / RATE
+    omega = 2 * np.pi * 4.82
+    turning = omega * math.sqrt(1 - zeta**2)
+    x = amplitude * np.exp(-zeta * omega * t) * np.cos(turning * t + rng.uniform(0, 2 * np.pi))
+    return Series(t, x + LASER * rng.standard_normal(len(t)))

@@ -1,0 +1,56 @@
+"""The wheel and the sdist."""
+
+import subprocess
+import sys
+import tarfile
+import tomllib
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SOURCE = ROOT / "fmu_src"
+
+
+@pytest.fixture(scope="module")
+def dist(tmp_path_factory) -> Path:
+    """Return a folder with the wheel and the sdist of this source."""
+    folder = tmp_path_factory.mktemp("dist")
+    subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-t", "sdist", "-d", folder],
+        cwd=ROOT, check=True, capture_output=True,
+    )  # fmt: skip
+    return folder
+
+
+def source_files() -> set[str]:
+    files = (path for path in (SOURCE / "prbm").rglob("*") if path.is_file())
+    return {
+        path.relative_to(SOURCE).as_posix() for path in files if "__pycache__" not in path.parts
+    }
+
+
+def test_a_wheel_installs_one_import_package_with_all_its_files(dist):
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    (wheel,) = dist.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = {name for name in archive.namelist() if not name.endswith("/")}
+    info = f"prbm_impact-{version}.dist-info"
+    assert {name.partition("/")[0] for name in names} == {"prbm", info}
+    assert {name for name in names if name.startswith("prbm/")} == source_files()
+    assert f"{info}/licenses/LICENSE" in names
+
+
+def test_an_sdist_has_one_import_package_with_all_its_files(dist):
+    (sdist,) = dist.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    inside = {name.removeprefix("fmu_src/") for name in names if name.startswith("fmu_src/")}
+    assert inside == source_files()
+    assert {"LICENSE", "README.md", "pyproject.toml", "build_fmu.py"} <= names
+
+
+@pytest.mark.parametrize("kind", [".c", ".h", ".toml", ".txt", ".py"])
+def test_sources_data_and_licences_are_among_these_files(kind):
+    assert [name for name in source_files() if name.endswith(kind)]
