@@ -50,8 +50,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
 from prbm import Simulation, load
 from prbm.base.errors import SimulationError
-from prbm.mechanics import constraints, contact
-from prbm.mechanics.kinetics import inertia
+from prbm.mechanics import contact
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -465,7 +464,7 @@ class Problem:
 
     def error(self, found: Real, wanted: Real) -> Real:
         """Return the root mean square over the state at each time, in scales, (m,)."""
-        scales = np.array([self.simulation._scales(y) for y in wanted])
+        scales = np.array([self.simulation.configuration.scales.of_state(y) for y in wanted])
         result: Real = np.sqrt((((found - wanted) / scales) ** 2).mean(axis=1))
         return result
 
@@ -478,9 +477,9 @@ class Problem:
         """Return the state after an impact at the first stop."""
         system, n = self.simulation.system, self.simulation.system.n
         e, v = system.directions(y[:n]), y[n : 2 * n]
-        M, _ = inertia(system.H, self.simulation.equations.J, e)
-        G = constraints.gap_rows(system).jacobian(e)[:1]
-        X = contact.response(M, constraints.jacobian(system.spread(system.loops), e), G)
+        _, M, loops = self.simulation.equations.mass_and_loops(y[:n])
+        G = system.gap_rows.jacobian(e)[:1]
+        X = contact.response(M, loops, G)
         P = contact.newton(G @ X, G @ v, np.array([self.simulation.values["stop.restitution"]]))
         result = y.copy()
         result[n : 2 * n] = v + X @ P
@@ -503,7 +502,7 @@ def problem(
 def reference(problem: Problem) -> Real:
     """Return the states at the times of a smooth arc by SciPy's DOP853, (m, n)."""
     equations, y, t = problem.simulation.equations, problem.y, problem.start
-    scales = problem.simulation._scales(y)
+    scales = problem.simulation.configuration.scales.of_state(y)
     states = []
     for end in problem.times:
         if end > t:
@@ -543,7 +542,7 @@ def integrate(pair: Pair, problem: Problem, *, tolerance: float = 0.0, step: flo
         Fixed step size [s]; after an impact the steps start anew from there.
     """
     simulation, times = problem.simulation, problem.times
-    equations, scales = simulation.equations, simulation._scales
+    equations, scales = simulation.equations, simulation.configuration.scales.of_state
     a, c, last = pair.a, pair.a.sum(axis=1), pair.last
     exponents = np.arange(pair.dense.shape[1]) + 1
     t, y, armed = problem.start, problem.y, problem.impact
@@ -596,7 +595,6 @@ def integrate(pair: Pair, problem: Problem, *, tolerance: float = 0.0, step: flo
             y = problem.rebound(equations.project(end, at(hit)))
             k[0], armed, anchor, count = equations.rate(end, y), False, end, 0
         t, h = end, h * factor
-        equations.trace.clear()
     return Run(states, calls, steps, rejected)
 
 

@@ -32,7 +32,7 @@ from prbm import simulate as simulate_one
 from prbm.base.errors import PrbmError
 from prbm.base.progress import Progress, reporter
 from prbm.fmu.native_fmu import build
-from prbm.hybrid.simulation import Impact
+from prbm.hybrid.impacts import Impact
 from prbm.systems.cosimulation import simulate as cosimulate
 
 MOMENT, STOP_TIME, TOLERANCE = -1e-4, 0.3, 1e-9  # N m on the wheel, s

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from prbm.base.errors import EquilibriumError
 from prbm.hybrid.simulation import Simulation
-from prbm.mechanics import constraints
 from prbm.mechanics.assembly import assemble
-from prbm.mechanics.dynamics import IDLE, Discrete, Equations
+from prbm.mechanics.contact_state import ContactState
+from prbm.mechanics.dynamics import Equations
 from prbm.mechanics.kinetics import inertia
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
@@ -163,10 +163,10 @@ def test_rows_are_the_derivatives_of_what_they_constrain(mechanism, seed):
     e = system.directions(q)
     places = np.array([value(s, "position", system.values) for s in mechanism.stops])
     scalars = [
-        (constraints.Rows(system, system.loops, system.loops_c), closures, 0.0),
-        (constraints.gap_rows(system), gaps, places),
-        (constraints.slide_rows(system), slides, None),
-        (constraints.rub_rows(system), rubs, None),
+        (system.loop_rows, closures, 0.0),
+        (system.gap_rows, gaps, places),
+        (system.slide_rows, slides, None),
+        (system.rub_rows, rubs, None),
     ]
     for rows, scalar, shift in scalars:
         if not len(rows):
@@ -231,8 +231,8 @@ def test_accelerations_obey_lagrange(mechanism, seed, held):
     system = sim.system
     q, v = somewhere(system, seed)
     holds = [held and i == 0 for i in range(len(mechanism.stops))]
-    discrete = Discrete(tuple(holds), (IDLE,) * len(holds), ())
-    a, lam, _ = Equations(system, sim.inputs, discrete, sim.omega).accelerations(q, v)
+    contacts = ContactState.holding(np.flatnonzero(holds), len(holds), 0)
+    a, lam, _, _ = Equations(system, sim.inputs, contacts, sim.omega).evaluate(q, v)
 
     def scalars(q):
         return np.concatenate([closures(system, q), gaps(system, q)[holds]])
@@ -305,7 +305,7 @@ def keeps_energy(mechanism, seed):
         assert gaps(system, y[:n]).min(initial=1.0) > -1e-9
     assert np.ptp(balance) < 1e-7 * max(kinetic)
     lossless = all(s.restitution == 1.0 and s.friction == 0.0 for s in mechanism.stops)
-    if lossless and not mechanism.frictions and not any(sim.discrete.holds):
+    if lossless and not mechanism.frictions and not sim.contacts.held:
         assert abs(out["energy.dissipated"]) < 1e-7 * max(kinetic)
 
 
@@ -334,7 +334,7 @@ def balances_momentum(mechanism, seed):
         for time in (t - h, t, t + h):
             sim.advance(time)
             found.append(momentum(sim))
-            states.append((sim.discrete, list(sim.latched)))
+            states.append((sim.contacts, sim.latched))
             if time == t:
                 out, y = sim.outputs(), sim.state()
         if any(state != states[0] for state in states):
@@ -422,7 +422,7 @@ def test_the_examples_are_rich():
         sim.advance(SPAN)
         seen_kinds |= {"loop"} if len(sim.system.loops) else set()
         seen_kinds |= {"stretch"} if len(sim.system.stretches) else set()
-        seen_kinds |= {"rest"} if any(sim.discrete.holds) else set()
+        seen_kinds |= {"rest"} if sim.contacts.held else set()
         for impact in sim.record:
             stop = next(s for s in mechanism.stops if s.name == impact.stop)
             seen_kinds.add("ground" if stop.on == GROUND else "body")

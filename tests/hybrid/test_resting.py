@@ -7,8 +7,9 @@ import pytest
 
 from kernel_simulation import KernelSimulation
 from native_host import OK, WARNING, Instance
+from prbm.hybrid import contact_modes
 from prbm.hybrid.simulation import Simulation
-from prbm.mechanics.dynamics import IDLE, STICKS
+from prbm.mechanics.contact_state import ContactMode
 from support import energy_balance, mechanism, simulation
 
 AT_REST = {"release.displacement": 0.0}  # on the wall, by its weight
@@ -84,42 +85,34 @@ def frictions(rng):
 
 def obeys_coulomb(settled: Simulation) -> bool:
     """Tell whether forces and accelerations are what each friction says."""
-    equations, n = settled.equations, settled.system.n
-    q, v = settled.front[:n], settled.front[n : 2 * n]
-    e, right = settled.system.directions(q), True
-    a, lam, _ = equations.accelerations(q, v)
-    for k, i in enumerate(equations.stuck):
-        normal = lam[equations.first_hold + equations.held.index(i)]
-        right &= abs(lam[equations.first_stick + k]) <= equations.stop_friction[i] * normal
-    for k, i in enumerate(equations.rubbing):
-        right &= abs(lam[equations.first_rub + k]) <= equations.rub_limit(i, e)
-    for rows, states in (
-        (equations.slide_rows, settled.discrete.slides),
-        (equations.rub_rows, settled.discrete.rubs),
-    ):
-        rates = rows.jacobian(e) @ a - rows.convective(e, v)
-        for state, rate in zip(states, rates, strict=True):
-            right &= state in (STICKS, IDLE) or state * rate > 0.0
+    equations, front, right = settled.equations, settled.front, True
+    a, lam, _, _ = equations.evaluate(front.q, front.v)
+    for c, mode in enumerate(settled.contacts.modes):
+        if mode is ContactMode.STICK:
+            friction, limit = equations.friction(c, front.e, lam)
+            right &= abs(friction) <= limit
+        rate = equations.slip_acceleration(c, front.e, front.v, a)
+        right &= mode.slip == 0 or mode.slip * rate > 0.0
     return right
 
 
-def test_friction_in_two_places_obeys_coulombs_law_in_both():
+def test_friction_in_two_places_obeys_coulombs_law_in_both(monkeypatch):
     """One by one they may go round in circles; in some of these draws they do.
 
     Where the stop would have to pull it lets go at once.
     """
     rng, together, found = np.random.default_rng(0), 0, 0
-    alone = Simulation._settle_together
+    jointly, counted = contact_modes.joint_modes, []
+
+    def counting(*given):
+        counted.append(given)
+        return jointly(*given)
+
+    monkeypatch.setattr(contact_modes, "joint_modes", counting)
     for k in range(150):
-        counted = []
-
-        class Counting(Simulation):
-            def _settle_together(self, *given, counted=counted):
-                counted.append(given)
-                alone(self, *given)
-
+        counted.clear()
         values = frictions(rng)
-        settled = Counting(mechanism("PRBDM2RAxial"), values)
+        settled = Simulation(mechanism("PRBDM2RAxial"), values)
         if settled.outputs()["stop.force"] > 0.0:
             assert obeys_coulomb(settled), values
             together += bool(counted)
@@ -129,7 +122,7 @@ def test_friction_in_two_places_obeys_coulombs_law_in_both():
         kernel = KernelSimulation(mechanism("PRBDM2RAxial"), values)
         for twin in (settled, kernel):
             twin.advance(5e-5)
-        assert settled.discrete.holds[0] == (settled.outputs()["stop.force"] > 0.0)
+        assert settled.contacts.modes[0].closed == (settled.outputs()["stop.force"] > 0.0)
         for name in ("shuttle.vx", "shuttle.vy", "shuttle.omega"):
             assert kernel.get(name) == pytest.approx(settled.outputs()[name], abs=1e-9)
     assert found > 50

@@ -6,10 +6,10 @@ import pytest
 from kernel_simulation import KernelMistake, KernelSimulation
 from many_parts import anvil, elastic
 from prbm.mechanics.assembly import assemble
-from prbm.mechanics.constraints import jacobian
 from prbm.mechanics.independent import conditioning, independent
 from prbm.mechanics.inputs import input_names
 from prbm.mechanics.statics import equilibrium
+from prbm.mechanics.system import jacobian
 from support import GUIDES, case, each_shipped, energy_balance, fastest, mechanism
 
 INPUTS = {

@@ -54,7 +54,7 @@ def test_accelerations_are_those_of_lagrange():
         angles, rates = RNG.normal(size=3), 20 * RNG.normal(size=3)
         M, f = evaluate(*angles, *rates)
         expected = np.linalg.solve(np.array(M, float), np.array(f, float).ravel())
-        found, _, mass = sim.equations.accelerations(angles, rates)
+        found, _, mass, _ = sim.equations.evaluate(angles, rates)
         np.testing.assert_allclose(mass, np.array(M, float), rtol=1e-12, atol=1e-20)
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-8)
 
@@ -75,6 +75,7 @@ def test_centrifugal_terms_do_the_work_that_the_mass_matrix_takes():
 def test_fused_product_equals_the_separate_equations():
     """One product with e gives what inertia, jacobian and convective give each for itself."""
     from prbm.mechanics import constraints, forces
+    from prbm.mechanics.system import convective, jacobian
 
     sim = Simulation(mechanism("PRBDM2R"), {"damping.zeta": 0.02})
     system, equations = sim.system, sim.equations
@@ -83,20 +84,20 @@ def test_fused_product_equals_the_separate_equations():
         v = RNG.normal(size=system.n)
         e = np.exp(1j * q)
         M, C = inertia(system.H, np.diag(system.J), e)
-        rows = constraints.jacobian(system.loops, e)
+        rows = jacobian(system.loops, e)
         w = forces.field_row(system.S, system.gravity)
         Q = forces.springs(system.K, q - system.q0) + forces.generalised(w, e)
         Q -= 8e-6 * system.K @ v + 2 * 0.02 * sim.omega * M @ v
-        right = np.concatenate([Q - C @ v**2, constraints.convective(system.loops, e, v)])
+        right = np.concatenate([Q - C @ v**2, convective(system.loops, e, v)])
         x = constraints.solve(constraints.saddle(M, rows, rows), right)
-        a, lam, _ = equations.accelerations(q, v)
+        a, lam, _, _ = equations.evaluate(q, v)
         np.testing.assert_allclose(a, x[: system.n], rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(lam, -x[system.n :], rtol=1e-9, atol=1e-12)
 
 
 def test_constraint_rows_are_the_derivatives_of_the_constraints():
     """Central differences, and the convective term by differencing the Jacobian."""
-    from prbm.mechanics import constraints
+    from prbm.mechanics.system import convective, jacobian, values
 
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
     B, h = np.vstack([system.loops, system.gaps, system.slides, system.rubs]), 6e-6
@@ -104,14 +105,14 @@ def test_constraint_rows_are_the_derivatives_of_the_constraints():
     zero = np.zeros(len(B))
 
     def value(angles):
-        return constraints.values(B, zero, np.exp(1j * angles))
+        return values(B, zero, np.exp(1j * angles))
 
     def rows(angles):
-        return constraints.jacobian(B, np.exp(1j * angles))
+        return jacobian(B, np.exp(1j * angles))
 
     differences = np.array(
         [(value(q + d) - value(q - d)) / (2 * h) for d in h * np.eye(system.n)]
     ).T
     np.testing.assert_allclose(rows(q), differences, atol=1e-9)
     turning = (rows(q + h * v) - rows(q - h * v)) @ v / (2 * h)
-    np.testing.assert_allclose(constraints.convective(B, np.exp(1j * q), v), -turning, atol=1e-9)
+    np.testing.assert_allclose(convective(B, np.exp(1j * q), v), -turning, atol=1e-9)

@@ -1,7 +1,7 @@
 """A mechanism file that uses everything there is, and what can be wrong with one."""
 
 from prbm.files.mechanism_file import LARGEST_FILE
-from prbm.mechanism.flexure import MOST_LINKS
+from prbm.mechanism.flexure import LINKS_MAX
 
 EXAMPLE = """\
 #:schema mechanism.schema.json
@@ -373,7 +373,7 @@ CHANGES = {
         "leaf.model = '7R' is unknown: choose one of",
     ),
     "n missing": ("n = 8\n", "", "right.n = 0 must be the number of links of the chain"),
-    "n too large": ("n = 8\n", "n = 100000\n", f"from 1 to {MOST_LINKS}"),
+    "n too large": ("n = 8\n", "n = 100000\n", f"from 1 to {LINKS_MAX}"),
     "n of nothing": ("n = 8\n", "n = 0\n", "flexures.1.n (of right) = 0: write a larger number"),
     "n with 2R": (
         'model = "2R"',

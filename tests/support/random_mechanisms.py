@@ -21,9 +21,9 @@ from hypothesis import strategies as st
 from prbm.base.errors import EquilibriumError, ParameterError, PrbmError
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
-from prbm.mechanics.constraints import jacobian
 from prbm.mechanics.contact import response
 from prbm.mechanics.kinetics import inertia
+from prbm.mechanics.system import jacobian
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.flexure import CLAMP, FREE, PIN
 from prbm.mechanism.parts import (
@@ -212,7 +212,7 @@ def starts(mechanism: Mechanism) -> bool:
     except (EquilibriumError, ParameterError):
         return False
     system = sim.system
-    e = system.directions(sim.front[: system.n])
+    e = system.directions(sim.front.q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     rows = jacobian(system.spread(np.vstack([system.loops, system.release])), e)
     left, free = (

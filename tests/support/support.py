@@ -13,7 +13,8 @@ from scipy.optimize import brentq
 
 from prbm.files.mechanism_file import load, shipped
 from prbm.fmu import native_fmu
-from prbm.hybrid.simulation import Impact, Simulation
+from prbm.hybrid.impacts import Impact
+from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium

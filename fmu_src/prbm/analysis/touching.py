@@ -5,7 +5,6 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from ..base.errors import EquilibriumError, ParameterError
-from ..mechanics.constraints import gap_rows
 from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System, unit
 from ..mechanism.description import Mechanism
@@ -84,7 +83,7 @@ def impact_shape(system: System, stop: int, height: float) -> Equilibrium:
     EquilibriumError
         If there is none.
     """
-    rows = gap_rows(system)
+    rows = system.gap_rows
 
     def gap(shape: Equilibrium) -> float:
         return float(rows.values(system.directions(shape.q))[stop]) + height

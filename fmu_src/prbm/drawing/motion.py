@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..mechanics.arrays import Complex, Real
-from ..mechanics.constraints import Rows, project_positions
-from ..mechanics.system import FIXED, System
+from ..mechanics.constraints import project_positions
+from ..mechanics.system import FIXED, Rows, System
 
 STRETCH_ITERATIONS = 4  # They converge quadratically, and stretches are small.
 

@@ -33,9 +33,9 @@ from ..base.errors import MechanismError
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism
 from ..mechanism.expressions import Quantity, affine
-from ..mechanism.flexure import CLAMP, ENDS, MODELS, MOST_LINKS
+from ..mechanism.flexure import CLAMP, ENDS, LINKS_MAX, MODELS
 from ..mechanism.parameters import NAME
-from ..mechanism.parts import FIELDS, GROUND, LARGE, TINY_LENGTH
+from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .units import check_coherent, number, quantity, si_unit
 
 LONGEST_NAME = 100  # characters; a name becomes part of the names of files
@@ -187,7 +187,7 @@ class Section(Named):
     """Section, material and model of flexures."""
 
     model: Model | None = Field(None, description="Pseudo-rigid-body model")
-    n: Annotated[StrictInt, Field(ge=1, json_schema_extra={"maximum": MOST_LINKS})] | None = Field(
+    n: Annotated[StrictInt, Field(ge=1, json_schema_extra={"maximum": LINKS_MAX})] | None = Field(
         None, description="Number of links, of the chain nR alone"
     )
     thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")] | None = None
@@ -498,16 +498,16 @@ def _check_drawn(mechanism: Mechanism) -> None:
     values = mechanism.values()
     for name, point in _places(mechanism):
         x, y = (affine(coordinate)(values) for coordinate in point)
-        if not math.hypot(x, y) <= LARGE:
+        if not math.hypot(x, y) <= LENGTH_MAX:
             raise MechanismError(
-                f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within {LARGE:g} m "
-                "of the origin"
+                f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within "
+                f"{LENGTH_MAX:g} m of the origin"
             )
     for flexure in mechanism.flexures:
         _check_slender(mechanism, flexure, values)
     for joint in mechanism.joints:
         apart = _distance(mechanism, joint, values)
-        if apart > TINY_LENGTH:
+        if apart > LENGTH_MIN:
             raise MechanismError(
                 f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
                 "draw them at the same place"
@@ -519,7 +519,7 @@ def _check_slender(
 ) -> None:
     """Refuse a flexure without length, or as thick as long: millimetres written as metres."""
     length = _distance(mechanism, flexure, values)
-    if length < TINY_LENGTH:
+    if length < LENGTH_MIN:
         raise MechanismError(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has no length: move "
             "its ends apart"

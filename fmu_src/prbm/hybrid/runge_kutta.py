@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ..base.tolerances import TABLEAU_ATOL
 from ..mechanics.arrays import Real
 
 Rate = Callable[[float, Real], Real]
@@ -46,9 +47,9 @@ class Tableau:
     def __post_init__(self) -> None:
         if np.any(np.triu(self.a)):
             raise ValueError("the stages of an explicit method depend on earlier stages only")
-        if abs(self.weights.sum() - 1) > 1e-14 or abs(self.error.sum()) > 1e-14:
+        if max(abs(self.weights.sum() - 1), abs(self.error.sum())) > TABLEAU_ATOL:
             raise ValueError("the weights must add up to one, those of the error to zero")
-        if not np.allclose(self.dense.sum(axis=1), self.weights, rtol=0, atol=1e-14):
+        if not np.allclose(self.dense.sum(axis=1), self.weights, rtol=0, atol=TABLEAU_ATOL):
             raise ValueError("the dense output must end at the solution")
 
     @cached_property

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 from ..base.errors import MechanismError, ParameterError
 from ..base.names import unknown
-from ..mechanics.inputs import LARGEST_MOBILITY, MOBILITY, input_units
+from ..base.tolerances import WALL_MOBILITY_MAX
+from ..mechanics.inputs import MOBILITY, input_units
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.parameters import Parameter
@@ -365,7 +366,7 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
             f"Inverse of the effective mass of the {wall(stop)}: an impulse changes its velocity "
             "by so much times itself, 0 if it is immovable",
         )
-        yield replace(mobility, minimum=0.0, maximum=LARGEST_MOBILITY)
+        yield replace(mobility, minimum=0.0, maximum=WALL_MOBILITY_MAX)
     for axis in "xy":
         yield given(
             f"{BASE}.acceleration.{axis}",

@@ -1,37 +1,27 @@
-r"""From a mechanism and parameter values to the constant arrays of the equations of motion.
+"""How the constant arrays of a mechanism are assembled from its description.
 
-A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, the
-logarithm of its length over the drawn one.  Each link and body has one *arm*,
-
-    E = exp(s + i theta),       E' = i w E,     w = theta' - i s',
-
-(s = 0 for what does not stretch), and every position is z = c + A E with constant c, A.  Every
-scalar that the engine constrains, watches or reports (loop closures, gaps, displacements) is
-therefore of one form,
-
-    x = Re(B E) + c,      x' = -Im(B E w),      x'' = -Im(B E w') - Re(B E w^2).
-
-Arrays have a column for every coordinate.  The vector e has, for the angle of an arm, E, and for
-its stretch -i E, so that dE/dq = i e for both; the columns of A and B at stretches are zero.
-:meth:`System.spread` repeats there the column of the arm: then dx/dq = -Im(spread(B) e).
+Every flexure becomes a chain of links.  Chains are rooted at the ground or at a body already
+reached; a flexure between two bodies already reached is rooted at its start and closes a loop at
+its end.  So does a joint.
 """
 
 import cmath
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from scipy.linalg import qr
 
 from ..base.errors import MechanismError, ParameterError
+from ..base.tolerances import DEPENDENT_LOOP_RTOL, JOINT_DISTANCE_RTOL, MASSLESS_RTOL
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.flexure import Segments, segments, stub
 from ..mechanism.parts import (
     GROUND,
-    TINY_LENGTH,
+    LENGTH_MIN,
     Flexure,
     FlexureType,
     Joint,
@@ -41,22 +31,14 @@ from ..mechanism.parts import (
     body_of,
     value,
 )
-
-if TYPE_CHECKING:
-    pass
 from .arrays import Complex, Real
 from .system import FIXED, BodyFrame, Outline, Place, System, stacked, unit
 
-MOST_NAMED = 5  # parameters that a message names
-TOGETHER = 1e-9  # of the size: points that a joint joins are drawn no further apart
+NAMES_MAX = 5  # Parameters that a message names.
 
 
 def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
-    """Build the constant arrays of a mechanism.
-
-    Every flexure becomes a chain of links.  Chains are rooted at ground or at a body already
-    reached; a flexure between two bodies already reached is rooted at its start and closes a
-    loop at its end.  So does a joint.
+    """Return the constant arrays of a mechanism.
 
     Parameters
     ----------
@@ -68,7 +50,7 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
     Raises
     ------
     MechanismError
-        If a body is not held by anything, or a loop repeats what others ask for.
+        If a body is not held by anything, or a loop depends on others.
     ParameterError
         If a value is missing, a flexure has no length, or its links are longer than itself.
     """
@@ -82,14 +64,14 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
 
 
 def _some(names: Sequence[str]) -> str:
-    """Return names in words, the first of them if they are many."""
-    rest = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {rest} more" if rest > 0 else "")
+    """Return a list of names as text, cut after the first few."""
+    rest = len(names) - NAMES_MAX
+    return ", ".join(names[:NAMES_MAX]) + (f" and {rest} more" if rest > 0 else "")
 
 
 @dataclass(frozen=True)
 class Hit:
-    """The gap of a stop, Re(f (B E + z)) + c, as seen from what its wall is fixed to."""
+    """The gap of a stop, Re(f (B E + z)) + c, as seen from the body that its wall is fixed to."""
 
     B: Complex
     c: float
@@ -192,7 +174,7 @@ class _Assembler:
         if body_of(start) not in self.origin:
             start, end = end, start
         z_start, z_end = self.end(joint, start), self.end(joint, end)
-        if abs(z_end - z_start) > TOGETHER * self.size():
+        if abs(z_end - z_start) > JOINT_DISTANCE_RTOL * self.size():
             raise MechanismError(
                 f"the joint {joint.name} joins {start} and {end}, which are drawn "
                 f"{abs(z_end - z_start):.4g} m apart: draw them at the same place"
@@ -205,11 +187,11 @@ class _Assembler:
         self.lines.append((joint.name, "joint", [place]))
 
     def reach(self, body: str, place: Place, drawn: complex, j: int | None) -> None:
-        """Note where a drawn point of a body is that turns with a coordinate."""
+        """Register the place of a drawn point of a body that turns with a coordinate."""
         self.origin[body], self.drawn[body], self.index[body] = place, drawn, j
 
     def close(self, name: str, place: Place, other: Place) -> None:
-        """Ask for two places to be one."""
+        """Close a loop: require that two places coincide."""
         self.loops.append((name, place.minus(other)))
 
     def flexure(self, flexure: Flexure) -> None:
@@ -269,7 +251,7 @@ class _Assembler:
     def segments(self, flexure: Flexure) -> Segments:
         kind = next(k for k in self.mechanism.flexure_types if k.name == flexure.type)
         L = self.length(flexure)
-        if L < TINY_LENGTH:
+        if L < LENGTH_MIN:
             raise ParameterError(
                 f"flexure {flexure.name} from {flexure.start} to {flexure.end} has the length "
                 f"{L:g} m: move its ends apart"
@@ -295,24 +277,16 @@ class _Assembler:
     # -- arrays --
 
     def arrays(self) -> System:
+        """Return the arrays from the collected parts."""
         n, mechanism = len(self.q0), self.mechanism
         arm = np.array(self.arm)
         A = np.array([place.row(n) for place, _ in self.masses])
         m = np.array([mass for _, mass in self.masses])
-        e0 = np.exp(1j * np.array(self.q0))  # of arms: no place depends on stretches, which are 0
-        closures = [place for _, place in self.loops]
-        loops = np.array([r for p in closures for r in (p.row(n), -1j * p.row(n))])
-        loops_c = np.array([x for p in closures for x in (p.c.real, p.c.imag)])
-        loops = loops.reshape(-1, n)
+        # Directions of arms alone: no place depends on stretches, which are zero here.
+        e0 = np.exp(1j * np.array(self.q0))
         spread = A[:, arm]
-
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
         self.lines += [(body, "body", self.corners(body)) for body in frames]
-        hits = [self.hit(stop, e0) for stop in mechanism.stops]
-        rubbed = [self.displaced(f.body, f.point, f.direction, e0) for f in mechanism.frictions]
-        lifted = [
-            self.displaced(f.body, f.point, f.direction + 90.0, e0) for f in mechanism.frictions
-        ]
         release = mechanism.release
         along_release, release_c = self.displaced(release.body, None, release.direction, e0)
         return System(
@@ -326,35 +300,55 @@ class _Assembler:
             A=A,
             c=np.array([place.c for place, _ in self.masses]),
             m=m,
-            loops=loops,
-            loops_c=loops_c,
-            gaps=stacked([hit.B for hit in hits], n),
-            gaps_c=np.array([hit.c for hit in hits]),
-            gaps_z=np.array([hit.z for hit in hits], complex),
-            slides=stacked([1j * hit.B for hit in hits], n),
-            slides_z=np.array([1j * hit.z for hit in hits], complex),
-            on=np.array([hit.on for hit in hits], int),
-            rubs=stacked([B for B, _ in rubbed], n),
-            lifts=stacked([B for B, _ in lifted], n),
-            lifts_c=np.array([c for _, c in lifted]),
+            **self.loop_arrays(n),
+            **self.stop_arrays(n, e0),
+            **self.friction_arrays(n, e0),
             release=along_release,
             release_c=release_c,
             bodies=frames,
             pushed=tuple(self.frame(f.name, f.body, f.point) for f in mechanism.forces),
             probes=tuple(self.probe(probe) for probe in mechanism.probes),
             links=tuple(self.links),
-            outlines=tuple(
-                Outline(
-                    name,
-                    kind,
-                    np.array([p.c for p in places]),
-                    np.array([p.row(n) for p in places]),
-                )
-                for name, kind, places in self.lines
-            ),
+            outlines=tuple(self.outline(*line) for line in self.lines),
             anchor=self.anchor(),
             length=self.size(),
         )
+
+    def loop_arrays(self, n: int) -> dict[str, Any]:
+        """Return the rows of the loop closures and their constants."""
+        closures = [place for _, place in self.loops]
+        rows = np.array([r for p in closures for r in (p.row(n), -1j * p.row(n))])
+        constants = np.array([x for p in closures for x in (p.c.real, p.c.imag)])
+        return {"loops": rows.reshape(-1, n), "loops_c": constants}
+
+    def stop_arrays(self, n: int, e0: Complex) -> dict[str, Any]:
+        """Return the rows of gaps and of displacements along the walls, and their constants."""
+        hits = [self.hit(stop, e0) for stop in self.mechanism.stops]
+        return {
+            "gaps": stacked([hit.B for hit in hits], n),
+            "gaps_c": np.array([hit.c for hit in hits]),
+            "gaps_z": np.array([hit.z for hit in hits], complex),
+            "slides": stacked([1j * hit.B for hit in hits], n),
+            "slides_z": np.array([1j * hit.z for hit in hits], complex),
+            "on": np.array([hit.on for hit in hits], int),
+        }
+
+    def friction_arrays(self, n: int, e0: Complex) -> dict[str, Any]:
+        """Return the displacements of friction points along and across their directions."""
+        points = self.mechanism.frictions
+        along = [self.displaced(f.body, f.point, f.direction, e0) for f in points]
+        across = [self.displaced(f.body, f.point, f.direction + 90.0, e0) for f in points]
+        return {
+            "rubs": stacked([B for B, _ in along], n),
+            "lifts": stacked([B for B, _ in across], n),
+            "lifts_c": np.array([c for _, c in across]),
+        }
+
+    def outline(self, name: str, kind: str, places: list[Place]) -> Outline:
+        """Return a line to draw."""
+        n = len(self.q0)
+        A = np.array([p.row(n) for p in places])
+        return Outline(name, kind, np.array([p.c for p in places]), A)
 
     def stiffness(self) -> Real:
         n = len(self.q0)
@@ -437,7 +431,7 @@ def calculated(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, f
 
 
 def check_masses(M: Real, J: Sequence[float]) -> None:
-    """Refuse a motion that moves no mass.
+    """Reject a motion that moves no mass.
 
     Parameters
     ----------
@@ -455,7 +449,7 @@ def check_masses(M: Real, J: Sequence[float]) -> None:
     scale = np.sqrt(np.diag(full))
     if np.all(scale > 0.0):
         scaled = full / np.outer(scale, scale)
-        if np.linalg.eigvalsh(scaled)[0] > 1e-13:
+        if np.linalg.eigvalsh(scaled)[0] > MASSLESS_RTOL:
             return
     raise ParameterError(
         "something that can move has no mass: give the flexures a density and the bodies a mass "
@@ -464,7 +458,7 @@ def check_masses(M: Real, J: Sequence[float]) -> None:
 
 
 def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
-    """Refuse loops that are not independent of each other at the straight shape.
+    """Reject loops that are not independent of each other at the straight shape.
 
     Parameters
     ----------
@@ -483,7 +477,7 @@ def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
     if not len(loops):
         return
     jacobian = (1j * loops * e).real
-    tolerance = 1e-9 * np.abs(jacobian).max()
+    tolerance = DEPENDENT_LOOP_RTOL * np.abs(jacobian).max()
     _, R, order = qr(jacobian.T, mode="economic", pivoting=True)
     size = np.abs(np.diag(R))
     repeated = sorted({names[row // 2] for row in order[: len(size)][size <= tolerance]})

@@ -1,163 +1,25 @@
-r"""Scalars s = Re(B E) + c of the position: values, rates, convective terms, projection.
-
-Loop closures, gaps and displacements are all of this form (see :mod:`prbm.mechanics.assembly`).
-What is seen from a body that moves itself, a gap to a wall on it, say, is
-
-    s = Re(f (B E + z)) + c,    f = conj(E of that body),
-
-and a row of :class:`Rows` like the others.
+r"""Saddle-point systems of constrained motions, and projections onto constraints.
 
 Sources
 -------
 .. [1] E. Eich, SIAM J. Numer. Anal. 30 (1993) 1467 (coordinate projection).
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dgesv, dgetrs
 
 from ..base.errors import SimulationError
-from .arrays import Complex, Real, Whole
+from ..base.tolerances import (
+    CONSTRAINT_ITERATIONS_MAX,
+    CONSTRAINT_RTOL,
+    CONSTRAINT_STALLED_RTOL,
+)
+from .arrays import Complex, Real
 from .kinetics import inertia
-from .system import FIXED, System
+from .system import Rows, System
 
 Factors = tuple[Real, NDArray[np.int32]]
-
-CLOSED = 1e-14  # of the size of the mechanism: a few roundings of its coordinates
-BARELY_CLOSED = 1e-12  # of that size: accepted if the iteration can do no better
-ITERATIONS = 20  # Gauss-Newton converges quadratically: three are usual, twenty are hopeless
-
-
-def values(B: Complex, c: Real, e: Complex) -> Real:
-    """Return s = Re(B E) + c [m], for rows B."""
-    result: Real = (B @ e).real + c
-    return result
-
-
-def jacobian(B: Complex, e: Complex) -> Real:
-    """Return ds/dq = -Im(B e) [m/rad], one row per row of B, which is spread over stretches."""
-    return -(B * e).imag
-
-
-def convective(B: Complex, e: Complex, w: Real | Complex) -> Real:
-    """Return -(d/dt ds/dq) v = Re(B e w^2), the right side of (ds/dq) a = ... for s'' = 0."""
-    result: Real = ((B * e) @ (w * w)).real
-    return result
-
-
-class Rows:
-    """Scalars of a mechanism, some of them seen from a body that moves.
-
-    Parameters
-    ----------
-    system : System
-        The mechanism.
-    B, c : (r, n) complex, (r,)
-        s = Re(f (B E + z)) + c [m].
-    z, on : (r,) complex, (r,) int, or None
-        The fixed part of what is seen from a body, and its coordinate; :data:`FIXED` or None:
-        f = 1, z = 0.
-    """
-
-    def __init__(
-        self, system: System, B: Complex, c: Real, z: Complex | None = None, on: Whole | None = None
-    ) -> None:
-        self.system, self.B, self.c = system, B, c
-        self.spread = system.spread(B)
-        on = np.full(len(B), FIXED) if on is None else on
-        self.carried: Whole = np.flatnonzero(on != FIXED)
-        self.on: Whole = on[self.carried]
-        self.z: Complex = np.zeros(0, complex) if z is None else z[self.carried]
-
-    def __len__(self) -> int:
-        return len(self.B)
-
-    def first(self, r: int) -> "Rows":
-        """Return the first r rows."""
-        if r == len(self):
-            return self
-        on = np.full(len(self), FIXED)
-        z = np.zeros(len(self), complex)
-        on[self.carried], z[self.carried] = self.on, self.z
-        return Rows(self.system, self.B[:r], self.c[:r], z[:r], on[:r])
-
-    def values(self, e: Complex, c: Real | None = None) -> Real:
-        """Return s [m]; e may be a stack (..., n), and c replace the constants."""
-        x = e @ self.B.T
-        if len(self.carried):
-            x[..., self.carried] = self._seen(x, e)
-        result: Real = x.real + (self.c if c is None else c)
-        return result
-
-    def _seen(self, x: Complex, e: Complex) -> Complex:
-        """Return f (B E + z) of the carried rows."""
-        result: Complex = e[..., self.on].conj() * (x[..., self.carried] + self.z)
-        return result
-
-    def jacobian(self, e: Complex) -> Real:
-        """Return ds/dq [m/rad]."""
-        result = jacobian(self.spread, e)
-        if len(self.carried):
-            f = e[self.on].conj()
-            result[self.carried] = -(f[:, None] * self.spread[self.carried] * e).imag
-            result[self.carried, self.on] += self._seen(self.B @ e, e).imag
-        return result
-
-    def rates(self, e: Complex, v: Real) -> Real:
-        """Return s' [m/s]; e and v may be stacks (..., n)."""
-        y: Complex = (e * self.system.turning(v)) @ self.B.T
-        if len(self.carried):
-            f = e[..., self.on].conj()
-            turned = v[..., self.on] * self._seen(e @ self.B.T, e)
-            y[..., self.carried] = f * y[..., self.carried] - turned
-        return -y.imag
-
-    def convective(self, e: Complex, v: Real) -> Real:
-        """Return -(d/dt ds/dq) v, the right side of (ds/dq) a = ... for s'' = 0 [m/s^2]."""
-        w = self.system.turning(v)
-        result = convective(self.B, e, w)
-        if len(self.carried):
-            result[self.carried] = self.carried_convective(e, v, w)
-        return result
-
-    def carried_convective(self, e: Complex, v: Real, w: Real | Complex) -> Real:
-        """Return the convective terms of the carried rows [m/s^2]."""
-        f, turn = e[self.on].conj(), v[self.on]
-        B = self.B[self.carried]
-        bent = ((w - turn[:, None]) ** 2 * (B * e)).sum(axis=1) + turn**2 * self.z
-        result: Real = (f * bent).real
-        return result
-
-
-def gap_rows(system: System) -> Rows:
-    """Return the gaps of all stops, without the positions of their walls."""
-    return Rows(system, system.gaps, system.gaps_c, system.gaps_z, system.on)
-
-
-def slide_rows(system: System) -> Rows:
-    """Return the displacements of all hit points along their walls, but for a constant."""
-    return Rows(system, system.slides, np.zeros(len(system.slides)), system.slides_z, system.on)
-
-
-def rub_rows(system: System) -> Rows:
-    """Return the displacements of all friction points, but for a constant."""
-    return Rows(system, system.rubs, np.zeros(len(system.rubs)))
-
-
-@dataclass(frozen=True)
-class Watched:
-    """What is watched of a system in all of its discrete states: its gaps, slides and rubs."""
-
-    gaps: Rows
-    slides: Rows
-    rubs: Rows
-
-    @classmethod
-    def of(cls, system: System) -> "Watched":
-        """Return the rows of a system."""
-        return cls(gap_rows(system), slide_rows(system), rub_rows(system))
 
 
 def saddle(M: Real, columns: Real, rows: Real) -> Real:
@@ -205,6 +67,11 @@ def solve_again(factors: Factors, right: Real) -> Real:
     return x
 
 
+def satisfied(residual: Real, length: float) -> bool:
+    """Return whether residuals of constraints [m] are round-off in a mechanism of a length [m]."""
+    return not len(residual) or float(np.abs(residual).max()) <= CONSTRAINT_RTOL * length
+
+
 def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Real, Complex]:
     """Move q onto the rows by the least mass-weighted change (Gauss-Newton).
 
@@ -222,7 +89,8 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
     Returns
     -------
     q : (n,)
-        On the constraints, to :data:`CLOSED` times the length where rounding allows.
+        On the constraints, to :data:`prbm.base.tolerances.CONSTRAINT_RTOL` times the length
+        where round-off allows.
     e : (n,) complex
         Its directions.
 
@@ -233,11 +101,12 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
     """
     n, J = len(q), np.diag(system.J)
     best = np.inf
-    for _ in range(ITERATIONS):
+    for _ in range(CONSTRAINT_ITERATIONS_MAX):
         e = system.directions(q)
         s = rows.values(e, c)
         error = float(np.abs(s).max()) if len(s) else 0.0
-        if error <= CLOSED * system.length or BARELY_CLOSED * system.length >= best <= error:
+        stalled = CONSTRAINT_STALLED_RTOL * system.length >= best <= error
+        if stalled or error <= CONSTRAINT_RTOL * system.length:
             return q, e
         best = min(best, error)
         G = rows.jacobian(e)

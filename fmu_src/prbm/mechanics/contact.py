@@ -17,20 +17,25 @@ Sources
 """
 
 import math
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
 from ..base.errors import SimulationError
+from ..base.tolerances import (
+    COMPLEMENTARITY_RTOL,
+    IMPACT_SETS_MAX,
+    IMPULSE_RANK_RTOL,
+    REBOUND_RTOL,
+    SWEEP_RELAXATIONS,
+    SWEEP_RTOL,
+    SWEEPS_MAX,
+    WEDGED_RTOL,
+    ZERO_SPEED_RTOL,
+)
 from . import constraints
 from .arrays import Real
-
-FEASIBLE = 1e-10  # of the largest approach: what the complementarity may be violated by
-SWEEPS = 2000  # of Gauss-Seidel over several contacts with friction
-WEDGED = 1e-10  # of the inverse normal mass: a smaller rate of the approach is a rounding
-ROUNDING = 1e-12  # of the rates before: what is left of a rate that has vanished
-RELAXATIONS = (1.0, 0.3, 0.05)  # of the sweeps, tried in this order
-SETTLED = 1e-14  # change of the impulses at which the sweeps end, relative
 
 
 def response(M: Real, held: Real, rows: Real) -> Real:
@@ -60,7 +65,9 @@ def newton(W: Real, u: Real, restitution: Real) -> Real:
     r"""Return the impulses of a frictionless impact of several stops, without an order.
 
     Solves P >= 0, W P + u + eps u >= 0, complementary, for closing or resting stops (u <= 0):
-    each stop that receives an impulse opens at -eps u.  Energy is never gained.
+    each stop that receives an impulse opens at -eps u.  Energy is never gained.  Of up to
+    :data:`prbm.base.tolerances.IMPACT_SETS_MAX` stops every subset is tried; the impulses of more
+    are found by Gauss-Seidel sweeps.
 
     Parameters
     ----------
@@ -84,25 +91,41 @@ def newton(W: Real, u: Real, restitution: Real) -> Real:
     9.0
     """
     b = (1.0 + restitution) * u
-    k = len(u)
+    if len(u) > IMPACT_SETS_MAX:
+        return _newton_sweeps(W, b)
+    return _newton_search(W, b, COMPLEMENTARITY_RTOL * float(np.abs(u).max()))
+
+
+def _newton_search(W: Real, b: Real, tolerance: float) -> Real:
+    """Try every set of stops that may receive an impulse; return the least violating one."""
+    k = len(b)
     worst, best = math.inf, np.zeros(k)
-    # the largest sets first: a stop that closes nearly always receives an impulse
+    # The largest sets first: a stop that closes nearly always receives an impulse.
     for size in range(k, -1, -1):
         for members in combinations(range(k), size):
             s = list(members)
             P = np.zeros(k)
             if s:
-                P[s] = np.linalg.lstsq(W[np.ix_(s, s)], -b[s], rcond=1e-13)[0]
+                P[s] = np.linalg.lstsq(W[np.ix_(s, s)], -b[s], rcond=IMPULSE_RANK_RTOL)[0]
             violation = max(
                 float((-(W @ P + b)).max()),
                 float((-P * np.diag(W)).max()),
                 float(np.abs(P * np.diag(W) * (W @ P + b)).max()) ** 0.5,
             )
-            if violation <= FEASIBLE * float(np.abs(u).max()):
+            if violation <= tolerance:
                 return np.maximum(P, 0.0)
             if violation < worst:
                 worst, best = violation, np.maximum(P, 0.0)
     return best
+
+
+def _newton_sweeps(W: Real, b: Real) -> Real:
+    """Return the impulses by Gauss-Seidel, each step of which lowers P.W P/2 + b.P."""
+    P = np.zeros(len(b))
+    for _ in range(SWEEPS_MAX):
+        for i in np.flatnonzero(np.diag(W) > 0.0):
+            P[i] = max(0.0, P[i] - float(W[i] @ P + b[i]) / W[i, i])
+    return P
 
 
 def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[float, float]:
@@ -134,41 +157,73 @@ def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[floa
     >>> stronge(np.eye(2), np.array([-1.0, 1.0]), 0.1, 0.5)
     (1.5, -0.15000000000000002)
     """
-    nn, nt, tt = float(W[0, 0]), float(W[0, 1]), float(W[1, 1])
-    u_n, u_t = float(u[0]), float(u[1])
-    small_n = ROUNDING * abs(u_n)
-    small_t = ROUNDING * (abs(u_t) + abs(u_n) * math.sqrt(tt / nn) if nn > 0.0 else abs(u_t))
-    p_n = p_t = work = 0.0
-    while u_n < 0.0:
-        ratio = _friction_ratio(nt, tt, u_t, friction)
-        rate_n, rate_t = nn + ratio * nt, nt + ratio * tt
-        stops_sliding = -u_t / rate_t if u_t * rate_t < 0.0 else math.inf
-        stops_closing = -u_n / rate_n if rate_n > WEDGED * nn else math.inf
-        step = min(stops_sliding, stops_closing)
-        if step == math.inf:
-            break
-        work -= u_n * step + rate_n * step**2 / 2
-        p_n, p_t = p_n + step, p_t + ratio * step
-        u_n = 0.0 if step == stops_closing else u_n + rate_n * step
-        u_t = 0.0 if step == stops_sliding else u_t + rate_t * step
-    # with one degree of freedom both rates vanish together, up to a rounding
-    u_n = u_n if u_n > small_n else 0.0
-    u_t = u_t if abs(u_t) > small_t else 0.0
-    left = restitution**2 * work
-    while left > 0.0:
-        ratio = _friction_ratio(nt, tt, u_t, friction)
-        rate_n, rate_t = nn + ratio * nt, nt + ratio * tt
-        stops_sliding = -u_t / rate_t if u_t * rate_t < 0.0 else math.inf
-        spent = _restitution_ends(u_n, rate_n if abs(rate_n) > WEDGED * nn else 0.0, left)
-        step = min(stops_sliding, spent)
-        if step == math.inf:
-            break
-        left -= u_n * step + rate_n * step**2 / 2
-        p_n, p_t = p_n + step, p_t + ratio * step
-        if step == spent:
-            break
-        u_n, u_t = max(0.0, u_n + rate_n * step), 0.0
-    return p_n, p_t
+    hit = _Hit(float(W[0, 0]), float(W[0, 1]), float(W[1, 1]), friction, float(u[0]), float(u[1]))
+    work = hit.compress()
+    hit.restore(restitution**2 * work)
+    return hit.p_n, hit.p_t
+
+
+@dataclass
+class _Hit:
+    """A hit with friction in progress: inverse masses, rates and impulses so far."""
+
+    nn: float
+    nt: float
+    tt: float
+    friction: float
+    u_n: float
+    u_t: float
+    p_n: float = 0.0
+    p_t: float = 0.0
+    ratio: float = 0.0
+    rate_n: float = 0.0
+    rate_t: float = 0.0
+
+    def compress(self) -> float:
+        """Apply the impulses of compression and return their work [J]."""
+        nn, tt, u_n, u_t = self.nn, self.tt, abs(self.u_n), abs(self.u_t)
+        small_n = ZERO_SPEED_RTOL * u_n
+        small_t = ZERO_SPEED_RTOL * (u_t + u_n * math.sqrt(tt / nn) if nn > 0.0 else u_t)
+        work = 0.0
+        while self.u_n < 0.0:
+            sticking = self.sliding_ends()
+            closed = -self.u_n / self.rate_n if self.rate_n > WEDGED_RTOL * nn else math.inf
+            step = min(sticking, closed)
+            if step == math.inf:
+                break
+            work -= self.receive(step)
+            self.u_n = 0.0 if step == closed else self.u_n + self.rate_n * step
+            self.u_t = 0.0 if step == sticking else self.u_t + self.rate_t * step
+        # With one degree of freedom both rates vanish together, up to round-off.
+        self.u_n = self.u_n if self.u_n > small_n else 0.0
+        self.u_t = self.u_t if abs(self.u_t) > small_t else 0.0
+        return work
+
+    def restore(self, left: float) -> None:
+        """Apply the impulses of restitution that do the work ``left`` [J]."""
+        while left > 0.0:
+            sticking = self.sliding_ends()
+            rate_n = self.rate_n if abs(self.rate_n) > WEDGED_RTOL * self.nn else 0.0
+            spent = _restitution_ends(self.u_n, rate_n, left)
+            step = min(sticking, spent)
+            if step == math.inf:
+                break
+            left -= self.receive(step)
+            if step == spent:
+                break
+            self.u_n, self.u_t = max(0.0, self.u_n + self.rate_n * step), 0.0
+
+    def sliding_ends(self) -> float:
+        """Return the normal impulse at which sliding ends, and set the rates until then."""
+        self.ratio = _friction_ratio(self.nt, self.tt, self.u_t, self.friction)
+        self.rate_n = self.nn + self.ratio * self.nt
+        self.rate_t = self.nt + self.ratio * self.tt
+        return -self.u_t / self.rate_t if self.u_t * self.rate_t < 0.0 else math.inf
+
+    def receive(self, step: float) -> float:
+        """Add a normal impulse with its friction, and return its work [J]."""
+        self.p_n, self.p_t = self.p_n + step, self.p_t + self.ratio * step
+        return self.u_n * step + self.rate_n * step**2 / 2
 
 
 def _restitution_ends(u_n: float, rate_n: float, left: float) -> float:
@@ -229,7 +284,7 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
 
     R, gain = rebound(1.0)
     low, high = 0.0, 1.0
-    while gain > lost and high - low > 1e-12:
+    while gain > lost and high - low > REBOUND_RTOL:
         s = (low + high) / 2
         low, high = (s, high) if rebound(s)[1] <= lost else (low, s)
     return P + (R if gain <= lost else rebound(low)[0])
@@ -238,12 +293,12 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
 def _sweep(W: Real, u: Real, friction: Real, least: Real) -> Real:
     """Gauss-Seidel over contacts: P_n >= least, u_n >= 0, complementary; Coulomb's law.
 
-    Strongly coupled contacts can make the sweeps run in circles; shorter steps lead out.
+    The sweeps may cycle between strongly coupled contacts; relaxation ends the cycle.
     """
     k = len(friction)
-    for relaxation in RELAXATIONS:
+    for relaxation in SWEEP_RELAXATIONS:
         P = np.concatenate([least, np.zeros(k)])
-        for _ in range(SWEEPS):
+        for _ in range(SWEEPS_MAX):
             last = P.copy()
             for i in range(k):
                 if W[i, i] > 0.0:
@@ -254,7 +309,7 @@ def _sweep(W: Real, u: Real, friction: Real, least: Real) -> Real:
                     limit = friction[i] * P[i]
                     wanted = P[j] - relaxation * float(u[j] + W[j] @ P) / W[j, j]
                     P[j] = min(limit, max(-limit, wanted))
-            if np.abs(P - last).max() <= SETTLED * relaxation * np.abs(P).max():
+            if np.abs(P - last).max() <= SWEEP_RTOL * relaxation * np.abs(P).max():
                 return P
     raise SimulationError(
         "several stops are hit at once with friction, and no impulses were found that satisfy "

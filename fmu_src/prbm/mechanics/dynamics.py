@@ -1,106 +1,115 @@
-r"""The equations of motion in one discrete state: which stops hold, what slides, what sticks.
+r"""The equations of motion for one state of the contacts.
 
     [ M    R^T ] [  a   ]   [ Q - C v^2 ]
     [ R     0  ] [ -lam ] = [ Re(B e) v^2 ]
 
-(w^2 for v^2 where links stretch: see :mod:`prbm.mechanics.assembly`) with R the rows of the loops,
-of the stops that hold and of what sticks.  A stop that holds and slides pushes along its gap and,
-by Coulomb's law, along its wall: its column differs from its row.
+(w^2 for v^2 where links stretch: see :mod:`prbm.mechanics.system`) with R the rows of the loops,
+of the stops that hold and of the contacts that stick.  A stop that holds and slips pushes along
+its gap and, by Coulomb's law, along its wall: its column differs from its row.
 """
 
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..mechanism.parts import value
 from . import constraints, forces
 from .arrays import Complex, Real
-from .constraints import Rows
+from .contact_state import ContactMode, ContactState
 from .inputs import Inputs
 from .kinetics import inertia, kinetic_energy, mass_accelerations
-from .system import FIXED, System
-
-STICKS = 0  # and +1, -1: slides along, against the direction
-IDLE = 2  # no friction acts: open, frictionless, or the stop carries everything
+from .system import FIXED, Rows, System
 
 
-@dataclass(frozen=True)
-class Discrete:
-    """The discrete state.
+class Evaluation(NamedTuple):
+    """The equations of motion, solved at one state.
 
     Parameters
     ----------
-    holds : (s,) bools
-        Whether each stop holds (resting contact).
-    slides : (s,) of {-1, 0, 1, 2}
-        Sliding of each stop along its wall: its sign, :data:`STICKS` or :data:`IDLE`.
-    rubs : (f,) of {-1, 0, 1, 2}
-        The same for each friction point.
+    a : (n,)
+        Accelerations [rad/s^2].
+    lam : (r,)
+        Forces of the loops, then of the stops that hold (> 0 pushes), then of the contacts that
+        stick [N].
+    M : (n, n)
+        Mass matrix [kg m^2].
+    factors : Factors
+        Of the matrix of the equations, for :meth:`Equations.project_near`.
     """
 
-    holds: tuple[bool, ...]
-    slides: tuple[int, ...]
-    rubs: tuple[int, ...]
+    a: Real
+    lam: Real
+    M: Real
+    factors: constraints.Factors
 
-    def without_hold(self, stop: int) -> "Discrete":
-        """Return the state in which a stop has let go."""
-        changed = list(self.holds)
-        changed[stop] = False
-        return replace(self, holds=tuple(changed))
 
-    def with_slide(self, kind: str, i: int, state: int) -> "Discrete":
-        """Return the state in which a held stop ("slide") or a friction point ("rub") slides so."""
-        states = list(self.rubs if kind == "rub" else self.slides)
-        states[i] = state
-        if kind == "rub":
-            return replace(self, rubs=tuple(states))
-        return replace(self, slides=tuple(states))
+class FrictionLaw(NamedTuple):
+    """Coulomb's law of a friction point: coefficient [-], normal force [N], stiffness [N/m]."""
+
+    coefficient: float
+    normal_force: float
+    normal_stiffness: float
 
 
 class Equations:
-    """Accelerations, multipliers and powers of a system in one discrete state.
+    """Accelerations, multipliers and powers of a system in one state of its contacts.
+
+    No method changes the object: each result depends on its arguments alone.
 
     Parameters
     ----------
     system : System
         The constant arrays.
     inputs : Inputs
-        What acts from outside.
-    discrete : Discrete
-        What holds, sticks and slides.
+        Forces, walls and the acceleration of the base.
+    contacts : ContactState
+        The modes of stops and friction points.
     omega : float
         Angular frequency of the fundamental mode, for the damping ratio [rad/s].
     """
 
-    def __init__(self, system: System, inputs: Inputs, discrete: Discrete, omega: float) -> None:
-        self.system, self.inputs, self.discrete = system, inputs, discrete
+    def __init__(
+        self, system: System, inputs: Inputs, contacts: ContactState, omega: float
+    ) -> None:
+        self.system, self.inputs, self.contacts, self.omega = system, inputs, contacts, omega
         values, mechanism = system.values, system.mechanism
         self.n = system.n
         self.J = np.diag(system.J)
         self.beta = values["damping.beta"]
         self.mass_damping = 2.0 * values["damping.zeta"] * omega
-
-        held = [i for i, holds in enumerate(discrete.holds) if holds]
-        stuck = [i for i in held if discrete.slides[i] == STICKS]
-        rubbing = [i for i, s in enumerate(discrete.rubs) if s == STICKS]
-        self.held, self.stuck, self.rubbing = held, stuck, rubbing
-        B = np.vstack([system.loops, system.gaps[held], system.slides[stuck], system.rubs[rubbing]])
-        self.first_hold = len(system.loops)
-        self.first_stick = self.first_hold + len(held)
-        self.first_rub = self.first_stick + len(stuck)
-        self.sliding = [i for i in held if abs(discrete.slides[i]) == 1]
         self.stop_friction = [value(s, "friction", values) for s in mechanism.stops]
-        self.rub_law = [
-            tuple(
-                value(f, what, values)
-                for what in ("coefficient", "normal_force", "normal_stiffness")
-            )
+        self.friction_laws = [
+            FrictionLaw(*(value(f, name, values) for name in FrictionLaw._fields))
             for f in mechanism.frictions
         ]
-        self.rub_slides = [
-            i for i, s in enumerate(discrete.rubs) if abs(s) == 1 and self.rub_law[i][0] > 0.0
-        ]
+        self._number_contacts()
+        self._collect_loads()
+        self._stack_rows()
+        # One product with e gives loads, inertia and constraints: see _solve.
+        self._stack: Complex = np.vstack([self.w, system.H, 1j * self.rows.spread])
+        self._J_stack = np.zeros((self.n + len(self.rows), self.n))
+        self._J_stack[: self.n] = self.J
+        # Springs and their damping in one product with (q, v): see torques.
+        damping = self.beta * system.K
+        self._K_y = np.block([[system.K, damping], [0 * system.K, damping]])
+        self._straight = np.concatenate([system.K @ system.q0, np.zeros(self.n)])
 
+    def _number_contacts(self) -> None:
+        """Sort the contacts by their modes, and number their rows."""
+        modes, stops = self.contacts.modes, self.contacts.stops
+        self.held = list(self.contacts.held)
+        self.sticking = [c for c, mode in enumerate(modes) if mode is ContactMode.STICK]
+        self.slipping_stops = [i for i in self.held if modes[i].slip]
+        self.slipping_points = [
+            c for c in range(stops, len(modes))
+            if modes[c].slip and self.friction_laws[c - stops].coefficient > 0.0
+        ]  # fmt: skip
+        self.first_hold = len(self.system.loops)
+        self.first_stick = self.first_hold + len(self.held)
+
+    def _collect_loads(self) -> None:
+        """Add up the rows of gravity, of the base and of the forces."""
+        system, inputs = self.system, self.inputs
         w = forces.field_row(system.S, -inputs.base)
         self.moment = np.zeros(self.n)
         for frame, force, moment in zip(system.pushed, inputs.forces, inputs.moments, strict=True):
@@ -109,58 +118,56 @@ class Equations:
         self.w_input = system.spread(w)
         self.w = self.w_input + system.spread(forces.field_row(system.S, system.gravity))
         self.driven = bool(np.any(self.w_input) or np.any(self.moment))
-        self.walls_push = any(inputs.walls[i].rate for i in held)
+        self.moving_walls = any(inputs.walls[i].rate for i in self.held)
 
-        loops, rubs = len(system.loops), len(rubbing)
+    def _stack_rows(self) -> None:
+        """Stack the rows of the active constraints: loops, held stops, sticking contacts."""
+        system, held, stops = self.system, self.held, self.contacts.stops
+        stuck = [c for c in self.sticking if c < stops]
+        rubbing = [c - stops for c in self.sticking if c >= stops]
+        B = np.vstack([system.loops, system.gaps[held], system.slides[stuck], system.rubs[rubbing]])
+        loops, end = len(system.loops), len(B) - len(rubbing)
         c = np.zeros(len(B))
         c[:loops] = system.loops_c
         for k, i in enumerate(held):
-            c[self.first_hold + k] = system.gaps_c[i] + inputs.walls[i].position
+            c[self.first_hold + k] = system.gaps_c[i] + self.inputs.walls[i].position
         z = np.zeros(len(B), complex)
         on = np.full(len(B), FIXED)
-        z[loops : len(B) - rubs] = [*system.gaps_z[held], *system.slides_z[stuck]]
-        on[loops : len(B) - rubs] = [*system.on[held], *system.on[stuck]]
+        z[loops:end] = [*system.gaps_z[held], *system.slides_z[stuck]]
+        on[loops:end] = [*system.on[held], *system.on[stuck]]
         self.rows = Rows(system, B, c, z, on)
         self.positions = self.rows.first(self.first_stick)
-        self.gap_rows, self.slide_rows = system.watched.gaps, system.watched.slides
-        self.rub_rows = system.watched.rubs
 
-        # one product with e serves loads, inertia and constraints: see accelerations
-        self.stack: Complex = np.vstack([self.w, system.H, 1j * self.rows.spread])
-        self.J_stack = np.zeros((self.n + len(B), self.n))
-        self.J_stack[: self.n] = self.J
-        self.kkt = np.zeros((self.n + len(B),) * 2, order="F")
-        # springs and their damping in one product with y = (q, v, ...): see torques
-        self.K_y = np.block(
-            [[system.K, self.beta * system.K], [0 * system.K, self.beta * system.K]]
-        )
-        self.straight = np.concatenate([system.K @ system.q0, np.zeros(self.n)])
-        self.trace: list[Real] = []
+    def with_contacts(self, contacts: ContactState) -> "Equations":
+        """Return the equations for another state of the contacts."""
+        if contacts == self.contacts:
+            return self
+        return Equations(self.system, self.inputs, contacts, self.omega)
+
+    def with_inputs(self, inputs: Inputs) -> "Equations":
+        """Return the equations with other inputs."""
+        return Equations(self.system, inputs, self.contacts, self.omega)
 
     # -- motion --
 
-    def accelerations(self, q: Real, v: Real) -> tuple[Real, Real, Real]:
-        """Return accelerations, multipliers and the mass matrix.
+    def evaluate(self, q: Real, v: Real) -> Evaluation:
+        """Return accelerations, multipliers, mass matrix and factors.
 
         Parameters
         ----------
         q, v : (n,)
             Angles and rates [rad], [rad/s].
 
-        Returns
-        -------
-        a : (n,)
-            [rad/s^2].
-        lam : (r,)
-            Loops, then the forces of the stops that hold (> 0 pushes), of what sticks [N].
-        M : (n, n)
-            Mass matrix [kg m^2].
+        Raises
+        ------
+        SimulationError
+            If the equations are singular.
         """
         torques = self.torques(np.concatenate([q, v]))
         return self._solve(q, v, torques[: self.n])
 
     def torques(self, y: Real) -> Real:
-        """Return what springs and their damping take up, and the share of the damping.
+        """Return the torques that springs and their damping take up, and those of the damping.
 
         Parameters
         ----------
@@ -172,12 +179,12 @@ class Equations:
         (2 n,)
             K (q - q0) + beta K v, then beta K v [N m].
         """
-        result: Real = self.K_y @ y
-        result -= self.straight
+        result: Real = self._K_y @ y
+        result -= self._straight
         return result
 
-    def _solve(self, q: Real, v: Real, torques: Real) -> tuple[Real, Real, Real]:
-        """Return accelerations, multipliers and mass matrix for given torques of the springs.
+    def _solve(self, q: Real, v: Real, torques: Real) -> Evaluation:
+        """Solve the equations for given torques of the springs.
 
         All that depends on e comes from one product, row by row:
 
@@ -186,14 +193,16 @@ class Equations:
         whose real parts are the load, M - J and the constraint rows, and whose imaginary parts
         are -C (:func:`prbm.mechanics.kinetics.inertia`) and the convective terms Re(B e).
         """
-        n, kkt = self.n, self.kkt
+        n = self.n
         e, w = self.system.directions(q), self.system.turning(v)
-        G = self.stack * e
+        G = self._stack * e
         G[1 : n + 1] *= e.conj()[:, None]
         carried = n + self.rows.carried
         if len(carried):
             G.real[1 + carried] = self.rows.jacobian(e)[self.rows.carried]
-        np.add(G.real[1:], self.J_stack, out=kkt[:, :n])
+        size = len(self._J_stack)
+        kkt = np.zeros((size, size), order="F")
+        np.add(G.real[1:], self._J_stack, out=kkt[:, :n])
         kkt[:n, n:] = kkt[n:, :n].T
         M = kkt[:n, :n]
         right: Real = (G[1:] @ (w * w)).imag if np.iscomplexobj(w) else G.imag[1:] @ (v * v)
@@ -206,59 +215,60 @@ class Equations:
             Q += self.moment
         if self.mass_damping:
             Q -= self.mass_damping * (M @ v)
-        for i in self.rub_slides:
-            Q += self._rub_force(i, e) * self.rub_rows.jacobian(e)[i]
-        for i in self.sliding:
-            share = -self.stop_friction[i] * self.discrete.slides[i]
-            column = n + self.first_hold + self.held.index(i)
-            kkt[:n, column] += share * self.slide_rows.jacobian(e)[i]
-        x, self.factors = constraints.factor_and_solve(kkt, right)
-        return x[:n], -x[n:], M
+        for c in self.slipping_points:
+            Q += self._point_force(c, e) * self.slip_row(c, e)
+        for i in self.slipping_stops:
+            share = -self.stop_friction[i] * self.contacts.modes[i].slip
+            kkt[:n, n + self._hold_row(i)] += share * self.slip_row(i, e)
+        x, factors = constraints.factor_and_solve(kkt, right)
+        return Evaluation(x[:n], -x[n:], M, factors)
 
-    def _rub_force(self, i: int, e: Complex) -> float:
-        """Return the friction force of a sliding friction point along its direction [N]."""
-        return -self.discrete.rubs[i] * self.rub_limit(i, e)
+    def mass_and_loops(self, q: Real) -> tuple[Complex, Real, Real]:
+        """Return e, the mass matrix (n, n) and the Jacobian of the loops (r, n) at a position."""
+        e = self.system.directions(q)
+        M, _ = inertia(self.system.H, self.J, e)
+        return e, M, self.system.loop_rows.jacobian(e)
 
-    def rub_limit(self, i: int, e: Complex) -> float:
-        """Return mu N of a friction point [N]."""
-        mu, preload, stiffness = self.rub_law[i]
-        lift = float((self.system.lifts[i] @ e).real) + self.system.lifts_c[i]
-        return mu * forces.normal_force(lift, preload, stiffness)
+    # -- rates of the state --
 
     def rate(self, t: float, y: Real) -> Real:
-        """Return dy/dt for y = (q, v, dissipated energy, work)."""
+        """Return dy/dt for y = (q, v, dissipated energy, work), (2 n + 2,)."""
+        return self.rate_and_evaluation(y)[0]
+
+    def rate_and_evaluation(self, y: Real) -> tuple[Real, Evaluation]:
+        """Return dy/dt for y = (q, v, dissipated energy, work), and the evaluation there."""
         n = self.n
         q, v = y[:n], y[n : 2 * n]
         torques = self.torques(y[: 2 * n])
-        a, lam, M = self._solve(q, v, torques[:n])
-        self.trace.append(lam)
+        evaluation = self._solve(q, v, torques[:n])
+        lam = evaluation.lam
         result = np.empty(2 * n + 2)
         result[:n] = v
-        result[n : 2 * n] = a
+        result[n : 2 * n] = evaluation.a
         result[2 * n] = v @ torques[n:]
         result[2 * n + 1] = 0.0
         if self.mass_damping:
-            result[2 * n] += 2.0 * self.mass_damping * kinetic_energy(M, v)
-        if self.rub_slides or self.sliding:
-            result[2 * n] += self._rubbing_power(q, v, lam)
-        if self.driven or self.walls_push:
+            result[2 * n] += 2.0 * self.mass_damping * kinetic_energy(evaluation.M, v)
+        if self.slipping_points or self.slipping_stops:
+            result[2 * n] += self._friction_power(q, v, lam)
+        if self.driven or self.moving_walls:
             result[2 * n + 1] = self._input_power(q, v, lam)
-        return result
+        return result, evaluation
 
-    def _rubbing_power(self, q: Real, v: Real, lam: Real) -> float:
-        """Return the power that friction takes out [W]."""
+    def _friction_power(self, q: Real, v: Real, lam: Real) -> float:
+        """Return the power that friction dissipates [W]."""
         e = self.system.directions(q)
         power = 0.0
-        for i in self.rub_slides:
-            power -= self._rub_force(i, e) * float(self.rub_rows.rates(e, v)[i])
-        for i in self.sliding:
-            rate = float(self.slide_rows.rates(e, v)[i])
-            force = float(lam[self.first_hold + self.held.index(i)])
-            power += self.stop_friction[i] * force * self.discrete.slides[i] * rate
+        for c in self.slipping_points:
+            power -= self._point_force(c, e) * self.slip_rate(c, e, v)
+        for i in self.slipping_stops:
+            rate = self.slip_rate(i, e, v)
+            force = float(lam[self._hold_row(i)])
+            power += self.stop_friction[i] * force * self.contacts.modes[i].slip * rate
         return power
 
     def _input_power(self, q: Real, v: Real, lam: Real) -> float:
-        """Return the power of the inputs and of the moving walls that hold [W]."""
+        """Return the power of the inputs and of the moving walls of held stops [W]."""
         power = 0.0
         if self.driven:
             e = self.system.directions(q)
@@ -271,7 +281,7 @@ class Equations:
 
     def offsets(self, t: float) -> Real:
         """Return the constant parts of the active constraints at time t [m]."""
-        if not self.walls_push:
+        if not self.moving_walls:
             return self.rows.c
         c = self.rows.c.copy()
         for k, i in enumerate(self.held):
@@ -281,7 +291,12 @@ class Equations:
     def project(self, t: float, y: Real) -> Real:
         """Return the state on the constraints, positions and velocities.
 
-        What sticks is kept by its velocity alone: where it stuck is not a constraint.
+        A contact that sticks is constrained by its velocity alone, not by its position.
+
+        Raises
+        ------
+        SimulationError
+            If the loops cannot be closed near the state.
         """
         n, r = self.n, self.first_stick
         q, e = constraints.project_positions(
@@ -297,30 +312,38 @@ class Equations:
         result[n : 2 * n] = constraints.project_velocities(M, rows, rates, y[n : 2 * n])
         return result
 
-    def project_from_here(self, t: float, y: Real) -> Real:
-        """Return what :meth:`project` does, for the state that was evaluated last.
+    def project_near(self, t: float, y: Real, factors: constraints.Factors) -> Real:
+        """Return the projection of a state that is as near as a step leaves it.
 
-        Its matrix is at hand and the state is as close to the constraints as a step leaves it,
-        so that one correction of the positions and one of the velocities are enough; if they
-        are not, the iteration does the rest.
+        One correction of the positions and one of the velocities are enough there; if they are
+        not, the result is that of :meth:`project`.
+
+        Parameters
+        ----------
+        t : float
+            [s].
+        y : (2 n + 2,)
+            State.
+        factors : Factors
+            Of the evaluation at the state.
         """
-        if self.sliding:
+        if self.slipping_stops:
             return self.project(t, y)
         system, n, r = self.system, self.n, self.first_stick
         c = self.offsets(t)
         right = np.zeros(n + len(c))
         right[n : n + r] = -self.positions.values(system.directions(y[:n]), c[:r])
         result = y.copy()
-        result[:n] += constraints.solve_again(self.factors, right)[:n]
+        result[:n] += constraints.solve_again(factors, right)[:n]
         e = system.directions(result[:n])
-        open_by = self.positions.values(e, c[:r])
-        if len(open_by) and np.abs(open_by).max() > constraints.CLOSED * system.length:
+        residual = self.positions.values(e, c[:r])
+        if not constraints.satisfied(residual, system.length):
             return self.project(t, y)
         rates = self.rows.rates(e, result[n : 2 * n])
         for k, i in enumerate(self.held):
             rates[self.first_hold + k] += self.inputs.walls[i].rate
         right[n:] = -rates
-        result[n : 2 * n] += constraints.solve_again(self.factors, right)[:n]
+        result[n : 2 * n] += constraints.solve_again(factors, right)[:n]
         return result
 
     # -- stops --
@@ -328,28 +351,75 @@ class Equations:
     def gaps(self, t: float | Real, e: Complex) -> Real:
         """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row a time t."""
         walls = np.array([wall.at(t) for wall in self.inputs.walls]).T
-        result: Real = self.gap_rows.values(e) + walls
+        result: Real = self.system.gap_rows.values(e) + walls
         return result
 
     def gap_rates(self, e: Complex, v: Real) -> Real:
         """Return the rates of all gaps [m/s]; ``e`` and ``v`` may be stacks (m, n)."""
         walls = np.array([wall.rate for wall in self.inputs.walls])
-        result: Real = self.gap_rows.rates(e, v) + walls
+        result: Real = self.system.gap_rows.rates(e, v) + walls
         return result
 
     def stop_forces(self, lam: Real) -> Real:
-        """Return the normal forces of all stops, zero where open [N]."""
-        result = np.zeros(len(self.discrete.holds))
+        """Return the normal forces of all stops, (s,), zero where open [N]."""
+        result = np.zeros(self.contacts.stops)
         result[self.held] = lam[self.first_hold : self.first_stick]
         return result
+
+    def _hold_row(self, stop: int) -> int:
+        """Return the row of the gap of a held stop."""
+        return self.first_hold + self.held.index(stop)
+
+    # -- friction --
+
+    def slip_rows(self, contact: int) -> tuple[Rows, int]:
+        """Return the rows of the displacements along the contacts, and the contact's place."""
+        stops = self.contacts.stops
+        if contact < stops:
+            return self.system.slide_rows, contact
+        return self.system.rub_rows, contact - stops
+
+    def slip_row(self, contact: int, e: Complex) -> Real:
+        """Return the gradient of the displacement along a contact, (n,) [m/rad]."""
+        rows, i = self.slip_rows(contact)
+        result: Real = rows.jacobian(e)[i]
+        return result
+
+    def slip_rate(self, contact: int, e: Complex, v: Real) -> float:
+        """Return the sliding velocity of a contact [m/s]."""
+        rows, i = self.slip_rows(contact)
+        return float(rows.rates(e, v)[i])
+
+    def slip_acceleration(self, contact: int, e: Complex, v: Real, a: Real) -> float:
+        """Return the sliding acceleration of a contact [m/s^2]."""
+        rows, i = self.slip_rows(contact)
+        return float(rows.jacobian(e)[i] @ a - rows.convective(e, v)[i])
+
+    def friction(self, contact: int, e: Complex, lam: Real) -> tuple[float, float]:
+        """Return the friction force of a sticking contact, and its limit mu N [N]."""
+        force = float(lam[self.first_stick + self.sticking.index(contact)])
+        if self.contacts.is_stop(contact):
+            return force, self.stop_friction[contact] * float(lam[self._hold_row(contact)])
+        return force, self.friction_limit(contact, e)
+
+    def friction_limit(self, contact: int, e: Complex) -> float:
+        """Return mu N of a friction point [N]."""
+        point = contact - self.contacts.stops
+        mu, preload, stiffness = self.friction_laws[point]
+        lift = float((self.system.lifts[point] @ e).real) + self.system.lifts_c[point]
+        return mu * forces.normal_force(lift, preload, stiffness)
+
+    def _point_force(self, contact: int, e: Complex) -> float:
+        """Return the friction force of a slipping friction point along its direction [N]."""
+        return -self.contacts.modes[contact].slip * self.friction_limit(contact, e)
 
     # -- reactions --
 
     def base_reaction(self, q: Real, v: Real, a: Real) -> tuple[complex, float]:
         """Return the force [N] and the moment about the first clamp [N m] on the ground.
 
-        From the balance of momentum of everything that moves: what the ground, its stops and
-        its friction points put in is what gravity, the inputs and inertia leave.
+        From the balance of momentum of all moving parts: clamps, stops and friction points on the
+        ground balance gravity, inputs and inertia.
         """
         system = self.system
         e = system.directions(q)

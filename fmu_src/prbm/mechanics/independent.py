@@ -1,4 +1,4 @@
-r"""Independent coordinates: what an importer's solver integrates in model exchange.
+r"""Independent coordinates, which the importer's solver integrates in model exchange.
 
 The loops tie the n coordinates together, Phi(q) = Re(B e) + c = 0.  Of them r are solved from the
 other n - r, so that a solver that knows nothing of constraints stays on them:
@@ -16,13 +16,12 @@ from scipy.linalg import qr
 
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
-from . import constraints
 from .arrays import Real
 from .assembly import assemble
 from .statics import equilibrium
 from .system import System
 
-SHAPES = (0.0, 0.5, 1.0)  # of the displacement at the release
+SHAPES = (0.0, 0.5, 1.0)  # Of the displacement at the release.
 
 
 def independent(mechanism: Mechanism) -> tuple[int, ...]:
@@ -55,21 +54,21 @@ def independent(mechanism: Mechanism) -> tuple[int, ...]:
 
 def _jacobians(system: System, displacement: float) -> Iterator[Real]:
     """Yield the Jacobian of the loops at the straight shape and towards the release."""
-    loops = system.spread(system.loops)
-    yield constraints.jacobian(loops, system.directions(system.q0))
+    loops = system.loop_rows
+    yield loops.jacobian(system.directions(system.q0))
     for fraction in SHAPES:
         shape = equilibrium(system, fraction * displacement)
-        yield constraints.jacobian(loops, system.directions(shape.q))
+        yield loops.jacobian(system.directions(shape.q))
 
 
 def _pivots(jacobian: Real) -> tuple[int, ...]:
-    """Return as many columns as there are rows, chosen one after the other as the longest left."""
+    """Return as many columns as there are rows, chosen by QR with column pivoting."""
     _, _, order = qr(jacobian, mode="economic", pivoting=True)
     return tuple(int(j) for j in order[: len(jacobian)])
 
 
 def conditioning(jacobian: Real, dependent: tuple[int, ...]) -> float:
-    """Return how far the columns are from singular: least over largest singular value, 0 to 1.
+    """Return the ratio of the least singular value of some columns to the largest of all, 0 to 1.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Inputs of a mechanism: forces, walls and the acceleration of the base."""
+"""Inputs of a mechanism: their names and units, and their values as the equations use them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,21 +6,37 @@ from typing import TypeVar
 
 from ..base.errors import ParameterError
 from ..base.names import unknown
+from ..base.tolerances import WALL_MOBILITY_MAX
 from ..mechanism.description import Mechanism
 from ..mechanism.parameters import finite
 from .arrays import Real
 
-LOADS = {"x": "N", "y": "N", "moment": "N.m"}  # of a force; times s, of an impulse
-MOBILITY = "mobility"  # of a wall: an input of its stop
-LARGEST_MOBILITY = 1e100  # 1/kg; beyond, impulses are lost to underflow
-
+LOADS = {"x": "N", "y": "N", "moment": "N.m"}
+"""Components of a force and their units; times s, those of an impulse."""
+MOBILITY = "mobility"
+"""The input of a stop that is the inverse mass of its wall."""
 
 T = TypeVar("T", float, Real, float | Real)
 
 
 @dataclass(frozen=True)
 class Wall:
-    """A wall in uniform motion: its position along the direction of the stop."""
+    """A wall in uniform motion along the direction of its stop.
+
+    Parameters
+    ----------
+    position : float
+        At the time ``since`` [m].
+    rate : float
+        Velocity [m/s].
+    since : float
+        [s].
+
+    Examples
+    --------
+    >>> Wall(0.1, rate=2.0, since=1.0).at(1.5)
+    1.1
+    """
 
     position: float
     rate: float = 0.0
@@ -38,9 +54,9 @@ class Inputs:
     Parameters
     ----------
     forces : (b,) tuple of complex
-        Forces on centres of mass, in the order of ``mechanism.forces`` [N].
+        Forces on points of bodies, in the order of ``mechanism.forces`` [N].
     moments : (b,) tuple of float
-        Moments on these bodies [N m].
+        Moments on these bodies, positive counter-clockwise [N m].
     base : complex
         Acceleration of the base [m/s^2].
     walls : (s,) tuple of Wall
@@ -54,6 +70,19 @@ class Inputs:
     base: complex
     walls: tuple[Wall, ...]
     mobilities: tuple[float, ...]
+
+    @classmethod
+    def of(
+        cls, mechanism: Mechanism, given: Mapping[str, float], walls: tuple[Wall, ...]
+    ) -> "Inputs":
+        """Return the inputs with the values given by name."""
+        return cls(
+            tuple(complex(given[f"{f.name}.x"], given[f"{f.name}.y"]) for f in mechanism.forces),
+            tuple(given[f"{f.name}.moment"] for f in mechanism.forces),
+            complex(given["base.acceleration.x"], given["base.acceleration.y"]),
+            walls,
+            tuple(given[f"{stop.name}.{MOBILITY}"] for stop in mechanism.stops),
+        )
 
 
 def input_units(mechanism: Mechanism) -> dict[str, str]:
@@ -72,7 +101,7 @@ def input_names(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def impulse_names(mechanism: Mechanism) -> list[str]:
-    """Return the names of the inputs that are impulses: what they grow by acts at once."""
+    """Return the names of the inputs that are impulses: an increase acts at once."""
     return list(_impulse_units(mechanism))
 
 
@@ -95,8 +124,8 @@ def check_input(name: str, number: float, known: Mapping[str, float]) -> float:
     if name not in known:
         raise ParameterError(unknown(name, known))
     x = finite(name, number)
-    if x > LARGEST_MOBILITY and name.endswith(f".{MOBILITY}"):
-        raise ParameterError(f"{name} = {x:g} 1/kg must be at most {LARGEST_MOBILITY:g} 1/kg")
+    if x > WALL_MOBILITY_MAX and name.endswith(f".{MOBILITY}"):
+        raise ParameterError(f"{name} = {x:g} 1/kg must be at most {WALL_MOBILITY_MAX:g} 1/kg")
     if x < 0.0 and name.endswith(f".{MOBILITY}"):
         raise ParameterError(
             f"{name} = {x:g} 1/kg must not be negative: it is the inverse effective mass of the "

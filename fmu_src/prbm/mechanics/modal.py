@@ -1,16 +1,17 @@
-r"""Small vibrations about a static shape, and what an impact leaves in the fundamental mode."""
+r"""Small vibrations about a static shape, and the effect of an impact on the fundamental mode."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import eigh, null_space
 
+from ..base.tolerances import ZERO_FREQUENCY_RTOL, ZERO_MODE_RTOL
 from . import constraints
 from .arrays import Complex, Real
 from .forces import field_row, springs
 from .kinetics import inertia
-from .statics import Equilibrium, tangent_stiffness
-from .system import System
+from .statics import Equilibrium, equilibrium, tangent_stiffness
+from .system import System, jacobian
 
 
 @dataclass(frozen=True)
@@ -54,11 +55,21 @@ def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm)
-    rows = constraints.jacobian(system.spread(system.loops), e)
+    rows = system.loop_rows.jacobian(e)
     Z = null_space(rows) if len(rows) else np.eye(system.n)
     omega2, reduced = eigh(Z.T @ K_t @ Z, Z.T @ M @ Z)
     frequency = np.sign(omega2) * np.sqrt(np.abs(omega2)) / (2 * np.pi)
     return Modes(frequency, Z @ reduced, M)
+
+
+def fundamental_frequency(system: System) -> float:
+    """Return the fundamental frequency about the equilibrium under gravity [Hz].
+
+    Zero if that equilibrium is unstable, or if a motion without a spring is possible.
+    """
+    frequency = modes(system, equilibrium(system)).frequency
+    lowest = float(frequency[0])
+    return lowest if lowest > ZERO_FREQUENCY_RTOL * float(np.abs(frequency).max()) else 0.0
 
 
 def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
@@ -85,7 +96,7 @@ def modes_at(system: System, q: Real) -> Modes:
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     B = np.vstack([system.loops, system.release])
-    rows = constraints.jacobian(system.spread(B), e)
+    rows = jacobian(system.spread(B), e)
     w = field_row(system.spread(system.S), system.gravity)
     right = np.concatenate([springs(system.K, q - system.q0) + (w * e).real, np.zeros(len(B))])
     lam = -constraints.solve(constraints.saddle(M, rows, rows), right)[system.n :]
@@ -95,7 +106,7 @@ def modes_at(system: System, q: Real) -> Modes:
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:
     """Return the modal restitution of an impact, -phi^T M v+ / phi^T M v- [-].
 
-    Zero if nothing of the fundamental mode arrives but rounding.
+    Zero if the fundamental mode arrives with round-off alone.
 
     Examples
     --------
@@ -105,7 +116,7 @@ def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> floa
     """
     momentum = M @ phi
     arriving = float(momentum @ before)
-    if abs(arriving) <= 1e-12 * float(np.abs(momentum) @ (np.abs(before) + np.abs(after))):
+    if abs(arriving) <= ZERO_MODE_RTOL * float(np.abs(momentum) @ (np.abs(before) + np.abs(after))):
         return 0.0
     return -float(momentum @ after) / arriving
 
@@ -124,11 +135,11 @@ def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution
     shape : Equilibrium
         Shape at the impact, held by a force on the released body.
     stop : int
-        Which stop is hit.
+        Number of the stop that is hit.
     restitution : float
         Coefficient of restitution eps [-].
     """
     found = modes(system, shape)
-    G = constraints.gap_rows(system).jacobian(system.directions(shape.q))[stop]
+    G = system.gap_rows.jacobian(system.directions(shape.q))[stop]
     share = (G @ found.shape) ** 2
     return (1.0 + restitution) * float(share[0] / share.sum()) - 1.0

@@ -14,20 +14,22 @@ import numpy as np
 
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
 from ..base.names import unknown
+from ..base.tolerances import (
+    RELEASE_MOBILITY_RTOL,
+    RELEASE_ROW_RTOL,
+    STATICS_CONSTRAINT_RTOL,
+    STATICS_FORCE_RTOL,
+    STATICS_ITERATIONS_MAX,
+    STATICS_LOAD_STEP_MIN,
+    STATICS_STEP_ATOL,
+    STATICS_TURN_MAX,
+)
 from ..mechanism.parameters import finite
 from . import constraints, contact
 from .arrays import Complex, Real, Whole
 from .forces import field_row, force_row, springs
 from .kinetics import inertia
-from .system import System
-
-NEWTON_STEPS = 30
-LARGEST_TURN = 0.5  # rad per Newton step and per step of the load: further is another shape
-SMALLEST_FRACTION = 1 / 512  # of the load, before the continuation gives up
-RIGID = 1e-9  # of the size: a row of the release no longer than that follows from the loops
-IMMOBILE = 1e-12  # share of a body's mobility that the loops leave it: below, it cannot move
-BALANCED = 1e-12  # of the largest spring rate times one radian, or without springs of the load
-CONVERGED = 1e-8  # rad of the last Newton step; what is left after it is its square
+from .system import System, jacobian, values
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ def tangent_stiffness(
     e : (n,) complex
         Directions.
     arm : (n,) int or None
-        Whose arm a coordinate turns or stretches; None: each its own.
+        The arm that a coordinate turns or stretches; None: each its own.
 
     Examples
     --------
@@ -114,12 +116,12 @@ def equilibrium(
     loads : mapping or None
         Forces and moments by the names of the inputs, ``force.x`` and ``force.y`` [N],
         ``force.moment`` [N m] for a :class:`prbm.mechanism.parts.Force` of the name
-        ``force``; they keep their directions.  What is not named is zero.
+        ``force``; they keep their directions.  Others are zero.
 
     Raises
     ------
     ParameterError
-        If a load is none of the mechanism's, or not a finite number.
+        If a load is unknown, or not a finite number.
     EquilibriumError
         If there is no such shape, or the loading does not lead there.
     """
@@ -132,8 +134,8 @@ def equilibrium(
         B = np.vstack([B, system.release])
         c = np.append(c, system.release_c)
     state = np.concatenate([system.q0, np.zeros(len(c))])
-    # what hangs on a pin alone may turn at once; a jump of anything else leads to another branch,
-    # where slow loading does not take it
+    # A body that hangs on a pin alone may turn at once.  A jump of any other coordinate leads to
+    # another branch, which slow loading does not reach.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
     done, fraction = 0.0, 1.0
     while done < 1.0:
@@ -141,12 +143,12 @@ def equilibrium(
         trial = _newton(
             system, B, c, target * (displacement or 0.0), (target * w, target * moment), state
         )
-        if trial is not None and np.abs((trial - state)[bent]).max() <= LARGEST_TURN:
+        if trial is not None and np.abs((trial - state)[bent]).max() <= STATICS_TURN_MAX:
             state, done = trial, target
             fraction = min(1.0, 2 * fraction)
         else:
             fraction /= 2
-            if fraction < SMALLEST_FRACTION:
+            if fraction < STATICS_LOAD_STEP_MIN:
                 raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
     n, r = system.n, len(system.loops)
     force = float(state[n + r]) if displacement is not None else 0.0
@@ -192,17 +194,19 @@ def _newton(
     shift = np.zeros(len(c))
     if len(c) > len(system.loops):
         shift[-1] = displacement
-    scale = BALANCED * float(np.abs(system.K).max() or np.abs(w).max())
+    scale = STATICS_FORCE_RTOL * float(np.abs(system.K).max() or np.abs(w).max())
     state, turn = start.copy(), math.inf
-    for _ in range(NEWTON_STEPS):
+    for _ in range(STATICS_ITERATIONS_MAX):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
-        rows = constraints.jacobian(system.spread(B), e)
+        rows = jacobian(system.spread(B), e)
         torque = springs(system.K, q - system.q0) + (w * e).real + moment + lam @ rows
-        open_by = constraints.values(B, c, e) - shift
-        closed = not len(open_by) or np.abs(open_by).max() <= 1e-13 * system.length
+        open_by = values(B, c, e) - shift
+        closed = (
+            not len(open_by) or np.abs(open_by).max() <= STATICS_CONSTRAINT_RTOL * system.length
+        )
         balanced = closed and np.abs(torque).max() <= scale
-        if balanced and turn <= CONVERGED:
+        if balanced and turn <= STATICS_STEP_ATOL:
             return state
         kkt = constraints.saddle(tangent_stiffness(system.K, w, B, lam, e, system.arm), rows, rows)
         try:
@@ -213,7 +217,7 @@ def _newton(
         turn = float(np.abs(change[:n]).max())
         if not math.isfinite(turn):
             return None
-        state = state + change * min(1.0, LARGEST_TURN / max(turn, 1e-300))
+        state = state + change * min(1.0, STATICS_TURN_MAX / max(turn, 1e-300))
     return None
 
 
@@ -247,10 +251,10 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
 
 
 def held_by_loops(system: System) -> bool:
-    """Tell whether the loops keep the released body, as drawn, from moving along the release."""
+    """Return whether the loops keep the released body, as drawn, from moving along the release."""
     e = system.directions(system.q0)
-    along = constraints.jacobian(system.spread(system.release[None]), e)
-    return _left_by_loops(system, e, along) <= RIGID * system.length
+    along = jacobian(system.spread(system.release[None]), e)
+    return _left_by_loops(system, e, along) <= RELEASE_ROW_RTOL * system.length
 
 
 def immobile(system: System) -> str:
@@ -268,18 +272,18 @@ def immobile(system: System) -> str:
 
 
 def _on_pivot(system: System, name: str) -> bool:
-    """Tell whether a body, as drawn, can turn and its centre of mass can move nowhere."""
+    """Return whether a body, as drawn, can turn while its centre of mass is fixed."""
     e, frame = system.directions(system.q0), system.bodies[name]
-    both = constraints.jacobian(system.spread(np.vstack([frame.A, -1j * frame.A])), e)
+    both = jacobian(system.spread(np.vstack([frame.A, -1j * frame.A])), e)
     turn = np.eye(system.n)[[frame.j]]
-    return _left_by_loops(system, e, both) <= RIGID * system.length and (
-        _left_by_loops(system, e, turn) > RIGID
+    return _left_by_loops(system, e, both) <= RELEASE_ROW_RTOL * system.length and (
+        _left_by_loops(system, e, turn) > RELEASE_ROW_RTOL
     )
 
 
 def _left_by_loops(system: System, e: Complex, rows: Real) -> float:
     """Return the largest derivative in rows (k, n) that does not follow from the loops'."""
-    loops = constraints.jacobian(system.spread(system.loops), e)
+    loops = system.loop_rows.jacobian(e)
     left = rows - (loops.T @ np.linalg.lstsq(loops.T, rows.T)[0]).T
     return float(np.abs(left).max())
 
@@ -297,7 +301,7 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     Returns
     -------
     v : (n,)
-        What an impulse on the centre of mass along that direction gives [rad/s].
+        The rates after an impulse on the centre of mass along that direction [rad/s].
 
     Raises
     ------
@@ -308,10 +312,10 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
         return np.zeros(system.n)
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
-    rows = constraints.jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    rows = jacobian(system.spread(np.vstack([system.loops, system.release])), e)
     loops, row = rows[:-1], rows[-1:]
     left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
-    if left <= IMMOBILE * free:
+    if left <= RELEASE_MOBILITY_RTOL * free:
         raise ParameterError(f"release.velocity = {speed:g} m/s: {immobile(system)}")
     rates = np.zeros(len(rows))
     rates[-1] = -speed

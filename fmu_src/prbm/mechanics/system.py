@@ -1,21 +1,37 @@
-"""The constant arrays of a mechanism, and the places of its points in them."""
+r"""The constant arrays of a mechanism, and the scalars of its position that they give.
+
+A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, the
+logarithm of its length over the drawn one.  Each link and body has one *arm*,
+
+    E = exp(s + i theta),       E' = i w E,     w = theta' - i s',
+
+(s = 0 where nothing stretches), and every position is z = c + A E with constant c, A.  Every
+scalar that is constrained, watched or reported (loop closures, gaps, displacements) is therefore
+of one form,
+
+    x = Re(B E) + c,      x' = -Im(B E w),      x'' = -Im(B E w') - Re(B E w^2).
+
+Seen from a body that moves, as the gap to a wall on a body is, it is
+
+    x = Re(f (B E + z)) + c,    f = conj(E of that body).
+
+Arrays have a column for every coordinate.  The vector e has, for the angle of an arm, E, and for
+its stretch -i E, so that dE/dq = i e for both; the columns of A and B at stretches are zero.
+:meth:`System.spread` repeats there the column of the arm: then dx/dq = -Im(spread(B) e).
+"""
 
 import cmath
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..mechanism.description import Mechanism
-
-if TYPE_CHECKING:
-    from .constraints import Watched
 from .arrays import Complex, Real, Whole
 
-FIXED = -1  # in place of a coordinate: to the ground
+FIXED = -1  # In place of a coordinate: fixed to the ground.
 
 
 @dataclass(frozen=True)
@@ -56,7 +72,19 @@ class Place:
 
 @dataclass(frozen=True)
 class BodyFrame:
-    """Where a point of a body is, its centre of mass, say: z = c + A E; the body's coordinate."""
+    """A point of a body, for instance its centre of mass.
+
+    Parameters
+    ----------
+    name : str
+        Of the body, the force or the probe.
+    j : int
+        The body's coordinate; :data:`FIXED`: the ground.
+    c, A : complex, (n,) complex
+        Its place z = c + A E [m].
+    drawn : complex
+        Its place in the straight shape [m].
+    """
 
     name: str
     j: int
@@ -75,6 +103,112 @@ class Outline:
     A: Complex
 
 
+def values(B: Complex, c: Real, e: Complex) -> Real:
+    """Return x = Re(B E) + c [m], for rows B."""
+    result: Real = (B @ e).real + c
+    return result
+
+
+def jacobian(B: Complex, e: Complex) -> Real:
+    """Return dx/dq = -Im(B e) [m/rad], (r, n), of rows B that are spread over the stretches."""
+    return -(B * e).imag
+
+
+def convective(B: Complex, e: Complex, w: Real | Complex) -> Real:
+    """Return -(d/dt dx/dq) v = Re(B e w^2), the right side of (dx/dq) a = ... for x'' = 0."""
+    result: Real = ((B * e) @ (w * w)).real
+    return result
+
+
+class Rows:
+    """Scalars x = Re(f (B E + z)) + c of a mechanism, some of them seen from a body that moves.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    B, c : (r, n) complex, (r,)
+        Coefficients of the arms, constants [m].
+    z, on : (r,) complex, (r,) int, or None
+        Fixed part [m] and coordinate of the body that a row is seen from; :data:`FIXED` or None:
+        seen from the ground, f = 1, z = 0.
+    """
+
+    def __init__(
+        self,
+        system: "System",
+        B: Complex,
+        c: Real,
+        z: Complex | None = None,
+        on: Whole | None = None,
+    ) -> None:
+        self.system, self.B, self.c = system, B, c
+        self.spread = system.spread(B)
+        on = np.full(len(B), FIXED) if on is None else on
+        self.carried: Whole = np.flatnonzero(on != FIXED)
+        self.on: Whole = on[self.carried]
+        self.z: Complex = np.zeros(0, complex) if z is None else z[self.carried]
+
+    def __len__(self) -> int:
+        return len(self.B)
+
+    def first(self, r: int) -> "Rows":
+        """Return the first r rows."""
+        if r == len(self):
+            return self
+        on = np.full(len(self), FIXED)
+        z = np.zeros(len(self), complex)
+        on[self.carried], z[self.carried] = self.on, self.z
+        return Rows(self.system, self.B[:r], self.c[:r], z[:r], on[:r])
+
+    def values(self, e: Complex, c: Real | None = None) -> Real:
+        """Return x [m], (..., r); e may be a stack (..., n), and c replace the constants."""
+        x = e @ self.B.T
+        if len(self.carried):
+            x[..., self.carried] = self._carried_values(x, e)
+        result: Real = x.real + (self.c if c is None else c)
+        return result
+
+    def _carried_values(self, x: Complex, e: Complex) -> Complex:
+        """Return f (B E + z) of the carried rows."""
+        result: Complex = e[..., self.on].conj() * (x[..., self.carried] + self.z)
+        return result
+
+    def jacobian(self, e: Complex) -> Real:
+        """Return dx/dq [m/rad], (r, n)."""
+        result = jacobian(self.spread, e)
+        if len(self.carried):
+            f = e[self.on].conj()
+            result[self.carried] = -(f[:, None] * self.spread[self.carried] * e).imag
+            result[self.carried, self.on] += self._carried_values(self.B @ e, e).imag
+        return result
+
+    def rates(self, e: Complex, v: Real) -> Real:
+        """Return x' [m/s], (..., r); e and v may be stacks (..., n)."""
+        y: Complex = (e * self.system.turning(v)) @ self.B.T
+        if len(self.carried):
+            f = e[..., self.on].conj()
+            turned = v[..., self.on] * self._carried_values(e @ self.B.T, e)
+            y[..., self.carried] = f * y[..., self.carried] - turned
+        return -y.imag
+
+    def convective(self, e: Complex, v: Real) -> Real:
+        """Return -(d/dt dx/dq) v, the right side of (dx/dq) a = ... for x'' = 0 [m/s^2]."""
+        w = self.system.turning(v)
+        result = convective(self.B, e, w)
+        if len(self.carried):
+            result[self.carried] = self.carried_convective(e, v, w)
+        return result
+
+    def carried_convective(self, e: Complex, v: Real, w: Real | Complex) -> Real:
+        """Return the convective terms of the carried rows [m/s^2]."""
+        f, turn = e[self.on].conj(), v[self.on]
+        B = self.B[self.carried]
+        bent = ((w - turn[:, None]) ** 2 * (B * e)).sum(axis=1) + turn**2 * self.z
+        result: Real = (f * bent).real
+        return result
+
+
 @dataclass(frozen=True)
 class System:
     """The constant arrays of a mechanism for given parameters: n coordinates, r loop rows.
@@ -85,7 +219,7 @@ class System:
         Coordinates of the straight shape: absolute angles, counter-clockwise from +x [rad], and
         stretches, which are zero there [-].
     arm : (n,) int
-        Whose arm a coordinate turns or stretches: its own, or that of a link.
+        The arm that a coordinate turns or stretches: its own, or that of a link.
     H : (n, n) complex
         A^H diag(m) A with the columns of A spread, Hermitian [kg m^2].
     J : (n,)
@@ -112,11 +246,11 @@ class System:
     pushed : tuple of BodyFrame
         Where the forces act.
     probes : tuple of BodyFrame
-        The points that are watched.
+        The points whose motion is reported.
     links : tuple of int
         The coordinates of the flexures' links, in the order of their names link[1], ...
     outlines : tuple of Outline
-        What to draw.
+        Lines to draw.
     anchor : complex
         The first clamp, about which moments on the base are taken [m].
     length : float
@@ -166,11 +300,24 @@ class System:
         return result
 
     @cached_property
-    def watched(self) -> "Watched":
-        """The rows of all gaps, slides and rubs, made once: discrete changes do not touch them."""
-        from .constraints import Watched  # which is about systems
+    def gap_rows(self) -> Rows:
+        """The gaps of all stops, without the positions of their walls [m]."""
+        return Rows(self, self.gaps, self.gaps_c, self.gaps_z, self.on)
 
-        return Watched.of(self)
+    @cached_property
+    def slide_rows(self) -> Rows:
+        """The displacements of all hit points along their walls, up to a constant [m]."""
+        return Rows(self, self.slides, np.zeros(len(self.slides)), self.slides_z, self.on)
+
+    @cached_property
+    def rub_rows(self) -> Rows:
+        """The displacements of all friction points, up to a constant [m]."""
+        return Rows(self, self.rubs, np.zeros(len(self.rubs)))
+
+    @cached_property
+    def loop_rows(self) -> Rows:
+        """The closures of all loops [m]."""
+        return Rows(self, self.loops, self.loops_c)
 
     @cached_property
     def stretches(self) -> Whole:
@@ -251,5 +398,5 @@ def unit(degrees: float) -> complex:
 
 
 def stacked(rows: list[Complex], n: int) -> Complex:
-    """Stack rows of n columns, also when there are none."""
+    """Return rows of n columns as an array (k, n); k may be 0."""
     return np.array(rows, complex).reshape(-1, n)

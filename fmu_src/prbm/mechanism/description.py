@@ -1,4 +1,4 @@
-"""A planar compliant mechanism as frozen data that refuses to be inconsistent.
+"""A planar compliant mechanism as frozen data, checked for consistency.
 
 Bodies, flexures, stops, friction, forces and the release are described as they are drawn: all
 points are global coordinates of the straight, unloaded shape.  A number in the description of a
@@ -7,19 +7,20 @@ part becomes a parameter ``part.field``; a text is an expression in parameters, 
     Body("shuttle", mass=0.05, ..., points={"right": ("shuttle.width", "flexure.length")})
 
 so that the same data serve one simulation, an FMU whose parameters are set by an importer, and a
-picture.  Nothing here knows of files or of FMI.
+picture.  This package is independent of files and of FMI.
 """
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from keyword import iskeyword
 
 from ..base.errors import MechanismError, ParameterError
 from ..base.names import proposal, unknown
+from ..base.tolerances import TOLERANCE_MAX, TOLERANCE_MIN
 from .expressions import Quantity, affine
-from .flexure import CLAMP, ENDS, FREE, MODELS, MOST_LINKS, FlexureModel
+from .flexure import CLAMP, ENDS, FREE, LINKS_MAX, MODELS, FlexureModel
 from .parameters import Parameter
 from .parts import (
     FIELDS,
@@ -43,7 +44,7 @@ RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "rel
 
 @dataclass(frozen=True)
 class Mechanism:
-    """Everything there is to know about a mechanism before any number is changed.
+    """The description of a mechanism: its parts, its parameters and their defaults.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ class Mechanism:
     Raises
     ------
     MechanismError
-        If a name is used twice, a reference leads nowhere or a part cannot be.
+        If a name is used twice, a reference is undefined, or a part is inconsistent.
     ParameterError
         If a default is out of its own bounds.
     """
@@ -143,7 +144,8 @@ class Mechanism:
         yield from _fields(self.release)
         yield Parameter(
             "solver.tolerance", 1e-8, "",
-            "Relative tolerance of the integration, unless the importer gives one", 1e-13, 1e-2,
+            "Relative tolerance of the integration, unless the importer gives one", TOLERANCE_MIN,
+            TOLERANCE_MAX,
             1e-8,
         )  # fmt: skip
         yield Parameter(
@@ -217,7 +219,16 @@ class Mechanism:
             self._check_flexure(flexure)
         for joint in self.joints:
             self._check_connection("joint", joint)
-        bodies = [body.name for body in self.bodies]
+        for probe in self.probes:
+            self.point(probe.point, probe.name)
+        self._check_attached([body.name for body in self.bodies])
+        directed: tuple[Stop | Friction | Release, ...] = (*self.stops, *self.frictions)
+        for one in (*directed, self.release):
+            if not math.isfinite(one.direction):
+                raise MechanismError(f"{one.name}.direction = {one.direction} must be an angle")
+
+    def _check_attached(self, bodies: Sequence[str]) -> None:
+        """Reject stops, friction, forces and a release at bodies that are not described."""
         attached: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
         for part in attached:
             if part.body not in bodies:
@@ -227,12 +238,6 @@ class Mechanism:
                 raise MechanismError(f"{stop.name}.on = {stop.on!r} is not described")
             if stop.on == stop.body:
                 raise MechanismError(f"the stop {stop.name} is fixed to the body that it stops")
-        for probe in self.probes:
-            self.point(probe.point, probe.name)
-        directed: tuple[Stop | Friction | Release, ...] = (*self.stops, *self.frictions)
-        for one in (*directed, self.release):
-            if not math.isfinite(one.direction):
-                raise MechanismError(f"{one.name}.direction = {one.direction} must be an angle")
         if self.release.body not in bodies:
             raise MechanismError(f"release.body = {self.release.body!r} is not described")
 
@@ -242,10 +247,10 @@ class Mechanism:
                 f"{kind.name}.model = {kind.model!r} is unknown: choose one of {', '.join(MODELS)}"
             )
         chain = not MODELS[kind.model].gamma
-        if chain and not 1 <= kind.n <= MOST_LINKS:
+        if chain and not 1 <= kind.n <= LINKS_MAX:
             raise MechanismError(
                 f"{kind.name}.n = {kind.n} must be the number of links of the chain, from 1 to "
-                f"{MOST_LINKS}"
+                f"{LINKS_MAX}"
             )
         if kind.n and not chain:
             raise MechanismError(
@@ -292,7 +297,7 @@ class Mechanism:
         Raises
         ------
         MechanismError
-            If there is none.
+            If it is not described.
         """
         owner, _, name = reference.rpartition(".")
         points = {GROUND: self.ground} | {b.name: b.points for b in self.bodies}

@@ -79,6 +79,7 @@ def affine(quantity: Quantity) -> Affine:
 
 
 def _affine(node: ast.expr) -> Affine:
+    """Return the expression of a syntax tree."""
     match node:
         case ast.Constant(value=int() | float() as number):
             return Affine(float(number))
@@ -88,18 +89,22 @@ def _affine(node: ast.expr) -> Affine:
             return _affine(a).scaled(-1.0)
         case ast.UnaryOp(op=ast.UAdd(), operand=a):
             return _affine(a)
-        case ast.BinOp(left=a, op=ast.Add(), right=b):
-            return _affine(a).plus(_affine(b))
-        case ast.BinOp(left=a, op=ast.Sub(), right=b):
-            return _affine(a).plus(_affine(b).scaled(-1.0))
-        case ast.BinOp(left=a, op=ast.Mult(), right=b):
-            x, y = _affine(a), _affine(b)
+        case ast.BinOp(left=a, op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() as op, right=b):
+            return _combined(op, _affine(a), _affine(b))
+    raise ValueError(f"{ast.unparse(node)!r} is not allowed")
+
+
+def _combined(op: ast.operator, x: Affine, y: Affine) -> Affine:
+    """Return the sum, difference, product or quotient of two expressions."""
+    match op:
+        case ast.Add():
+            return x.plus(y)
+        case ast.Sub():
+            return x.plus(y.scaled(-1.0))
+        case ast.Mult():
             if x.terms and y.terms:
                 raise ValueError("a product of two parameters")
             return y.scaled(x.constant) if y.terms else x.scaled(y.constant)
-        case ast.BinOp(left=a, op=ast.Div(), right=b):
-            x, y = _affine(a), _affine(b)
-            if y.terms:
-                raise ValueError("a division by a parameter")
-            return x.scaled(1.0 / y.constant)
-    raise ValueError(f"{ast.unparse(node)!r} is not allowed")
+    if y.terms:
+        raise ValueError("a division by a parameter")
+    return x.scaled(1.0 / y.constant)

@@ -33,6 +33,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from ..base.errors import ParameterError
+from ..base.tolerances import STUB_RTOL
 
 
 @dataclass(frozen=True)
@@ -140,7 +141,7 @@ MODELS = {
 
 CLAMP, PIN, FREE = "clamp", "pin", "free"
 ENDS = (CLAMP, PIN, FREE)
-MOST_LINKS = 200  # of a chain
+LINKS_MAX = 200  # Of a chain.
 
 
 @dataclass(frozen=True)
@@ -186,7 +187,7 @@ def stub(gamma: Sequence[float]) -> float:
     0.1
     """
     gamma0 = 1.0 - sum(gamma)
-    if gamma0 < -1e-12:
+    if gamma0 < -STUB_RTOL:
         raise ParameterError(
             f"the links of a flexure are longer than the flexure: the sum of its gammas is "
             f"{sum(gamma):.6g}, so that gamma0 = {gamma0:.6g} < 0; choose gammas that add up "
@@ -207,7 +208,7 @@ def segments(
 ) -> Segments:
     """Cut a flexure into rigid segments, springs and masses.
 
-    The rates are K_i = K_theta_i EI/h (with a further factor gamma_i where the model says so).
+    The rates are K_i = K_theta_i EI/h (times gamma_i if ``rate_with_gamma``).
     The masses at the pivots of the 1R are m/4 + (m L^2/12)/(gamma L)^2: the kinetic energy of
     a uniform rod about a fixed end, at the radius gamma L (eq. 3.3 of the thesis); with an end
     that is free or two that are pinned, the 1R is made of rods as the others are.
@@ -215,7 +216,7 @@ def segments(
     Parameters
     ----------
     model : FlexureModel
-        Which coefficients mean what.
+        The meaning of the coefficients.
     gamma, K_theta : sequences of float
         Their values, from the clamp to the tip [-].
     ends : pair of {"clamp", "pin", "free"}

@@ -13,9 +13,6 @@ Point = tuple[Quantity, Quantity]
 GROUND = "ground"
 
 
-# --- parts ------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
 class Body:
     """A rigid body: mass [kg], inertia about its centre of mass [kg m^2], points as drawn [m]."""
@@ -29,7 +26,7 @@ class Body:
 
 @dataclass(frozen=True)
 class FlexureType:
-    """Section and material that several flexures share, and the model that stands for them.
+    """Section and material that several flexures share, and their pseudo-rigid-body model.
 
     Parameters
     ----------
@@ -92,8 +89,8 @@ class Stop:
 
     The wall is a line across ``direction`` [deg], the direction in which the body travels
     towards it; it is touched when the point has moved by ``position`` [m] from the straight
-    shape along that direction, as seen from what the wall is fixed to.  ``offset`` [m] shifts
-    the point along the wall, positive to the left of the direction.
+    shape along that direction, as seen from the body or ground that the wall is fixed to.
+    ``offset`` [m] shifts the point along the wall, positive to the left of the direction.
     """
 
     name: str
@@ -166,9 +163,9 @@ class Release:
 
 Part = Body | FlexureType | Flexure | Joint | Stop | Friction | Force | Probe | Release
 
-TINY_LENGTH = 1e-9  # m; below this a dimension of a mechanism is a mistake, not a nanostructure
-TINY_MASS = 1e-15  # kg; a cubic micrometre of silicon has 2e-15 kg
-LARGE = 1e3  # m, and other magnitudes that no mechanism of this kind exceeds
+LENGTH_MIN = 1e-9  # m; a smaller dimension of a mechanism is a mistake.
+MASS_MIN = 1e-15  # kg; a cubic micrometre of silicon has 2e-15 kg.
+LENGTH_MAX = 1e3  # m; no mechanism of this kind is larger.
 
 
 def _meta(
@@ -185,29 +182,25 @@ def _meta(
 
 FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]] = {
     FlexureType: {
-        "thickness": _meta("m", "Thickness in the plane of motion", TINY_LENGTH, 1.0, 1e-4),
-        "width": _meta("m", "Width across the plane of motion", TINY_LENGTH, LARGE, 1e-2),
+        "thickness": _meta("m", "Thickness in the plane of motion", LENGTH_MIN, 1.0, 1e-4),
+        "width": _meta("m", "Width across the plane of motion", LENGTH_MIN, LENGTH_MAX, 1e-2),
         "youngs_modulus": _meta("Pa", "Young's modulus", 1.0, 1e13, 1e11),
         "density": _meta("kg/m3", "Density", 1.0, 1e5, 1e4),
     },
     Body: {
-        "mass": _meta("kg", "Mass", TINY_MASS, 1e6, 0.1),
+        "mass": _meta("kg", "Mass", MASS_MIN, 1e6, 0.1),
         "inertia": _meta(
             "kg.m2", "Moment of inertia about the centre of mass", 1e-30, 1e9, 1e-4
         ),
     },
     Stop: {
         "position": _meta(
-            "m",
-            "Displacement of the hit point from the straight shape at which it touches",
-            -LARGE,
-            LARGE,
-            1e-2,
-            tunable=True,
+            "m", "Displacement of the hit point from the straight shape at which it touches",
+            -LENGTH_MAX, LENGTH_MAX, 1e-2, tunable=True,
         ),
         "offset": _meta(
             "m", "Distance of the hit point from the centre of mass along the wall",
-            -LARGE, LARGE, 1e-2, tunable=True,
+            -LENGTH_MAX, LENGTH_MAX, 1e-2, tunable=True,
         ),
         "restitution": _meta(
             "", "Coefficient of restitution (energetic when there is friction)", 0.0, 1.0,
@@ -232,7 +225,7 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
     Release: {
         "displacement": _meta(
             "m", "Displacement from straight at which the body is held and let go",
-            -LARGE, LARGE, 1e-2,
+            -LENGTH_MAX, LENGTH_MAX, 1e-2,
         ),
         "velocity": _meta("m/s", "Velocity at release", -1e4, 1e4),
     },

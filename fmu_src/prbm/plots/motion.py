@@ -16,7 +16,6 @@ from ..base.errors import ParameterError
 from ..drawing.motion import angles, closed, stretched
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.assembly import assemble
-from ..mechanics.constraints import gap_rows
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
@@ -79,7 +78,7 @@ class Motion:
 
 
 def _gaps(system: System, q: Real) -> Real:
-    return gap_rows(system).values(system.directions(q))
+    return system.gap_rows.values(system.directions(q))
 
 
 def needed(mechanism: Mechanism) -> list[str]:

@@ -13,10 +13,10 @@ import numpy as np
 from ..base.errors import ParameterError, SimulationError
 from ..hybrid.runge_kutta import rk4
 from ..hybrid.simulation import Simulation
-from ..mechanics import constraints, contact
+from ..mechanics import contact
 from ..mechanics.arrays import Real
-from ..mechanics.dynamics import IDLE, Discrete, Equations
-from ..mechanics.kinetics import inertia
+from ..mechanics.contact_state import ContactState
+from ..mechanics.dynamics import Equations
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 
@@ -69,19 +69,14 @@ def march(
     if not 0.0 < step <= stop_time:
         raise ParameterError(f"step = {step:g} s must be positive and within {stop_time:g} s")
     simulation = Simulation(mechanism, values)
-    system, n, y = simulation.system, simulation.system.n, simulation.front
-    open_ = Discrete(
-        (False,) * len(mechanism.stops),
-        (IDLE,) * len(mechanism.stops),
-        (IDLE,) * len(mechanism.frictions),
-    )
-    equations = Equations(system, simulation.inputs, open_, simulation.omega)
+    system, n, y = simulation.system, simulation.system.n, simulation.front.y
+    contacts = ContactState.free(len(mechanism.stops), len(mechanism.frictions))
+    equations = Equations(system, simulation.inputs, contacts, simulation.omega)
     armed = [True] * len(mechanism.stops)
     times, states, impacts = [0.0], [y], []
     for k in range(1, round(stop_time / step) + 1):
         t = k * step
         y = equations.project(t, rk4(equations.rate, t - step, y, step))
-        equations.trace.clear()
         if not np.isfinite(y).all():
             raise SimulationError(f"the step of {step:g} s is too long: lost at t = {t:g} s")
         e = system.directions(y[:n])
@@ -92,9 +87,8 @@ def march(
             elif armed[i]:
                 armed[i] = False
                 impacts.append((t, stop.name))
-                M, _ = inertia(system.H, equations.J, e)
-                loops = constraints.jacobian(system.spread(system.loops), e)
-                G = equations.gap_rows.jacobian(e)[[i]]
+                e, M, loops = equations.mass_and_loops(y[:n])
+                G = system.gap_rows.jacobian(e)[[i]]
                 X = contact.response(M, loops, G)
                 eps = np.array([value(stop, "restitution", simulation.values)])
                 P = contact.newton(G @ X, G @ y[n : 2 * n], eps)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
-from ..hybrid.simulation import Impact
+from ..hybrid.impacts import Impact
 from ..mechanism.description import Mechanism
 
 Columns = NDArray[Any]

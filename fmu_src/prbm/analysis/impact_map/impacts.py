@@ -1,7 +1,8 @@
 """The first impact after a release, and the energies of the modes before and after it."""
 
 from ...base.errors import EquilibriumError
-from ...hybrid.simulation import Impact, Simulation
+from ...hybrid.impacts import Impact
+from ...hybrid.simulation import Simulation
 from ...mechanics.modal import modes_at
 from ...mechanics.system import System
 from ...mechanism.parts import value

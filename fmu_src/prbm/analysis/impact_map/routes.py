@@ -27,7 +27,6 @@ from ...base.progress import Progress
 from ...hybrid.simulation import Simulation
 from ...mechanics.arrays import Real
 from ...mechanics.assembly import assemble
-from ...mechanics.constraints import gap_rows
 from ...mechanics.modal import Modes, modes
 from ...mechanism.description import Mechanism
 from ...mechanism.parts import value
@@ -122,7 +121,7 @@ def algebraic(
         eps = value(mechanism.stops[which.index], "restitution", system.values)
         for h in heights:
             shape = impact_shape(system, which.index, h)
-            G = gap_rows(system).jacobian(system.directions(shape.q))[which.index]
+            G = system.gap_rows.jacobian(system.directions(shape.q))[which.index]
             yield _hit(h, offset, modes(system, shape), G, eps)
             count()
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.errors import ParameterError, SimulationError
-from ...hybrid.simulation import Impact, Latched
+from ...hybrid.front import Latched
+from ...hybrid.impacts import Impact
 from ...mechanics.arrays import Real
 from ...mechanics.modal import simulated_restitution
 from ...mechanism.parts import value

@@ -1,0 +1,100 @@
+"""All dimensionless tolerances and limits of the engine, and what each is a fraction of.
+
+They are written here once; :mod:`prbm.kernel.header` generates the constants of the C kernel from
+this module.  A name ends in what the number is: ``RTOL`` a fraction of the scale that its comment
+names, ``ATOL`` a number with a unit, ``MAX`` and ``MIN`` a limit, ``FACTOR`` a factor.
+:class:`prbm.hybrid.configuration.Scales` turns fractions into numbers with units.
+"""
+
+import math
+
+# --- description -------------------------------------------------------------------------------
+JOINT_DISTANCE_RTOL = 1e-9  # Of the size: largest distance of two points that a joint connects.
+MASSLESS_RTOL = 1e-13  # Smallest eigenvalue of the mass matrix, scaled to a unit diagonal.
+DEPENDENT_LOOP_RTOL = 1e-9  # Of the largest entry: smaller pivots of the loops are round-off.
+STUB_RTOL = 1e-12  # Of a cantilever: excess of the links over its length that is round-off.
+
+# --- constraints -------------------------------------------------------------------------------
+CONSTRAINT_RTOL = 1e-14  # Of the size: residual of a closed loop, a few roundings of a coordinate.
+CONSTRAINT_STALLED_RTOL = 1e-12  # Of the size: residual accepted when iteration stops improving.
+CONSTRAINT_ITERATIONS_MAX = 20  # Gauss-Newton converges quadratically; three are usual.
+
+# --- statics and modes -------------------------------------------------------------------------
+STATICS_ITERATIONS_MAX = 30  # Newton steps at one load.
+STATICS_TURN_MAX = 0.5  # rad per Newton step and load step; a larger turn reaches another shape.
+STATICS_LOAD_STEP_MIN = 1 / 512  # Of the load: smallest continuation step.
+STATICS_CONSTRAINT_RTOL = 1e-13  # Of the size: residual of closed loops at an equilibrium.
+STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring times one radian, or of the load.
+STATICS_STEP_ATOL = 1e-8  # rad; the error after a last step this small is its square.
+RELEASE_ROW_RTOL = 1e-9  # Of the size: a shorter row of the release follows from the loops.
+RELEASE_MOBILITY_RTOL = 1e-12  # Of the free mobility: below, the loops immobilise the body.
+ZERO_FREQUENCY_RTOL = 1e-7  # Of the highest frequency: a lower frequency is round-off.
+ZERO_MODE_RTOL = 1e-12  # Of the momenta before and after: a smaller modal momentum is round-off.
+SPRINGLESS_RATE = 2 * math.pi  # rad/s: rate scale of a linkage without springs.
+
+# --- impacts -----------------------------------------------------------------------------------
+COMPLEMENTARITY_RTOL = 1e-10  # Of the largest approach speed: allowed violation.
+SWEEPS_MAX = 2000  # Gauss-Seidel sweeps over several contacts with friction.
+SWEEP_RTOL = 1e-14  # Relative change of the impulses at which the sweeps end.
+SWEEP_RELAXATIONS = (1.0, 0.3, 0.05)  # Relaxation factors, tried in this order.
+WEDGED_RTOL = 1e-10  # Of the inverse normal mass: a smaller rate of the approach is round-off.
+ZERO_SPEED_RTOL = 1e-12  # Of the speeds before an impact: what is left of a vanished speed.
+IMPULSE_RANK_RTOL = 1e-13  # Of the largest singular value: rank of the inverse mass in contact.
+REACTION_RANK_RTOL = 1e-12  # The same of the rows of the stops that hold during an impact.
+REBOUND_RTOL = 1e-12  # Of the share of the restitution: width at which the bisection ends.
+IMPACT_SETS_MAX = 12  # Stops hit at once of which every subset is tried.
+
+# --- contact modes -----------------------------------------------------------------------------
+TOUCHING_RTOL = 1e-10  # Of the size: gaps below this close together with the one resolved.
+RELEASE_PENETRATION_ATOL = 1e-9  # m; a wall may be penetrated at release by no more than this.
+SHORTEST_FLIGHT_RTOL = 5e-7  # Of the period: the arc of a shorter bounce is lost in round-off.
+DEPENDENT_FRICTION_RTOL = 1e-4  # Of a contact's free mobility: below, held stops carry the load.
+DEPENDENT_STOP_RTOL = 1e-9  # The same for a stop among other stops that hold.
+STICKING_SETS_MAX = 6  # Contacts with friction at rest of which every combination is tried.
+RESTING_SETS_MAX = 12  # Resting stops of which every subset is tried.
+ZERO_RATE_RTOL = 1e-9  # Of the velocity scale: a slower rate is round-off.
+FRICTION_EXCESS_RTOL = 1e-6  # Of the friction limit: excess at which a sticking contact slips.
+EVENTS_MAX = 1000  # Events within EVENT_WINDOW_RTOL that end a simulation.
+EVENT_WINDOW_RTOL = 5e-3  # Of the period.
+WALL_PATH_RTOL = 1e-13  # Of the size: a smaller change of a wall's path is round-off.
+WALL_MOBILITY_MAX = 1e100  # 1/kg; larger mobilities lose impulses to underflow.
+IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
+
+# --- location of events ------------------------------------------------------------------------
+EVENT_TIME_ATOL = 1e-13  # s; events are located to 1e-12 s, of which projection needs a part.
+RELEASE_WATCH_FACTOR = 0.5  # Of the largest stop force in a step: below, a release is searched.
+GUARD_INTERVALS = 8  # Intervals of a step in which the guards are evaluated.
+
+EVENT_CORRECTIONS_MAX = 3  # Newton steps of a closing gap on projected states.
+EVENT_CORRECTION_RTOL = 1e-2  # Of the step: a larger correction is that of a grazing contact.
+
+# --- step size ---------------------------------------------------------------------------------
+TOLERANCE_MIN = 1e-13  # Smallest relative tolerance of the integration.
+TOLERANCE_MAX = 1e-2  # Largest relative tolerance of the integration.
+TABLEAU_ATOL = 1e-14  # Error of a sum of Runge-Kutta coefficients that is round-off.
+STEP_SAFETY_FACTOR = 0.9  # Of the optimal step size.
+STEP_SHRINK_MIN = 0.2  # Smallest ratio of successive step sizes.
+STEP_GROWTH_MAX = 5.0  # Largest ratio of successive step sizes.
+STEP_MEMORY_EXPONENT = 0.04  # Of the previous error [Hairer, IV.2].
+STEP_ERROR_FACTOR = 0.6  # Of the tolerance: the dense output needs the rest.
+STEP_ERROR_MIN = 1e-4  # Of the tolerance: smallest error that the controller remembers.
+STEP_MAX_RTOL = 0.05  # Of the period: longest step.
+STEP_MIN_ATOL = 1e-13  # s; shortest step.
+FIRST_STEP_FACTOR = 0.1  # Of the first step that the tolerance allows [Hairer, II.4].
+FIRST_STEP_EXPONENT = 0.2  # Of the tolerance in the first step.
+FIRST_RATE_MIN = 1e-6  # 1/s: smallest relative rate of the state that the first step assumes.
+STEPS_MAX = 1e9  # Longest steps to one communication point; more is a mistake of units.
+
+# --- communication times -----------------------------------------------------------------------
+TIME_SUM_RTOL = 1e-12  # Of a time: round-off of importers that add up steps.
+STEP_SUM_RTOL = 1e-6  # Of a communication step: round-off that an importer's time accumulates.
+STOP_TIME_RTOL = 1e-3  # Of a communication step: allowed overshoot of the stop time.
+
+# --- model exchange ----------------------------------------------------------------------------
+DRIFT_RTOL = 1e-8  # Of the size: drift of a held contact that requests an event.
+DRIFT_CORRECTED_RTOL = 1e-12  # Of the size: drift that an event leaves uncorrected.
+PENETRATION_WARNING_RTOL = 1e-2  # Of the size: penetration that no solver's overshoot explains.
+GAP_CLOSED_RTOL = 1e-12  # Of the size: how far below zero a gap closes.
+LOWEST_BOUNCE_RTOL = 1e-10  # Of the size: height of a bounce below which a gap closes late.
+INDICATOR_LEAD_RTOL = 0.01  # Of the period: time by which an opening rate lifts an indicator.
+DEPENDENT_PIVOT_RTOL = 1e-7  # Of the largest pivot: smaller pivots make the states singular.

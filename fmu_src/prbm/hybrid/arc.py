@@ -1,0 +1,53 @@
+"""A step of the integration as a function of time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.tolerances import GUARD_INTERVALS
+from ..mechanics.arrays import Real
+from .runge_kutta import BOGACKI_SHAMPINE, interpolate, powers
+
+FRACTIONS = np.linspace(0.0, 1.0, GUARD_INTERVALS + 1)
+GRID = powers(BOGACKI_SHAMPINE, FRACTIONS)
+
+
+@dataclass(frozen=True)
+class Arc:
+    """The dense output of a step, y(t) for start <= t <= end.
+
+    Parameters
+    ----------
+    start : float
+        [s].
+    h : float
+        Size of the whole step [s].
+    end : float
+        Its end, or the time of the event that ends it [s].
+    y : (2 n + 2,)
+        State at the start.
+    k : (stages, 2 n + 2)
+        Rates of the stages.
+    """
+
+    start: float
+    h: float
+    end: float
+    y: Real
+    k: Real
+
+    def at(self, t: float) -> Real:
+        """Return the state at time t, not projected."""
+        return interpolate(BOGACKI_SHAMPINE, self.y, self.k, self.h, (t - self.start) / self.h)
+
+    def samples(self) -> tuple[Real, Real]:
+        """Return the ends of the intervals in which the guards are evaluated.
+
+        Returns
+        -------
+        times : (w + 1,)
+            [s].
+        states : (w + 1, 2 n + 2)
+            Not projected.
+        """
+        return self.start + self.h * FRACTIONS, self.y + self.h * (GRID @ self.k)

@@ -1,0 +1,206 @@
+"""Everything about a simulation that the motion does not change, and its scales."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.errors import ParameterError
+from ..base.tolerances import (
+    SPRINGLESS_RATE,
+    STEP_MAX_RTOL,
+    TOLERANCE_MAX,
+    TOLERANCE_MIN,
+    TOUCHING_RTOL,
+    ZERO_RATE_RTOL,
+)
+from ..mechanics.arrays import Real
+from ..mechanics.assembly import assemble, calculated
+from ..mechanics.contact_state import ContactState
+from ..mechanics.dynamics import Equations
+from ..mechanics.inputs import Inputs
+from ..mechanics.modal import fundamental_frequency
+from ..mechanics.system import System
+from ..mechanism.description import Mechanism
+from ..mechanism.parts import value
+
+
+@dataclass(frozen=True)
+class Scales:
+    """Magnitudes that turn dimensionless tolerances into numbers with units.
+
+    Parameters
+    ----------
+    length : float
+        Size of the mechanism [m].
+    rate : float
+        Fundamental angular frequency; without one, that of the stiffest spring [rad/s].
+    energy : float
+        Of one radian against the stiffest torsion spring; without springs, of one radian in a
+        period [J].
+
+    Examples
+    --------
+    >>> scales = Scales(length=0.5, rate=2.0, energy=1e-3)
+    >>> scales.zero_speed
+    1e-09
+    """
+
+    length: float
+    rate: float
+    energy: float
+
+    @classmethod
+    def of(cls, system: System, omega: float) -> "Scales":
+        """Return the scales of a system with a fundamental angular frequency [rad/s], or 0."""
+        K, inertia = np.abs(system.K), float(np.abs(system.H).max())
+        turns = np.setdiff1d(np.arange(system.n), system.stretches)
+        rate = omega or math.sqrt(float(K.max()) / inertia) or SPRINGLESS_RATE
+        energy = float(K[np.ix_(turns, turns)].max()) or inertia * rate**2
+        return cls(system.length, rate, energy)
+
+    @property
+    def time(self) -> float:
+        """Period of the motion [s]."""
+        return 2 * math.pi / self.rate
+
+    @property
+    def zero_speed(self) -> float:
+        """Speed below which a speed is round-off [m/s]."""
+        return ZERO_RATE_RTOL * self.rate * self.length
+
+    @property
+    def zero_acceleration(self) -> float:
+        """Acceleration below which an acceleration is round-off [m/s^2]."""
+        return ZERO_RATE_RTOL * self.rate**2 * self.length
+
+    @property
+    def touching(self) -> float:
+        """Gap below which a stop closes together with others [m]."""
+        return TOUCHING_RTOL * self.length
+
+    @property
+    def step_max(self) -> float:
+        """Longest step [s]."""
+        return STEP_MAX_RTOL * self.time
+
+    def of_state(self, y: Real) -> Real:
+        """Return the magnitudes against which errors of a state are measured, (2 n + 2,).
+
+        One radian for angles of any size; for rates and energies at least their scales.
+        """
+        n = len(y) // 2 - 1
+        scale = np.abs(y)
+        scale[:n] = 1.0
+        np.maximum(scale[n : 2 * n], self.rate, out=scale[n : 2 * n])
+        np.maximum(scale[2 * n :], self.energy, out=scale[2 * n :])
+        return scale
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """The mechanism of a simulation with its parameters and tolerances.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Description.
+    values : mapping
+        Values of all its parameters.
+    system : System
+        Its constant arrays.
+    calculated : mapping
+        Parameters that follow from others.
+    tolerance : float
+        Relative tolerance of the integration.
+    step : float or None
+        Fixed step size [s]; None: adaptive.
+    frequency : float
+        Fundamental frequency at the start [Hz]; 0: none.
+    scales : Scales
+        Of lengths, rates and energies.
+    """
+
+    mechanism: Mechanism
+    values: Mapping[str, float]
+    system: System
+    calculated: Mapping[str, float]
+    tolerance: float
+    step: float | None
+    frequency: float
+    scales: Scales
+
+    @classmethod
+    def of(
+        cls,
+        mechanism: Mechanism,
+        values: Mapping[str, float],
+        tolerance: float | None = None,
+        step: float | None = None,
+    ) -> "Configuration":
+        """Return the configuration for values of all parameters.
+
+        Raises
+        ------
+        ParameterError
+            If a value, the tolerance or the step makes no sense.
+        """
+        system = assemble(mechanism, values)
+        known = calculated(mechanism, values)
+        tolerance = checked_tolerance(
+            values["solver.tolerance"] if tolerance is None else tolerance
+        )
+        if step is not None and not (math.isfinite(step) and step > 0.0):
+            raise ParameterError(f"step = {step} s must be positive")
+        frequency = fundamental_frequency(system)
+        scales = Scales.of(system, 2 * math.pi * frequency)
+        return cls(mechanism, values, system, known, tolerance, step, frequency, scales)
+
+    @property
+    def omega(self) -> float:
+        """Fundamental angular frequency [rad/s]; 0: none."""
+        return 2 * math.pi * self.frequency
+
+    def with_values(self, values: Mapping[str, float]) -> "Configuration":
+        """Return the configuration with other values of tunable parameters."""
+        if values == self.values:
+            return self
+        system = assemble(self.mechanism, values)
+        known = calculated(self.mechanism, values)
+        return replace(self, values=values, system=system, calculated=known)
+
+    def restored(
+        self,
+        values: Mapping[str, float],
+        frequency: float,
+        tolerance: float,
+        step: float | None,
+    ) -> "Configuration":
+        """Return the configuration of a saved state of the same mechanism."""
+        known = self.with_values(dict(values))
+        scales = Scales.of(known.system, 2 * math.pi * frequency)
+        return replace(known, frequency=frequency, tolerance=tolerance, step=step, scales=scales)
+
+    def equations(self, inputs: Inputs, contacts: ContactState) -> Equations:
+        """Return the equations of motion for inputs and modes of the contacts."""
+        return Equations(self.system, inputs, contacts, self.omega)
+
+    def stop_value(self, stop: int, name: str) -> float:
+        """Return a parameter of a stop, for instance ``restitution``."""
+        return value(self.mechanism.stops[stop], name, self.values)
+
+
+def checked_tolerance(tolerance: float) -> float:
+    """Return a relative tolerance as a float.
+
+    Raises
+    ------
+    ParameterError
+        If it is out of bounds.
+    """
+    if not (math.isfinite(tolerance) and TOLERANCE_MIN <= tolerance <= TOLERANCE_MAX):
+        raise ParameterError(
+            f"tolerance = {tolerance:g} must lie between {TOLERANCE_MIN:g} and {TOLERANCE_MAX:g}"
+        )
+    return float(tolerance)

@@ -1,0 +1,140 @@
+"""Events: their kinds, the table of guards and resets, and the first event of a step."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+from ..base.errors import SimulationError
+from ..base.tolerances import EVENT_WINDOW_RTOL, EVENTS_MAX
+from . import contact_modes, guards, impacts
+from .configuration import Configuration, Scales
+from .front import Front
+from .guards import Guard, Looks
+from .impacts import Impact
+
+
+class EventKind(IntEnum):
+    """The kind of an event; 0 is that of none."""
+
+    IMPACT = 1
+    """The gap of an open stop closes: an impact or a capture."""
+    RELEASE = 2
+    """The force of a held stop falls to zero."""
+    SLIP = 3
+    """A sticking contact reaches the limit of friction."""
+    REVERSAL = 4
+    """The sliding velocity of a contact falls to zero: it sticks or slips back."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event of a contact at a time [s]; contacts are stops first, then friction points."""
+
+    kind: EventKind
+    contact: int
+    time: float
+
+
+FALLING = -1  # Domain change z > 0 -> z <= 0.
+Reset = Callable[[Configuration, Front, int], tuple[Front, list[Impact]]]
+
+
+@dataclass(frozen=True)
+class Transition:
+    """A row of the table of events.
+
+    Parameters
+    ----------
+    kind : EventKind
+        Kind of the event.
+    guard : Guard
+        The scalar z that is watched.
+    direction : int
+        Sign of the change of z at the event.
+    reset : Reset
+        The change of state at the event.
+    watched : callable
+        Returns the contacts whose guard may fall in a step.
+    detect : callable
+        Returns when the guard of a contact falls in a step, or None.
+    """
+
+    kind: EventKind
+    guard: Guard
+    direction: int
+    reset: Reset
+    watched: Callable[[Looks], Sequence[int]]
+    detect: Callable[[Looks, Guard, int], float | None]
+
+
+def _settling(change: Callable[[Configuration, Front, int], Front]) -> Reset:
+    """Return a change of the contact modes as a reset without impacts."""
+    return lambda configuration, front, contact: (change(configuration, front, contact), [])
+
+
+TRANSITIONS = (
+    Transition(
+        EventKind.IMPACT, guards.gap, FALLING, impacts.impact,
+        guards.open_stops, guards.closing_time,
+    ),
+    Transition(
+        EventKind.REVERSAL, guards.slip_speed, FALLING, _settling(contact_modes.reverse),
+        guards.slipping_contacts, guards.reversal_time,
+    ),
+    Transition(
+        EventKind.RELEASE, guards.stop_force, FALLING, _settling(contact_modes.release),
+        guards.releasing_stops, guards.release_time,
+    ),
+    Transition(
+        EventKind.SLIP, guards.friction_margin, FALLING, _settling(contact_modes.slip),
+        guards.sticking_contacts, guards.slip_time,
+    ),
+)  # fmt: skip
+"""Guards and resets of all events, in the order in which events of one time are applied."""
+
+_RESETS = {row.kind: row.reset for row in TRANSITIONS}
+
+
+def first_event(looks: Looks) -> Event | None:
+    """Return the first event within a step, or None."""
+    first: Event | None = None
+    for row in TRANSITIONS:
+        for contact in row.watched(looks):
+            t = row.detect(looks, row.guard, contact)
+            if t is not None and (first is None or t < first.time):
+                first = Event(row.kind, contact, t)
+    return first
+
+
+def apply(configuration: Configuration, front: Front, event: Event) -> tuple[Front, list[Impact]]:
+    """Return the front after an event at its time, and the impacts that were counted."""
+    return _RESETS[event.kind](configuration, front, event.contact)
+
+
+@dataclass(frozen=True)
+class EventWindow:
+    """The number of events since a time [s], to end a simulation that chatters."""
+
+    since: float
+    count: int = 0
+
+    def counting(self, event: Event, scales: Scales) -> "EventWindow":
+        """Return the window with one more event.
+
+        Raises
+        ------
+        SimulationError
+            If there are more than ``EVENTS_MAX`` within ``EVENT_WINDOW_RTOL`` of the period.
+        """
+        window = self
+        if event.time - window.since > EVENT_WINDOW_RTOL * scales.time:
+            window = EventWindow(event.time)
+        window = EventWindow(window.since, window.count + 1)
+        if window.count > EVENTS_MAX:
+            raise SimulationError(
+                f"more than {EVENTS_MAX} events ({event.kind.name.lower()} the last) within "
+                f"{event.time - window.since:.3g} s at t = {event.time:.9g} s: the contact "
+                "chatters; raise rest_speed or damping.beta, lower the restitution, or give the "
+                "body room between its walls"
+            )
+        return window

@@ -1,0 +1,278 @@
+"""Guards: the scalars whose fall through zero is an event, and where in a step they fall.
+
+A guard z(equations, contact, t, y) is positive before its event.  Each detection function looks
+at a step and returns the time at which the guard of one contact falls through zero, or None.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+from scipy.optimize import brentq
+
+from ..base.tolerances import (
+    CONSTRAINT_RTOL,
+    EVENT_CORRECTION_RTOL,
+    EVENT_CORRECTIONS_MAX,
+    EVENT_TIME_ATOL,
+    FRICTION_EXCESS_RTOL,
+    GUARD_INTERVALS,
+    RELEASE_WATCH_FACTOR,
+)
+from ..mechanics.arrays import Complex, Real
+from ..mechanics.dynamics import Equations, Evaluation
+from .arc import Arc
+from .configuration import Scales
+
+Guard = Callable[[Equations, int, float, Real], float]
+Scalar = Callable[[float], float]
+
+
+# --- guards -----------------------------------------------------------------------------------
+
+
+def gap(equations: Equations, stop: int, t: float, y: Real) -> float:
+    """Return the gap of a stop [m]."""
+    e = equations.system.directions(y[: equations.n])
+    return float(equations.gaps(t, e)[stop])
+
+
+def stop_force(equations: Equations, stop: int, t: float, y: Real) -> float:
+    """Return the normal force of a held stop [N]."""
+    n = equations.n
+    return _stop_force(equations, stop, equations.evaluate(y[:n], y[n : 2 * n]))
+
+
+def friction_margin(equations: Equations, contact: int, t: float, y: Real) -> float:
+    """Return the friction that is left before a sticking contact slips [N]."""
+    n = equations.n
+    e = equations.system.directions(y[:n])
+    return _friction_margin(equations, contact, e, equations.evaluate(y[:n], y[n : 2 * n]))
+
+
+def slip_speed(equations: Equations, contact: int, t: float, y: Real) -> float:
+    """Return the speed of a slipping contact in its direction [m/s]."""
+    n = equations.n
+    e = equations.system.directions(y[:n])
+    return equations.contacts.modes[contact].slip * equations.slip_rate(contact, e, y[n : 2 * n])
+
+
+def _stop_force(equations: Equations, stop: int, evaluation: Evaluation) -> float:
+    return float(evaluation.lam[equations.first_hold + equations.held.index(stop)])
+
+
+def _friction_margin(
+    equations: Equations, contact: int, e: Complex, evaluation: Evaluation
+) -> float:
+    friction, limit = equations.friction(contact, e, evaluation.lam)
+    return (1.0 + FRICTION_EXCESS_RTOL) * limit - abs(friction)
+
+
+# --- a step as the guards see it --------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Looks:
+    """The quantities that guards evaluate in a step, each computed once and on demand.
+
+    Parameters
+    ----------
+    scales : Scales
+        Of the mechanism.
+    equations : Equations
+        That hold in the step.
+    arc : Arc
+        The step.
+    forces : (stages, r)
+        Constraint forces of its stages but the first [N].
+    """
+
+    scales: Scales
+    equations: Equations
+    arc: Arc
+    forces: Real
+
+    @cached_property
+    def samples(self) -> tuple[Real, Complex, Real]:
+        """Times (w + 1,), directions and rates (w + 1, n) at the ends of the intervals."""
+        n, (times, states) = self.equations.n, self.arc.samples()
+        return times, self.equations.system.directions(states[:, :n]), states[:, n : 2 * n]
+
+    @cached_property
+    def gaps_and_rates(self) -> tuple[Real, Real]:
+        """Gaps and their rates at the ends of the intervals, (w + 1, s) [m], [m/s]."""
+        times, e, v = self.samples
+        return self.equations.gaps(times, e), self.equations.gap_rates(e, v)
+
+    @cached_property
+    def evaluations(self) -> list[tuple[float, Complex, Evaluation]]:
+        """Times, directions and evaluations at start, middle and end of the step."""
+        n, arc = self.equations.n, self.arc
+        result = []
+        for t in (arc.start, arc.start + arc.h / 2, arc.start + arc.h):
+            y = arc.at(t)
+            evaluation = self.equations.evaluate(y[:n], y[n : 2 * n])
+            result.append((t, self.equations.system.directions(y[:n]), evaluation))
+        return result
+
+    def along(self, guard: Guard, contact: int, sign: float = 1.0) -> Scalar:
+        """Return a guard of a contact, times a sign, as a function of time."""
+        return lambda t: sign * guard(self.equations, contact, t, self.arc.at(t))
+
+
+def open_stops(looks: Looks) -> Sequence[int]:
+    """Return the contacts that are watched for impacts."""
+    return looks.equations.contacts.open_stops
+
+
+def slipping_contacts(looks: Looks) -> Sequence[int]:
+    """Return the contacts that are watched for reversals."""
+    return looks.equations.slipping_points + looks.equations.slipping_stops
+
+
+def sticking_contacts(looks: Looks) -> Sequence[int]:
+    """Return the contacts that are watched for slip."""
+    return looks.equations.sticking
+
+
+def releasing_stops(looks: Looks) -> Sequence[int]:
+    """Return the held stops if one of the stage forces comes near to zero in the step."""
+    equations = looks.equations
+    if not equations.held or equations.sticking:
+        return equations.held
+    held = looks.forces[:, equations.first_hold :]
+    near = held.min(axis=0) <= RELEASE_WATCH_FACTOR * held.max(axis=0)
+    return equations.held if bool(near.any()) else ()
+
+
+# --- detection --------------------------------------------------------------------------------
+
+
+def closing_time(looks: Looks, guard: Guard, stop: int) -> float | None:
+    """Return when a gap closes: z > 0 -> z <= 0 at a closing rate.
+
+    A gap that is opening at the start of an interval closes only after its apex, so that the
+    impact that has just been resolved, whose gap is zero up to round-off of either sign, is not
+    found again.  The rates show a dip below zero between two looks.
+    """
+    all_gaps, all_rates = looks.gaps_and_rates
+    gaps, rates = all_gaps[:, stop], all_rates[:, stop]
+    for j in range(GUARD_INTERVALS):
+        if gaps[j + 1] > 0.0 and not rates[j] < 0.0 < rates[j + 1]:
+            continue
+        t = _closing_time_between(looks, guard, stop, j)
+        if t is not None:
+            return t
+    return None
+
+
+def _closing_time_between(looks: Looks, guard: Guard, stop: int, j: int) -> float | None:
+    """Return when a gap closes within an interval of the looks that ends or dips below zero."""
+    z, near = looks.along(guard, stop), looks.scales.touching
+    a, b = looks.samples[0][j : j + 2].tolist()
+    (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2, stop] for x in looks.gaps_and_rates)
+    if abs(rate_a) <= looks.scales.zero_speed and abs(gap_a) <= _round_off(looks):
+        # Released too early: it is pressed again a little later.
+        return fall_time(lambda t: z(t) + near, a, b) if gap_b < -near else None
+    if rate_a > 0.0:
+        if rate_b >= 0.0:
+            return None  # It still opens from zero.
+        a = fall_time(looks.along(_gap_rate, stop), a, b)
+        if z(a) <= 0.0:
+            return a  # The flight is lower than the resolution of a position.
+    elif gap_a <= 0.0:
+        return a if gap_b < -near else None  # Without a rate of its own it only touches.
+    if rate_a < 0.0 < rate_b:
+        b = fall_time(looks.along(_gap_rate, stop, sign=-1.0), a, b)
+        if z(b) > 0.0:
+            return None
+    return _corrected_time(looks, stop, fall_time(z, a, b), earliest=a)
+
+
+def _round_off(looks: Looks) -> float:
+    """Return the gap that a projection leaves of a closed stop [m]."""
+    return CONSTRAINT_RTOL * looks.scales.length
+
+
+def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
+    """Return the rate of the gap of a stop [m/s]."""
+    n = equations.n
+    e = equations.system.directions(y[:n])
+    return float(equations.gap_rates(e, y[n : 2 * n])[stop])
+
+
+def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float:
+    """Return the time at which the projected state closes a gap, from that of the dense output.
+
+    Never before the apex: the gap is opening there, the impact would have no effect and be
+    located forever.
+    """
+    equations = looks.equations
+    for _ in range(EVENT_CORRECTIONS_MAX):
+        y = equations.project(t, looks.arc.at(t))
+        size, rate = gap(equations, stop, t, y), _gap_rate(equations, stop, t, y)
+        if rate >= 0.0 or abs(size) <= EVENT_TIME_ATOL * abs(rate):
+            break
+        change = -size / rate
+        if abs(change) > EVENT_CORRECTION_RTOL * looks.arc.h:
+            break  # Grazing: the root of the dense output is better.
+        t = max(earliest, t + change)
+    return t
+
+
+def reversal_time(looks: Looks, guard: Guard, contact: int) -> float | None:
+    """Return when the sliding velocity of a contact falls through zero.
+
+    A contact that begins to slip is at rest, up to round-off of either sign: it slips the other
+    way if it does so at the end of the step.
+    """
+    equations, (times, e, v) = looks.equations, looks.samples
+    rows, i = equations.slip_rows(contact)
+    z = equations.contacts.modes[contact].slip * rows.rates(e, v)[:, i]
+    begins = bool(z[0] <= looks.scales.zero_speed)
+    for j in range(int(begins), GUARD_INTERVALS):
+        if z[j] > 0.0 >= z[j + 1]:
+            return fall_time(looks.along(guard, contact), times[j], times[j + 1])
+    return float(times[1]) if begins and z[-1] < 0.0 else None
+
+
+def release_time(looks: Looks, guard: Guard, stop: int) -> float | None:
+    """Return when the force of a held stop falls to zero."""
+    seen = [(t, _stop_force(looks.equations, stop, at)) for t, _, at in looks.evaluations]
+    return _first_fall(looks.along(guard, stop), seen)
+
+
+def slip_time(looks: Looks, guard: Guard, contact: int) -> float | None:
+    """Return when a sticking contact reaches the limit of friction."""
+    equations = looks.equations
+    seen = [(t, _friction_margin(equations, contact, e, at)) for t, e, at in looks.evaluations]
+    return _first_fall(looks.along(guard, contact), seen)
+
+
+# --- location ---------------------------------------------------------------------------------
+
+
+def _first_fall(z: Scalar, seen: Sequence[tuple[float, float]]) -> float | None:
+    """Return when z falls through zero first, between times at which its value is known."""
+    for (a, before), (b, after) in pairwise(seen):
+        if after <= 0.0:
+            return fall_time(z, a, b) if before > 0.0 else a
+    return None
+
+
+def fall_time(z: Scalar, a: float, b: float) -> float:
+    """Return when z falls to zero between a, where it is positive, and b, where it is not.
+
+    Where round-off denies one of these signs, the result is the end of the interval there.
+
+    Examples
+    --------
+    >>> round(fall_time(lambda t: 1.0 - t**2, 0.0, 4.0), 12)
+    1.0
+    """
+    if z(a) <= 0.0:
+        return float(a)
+    if z(b) > 0.0:
+        return float(b)
+    return float(brentq(z, a, b, xtol=EVENT_TIME_ATOL))

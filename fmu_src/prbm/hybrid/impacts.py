@@ -1,0 +1,273 @@
+"""Rigid impacts: the stops that take part, their impulses, and the booking of the results."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.tolerances import IMPACT_COUNT_MAX, REACTION_RANK_RTOL, SHORTEST_FLIGHT_RTOL
+from ..mechanics import contact, forces
+from ..mechanics.arrays import Real
+from ..mechanics.inputs import Wall
+from ..mechanics.modal import fundamental_at, simulated_restitution
+from .configuration import Configuration
+from .contact_modes import equations_holding, holding_stops, mobility, settle
+from .front import Front, Latched
+
+
+@dataclass(frozen=True)
+class Impact:
+    """An impact in a record.
+
+    Parameters
+    ----------
+    stop : str
+        Name of the stop.
+    time : float
+        [s].
+    q : (n,)
+        Angles [rad].
+    before, after : (n,)
+        Rates around the impact [rad/s].
+    impulse : float
+        Normal impulse, > 0 pushes [N s].
+    latched : Latched
+        The outputs of the stop after the impact.
+    """
+
+    stop: str
+    time: float
+    q: Real
+    before: Real
+    after: Real
+    impulse: float
+    latched: Latched
+
+
+@dataclass(frozen=True)
+class Impulses:
+    """The impulses of an impact by stop [N s], and the rates after it, (n,) [rad/s]."""
+
+    after: Real
+    normal: Mapping[int, float]
+    tangential: Mapping[int, float]
+
+
+def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front, list[Impact]]:
+    """Resolve the impact of a stop and of all stops that touch with it.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Mechanism and scales.
+    front : Front
+        State before the impact.
+    hit : int
+        The stop whose gap has closed.
+
+    Returns
+    -------
+    front : Front
+        State after the impact, with the contact modes that follow.
+    impacts : list of Impact
+        One for each stop that was struck; captures do not count.
+
+    Raises
+    ------
+    SimulationError
+        If no impulses satisfy the laws of contact.
+    """
+    gaps, rates = front.gaps_and_rates()
+    near, zero = configuration.scales.touching, configuration.scales.zero_speed
+    struck = [
+        i for i in front.contacts.open_stops if rates[i] < 0.0 and (i == hit or gaps[i] <= near)
+    ]
+    if not struck:
+        resting = [hit] if abs(rates[hit]) <= zero else []
+        return settle(configuration, front, resting=resting), []
+    held = list(front.contacts.held)
+    soft = [i for i in struck if _captured(configuration, front, i, held, float(-rates[i]))]
+    restitution = np.array(
+        [0.0 if i in soft else configuration.stop_value(i, "restitution") for i in struck]
+    )
+    impulses = _impulses(configuration, front, struck, held, restitution)
+    counted = [i for i in struck if i not in soft]
+    front, impacts = _book(configuration, front, counted, impulses)
+    _, rates = front.gaps_and_rates()
+    resting = [i for i in (*struck, *held) if rates[i] <= zero]
+    front = front.with_contacts(front.contacts.opened())
+    return settle(configuration, front, resting=resting), impacts
+
+
+def receive(front: Front, impulses: Real) -> Front:
+    """Return the front after impulses from outside at the points of the forces.
+
+    Each component P changes the rate u of its point, and its work is P (u- + u+)/2.  The loops
+    take part, stops follow later.  Friction is finite and has no impulse: sticking contacts are
+    free to slip or to stick again.
+
+    Parameters
+    ----------
+    front : Front
+        State before.
+    impulses : (3 b,)
+        Along x and y [N s] and about the point [N m s] of each force.
+    """
+    equations = front.equations
+    e, M, loops = equations.mass_and_loops(front.q)
+    system = equations.system
+    rows = np.vstack([forces.load_rows(system, frame, e) for frame in system.pushed])
+    after = front.v + contact.response(M, loops, rows) @ impulses
+    work = float(impulses @ (rows @ (front.v + after))) / 2
+    front = front.with_velocities(after, work=work)
+    return front.with_contacts(front.contacts.without_friction())
+
+
+def _captured(
+    configuration: Configuration, front: Front, stop: int, held: list[int], speed: float
+) -> bool:
+    """Return whether a stop that is struck slowly comes to rest.
+
+    It does if, after an impact without restitution, it is pressed, and if it closes below
+    ``rest_speed`` or after a flight shorter than ``SHORTEST_FLIGHT_RTOL`` of the period.  A speed
+    that is round-off is neither counted nor returned.
+    """
+    scales = configuration.scales
+    if speed <= scales.zero_speed:
+        return True
+    after = _impulses(configuration, front, [stop], held, np.zeros(1)).after
+    landed = front.with_velocities(after)
+    holding = holding_stops(configuration, landed, [stop, *held])
+    if stop not in holding:
+        return False
+    if speed < configuration.stop_value(stop, "rest_speed"):
+        return True
+    equations = equations_holding(scales, landed, holding)
+    lam = equations.evaluate(landed.q, after).lam
+    e, M, loops = equations.mass_and_loops(landed.q)
+    G = configuration.system.gap_rows.jacobian(e)[[stop]]
+    pressing = float(equations.stop_forces(lam)[stop]) * mobility(M, loops, G)
+    return 2.0 * speed < pressing * SHORTEST_FLIGHT_RTOL * scales.time
+
+
+# --- impulses ---------------------------------------------------------------------------------
+
+
+def _impulses(
+    configuration: Configuration,
+    front: Front,
+    struck: list[int],
+    held: list[int],
+    restitution: Real,
+) -> Impulses:
+    """Return the impulses of an impact.
+
+    Held stops take part: without friction as partners of the complementarity problem, with
+    friction as constraints that are released if they would pull.  Their own friction, and that
+    of friction points, is finite and has no impulse.
+    """
+    mu = np.array([configuration.stop_value(i, "friction") for i in struck])
+    if mu.any():
+        return _impulses_with_friction(front, struck, held, mu, restitution)
+    e, M, loops = front.equations.mass_and_loops(front.q)
+    partners = struck + held
+    mobilities = np.array(front.inputs.mobilities)
+    G = configuration.system.gap_rows.jacobian(e)[partners]
+    X = contact.response(M, loops, G)
+    W = G @ X + np.diag(mobilities[partners])
+    u = front.equations.gap_rates(e, front.v)[partners]
+    P = contact.newton(W, np.minimum(u, 0.0), np.concatenate([restitution, np.zeros(len(held))]))
+    return Impulses(front.v + X @ P, dict(zip(partners, P.tolist(), strict=True)), {})
+
+
+def _impulses_with_friction(
+    front: Front, struck: list[int], held: list[int], mu: Real, restitution: Real
+) -> Impulses:
+    """Return the impulses of an impact with friction at the stops that are struck."""
+    v, k, kept = front.v, len(struck), list(held)
+    e, M, loops = front.equations.mass_and_loops(front.q)
+    system = front.equations.system
+    gaps, u = system.gap_rows.jacobian(e), front.equations.gap_rates(e, v)
+    mobilities = np.array(front.inputs.mobilities)[struck]
+    T = system.slide_rows.jacobian(e)[struck]
+    both = np.vstack([gaps[struck], T])
+    rates = np.concatenate([u[struck], T @ v])
+    while True:
+        rows = np.vstack([loops, gaps[kept]])
+        X = contact.response(M, rows, both)
+        W = both @ X
+        W[range(k), range(k)] += mobilities
+        if k == 1:
+            P = np.array(contact.stronge(W, rates, float(mu[0]), float(restitution[0])))
+        else:
+            P = contact.several(W, rates, mu, restitution)
+        after = v + X @ P
+        left = M @ (after - v) - both.T @ P
+        solution = np.linalg.lstsq(rows.T, left, rcond=REACTION_RANK_RTOL)[0]
+        reaction = dict(zip(kept, solution[len(loops) :].tolist(), strict=True))
+        pulling = [i for i, p in reaction.items() if p < 0.0]
+        if not pulling:
+            normal = dict(zip(struck, P[:k].tolist(), strict=True)) | reaction
+            return Impulses(after, normal, dict(zip(struck, P[k:].tolist(), strict=True)))
+        kept = [i for i in kept if i not in pulling]
+
+
+# --- booking ----------------------------------------------------------------------------------
+
+
+def _book(
+    configuration: Configuration, front: Front, counted: Sequence[int], impulses: Impulses
+) -> tuple[Front, list[Impact]]:
+    """Return the front after an impact, with energies and latched outputs, and the record.
+
+    At each stop -P (u- + u+)/2 is lost, and as much along the wall; the wall does
+    -P (w- + w+)/2, where an impulse changes the velocity w of a wall by its mobility times P.
+    """
+    e, v, after, normal = front.e, front.v, impulses.after, impulses.normal
+    before = front
+    u = front.equations.gap_rates(e, v)
+    front = _with_pushed_walls(front, normal)
+    u_after = front.equations.gap_rates(e, after)
+    slides = configuration.system.slide_rows.jacobian(e)
+    lost = {i: -P * float(u[i] + u_after[i]) / 2 for i, P in normal.items()}
+    for i, P in impulses.tangential.items():
+        lost[i] -= P * float(slides[i] @ (v + after)) / 2
+    old, new = before.inputs.walls, front.inputs.walls
+    work = -sum(P * (old[i].rate + new[i].rate) / 2 for i, P in normal.items())
+    front = front.with_velocities(after, sum(lost.values()), work)
+    latched = list(front.latched)
+    for i, P in normal.items():
+        latched[i] = replace(latched[i], impulse_sum=latched[i].impulse_sum + P)
+    if counted:
+        phi, M = fundamental_at(configuration.system, front.q)
+        modal = simulated_restitution(phi, M, v, after)
+        for i in counted:
+            latched[i] = Latched(
+                impact_count=min(latched[i].impact_count + 1, IMPACT_COUNT_MAX),
+                impact_time=front.time,
+                approach_speed=float(-u[i]),
+                rebound_speed=float(u_after[i]),
+                impulse=normal[i],
+                energy_lost=lost[i],
+                modal_restitution=modal,
+                impulse_sum=latched[i].impulse_sum,
+            )
+    stops = configuration.mechanism.stops
+    impacts = [
+        Impact(stops[i].name, front.time, before.q, v, after, normal[i], latched[i])
+        for i in counted
+    ]
+    return replace(front, latched=tuple(latched)), impacts
+
+
+def _with_pushed_walls(front: Front, normal: Mapping[int, float]) -> Front:
+    """Return the front with the wall velocities after the impulses, until the next restart."""
+    t, walls = front.time, list(front.inputs.walls)
+    for i, P in normal.items():
+        change = front.inputs.mobilities[i] * P
+        if change:
+            walls[i] = Wall(walls[i].at(t), walls[i].rate + change, t)
+    if tuple(walls) == front.inputs.walls:
+        return front
+    inputs = replace(front.inputs, walls=tuple(walls))
+    return replace(front, equations=front.equations.with_inputs(inputs))

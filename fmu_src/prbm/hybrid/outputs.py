@@ -1,0 +1,104 @@
+"""Outputs of a simulation by name, in SI units, at a time and a state."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..mechanics import contact, forces
+from ..mechanics.arrays import Complex, Real
+from ..mechanics.dynamics import Equations
+from ..mechanics.kinetics import kinetic_energy
+from ..mechanics.system import System
+from ..mechanism.parts import value
+from .front import Latched
+
+Outputs = dict[str, float | int | bool]
+
+
+def all_outputs(
+    equations: Equations, latched: Sequence[Latched], t: float, y: Real, others: Mapping[str, float]
+) -> Outputs:
+    """Return all outputs.
+
+    Parameters
+    ----------
+    equations : Equations
+        That hold at the time.
+    latched : (s,) sequence of Latched
+        The last impact of each stop.
+    t, y : float, (2 n + 2,)
+        Time [s] and state.
+    others : mapping
+        Outputs that are constant.
+    """
+    system, n = equations.system, equations.n
+    q, v = y[:n], y[n : 2 * n]
+    e = system.directions(q)
+    a, lam, M, _ = equations.evaluate(q, v)
+    out: Outputs = {**motions(system, q, v, e)}
+    out |= _stops(equations, t, e, v, lam, M)
+    force, moment = equations.base_reaction(q, v, a)
+    out["base.force.x"], out["base.force.y"] = force.real, force.imag
+    out["base.moment"] = moment
+    out["energy.kinetic"] = kinetic_energy(M, v)
+    out["energy.elastic"] = forces.elastic_energy(system.K, q - system.q0)
+    out["energy.gravitational"] = forces.gravitational_energy(system, e)
+    out["energy.dissipated"] = float(y[2 * n])
+    out["energy.work"] = float(y[2 * n + 1])
+    for i, stop in enumerate(system.mechanism.stops):
+        out[f"{stop.name}.contact"] = equations.contacts.modes[i].closed
+        out |= {f"{stop.name}.{name}": x for name, x in vars(latched[i]).items()}
+    out |= _links(system, q, v)
+    out |= others
+    return out
+
+
+def motions(system: System, q: Real, v: Real, e: Complex) -> dict[str, float]:
+    """Return the places and motions of bodies and probes, as displacements from straight."""
+    out = {}
+    for name, frame in system.bodies.items():
+        place, velocity = system.motion(frame, e, v)
+        out[f"{name}.x"], out[f"{name}.y"] = place.real, place.imag
+        out[f"{name}.angle"] = float(q[frame.j])
+        out[f"{name}.vx"], out[f"{name}.vy"] = velocity.real, velocity.imag
+        out[f"{name}.omega"] = float(v[frame.j])
+    for frame in system.probes:
+        place, velocity = system.motion(frame, e, v)
+        out[f"{frame.name}.x"], out[f"{frame.name}.y"] = place.real, place.imag
+        out[f"{frame.name}.vx"], out[f"{frame.name}.vy"] = velocity.real, velocity.imag
+    return out
+
+
+def _stops(
+    equations: Equations, t: float, e: Complex, v: Real, lam: Real, M: Real
+) -> dict[str, float]:
+    """Return gaps, forces and the motions and mobilities of the hit points."""
+    system = equations.system
+    out = {}
+    gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
+    places, speeds = system.gap_rows.values(e), system.gap_rows.rates(e, v)
+    G, loops = system.gap_rows.jacobian(e), equations.rows.jacobian(e)[: len(system.loops)]
+    pressed = equations.stop_forces(lam)
+    mobilities = np.diag(G @ contact.response(M, loops, G))
+    for i, stop in enumerate(system.mechanism.stops):
+        out[f"{stop.name}.gap"] = float(gaps[i])
+        out[f"{stop.name}.gap_rate"] = float(rates[i])
+        out[f"{stop.name}.force"] = float(pressed[i])
+        drawn = value(stop, "position", system.values)
+        out[f"{stop.name}.point.displacement"] = -float(places[i]) - drawn
+        out[f"{stop.name}.point.velocity"] = -float(speeds[i])
+        out[f"{stop.name}.point.mobility"] = float(mobilities[i])
+    return out
+
+
+def _links(system: System, q: Real, v: Real) -> dict[str, float]:
+    """Return the angles and strains of the links, and their rates."""
+    out = {}
+    for number, j in enumerate(system.links, start=1):
+        out[f"link[{number}].angle"] = float(q[j])
+        out[f"link[{number}].omega"] = float(v[j])
+    for j, link in zip(system.stretches, system.stretched, strict=True):
+        number = system.links.index(link) + 1
+        out[f"link[{number}].strain"] = float(q[j])
+        out[f"link[{number}].strain_rate"] = float(v[j])
+    return out

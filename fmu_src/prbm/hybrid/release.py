@@ -1,0 +1,73 @@
+"""The start of a motion: the released shape and velocity, and the contacts there."""
+
+import numpy as np
+
+from ..base.errors import ParameterError
+from ..base.tolerances import RELEASE_PENETRATION_ATOL
+from ..mechanics.contact_state import ContactState
+from ..mechanics.inputs import Inputs
+from ..mechanics.statics import equilibrium, release_velocity
+from ..mechanism.parts import value
+from .configuration import Configuration
+from .contact_modes import settle
+from .front import Front, Latched
+from .impacts import impact
+
+
+def released(configuration: Configuration, inputs: Inputs, time: float) -> Front:
+    """Return the front at the release.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Mechanism and parameters.
+    inputs : Inputs
+        Forces, walls and the acceleration of the base.
+    time : float
+        [s].
+
+    Raises
+    ------
+    EquilibriumError
+        If no equilibrium has the displacement of the release.
+    ParameterError
+        If a wall is penetrated, or the loops do not allow the velocity of the release.
+    """
+    mechanism, system = configuration.mechanism, configuration.system
+    displacement, speed = (
+        value(mechanism.release, name, configuration.values)
+        for name in ("displacement", "velocity")
+    )
+    shape = equilibrium(system, displacement)
+    velocity = release_velocity(system, shape.q, speed)
+    stops = len(mechanism.stops)
+    contacts = ContactState.free(stops, len(mechanism.frictions))
+    y = np.concatenate([shape.q, velocity, np.zeros(2)])
+    equations = configuration.equations(inputs, contacts)
+    front = Front(time, y, equations, (Latched(),) * stops).projected()
+    check_walls(configuration, front)
+    gaps, rates = front.gaps_and_rates()
+    for i in range(stops):
+        if gaps[i] <= RELEASE_PENETRATION_ATOL and rates[i] < 0.0:
+            front, _ = impact(configuration, front, i)
+            break
+    return settle(configuration, front, resting=range(stops))
+
+
+def check_walls(configuration: Configuration, front: Front) -> None:
+    """Reject a wall that is penetrated.
+
+    Raises
+    ------
+    ParameterError
+        If a gap is negative by more than ``RELEASE_PENETRATION_ATOL``.
+    """
+    gaps, _ = front.gaps_and_rates()
+    for i, stop in enumerate(configuration.mechanism.stops):
+        if gaps[i] < -RELEASE_PENETRATION_ATOL:
+            wall = front.inputs.walls[i].position
+            raise ParameterError(
+                f"the wall {stop.name} is penetrated by {-gaps[i]:.6g} m at release: "
+                f"{stop.name}.position = {wall:.6g} m, the hit point is at "
+                f"{wall - gaps[i]:.6g} m; move the stop or release further back"
+            )

@@ -1,0 +1,106 @@
+"""The parts of a saved state as plain values that JSON keeps exactly, and back."""
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from ..mechanics.arrays import Real
+from ..mechanics.contact_state import ContactMode, ContactState
+from ..mechanics.inputs import Inputs, Wall
+from .arc import Arc
+from .configuration import Configuration
+from .events import Event, EventKind
+from .front import Front, Latched
+from .walls import WallSchedule
+
+Plain = dict[str, Any]
+
+
+def plain_inputs(inputs: Inputs) -> Plain:
+    """Return inputs as plain values."""
+    return {
+        "forces": [[f.real, f.imag] for f in inputs.forces],
+        "moments": list(inputs.moments),
+        "base": [inputs.base.real, inputs.base.imag],
+        "walls": [asdict(wall) for wall in inputs.walls],
+        "mobilities": list(inputs.mobilities),
+    }
+
+
+def inputs_of(plain: Mapping[str, Any]) -> Inputs:
+    """Return the inputs that :func:`plain_inputs` gave."""
+    return Inputs(
+        tuple(complex(*f) for f in plain["forces"]),
+        tuple(plain["moments"]),
+        complex(*plain["base"]),
+        tuple(Wall(**wall) for wall in plain["walls"]),
+        tuple(plain["mobilities"]),
+    )
+
+
+def plain_front(front: Front) -> Plain:
+    """Return a front as plain values."""
+    return {
+        "time": front.time,
+        "y": front.y.tolist(),
+        "inputs": plain_inputs(front.inputs),
+        "modes": [int(mode) for mode in front.contacts.modes],
+        "latched": [asdict(latched) for latched in front.latched],
+    }
+
+
+def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
+    """Return the front that :func:`plain_front` gave, of a mechanism with such parameters."""
+    modes = tuple(ContactMode(mode) for mode in plain["modes"])
+    contacts = ContactState(modes, len(configuration.mechanism.stops))
+    return Front(
+        plain["time"],
+        np.array(plain["y"]),
+        configuration.equations(inputs_of(plain["inputs"]), contacts),
+        tuple(Latched(**latched) for latched in plain["latched"]),
+    )
+
+
+def schedule_of(plain: Mapping[str, Any]) -> WallSchedule:
+    """Return the schedule of the walls from plain values."""
+    velocities, driven = tuple(plain["velocities"]), tuple(plain["driven"])
+    return WallSchedule(plain["planned"], plain["due"], velocities, driven)
+
+
+def plain_arc(arc: Arc | None) -> Plain | None:
+    """Return an arc as plain values."""
+    if arc is None:
+        return None
+    return {
+        "start": arc.start, "h": arc.h, "end": arc.end, "y": arc.y.tolist(), "k": arc.k.tolist(),
+    }  # fmt: skip
+
+
+def arc_of(plain: Mapping[str, Any] | None) -> Arc | None:
+    """Return the arc that :func:`plain_arc` gave."""
+    if plain is None:
+        return None
+    start, h, end = plain["start"], plain["h"], plain["end"]
+    return Arc(start, h, end, np.array(plain["y"]), np.array(plain["k"]))
+
+
+def plain_event(event: Event | None) -> list[float] | None:
+    """Return an event as plain values."""
+    return None if event is None else [int(event.kind), event.contact, event.time]
+
+
+def event_of(plain: Any) -> Event | None:
+    """Return the event that :func:`plain_event` gave."""
+    return None if plain is None else Event(EventKind(plain[0]), plain[1], plain[2])
+
+
+def plain_array(x: Real | None) -> list[float] | None:
+    """Return an array as a list."""
+    return None if x is None else list(x.tolist())
+
+
+def array_of(plain: Any) -> Real | None:
+    """Return the array that :func:`plain_array` gave."""
+    return None if plain is None else np.array(plain)

@@ -1,0 +1,223 @@
+"""Steps of the integration, their errors and their sizes.
+
+Sources
+-------
+.. [1] E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.4.
+.. [2] E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.2 (memory).
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.errors import SimulationError
+from ..base.tolerances import (
+    FIRST_RATE_MIN,
+    FIRST_STEP_EXPONENT,
+    FIRST_STEP_FACTOR,
+    STEP_ERROR_FACTOR,
+    STEP_ERROR_MIN,
+    STEP_GROWTH_MAX,
+    STEP_MEMORY_EXPONENT,
+    STEP_MIN_ATOL,
+    STEP_SAFETY_FACTOR,
+    STEP_SHRINK_MIN,
+)
+from ..mechanics.arrays import Real
+from ..mechanics.constraints import Factors
+from ..mechanics.dynamics import Equations, Evaluation
+from .configuration import Configuration, Scales
+from .front import Front
+from .runge_kutta import BOGACKI_SHAMPINE as PAIR
+from .runge_kutta import stages
+
+REJECTED_EXPONENT = 1.0 / PAIR.order
+ACCEPTED_EXPONENT = REJECTED_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT
+
+
+@dataclass(frozen=True)
+class StepSizeController:
+    """The size of the next step, from the errors of the steps so far.
+
+    Parameters
+    ----------
+    h : float
+        Size of the next step [s]; 0: not known yet.
+    last_error : float
+        Error of the last step that was accepted, in units of the tolerance.
+    growth : float
+        Largest ratio of the step after the next to the next.
+
+    Examples
+    --------
+    >>> controller = StepSizeController(h=1.0)
+    >>> controller.next(error=2.0**5).h
+    0.45
+    """
+
+    h: float = 0.0
+    last_error: float = STEP_ERROR_MIN
+    growth: float = STEP_GROWTH_MAX
+
+    def next(self, error: float) -> "StepSizeController":
+        """Return the controller after a step with an error in units of the tolerance.
+
+        A step with an error above 1 is to be repeated; the step after it does not grow.
+        """
+        if not error <= 1.0:
+            optimal = (
+                STEP_SAFETY_FACTOR * error**-REJECTED_EXPONENT if math.isfinite(error) else 0.0
+            )
+            return replace(self, h=self.h * max(STEP_SHRINK_MIN, optimal), growth=1.0)
+        error = max(error, STEP_ERROR_MIN)
+        optimal = STEP_SAFETY_FACTOR * error**-ACCEPTED_EXPONENT
+        ratio = min(self.growth, optimal * self.last_error**STEP_MEMORY_EXPONENT)
+        return StepSizeController(self.h * max(STEP_SHRINK_MIN, ratio), error)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step that was computed.
+
+    Parameters
+    ----------
+    h : float
+        Size [s].
+    k : (stages, 2 n + 2)
+        Rates of the stages.
+    y : (2 n + 2,)
+        State at the end, not projected.
+    error : float
+        In units of the tolerance.
+    forces : (stages - 1, r)
+        Constraint forces of the stages but the first [N].
+    factors : Factors
+        Of the equations at the end.
+    """
+
+    h: float
+    k: Real
+    y: Real
+    error: float
+    forces: Real
+    factors: Factors
+
+
+def take_step(
+    configuration: Configuration, front: Front, k1: Real, controller: StepSizeController
+) -> tuple[Step, StepSizeController]:
+    """Return a step whose error is within the tolerance, and the controller of the next.
+
+    Parameters
+    ----------
+    configuration : Configuration
+        Scales, tolerance and the fixed step, if there is one.
+    front : Front
+        State at the start.
+    k1 : (2 n + 2,)
+        Rates there.
+    controller : StepSizeController
+        Of this step.
+
+    Raises
+    ------
+    SimulationError
+        If the step size vanishes, or a fixed step is far too long.
+    """
+    t, y, equations = front.time, front.y, front.equations
+    if configuration.step:
+        return fixed_step(configuration, front, k1), controller
+    h = controller.h or first_step(configuration, y, k1)
+    h = min(h, configuration.scales.step_max)
+    controller = StepSizeController(h, controller.last_error)
+    while True:
+        check_size(t, controller.h)
+        try:
+            step = compute_step(configuration, equations, t, y, controller.h, k1)
+        except SimulationError:  # The step is far too long: the equations fail where it leads.
+            controller = controller.next(math.inf)
+            continue
+        controller = controller.next(step.error)
+        if step.error <= 1.0:
+            return step, controller
+
+
+def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
+    """Return a step of the fixed size.
+
+    Raises
+    ------
+    SimulationError
+        If the error is larger than the state, or nothing can be computed there.
+    """
+    t, h = front.time, configuration.step or 0.0
+    check_size(t, h)
+    step = compute_step(configuration, front.equations, t, front.y, h, k1)
+    if not step.error * STEP_ERROR_FACTOR * configuration.tolerance <= 1.0:
+        raise SimulationError(
+            f"the fixed step of {h:g} s is too long at t = {t:.9g} s: its error is larger than "
+            "the state; shorten it"
+        )
+    return step
+
+
+def check_size(t: float, h: float) -> None:
+    """Reject a step size h at a time t that is too small [s].
+
+    Raises
+    ------
+    SimulationError
+        If it is below the shortest step, or the time does not resolve it.
+    """
+    if h < STEP_MIN_ATOL:
+        raise SimulationError(
+            f"the step size fell below {STEP_MIN_ATOL:g} s at t = {t:.9g} s: the motion "
+            "is too violent for the model, or its links lie flat, where it ends; check the "
+            "inputs and parameters, or add damping.beta"
+        )
+    if t + h == t:
+        raise SimulationError(
+            f"at t = {t:.9g} s a step of {h:.3g} s is lost in the rounding of the time: "
+            "start the simulation nearer to zero"
+        )
+
+
+def first_step(configuration: Configuration, y: Real, k1: Real) -> float:
+    """Return a first step size from the size of the rates [1, II.4] [s]."""
+    rate = k1 / configuration.scales.of_state(y)
+    size = math.sqrt(float(rate @ rate) / len(rate))
+    accuracy = math.pow(configuration.tolerance, FIRST_STEP_EXPONENT)
+    longest = FIRST_STEP_FACTOR * accuracy / max(size, FIRST_RATE_MIN)
+    return min(configuration.scales.step_max, longest)
+
+
+def compute_step(
+    configuration: Configuration, equations: Equations, t: float, y: Real, h: float, k1: Real
+) -> Step:
+    """Return the step of size h from y at t, with the rates k1 there.
+
+    Raises
+    ------
+    SimulationError
+        If the equations are singular at one of its stages.
+    """
+    evaluations: list[Evaluation] = []
+
+    def rate(t: float, y: Real) -> Real:
+        result, evaluation = equations.rate_and_evaluation(y)
+        evaluations.append(evaluation)
+        return result
+
+    with np.errstate(over="ignore", invalid="ignore"):
+        k, y1 = stages(PAIR, rate, t, y, h, k1)
+        error = error_norm(configuration.scales, h * (PAIR.error @ k), y, y1)
+    error /= STEP_ERROR_FACTOR * configuration.tolerance
+    forces = np.array([evaluation.lam for evaluation in evaluations])
+    return Step(h, k, y1, error, forces, evaluations[-1].factors)
+
+
+def error_norm(scales: Scales, difference: Real, y: Real, y1: Real) -> float:
+    """Return the root mean square of an error (2 n + 2,), relative to the larger state."""
+    ratio = difference / scales.of_state(np.maximum(np.abs(y), np.abs(y1)))
+    return math.sqrt(float(ratio @ ratio) / len(ratio))

@@ -1,0 +1,117 @@
+"""Guards, resets and the step size by themselves."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from prbm.base.errors import SimulationError
+from prbm.base.tolerances import RESTING_SETS_MAX, STEP_GROWTH_MAX, STEP_SHRINK_MIN
+from prbm.hybrid import events
+from prbm.hybrid.events import TRANSITIONS, EventKind
+from prbm.hybrid.simulation import Simulation
+from prbm.hybrid.stepping import StepSizeController
+from prbm.mechanics.contact_state import ContactMode, ContactState
+from support import mechanism, simulation
+
+SLIDING = {
+    "gravity.x": 0.0, "release.displacement": -1e-3, "stop.position": 0.01,
+    "friction.coefficient": 1.0, "friction.normal_force": 2e-3,
+}  # fmt: skip
+RUBBING = {
+    "release.displacement": 0.0, "stop.friction": 0.5, "stop.offset": 0.01,
+}  # fmt: skip
+
+
+def fixed(t):
+    """Return displacement and velocity of a wall."""
+    return 0.0, 0.0
+
+
+def ramp(t):
+    return 0.05 * t, 0.05
+
+
+def sine(t):
+    return 1e-4 * math.sin(31.0 * t), 31e-4 * math.cos(31.0 * t)
+
+
+def test_each_kind_of_event_has_one_guard_and_one_reset():
+    assert sorted(row.kind for row in TRANSITIONS) == list(EventKind)
+    assert {row.direction for row in TRANSITIONS} == {events.FALLING}
+
+
+@pytest.mark.parametrize(
+    ("kind", "model", "values", "wall"),
+    [
+        (EventKind.IMPACT, "PRBDM", {}, fixed),
+        (EventKind.REVERSAL, "PRBDM", SLIDING, fixed),
+        (EventKind.RELEASE, "PRBDM", {"release.displacement": 0.0, "stop.rest_speed": 0.2}, ramp),
+        (EventKind.SLIP, "PRBDM2R", RUBBING, sine),
+    ],
+)
+def test_the_guard_of_an_event_is_positive_before_and_falls(monkeypatch, kind, model, values, wall):
+    """The wall is fixed, retreats from the shuttle that it carries, or shakes it."""
+    guard = next(row.guard for row in TRANSITIONS if row.kind == kind)
+    found, apply = [], events.apply
+
+    def recording(configuration, front, event):
+        found.append((front, event))
+        return apply(configuration, front, event)
+
+    monkeypatch.setattr(events, "apply", recording)
+    sim = simulation(model, values)
+    for k in range(300):
+        sim.set(dict(zip(("stop.displacement", "stop.velocity"), wall(k * 1e-3), strict=True)))
+        sim.advance((k + 1) * 1e-3)
+        if found and found[-1][1].kind == kind:
+            break
+    front, event = found[-1]
+    assert event.kind == kind
+
+    def z(h):
+        n, y, a = front.equations.n, front.y.copy(), front.equations.evaluate(front.q, front.v).a
+        y[:n] -= h * front.v - h**2 / 2 * a
+        y[n : 2 * n] -= h * a
+        return guard(front.equations, event.contact, event.time - h, y)
+
+    assert z(1e-7) > 100 * abs(z(0.0))
+    assert z(1e-6) == pytest.approx(10 * z(1e-7), rel=0.05)
+
+
+def test_an_evaluation_does_not_change_when_another_state_is_evaluated():
+    sim = simulation("PRBDM2R")
+    q, v = sim.front.q, sim.front.v
+    first = sim.equations.evaluate(q, v)
+    kept = [x.copy() for x in (first.a, first.lam, first.M, first.factors[0])]
+    sim.equations.evaluate(q + 0.1, v + 1.0)
+    for x, same in zip((first.a, first.lam, first.M, first.factors[0]), kept, strict=True):
+        np.testing.assert_array_equal(x, same)
+
+
+def test_more_stops_at_rest_than_sets_can_be_tried_are_rejected_by_name():
+    guide = mechanism("PRBDM")
+    stops = tuple(replace(guide.stops[0], name=f"wall{k}") for k in range(RESTING_SETS_MAX + 1))
+    crowded = replace(guide, stops=stops)
+    with pytest.raises(SimulationError, match=r"13 stops rest at once at t = 0 s \(wall0, wall1"):
+        Simulation(crowded, {"release.displacement": 0.0})
+    Simulation(replace(guide, stops=stops[:3]), {"release.displacement": 0.0}).advance(1e-3)
+
+
+def test_the_step_size_changes_within_its_limits():
+    controller = StepSizeController(h=1e-3)
+    assert controller.next(0.0).h == pytest.approx(1e-3 * min(STEP_GROWTH_MAX, 0.9 * 1e-4**-0.13))
+    for error in (1e12, math.inf, math.nan):
+        rejected = controller.next(error)
+        assert rejected.h == pytest.approx(1e-3 * STEP_SHRINK_MIN)
+        assert rejected.next(1e-9).h <= rejected.h
+
+
+def test_contact_modes_know_their_direction():
+    assert [mode.slip for mode in ContactMode] == [0, 0, 0, 1, -1]
+    state = ContactState.holding([1], stops=2, points=1).with_mode(2, ContactMode.STICK)
+    assert state.held == (1,)
+    assert state.open_stops == (0,)
+    assert state.released(1) == state.opened()
+    assert state.without_friction().modes[2] is ContactMode.FRICTIONLESS
