@@ -6,11 +6,13 @@ from typing import Any
 
 import pytest
 
+from c_importer import host_fmu
 from prbm.base.atomic import write
 from prbm.files.mechanism_file import shipped
 from prbm.fmu import python_fmu
 from prbm.mechanism.description import Mechanism
-from support import GUIDES, built, mechanism
+from shared import once
+from support import GUIDES, mechanism
 
 collect_ignore = ["support"]  # imported by tests, not collected
 
@@ -34,33 +36,19 @@ def mechanisms() -> dict[str, Mechanism]:
 
 
 @pytest.fixture(scope="session")
-def fmus(
-    mechanisms: dict[str, Mechanism], tmp_path_factory: pytest.TempPathFactory
-) -> dict[str, Path]:
+def fmus(mechanisms: dict[str, Mechanism]) -> dict[str, Path]:
     """Return the Python FMUs by name."""
-    folder = tmp_path_factory.mktemp("fmus")
 
     def one(name: str) -> Path:
-        write(folder / f"{name}.fmu", python_fmu.build(mechanisms[name]))
-        return folder / f"{name}.fmu"
+        def make(folder: Path) -> None:
+            write(folder / f"{name}.fmu", python_fmu.build(mechanisms[name]))
+
+        return once(f"python-{name}", make) / f"{name}.fmu"
 
     return Built(one, GUIDES)
 
 
 @pytest.fixture(scope="session")
-def native(
-    mechanisms: dict[str, Mechanism], tmp_path_factory: pytest.TempPathFactory
-) -> dict[tuple[str, int], Path]:
-    """Return the native FMUs for this machine, by name and version of FMI.
-
-    Those that take the engine long are without reference results.
-    """
-    folder = tmp_path_factory.mktemp("native")
-
-    def one(key: tuple[str, int]) -> Path:
-        name, fmi = key
-        path = folder / f"fmi{fmi}" / f"{name}.fmu"
-        write(path, built(mechanisms[name], fmi))
-        return path
-
-    return Built(one, [(name, fmi) for name in GUIDES for fmi in (2, 3)])
+def native() -> dict[tuple[str, int], Path]:
+    """Return the native FMUs for this machine, by name and version of FMI."""
+    return Built(lambda key: host_fmu(*key), [(name, fmi) for name in GUIDES for fmi in (2, 3)])

@@ -49,6 +49,7 @@ def _typed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.native
+@pytest.mark.slow
 def test_from_an_empty_folder_it_builds_simulates_tells_and_plots(tmp_path):
     """Free rest 10.42 and 10.78 mm, 4.957 and 4.889 Hz: the table of the design document."""
     done = build(tmp_path, *GUIDES, "--simulate")

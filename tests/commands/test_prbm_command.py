@@ -51,6 +51,7 @@ def _empty_folder(tmp_path, monkeypatch):
 # --- the page and the help ----------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_commands_of_the_page_run_in_an_empty_folder(tmp_path, capsys):
     """And print what the page says that they print."""
     records(tmp_path)

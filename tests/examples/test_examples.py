@@ -122,6 +122,7 @@ def test_parameter_study_writes_its_table_and_figure(
 
 
 @pytest.mark.native
+@pytest.mark.slow
 def test_sweep_spreads_as_the_first_order_says(capsys: pytest.CaptureFixture[str]) -> None:
     """Within four standard errors of a standard deviation, s / sqrt(2 n) each."""
     main = example("sweep/run.py").main

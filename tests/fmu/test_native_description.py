@@ -17,6 +17,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from lxml import etree
 
+import native_host
 from prbm.base.atomic import write
 from prbm.base.errors import MechanismError, SimulationError
 from prbm.commands import fmu_report as report
@@ -40,10 +41,8 @@ pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
 
 @pytest.fixture(scope="module")
-def clocked(mechanisms, tmp_path_factory) -> Path:
-    path = tmp_path_factory.mktemp("clocked") / "PRBDM.fmu"
-    write(path, native_fmu.build(mechanisms["PRBDM"], fmi=3, clock=True))
-    return path
+def clocked() -> Path:
+    return native_host.clocked("PRBDM")
 
 
 @pytest.fixture(params=[*FLAVOURS, "clock"], ids=str)

@@ -247,6 +247,7 @@ def test_nothing_happens_in_an_exact_equilibrium_that_touches():
     assert abs(sim.outputs()["stop.gap"]) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_micrometre_switch_bounces_at_its_own_pace():
     """Elastic bounces of a MHz device are no chatter: the guard counts in periods."""
     scale = 1e-4

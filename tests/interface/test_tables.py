@@ -146,119 +146,164 @@ def same(mechanism: Mechanism, quantity, expected) -> None:
         assert quantity(scaled) == pytest.approx(expected(scaled), rel=1e-15)
 
 
+class Comparison:
+    """Reads tables in the order of the format and compares every item with the mechanism."""
+
+    def __init__(self, mechanism: Mechanism, written: bytes) -> None:
+        self.mechanism, self.reader = mechanism, Reader(written)
+        self.native = described(mechanism, {}, 3, clock=True)
+        self.bodies = ["ground", *(b.name for b in mechanism.bodies)]
+        self.bounds = [
+            (part, name)
+            for part in mechanism._parts()
+            for name in FIELDS[type(part)]
+            if isinstance(getattr(part, name), str)
+        ]
+
+    def fields(self, part) -> None:
+        for name in FIELDS[type(part)]:
+            same(
+                self.mechanism, self.reader.expression(), lambda v, name=name: value(part, name, v)
+            )
+
+    def point(self, drawn) -> None:
+        x, y = (affine(coordinate) for coordinate in drawn)
+        same(self.mechanism, self.reader.point(), lambda v: (x(v), y(v)))
+
+    def body(self) -> str:
+        return self.bodies[self.reader.take("I")]
+
+    def between(self, part) -> None:
+        for end in (part.start, part.end):
+            assert self.body() == end.rpartition(".")[0]
+            self.point(self.mechanism.point(end, part.name))
+
+    def placed(self, part) -> None:
+        """Compare the point where a part acts: the centre of mass by default."""
+        assert (self.reader.text(), self.body()) == (part.name, part.body)
+        bodies = self.mechanism.bodies
+        self.point(part.point or next(b for b in bodies if b.name == part.body).centre)
+
+    def head(self) -> None:
+        m, r = self.mechanism, self.reader
+        assert (r.text(), r.text()) == (TOKEN, m.name)
+        counts = [r.take("I") for _ in range(14)]
+        parts = (
+            m.bodies, m.flexure_types, m.flexures, m.joints, m.stops, m.frictions, m.forces,
+            m.probes, m.ground,
+        )  # fmt: skip
+        assert counts[0] == len(m.parameters)
+        assert counts[1:10] == [*map(len, parts)]
+        assert counts[10:] == [
+            len(self.bounds), len(self.native.variables), len(self.native.independent),
+            len(input_names(m)),
+        ]  # fmt: skip
+
+    def parameters_and_inputs(self) -> None:
+        m, r = self.mechanism, self.reader
+        for p in m.parameters:
+            r.parameters.append(p.name)
+            assert (r.text(), r.text()) == (p.name, p.unit)
+            assert r.take("dddI") == (p.value, p.minimum, p.maximum, p.tunable)
+        assert [r.parameters[r.take("I")] for _ in range(5)] == [
+            "gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta"
+        ]  # fmt: skip
+        for name in input_names(m):
+            assert (r.text(), r.take("d")) == (name, 0.0)
+
+    def body_data(self) -> None:
+        for body in self.mechanism.bodies:
+            assert self.reader.text() == body.name
+            self.fields(body)
+            self.point(body.centre)
+
+    def flexure_types(self) -> None:
+        m, r = self.mechanism, self.reader
+        for kind in m.flexure_types:
+            model = m.model(kind)
+            assert r.text() == kind.name
+            assert r.take("III") == (model.lumped, model.rate_with_gamma, kind.axial)
+            assert r.take("II") == (len(model.gamma), kind.n)
+            self.fields(kind)
+            for c in (*model.gamma, *model.K_theta):
+                given = kind.coefficients.get(c.name, 0.0)
+                expression = affine(given) if isinstance(given, str) else None
+                name = f"{kind.name}.{c.name}"
+                same(m, r.expression(), expression or (lambda v, name=name: v[name]))
+
+    def connections(self) -> None:
+        m, r = self.mechanism, self.reader
+        for flexure in m.flexures:
+            assert (r.text(), r.take("I")) == (
+                flexure.name, [k.name for k in m.flexure_types].index(flexure.type)
+            )  # fmt: skip
+            self.between(flexure)
+            assert r.take("II") == tuple(("clamp", "pin", "free").index(e) for e in flexure.ends)
+        for joint in m.joints:
+            assert r.text() == joint.name
+            self.between(joint)
+
+    def contacts_and_forces(self) -> None:
+        m, r = self.mechanism, self.reader
+        for stop in m.stops:
+            assert (r.text(), self.body(), self.body()) == (stop.name, stop.body, stop.on)
+            self.point(stop.point)
+            assert r.take("d") == stop.direction
+            self.fields(stop)
+        for friction in m.frictions:
+            self.placed(friction)
+            assert r.take("d") == friction.direction
+            self.fields(friction)
+        for force in m.forces:
+            self.placed(force)
+
+    def probes_and_release(self) -> None:
+        m, r = self.mechanism, self.reader
+        for probe in m.probes:
+            assert (r.text(), self.body()) == (probe.name, probe.point.rpartition(".")[0])
+            self.point(m.point(probe.point, probe.name))
+        assert (self.body(), r.take("d")) == (m.release.body, m.release.direction)
+        self.fields(m.release)
+        for place in m.ground.values():
+            self.point(place)
+
+    def limits(self) -> None:
+        r = self.reader
+        for part, name in self.bounds:
+            unit, _, minimum, maximum, *_ = FIELDS[type(part)][name]
+            assert (r.text(), r.text()) == (f"{part.name}.{name}", unit)
+            same(self.mechanism, r.expression(), affine(getattr(part, name)))
+            assert r.take("dd") == (minimum, maximum)
+
+    def variables(self) -> None:
+        r, native = self.reader, self.native
+        assert tuple(r.take("I") for _ in native.independent) == native.independent
+        place = slots(self.mechanism, native.independent)
+        by_name = {v.name: v for v in native.variables}
+        before = -1
+        for _ in native.variables:
+            reference, kind, slot = r.take("III")
+            v = by_name.pop(r.text())
+            assert before < reference == v.reference
+            assert TYPES[kind] == v.type
+            assert slot == place[f"{v.name}_count" if v.type == CLOCK else v.name]
+            before = reference
+        assert not by_name
+
+
 def test_everything_is_read_back_as_it_is_in_the_mechanism(mechanism, written):
     """Every field of every part, in the order of the format, to the last byte."""
-    m, r = mechanism, Reader(written)
-    native = described(mechanism, {}, 3, clock=True)
-
-    def fields(part) -> None:
-        for name in FIELDS[type(part)]:
-            same(m, r.expression(), lambda v, name=name: value(part, name, v))
-
-    def point(drawn) -> None:
-        x, y = (affine(coordinate) for coordinate in drawn)
-        same(m, r.point(), lambda v: (x(v), y(v)))
-
-    assert (r.text(), r.text()) == (TOKEN, m.name)
-    bounds = [
-        (part, name)
-        for part in m._parts()
-        for name in FIELDS[type(part)]
-        if isinstance(getattr(part, name), str)
-    ]
-    counts = [r.take("I") for _ in range(14)]
-    parts = (
-        m.bodies, m.flexure_types, m.flexures, m.joints, m.stops, m.frictions, m.forces, m.probes,
-        m.ground,
-    )  # fmt: skip
-    assert counts[0] == len(m.parameters)
-    assert counts[1:10] == [*map(len, parts)]
-    assert counts[10:] == [
-        len(bounds), len(native.variables), len(native.independent), len(input_names(m))
-    ]  # fmt: skip
-    for p in m.parameters:
-        r.parameters.append(p.name)
-        assert (r.text(), r.text()) == (p.name, p.unit)
-        assert r.take("dddI") == (p.value, p.minimum, p.maximum, p.tunable)
-    assert [r.parameters[r.take("I")] for _ in range(5)] == [
-        "gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta"
-    ]  # fmt: skip
-    for name in input_names(m):
-        assert (r.text(), r.take("d")) == (name, 0.0)
-    bodies = ["ground", *(b.name for b in m.bodies)]
-
-    def between(part) -> None:
-        for end in (part.start, part.end):
-            assert bodies[r.take("I")] == end.rpartition(".")[0]
-            point(m.point(end, part.name))
-
-    def placed(part) -> None:
-        """Read where a part acts: at the centre of mass if nothing is said."""
-        assert (r.text(), bodies[r.take("I")]) == (part.name, part.body)
-        point(part.point or next(b for b in m.bodies if b.name == part.body).centre)
-
-    for body in m.bodies:
-        assert r.text() == body.name
-        fields(body)
-        point(body.centre)
-    for kind in m.flexure_types:
-        model = m.model(kind)
-        assert r.text() == kind.name
-        assert r.take("III") == (model.lumped, model.rate_with_gamma, kind.axial)
-        assert r.take("II") == (len(model.gamma), kind.n)
-        fields(kind)
-        for c in (*model.gamma, *model.K_theta):
-            given = kind.coefficients.get(c.name, 0.0)
-            expression = affine(given) if isinstance(given, str) else None
-            name = f"{kind.name}.{c.name}"
-            same(m, r.expression(), expression or (lambda v, name=name: v[name]))
-    for flexure in m.flexures:
-        assert (r.text(), r.take("I")) == (
-            flexure.name, [k.name for k in m.flexure_types].index(flexure.type)
-        )  # fmt: skip
-        between(flexure)
-        assert r.take("II") == tuple(("clamp", "pin", "free").index(end) for end in flexure.ends)
-    for joint in m.joints:
-        assert r.text() == joint.name
-        between(joint)
-    for stop in m.stops:
-        assert (r.text(), bodies[r.take("I")]) == (stop.name, stop.body)
-        assert bodies[r.take("I")] == stop.on
-        point(stop.point)
-        assert r.take("d") == stop.direction
-        fields(stop)
-    for friction in m.frictions:
-        placed(friction)
-        assert r.take("d") == friction.direction
-        fields(friction)
-    for force in m.forces:
-        placed(force)
-    for probe in m.probes:
-        assert (r.text(), bodies[r.take("I")]) == (probe.name, probe.point.rpartition(".")[0])
-        point(m.point(probe.point, probe.name))
-    assert bodies[r.take("I")] == m.release.body
-    assert r.take("d") == m.release.direction
-    fields(m.release)
-    for place in m.ground.values():
-        point(place)
-    for part, name in bounds:
-        unit, _, minimum, maximum, *_ = FIELDS[type(part)][name]
-        assert (r.text(), r.text()) == (f"{part.name}.{name}", unit)
-        same(m, r.expression(), affine(getattr(part, name)))
-        assert r.take("dd") == (minimum, maximum)
-    assert tuple(r.take("I") for _ in native.independent) == native.independent
-    place = slots(m, native.independent)
-    by_name = {v.name: v for v in native.variables}
-    before = -1
-    for _ in native.variables:
-        reference, kind, slot = r.take("III")
-        v = by_name.pop(r.text())
-        assert before < reference == v.reference
-        assert TYPES[kind] == v.type
-        assert slot == place[f"{v.name}_count" if v.type == CLOCK else v.name]
-        before = reference
-    assert not by_name
-    assert r.at == len(written)
+    comparison = Comparison(mechanism, written)
+    comparison.head()
+    comparison.parameters_and_inputs()
+    comparison.body_data()
+    comparison.flexure_types()
+    comparison.connections()
+    comparison.contacts_and_forces()
+    comparison.probes_and_release()
+    comparison.limits()
+    comparison.variables()
+    assert comparison.reader.at == len(written)
 
 
 def test_start_values_are_those_of_the_variables(mechanism):

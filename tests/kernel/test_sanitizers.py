@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from c_importer import Job, given, kernel_library, native, needs, run
+from c_importer import ANVIL, TWO_STOPS, Job, given, kernel_library, native, needs, run
 from fuzzing import (
     ENVIRONMENT,
     MODELS,
@@ -20,6 +20,11 @@ pytestmark = pytest.mark.native
 
 WAYS = ((2, "cs"), (3, "cs"), (3, "events"), (2, "me"), (3, "me"))
 POINTS = 1e-3 * np.arange(301)  # the default run bounces until 0.243 s, then it rests
+QUICK = [
+    model if model in (TWO_STOPS, ANVIL) else pytest.param(model, marks=pytest.mark.slow)
+    for model in MODELS
+]
+"""The tests' own mechanisms have all that the guides have; the guides are checked as slow."""
 VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full")
 
 
@@ -45,7 +50,7 @@ def sanitized(job: Job, *words: object) -> bytes:
 
 
 @pytest.mark.parametrize(("fmi", "kind"), WAYS)
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("model", QUICK)
 def test_sanitizers_find_nothing_in_a_run_with_changes(model, fmi, kind):
     """And what they change in the code does not change a byte of what it computes."""
     job = Job(native(model, fmi), kind, POINTS, changes=changes(model))
@@ -103,8 +108,9 @@ def test_arbitrary_calls_neither_crash_nor_leak(tmp_path, model, fmi):
     assert found.status == 0, found.said
 
 
-def test_arbitrary_tables_neither_crash_nor_leak(tmp_path):
-    found = fuzz_tables(tmp_path, seconds=8, seed=0)
+@pytest.mark.parametrize("seconds", [2, pytest.param(8, marks=pytest.mark.slow)])
+def test_arbitrary_tables_neither_crash_nor_leak(tmp_path, seconds):
+    found = fuzz_tables(tmp_path, seconds=seconds, seed=0)
     assert found.status == 0, found.said[-8000:]
 
 

@@ -33,6 +33,7 @@ def test_fundamental_frequency_straight_without_gravity(model, f1):
     assert modes(system, equilibrium(system)).frequency[0] == pytest.approx(f1, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_energy_of_a_conservative_second_drifts_less_than_1e_8():
     """No damping, no wall within reach; exchanged: what the kinetic energy rises to."""
     values = {"damping.beta": 0.0, "stop.position": 0.05}

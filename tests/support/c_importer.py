@@ -1,6 +1,5 @@
 """The C importer of ``importer/``: compiled where needed, given jobs, its rows read back."""
 
-import atexit
 import dataclasses
 import os
 import shutil
@@ -9,7 +8,7 @@ import subprocess
 import sys
 import tempfile
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -24,9 +23,10 @@ from fmpy import read_model_description
 import prbm.kernel
 from many_parts import anvil
 from prbm.base.atomic import write
-from prbm.kernel.compiler import _locked, cache_folder
+from prbm.kernel.compiler import cache_folder
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Stop
+from shared import once, shared_folder
 from support import built, mechanism
 
 SOURCES = Path(__file__).with_name("importer")
@@ -94,37 +94,6 @@ def needs(*programs: str) -> None:
             pytest.skip(f"{program} is not installed (Debian: {PACKAGES.get(program, program)})")
 
 
-@cache
-def _folder() -> Path:
-    """Return a folder for what is made once, shared by all processes of a run of the tests."""
-    run = os.environ.get("PYTEST_XDIST_TESTRUNUID", f"of-{os.getpid()}")
-    folder = Path(tempfile.gettempdir()) / f"prbm_importer_{run}"
-    users = folder / "users"
-    users.mkdir(parents=True, exist_ok=True)
-    (users / str(os.getpid())).touch()
-    atexit.register(_leave, folder)
-    return folder
-
-
-def _leave(folder: Path) -> None:
-    """Remove the folder if no other process uses it any more."""
-    users = folder / "users"
-    (users / str(os.getpid())).unlink()
-    if not any(users.iterdir()):
-        shutil.rmtree(folder, ignore_errors=True)
-
-
-def once(name: str, make: Callable[[Path], object]) -> Path:
-    """Return a file or folder that is made by whoever needs it first."""
-    path = _folder() / name
-    with _locked(path.with_name(f"{name}.lock")):
-        if not path.exists():
-            part = path.with_name(f"part-{name}")
-            make(part)
-            part.rename(path)
-    return path
-
-
 def zig(target: str) -> list[str]:
     return [sys.executable, "-m", "ziglang", "cc", "-target", target]
 
@@ -133,7 +102,7 @@ def zig_environment() -> dict[str, str]:
     """Return an environment in which ziglang shares what it builds with the exporter."""
     return os.environ | {
         "ZIG_GLOBAL_CACHE_DIR": str(cache_folder() / "zig"),
-        "ZIG_LOCAL_CACHE_DIR": str(_folder() / f"zig-{os.getpid()}"),
+        "ZIG_LOCAL_CACHE_DIR": str(shared_folder() / f"zig-{os.getpid()}"),
     }
 
 
@@ -298,7 +267,7 @@ def execute(
     with tempfile.TemporaryDirectory(prefix="prbm_job_") as name:
         file = Path(name) / "job.txt"
         file.write_text(job.text(), encoding="utf-8")
-        own = {"WINEPREFIX": str(_folder() / f"wine-{os.getpid()}")} if host.windows else {}
+        own = {"WINEPREFIX": str(shared_folder() / f"wine-{os.getpid()}")} if host.windows else {}
         done = subprocess.run(
             [*host.emulator, *before, str(program), host.path(file), *map(str, words)],
             capture_output=True, check=False, timeout=timeout,
@@ -336,16 +305,30 @@ def given(model: str) -> Mechanism:
 
 
 @cache
-def native(model: str, fmi: int, platform: str = "host") -> Path:
-    """Return a native FMU of a mechanism, unpacked; the FMU itself lies beside it.
+def host_fmu(model: str, fmi: int) -> Path:
+    """Return the FMU of a mechanism for this machine.
 
-    What takes the engine long has no reference results.
+    Mechanisms that take the engine long have no reference results.
     """
+
+    def make(folder: Path) -> None:
+        write(folder / f"{model}.fmu", built(given(model), fmi))
+
+    return once(f"fmi{fmi}-{model}", make) / f"{model}.fmu"
+
+
+@cache
+def native(model: str, fmi: int, platform: str = "host") -> Path:
+    """Return a native FMU of a mechanism, unpacked; the FMU itself lies beside it."""
     name = f"{model}-{fmi}-{platform}"
-    fmu = once(
-        f"{name}.fmu",
-        lambda path: write(path, built(given(model), fmi, (platform,))),
-    )
+
+    def make(path: Path) -> None:
+        if platform == "host":
+            shutil.copy(host_fmu(model, fmi), path)
+        else:
+            write(path, built(given(model), fmi, (platform,)))
+
+    fmu = once(f"{name}.fmu", make)
     return once(name, lambda path: unpack(fmu, path))
 
 

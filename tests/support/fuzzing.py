@@ -27,11 +27,11 @@ from c_importer import (
     kernel_library,
     native,
     needs,
-    once,
 )
 from many_parts import elastic
 from prbm.interface.tables import tables
 from prbm.mechanics.independent import independent
+from shared import once
 
 SANITIZERS = (
     "-O0",  # which compiles in seconds what takes a minute else

@@ -2,11 +2,9 @@
 
 import ctypes
 import re
-import shutil
 import subprocess
 from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 
 import numpy as np
 
@@ -15,6 +13,7 @@ from prbm.fmu.python_fmu import interface
 from prbm.interface.tables import slots, tables
 from prbm.mechanics.independent import independent
 from prbm.mechanism.description import Mechanism
+from shared import once
 
 DOUBLE, POINTER, BOOL, INT = ctypes.c_double, ctypes.c_void_p, ctypes.c_bool, ctypes.c_int
 SENTENCE = 640
@@ -53,18 +52,19 @@ class KernelMistake(Exception):
     """What the kernel refuses, in its words."""
 
 
+def _compile(folder: Path) -> None:
+    """Compile the kernel up to the simulation, all functions visible."""
+    folder.mkdir()
+    kernel = (KERNEL / "prbm_fmu.c").read_text().partition('#include "fmi/')[0]
+    source, built = folder / "kernel.c", folder / "kernel.so"
+    source.write_text(kernel)
+    subprocess.run(["cc", *FLAGS, str(source), "-o", str(built), "-lm"], check=True)
+
+
 @cache
 def library() -> ctypes.CDLL:
     """Return the kernel up to the simulation, compiled once, all functions visible."""
-    folder = Path(mkdtemp(prefix="prbm-simulation-"))
-    try:
-        kernel = (KERNEL / "prbm_fmu.c").read_text().partition('#include "fmi/')[0]
-        source, built = folder / "kernel.c", folder / "kernel.so"
-        source.write_text(kernel)
-        subprocess.run(["cc", *FLAGS, str(source), "-o", str(built), "-lm"], check=True)
-        found = ctypes.CDLL(str(built))
-    finally:
-        shutil.rmtree(folder)
+    found = ctypes.CDLL(str(once("kernel-simulation", _compile) / "kernel.so"))
     for name, (result, *arguments) in FUNCTIONS.items():
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments

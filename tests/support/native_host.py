@@ -20,6 +20,7 @@ from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelDescription
 
 from prbm.base.atomic import write
+from shared import once
 from support import built, mechanism
 
 OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
@@ -69,11 +70,11 @@ def callbacks(listener: int | None = None) -> fmi2CallbackFunctions:
 @cache
 def clocked(model: str) -> Path:
     """Return the FMU with an output clock."""
-    folder = TemporaryDirectory(prefix="prbm_clocked_")
-    _folders.append(folder)
-    path = Path(folder.name) / f"{model}.fmu"
-    write(path, built(mechanism(model), fmi=3, clock=True))
-    return path
+
+    def make(folder: Path) -> None:
+        write(folder / f"{model}.fmu", built(mechanism(model), fmi=3, clock=True))
+
+    return once(f"clocked-{model}", make) / f"{model}.fmu"
 
 
 class Instance:
