@@ -349,7 +349,7 @@ def test_angles_of_something_else_are_refused(short: Result) -> None:
     with pytest.raises(ResultError, match="loops of PRBDM stand open"):
         motion(columns, short.mechanism)
     columns["link[1].angle"] = np.nan
-    with pytest.raises(ResultError, match="no numbers"):
+    with pytest.raises(ResultError, match="not finite numbers"):
         motion(columns, short.mechanism)
 
 
