@@ -13,11 +13,19 @@ For every FMU that both folders hold it prints
 
 The exit status is 1 if an interface differs, a run differs by more than 1e-9 m before it diverges,
 or a number of impacts differs.
+
+    python benchmarks/versions.py old new --time 100 --only fmi2/PRBDM2R.fmu
+
+prints the CPU time of the steps of the default run instead: both FMUs in turn, 100 pairs, and the
+ratios new / old of the medians and of the best.
 """
 
 import argparse
+import statistics
 import sys
-from collections.abc import Iterator
+import tempfile
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -103,6 +111,44 @@ def report(old: Path, new: Path, divergence: float) -> bool:
     return good
 
 
+def stepper(path: Path, folder: Path) -> Callable[[], float]:
+    """Return a function that makes the steps of the default run and returns their CPU time [s]."""
+    description = fmpy.read_model_description(str(path))
+    unpacked = fmpy.extract(str(path), unzipdir=str(folder))
+    slave = fmpy.instantiate_fmu(unpacked, description, fmi_type="CoSimulation")
+    experiment = description.defaultExperiment
+    step, stop = float(experiment.stepSize), float(experiment.stopTime)
+
+    def run_once() -> float:
+        slave.reset()
+        slave.setupExperiment(startTime=0.0)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        begin = time.process_time()
+        for k in range(round(stop / step)):
+            slave.doStep(currentCommunicationPoint=k * step, communicationStepSize=step)
+        return time.process_time() - begin
+
+    return run_once
+
+
+def timed(old: Path, new: Path, pairs: int) -> None:
+    """Print the CPU times of the default runs of two FMUs of FMI 2.0, in alternating runs."""
+    with tempfile.TemporaryDirectory() as name:
+        runs = [stepper(path, Path(name) / str(i)) for i, path in enumerate((old, new))]
+        spent: list[list[float]] = [[], []]
+        for _ in range(pairs):
+            for times, one in zip(spent, runs, strict=True):
+                times.append(one())
+    medians, best = ([f(times) for times in spent] for f in (statistics.median, min))
+    ratio = statistics.median(b / a for a, b in zip(*spent, strict=True))
+    print(
+        f"  {pairs} pairs: medians {1e3 * medians[0]:.3f} and {1e3 * medians[1]:.3f} ms "
+        f"(new / old {medians[1] / medians[0]:.3f}), best {1e3 * best[0]:.3f} and "
+        f"{1e3 * best[1]:.3f} ms ({best[1] / best[0]:.3f}), median of ratios {ratio:.3f}"
+    )
+
+
 def main() -> int:
     """Compare all FMUs that two folders have in common; return the exit status."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -112,19 +158,26 @@ def main() -> int:
         "--divergence", type=float, default=1e-7, metavar="LENGTH",
         help="difference at which chaotic runs count as diverged (default: 1e-7 m)",
     )  # fmt: skip
+    parser.add_argument("--only", metavar="FMU", help="path of one FMU below both folders")
+    parser.add_argument("--time", type=int, metavar="PAIRS", help="measure the CPU time instead")
     options = parser.parse_args()
     common = sorted(
         path.relative_to(options.old)
         for path in options.old.rglob("*.fmu")
         if (options.new / path.relative_to(options.old)).exists()
+        and options.only in (None, path.relative_to(options.old).as_posix())
     )
     if not common:
         parser.error(f"{options.old} and {options.new} have no FMU in common")
     good = True
     for path in common:
         print(path)
+        if options.time:
+            timed(options.old / path, options.new / path, options.time)
+            continue
         good &= report(options.old / path, options.new / path, options.divergence)
-    print("the versions agree" if good else "the versions differ")
+    if not options.time:
+        print("the versions agree" if good else "the versions differ")
     return 0 if good else 1
 
 
