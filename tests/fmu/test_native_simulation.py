@@ -234,7 +234,9 @@ def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
         str(native[model, fmi]), fmi_type="ModelExchange", relative_tolerance=1e-9, **options
     )
     assert found["time"] == pytest.approx(expected["time"], abs=1e-12)
-    bound = 1e-6 * 0.018 if model in GUIDES else 5e-8  # m; a snap makes more of an error
+    bound = (
+        1e-6 * 0.018 if model in GUIDES else 2e-7
+    )  # m; a snap amplifies the error, CVode has other bits on every processor
     for name in it.outputs("x", "y"):
         assert worst(found, expected, name) < bound, name
     for name in it.outputs("angle"):
@@ -793,7 +795,9 @@ def test_the_clock_ticks_at_impacts_and_only_there(model):
 def test_the_clock_changes_nothing_of_the_motion(model):
     """Also in FMPy, and in model exchange."""
     run, it = engine_run(model), case(model)
-    bound = 1e-8 if model in GUIDES else 5e-8  # m; a snap makes more of an error
+    bound = (
+        1e-8 if model in GUIDES else 2e-7
+    )  # m; a snap amplifies the error, CVode has other bits on every processor
     names = [it.released, *it.at_stops("impact_count")]
     found = simulate_fmu(
         str(clocked(model)), use_event_mode=True, early_return_allowed=True, stop_time=it.end,

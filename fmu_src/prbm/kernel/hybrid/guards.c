@@ -167,7 +167,7 @@ static bool polish_impact(Simulation *sim, int stop, double apex, double *time, 
 /* --- samples of the step ---------------------------------------------------------------------- */
 
 static double sample_time(const Simulation *sim, int k) {
-    return sim->state.arc.start + sim->state.arc.h * ((double)k / GUARD_INTERVALS);
+    return sim->state.arc.start + sim->state.arc.h * ((double)k / (double)GUARD_INTERVALS);
 }
 
 /* Positions, rates and directions at the samples. */

@@ -151,7 +151,7 @@ PRBM Simulation *simulation_open(const Mechanism *mechanism) {
     sim->bytes = bytes;
     place_all(sim, &memory);
     for (int i = 0; i <= GUARD_INTERVALS; i++) {
-        weights((double)i / GUARD_INTERVALS, sim->stepping.weights[i]);
+        weights((double)i / (double)GUARD_INTERVALS, sim->stepping.weights[i]);
     }
     simulation_reset(sim);
     return sim;
