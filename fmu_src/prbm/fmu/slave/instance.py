@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...base.errors import ParameterError, PrbmError
+from ...base.tolerances import STEP_SUM_RTOL, TIME_SUM_RTOL
 from ...hybrid.simulation import Simulation
 from .messages import Messages
 from .resolved import EMPTY, Model
 
 START, EXPERIMENT = "the start", "setupExperiment"  # keys of refusals that are not of a variable
 RESET = "reset the instance to start again"
-TIME_SLACK = 1e-6  # of a communication step: round-off that importers gather in their time
 SAVED = (
     "given",
     "waiting",
@@ -152,7 +152,7 @@ class Instance:
             return f"cannot step from t = {time} s by {size} s: not finite numbers"
         if size <= 0.0:
             return f"communicationStepSize = {size:.9g} s must be positive; time only runs on"
-        slack = TIME_SLACK * size + 1e-12 * abs(self.clock)
+        slack = STEP_SUM_RTOL * size + TIME_SUM_RTOL * abs(self.clock)
         if abs(time - self.clock) > slack:
             return (
                 f"the step begins at t = {time:.12g} s, but the last one ended at "
