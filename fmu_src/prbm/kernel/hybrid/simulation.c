@@ -313,7 +313,8 @@ PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *pr
 
 static bool check_tolerance(double x, Problem *problem) {
     if (!(x >= TOLERANCE_MIN && x <= TOLERANCE_MAX)) {
-        return fail(problem, "tolerance = %g must lie between 1e-13 and 1e-2", x);
+        return fail(problem, "tolerance = %g must lie between %g and %g", x, TOLERANCE_MIN,
+                    TOLERANCE_MAX);
     }
     return true;
 }
