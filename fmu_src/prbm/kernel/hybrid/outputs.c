@@ -54,15 +54,15 @@ static void output_latched(const Simulation *sim, double *out) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         const Latched *last = &sim->state.latched[i];
         const double values[PER_LATCHED] = {
-            sim->state.modes[i] != CONTACT_OPEN,
-            last->count,
-            last->time,
-            last->approach_speed,
-            last->rebound_speed,
-            last->impulse,
-            last->energy_lost,
-            last->modal_restitution,
-            last->impulse_sum,
+            [LATCHED_CONTACT] = sim->state.modes[i] != CONTACT_OPEN,
+            [LATCHED_IMPACT_COUNT] = last->count,
+            [LATCHED_IMPACT_TIME] = last->time,
+            [LATCHED_APPROACH_SPEED] = last->approach_speed,
+            [LATCHED_REBOUND_SPEED] = last->rebound_speed,
+            [LATCHED_IMPULSE] = last->impulse,
+            [LATCHED_ENERGY_LOST] = last->energy_lost,
+            [LATCHED_MODAL_RESTITUTION] = last->modal_restitution,
+            [LATCHED_IMPULSE_SUM] = last->impulse_sum,
         };
         memcpy(out + PER_LATCHED * i, values, sizeof values);
     }
