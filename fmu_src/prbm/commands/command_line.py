@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..base.errors import EquilibriumError, PrbmError, SimulationError
+from ..mechanism.flexure import MODELS
 from .arguments import (
     ANIMATION_USAGE,
     animation_arguments,
@@ -292,8 +293,8 @@ def _impact_map(commands: Commands) -> None:
         "moves and does not turn.  Default: algebraic",
     )  # fmt: skip
     add(
-        "--model", nargs="+", default=[], metavar="M", choices=("1R", "2R", "3R", "nR"),
-        help="models of the flexures, 1R, 2R, 3R or nR; default: the mechanism's own",
+        "--model", nargs="+", default=[], metavar="M", choices=tuple(MODELS),
+        help=f"models of the flexures: {', '.join(MODELS)} (default: the mechanism's own)",
     )  # fmt: skip
     add("--axial", action="store_true", help="flexures of --model stretch")
     add("--links", type=int, default=12, metavar="N", help="of nR; %(default)s")

@@ -23,8 +23,6 @@ from .systems import check_length
 WALLS, OFFSETS = 5 / 9, 1 / 20  # of the release, of the size: the source's, whatever the size
 STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)
 MOST_POINTS = 400  # points of a map; more are a mistake
-MODELS = ("1R", "2R", "3R", "nR")
-
 OF_MODELS = {"algebraic", "simulated", "fitted"}  # ways whose maps are of models of flexures
 
 Way = Callable[..., ImpactMap]
