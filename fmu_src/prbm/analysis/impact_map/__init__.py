@@ -1,15 +1,14 @@
 """Impact maps: the modal restitution over positions of the wall and offsets of the hit."""
 
-from .flexure_models import MODELS, variants, with_flexures
+from .flexure_models import with_flexures
 from .free_body import closed_form
-from .impacts import first_impact, mode_energies
+from .impacts import first_impact
 from .maps import HEIGHTS, OFFSETS, Hit, ImpactMap, grouped
 from .responses import fit_response, response
 from .routes import algebraic, by_elements, fitted, shares, simulated
 
 __all__ = [
     "HEIGHTS",
-    "MODELS",
     "OFFSETS",
     "Hit",
     "ImpactMap",
@@ -20,10 +19,8 @@ __all__ = [
     "fit_response",
     "fitted",
     "grouped",
-    "mode_energies",
     "response",
     "shares",
     "simulated",
-    "variants",
     "with_flexures",
 ]

@@ -1,11 +1,8 @@
 """Mechanisms with other models of their flexures."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 from ...mechanism.description import Mechanism
-
-MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 12))
 
 
 def with_flexures(
@@ -33,23 +30,3 @@ def with_flexures(
         for kind in mechanism.flexure_types
     )  # fmt: skip
     return replace(mechanism, flexure_types=kinds)
-
-
-def variants(
-    mechanism: Mechanism, models: Sequence[tuple[str, int]] = MODELS
-) -> dict[str, Mechanism]:
-    """Return a mechanism with each model of its flexures, inextensible and axial, by label.
-
-    Examples
-    --------
-    >>> from prbm.files.mechanism_file import load, shipped
-    >>> list(variants(load(shipped()["PRBDM"]), (("1R", 0), ("nR", 8))))
-    ['1R', '1R axial', '8R', '8R axial']
-    """
-    return {
-        (f"{n}R" if n else model) + (" axial" if axial else ""): with_flexures(
-            mechanism, model, axial=axial, n=n
-        )
-        for model, n in models
-        for axial in (False, True)
-    }
