@@ -1,11 +1,12 @@
 /* The mechanics in C: the headers of core/.
  *
- * The files of core/ correspond to the modules of the Python package prbm.mechanics.  The functions
- * that tests/test_kernel_twins.py compares one by one take the same arguments as their Python
- * counterparts; all others are compared through the results of whole simulations.  Plain C99; after
- * a simulation is opened nothing is allocated; no global state; of libm only sqrt, fabs, floor,
- * frexp and ldexp, all of which are exact or correctly rounded, so that the same input gives the
- * same bytes on every platform.
+ * The first comment of a file names its counterpart in Python, if there is one: most are modules of
+ * prbm.mechanics.  tests/kernel/test_kernel_twins.py compares functions of both one by one and
+ * reports the pairs; all others are compared through the results of whole simulations.
+ *
+ * Plain C99; after a simulation is opened nothing is allocated; no global state; of libm only sqrt,
+ * fabs, floor, frexp and ldexp, all of which are exact or correctly rounded, so that the same input
+ * gives the same bytes on every platform.
  *
  * Matrices are stored row by row.  A function that can fail returns false and leaves a sentence in a
  * Problem.  SI units and radians everywhere; docs/conventions.md has the signs and symbols.

@@ -210,7 +210,7 @@ def fit(
     free : sequence of Free or str
         Parameters to fit.
     targets : Target or sequence of Target
-        :class:`Frequency`, :class:`Response`, :class:`ForceDeflection`; any mixture.
+        Any of the classes in :mod:`prbm.analysis.fit.targets`, mixed as needed.
     values : mapping
         Other parameters that differ from those of the mechanism.
     starts : int or None

@@ -1,4 +1,5 @@
-/* Scalars s = Re(f (B E + z)) + c of the position: the twin of mechanics/constraints.py. */
+/* Scalars s = Re(f (B E + z)) + c of the position: the twin of Rows in mechanics/system.py.
+ * Saddle-point systems and projections: the twin of mechanics/constraints.py. */
 #include <math.h>
 #include <string.h>
 

@@ -1,4 +1,5 @@
-/* The equations of motion in one discrete state: their rows, laws, loads and workspace. */
+/* The equations of motion in one discrete state, with their rows, laws, loads and workspace: the
+ * twin of Equations in mechanics/dynamics.py. */
 #include <string.h>
 
 #include "core/equations.h"

@@ -1,4 +1,5 @@
-/* Accelerations and multipliers: loads, mass matrix, rows and their factors at a state. */
+/* Accelerations and multipliers, from loads, mass matrix, rows and their factors at a state: the
+ * twin of Equations.evaluate in mechanics/dynamics.py. */
 #include <math.h>
 #include <string.h>
 

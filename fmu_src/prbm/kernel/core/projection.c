@@ -1,4 +1,5 @@
-/* Projection of a state onto the active constraints. */
+/* Projection of a state onto the active constraints: the twin of Equations.project and
+ * Equations.project_near in mechanics/dynamics.py. */
 #include <math.h>
 
 #include "core/kinetics.h"
