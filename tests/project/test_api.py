@@ -65,6 +65,12 @@ def test_load_proposes_the_nearest_names():
         prbm.load("Bistabel")
 
 
+@pytest.mark.parametrize("start", [prbm.simulate, prbm.Simulation])
+def test_a_name_in_place_of_a_mechanism_is_rejected_with_a_remedy(start):
+    with pytest.raises(TypeError, match="'PRBDM' must be a Mechanism, as prbm.load returns"):
+        start("PRBDM")
+
+
 def test_simulate_takes_the_default_experiment_by_default():
     """A second and a millisecond for the guides, less for a mechanism of high frequency."""
     result = prbm.simulate(prbm.load("PRBDM"), {"stop.restitution": 0.0})

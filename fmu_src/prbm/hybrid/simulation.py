@@ -62,6 +62,8 @@ class Simulation:
 
     Raises
     ------
+    TypeError
+        If the mechanism is a name or a path: load it first.
     ParameterError
         If a name is unknown, a value out of bounds, or the wall is penetrated at release.
     EquilibriumError
@@ -77,6 +79,8 @@ class Simulation:
         tolerance: float | None = None,
         step: float | None = None,
     ) -> None:
+        if not isinstance(mechanism, Mechanism):
+            raise TypeError(f"mechanism = {mechanism!r} must be a Mechanism, as prbm.load returns")
         changes = dict(values or {})
         defaults = mechanism.values()
         known = mechanism.values({k: x for k, x in changes.items() if k in defaults})
