@@ -67,7 +67,7 @@ def test_load_proposes_the_nearest_names():
 
 @pytest.mark.parametrize("start", [prbm.simulate, prbm.Simulation])
 def test_a_name_in_place_of_a_mechanism_is_rejected_with_a_remedy(start):
-    with pytest.raises(TypeError, match="'PRBDM' must be a Mechanism, as prbm.load returns"):
+    with pytest.raises(TypeError, match="'PRBDM' must be a Mechanism"):
         start("PRBDM")
 
 
