@@ -1,8 +1,8 @@
-"""All dimensionless tolerances and limits of the engine, and what each is a fraction of.
+"""All tolerances and limits of the engine, each with its scale or unit.
 
 They are written here once; :mod:`prbm.kernel.header` generates the constants of the C kernel from
-this module.  A name ends in what the number is: ``RTOL`` a fraction of the scale that its comment
-names, ``ATOL`` a number with a unit, ``MAX`` and ``MIN`` a limit, ``FACTOR`` a factor.
+this module.  The end of a name is the kind of the number: ``RTOL`` a fraction of the scale that the
+comment names, ``ATOL`` a number with a unit, ``MAX`` and ``MIN`` a limit, ``FACTOR`` a factor.
 :class:`prbm.hybrid.configuration.Scales` turns fractions into numbers with units.
 """
 

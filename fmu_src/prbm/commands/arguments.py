@@ -1,4 +1,4 @@
-"""Arguments that commands share; without what takes time to import, so that help comes at once."""
+"""Arguments that commands share.  It imports no slow packages, so that help appears at once."""
 
 from argparse import ArgumentParser
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The command ``prbm``: its arguments, and which function does what they ask for.
+"""The command ``prbm``: its arguments, and the function that runs each command.
 
 Text goes to standard output; tables and figures into a folder, if ``--out`` names one, all at
 once when everything is computed; progress and mistakes to standard error.  The status is 0, 1 if
@@ -34,11 +34,11 @@ QUANTITIES = 'quantities are in SI, or have a unit: 0.01, 10mm, "-10 mm"; lists 
 
 
 class _ArgumentError(Exception):
-    """The command line is none."""
+    """Invalid command line."""
 
 
 class _Parser(argparse.ArgumentParser):
-    """A parser that answers a mistake with one sentence."""
+    """A parser that reports a mistake in one sentence."""
 
     def error(self, message: str) -> NoReturn:
         raise _ArgumentError(f"{self.prog}: {message}; see {self.prog} --help")

@@ -1,4 +1,4 @@
-"""``prbm modes``: frequencies, and what moves in each mode."""
+"""``prbm modes``: frequencies, and the shares of the parts in each mode."""
 
 import argparse
 from collections.abc import Mapping

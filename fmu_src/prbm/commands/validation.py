@@ -1,4 +1,4 @@
-"""``prbm validate``: the source's results again, or one mechanism beside its referees."""
+"""``prbm validate``: the results of the thesis, or one mechanism beside references."""
 
 import argparse
 import tempfile

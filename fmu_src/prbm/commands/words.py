@@ -1,4 +1,4 @@
-"""Values with uncertainties, what is fitted and to what, as they stand on a command line."""
+"""Values with uncertainties, fitted parameters and targets, parsed from a command line."""
 
 import re
 from pathlib import Path

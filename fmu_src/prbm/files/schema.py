@@ -1,8 +1,8 @@
 """The tables and keys of a mechanism file, and the mechanism that they describe.
 
-The file says more ways than the engine's data: a section and a material may stand with the flexure
-that has them, several types may share a material, a point may be given by its name, and quantities
-have units.  Here all of that becomes the parts of :mod:`prbm.mechanism.description`.
+A file allows more forms than the data of the engine: a section and a material may stand with their
+flexure, several types may share a material, points may be given by name, and quantities have units.
+This module converts them to the parts of :mod:`prbm.mechanism.description`.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""In which line of a TOML text each table and key stands, which tomllib does not tell."""
+"""Line numbers of the tables and keys of a TOML text, which tomllib does not report."""
 
 import re
 import tomllib

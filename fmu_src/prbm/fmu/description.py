@@ -1,4 +1,4 @@
-"""The modelDescription.xml of the Python FMUs, and what every model description shares."""
+"""The modelDescription.xml of Python FMUs, and the parts common to all model descriptions."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping

@@ -1,4 +1,4 @@
-"""The page that an FMU carries: what it is, its equations, its variables, its limits."""
+"""The documentation page of an FMU: summary, equations, variables, limits of the model."""
 
 import html
 import math

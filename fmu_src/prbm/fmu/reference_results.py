@@ -1,7 +1,6 @@
 """Reference results inside a native FMU, as the layered standard FMI-LS-REF describes them.
 
-They come from the Python engine, so that they are an independent route to what the C kernel
-computes.
+They come from the Python engine and are thus independent of the C kernel.
 """
 
 import csv

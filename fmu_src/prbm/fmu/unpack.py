@@ -1,4 +1,4 @@
-"""An FMU unpacked where it can be read: what FMPy and pythonfmu do not agree upon by themselves."""
+"""Unpacking of FMUs: workarounds for differences between FMPy and pythonfmu."""
 
 import tempfile
 from collections.abc import Iterator

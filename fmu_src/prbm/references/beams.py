@@ -1,4 +1,4 @@
-r"""Cantilevers in closed form: what the flexure models are held against.
+r"""Cantilevers in closed form, as references for the flexure models.
 
 The beam of Euler and Bernoulli: it bends, it neither stretches nor shears, and however far it
 bends its moment is EI times its curvature (the elastica).  Lengths are in units of the length L of

@@ -1,12 +1,12 @@
-"""The 1R guide as one scalar equation: a referee for systems that it is part of.
+"""The 1R guide as one scalar equation: a reference for systems that contain it.
 
 A parallelogram does not turn its shuttle, so that the guide is a pendulum of one angle phi from
 straight, x = r sin(phi) with r = gamma L,
 
     M r^2 phi'' = -4 k (phi + beta phi') + r cos(phi) F,        k = 2 gamma K_theta E I / L
 
-with M the shuttle and two lumped masses.  What pushes it, F, may depend on states of a partner,
-which are integrated along: the whole system is in one solver.  Nothing of the engine is used.
+with M the shuttle and two lumped masses.  The force F may depend on states of a partner, which
+are integrated along: the whole system is in one solver.  Nothing of the engine is used.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""An FMU as a component of a system, on FMPy's classes: variables by name, mistakes told."""
+"""FMUs as components of a system, on FMPy's classes: variables by name, errors with remedies."""
 
 import math
 from collections import defaultdict

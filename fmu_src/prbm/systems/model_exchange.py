@@ -1,8 +1,8 @@
 """An FMU for model exchange and a partner in one solver, the partner being a Python function.
 
-Model exchange gives away the equations and no solver: derivatives of the states, and indicators
-whose change of sign is an event.  So all that is coupled can be integrated at once, without
-communication steps; what co-simulation does is compared with this.
+Model exchange provides the derivatives of the states, and indicators whose change of sign is an
+event, but no solver.  A coupled system can therefore be integrated at once, without communication
+steps, as a reference for its co-simulation.
 """
 
 import tempfile

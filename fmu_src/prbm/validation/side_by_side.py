@@ -1,4 +1,4 @@
-"""Numbers of a result side by side: printed, ours, by an independent route; and what they claim."""
+"""Printed values, ours and those of an independent route side by side, with their assessment."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-/* Reading bytes that anybody may have tampered with: numbers, texts, counts and references. */
+/* The reader of untrusted bytes: numbers, texts, counts and references. */
 #include <string.h>
 
 #include "core/tables.h"

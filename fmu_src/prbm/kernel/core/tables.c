@@ -1,4 +1,4 @@
-/* The tables of a mechanism: read once, as anybody may have tampered with them. */
+/* The tables of a mechanism, read once, from untrusted bytes. */
 #include <stdlib.h>
 #include <string.h>
 

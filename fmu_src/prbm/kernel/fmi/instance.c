@@ -1,4 +1,4 @@
-/* Instances: the state machine of the standards, refused values, life. */
+/* Instances: the state machine of the standards, rejected values, creation and release. */
 #include <stdlib.h>
 #include <string.h>
 
