@@ -79,3 +79,12 @@ def test_simulate_takes_the_default_experiment_by_default():
     assert len(result["time"]) == 1001
     short = prbm.simulate(prbm.load("PRBDM"), stop_time=0.0025)
     assert short["time"].tolist() == pytest.approx([0.0, 1e-3, 2e-3, 2.5e-3], abs=1e-15)
+
+
+def test_load_rejects_a_folder(tmp_path):
+    with pytest.raises(ValueError, match="is a folder"):
+        prbm.load(tmp_path)
+
+
+def test_only_public_names_are_listed():
+    assert {name for name in dir(prbm) if not name.startswith("__")} == {*PUBLIC} - {"__version__"}

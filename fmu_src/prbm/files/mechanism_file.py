@@ -137,6 +137,8 @@ def find(name: str | Path) -> Mechanism:
     name, files = str(name), shipped()
     if name in files:
         return load(files[name])
+    if Path(name).is_dir():
+        raise ParameterError(f"{name!r} is a folder; name a mechanism file in it")
     if not Path(name).suffix and not Path(name).is_file():
         raise ParameterError(
             f"there is no model {name!r}; {proposal(name, files)}; a file of your own ends in .toml"
