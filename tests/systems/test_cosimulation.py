@@ -1,5 +1,6 @@
 """Our master: schemes against closed forms, events against FMUs alone, mistakes as sentences."""
 
+import gc
 import math
 import re
 import zipfile
@@ -247,6 +248,15 @@ def test_mistakes_are_sentences(changes, sentence):
     system = {"fmus": {"a": integrator(), "guide": guide(2)}, "connections": {}} | changes
     with pytest.raises(CouplingError, match=sentence):
         simulate(stop_time=0.01, step=1e-3, **system)
+
+
+def test_messages_do_not_depend_on_loggers_of_other_simulations():
+    """FMPy wraps the logger of the last simulation in one native logger for all."""
+    simulate_fmu(str(guide(2)), stop_time=0.01, logger=lambda *_: None)
+    gc.collect()
+    values = {"guide.flexure.length": -1.0}
+    with pytest.raises(CouplingError, match=r"status 3: flexure\.length = -1 m"):
+        simulate({"guide": guide(2)}, {}, 0.01, 1e-3, values)
 
 
 @pytest.mark.parametrize("kind", [float, int, bool, np.float32, np.int64, np.bool_, np.array])

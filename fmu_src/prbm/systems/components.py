@@ -10,7 +10,13 @@ from typing import Any, SupportsFloat
 
 from fmpy import extract, read_model_description  # type: ignore[import-untyped]
 from fmpy.fmi1 import FMICallException  # type: ignore[import-untyped]
-from fmpy.fmi2 import FMU2Model, FMU2Slave  # type: ignore[import-untyped]
+from fmpy.fmi2 import (  # type: ignore[import-untyped]
+    FMU2Model,
+    FMU2Slave,
+    defaultCallbacks,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
 from fmpy.fmi3 import FMU3Model, FMU3Slave  # type: ignore[import-untyped]
 
 from ..base.errors import PrbmError
@@ -66,7 +72,8 @@ class Component:
         if self.interface is None or self.version < 2:
             raise CouplingError(f"{name}: {fmu} has no {kind} of FMI 2.0 or 3.0")
         self.variables = {v.name: v for v in self.description.modelVariables}
-        self.said = ""  # by the FMU, about what is wrong
+        self.said = ""  # the last message of the FMU about an error
+        self.callbacks = self._callbacks()
         self.fmu: Any = self._loaded(CLASSES[kind, self.version], fmu, folder)
 
     def _loaded(self, of: Any, fmu: str | Path, folder: str | Path) -> Any:
@@ -82,15 +89,34 @@ class Component:
             raise CouplingError(f"{self.name}: {fmu} cannot be loaded here ({error})") from None
 
     def instantiate(self, **options: Any) -> None:
-        """Instantiate it; in FMI 3.0 what it says is kept, in FMI 2.0 FMPy prints it."""
+        """Instantiate it and keep its messages about errors.
+
+        In FMI 2.0 the instance gets callbacks of its own.  FMPy's default callbacks share one
+        native logger with every simulation of the process, and end the process after another
+        simulation with a logger has been collected.
+        """
         if self.version > 2:
             options |= {"loggingOn": True, "logMessage": self._note}
             self.call("instantiate", **options)
         else:
-            self.call("instantiate")
+            self.call("instantiate", callbacks=self.callbacks, loggingOn=True)
+
+    def _callbacks(self) -> Any:
+        """Return callbacks of FMI 2.0, which live as long as the component."""
+        callbacks = fmi2CallbackFunctions()
+        callbacks.logger = fmi2CallbackLoggerTYPE(self._note_fmi2)
+        callbacks.allocateMemory = defaultCallbacks.allocateMemory
+        callbacks.freeMemory = defaultCallbacks.freeMemory
+        return callbacks
+
+    def _note_fmi2(self, _: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
+        """Keep a message of FMI 2.0, a format without arguments."""
+        self._note(
+            None, status, category, (message or b"").replace(b"%%", b"%").replace(b"##", b"#")
+        )
 
     def _note(self, _: Any, status: int, category: bytes, message: bytes) -> None:
-        """Keep what is wrong, not what happens."""
+        """Keep a message about an error, not one about an event."""
         if status > 0:
             self.said = message.decode(errors="replace")
 
@@ -105,7 +131,7 @@ class Component:
         try:
             return getattr(self.fmu, function)(*arguments, **options)
         except FMICallException as error:
-            why = self.said or "what the FMU has written above tells why"
+            why = self.said or "it gave no reason"
             raise CouplingError(
                 f"{self.name}: {error.function} at {self.time:g} s returned the status "
                 f"{error.status}: {why}"
