@@ -119,7 +119,7 @@ def test_a_first_step_that_is_far_too_long_is_shortened():
     """With much damping, a step that is short beside the period leads to nothing but infinities."""
     simulation = Simulation(elastic(), {"damping.beta": 1e-4})
     simulation.advance(1e-7)
-    assert 0.0 < simulation.h < 1e-6
+    assert 0.0 < simulation.controller.h < 1e-6
     kernel = KernelSimulation(elastic(), {"damping.beta": 1e-4})
     kernel.advance(1e-7)
     assert kernel.get("tip.x") == pytest.approx(simulation.outputs()["tip.x"])
