@@ -29,7 +29,6 @@ def drawn(options: argparse.Namespace) -> None:
     check_file(path)
     figure = picture(mechanism, settings(mechanism, options.set), options.modes)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         print(save(figure, path))
     except OSError as error:
         if isinstance(error, FileError):
