@@ -21,7 +21,7 @@ WALL = 3.0  # 1/kg
 def moved(simulation):
     """Return the displacement of the first wall."""
     drawn = value(simulation.mechanism.stops[0], "position", simulation.values)
-    return simulation.inputs.walls[0].at(simulation.time) - drawn
+    return simulation.inputs.walls[0].motion(simulation.time)[0] - drawn
 
 
 def first_impact(name, **values):
@@ -178,7 +178,7 @@ def test_the_hit_point_is_where_the_wall_is_when_it_touches(name):
     out = simulation.outputs()
     gap = moved(simulation) - out[f"{stop}.point.displacement"]
     assert out[f"{stop}.gap"] == pytest.approx(gap, abs=1e-15)
-    rate = simulation.inputs.walls[0].rate - out[f"{stop}.point.velocity"]
+    rate = simulation.inputs.walls[0].motion(simulation.time)[1] - out[f"{stop}.point.velocity"]
     assert out[f"{stop}.gap_rate"] == pytest.approx(rate, abs=1e-15)
 
 

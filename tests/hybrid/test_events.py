@@ -71,7 +71,11 @@ def test_the_guard_of_an_event_is_positive_before_and_falls(monkeypatch, kind, m
     assert event.kind == kind
 
     def z(h):
-        n, y, a = front.equations.n, front.y.copy(), front.equations.evaluate(front.q, front.v).a
+        n, y, a = (
+            front.equations.n,
+            front.y.copy(),
+            front.equations.evaluate(front.time, front.q, front.v).a,
+        )
         y[:n] -= h * front.v - h**2 / 2 * a
         y[n : 2 * n] -= h * a
         return guard(front.equations, event.contact, event.time - h, y)
@@ -83,9 +87,9 @@ def test_the_guard_of_an_event_is_positive_before_and_falls(monkeypatch, kind, m
 def test_an_evaluation_does_not_change_when_another_state_is_evaluated():
     sim = simulation("PRBDM2R")
     q, v = sim.front.q, sim.front.v
-    first = sim.equations.evaluate(q, v)
+    first = sim.equations.evaluate(sim.time, q, v)
     kept = [x.copy() for x in (first.a, first.lam, first.M, first.factors[0])]
-    sim.equations.evaluate(q + 0.1, v + 1.0)
+    sim.equations.evaluate(sim.time, q + 0.1, v + 1.0)
     for x, same in zip((first.a, first.lam, first.M, first.factors[0]), kept, strict=True):
         np.testing.assert_array_equal(x, same)
 

@@ -232,7 +232,7 @@ def test_accelerations_obey_lagrange(mechanism, seed, held):
     q, v = somewhere(system, seed)
     holds = [held and i == 0 for i in range(len(mechanism.stops))]
     contacts = ContactState.holding(np.flatnonzero(holds), len(holds), 0)
-    a, lam, _, _ = Equations(system, sim.inputs, contacts, sim.omega).evaluate(q, v)
+    a, lam, _, _ = Equations(system, sim.inputs, contacts, sim.omega).evaluate(sim.time, q, v)
 
     def scalars(q):
         return np.concatenate([closures(system, q), gaps(system, q)[holds]])

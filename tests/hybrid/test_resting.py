@@ -86,7 +86,7 @@ def frictions(rng):
 def obeys_coulomb(settled: Simulation) -> bool:
     """Tell whether forces and accelerations are what each friction says."""
     equations, front, right = settled.equations, settled.front, True
-    a, lam, _, _ = equations.evaluate(front.q, front.v)
+    a, lam, _, _ = equations.evaluate(front.time, front.q, front.v)
     for c, mode in enumerate(settled.contacts.modes):
         if mode is ContactMode.STICK:
             friction, limit = equations.friction(c, front.e, lam)
@@ -237,10 +237,14 @@ def test_what_is_set_around_an_event_does_not_push_the_wall_in_the_rest_of_the_s
         assert not event
         assert found["stop.impact_count"] == 1
         assert found["stop.gap_rate"] == pytest.approx(found["stop.rebound_speed"], rel=1e-3)
-        *_, end = instance.fmu.doStep(hit + 1e-6, 1e-3)
+        end = hit + 1e-6
+        for _ in range(60):  # the wall joins its reference within two recent longest steps
+            event, _, _, end = instance.fmu.doStep(end, 1e-3)
+            if event:
+                instance.fmu.enterEventMode()
+                instance.update()
         drawn = instance.values()
         assert drawn["stop.gap"] == pytest.approx(-1e-5 - drawn["shuttle.x"], abs=1e-9)
-        assert end == pytest.approx(hit + 1e-6 + 1e-3)
 
 
 @pytest.mark.parametrize("twin", TWINS)
@@ -256,18 +260,6 @@ def test_a_wall_that_has_come_to_a_stand_is_not_pushed_either(twin):
     out = moved.outputs()
     assert out["stop.approach_speed"] < 0.01
     assert abs(out["shuttle.vx"]) < 0.02
-
-
-@pytest.mark.parametrize("twin", TWINS)
-def test_a_rest_speed_that_is_set_with_the_wall_acts_on_it(twin):
-    """The wall may mend what it is off with half of it, 0.5 m/s for 10 us: 5 of 5.01 um."""
-    moved = TWINS[twin](mechanism("PRBDM"), {"release.displacement": -0.01})
-    moved.set({"stop.velocity": 0.01})
-    moved.advance(1e-3)
-    moved.set({"stop.displacement": 1.501e-5, "stop.rest_speed": 1.0})
-    moved.advance(1.01e-3)
-    out = moved.outputs()
-    assert out["stop.gap"] + out["shuttle.x"] == pytest.approx(1.51e-5, abs=2e-7)
 
 
 @events

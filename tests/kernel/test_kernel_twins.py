@@ -12,7 +12,7 @@ import inspect
 import itertools
 import math
 import re
-from dataclasses import replace
+from dataclasses import astuple, replace
 from pathlib import Path
 
 import numpy as np
@@ -914,7 +914,7 @@ class KernelEquations:
             )
         ]
         given = [(f.real, f.imag, m) for f, m in zip(inputs.forces, inputs.moments, strict=True)]
-        walls = [(wall.position, wall.rate, wall.since) for wall in inputs.walls]
+        walls = [astuple(wall) for wall in inputs.walls]
         self.arrays = [np.array(part, float) for part in (given, walls, inputs.mobilities)]
         self.modes = np.array(contacts.modes, np.int32)
         base = structures()["Complex"](inputs.base.real, inputs.base.imag)
@@ -924,19 +924,19 @@ class KernelEquations:
         state = structures()["ContactState"](self.modes.ctypes.data)
         kernel().set_equations(self.structure, self.inputs, state, omega)
 
-    def evaluate(self, q, v):
+    def evaluate(self, t, q, v):
         """Return accelerations and multipliers."""
-        kernel().evaluate_equations(self.structure, q, v, None, self.evaluation)
+        kernel().evaluate_equations(self.structure, t, q, v, None, self.evaluation)
         return self.multiplied(len(q))
 
     def multiplied(self, n):
         """Return the accelerations and multipliers of the evaluation."""
         return array(self.evaluation.a, n), array(self.evaluation.lam, self.structure.r)
 
-    def rate(self, y):
-        """Return the rates of a state."""
+    def rate(self, t, y):
+        """Return the rates of a state at a time."""
         dy = np.full(len(y), np.nan)
-        kernel().rate(self.structure, y, None, self.evaluation, dy)
+        kernel().rate(self.structure, t, y, None, self.evaluation, dy)
         return dy
 
     def project_near(self, t, y, reference=None):
@@ -946,11 +946,13 @@ class KernelEquations:
         kernel().project_near(self.structure, self.evaluation, reference, t, near, self.correction)
         return near
 
-    def stages(self, y, h, k):
+    def stages(self, t, y, h, k):
         """Fill the stages of which the first is given; return the new state and the force range."""
         y1, forces = np.full(len(y), np.nan), np.full((2, 8), np.nan)
         span = structures()["ForceRange"](*(row.ctypes.data for row in forces))
-        kernel().stages(self.structure, len(y), y, h, k, y1, self.reference, self.evaluation, span)
+        kernel().stages(
+            self.structure, t, len(y), y, h, k, y1, self.reference, self.evaluation, span
+        )
         return y1, forces[:, : self.structure.held_count]
 
 
@@ -979,7 +981,13 @@ def random_inputs(system, e, rng, driven):
         tuple(F[:, 2] * 0.01),
         driven * complex(*rng.normal(size=2)),
         tuple(
-            input_data.Wall(x + 1e-5 * rng.normal(), driven * 0.01 * rng.normal(), rng.normal())
+            input_data.Wall(
+                x + 1e-5 * rng.normal(),
+                *(driven * 0.01 * rng.normal(size=1)),
+                rng.normal(),
+                *(driven * np.array([1e-6, 1e-3]) * rng.normal(size=2)),
+                driven * 1e-3,
+            )
             for x in touched
         ),
         tuple(driven * rng.uniform(size=len(touched))),
@@ -1026,15 +1034,16 @@ def condition(evaluation):
 def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
     for theirs, mine, y, _ in equations(name):
         n, r = theirs.n, len(theirs.rows)
-        a, lam = mine.evaluate(y[:n], y[n : 2 * n])
-        evaluation = theirs.evaluate(y[:n], y[n : 2 * n])
+        t = theirs.inputs.walls[0].since + 3e-4  # on its way to its reference
+        a, lam = mine.evaluate(t, y[:n], y[n : 2 * n])
+        evaluation = theirs.evaluate(t, y[:n], y[n : 2 * n])
         a_expected, lam_expected, M, _ = evaluation
         rel = spread(condition(evaluation))
         assert mine.structure.r == r
         assert_same(a, a_expected, rel)
         assert_same(lam, lam_expected, rel)
-        dy = mine.rate(y)
-        expected = theirs.rate(0.3, y)
+        dy = mine.rate(t, y)
+        expected = theirs.rate(t, y)
         assert_same(dy[: 2 * n], expected[: 2 * n], rel)
         power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # what the powers add up to
         assert_same(dy[2 * n :], expected[2 * n :], rel, scale=power)
@@ -1046,10 +1055,10 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
 def test_evaluations_do_not_depend_on_the_state_evaluated_before(name):
     for theirs, mine, y, rng in equations(name):
         t = theirs.inputs.walls[0].since
-        first, projected = mine.rate(y), mine.project_near(t, y)
-        mine.rate(y + 0.1 * rng.normal(size=len(y)))
+        first, projected = mine.rate(t, y), mine.project_near(t, y)
+        mine.rate(t, y + 0.1 * rng.normal(size=len(y)))
         assert mine.project_near(t, y).tobytes() == projected.tobytes()
-        assert mine.rate(y).tobytes() == first.tobytes()
+        assert mine.rate(t, y).tobytes() == first.tobytes()
 
 
 @each_mechanism
@@ -1057,9 +1066,9 @@ def test_a_reference_nearby_changes_evaluations_by_round_off(name):
     for theirs, mine, y, _ in equations(name):
         n = theirs.n
         q, v = y[:n], y[n : 2 * n]
-        expected, rel = mine.evaluate(q, v), spread(condition(theirs.evaluate(q, v)))
+        expected, rel = mine.evaluate(0.1, q, v), spread(condition(theirs.evaluate(0.1, q, v)))
         kernel().set_reference(mine.reference, mine.ours.structure, q + 1e-3)
-        kernel().evaluate_equations(mine.structure, q, v, mine.reference, mine.evaluation)
+        kernel().evaluate_equations(mine.structure, 0.1, q, v, mine.reference, mine.evaluation)
         for found, one in zip(mine.multiplied(n), expected, strict=True):
             assert_same(found, one, rel)
 
@@ -1079,27 +1088,32 @@ def test_accelerations_do_not_depend_on_the_size_of_masses_and_stiffnesses(facto
         ours.assemble(scaled)
         inputs = input_data.Inputs((0j,), (0.0,), 0j, (input_data.Wall(1.0),), (0.0,))
         mine = KernelEquations(ours, inputs, ContactState.free(1, 1), 80.0)
-        found.append(mine.evaluate(*state)[0])
+        found.append(mine.evaluate(0.0, *state)[0])
     assert np.all(np.isfinite(found[0]))
     np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
 
 
 @twin(
-    gap=dynamics.Equations.gaps, gap_rate=dynamics.Equations.gap_rates, wall_at=input_data.Wall.at,
+    gap=dynamics.Equations.gaps, gap_rate=dynamics.Equations.gap_rates,
+    wall_motion=input_data.Wall.motion,
 )  # fmt: skip
 @each_mechanism
 def test_gaps_are_the_same(name):
     for theirs, mine, y, rng in equations(name, 3):
-        n, t, size = theirs.n, rng.uniform(), theirs.system.length
+        n, size = theirs.n, theirs.system.length
+        t = theirs.inputs.walls[0].since + 1e-3 * rng.uniform(0.0, 1.5)
         e, v = theirs.system.directions(y[:n]), y[n : 2 * n]
         stops = len(theirs.system.gaps)
         gaps = [kernel().gap(mine.structure, i, t, e) for i in range(stops)]
         assert_same(gaps, theirs.gaps(t, e), scale=size)
-        rates = [kernel().gap_rate(mine.structure, i, e, v) for i in range(stops)]
-        assert_same(rates, theirs.gap_rates(e, v), scale=size * np.abs(v).max())
+        rates = [kernel().gap_rate(mine.structure, i, t, e, v) for i in range(stops)]
+        assert_same(rates, theirs.gap_rates(t, e, v), scale=size * np.abs(v).max())
         wall = theirs.inputs.walls[0]
-        one = structures()["Wall"](wall.position, wall.rate, wall.since)
-        assert_same(kernel().wall_at(one, t), wall.at(t))
+        found = kernel().wall_motion(structures()["Wall"](*astuple(wall)), t)
+        scale = (size, 0.01, 10.0)
+        for part, expected, one in zip((found.x, found.v, found.a), wall.motion(t), scale,
+                                       strict=True):  # fmt: skip
+            assert_same(part, expected, scale=one)
 
 
 @twin(rub_limit=dynamics.Equations.friction_limit)
@@ -1120,7 +1134,7 @@ def test_states_are_projected_alike(name):
         n, t = theirs.n, theirs.inputs.walls[0].since + 1e-4  # of the wall that may hold
         projected, found = theirs.project(t, y), y.copy()
         kernel().project(mine.structure, t, found)
-        evaluation = theirs.evaluate(projected[:n], projected[n : 2 * n])
+        evaluation = theirs.evaluate(t, projected[:n], projected[n : 2 * n])
         rel, r = spread(condition(evaluation)), theirs.first_stick
         rows = theirs.rows.jacobian(theirs.system.directions(projected[:n]))[:r]
         M = evaluation.M
@@ -1129,7 +1143,7 @@ def test_states_are_projected_alike(name):
         for distance in (1e-9, 1e-5):  # one correction is enough, or not
             start = projected.copy()
             start[: 2 * n] += distance * rng.normal(size=2 * n)
-            factors = theirs.evaluate(start[:n], start[n : 2 * n]).factors
+            factors = theirs.evaluate(t, start[:n], start[n : 2 * n]).factors
             expected, near = theirs.project_near(t, start, factors), mine.project_near(t, start)
             assert_same_turn(near[:n], expected[:n], start[:n], theirs.system, M, rows)
             assert_same(near[n:], expected[n:], rel, scale=np.abs(y[n:]).max())
@@ -1160,11 +1174,12 @@ def test_steps_of_the_integration_are_the_same(name):
     for theirs, mine, y, _ in equations(name, 1):
         h, size = 1e-5, len(y)
         k, error = np.full((count, size), np.nan), np.full(size, np.nan)
-        k[0] = theirs.rate(0.0, y)
-        expected, y1_expected = runge_kutta.stages(PAIR, theirs.rate, 0.0, y, h, k[0])
+        t = theirs.inputs.walls[0].since + 2e-4
+        k[0] = theirs.rate(t, y)
+        expected, y1_expected = runge_kutta.stages(PAIR, theirs.rate, t, y, h, k[0])
         n = theirs.n
-        rel = 10 * spread(condition(theirs.evaluate(y[:n], y[n : 2 * n])))
-        y1, forces = mine.stages(y, h, k)
+        rel = 10 * spread(condition(theirs.evaluate(t, y[:n], y[n : 2 * n])))
+        y1, forces = mine.stages(t, y, h, k)
         assert_same(k, expected, rel)
         assert_same(y1, y1_expected, rel)
         assert np.all(forces[0] <= forces[1])

@@ -115,7 +115,7 @@ def test_frequencies_are_those_of_the_linearised_motion():
         h = 1e-6 / np.abs(phi).max()
         states = [sim.equations.project(0.0, np.concatenate([rest.q + s * h * phi, np.zeros(9)]))
                   for s in (-1, 1)]  # fmt: skip
-        a = [sim.equations.evaluate(y[:7], np.zeros(7)).a for y in states]
+        a = [sim.equations.evaluate(sim.time, y[:7], np.zeros(7)).a for y in states]
         stiffness = -phi @ found.M @ (a[1] - a[0]) / (2 * h)
         assert math.sqrt(stiffness) / (2 * math.pi) == pytest.approx(f, rel=1e-5)
 

@@ -115,11 +115,13 @@ def test_a_stretching_pendulum_with_a_wall_obeys_lagrange(holds):
     for seed in range(20):
         q, v = state(sim, seed)
         M, right, gap, gradient, quadratic = (np.array(x, float) for x in lagrange()(q, v))
-        a, lam, mass, _ = equations.evaluate(q, v)
+        a, lam, mass, _ = equations.evaluate(0.0, q, v)
         np.testing.assert_allclose(mass, M, rtol=1e-12, atol=1e-18)
         e = sim.system.directions(q)
         assert equations.gaps(0.0, e)[0] == pytest.approx(float(gap), abs=1e-15)
-        assert equations.gap_rates(e, v)[0] == pytest.approx(float((gradient @ v)[0]), abs=1e-13)
+        assert equations.gap_rates(0.0, e, v)[0] == pytest.approx(
+            float((gradient @ v)[0]), abs=1e-13
+        )
         rows = gradient if holds else np.zeros((0, 5))
         kkt = np.block([[M, -rows.T], [rows, np.zeros((len(rows),) * 2)]])
         x = np.linalg.solve(kkt, [*right.ravel(), *-quadratic.ravel()[: len(rows)]])

@@ -56,7 +56,10 @@ ZERO_RATE_RTOL = 1e-9  # Of the velocity scale: a slower rate is round-off.
 FRICTION_EXCESS_RTOL = 1e-6  # Of the friction limit: excess at which a sticking contact slips.
 EVENTS_MAX = 1000  # Events within EVENT_WINDOW_RTOL that end a simulation.
 EVENT_WINDOW_RTOL = 5e-3  # Of the period.
-WALL_PATH_RTOL = 1e-13  # Of the size: a smaller change of a wall's path is round-off.
+WALL_PATH_RTOL = 1e-13  # Of the size: a smaller change of a wall's reference is round-off.
+WALL_FADING_FACTOR = 1 / 3  # Of each step, by which the recent longest one is forgotten.
+WALL_LONGEST_RTOL = 0.1  # Of the period: longest communication step that walls remember.
+WALL_STEP_RTOL = 0.5  # Of the time in which a wall joins its reference: longest step meanwhile.
 WALL_MOBILITY_MAX = 1e100  # 1/kg; larger mobilities lose impulses to underflow.
 IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 
@@ -92,6 +95,7 @@ STOP_TIME_RTOL = 1e-3  # Of a communication step: allowed overshoot of the stop 
 
 # --- model exchange ----------------------------------------------------------------------------
 DRIFT_RTOL = 1e-8  # Of the size: drift of a held contact that requests an event.
+MOVING_DRIFT_FACTOR = 100.0  # Of DRIFT_RTOL: the same while the wall moves.
 DRIFT_CORRECTED_RTOL = 1e-12  # Of the size: drift that an event leaves uncorrected.
 PENETRATION_WARNING_RTOL = 1e-2  # Of the size: penetration that no solver's overshoot explains.
 GAP_CLOSED_RTOL = 1e-12  # Of the size: how far below zero a gap closes.

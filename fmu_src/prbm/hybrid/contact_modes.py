@@ -146,9 +146,13 @@ def holding_stops(
             if not _independent(G[holding], M, loops):
                 continue
             equations = equations_holding(configuration.scales, front, holding)
-            a, lam, _, _ = equations.evaluate(front.q, front.v)
+            a, lam, _, _ = equations.evaluate(front.time, front.q, front.v)
             if all(equations.stop_forces(lam)[i] > 0.0 for i in holding):
-                others = [float(G[i] @ a - bend[i]) for i in every if i not in holding]
+                others = [
+                    float(G[i] @ a - bend[i] + front.inputs.walls[i].motion(front.time)[2])
+                    for i in every
+                    if i not in holding
+                ]
                 found.append((min(others, default=0.0), holding))
         if found:
             opens, holding = max(found, key=lambda one: one[0])
@@ -210,7 +214,7 @@ def slip_mode(scales: Scales, speed: float, slow: float = 0.0) -> ContactMode:
 
 def _residual_speed(front: Front, contact: int) -> float:
     """Return the sliding speed that the resolution of time leaves at a reversal [m/s]."""
-    a = front.equations.evaluate(front.q, front.v).a
+    a = front.equations.evaluate(front.time, front.q, front.v).a
     rate = front.equations.slip_acceleration(contact, front.e, front.v, a)
     return abs(rate) * (2 * EVENT_TIME_ATOL + 8 * ulp(front.time))
 
@@ -257,13 +261,13 @@ def _friction_mode(
     if not _mobile(front, contacts, contact):
         return FRICTIONLESS
     equations = front.equations.with_contacts(contacts.with_mode(contact, STICK))
-    friction, limit = equations.friction(contact, e, equations.evaluate(q, v).lam)
+    friction, limit = equations.friction(contact, e, equations.evaluate(front.time, q, v).lam)
     if abs(friction) <= limit and not slipped:
         return STICK
     pushed = ContactMode.slipping(-1 if friction > 0.0 else 1)
     for mode in (pushed, ContactMode.slipping(-pushed.slip)):
         trial = front.equations.with_contacts(contacts.with_mode(contact, mode))
-        a = trial.evaluate(q, v).a
+        a = trial.evaluate(front.time, q, v).a
         if mode.slip * trial.slip_acceleration(contact, e, v, a) > 0.0:
             return mode
     return FRICTIONLESS if slipped else STICK
@@ -314,7 +318,7 @@ def _consistent(front: Front, contacts: ContactState, chosen: Mapping[int, Conta
     if not all(_mobile(front, contacts, c) for c, mode in chosen.items() if mode is STICK):
         return False
     e, v, equations = front.e, front.v, front.equations.with_contacts(contacts)
-    a, lam, _, _ = equations.evaluate(front.q, v)
+    a, lam, _, _ = equations.evaluate(front.time, front.q, v)
     if not all(equations.stop_forces(lam)[i] > 0.0 for i in equations.held):
         return False
     for c, mode in chosen.items():

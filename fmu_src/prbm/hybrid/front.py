@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
-from ..mechanics.inputs import Inputs
+from ..mechanics.inputs import Inputs, Wall
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,11 @@ class Front:
         """Return the front with other modes of the contacts."""
         return replace(self, equations=self.equations.with_contacts(contacts))
 
+    def with_walls(self, walls: tuple[Wall, ...]) -> "Front":
+        """Return the front with other motions of the walls."""
+        inputs = replace(self.inputs, walls=walls)
+        return replace(self, equations=self.equations.with_inputs(inputs))
+
     def with_velocities(self, v: Real, dissipated: float = 0.0, work: float = 0.0) -> "Front":
         """Return the front with other rates, and with energies added [J]."""
         n, y = self.equations.n, self.y.copy()
@@ -85,7 +90,7 @@ class Front:
     def gaps_and_rates(self) -> tuple[Real, Real]:
         """Return the gaps of all stops [m] and their rates [m/s]."""
         e = self.e
-        return self.equations.gaps(self.time, e), self.equations.gap_rates(e, self.v)
+        return self.equations.gaps(self.time, e), self.equations.gap_rates(self.time, e, self.v)
 
     def projected(self) -> "Front":
         """Return the front on the constraints."""

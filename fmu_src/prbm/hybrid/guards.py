@@ -41,14 +41,14 @@ def gap(equations: Equations, stop: int, t: float, y: Real) -> float:
 def stop_force(equations: Equations, stop: int, t: float, y: Real) -> float:
     """Return the normal force of a held stop [N]."""
     n = equations.n
-    return _stop_force(equations, stop, equations.evaluate(y[:n], y[n : 2 * n]))
+    return _stop_force(equations, stop, equations.evaluate(t, y[:n], y[n : 2 * n]))
 
 
 def friction_margin(equations: Equations, contact: int, t: float, y: Real) -> float:
     """Return the friction that is left before a sticking contact slips [N]."""
     n = equations.n
     e = equations.system.directions(y[:n])
-    return _friction_margin(equations, contact, e, equations.evaluate(y[:n], y[n : 2 * n]))
+    return _friction_margin(equations, contact, e, equations.evaluate(t, y[:n], y[n : 2 * n]))
 
 
 def slip_speed(equations: Equations, contact: int, t: float, y: Real) -> float:
@@ -103,7 +103,7 @@ class Looks:
     def gaps_and_rates(self) -> tuple[Real, Real]:
         """Gaps and their rates at the ends of the intervals, (w + 1, s) [m], [m/s]."""
         times, e, v = self.samples
-        return self.equations.gaps(times, e), self.equations.gap_rates(e, v)
+        return self.equations.gaps(times, e), self.equations.gap_rates(times, e, v)
 
     @cached_property
     def evaluations(self) -> list[tuple[float, Complex, Evaluation]]:
@@ -112,7 +112,7 @@ class Looks:
         result = []
         for t in (arc.start, arc.start + arc.h / 2, arc.start + arc.h):
             y = arc.at(t)
-            evaluation = self.equations.evaluate(y[:n], y[n : 2 * n])
+            evaluation = self.equations.evaluate(t, y[:n], y[n : 2 * n])
             result.append((t, self.equations.system.directions(y[:n]), evaluation))
         return result
 
@@ -199,7 +199,7 @@ def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
     """Return the rate of the gap of a stop [m/s]."""
     n = equations.n
     e = equations.system.directions(y[:n])
-    return float(equations.gap_rates(e, y[n : 2 * n])[stop])
+    return float(equations.gap_rates(t, e, y[n : 2 * n])[stop])
 
 
 def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float:

@@ -8,7 +8,6 @@ import numpy as np
 from ..base.tolerances import IMPACT_COUNT_MAX, REACTION_RANK_RTOL, SHORTEST_FLIGHT_RTOL
 from ..mechanics import contact, forces
 from ..mechanics.arrays import Real
-from ..mechanics.inputs import Wall
 from ..mechanics.modal import fundamental_at, simulated_restitution
 from .configuration import Configuration
 from .contact_modes import equations_holding, holding_stops, mobility, settle
@@ -143,7 +142,7 @@ def _captured(
     if speed < configuration.stop_value(stop, "rest_speed"):
         return True
     equations = equations_holding(scales, landed, holding)
-    lam = equations.evaluate(landed.q, after).lam
+    lam = equations.evaluate(front.time, landed.q, after).lam
     e, M, loops = equations.mass_and_loops(landed.q)
     G = configuration.system.gap_rows.jacobian(e)[[stop]]
     pressing = float(equations.stop_forces(lam)[stop]) * mobility(M, loops, G)
@@ -175,7 +174,7 @@ def _impulses(
     G = configuration.system.gap_rows.jacobian(e)[partners]
     X = contact.response(M, loops, G)
     W = G @ X + np.diag(mobilities[partners])
-    u = front.equations.gap_rates(e, front.v)[partners]
+    u = front.equations.gap_rates(front.time, e, front.v)[partners]
     P = contact.newton(W, np.minimum(u, 0.0), np.concatenate([restitution, np.zeros(len(held))]))
     return Impulses(front.v + X @ P, dict(zip(partners, P.tolist(), strict=True)), {})
 
@@ -187,7 +186,7 @@ def _impulses_with_friction(
     v, k, kept = front.v, len(struck), list(held)
     e, M, loops = front.equations.mass_and_loops(front.q)
     system = front.equations.system
-    gaps, u = system.gap_rows.jacobian(e), front.equations.gap_rates(e, v)
+    gaps, u = system.gap_rows.jacobian(e), front.equations.gap_rates(front.time, e, v)
     mobilities = np.array(front.inputs.mobilities)[struck]
     T = system.slide_rows.jacobian(e)[struck]
     both = np.vstack([gaps[struck], T])
@@ -225,15 +224,18 @@ def _book(
     """
     e, v, after, normal = front.e, front.v, impulses.after, impulses.normal
     before = front
-    u = front.equations.gap_rates(e, v)
+    u = front.equations.gap_rates(front.time, e, v)
     front = _with_pushed_walls(front, normal)
-    u_after = front.equations.gap_rates(e, after)
+    u_after = front.equations.gap_rates(front.time, e, after)
     slides = configuration.system.slide_rows.jacobian(e)
     lost = {i: -P * float(u[i] + u_after[i]) / 2 for i, P in normal.items()}
     for i, P in impulses.tangential.items():
         lost[i] -= P * float(slides[i] @ (v + after)) / 2
-    old, new = before.inputs.walls, front.inputs.walls
-    work = -sum(P * (old[i].rate + new[i].rate) / 2 for i, P in normal.items())
+    old, new = (
+        {i: float(one.inputs.walls[i].motion(front.time)[1]) for i in normal}
+        for one in (before, front)
+    )
+    work = -sum(P * (old[i] + new[i]) / 2 for i, P in normal.items())
     front = front.with_velocities(after, sum(lost.values()), work)
     latched = list(front.latched)
     for i, P in normal.items():
@@ -261,13 +263,10 @@ def _book(
 
 
 def _with_pushed_walls(front: Front, normal: Mapping[int, float]) -> Front:
-    """Return the front with the wall velocities after the impulses, until the next restart."""
+    """Return the front with walls, and their references, that the impulses have pushed."""
     t, walls = front.time, list(front.inputs.walls)
     for i, P in normal.items():
         change = front.inputs.mobilities[i] * P
         if change:
-            walls[i] = Wall(walls[i].at(t), walls[i].rate + change, t)
-    if tuple(walls) == front.inputs.walls:
-        return front
-    inputs = replace(front.inputs, walls=tuple(walls))
-    return replace(front, equations=front.equations.with_inputs(inputs))
+            walls[i] = walls[i].pushed(t, change)
+    return front if tuple(walls) == front.inputs.walls else front.with_walls(tuple(walls))

@@ -34,7 +34,7 @@ def all_outputs(
     system, n = equations.system, equations.n
     q, v = y[:n], y[n : 2 * n]
     e = system.directions(q)
-    a, lam, M, _ = equations.evaluate(q, v)
+    a, lam, M, _ = equations.evaluate(t, q, v)
     out: Outputs = {**motions(system, q, v, e)}
     out |= _stops(equations, t, e, v, lam, M)
     force, moment = equations.base_reaction(q, v, a)
@@ -75,7 +75,7 @@ def _stops(
     """Return gaps, forces and the motions and mobilities of the hit points."""
     system = equations.system
     out = {}
-    gaps, rates = equations.gaps(t, e), equations.gap_rates(e, v)
+    gaps, rates = equations.gaps(t, e), equations.gap_rates(t, e, v)
     places, speeds = system.gap_rows.values(e), system.gap_rows.rates(e, v)
     G, loops = system.gap_rows.jacobian(e), equations.rows.jacobian(e)[: len(system.loops)]
     pressed = equations.stop_forces(lam)

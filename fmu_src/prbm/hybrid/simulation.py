@@ -20,7 +20,7 @@ from ..base.tolerances import STEPS_MAX
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
-from ..mechanics.inputs import Inputs, Wall, check_input, impulse_names, input_names
+from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, check_input, impulse_names, input_names
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from . import contact_modes, events, impacts, snapshot, walls
@@ -97,10 +97,8 @@ class Simulation:
         self.prepared = self.configuration
         self.changed = False
         self.received = self._impulses_given()
-        velocities = walls.velocities(mechanism, self.given)
-        self.schedule = walls.WallSchedule.starting(self.time, velocities)
-        targets = walls.targets(mechanism, known, self.given)
-        inputs = Inputs.of(mechanism, self.given, tuple(Wall(x) for x in targets))
+        self.course, at_start = walls.start(self.configuration, self.given, self.time)
+        inputs = Inputs.of(mechanism, self.given, at_start)
         self.front = released(self.configuration, inputs, self.time)
         # The step that leads to the front, the event at its end, and the rates there.
         self.arc: Arc | None = None
@@ -192,10 +190,12 @@ class Simulation:
                 given[name] = check_input(name, x, given)
             else:
                 raise ParameterError(unknown(name, {**parameters, **given}))
-        if values == self.values and given == self.given:
-            return
+        # The walls join their references at the next step, and change nothing before.
+        moving = {f"{stop.name}.{name}" for stop in self.mechanism.stops for name in WALL_INPUTS}
+        others = any(given[name] != x for name, x in self.given.items() if name not in moving)
+        self.changed = self.changed or others or values != self.values
         self.prepared = self.prepared.with_values(values)
-        self.given, self.changed = given, True
+        self.given = given
 
     def _impulses_given(self) -> Real:
         """Return the inputs that are impulses [N s], [N m s]."""
@@ -206,10 +206,8 @@ class Simulation:
     def advance(self, time: float) -> None:
         """Continue the motion to a time.
 
-        The walls move uniformly from where they are to ``position + displacement + velocity *
-        (time - now)``; in a step shorter than one before, a wall whose velocity is an input takes
-        longer to arrive: see :mod:`prbm.hybrid.walls`.  After an error the simulation is as
-        before.
+        The present time is a communication point: the walls join the lines that the inputs
+        define here, see :mod:`prbm.hybrid.walls`.  After an error the simulation is as before.
 
         Parameters
         ----------
@@ -243,8 +241,8 @@ class Simulation:
 
     def _advance(self, time: float) -> None:
         """Continue the motion to a later time."""
-        self.schedule, moved = walls.move(
-            self.prepared, self.given, self.schedule, self.inputs.walls, self.time, time
+        self.course, moved = walls.join(
+            self.prepared, self.given, self.course, self.inputs.walls, self.time, time
         )
         if self.changed or moved != self.inputs.walls:
             self._restart(moved)
@@ -288,8 +286,10 @@ class Simulation:
 
     def _take_step(self) -> None:
         """Take one step from the front, up to the first event within it."""
-        configuration, front = self.configuration, self.front
-        equations = front.equations
+        front = walls.arrived(self.front)
+        if front is not self.front:
+            self._set_front(front, [])
+        configuration, equations = self.configuration, front.equations
         if self.k1 is None:
             self.k1 = equations.rate(front.time, front.y)
         step, controller = take_step(configuration, front, self.k1, self.controller)
@@ -313,7 +313,7 @@ class Simulation:
             return self.front.y
         # The step beyond the present time was computed with the present equations.
         n, y = self.system.n, self.arc.at(self.time)
-        evaluation = self.equations.evaluate(y[:n], y[n : 2 * n])
+        evaluation = self.equations.evaluate(self.time, y[:n], y[n : 2 * n])
         return self.equations.project_near(self.time, y, evaluation.factors)
 
     def magnitudes(self) -> tuple[float, float, float]:
@@ -356,7 +356,7 @@ class Simulation:
             "frequency": self.frequency,
             "time": self.time,
             "front": snapshot.plain_front(self.front),
-            "schedule": asdict(self.schedule),
+            "course": asdict(self.course),
             "window": asdict(self.window),
             "controller": asdict(self.controller),
             "arc": snapshot.plain_arc(self.arc),
@@ -382,7 +382,7 @@ class Simulation:
         self.given, self.received = dict(saved["given"]), np.array(saved["received"])
         self.changed, self.time = saved["changed"], saved["time"]
         self.front = snapshot.front_of(saved["front"], acting)
-        self.schedule = snapshot.schedule_of(saved["schedule"])
+        self.course = snapshot.course_of(saved["course"])
         self.window = EventWindow(**saved["window"])
         self.controller = StepSizeController(**saved["controller"])
         self.arc = snapshot.arc_of(saved["arc"])

@@ -13,7 +13,7 @@ from .arc import Arc
 from .configuration import Configuration
 from .events import Event, EventKind
 from .front import Front, Latched
-from .walls import WallSchedule
+from .walls import Course, Sample
 
 Plain = dict[str, Any]
 
@@ -63,10 +63,10 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
     )
 
 
-def schedule_of(plain: Mapping[str, Any]) -> WallSchedule:
-    """Return the schedule of the walls from plain values."""
-    velocities, driven = tuple(plain["velocities"]), tuple(plain["driven"])
-    return WallSchedule(plain["planned"], plain["due"], velocities, driven)
+def course_of(plain: Mapping[str, Any]) -> Course:
+    """Return the course of the walls from plain values."""
+    samples = tuple(Sample(**sample) for sample in plain["samples"])
+    return Course(plain["point"], plain["longest"], samples)
 
 
 def plain_arc(arc: Arc | None) -> Plain | None:

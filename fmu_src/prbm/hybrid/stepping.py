@@ -31,6 +31,7 @@ from .configuration import Configuration, Scales
 from .front import Front
 from .runge_kutta import BOGACKI_SHAMPINE as PAIR
 from .runge_kutta import stages
+from .walls import step_limit
 
 REJECTED_EXPONENT = 1.0 / PAIR.order
 ACCEPTED_EXPONENT = REJECTED_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT
@@ -128,8 +129,8 @@ def take_step(
     t, y, equations = front.time, front.y, front.equations
     if configuration.step:
         return fixed_step(configuration, front, k1), controller
-    h = controller.h or first_step(configuration, y, k1)
-    h = min(h, configuration.scales.step_max)
+    wanted = min(controller.h or first_step(configuration, y, k1), configuration.scales.step_max)
+    h = min(wanted, step_limit(front.inputs.walls, t))
     controller = StepSizeController(h, controller.last_error)
     while True:
         check_size(t, controller.h)
@@ -140,7 +141,9 @@ def take_step(
             continue
         controller = controller.next(step.error)
         if step.error <= 1.0:
-            return step, controller
+            # A step that a wall cuts short says little about the next one.
+            whole = wanted if step.h == h < wanted else 0.0
+            return step, replace(controller, h=max(controller.h, whole))
 
 
 def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
@@ -151,7 +154,8 @@ def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
     SimulationError
         If the error is larger than the state, or nothing can be computed there.
     """
-    t, h = front.time, configuration.step or 0.0
+    t = front.time
+    h = min(configuration.step or 0.0, step_limit(front.inputs.walls, t))
     check_size(t, h)
     step = compute_step(configuration, front.equations, t, front.y, h, k1)
     if not step.error * STEP_ERROR_FACTOR * configuration.tolerance <= 1.0:
@@ -205,7 +209,7 @@ def compute_step(
     evaluations: list[Evaluation] = []
 
     def rate(t: float, y: Real) -> Real:
-        result, evaluation = equations.rate_and_evaluation(y)
+        result, evaluation = equations.rate_and_evaluation(t, y)
         evaluations.append(evaluation)
         return result
 

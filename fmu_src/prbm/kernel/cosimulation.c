@@ -6,13 +6,14 @@
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
-/* Continue from the present state with the inputs and parameters that have been set. */
-static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
+/* Continue from the present state with the inputs and parameters that have been set.  follow:
+ * whether held stops may follow jumps of their walls. */
+static bool restart(Simulation *sim, const Wall *walls, bool follow, Problem *problem) {
     State *state = &sim->state;
     if (!arc_state(sim, sim->present.y, problem)) {
         return false;
     }
-    memcpy(state->walls, planned, (size_t)system_of(sim)->s * sizeof *planned);
+    memmove(state->walls, walls, (size_t)system_of(sim)->s * sizeof *walls);
     copy(state_size(sim), sim->present.y, state->front);
     state->front_time = state->time;
     state->arc.valid = state->has_k1 = false;
@@ -21,7 +22,8 @@ static bool restart(Simulation *sim, const Wall *planned, Problem *problem) {
     }
     copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
     set_inputs(sim);
-    return receive_impulses(sim, problem) && settle_walls(sim, problem);
+    return receive_impulses(sim, problem) &&
+           (!follow || follow_walls(sim, false, HUGE_VAL, problem)) && settle_moved(sim, problem);
 }
 
 static bool event_due(const State *state, double time) {
@@ -33,22 +35,6 @@ static bool apply_pending(Simulation *sim, Problem *problem) {
     sim->state.arc.valid = false;
     sim->state.pending.kind = EVENT_NONE;
     return apply_event(sim, &event, problem);
-}
-
-/* Whether this continues an interrupted communication step to the same end, up to the round-off of
- * an importer that adds the rest of the step to the time. */
-static bool continues(const Simulation *sim, double time) {
-    const State *state = &sim->state;
-    double rounding = TIME_SUM_RTOL * (fabs(time) + fabs(state->time));
-    return state->interrupted && fabs(state->step_end - time) <= rounding &&
-           !values_changed(sim) && !inputs_changed(sim);
-}
-
-/* Stop at a time, maybe before the end of the communication step; the walls continue until then. */
-static void interrupt(State *state, double time, double end) {
-    state->time = time;
-    state->interrupted = time < end;
-    state->step_end = end;
 }
 
 /* Reject a target time in the past or more than STEPS_MAX steps ahead. */
@@ -67,23 +53,17 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
     return true;
 }
 
-/* Begin a communication step: plan the walls and take over changed inputs and parameters. */
+/* Begin a communication step: join the walls to their references, and take over changed inputs and
+ * parameters.  After an interruption the references go on unless an input of a wall has changed. */
 static bool begin_step(Simulation *sim, double time, Problem *problem) {
     State *state = &sim->state;
-    Wall planned[STOPS_MAX];
-    bool walls = plan_walls(sim, time, planned), rest = within_step(sim, time);
-    double begins = state->time, due = due_walls(sim);
-    if ((walls || values_changed(sim) || inputs_changed(sim)) && !restart(sim, planned, problem)) {
-        return false;
+    Wall joined[STOPS_MAX];
+    bool goes_on = state->interrupted && same_walls(sim) && !values_changed(sim);
+    bool walls = !goes_on && join_walls(sim, time, joined);
+    if (walls || values_changed(sim) || inputs_changed(sim)) {
+        return restart(sim, walls ? joined : state->walls, false, problem);
     }
-    if (!rest) {
-        state->due = due;
-        state->planned = begins;
-    }
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        state->swift[i] = state->swift[i] || given_velocity(sim, i) != 0.0;
-    }
-    state->walls_continue = rest && time < state->step_end;
+    copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
     return true;
 }
 
@@ -95,7 +75,7 @@ typedef struct {
 static bool advance(Simulation *sim, double time, Stops stops, bool *event, Problem *problem) {
     State *state = &sim->state;
     *event = false;
-    if (!continues(sim, time) && !begin_step(sim, time, problem)) {
+    if (!begin_step(sim, time, problem)) {
         return false;
     }
     state->interrupted = false;
@@ -103,7 +83,8 @@ static bool advance(Simulation *sim, double time, Stops stops, bool *event, Prob
         if (event_due(state, time)) {
             if (stops.events) {
                 *event = true;
-                interrupt(state, state->pending.time, time);
+                state->time = state->pending.time;
+                state->interrupted = state->time < time;
                 return true;
             }
             if (!apply_pending(sim, problem)) {
@@ -114,7 +95,8 @@ static bool advance(Simulation *sim, double time, Stops stops, bool *event, Prob
             break;
         }
         if (stops.steps && stepped) {
-            interrupt(state, state->front_time, time);
+            state->time = state->front_time;
+            state->interrupted = true;
             return true;
         }
         if (!take_step(sim, problem)) {
@@ -159,43 +141,41 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* --- event mode ------------------------------------------------------------------------------- */
 
-/* Apply the pending event, if any, with the inputs that have been set, and the impulses. */
-static bool apply_here(Simulation *sim, bool event, bool inputs, bool impulses, Problem *problem) {
-    State *state = &sim->state;
-    int s = system_of(sim)->s;
-    double acted[STOPS_MAX];
-    for (int i = 0; i < s; i++) {
-        acted[i] = *acting_velocity(sim, i);
-    }
-    if (inputs) {
-        walls_at_event(sim, acted);
-        copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
-        set_inputs(sim);
-    }
-    bool right = !event || apply_pending(sim, problem);
-    if (right && impulses) {
-        Wall walls[STOPS_MAX];
-        memcpy(walls, state->walls, (size_t)s * sizeof *walls);
-        right = restart(sim, walls, problem);
-    }
-    if (inputs || impulses) {
-        for (int i = 0; i < s; i++) {
-            *acting_velocity(sim, i) = acted[i];
+/* Whether stop.velocity has been set to another value since it acted. */
+static bool velocities_changed(const Simulation *sim) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        if (velocity_change(sim, i) != 0.0) {
+            return true;
         }
-        state->walls_continue = state->walls_continue || state->interrupted;
-        state->interrupted = false;
     }
-    return right;
+    return false;
+}
+
+/* Change the velocities of the walls as stop.velocity has changed, and apply the pending event, if
+ * any, with the inputs that have been set, and the impulses. */
+static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *problem) {
+    State *state = &sim->state;
+    Wall walls[STOPS_MAX];
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        walls[i] = pushed_wall(&state->walls[i], state->time, velocity_change(sim, i));
+    }
+    if (!event) {
+        return restart(sim, walls, !impulses, problem);
+    }
+    memcpy(state->walls, walls, (size_t)system_of(sim)->s * sizeof *walls);
+    copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
+    set_inputs(sim);
+    return follow_walls(sim, false, HUGE_VAL, problem) && apply_pending(sim, problem) &&
+           (!impulses || restart(sim, state->walls, false, problem));
 }
 
 PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     Simulation *sim = simulation;
     bool event = event_due(&sim->state, sim->state.time), impulses = impulses_changed(sim);
-    bool inputs = event && inputs_changed(sim);
-    if (!event && !impulses) {
+    if (!event && !impulses && !velocities_changed(sim)) {
         return true;
     }
     keep_backup(sim);
     sim->present.fresh = NOTHING;
-    return attempt(sim, apply_here(sim, event, inputs, impulses, problem), problem);
+    return attempt(sim, apply_here(sim, event, impulses, problem), problem);
 }

@@ -47,6 +47,9 @@ enum { RESTING_SETS_MAX = 12 };
 enum { EVENTS_MAX = 1000 };
 #define EVENT_WINDOW_RTOL 0.005
 #define WALL_PATH_RTOL 1e-13
+#define WALL_FADING_FACTOR 0.3333333333333333
+#define WALL_LONGEST_RTOL 0.1
+#define WALL_STEP_RTOL 0.5
 #define WALL_MOBILITY_MAX 1e+100
 enum { IMPACT_COUNT_MAX = 2147483647 };
 #define EVENT_TIME_ATOL 1e-13
@@ -73,6 +76,7 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define STEP_SUM_RTOL 1e-06
 #define STOP_TIME_RTOL 0.001
 #define DRIFT_RTOL 1e-08
+#define MOVING_DRIFT_FACTOR 100.0
 #define DRIFT_CORRECTED_RTOL 1e-12
 #define PENETRATION_WARNING_RTOL 0.01
 #define GAP_CLOSED_RTOL 1e-12
@@ -205,6 +209,17 @@ enum { AXES = 2 };
 enum { STAGES = 8 };
 enum { ORDER = 5 };
 enum { DENSE = 4 };
+#define STAGE_TIMES \
+    { \
+        0.0, \
+        0.16666666666666666, \
+        0.2222222222222222, \
+        0.4285714285714286, \
+        0.6666666666666665, \
+        0.75, \
+        1.0, \
+        1.0, \
+    }
 #define STAGE_WEIGHTS \
     { \
         {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0}, \

@@ -153,6 +153,7 @@ def _tableau(tableau: Tableau) -> Iterator[str]:
     yield _constant("STAGES", stages)
     yield _constant("ORDER", tableau.order)
     yield _constant("DENSE", dense)
+    yield _array("STAGE_TIMES", tableau.c)
     yield _array("STAGE_WEIGHTS", tableau.a)
     yield _array("ERROR_WEIGHTS", tableau.error)
     yield _array("DENSE_WEIGHTS", tableau.dense)

@@ -198,7 +198,7 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
         return false;
     }
     copy(m->input_count, state->given, state->acting_given);
-    place_walls(sim, true);
+    start_walls(sim);
     state->front_time = state->time;
     set_inputs(sim);
     copy(n, state->arc.y, state->front); /* angles of the last step: the shape is near them */
@@ -224,7 +224,7 @@ PRBM bool exchange_rates(Simulation *sim, Problem *problem) {
     }
     rates->y = sim->state.front;
     if (!rates->evaluated) {
-        rates->evaluated = rate(&sim->equations, rates->y, NULL, &rates->evaluation, rates->rates,
+        rates->evaluated = rate(&sim->equations, sim->state.time, rates->y, NULL, &rates->evaluation, rates->rates,
                                 problem);
     }
     return rates->evaluated;
@@ -326,32 +326,26 @@ static double lifted_guard(const Simulation *sim, int kind, int contact) {
     return kind == EVENT_REVERSAL ? z + 0.5 * zero_speed(&sim->configuration) : z;
 }
 
-/* How much the velocity of a wall may change under a resting body before that is an event: the
- * wall's acceleration is unknown, and an impact slower than rest_speed ends in rest. */
-static double turn_allowed(const Simulation *sim, int i) {
-    const Stop *stop = &sim->configuration.mechanism->stops[i];
-    return greater(0.5 * stop_field(sim, stop->rest_speed),
-                   10.0 * zero_speed(&sim->configuration));
-}
-
-/* The change of a wall's velocity since the last event. */
-static double wall_turn(const Simulation *sim, int i) {
-    return sim->state.walls[i].rate - sim->state.held_rates[i];
-}
-
 /* Positive while an open gap stays open.  An opening gap is lifted off zero, so that its indicator
  * is positive right after an impact, where the gap is zero up to round-off. */
 static double impact_indicator(const Simulation *sim, int i) {
     Instant at = present_instant(sim);
-    double speed = gap_rate(&sim->equations, i, at.e, at.v);
+    double speed = gap_rate(&sim->equations, i, at.time, at.e, at.v);
     double ahead = INDICATOR_LEAD_RTOL * sim->configuration.scales.time * greater(speed, 0.0);
     return (lifted_guard(sim, EVENT_IMPACT, i) + ahead) / sim->configuration.scales.length;
 }
 
-/* Positive while a closed stop is pressed and its wall keeps its velocity. */
+/* The rate at which a closed stop leaves its wall, whose acceleration is unknown. */
+static double leaving_rate(const Simulation *sim, int i) {
+    Instant at = present_instant(sim);
+    return gap_rate(&sim->equations, i, at.time, at.e, at.v);
+}
+
+/* Positive while a closed stop is pressed and its wall has not changed its velocity by half of what
+ * keeps it closed. */
 static double release_indicator(const Simulation *sim, int i) {
     double pressed = lifted_guard(sim, EVENT_RELEASE, i) / force_scale(sim);
-    double steady = (turn_allowed(sim, i) - fabs(wall_turn(sim, i))) / speed_scale(sim);
+    double steady = (0.5 * jump_allowed(sim, i) - fabs(leaving_rate(sim, i))) / speed_scale(sim);
     return lesser(pressed, steady);
 }
 
@@ -387,15 +381,13 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
 
 /* --- drift ------------------------------------------------------------------------------------ */
 
-/* The drift of a closed stop off its wall and off the velocity at which it was closed, in units of
- * size and speed.  While the wall changes its velocity its position does not count. */
+/* The drift of a closed stop off its wall, in units of size and speed.  While the wall moves, with
+ * an unknown acceleration, the indicator watches the speed. */
 static double stop_drift(const Simulation *sim, int i) {
     Instant at = present_instant(sim);
-    double turn = wall_turn(sim, i);
     double off = fabs(gap(&sim->equations, i, at.time, at.e)) / system_of(sim)->length;
-    double speed = fabs(gap_rate(&sim->equations, i, at.e, at.v) - turn);
-    bool turned = fabs(turn) > zero_speed(&sim->configuration);
-    return greater(turned ? 0.0 : off, speed / speed_scale(sim));
+    double speed = fabs(leaving_rate(sim, i)) / speed_scale(sim);
+    return sim->state.walls[i].rate != 0.0 ? off / MOVING_DRIFT_FACTOR : greater(off, speed);
 }
 
 /* The largest drift of the closed stops and the sticking contacts. */
@@ -424,99 +416,10 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
     return true;
 }
 
-/* --- walls that change their velocity --------------------------------------------------------- */
-
 /* The front has changed: its rates and outputs are no longer up to date. */
 static void changed_front(Simulation *sim) {
     sim->rates.evaluated = false;
     sim->present.fresh = NOTHING;
-}
-
-/* Whether an impulse on a closed stop pulls more than it was pressed since the last event: then its
- * wall has retreated faster than the body could follow. */
-static bool left_behind(const Simulation *sim, int stop, double P) {
-    double since = sim->state.time - sim->state.held_times[stop];
-    return -P > greater(lifted_guard(sim, EVENT_RELEASE, stop), 0.0) * since;
-}
-
-/* Solve for the changes of velocities, and minus the impulses behind them, that bring the active
- * rows (r, n) to their prescribed rates. */
-static bool following_impulses(Simulation *sim, double *rows, double *x, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const Equations *q = &sim->equations;
-    const System *system = system_of(sim);
-    const double *v = sim->state.front + system->n;
-    int n = system->n, r = q->r, size = n + r;
-    Instant at = present_instant(sim);
-    double *M = take_matrix(&sim->scratch, n, n), *C = take_matrix(&sim->scratch, n, n);
-    double *kkt = take_matrix(&sim->scratch, size, size);
-    jacobian(&q->active, at.e, rows);
-    inertia(n, system->H, system->J, at.e, M, C);
-    saddle(n, r, M, rows, rows, kkt);
-    zeros(n, x);
-    for (int k = 0; k < r; k++) {
-        x[n + k] = -(dot(n, rows + k * n, v) + prescribed(q, k));
-    }
-    bool right = solve(size, kkt, x, &sim->scratch, problem);
-    sim->scratch.used = mark;
-    return right;
-}
-
-/* The energies of the impulses P = -x on the closed stops, as at an impact. */
-static void book_following(Simulation *sim, const double *rows, const double *x) {
-    const Equations *q = &sim->equations;
-    int n = system_of(sim)->n;
-    double *y = sim->state.front;
-    for (int k = 0; k < q->held_count; k++) {
-        int row = q->first_hold + k;
-        double P = -x[row], wall = sim->state.walls[q->held[k]].rate;
-        double before = dot(n, rows + row * n, y + n) + wall;
-        y[2 * n] -= P * before / 2; /* and nothing after */
-        y[2 * n + 1] -= P * wall;
-    }
-}
-
-/* Give the closed stops the present velocities of their walls, if the forces since the last event
- * bear the change.  The impulses, which may pull a little, are booked as at an impact. */
-static bool follow(Simulation *sim, bool *followed, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const Equations *q = &sim->equations;
-    int n = system_of(sim)->n;
-    double *y = sim->state.front, *rows = take_matrix(&sim->scratch, q->r, n);
-    double *x = take(&sim->scratch, (size_t)(n + q->r));
-    bool right = following_impulses(sim, rows, x, problem);
-    *followed = right;
-    for (int k = 0; right && k < q->held_count; k++) {
-        int i = q->held[k];
-        bool turned = fabs(wall_turn(sim, i)) > zero_speed(&sim->configuration);
-        *followed = *followed && !(turned && left_behind(sim, i, -x[n + q->first_hold + k]));
-    }
-    if (*followed) {
-        book_following(sim, rows, x + n);
-        add_scaled(n, 1.0, x, y + n);
-    }
-    sim->scratch.used = mark;
-    return right && (!*followed || project(q, sim->state.time, y, &sim->scratch, problem));
-}
-
-/* Bring closed stops back onto their walls, open or strike them where a wall has changed its
- * velocity at once; bring sticking contacts back to rest. */
-static bool follow_walls(Simulation *sim, Problem *problem) {
-    bool turned = false, jumped = false, followed = false;
-    bool drifted = drift(sim) > DRIFT_CORRECTED_RTOL;
-    for (int k = 0; k < sim->equations.held_count; k++) {
-        int i = sim->equations.held[k];
-        double turn = fabs(wall_turn(sim, i));
-        turned = turned || turn > zero_speed(&sim->configuration);
-        jumped = jumped || turn > 2.0 * turn_allowed(sim, i);
-    }
-    if (!jumped && (turned || drifted) && !follow(sim, &followed, problem)) {
-        return false;
-    }
-    if (turned || drifted) {
-        changed_front(sim);
-    }
-    return followed || !turned || settle_walls(sim, problem);
 }
 
 /* --- events ----------------------------------------------------------------------------------- */
@@ -538,7 +441,7 @@ static void stop_sliding(Simulation *sim, int contact) {
 static bool closes_here(const Simulation *sim, int stop) {
     Instant at = present_instant(sim);
     double distance = gap(&sim->equations, stop, at.time, at.e);
-    double speed = gap_rate(&sim->equations, stop, at.e, at.v);
+    double speed = gap_rate(&sim->equations, stop, at.time, at.e, at.v);
     bool touches = distance <= TOUCHING_RTOL * system_of(sim)->length;
     return (touches && speed < -zero_speed(&sim->configuration)) ||
            (lifted_guard(sim, EVENT_IMPACT, stop) <= 0.0 && speed < 0.0);
@@ -564,7 +467,7 @@ static Event due_here(const Simulation *sim, bool *struck) {
     return event;
 }
 
-/* After an event: the gaps at which stops close from here on, and the velocities of the walls. */
+/* After an event: the gaps at which stops close from here on. */
 static void arm(Simulation *sim) {
     State *state = &sim->state;
     Instant at = present_instant(sim);
@@ -573,9 +476,8 @@ static void arm(Simulation *sim) {
         if (state->modes[i] == CONTACT_OPEN) {
             state->floors[i] += greater(0.0, -gap(&sim->equations, i, at.time, at.e));
         }
-        state->held_rates[i] = state->walls[i].rate;
-        state->held_times[i] = state->time;
     }
+    state->point = state->time;
 }
 
 /* Apply the impulses and the changes of the walls. */
@@ -584,11 +486,10 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
     if (!exchange_rates(sim, problem) || !receive_impulses(sim, problem)) {
         return false;
     }
-    if (!impulses) {
-        return follow_walls(sim, problem);
-    }
+    bool drifted = drift(sim) > DRIFT_CORRECTED_RTOL;
     changed_front(sim);
-    return exchange_rates(sim, problem) && settle_walls(sim, problem);
+    return impulses ? exchange_rates(sim, problem) && settle_moved(sim, problem)
+                    : follow_walls(sim, drifted, sim->state.time - sim->state.point, problem);
 }
 
 static bool apply_due_events(Simulation *sim, Problem *problem) {

@@ -546,7 +546,8 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k], h = q->first_hold + k;
         double velocity = wall_change(t, i)[1];
-        sum -= multiplier_change(t, h) * q->inputs.walls[i].rate + multiplier(t, h) * velocity;
+        double w = wall_motion(&q->inputs.walls[i], t->sim->state.time).v;
+        sum -= multiplier_change(t, h) * w + multiplier(t, h) * velocity;
     }
     return sum;
 }
@@ -558,18 +559,17 @@ static double sign_times(double x, double change) {
 
 static double impact_indicator_change(const Tangent *t, int i) {
     const Scales *scales = &t->sim->configuration.scales;
-    bool opens = gap_rate(t->q, i, t->e, t->v) > 0.0;
+    bool opens = gap_rate(t->q, i, t->sim->state.time, t->e, t->v) > 0.0;
     double ahead = opens ? INDICATOR_LEAD_RTOL * scales->time * gap_rate_change(t, i) : 0.0;
     return (gap_change(t, i) + ahead) / scales->length;
 }
 
 static double release_indicator_change(const Tangent *t, int i) {
     const Simulation *sim = t->sim;
-    double velocity = wall_change(t, i)[1];
     double pressed = lifted_guard(sim, EVENT_RELEASE, i) / force_scale(sim);
     return pressed <= release_indicator(sim, i)
                ? multiplier_change(t, t->q->first_hold + held_at(t->q, i)) / force_scale(sim)
-               : -sign_times(wall_turn(sim, i), velocity) / speed_scale(sim);
+               : -sign_times(leaving_rate(sim, i), gap_rate_change(t, i)) / speed_scale(sim);
 }
 
 static double slip_indicator_change(const Tangent *t, int contact) {

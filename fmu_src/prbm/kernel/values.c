@@ -55,7 +55,7 @@ PRBM bool present_rates(Simulation *sim, Problem *problem) {
     rates->y = sim->present.y;
     rates->evaluated = false;
     return update_outputs(sim, PLACES, problem) &&
-           rate(&sim->equations, rates->y, NULL, &rates->evaluation, rates->rates, problem);
+           rate(&sim->equations, sim->state.time, rates->y, NULL, &rates->evaluation, rates->rates, problem);
 }
 
 /* A derivative of a state. */

@@ -118,7 +118,8 @@ class Equations:
         self.w_input = system.spread(w)
         self.w = self.w_input + system.spread(forces.field_row(system.S, system.gravity))
         self.driven = bool(np.any(self.w_input) or np.any(self.moment))
-        self.moving_walls = any(inputs.walls[i].rate for i in self.held)
+        held = [inputs.walls[i] for i in self.held]
+        self.moving_walls = any(wall.rate or wall.span for wall in held)
 
     def _stack_rows(self) -> None:
         """Stack the rows of the active constraints: loops, held stops, sticking contacts."""
@@ -150,11 +151,13 @@ class Equations:
 
     # -- motion --
 
-    def evaluate(self, q: Real, v: Real) -> Evaluation:
+    def evaluate(self, t: float, q: Real, v: Real) -> Evaluation:
         """Return accelerations, multipliers, mass matrix and factors.
 
         Parameters
         ----------
+        t : float
+            Time, for the accelerations of walls [s].
         q, v : (n,)
             Angles and rates [rad], [rad/s].
 
@@ -164,7 +167,7 @@ class Equations:
             If the equations are singular.
         """
         torques = self.torques(np.concatenate([q, v]))
-        return self._solve(q, v, torques[: self.n])
+        return self._solve(t, q, v, torques[: self.n])
 
     def torques(self, y: Real) -> Real:
         """Return the torques that springs and their damping take up, and those of the damping.
@@ -183,7 +186,7 @@ class Equations:
         result -= self._straight
         return result
 
-    def _solve(self, q: Real, v: Real, torques: Real) -> Evaluation:
+    def _solve(self, t: float, q: Real, v: Real, torques: Real) -> Evaluation:
         """Solve the equations for given torques of the springs.
 
         All that depends on e comes from one product, row by row:
@@ -208,6 +211,8 @@ class Equations:
         right: Real = (G[1:] @ (w * w)).imag if np.iscomplexobj(w) else G.imag[1:] @ (v * v)
         if len(carried):
             right[carried] = self.rows.carried_convective(e, v, w)
+        if self.moving_walls:
+            right[n + self.first_hold : n + self.first_stick] -= self.held_motions(t)[2]
         Q = right[:n]
         Q += G.real[0]
         Q -= torques
@@ -233,14 +238,14 @@ class Equations:
 
     def rate(self, t: float, y: Real) -> Real:
         """Return dy/dt for y = (q, v, dissipated energy, work), (2 n + 2,)."""
-        return self.rate_and_evaluation(y)[0]
+        return self.rate_and_evaluation(t, y)[0]
 
-    def rate_and_evaluation(self, y: Real) -> tuple[Real, Evaluation]:
+    def rate_and_evaluation(self, t: float, y: Real) -> tuple[Real, Evaluation]:
         """Return dy/dt for y = (q, v, dissipated energy, work), and the evaluation there."""
         n = self.n
         q, v = y[:n], y[n : 2 * n]
         torques = self.torques(y[: 2 * n])
-        evaluation = self._solve(q, v, torques[:n])
+        evaluation = self._solve(t, q, v, torques[:n])
         lam = evaluation.lam
         result = np.empty(2 * n + 2)
         result[:n] = v
@@ -252,7 +257,7 @@ class Equations:
         if self.slipping_points or self.slipping_stops:
             result[2 * n] += self._friction_power(q, v, lam)
         if self.driven or self.moving_walls:
-            result[2 * n + 1] = self._input_power(q, v, lam)
+            result[2 * n + 1] = self._input_power(t, q, v, lam)
         return result, evaluation
 
     def _friction_power(self, q: Real, v: Real, lam: Real) -> float:
@@ -267,25 +272,29 @@ class Equations:
             power += self.stop_friction[i] * force * self.contacts.modes[i].slip * rate
         return power
 
-    def _input_power(self, q: Real, v: Real, lam: Real) -> float:
+    def _input_power(self, t: float, q: Real, v: Real, lam: Real) -> float:
         """Return the power of the inputs and of the moving walls of held stops [W]."""
         power = 0.0
         if self.driven:
             e = self.system.directions(q)
             power += float((forces.generalised(self.w_input, e) + self.moment) @ v)
-        for k, i in enumerate(self.held):
-            power -= float(lam[self.first_hold + k]) * self.inputs.walls[i].rate
+        if self.moving_walls:
+            power -= float(lam[self.first_hold : self.first_stick] @ self.held_motions(t)[1])
         return power
 
     # -- constraints --
+
+    def held_motions(self, t: float) -> Real:
+        """Return positions, velocities and accelerations of the walls of held stops, (3, h)."""
+        return np.array([self.inputs.walls[i].motion(t) for i in self.held]).T
 
     def offsets(self, t: float) -> Real:
         """Return the constant parts of the active constraints at time t [m]."""
         if not self.moving_walls:
             return self.rows.c
         c = self.rows.c.copy()
-        for k, i in enumerate(self.held):
-            c[self.first_hold + k] = self.system.gaps_c[i] + self.inputs.walls[i].at(t)
+        c[self.first_hold : self.first_stick] = self.system.gaps_c[self.held]
+        c[self.first_hold : self.first_stick] += self.held_motions(t)[0]
         return c
 
     def project(self, t: float, y: Real) -> Real:
@@ -304,8 +313,8 @@ class Equations:
         )
         rows = self.rows.jacobian(e)
         rates = np.zeros(len(rows))
-        for k, i in enumerate(self.held):
-            rates[self.first_hold + k] = self.inputs.walls[i].rate
+        if self.moving_walls:
+            rates[self.first_hold : r] = self.held_motions(t)[1]
         result = y.copy()
         result[:n] = q
         M, _ = inertia(self.system.H, self.J, e)
@@ -340,8 +349,8 @@ class Equations:
         if not constraints.satisfied(residual, system.length):
             return self.project(t, y)
         rates = self.rows.rates(e, result[n : 2 * n])
-        for k, i in enumerate(self.held):
-            rates[self.first_hold + k] += self.inputs.walls[i].rate
+        if self.moving_walls:
+            rates[self.first_hold : r] += self.held_motions(t)[1]
         right[n:] = -rates
         result[n : 2 * n] += constraints.solve_again(factors, right)[:n]
         return result
@@ -350,13 +359,13 @@ class Equations:
 
     def gaps(self, t: float | Real, e: Complex) -> Real:
         """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row a time t."""
-        walls = np.array([wall.at(t) for wall in self.inputs.walls]).T
+        walls = np.array([wall.motion(t)[0] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.values(e) + walls
         return result
 
-    def gap_rates(self, e: Complex, v: Real) -> Real:
-        """Return the rates of all gaps [m/s]; ``e`` and ``v`` may be stacks (m, n)."""
-        walls = np.array([wall.rate for wall in self.inputs.walls])
+    def gap_rates(self, t: float | Real, e: Complex, v: Real) -> Real:
+        """Return the rates of all gaps [m/s]; as for :meth:`gaps`."""
+        walls = np.array([wall.motion(t)[1] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.rates(e, v) + walls
         return result
 

@@ -1,8 +1,10 @@
 """Inputs of a mechanism: their names and units, and their values as the equations use them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
+
+import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.names import unknown
@@ -25,30 +27,76 @@ T = TypeVar("T", float, Real, float | Real)
 
 @dataclass(frozen=True)
 class Wall:
-    """A wall in uniform motion along the direction of its stop.
+    """A wall that joins its reference, a uniform motion, along a cubic.
+
+    With tau = t - since and s = min(tau / span, 1), the wall is at
+
+        x = position + rate tau + offset (1 - 3 s^2 + 2 s^3) + excess span (s - 2 s^2 + s^3).
 
     Parameters
     ----------
     position : float
-        At the time ``since`` [m].
+        Of the reference at the time ``since`` [m].
     rate : float
-        Velocity [m/s].
+        Velocity of the reference [m/s].
     since : float
         [s].
+    offset : float
+        How far the wall is ahead of its reference at the time ``since`` [m].
+    excess : float
+        How much faster than its reference it is then [m/s].
+    span : float
+        Time after which it is on its reference [s]; 0: it is.
 
     Examples
     --------
-    >>> Wall(0.1, rate=2.0, since=1.0).at(1.5)
-    1.1
+    >>> Wall(0.1, rate=2.0, since=1.0).motion(1.5)
+    (1.1, 2.0, 0.0)
+    >>> [float(part) for part in Wall(0.0, offset=1.0, span=2.0).motion(1.0)]
+    [0.5, -0.75, 0.0]
     """
 
     position: float
     rate: float = 0.0
     since: float = 0.0
+    offset: float = 0.0
+    excess: float = 0.0
+    span: float = 0.0
 
-    def at(self, t: T) -> T:
-        """Return the position at time t [m]."""
+    @property
+    def end(self) -> float:
+        """Time at which the wall is on its reference [s]."""
+        return self.since + self.span
+
+    def reference(self, t: T) -> T:
+        """Return the position of the reference at time t [m]."""
         return self.position + self.rate * (t - self.since)
+
+    def motion(self, t: T) -> tuple[T, T, T]:
+        """Return position, velocity and acceleration at time t [m], [m/s], [m/s^2].
+
+        The acceleration is that of the cubic to its end, included, and beyond: the wall is to be
+        replaced by its reference there.
+        """
+        x, zero = self.reference(t), 0.0 * t
+        if not self.span:
+            return x, self.rate + zero, zero
+        e, u, T = self.offset, self.excess, self.span
+        s = np.minimum((t - self.since) / T, 1.0) + zero
+        x = x + e * (1.0 + s * s * (2.0 * s - 3.0)) + u * T * s * (1.0 - s) ** 2
+        velocity = self.rate + 6.0 * e / T * s * (s - 1.0) + u * (1.0 - s) * (1.0 - 3.0 * s)
+        acceleration = (6.0 * e / T * (2.0 * s - 1.0) + u * (6.0 * s - 4.0)) / T
+        return x, velocity, acceleration
+
+    def pushed(self, t: float, change: float) -> "Wall":
+        """Return the wall after a change of its velocity and that of its reference [m/s]."""
+        x, velocity, _ = (float(part) for part in self.motion(t))
+        here = self.reference(t)
+        return Wall(here, self.rate + change, t, x - here, velocity - self.rate, self.span)
+
+    def arrived(self) -> "Wall":
+        """Return the wall on its reference."""
+        return replace(self, offset=0.0, excess=0.0, span=0.0)
 
 
 @dataclass(frozen=True)

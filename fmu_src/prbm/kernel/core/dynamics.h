@@ -5,10 +5,11 @@
 #include "core/evaluation.h"
 
 /* The rates dy of y = (q, v, dissipated energy, work), and their evaluation. */
-PRBM bool rate(const Equations *equations, const double *y, const Reference *near,
+PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
                Evaluation *result, double *dy, Problem *problem);
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e);
-PRBM double gap_rate(const Equations *equations, int i, const Complex *e, const double *v);
+PRBM double gap_rate(const Equations *equations, int i, double t, const Complex *e,
+                     const double *v);
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,
                         const double *a, Complex *force, double *moment, Scratch *scratch);
 

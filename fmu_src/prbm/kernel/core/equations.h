@@ -5,10 +5,16 @@
 #include "core/constraints.h"
 #include "core/contact_state.h"
 
-/* A wall in uniform motion: its position along the direction of the stop. */
+/* A wall that joins its reference, a uniform motion, along a cubic: at the time since it is ahead by
+ * the offset and faster by the excess, and after the span it is on it. */
 typedef struct {
-    double position, rate, since;
+    double position, rate, since, offset, excess, span;
 } Wall;
+
+/* Position along the direction of the stop, velocity and acceleration. */
+typedef struct {
+    double x, v, a;
+} WallMotion;
 
 typedef struct {
     const double *forces;  /* (3 b,): x, y, moment of each force */
@@ -47,6 +53,6 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 /* Set up the rows and loads of a contact state. */
 PRBM void set_equations(Equations *equations, const Inputs *inputs,
                         const ContactState *contacts, double omega);
-PRBM double wall_at(const Wall *wall, double t);
+PRBM WallMotion wall_motion(const Wall *wall, double t);
 
 #endif

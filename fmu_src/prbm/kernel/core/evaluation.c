@@ -443,13 +443,23 @@ RARE void add_coriolis(const System *system, Evaluation *result) {
     }
 }
 
-/* Solve for a and lam at the angles and rates of the evaluation. */
-SIZED bool motion_of_length(int even, const Equations *q, const Reference *near,
+/* Held stops accelerate with their walls. */
+RARE void add_walls(const Equations *q, double t, double *right) {
+    for (int k = 0; k < q->held_count; k++) {
+        right[q->first_hold + k] -= wall_motion(&q->inputs.walls[q->held[k]], t).a;
+    }
+}
+
+/* Solve for a and lam at a time, and the angles and rates of the evaluation. */
+SIZED bool motion_of_length(int even, const Equations *q, double t, const Reference *near,
                             Evaluation *result) {
     directions_of(even, q->system, near, &result->at);
     find_loads(even, q, result);
     add_springs(even, q, result);
     rows_of_length(even, q, &result->at, result->factors.Z, result->lam);
+    if (q->walls_push) {
+        add_walls(q, t, result->lam);
+    }
     add_rubs(q, result);
     if (!factor_motion(even, q, result)) {
         return false;
@@ -461,12 +471,12 @@ SIZED bool motion_of_length(int even, const Equations *q, const Reference *near,
     return true;
 }
 
-PRBM bool evaluate_equations(const Equations *equations, const double *q, const double *v,
-                             const Reference *near, Evaluation *result, Problem *problem) {
+PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
+                             const double *v, const Reference *near, Evaluation *result, Problem *problem) {
     int n = equations->system->n;
     pad(n, q, result->at.angle);
     pad(n, v, result->at.speed);
-    return motion_of_length(equations->system->even, equations, near, result) ||
+    return motion_of_length(equations->system->even, equations, t, near, result) ||
            fail(problem, "%s", SINGULAR);
 }
 

@@ -36,8 +36,8 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
 PRBM void set_reference(Reference *reference, const System *system, const double *angle);
 /* Accelerations a (n,) and multipliers lam (r,): loops, closed stops (> 0 pushes), what sticks.
  * near: a reference near q, or NULL. */
-PRBM bool evaluate_equations(const Equations *equations, const double *q, const double *v,
-                             const Reference *near, Evaluation *result, Problem *problem);
+PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
+                             const double *v, const Reference *near, Evaluation *result, Problem *problem);
 /* Only the factors of the equations at a state. */
 PRBM bool factor_equations(const Equations *equations, const double *q, const double *v,
                            const Reference *near, Evaluation *result, Problem *problem);

@@ -10,15 +10,15 @@
 static double offset(const Equations *q, int k, double t) {
     if (k >= q->first_hold && k < q->first_stick) {
         int i = q->held[k - q->first_hold];
-        return q->system->gaps_c[i] + wall_at(&q->inputs.walls[i], t);
+        return q->system->gaps_c[i] + wall_motion(&q->inputs.walls[i], t).x;
     }
     return q->c[k];
 }
 
-/* The part of the rate of an active constraint that is prescribed. */
-static double prescribed(const Equations *q, int k) {
+/* The part of the rate of an active constraint that is prescribed at time t. */
+static double prescribed(const Equations *q, int k, double t) {
     bool holds = k >= q->first_hold && k < q->first_stick;
-    return holds ? q->inputs.walls[q->held[k - q->first_hold]].rate : 0.0;
+    return holds ? wall_motion(&q->inputs.walls[q->held[k - q->first_hold]], t).v : 0.0;
 }
 
 PRBM bool project(const Equations *equations, double t, double *y, Scratch *scratch,
@@ -30,7 +30,7 @@ PRBM bool project(const Equations *equations, double t, double *y, Scratch *scra
     Complex *e = (Complex *)take(scratch, 2 * n);
     for (int k = 0; k < q->r; k++) {
         c[k] = offset(q, k, t);
-        rates[k] = prescribed(q, k);
+        rates[k] = prescribed(q, k, t);
     }
     Rows positions = q->active;
     positions.count = q->first_stick;
@@ -82,10 +82,11 @@ SIZED double position_residuals(int even, const Equations *q, const Kinematics *
     return worst;
 }
 
-SIZED void velocity_residuals(int even, const Equations *q, Correction *c) {
+SIZED void velocity_residuals(int even, const Equations *q, double t, Correction *c) {
     rows_of_length(even, q, &c->at, c->rows, c->convective);
     for (int k = 0; k < q->r; k++) {
-        c->residual[k] = -(even_dot(even, c->rows + k * even, c->at.speed) + prescribed(q, k));
+        double rate = even_dot(even, c->rows + k * even, c->at.speed);
+        c->residual[k] = -(rate + prescribed(q, k, t));
     }
 }
 
@@ -115,7 +116,7 @@ SIZED bool corrected_of_length(int even, const Equations *q, const Evaluation *e
         return false;
     }
     pad_second(even, n, y, c->at.speed);
-    velocity_residuals(even, q, c);
+    velocity_residuals(even, q, t, c);
     correct(even, q, &evaluation->factors, c, y + n);
     return true;
 }

@@ -5,6 +5,7 @@
 #include "core/matrix.h"
 #include "core/runge_kutta.h"
 
+static const double STAGE_TIME[STAGES] = STAGE_TIMES;
 static const double STAGE[STAGES][STAGES] = STAGE_WEIGHTS;
 static const double ERROR_WEIGHT[STAGES] = ERROR_WEIGHTS;
 static const double DENSE_WEIGHT[STAGES][DENSE] = DENSE_WEIGHTS;
@@ -61,8 +62,8 @@ static void add_to_range(const Equations *q, const Evaluation *evaluation, Force
     }
 }
 
-PRBM bool stages(const Equations *equations, int n, const double *y, double h, double *k,
-                 double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
+PRBM bool stages(const Equations *equations, double t, int n, const double *y, double h,
+                 double *k, double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
                  Problem *problem) {
     for (int i = 0; i < equations->held_count; i++) {
         forces->least[i] = HUGE_VAL;
@@ -71,7 +72,7 @@ PRBM bool stages(const Equations *equations, int n, const double *y, double h, d
     set_reference(reference, equations->system, y);
     for (int i = 1; i < STAGES; i++) {
         combine(n, i, h, STAGE[i], k, y, y1);
-        if (!rate(equations, y1, reference, evaluation, k + i * n, problem)) {
+        if (!rate(equations, t + STAGE_TIME[i] * h, y1, reference, evaluation, k + i * n, problem)) {
             return false;
         }
         add_to_range(equations, evaluation, forces);

@@ -11,8 +11,8 @@ typedef struct {
 
 /* The stages k (STAGES, n), of which the first is given, the new state y1 and its evaluation; the
  * reference becomes that of y. */
-PRBM bool stages(const Equations *equations, int n, const double *y, double h, double *k,
-                 double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
+PRBM bool stages(const Equations *equations, double t, int n, const double *y, double h,
+                 double *k, double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
                  Problem *problem);
 PRBM void error_of(int n, const double *k, double h, double *error);
 PRBM void weights(double theta, double *b);

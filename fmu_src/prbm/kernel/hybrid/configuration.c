@@ -48,8 +48,11 @@ PRBM bool values_changed(const Simulation *sim) {
 }
 
 PRBM bool inputs_changed(const Simulation *sim) {
-    size_t bytes = (size_t)sim->configuration.mechanism->input_count * sizeof(double);
-    return memcmp(sim->state.given, sim->state.acting_given, bytes) != 0;
+    const Mechanism *m = sim->configuration.mechanism;
+    const double *given = sim->state.given, *acting = sim->state.acting_given;
+    size_t from = (size_t)m->input.impulses, count = (size_t)m->input_count;
+    return memcmp(given, acting, (size_t)m->input.walls * sizeof(double)) != 0 ||
+           memcmp(given + from, acting + from, (count - from) * sizeof(double)) != 0;
 }
 
 PRBM double stop_field(const Simulation *sim, Expression field) {

@@ -22,7 +22,7 @@ static void try_mode(Simulation *sim, int contact, int mode) {
 }
 
 static bool evaluate_trial(Simulation *sim, const double *q, const double *v, Problem *problem) {
-    return evaluate_equations(&sim->trial.equations, q, v, NULL, &sim->trial.evaluation, problem);
+    return evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL, &sim->trial.evaluation, problem);
 }
 
 /* The mode of a closed contact with a sliding velocity, CONTACT_FRICTIONLESS at round-off. */
@@ -116,7 +116,8 @@ static bool try_set(Simulation *sim, const Touching *touching, HoldingSet *tried
     for (int k = 0; k < touching->count; k++) {
         int i = touching->stops[k];
         if (sim->trial.contacts.modes[i] == CONTACT_OPEN) {
-            double opening = dot(n, touching->G + i * n, evaluation->a) - touching->convective[i];
+            double opening = dot(n, touching->G + i * n, evaluation->a) - touching->convective[i] +
+                             wall_motion(&sim->state.walls[i], sim->state.front_time).a;
             tried->opening = lesser(tried->opening, opening);
         }
     }
@@ -499,7 +500,7 @@ static bool residual_speed(Simulation *sim, int contact, double *result, Problem
     const System *system = system_of(sim);
     Evaluation *evaluation = &sim->trial.evaluation;
     const double *q = sim->state.front, *v = q + system->n;
-    if (!evaluate_equations(&sim->equations, q, v, NULL, evaluation, problem)) {
+    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, NULL, evaluation, problem)) {
         return false;
     }
     double *row = take(&sim->scratch, (size_t)system->n);
@@ -541,7 +542,7 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
     for (int k = 0; k < touching_count; k++) {
         int i = touching[k];
         if (sim->state.modes[i] == CONTACT_OPEN && gap(&sim->equations, i, t, e) <= near &&
-            gap_rate(&sim->equations, i, e, v) <= bound) {
+            gap_rate(&sim->equations, i, t, e, v) <= bound) {
             candidates[count++] = i;
         }
     }
@@ -577,4 +578,41 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
     return resting.count == 0 ||
            project(&sim->equations, sim->state.front_time, sim->state.front, &sim->scratch,
                    problem);
+}
+
+/* Open the closed stops whose gaps change, by a wall's velocity or an impulse: a wall that retreats
+ * leaves the body; one that advances strikes, as does a body that is thrown against a wall that it
+ * touches.  Returns a stop that is struck, or -1. */
+static int release_moving(Simulation *sim) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int struck = -1;
+    double gaps[STOPS_MAX], rates[STOPS_MAX], bound = zero_speed(&sim->configuration);
+    double t = sim->state.time;
+    Complex *e = directions_at(sim, sim->state.front);
+    for (int i = 0; i < system->s; i++) {
+        gaps[i] = gap(&sim->equations, i, t, e);
+        rates[i] = gap_rate(&sim->equations, i, t, e, sim->state.front + system->n);
+    }
+    sim->scratch.used = mark;
+    for (int i = 0; i < system->s; i++) {
+        bool closed = sim->state.modes[i] != CONTACT_OPEN;
+        if (closed && fabs(rates[i]) > bound) {
+            set_mode(sim, i, CONTACT_OPEN);
+        } else if (closed || gaps[i] > TOUCHING_RTOL * system->length) {
+            continue;
+        }
+        struck = rates[i] < -bound ? i : struck;
+    }
+    return struck;
+}
+
+/* The contact state after changes of wall velocities or impulses. */
+PRBM bool settle_moved(Simulation *sim, Problem *problem) {
+    int struck = release_moving(sim);
+    if (struck >= 0) {
+        return impact(sim, struck, problem);
+    }
+    return project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch, problem) &&
+           settle(sim, NULL, 0, NULL, problem);
 }

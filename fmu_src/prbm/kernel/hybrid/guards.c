@@ -10,7 +10,7 @@ PRBM double gap_guard(const Equations *equations, const Instant *at, int contact
 }
 
 static double gap_rate_guard(const Equations *equations, const Instant *at, int contact) {
-    return gap_rate(equations, contact, at->e, at->v);
+    return gap_rate(equations, contact, at->time, at->e, at->v);
 }
 
 PRBM double release_guard(const Equations *equations, const Instant *at, int contact) {
@@ -64,7 +64,7 @@ static double guard_at(const ArcGuard *guard, double t) {
     arc_at(sim, t, y);
     if (guard->forces) {
         Problem ignored;
-        if (!evaluate_equations(&sim->equations, y, y + system->n, NULL, evaluation, &ignored)) {
+        if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &ignored)) {
             return 0.0;
         }
         at.e = evaluation->at.e;
@@ -152,7 +152,7 @@ static bool polish_impact(Simulation *sim, int stop, double apex, double *time, 
         }
         directions(system_of(sim), y, e);
         double distance = gap(&sim->equations, stop, t, e);
-        double speed = gap_rate(&sim->equations, stop, e, y + n);
+        double speed = gap_rate(&sim->equations, stop, t, e, y + n);
         double change = -distance / speed;
         if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_ATOL * fabs(speed) ||
             fabs(change) > EVENT_CORRECTION_RTOL * sim->state.arc.h) {
@@ -222,7 +222,7 @@ static bool within_reach(Simulation *sim) {
     for (int s = 0; s < system->s; s++) {
         if (watched(&sim->equations, EVENT_IMPACT, s)) {
             const Complex *row = gaps.B + s * n;
-            double reach = near + fabs(sim->state.walls[s].rate) * arc->h;
+            double reach = near + wall_reach(&sim->state.walls[s], arc->h);
             for (int j = 0; j < n; j++) {
                 reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
             }

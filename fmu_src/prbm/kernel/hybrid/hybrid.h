@@ -27,7 +27,7 @@ typedef struct {
 PRBM void set_scales(Configuration *configuration, double frequency);
 PRBM bool take_values(Simulation *sim, Problem *problem); /* the values set become acting ones */
 PRBM bool values_changed(const Simulation *sim);
-PRBM bool inputs_changed(const Simulation *sim);
+PRBM bool inputs_changed(const Simulation *sim); /* but those that move walls */
 PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
 PRBM double stop_field(const Simulation *sim, Expression field);
 
@@ -95,12 +95,11 @@ typedef struct {
     Event pending;        /* located, but not yet applied */
     double window_since;  /* start of the window in which events are counted */
     int window_count;
-    bool interrupted;     /* a communication step was left before its end */
-    double step_end;      /* of that communication step */
-    double planned, due;  /* times at which wall motions were planned and are to be complete */
-    bool walls_continue;  /* inputs came in an event within a step: walls move on to its end */
+    bool interrupted;     /* the communication step was left before its end */
+    double point;         /* the last communication point; in model exchange the last event */
+    double longest;       /* the recent longest communication step */
     int *modes;           /* (s + f,) of the contacts */
-    bool *swift;          /* (s,): whether a wall has been given a velocity */
+    bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
     Latched *latched;     /* (s,) */
     Wall *walls;          /* (s,) */
     double *numbers;      /* the arrays below, one behind the other */
@@ -110,7 +109,7 @@ typedef struct {
     double *received;                     /* (3 b,): impulses that have acted */
     double *front, *k1;                   /* (ny,): the end of the last step, its rates */
     double *floors;                       /* (s,): gaps close this far below zero */
-    double *held_rates, *held_times;      /* (s,): of the walls at the last event, and its time */
+    double *displacements;                /* (s,): stop.displacement at the last point */
     double *states;                       /* model exchange: as they were set */
 } State;
 
@@ -203,17 +202,16 @@ PRBM bool first_event(Simulation *sim, Event *event, Problem *problem);
 
 /* --- walls.c ---------------------------------------------------------------------------------- */
 
-PRBM double given_velocity(const Simulation *sim, int i);
-PRBM double *acting_velocity(const Simulation *sim, int i);
-PRBM double wall_target(const Simulation *sim, int i);
-PRBM void place_walls(Simulation *sim, bool moving);
-PRBM double due_walls(const Simulation *sim);
-PRBM bool within_step(const Simulation *sim, double time);
-PRBM bool plan_walls(const Simulation *sim, double time, Wall *planned);
-PRBM void push_wall(Simulation *sim, int i, double P);
-PRBM void walls_at_event(Simulation *sim, double *acted);
-PRBM bool check_walls(Simulation *sim, Problem *problem);
-PRBM bool settle_walls(Simulation *sim, Problem *problem);
+PRBM void start_walls(Simulation *sim);
+PRBM bool same_walls(const Simulation *sim);
+PRBM bool join_walls(Simulation *sim, double time, Wall *joined);
+PRBM double jump_allowed(const Simulation *sim, int i);
+PRBM double velocity_change(const Simulation *sim, int i);
+PRBM Wall pushed_wall(const Wall *wall, double t, double change);
+PRBM double wall_reach(const Wall *wall, double h);
+PRBM double longest_wall_step(const Simulation *sim);
+PRBM void arrive_walls(Simulation *sim);
+PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem);
 
 /* --- impacts.c -------------------------------------------------------------------------------- */
 
@@ -245,6 +243,7 @@ PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const do
                       const double *v);
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem);
+PRBM bool settle_moved(Simulation *sim, Problem *problem); /* after velocities have jumped */
 
 /* --- stepping.c ------------------------------------------------------------------------------- */
 

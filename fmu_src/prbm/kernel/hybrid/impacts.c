@@ -233,7 +233,7 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
     Inertia at = inertia_at(sim, q);
     Approach approach = {&at, v, {0.0}, {0.0}};
     for (int i = 0; i < system_of(sim)->s; i++) {
-        approach.rates[i] = gap_rate(&sim->equations, i, at.e, v);
+        approach.rates[i] = gap_rate(&sim->equations, i, sim->state.front_time, at.e, v);
         hits->normal[i] = hits->tangential[i] = 0.0;
         hits->with_normal[i] = false;
     }
@@ -269,7 +269,7 @@ static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting
     double *G = take(&sim->scratch, (size_t)system->n), free;
     Rows gaps = gap_rows(system);
     equations_holding(sim, resting, q, v);
-    if (!evaluate_equations(&sim->trial.equations, q, v, NULL, &sim->trial.evaluation, problem)) {
+    if (!evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL, &sim->trial.evaluation, problem)) {
         return false;
     }
     Inertia at = inertia_at(sim, q);
@@ -351,21 +351,23 @@ static void book_energies(Simulation *sim, const Hits *hits, const double *q, co
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     Rows walls = slide_rows(system);
-    double lost = 0.0, work = 0.0, *front = sim->state.front;
+    double lost = 0.0, work = 0.0, *front = sim->state.front, t = sim->state.front_time;
     Complex *e = directions_at(sim, q);
     for (int i = 0; i < system->s; i++) {
-        double wall = sim->state.walls[i].rate, P = hits->normal[i];
-        account->before[i] = gap_rate(&sim->equations, i, e, v);
+        double wall = wall_motion(&sim->state.walls[i], t).v, P = hits->normal[i];
+        account->before[i] = gap_rate(&sim->equations, i, t, e, v);
         if (hits->with_normal[i]) {
-            push_wall(sim, i, P);
+            double change = sim->equations.inputs.mobilities[i] * P;
+            sim->state.walls[i] = pushed_wall(&sim->state.walls[i], t, change);
             sim->state.latched[i].impulse_sum += P;
         }
-        account->after[i] = gap_rate(&sim->equations, i, e, hits->after);
+        account->after[i] = gap_rate(&sim->equations, i, t, e, hits->after);
         double slid = row_rate(&walls, i, e, v) + row_rate(&walls, i, e, hits->after);
         account->lost[i] = -P * (account->before[i] + account->after[i]) / 2 -
                            hits->tangential[i] * slid / 2;
         lost += hits->with_normal[i] ? account->lost[i] : 0.0;
-        work -= hits->with_normal[i] ? P * (wall + sim->state.walls[i].rate) / 2 : 0.0;
+        wall += wall_motion(&sim->state.walls[i], t).v;
+        work -= hits->with_normal[i] ? P * wall / 2 : 0.0;
     }
     copy(system->n, hits->after, front + system->n);
     front[2 * system->n] += lost;
@@ -413,12 +415,12 @@ static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *acco
 static void find_partners(Simulation *sim, int hit, const double *q, const double *v, Hits *hits,
                           double *rates) {
     size_t mark = sim->scratch.used;
-    double near = TOUCHING_RTOL * system_of(sim)->length;
+    double near = TOUCHING_RTOL * system_of(sim)->length, t = sim->state.front_time;
     Complex *e = directions_at(sim, q);
     hits->struck_count = hits->held_count = 0;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        double distance = gap(&sim->equations, i, sim->state.front_time, e);
-        rates[i] = gap_rate(&sim->equations, i, e, v);
+        double distance = gap(&sim->equations, i, t, e);
+        rates[i] = gap_rate(&sim->equations, i, t, e, v);
         if (sim->state.modes[i] != CONTACT_OPEN) {
             hits->held[hits->held_count++] = i;
         } else if (rates[i] < 0.0 && (i == hit || distance <= near)) {
@@ -450,12 +452,12 @@ static bool choose_restitutions(Simulation *sim, const double *q, const double *
 /* Open all stops; returns how many of those that took part do not separate. */
 static int open_all(Simulation *sim, const Hits *hits, int *touching) {
     size_t mark = sim->scratch.used;
-    double bound = zero_speed(&sim->configuration);
+    double bound = zero_speed(&sim->configuration), t = sim->state.front_time;
     int count = 0;
     Complex *e = directions_at(sim, sim->state.front);
     for (int k = 0; k < hits->struck_count + hits->held_count; k++) {
         int i = partner(hits, k);
-        if (gap_rate(&sim->equations, i, e, hits->after) <= bound) {
+        if (gap_rate(&sim->equations, i, t, e, hits->after) <= bound) {
             touching[count++] = i;
         }
     }

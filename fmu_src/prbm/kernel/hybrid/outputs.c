@@ -43,7 +43,7 @@ static void output_stops(const Simulation *sim, double *out) {
     for (int i = 0; i < system->s; i++) {
         double *values = out + PER_STOP * i;
         values[STOP_GAP] = gap(&sim->equations, i, sim->state.time, e);
-        values[STOP_GAP_RATE] = gap_rate(&sim->equations, i, e, v);
+        values[STOP_GAP_RATE] = gap_rate(&sim->equations, i, sim->state.time, e, v);
         values[STOP_POINT_DISPLACEMENT] = -(row_value(&gaps, i, e) + gaps.c[i]) -
                     stop_field(sim, system->mechanism->stops[i].position);
         values[STOP_POINT_VELOCITY] = -row_rate(&gaps, i, e, v);
@@ -105,7 +105,7 @@ static bool output_motion(Simulation *sim, bool near, Problem *problem) {
     const Equations *q = &sim->equations;
     Present *present = &sim->present;
     double *out = present->outputs, *v = present->y + system_of(sim)->n;
-    if (!evaluate_equations(q, present->y, v, near ? &present->reference : NULL,
+    if (!evaluate_equations(q, sim->state.time, present->y, v, near ? &present->reference : NULL,
                             &present->evaluation, problem)) {
         return false;
     }

@@ -47,8 +47,8 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->received, LOADS * (size_t)m->force_count},
         {&state->front, ny},         {&state->k1, ny},
         {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
-        {&state->floors, s},         {&state->held_rates, s},
-        {&state->held_times, s},     {&state->states, 2 * (size_t)m->independent_count + 2},
+        {&state->floors, s},         {&state->displacements, s},
+        {&state->states, 2 * (size_t)m->independent_count + 2},
     };
     state->number_count = 0;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
@@ -66,7 +66,7 @@ static void place_state(State *state, const Mechanism *m, Memory *memory) {
     size_t s = (size_t)m->stop_count;
     place_numbers(state, m, memory);
     state->modes = place(memory, s + (size_t)m->friction_count, sizeof(int));
-    state->swift = place(memory, s, sizeof(bool));
+    state->driven = place(memory, s, sizeof(bool));
     state->latched = place(memory, s, sizeof(Latched));
     state->walls = place(memory, s, sizeof(Wall));
 }
@@ -225,7 +225,7 @@ static void clear_stops(Simulation *sim) {
     size_t s = (size_t)sim->configuration.mechanism->stop_count;
     memset(state->latched, 0, s * sizeof *state->latched);
     memset(state->walls, 0, s * sizeof *state->walls);
-    memset(state->swift, 0, s * sizeof *state->swift);
+    memset(state->driven, 0, s * sizeof *state->driven);
     free_contacts(sim);
 }
 
@@ -233,10 +233,10 @@ static void clear_stops(Simulation *sim) {
 static void clear_progress(State *state, double start_time) {
     const Event none = {EVENT_NONE, 0, 0.0};
     state->started = state->exchange = state->has_k1 = state->arc.valid = false;
-    state->interrupted = state->walls_continue = false;
+    state->interrupted = false;
     state->time = state->front_time = state->window_since = start_time;
-    state->planned = state->due = start_time;
-    state->step_end = state->arc.start = state->arc.h = 0.0;
+    state->point = start_time;
+    state->longest = state->arc.start = state->arc.h = 0.0;
     state->step_size = state->log_of_error = 0.0;
     state->tolerance = state->frequency = 0.0;
     state->window_count = 0;
@@ -337,6 +337,31 @@ static bool start_shape(Simulation *sim, Problem *problem) {
     return right;
 }
 
+/* Reject a penetrated wall at the start, and begin with the impact if one is hit at once. */
+static bool check_walls(Simulation *sim, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int n = system_of(sim)->n, struck = -1;
+    const double *front = sim->state.front, t = sim->state.front_time;
+    Complex *e = directions_at(sim, front);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        double distance = gap(&sim->equations, i, t, e);
+        if (distance < -RELEASE_PENETRATION_ATOL) {
+            double wall = sim->state.walls[i].position;
+            const char *name = sim->configuration.mechanism->stops[i].name;
+            return fail(problem,
+                        "the wall %s is penetrated by %.6g m at release: %s.position = %.6g m, "
+                        "the hit point is at %.6g m; move the stop or release further back",
+                        name, -distance, name, wall, wall - distance);
+        }
+        if (struck < 0 && distance <= RELEASE_PENETRATION_ATOL &&
+            gap_rate(&sim->equations, i, t, e, front + n) < 0.0) {
+            struck = i;
+        }
+    }
+    sim->scratch.used = mark;
+    return struck < 0 || impact(sim, struck, problem);
+}
+
 /* Release the mechanism in its start shape, and choose the contact state there. */
 static bool release_mechanism(Simulation *sim, Problem *problem) {
     int every[STOPS_MAX];
@@ -345,7 +370,7 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
         every[i] = i;
     }
     clear_stops(sim);
-    place_walls(sim, false);
+    start_walls(sim);
     copy(LOADS * sim->configuration.mechanism->force_count, given_impulses(sim), state->received);
     set_inputs(sim);
     return start_shape(sim, problem) &&

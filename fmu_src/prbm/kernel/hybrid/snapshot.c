@@ -4,7 +4,7 @@
 
 #include "hybrid/hybrid.h"
 
-enum { SCALARS = 22, PER_STOP_STATE = 13 }; /* numbers of a simulation and of a stop */
+enum { SCALARS = 20, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
@@ -18,8 +18,9 @@ static double *put_stop(const State *state, int i, double *to) {
     const Latched *last = &state->latched[i];
     const Wall *wall = &state->walls[i];
     const double stop[PER_STOP_STATE] = {
-        state->modes[i],      state->swift[i],     wall->position,
-        wall->rate,           wall->since,         last->count,
+        state->modes[i],      state->driven[i],    wall->position,
+        wall->rate,           wall->since,         wall->offset,
+        wall->excess,         wall->span,          last->count,
         last->time,           last->approach_speed, last->rebound_speed,
         last->impulse,        last->energy_lost,   last->modal_restitution,
         last->impulse_sum,
@@ -33,11 +34,10 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
     const Mechanism *m = simulation->configuration.mechanism;
     const double scalars[SCALARS] = {
         state->started,      state->exchange,       state->has_k1,       state->arc.valid,
-        state->interrupted,  state->walls_continue, state->pending.kind, state->pending.contact,
-        state->window_count, state->pending.time,   state->time,         state->tolerance,
-        state->frequency,    state->step_size,      state->log_of_error, state->front_time,
-        state->arc.start,    state->arc.h,          state->window_since, state->step_end,
-        state->planned,      state->due,
+        state->interrupted,  state->pending.kind,   state->pending.contact, state->window_count,
+        state->pending.time, state->time,           state->tolerance,    state->frequency,
+        state->step_size,    state->log_of_error,   state->front_time,   state->arc.start,
+        state->arc.h,        state->window_since,   state->point,        state->longest,
     };
     memcpy(to, scalars, sizeof scalars);
     to += SCALARS;
@@ -81,7 +81,6 @@ static void get_scalars(State *state, StateReader *reader) {
     state->has_k1 = get_flag(reader);
     state->arc.valid = get_flag(reader);
     state->interrupted = get_flag(reader);
-    state->walls_continue = get_flag(reader);
     state->pending.kind = get_integer(reader, EVENT_NONE, EVENT_REVERSAL);
     state->pending.contact = get_integer(reader, 0, 2 * STOPS_MAX);
     state->window_count = get_integer(reader, 0, EVENTS_MAX);
@@ -95,19 +94,21 @@ static void get_scalars(State *state, StateReader *reader) {
     state->arc.start = get_number(reader);
     state->arc.h = get_number(reader);
     state->window_since = get_number(reader);
-    state->step_end = get_number(reader);
-    state->planned = get_number(reader);
-    state->due = get_number(reader);
+    state->point = get_number(reader);
+    state->longest = get_number(reader);
 }
 
 static void get_stop(State *state, int i, StateReader *reader) {
     Latched *last = &state->latched[i];
     Wall *wall = &state->walls[i];
     state->modes[i] = get_integer(reader, CONTACT_OPEN, CONTACT_SLIP_NEGATIVE);
-    state->swift[i] = get_flag(reader);
+    state->driven[i] = get_flag(reader);
     wall->position = get_number(reader);
     wall->rate = get_number(reader);
     wall->since = get_number(reader);
+    wall->offset = get_number(reader);
+    wall->excess = get_number(reader);
+    wall->span = get_number(reader);
     last->count = get_integer(reader, 0, IMPACT_COUNT_MAX);
     last->time = get_number(reader);
     last->approach_speed = get_number(reader);

@@ -85,7 +85,7 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     const Arc *arc = &sim->state.arc;
     int ny = state_size(sim);
-    if (!stages(&sim->equations, ny, arc->y, h, arc->k, stepping->end, &stepping->reference,
+    if (!stages(&sim->equations, sim->state.front_time, ny, arc->y, h, arc->k, stepping->end, &stepping->reference,
                 &stepping->evaluation, &stepping->forces, problem)) {
         return HUGE_VAL;
     }
@@ -99,8 +99,9 @@ static bool find_step(Simulation *sim, double *h, Problem *problem) {
     State *state = &sim->state;
     int ny = state_size(sim);
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
-    StepSizeController controller = {lesser(wanted, longest_step(sim)), state->log_of_error,
-                                     STEP_GROWTH_MAX};
+    wanted = lesser(wanted, longest_step(sim));
+    double first = lesser(wanted, longest_wall_step(sim));
+    StepSizeController controller = {first, state->log_of_error, STEP_GROWTH_MAX};
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
     do {
@@ -109,7 +110,8 @@ static bool find_step(Simulation *sim, double *h, Problem *problem) {
             return false;
         }
     } while (!next(&controller, step_error(sim, *h, problem)));
-    state->step_size = controller.h;
+    bool cut = *h == first && first < wanted; /* by a wall: it says little about the next step */
+    state->step_size = cut ? greater(controller.h, wanted) : controller.h;
     state->log_of_error = controller.log_of_error;
     return true;
 }
@@ -133,7 +135,8 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
     double h = 0.0;
-    if (!state->has_k1 && !rate(&sim->equations, state->front, NULL, &stepping->evaluation,
+    arrive_walls(sim);
+    if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL, &stepping->evaluation,
                                 state->k1, problem)) {
         return false;
     }

@@ -1,192 +1,174 @@
-/* Motion of the walls between and at communication points: the twin of hybrid/walls.py. */
+/* Moving walls: the twin of hybrid/walls.py. */
 #include <math.h>
 #include <string.h>
 
 #include "hybrid/hybrid.h"
 
-PRBM double given_velocity(const Simulation *sim, int i) {
-    return wall_inputs(sim->configuration.mechanism, sim->state.given, i)[1];
+/* Displacement and velocity of a wall, as they were given. */
+static const double *told(const Simulation *sim, int i) {
+    return wall_inputs(sim->configuration.mechanism, sim->state.given, i);
 }
 
-PRBM double *acting_velocity(const Simulation *sim, int i) {
-    return sim->state.acting_given + sim->configuration.mechanism->input.walls + PER_WALL * i + 1;
+/* Put all walls on their references, with the velocities of these. */
+PRBM void start_walls(Simulation *sim) {
+    State *state = &sim->state;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        const double *d = told(sim, i), v = d[1];
+        double drawn = evaluate(sim->configuration.mechanism->stops[i].position, state->values);
+        Wall wall = {drawn + d[0], v, state->time, 0.0, 0.0, 0.0};
+        state->walls[i] = wall;
+        state->displacements[i] = d[0];
+        state->driven[i] = v != 0.0;
+    }
 }
 
-/* The position that the inputs prescribe now. */
-PRBM double wall_target(const Simulation *sim, int i) {
+/* How much stop.velocity has changed since it acted. */
+PRBM double velocity_change(const Simulation *sim, int i) {
     const Mechanism *m = sim->configuration.mechanism;
-    const double *wall = wall_inputs(m, sim->state.given, i);
-    return evaluate(m->stops[i].position, sim->state.values) + wall[0];
+    return told(sim, i)[1] - wall_inputs(m, sim->state.acting_given, i)[1];
 }
 
-/* Put all walls where the inputs prescribe, at rest or with the velocities of the inputs. */
-PRBM void place_walls(Simulation *sim, bool moving) {
+/* Whether the inputs of the walls are those of the last communication point. */
+PRBM bool same_walls(const Simulation *sim) {
+    bool same = true;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        Wall wall = {wall_target(sim, i), moving ? given_velocity(sim, i) : 0.0,
-                     moving ? sim->state.time : 0.0};
-        sim->state.walls[i] = wall;
+        same = same && told(sim, i)[0] == sim->state.displacements[i] &&
+               velocity_change(sim, i) == 0.0;
     }
+    return same;
 }
 
-/* Whether a wall is given another velocity than the acting one, beyond what its stop counts as
- * rest. */
-static bool velocity_changed(const Simulation *sim, int i, double acting) {
-    double velocity = given_velocity(sim, i);
-    double least = stop_field(sim, sim->configuration.mechanism->stops[i].rest_speed);
-    return velocity != acting && fabs(velocity - sim->state.walls[i].rate) >= least;
+/* The velocity of a reference whose displacement has changed in the last step: the mean over the
+ * recent longest step.  In a step that is longer the reference goes less far than that. */
+static double difference_quotient(double velocity, double change, double last, double longest,
+                                  double following) {
+    double share = lesser(last / longest, 1.0), most = greater(longest, last) / following;
+    velocity += share > 0.0 ? share * (change / last - velocity) : 0.0;
+    return velocity * (most < 1.0 ? most * most : 1.0);
 }
 
-/* --- communication steps ---------------------------------------------------------------------- */
-
-/* Whether a time is within a communication step that an event or the importer has interrupted. */
-PRBM bool within_step(const Simulation *sim, double time) {
-    const State *state = &sim->state;
-    double rounding = TIME_SUM_RTOL * (fabs(time) + fabs(state->time));
-    return (state->walls_continue || state->interrupted) && time <= state->step_end + rounding;
-}
-
-/* The time at which the walls complete their planned motions: as long as the last step took. */
-PRBM double due_walls(const Simulation *sim) {
-    return greater(sim->state.due, 2.0 * sim->state.time - sim->state.planned);
-}
-
-/* The rate of a wall in a step.  It reaches the prescribed position within the step.  A wall that
- * has been given a velocity does not hurry in a step that is shorter than the one before: its
- * rate is limited to that of the longer step, to the change of its velocity or to half of
- * rest_speed. */
-static double wall_rate(const Simulation *sim, int i, double time) {
-    double now = sim->state.time, due = due_walls(sim), velocity = given_velocity(sim, i);
-    double off = wall_target(sim, i) - wall_at(&sim->state.walls[i], now);
-    double correction = off / (time - now);
-    if ((velocity != 0.0 || sim->state.swift[i]) && due > time) {
-        const Stop *stop = &sim->configuration.mechanism->stops[i];
-        double rest_speed = evaluate(stop->rest_speed, sim->state.values);
-        double most = greater(fabs(off) / (due - now), fabs(velocity - *acting_velocity(sim, i)));
-        most = greater(most, 0.5 * rest_speed);
-        correction = lesser(greater(correction, -most), most);
-    }
-    return velocity + correction;
-}
-
-/* Plan uniform motions of the walls up to a time; returns whether one changes.  In the rest of a
- * step after an event a wall continues unless its velocity has changed. */
-PRBM bool plan_walls(const Simulation *sim, double time, Wall *planned) {
-    bool changed = false, rest = within_step(sim, time);
-    double now = sim->state.time, span = time - now;
+/* The walls from a communication point on, to which a step to a time follows; returns whether a
+ * reference has changed.  Before any step the velocity of a wall is that of its reference. */
+PRBM bool join_walls(Simulation *sim, double time, Wall *joined) {
+    State *state = &sim->state;
+    double now = state->time, last = now - state->point, following = time - now;
+    double longest = greater(last > 0.0 ? last : following,
+                             state->longest - WALL_FADING_FACTOR * last);
+    longest = lesser(longest, WALL_LONGEST_RTOL * sim->configuration.scales.time);
+    bool changed = false;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        const Wall *wall = &sim->state.walls[i];
-        double here = wall_at(wall, now);
-        double rate = rest ? given_velocity(sim, i) : wall_rate(sim, i, time);
-        double off = fabs(wall_at(wall, time) - here - rate * span);
-        bool other = rest ? velocity_changed(sim, i, *acting_velocity(sim, i))
-                          : off > WALL_PATH_RTOL * system_of(sim)->length;
-        planned[i] = *wall;
-        if (other) {
-            Wall next = {here, rate, now};
-            planned[i] = next;
+        const Wall *wall = &state->walls[i];
+        const double *d = told(sim, i);
+        double v = d[1], T = 2.0 * longest;
+        double r = evaluate(sim->configuration.mechanism->stops[i].position, state->values) + d[0];
+        double due = wall->position + wall->rate * (now - wall->since);
+        state->driven[i] = state->driven[i] || v != 0.0;
+        if (!state->driven[i]) {
+            double change = d[0] - state->displacements[i];
+            v = difference_quotient(wall->rate, change, last, longest, following);
+        }
+        joined[i] = *wall;
+        if (fabs(r - due) + fabs(v - wall->rate) * T > WALL_PATH_RTOL * system_of(sim)->length) {
+            WallMotion here = wall_motion(wall, now);
+            Wall next = {r, v, now, here.x - r, last > 0.0 ? here.v - v : 0.0, T};
+            joined[i] = next;
             changed = true;
         }
+        state->displacements[i] = d[0];
     }
+    state->point = now;
+    state->longest = longest;
     return changed;
 }
 
-/* --- events ----------------------------------------------------------------------------------- */
-
-/* The change of a wall's velocity by an impulse, until the next plan. */
-PRBM void push_wall(Simulation *sim, int i, double P) {
-    Wall *wall = &sim->state.walls[i];
-    double change = sim->equations.inputs.mobilities[i] * P, t = sim->state.front_time;
-    if (change != 0.0) {
-        Wall pushed = {wall_at(wall, t), wall->rate + change, t};
-        *wall = pushed;
-    }
+/* The jump of a wall's velocity with which a stop that holds keeps holding. */
+PRBM double jump_allowed(const Simulation *sim, int i) {
+    const Stop *stop = &sim->configuration.mechanism->stops[i];
+    return greater(stop_field(sim, stop->rest_speed), 20.0 * zero_speed(&sim->configuration));
 }
 
-/* Inputs that are set while an event is pending act in it: a wall hits with the velocity that it
- * has there, not with its mean over the communication step.  If the closing speed is below
- * rest_speed, the wall keeps its mean velocity, and the body rests on it.  The velocity of a wall
- * that carries a closed stop changes after the event, as at the start of any step.  acted: acting
- * velocities. */
-PRBM void walls_at_event(Simulation *sim, double *acted) {
-    size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    const double *front = sim->state.front;
-    double t = sim->state.time;
-    Complex *e = directions_at(sim, front);
-    for (int i = 0; i < system->s; i++) {
-        double speed = -gap_rate(&sim->equations, i, e, front + system->n);
-        double distance = gap(&sim->equations, i, t, e);
-        bool hits = distance <= TOUCHING_RTOL * system->length &&
-                    speed >= stop_field(sim, sim->configuration.mechanism->stops[i].rest_speed);
-        if (watched(&sim->equations, EVENT_IMPACT, i) &&
-            (hits || velocity_changed(sim, i, acted[i]))) {
-            Wall wall = {wall_at(&sim->state.walls[i], t), given_velocity(sim, i), t};
-            if (acted[i] != wall.rate) {
-                sim->state.walls[i] = wall;
-            }
-            acted[i] = wall.rate;
-        }
-    }
-    sim->scratch.used = mark;
+/* A wall after a change of its velocity and that of its reference. */
+PRBM Wall pushed_wall(const Wall *wall, double t, double change) {
+    double r = wall->position + wall->rate * (t - wall->since);
+    WallMotion here = wall_motion(wall, t);
+    Wall pushed = {r, wall->rate + change, t, here.x - r, here.v - wall->rate, wall->span};
+    return change != 0.0 ? pushed : *wall;
 }
 
-/* Reject a penetrated wall at the start, and begin with the impact if one is hit at once. */
-PRBM bool check_walls(Simulation *sim, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    int n = system_of(sim)->n, struck = -1;
-    const double *front = sim->state.front;
-    Complex *e = directions_at(sim, front);
+/* How far a wall may move in a step. */
+PRBM double wall_reach(const Wall *wall, double h) {
+    return fabs(wall->rate) * h + 2.0 * fabs(wall->offset) + fabs(wall->excess) * wall->span;
+}
+
+/* The longest step from the front: a fraction of a cubic, and none beyond its end. */
+PRBM double longest_wall_step(const Simulation *sim) {
+    double result = HUGE_VAL;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        double distance = gap(&sim->equations, i, sim->state.front_time, e);
-        if (distance < -RELEASE_PENETRATION_ATOL) {
-            double wall = sim->state.walls[i].position;
-            const char *name = sim->configuration.mechanism->stops[i].name;
-            return fail(problem,
-                        "the wall %s is penetrated by %.6g m at release: %s.position = %.6g m, "
-                        "the hit point is at %.6g m; move the stop or release further back",
-                        name, -distance, name, wall, wall - distance);
-        }
-        if (struck < 0 && distance <= RELEASE_PENETRATION_ATOL &&
-            gap_rate(&sim->equations, i, e, front + n) < 0.0) {
-            struck = i;
+        const Wall *wall = &sim->state.walls[i];
+        if (wall->span > 0.0) {
+            double left = wall->since + wall->span - sim->state.front_time;
+            result = lesser(result, lesser(WALL_STEP_RTOL * wall->span, left));
         }
     }
-    sim->scratch.used = mark;
-    return struck < 0 || impact(sim, struck, problem);
+    return result;
 }
 
-/* Open the closed stops whose gaps change, by a wall's velocity or an impulse: a wall that retreats
- * leaves the body; one that advances strikes, as does a body that is thrown against a wall that it
- * touches.  Returns a stop that is struck, or -1. */
-static int release_moving(Simulation *sim) {
+/* Replace the walls whose cubics end at the front by their references. */
+PRBM void arrive_walls(Simulation *sim) {
+    bool arrived = false;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Wall *wall = &sim->state.walls[i];
+        double left = wall->since + wall->span - sim->state.front_time;
+        if (wall->span > 0.0 && left <= EVENT_TIME_ATOL) {
+            wall->offset = wall->excess = wall->span = 0.0;
+            arrived = true;
+        }
+    }
+    if (arrived) {
+        sim->state.has_k1 = false;
+        set_inputs(sim);
+    }
+}
+
+/* Keep held stops on walls whose velocities have jumped by less than rest_speed; others open or are
+ * struck.  The impulses P = -x on the stops are booked as captures.  They may pull, but no more
+ * than the present forces press within a time. */
+PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    int struck = -1;
-    double gaps[STOPS_MAX], rates[STOPS_MAX], bound = zero_speed(&sim->configuration);
-    Complex *e = directions_at(sim, sim->state.front);
-    for (int i = 0; i < system->s; i++) {
-        gaps[i] = gap(&sim->equations, i, sim->state.time, e);
-        rates[i] = gap_rate(&sim->equations, i, e, sim->state.front + system->n);
+    const Equations *q = &sim->equations;
+    Evaluation *at = &sim->trial.evaluation;
+    int n = system_of(sim)->n, size = n + q->r, h = q->first_hold;
+    double *y = sim->state.front, t = sim->state.front_time, lost = 0.0, work = 0.0;
+    double *kkt = take_matrix(&sim->scratch, size, size), *x = take(&sim->scratch, (size_t)size);
+    double *rows = take_matrix(&sim->scratch, q->r, n);
+    Inertia inertia = inertia_at(sim, y);
+    bool moved = drifted, follows = true, right = true;
+    jacobian(&q->active, inertia.e, rows);
+    saddle(n, q->r, inertia.M, rows, rows, kkt);
+    zeros(n, x);
+    for (int k = 0; k < q->r; k++) {
+        x[n + k] = -(dot(n, rows + k * n, y + n) + prescribed(q, k, t));
+        bool holds = k >= h && k < q->first_stick;
+        moved = moved || (holds && fabs(x[n + k]) > zero_speed(&sim->configuration));
+        follows = follows && !(holds && fabs(x[n + k]) > jump_allowed(sim, q->held[k - h]));
+    }
+    if (moved && follows) {
+        right = evaluate_equations(q, t, y, y + n, NULL, at, problem) &&
+                solve(size, kkt, x, &sim->scratch, problem);
+        for (int k = h; right && k < q->first_stick; k++) {
+            double w = wall_motion(&sim->state.walls[q->held[k - h]], t).v, P = -x[n + k];
+            lost -= P * (dot(n, rows + k * n, y + n) + w) / 2;
+            work -= P * w;
+            bool still = fabs(dot(n, rows + k * n, y + n) + w) <= zero_speed(&sim->configuration);
+            follows = follows && (still || P >= -greater(at->lam[k], 0.0) * time);
+        }
+    }
+    if (right && moved && follows) {
+        add_scaled(n, 1.0, x, y + n);
+        y[2 * n] += lost;
+        y[2 * n + 1] += work;
     }
     sim->scratch.used = mark;
-    for (int i = 0; i < system->s; i++) {
-        bool closed = sim->state.modes[i] != CONTACT_OPEN;
-        if (closed && fabs(rates[i]) > bound) {
-            set_mode(sim, i, CONTACT_OPEN);
-        } else if (closed || gaps[i] > TOUCHING_RTOL * system->length) {
-            continue;
-        }
-        struck = rates[i] < -bound ? i : struck;
-    }
-    return struck;
-}
-
-/* The contact state after changes of wall velocities or impulses. */
-PRBM bool settle_walls(Simulation *sim, Problem *problem) {
-    int struck = release_moving(sim);
-    if (struck >= 0) {
-        return impact(sim, struck, problem);
-    }
-    return project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch, problem) &&
-           settle(sim, NULL, 0, NULL, problem);
+    return right && (!moved || (follows ? project(q, t, y, &sim->scratch, problem)
+                                        : settle_moved(sim, problem)));
 }

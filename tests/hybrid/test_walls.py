@@ -1,0 +1,332 @@
+"""The laws of moving walls: each joins its reference along a cubic (prbm.hybrid.walls)."""
+
+import itertools
+import json
+import math
+
+import numpy as np
+import pytest
+
+from kernel_simulation import KernelSimulation
+from prbm.base.tolerances import WALL_LONGEST_RTOL
+from prbm.hybrid.simulation import Simulation
+from prbm.mechanics.inputs import Wall
+from support import energy_balance, mechanism
+
+TWINS = {"engine": Simulation, "kernel": KernelSimulation}
+both = pytest.mark.parametrize("twin", TWINS)
+
+AWAY = {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 0.01}
+"""The shuttle at rest, the wall out of reach."""
+PRESSED = {"release.displacement": 0.0}
+"""The shuttle at rest on the wall, by its weight."""
+AMPLITUDE, RATE = 1e-3, 10 * math.pi
+"""Of the true wall: 0.031 m/s, 0.99 m/s2."""
+ACCELERATION = AMPLITUDE * RATE**2
+
+
+def sine(t: float) -> tuple[float, float]:
+    """Return displacement and velocity of the true wall."""
+    return AMPLITUDE * math.sin(RATE * t), AMPLITUDE * RATE * math.cos(RATE * t)
+
+
+def grid(kind: str, end: float) -> list[float]:
+    """Return communication points from 0 to an end [s]."""
+    rng = np.random.default_rng(3)
+    steps = {
+        "1 ms": lambda k: 1e-3,
+        "10 ms": lambda k: 1e-2,
+        "20 ms": lambda k: 2e-2,
+        "alternating": lambda k: (1e-3, 1e-6)[k % 2],
+        "random": lambda k: float(np.exp(rng.uniform(math.log(1e-6), math.log(1e-2)))),
+        "short and long": lambda k: float(rng.choice([1e-6, 1e-4, 2e-2])),
+    }[kind]
+    points, k = [0.0], 0
+    while points[-1] < end - 1e-9:
+        points.append(min(points[-1] + steps(k), end))
+        k += 1
+    return points
+
+
+GRIDS = ("1 ms", "10 ms", "alternating", "random", "short and long")
+
+
+def wall_of(sim) -> tuple[float, float]:
+    """Return displacement and velocity of the wall, from gap and hit point."""
+    out = sim.outputs()
+    place = out["stop.gap"] + out["stop.point.displacement"]
+    return place, out["stop.gap_rate"] + out["stop.point.velocity"]
+
+
+def given(true, t: float, velocities: bool) -> dict[str, float]:
+    d, v = true(t)
+    return {"stop.displacement": d} | ({"stop.velocity": v} if velocities else {})
+
+
+@pytest.mark.parametrize(("offset", "excess"), [(1e-3, 0.0), (0.0, 0.2), (-1e-3, 0.3)])
+def test_a_cubic_has_the_velocity_and_acceleration_of_its_position(offset, excess):
+    wall = Wall(0.1, -0.3, 2.0, offset, excess, 4e-3)
+    for t in (2.0005, 2.002, 2.0039, 2.1):
+        _, velocity, acceleration = wall.motion(t)
+        near = [wall.motion(t + dt) for dt in (-1e-7, 1e-7)]
+        assert velocity == pytest.approx((near[1][0] - near[0][0]) / 2e-7, abs=1e-6)
+        if t < wall.end:
+            slope = (near[1][1] - near[0][1]) / 2e-7
+            assert acceleration == pytest.approx(slope, abs=1e-6 * abs(acceleration) + 1e-3)
+    start, end = wall.motion(wall.since), wall.motion(wall.end)
+    assert start[:2] == pytest.approx((0.1 + offset, -0.3 + excess))
+    assert end[:2] == pytest.approx((0.1 - 0.3 * 4e-3, -0.3))
+
+
+@both
+@pytest.mark.parametrize("kind", GRIDS)
+def test_uniform_motion_is_followed_exactly(twin, kind):
+    """Newton in the frame of the wall: the time of the impact does not depend on the steps."""
+    speed, distance = -0.1, 8e-3
+    values = AWAY | {"stop.position": distance, "stop.restitution": 0.5, "stop.velocity": speed}
+    sim = TWINS[twin](mechanism("PRBDM"), values)
+    for t, end in itertools.pairwise(grid(kind, 0.1)):
+        sim.set({"stop.displacement": speed * t, "stop.velocity": speed})
+        sim.advance(end)
+        if sim.outputs()["stop.impact_count"]:
+            break
+    out = sim.outputs()
+    assert out["stop.impact_time"] == pytest.approx(-distance / speed, abs=1e-9)
+    assert out["stop.approach_speed"] == pytest.approx(-speed, rel=1e-9)
+
+
+def errors(sim, kind: str, *, velocities: bool) -> float:
+    """Return how far the wall is off the true one, in units of a h^2, after a start."""
+    points, worst = grid(kind, 0.6), 0.0
+    longest = max(b - a for a, b in itertools.pairwise(points))
+    assert longest <= WALL_LONGEST_RTOL * 0.22
+    for k, (t, end) in enumerate(itertools.pairwise(points)):
+        sim.set(given(sine, t, velocities))
+        sim.advance(end)
+        if t > 6 * longest and k % 3 < 2:
+            worst = max(worst, abs(wall_of(sim)[0] - sine(end)[0]))
+    return worst / (ACCELERATION * longest**2)
+
+
+@both
+@pytest.mark.parametrize("velocities", [True, False])
+@pytest.mark.parametrize("kind", [*GRIDS, "20 ms"])
+def test_a_wall_is_within_twice_the_acceleration_times_the_step_squared(twin, kind, velocities):
+    sim = TWINS[twin](mechanism("PRBDM"), AWAY)
+    bound = 2.0 if velocities or kind != "random" else 3.0
+    assert errors(sim, kind, velocities=velocities) < bound
+
+
+@both
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+@pytest.mark.parametrize("kind", ["1 ms", "alternating", "random"])
+def test_a_pressed_body_stays_on_its_wall_without_impacts(twin, model, kind):
+    """Gravity presses it with ten times the acceleration of the wall."""
+    sim = TWINS[twin](mechanism(model), PRESSED | dict(zip(INPUTS, sine(0.0), strict=True)))
+    struck = sim.outputs()["stop.impact_count"]
+    before, points = energy_balance(sim.outputs()), grid(kind, 0.1)
+    settled = False
+    for t, end in itertools.pairwise(points):
+        sim.set(given(sine, t, velocities=True))
+        sim.advance(end)
+        out = sim.outputs()
+        settled = settled or (t > 0.02 and bool(out["stop.contact"]))
+        if settled:
+            assert out["stop.contact"], t
+            assert abs(out["stop.gap"]) < 1e-12
+        else:
+            struck = out["stop.impact_count"]
+    assert settled
+    assert out["stop.impact_count"] == struck
+    assert energy_balance(out) == pytest.approx(before, abs=1e-9)
+
+
+INPUTS = ("stop.displacement", "stop.velocity")
+
+
+@both
+@pytest.mark.parametrize("kind", ["1 ms", "alternating", "random"])
+def test_a_displacement_that_jumps_is_not_overshot_by_more_than_the_jump(twin, kind):
+    jump = -1e-3
+    sim, points = TWINS[twin](mechanism("PRBDM"), AWAY), grid(kind, 0.15)
+    off, last = [], 0.0
+    for t, end in itertools.pairwise(points):
+        sim.set({"stop.displacement": jump if t > 0.05 else 0.0})
+        sim.advance(end)
+        off.append(abs(wall_of(sim)[0] - (jump if t > 0.05 else 0.0)))
+        last = wall_of(sim)[0]
+    assert max(off) <= abs(jump) * (1 + 1e-9)
+    assert last == pytest.approx(jump, abs=1e-12)
+
+
+@both
+def test_a_long_step_after_short_ones_is_not_extrapolated(twin):
+    """Two steps of 1 us give no velocity that lasts for 20 ms."""
+    sim = TWINS[twin](mechanism("PRBDM"), AWAY)
+    for k in range(3):
+        sim.set({"stop.displacement": -1e-4 * k})
+        sim.advance(1e-6 * (k + 1))
+    sim.set({"stop.displacement": -3e-4})
+    sim.advance(2e-2)
+    assert abs(wall_of(sim)[0] + 3e-4) <= 3e-4
+
+
+@both
+def test_a_wall_that_accelerates_presses_with_its_mass_times_acceleration(twin):
+    """The force of a held stop follows the wall's acceleration; released where it vanishes."""
+    sim = TWINS[twin](mechanism("PRBDM"), PRESSED)
+    sim.advance(1e-3)
+    weight, mobility = (sim.outputs()[f"stop.{name}"] for name in ("force", "point.mobility"))
+    sim.set({"stop.velocity": -1e-3})
+    sim.advance(1e-3 + 1e-9)
+    # 4 u / T at the start of the cubic, T of twice the step of 1 ms
+    expected = weight + 4 * 1e-3 / 2e-3 / mobility
+    assert sim.outputs()["stop.force"] == pytest.approx(expected, rel=1e-3)
+    sim.set({"stop.velocity": 0.1})
+    sim.advance(1e-3 + 1e-6)
+    assert not sim.outputs()["stop.contact"]
+
+
+@both
+def test_an_input_that_is_set_to_its_value_changes_nothing(twin):
+    runs = [TWINS[twin](mechanism("PRBDM"), {"stop.velocity": -0.02}) for _ in range(2)]
+    for k in range(40):
+        for sim, again in zip(runs, (False, True), strict=True):
+            if again or k == 0:
+                sim.set({"stop.displacement": -0.02 * k * 1e-3, "stop.velocity": -0.02})
+            elif not again:
+                sim.set({"stop.displacement": -0.02 * k * 1e-3})
+            sim.advance((k + 1) * 1e-3)
+    assert runs[0].outputs() == runs[1].outputs()
+
+
+def partner(twin, *, mobility: float, end: float, h: float):
+    """Return a guide after impacts with a free mass as its wall, and the mass' motion."""
+    sim = TWINS[twin](
+        mechanism("PRBDM"),
+        {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 2e-3,
+         "stop.mobility": mobility, "stop.velocity": -0.1, "stop.restitution": 0.6},
+    )  # fmt: skip
+    x, v, received, momenta = 0.0, -0.1, 0.0, []
+    for k in range(round(end / h)):
+        sim.set({"stop.displacement": x, "stop.velocity": v})
+        sim.advance((k + 1) * h)
+        out = sim.outputs()
+        total = out["stop.impulse_sum"]
+        if total != received:
+            # the instant of the impact within the step
+            left = (k + 1) * h - out["stop.impact_time"]
+            change = mobility * (total - received)
+            x, v, received = x + v * (h - left) + (v + change) * left, v + change, total
+        else:
+            x += v * h
+        momenta.append(v / mobility - total)
+    return sim, x, v, momenta
+
+
+@both
+@pytest.mark.parametrize("h", [1e-3, 3e-4])
+def test_momentum_that_a_partner_receives_is_exact(twin, h):
+    """The wall moves as the partner does: what it is given back equals what it is."""
+    sim, x, v, momenta = partner(twin, mobility=5.0, end=0.06, h=h)
+    assert sim.outputs()["stop.impact_count"] >= 1
+    assert momenta == pytest.approx([momenta[0]] * len(momenta), rel=1e-13)
+    place, velocity = wall_of(sim)
+    assert (place, velocity) == pytest.approx((x, v), abs=1e-9)
+
+
+@both
+def test_an_impact_moves_the_reference_with_the_wall(twin):
+    """Mobility times impulse is added to both: until the partner answers it goes on alike."""
+    values = {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 1e-3,
+              "stop.mobility": 5.0, "stop.velocity": -0.1, "stop.restitution": 1.0}  # fmt: skip
+    sim = TWINS[twin](mechanism("PRBDM"), values)
+    sim.advance(0.015)
+    out = sim.outputs()
+    assert out["stop.impact_count"] == 1
+    velocity = -0.1 + 5.0 * out["stop.impulse_sum"]
+    left = 0.015 - out["stop.impact_time"]
+    place = -0.1 * out["stop.impact_time"] + velocity * left
+    assert wall_of(sim) == pytest.approx((place, velocity), abs=1e-12)
+
+
+def test_the_force_of_a_moving_wall_does_its_work():
+    """Energy is balanced while the wall accelerates under a held body, for any steps."""
+    for kind in ("1 ms", "random"):
+        sim = Simulation(mechanism("PRBDM2R"), PRESSED)
+        sim.advance(0.01)
+        before = energy_balance(sim.outputs())
+        for t, end in itertools.pairwise(grid(kind, 0.1)):
+            if end > sim.time:
+                d = AMPLITUDE * (1 - math.cos(RATE * t)), AMPLITUDE * RATE * math.sin(RATE * t)
+                sim.set(dict(zip(INPUTS, d, strict=True)))
+                sim.advance(end)
+        assert energy_balance(sim.outputs()) == pytest.approx(before, abs=1e-9)
+
+
+# --- saved states -----------------------------------------------------------------------------
+
+
+def catching_up(twin):
+    """Return a simulation whose wall is on its way to its reference, with events ahead."""
+    sim = TWINS[twin](mechanism("PRBDM"), {})
+    for k in range(30):
+        sim.set({"stop.displacement": sine(k * 1e-3)[0]})
+        sim.advance((k + 1) * 1e-3)
+    return sim
+
+
+def goes_on(sim) -> list[dict]:
+    """Return outputs of the 20 steps that follow."""
+    found = []
+    for k in range(30, 50):
+        sim.set({"stop.displacement": sine(k * 1e-3)[0], "stop.velocity": 0.01 * (k > 40)})
+        sim.advance((k + 1) * 1e-3)
+        found.append(sim.outputs())
+    return found
+
+
+def test_a_state_saved_while_a_wall_catches_up_restores_to_the_same_bytes():
+    sim = catching_up("engine")
+    assert any(wall.span for wall in sim.inputs.walls)
+    saved = json.dumps(sim.snapshot())
+    other = Simulation(mechanism("PRBDM"))
+    other.restore(json.loads(saved))
+    assert json.dumps(other.snapshot()) == saved
+    assert goes_on(other) == goes_on(sim)
+
+
+def test_a_state_of_the_kernel_restores_to_the_same_bytes():
+    sim, other = catching_up("kernel"), catching_up("kernel")
+    saved = sim.state
+    expected = goes_on(sim)
+    other.advance(0.2)
+    other.restore(saved)
+    assert other.state.tobytes() == saved.tobytes()
+    assert goes_on(other) == expected
+
+
+@both
+def test_two_simulations_share_nothing(twin):
+    one, other = catching_up(twin), catching_up(twin)
+    other.set({"stop.displacement": 1e-3})
+    other.advance(0.031)
+    assert goes_on(one) == goes_on(catching_up(twin))
+
+
+def test_the_engine_and_the_kernel_move_walls_alike():
+    """End to end: random inputs at random points, with impacts, rest and jumps."""
+    rng = np.random.default_rng(5)
+    twins, t = [kind(mechanism("PRBDM"), {}) for kind in TWINS.values()], 0.0
+    for _ in range(150):
+        t += float(np.exp(rng.uniform(math.log(1e-5), math.log(1e-2))))
+        values = {"stop.displacement": 1e-4 * rng.normal(), "stop.velocity": 0.01 * rng.normal()}
+        if rng.uniform() < 0.3:
+            values = {"stop.position": 1e-4 * rng.normal()}
+        for sim in twins:
+            sim.set({name: float(x) for name, x in values.items()})
+            sim.advance(t)
+        engine, kernel = (sim.outputs() for sim in twins)
+        for name in ("shuttle.x", "stop.gap", "stop.impact_count"):
+            assert kernel[name] == pytest.approx(engine[name], abs=1e-7), (t, name)
+    assert kernel["stop.impact_count"] > 1
