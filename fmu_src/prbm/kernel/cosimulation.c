@@ -141,23 +141,23 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* --- event mode ------------------------------------------------------------------------------- */
 
-/* Whether stop.velocity has been set to another value since it acted. */
+/* Whether stop.velocity of any stop has been set to another value. */
 static bool velocities_changed(const Simulation *sim) {
     for (int i = 0; i < system_of(sim)->s; i++) {
-        if (velocity_change(sim, i) != 0.0) {
+        if (new_velocity(sim, i)) {
             return true;
         }
     }
     return false;
 }
 
-/* Change the velocities of the walls as stop.velocity has changed, and apply the pending event, if
- * any, with the inputs that have been set, and the impulses. */
+/* Give the walls the velocities that have been set, and apply the pending event, if any, with the
+ * inputs that have been set, and the impulses. */
 static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *problem) {
     State *state = &sim->state;
     Wall walls[STOPS_MAX];
     for (int i = 0; i < system_of(sim)->s; i++) {
-        walls[i] = pushed_wall(&state->walls[i], state->time, velocity_change(sim, i));
+        walls[i] = wall_at_event(sim, i);
     }
     if (!event) {
         return restart(sim, walls, !impulses, problem);

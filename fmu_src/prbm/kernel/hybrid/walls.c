@@ -22,10 +22,17 @@ PRBM void start_walls(Simulation *sim) {
     }
 }
 
-/* How much stop.velocity has changed since it acted. */
-PRBM double velocity_change(const Simulation *sim, int i) {
-    const Mechanism *m = sim->configuration.mechanism;
-    return told(sim, i)[1] - wall_inputs(m, sim->state.acting_given, i)[1];
+/* Whether stop.velocity has been set to another value since it acted. */
+PRBM bool new_velocity(const Simulation *sim, int i) {
+    return told(sim, i)[1] != wall_inputs(sim->configuration.mechanism, sim->state.acting_given, i)[1];
+}
+
+/* A wall in event mode: it takes the velocity that has been set, and so does its reference. */
+PRBM Wall wall_at_event(const Simulation *sim, int i) {
+    const Wall *wall = &sim->state.walls[i];
+    double t = sim->state.time, r = wall->position + wall->rate * (t - wall->since);
+    Wall next = {r, told(sim, i)[1], t, wall_motion(wall, t).x - r, 0.0, wall->span};
+    return new_velocity(sim, i) ? next : *wall;
 }
 
 /* Whether the inputs of the walls are those of the last communication point. */
@@ -33,7 +40,7 @@ PRBM bool same_walls(const Simulation *sim) {
     bool same = true;
     for (int i = 0; i < system_of(sim)->s; i++) {
         same = same && told(sim, i)[0] == sim->state.displacements[i] &&
-               velocity_change(sim, i) == 0.0;
+               !new_velocity(sim, i);
     }
     return same;
 }
