@@ -317,17 +317,21 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
             "eps the restitution and a the pressing acceleration."
         )
         items.append(
-            "The wall never jumps: within a communication step it moves uniformly from where "
-            "it was to <code>position + displacement + velocity h</code>, and that velocity "
-            "enters the impact law; in a step shorter than one before, a wall with a velocity "
-            "takes longer to make good what it is off. Several impacts within one communication "
-            "step are all computed and counted; the latched outputs show the last one."
+            "In co-simulation the inputs of a wall at a communication point t0 define a line, "
+            "r(t) = <code>position + displacement</code> + v (t - t0), with v its "
+            "<code>velocity</code> once that has been non-zero, else the mean rate of its "
+            "<code>displacement</code>. The wall joins it within T, twice the recent longest "
+            "communication step: x = r + e (1 - 3 s<sup>2</sup> + 2 s<sup>3</sup>) + u T (s - 2 "
+            "s<sup>2</sup> + s<sup>3</sup>), s = (t - t0)/T &le; 1, e and u its distance and speed "
+            "ahead of the line at t0. Uniform motion is exact, and jumps never overshoot by more "
+            "than themselves. Several impacts within one communication step are all computed and "
+            "counted; the latched outputs show the last one."
         )
         items.append(
-            "A wall that retreats lets go of what rests on it: <code>contact</code> becomes false "
-            "and the gap opens. What presses the body closes the gap again; it bounces on the "
-            "moving wall, each impact counted, until one below <code>rest_speed</code> captures "
-            "it, and then goes with the wall. A wall that advances strikes what rests on it."
+            "A body rests on a moving wall while its force on it is positive, the wall's "
+            "acceleration included; then it leaves. What presses it closes the gap again, and "
+            "below <code>rest_speed</code> it is captured. A velocity that is set in event mode is "
+            "that of the wall at once."
         )
         items.append(
             "A wall that is part of another model takes part in impacts by its "

@@ -343,8 +343,7 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
     for stop in mechanism.stops:
         yield given(
             f"{stop.name}.displacement",
-            f"Displacement of the {wall(stop)}, added to {stop.name}.position; the wall moves "
-            "there uniformly within a communication step that is as long as those before",
+            f"Displacement of the {wall(stop)}, added to {stop.name}.position",
         )
         yield given(
             f"{stop.name}.velocity",
