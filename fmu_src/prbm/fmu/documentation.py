@@ -329,9 +329,8 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
         )
         items.append(
             "A body rests on a moving wall while its force on it is positive, the wall's "
-            "acceleration included; then it leaves. What presses it closes the gap again, and "
-            "below <code>rest_speed</code> it is captured. A velocity that is set in event mode is "
-            "that of the wall at once."
+            "acceleration included; then it leaves, until what presses it closes the gap again. "
+            "A velocity that is set in event mode is that of the wall at once."
         )
         items.append(
             "A wall that is part of another model takes part in impacts by its "
