@@ -235,7 +235,14 @@ def test_the_page_names_every_variable_and_the_limits(mechanisms, model):
     html = page(mechanisms[model], listed, Experiment())
     for v in listed:
         assert f"<code>{v.name}</code>" in html
-    for limit in ("no duration", "Stronge", "NumPy", "percent-encoded", "End moments", "acceleration included"):
+    for limit in (
+        "no duration",
+        "Stronge",
+        "NumPy",
+        "percent-encoded",
+        "End moments",
+        "acceleration included",
+    ):
         assert limit in html
     kinds = {kind.model for kind in mechanisms[model].flexure_types}
     assert ("chaotic" in html) == ("2R" in kinds)

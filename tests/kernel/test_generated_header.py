@@ -44,10 +44,8 @@ ALLOWED = {
         "64": "kB a block", "248": "length of paths on Windows", "1024": "bytes a kB",
     },
     "hybrid/hybrid.h": {"6.283185307179586": "2 pi"},
-    "hybrid/guards.c": {
-        "4.5e-16": "spacing of doubles, by R. P. Brent", "100": "more iterations than are needed",
-    },
-    "hybrid/contact_modes.c": {"53": "binary digits of doubles", "300": "length of a message"},
+    "hybrid/guards.c": {"4.5e-16": "spacing of doubles, by R. P. Brent"},
+    "hybrid/contact_modes.c": {"53": "binary digits of doubles"},
     "hybrid/simulation.c": {"60": "working memory", "64": "working memory"},
     "hybrid/walls.c": {"20.0": "a factor of the zero speed"},
     "hybrid/stepping.c": {"0.75": "of the exponent of the memory [Hairer, IV.2]"},

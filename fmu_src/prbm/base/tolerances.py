@@ -34,15 +34,14 @@ SPRINGLESS_RATE = 2 * math.pi  # rad/s: rate scale of a linkage without springs.
 
 # --- impacts -----------------------------------------------------------------------------------
 COMPLEMENTARITY_RTOL = 1e-10  # Of the largest approach speed: allowed violation.
-SWEEPS_MAX = 2000  # Gauss-Seidel sweeps over several contacts with friction.
-SWEEP_RTOL = 1e-14  # Relative change of the impulses at which the sweeps end.
-SWEEP_RELAXATIONS = (1.0, 0.3, 0.05)  # Relaxation factors, tried in this order.
+PIVOT_RTOL = 1e-11  # Of the largest entry of its column: a smaller pivot is round-off.
+RATIO_RTOL = 1e-12  # Of the largest constant: ratios this close are equal.
+PIVOTS_FACTOR = 50  # Pivots of a complementarity problem, for each of its unknowns.
 WEDGED_RTOL = 1e-10  # Of the inverse normal mass: a smaller rate of the approach is round-off.
 ZERO_SPEED_RTOL = 1e-12  # Of the speeds before an impact: what is left of a vanished speed.
 IMPULSE_RANK_RTOL = 1e-13  # Of the largest singular value: rank of the inverse mass in contact.
 REACTION_RANK_RTOL = 1e-12  # The same of the rows of the stops that hold during an impact.
 REBOUND_RTOL = 1e-12  # Of the share of the restitution: width at which the bisection ends.
-IMPACT_SETS_MAX = 12  # Stops hit at once of which every subset is tried.
 
 # --- contact modes -----------------------------------------------------------------------------
 TOUCHING_RTOL = 1e-10  # Of the size: gaps below this close together with the one resolved.
@@ -66,6 +65,7 @@ IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 # --- location of events ------------------------------------------------------------------------
 EVENT_TIME_ATOL = 1e-13  # s; events are located to 1e-12 s, of which projection needs a part.
 RELEASE_WATCH_FACTOR = 0.5  # Of the largest stop force in a step: below, a release is searched.
+LOCATION_ITERATIONS_MAX = 100  # Iterations of Brent's search; about ten are usual.
 GUARD_INTERVALS = 8  # Intervals of a step in which the guards are evaluated.
 
 EVENT_CORRECTIONS_MAX = 3  # Newton steps of a closing gap on projected states.

@@ -1,7 +1,7 @@
 """Everything about a simulation that the motion does not change, and its scales."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -68,7 +68,12 @@ class Scales:
     @property
     def zero_speed(self) -> float:
         """Speed below which a speed is round-off [m/s]."""
-        return ZERO_RATE_RTOL * self.rate * self.length
+        return ZERO_RATE_RTOL * self.speed
+
+    @property
+    def speed(self) -> float:
+        """Speed of the motion [m/s]."""
+        return self.rate * self.length
 
     @property
     def zero_acceleration(self) -> float:
@@ -189,6 +194,12 @@ class Configuration:
     def stop_value(self, stop: int, name: str) -> float:
         """Return a parameter of a stop, for instance ``restitution``."""
         return value(self.mechanism.stops[stop], name, self.values)
+
+
+def contact_names(mechanism: Mechanism, contacts: Iterable[int]) -> str:
+    """Return the names of stops and friction points, in their order, without repetition."""
+    names = [s.name for s in mechanism.stops] + [f.name for f in mechanism.frictions]
+    return ", ".join(names[c] for c in sorted(set(contacts)))
 
 
 def checked_tolerance(tolerance: float) -> float:

@@ -5,12 +5,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.errors import SimulationError
 from ..base.tolerances import IMPACT_COUNT_MAX, REACTION_RANK_RTOL, SHORTEST_FLIGHT_RTOL
 from ..mechanics import contact, forces
 from ..mechanics.arrays import Real
 from ..mechanics.modal import fundamental_at, simulated_restitution
-from .configuration import Configuration
-from .contact_modes import equations_holding, holding_stops, mobility, settle
+from .configuration import Configuration, contact_names
+from .contact_modes import equations_holding, find_holding_stops, mobility, settle
 from .front import Front, Latched
 
 
@@ -136,8 +137,8 @@ def _captured(
         return True
     after = _impulses(configuration, front, [stop], held, np.zeros(1)).after
     landed = front.with_velocities(after)
-    holding = holding_stops(configuration, landed, [stop, *held])
-    if stop not in holding:
+    holding = find_holding_stops(configuration, landed, [stop, *held])
+    if holding is None or stop not in holding:
         return False
     if speed < configuration.stop_value(stop, "rest_speed"):
         return True
@@ -166,8 +167,23 @@ def _impulses(
     of friction points, is finite and has no impulse.
     """
     mu = np.array([configuration.stop_value(i, "friction") for i in struck])
-    if mu.any():
-        return _impulses_with_friction(front, struck, held, mu, restitution)
+    try:
+        if mu.any():
+            return _impulses_with_friction(configuration, front, struck, held, mu, restitution)
+        return _impulses_without_friction(configuration, front, struck, held, restitution)
+    except SimulationError as error:
+        names = contact_names(configuration.mechanism, [*struck, *held])
+        raise SimulationError(f"impact at t = {front.time:.9g} s ({names}): {error}") from None
+
+
+def _impulses_without_friction(
+    configuration: Configuration,
+    front: Front,
+    struck: list[int],
+    held: list[int],
+    restitution: Real,
+) -> Impulses:
+    """Return the impulses of an impact without friction at the stops that are struck."""
     e, M, loops = front.equations.mass_and_loops(front.q)
     partners = struck + held
     mobilities = np.array(front.inputs.mobilities)
@@ -175,15 +191,25 @@ def _impulses(
     X = contact.response(M, loops, G)
     W = G @ X + np.diag(mobilities[partners])
     u = front.equations.gap_rates(front.time, e, front.v)[partners]
-    P = contact.newton(W, np.minimum(u, 0.0), np.concatenate([restitution, np.zeros(len(held))]))
+    restitutions = np.concatenate([restitution, np.zeros(len(held))])
+    P = contact.newton(W, np.minimum(u, 0.0), restitutions, configuration.scales.speed)
     return Impulses(front.v + X @ P, dict(zip(partners, P.tolist(), strict=True)), {})
 
 
 def _impulses_with_friction(
-    front: Front, struck: list[int], held: list[int], mu: Real, restitution: Real
+    configuration: Configuration,
+    front: Front,
+    struck: list[int],
+    held: list[int],
+    mu: Real,
+    restitution: Real,
 ) -> Impulses:
-    """Return the impulses of an impact with friction at the stops that are struck."""
-    v, k, kept = front.v, len(struck), list(held)
+    """Return the impulses of an impact with friction at the stops that are struck.
+
+    If a held stop that has been released would close, the held stops are struck, too, without
+    restitution and friction.
+    """
+    v, k, kept, speed = front.v, len(struck), list(held), configuration.scales.speed
     e, M, loops = front.equations.mass_and_loops(front.q)
     system = front.equations.system
     gaps, u = system.gap_rows.jacobian(e), front.equations.gap_rates(front.time, e, v)
@@ -197,18 +223,27 @@ def _impulses_with_friction(
         W = both @ X
         W[range(k), range(k)] += mobilities
         if k == 1:
-            P = np.array(contact.stronge(W, rates, float(mu[0]), float(restitution[0])))
+            P = np.array(contact.stronge(W, rates, float(mu[0]), float(restitution[0]), speed))
         else:
-            P = contact.several(W, rates, mu, restitution)
+            P = contact.several(W, rates, mu, restitution, speed)
         after = v + X @ P
         left = M @ (after - v) - both.T @ P
         solution = np.linalg.lstsq(rows.T, left, rcond=REACTION_RANK_RTOL)[0]
         reaction = dict(zip(kept, solution[len(loops) :].tolist(), strict=True))
         pulling = [i for i, p in reaction.items() if p < 0.0]
         if not pulling:
-            normal = dict(zip(struck, P[:k].tolist(), strict=True)) | reaction
-            return Impulses(after, normal, dict(zip(struck, P[k:].tolist(), strict=True)))
+            break
         kept = [i for i in kept if i not in pulling]
+    released = [i for i in held if i not in kept]
+    closing = front.equations.gap_rates(front.time, e, after)[released]
+    if closing.min(initial=0.0) < -configuration.scales.zero_speed:
+        none = np.zeros(len(held))
+        return _impulses_with_friction(
+            configuration, front, struck + held, [], np.append(mu, none),
+            np.append(restitution, none),
+        )  # fmt: skip
+    normal = dict(zip(struck, P[:k].tolist(), strict=True)) | reaction
+    return Impulses(after, normal, dict(zip(struck, P[k:].tolist(), strict=True)))
 
 
 # --- booking ----------------------------------------------------------------------------------

@@ -33,6 +33,7 @@
 #include "core/dynamics.h"
 #include "core/projection.h"
 #include "core/runge_kutta.h"
+#include "core/complementarity.h"
 #include "core/contact.h"
 #include "core/statics.h"
 #include "core/modal.h"

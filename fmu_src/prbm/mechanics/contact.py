@@ -18,24 +18,30 @@ Sources
 
 import math
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
     COMPLEMENTARITY_RTOL,
-    IMPACT_SETS_MAX,
     IMPULSE_RANK_RTOL,
     REBOUND_RTOL,
-    SWEEP_RELAXATIONS,
-    SWEEP_RTOL,
-    SWEEPS_MAX,
     WEDGED_RTOL,
     ZERO_SPEED_RTOL,
 )
 from . import constraints
 from .arrays import Real
+from .complementarity import impulses, violation
+
+CLOSING_IN = (
+    "no impulses open all gaps: the walls close in on the mechanism; move them apart, or slow them "
+    "down"
+)
+WEDGED = (
+    "the wall pushes the mechanism in a direction that friction locks; reduce the friction of the "
+    "stop, or the velocity of the wall"
+)
 
 
 def response(M: Real, held: Real, rows: Real) -> Real:
@@ -61,13 +67,13 @@ def response(M: Real, held: Real, rows: Real) -> Real:
     return constraints.solve(constraints.saddle(M, held, held), right)[:n]
 
 
-def newton(W: Real, u: Real, restitution: Real) -> Real:
+def newton(W: Real, u: Real, restitution: Real, speed: float = 0.0) -> Real:
     r"""Return the impulses of a frictionless impact of several stops, without an order.
 
     Solves P >= 0, W P + u + eps u >= 0, complementary, for closing or resting stops (u <= 0):
-    each stop that receives an impulse opens at -eps u.  Energy is never gained.  Of up to
-    :data:`prbm.base.tolerances.IMPACT_SETS_MAX` stops every subset is tried; the impulses of more
-    are found by Gauss-Seidel sweeps.
+    each stop that receives an impulse opens at -eps u.  Energy is never gained.  There is a
+    solution unless walls close in on the mechanism; where several stops can share an impulse in
+    more than one way, they share it as evenly as they can (least sum of squares).
 
     Parameters
     ----------
@@ -77,11 +83,18 @@ def newton(W: Real, u: Real, restitution: Real) -> Real:
         Rates of the gaps before, none positive [m/s].
     restitution : (k,)
         Coefficients of restitution [-].
+    speed : float
+        Scale of speeds: violations are round-off below ``COMPLEMENTARITY_RTOL`` of it [m/s].
 
     Returns
     -------
     P : (k,)
         Impulses [N s].
+
+    Raises
+    ------
+    SimulationError
+        If there are no such impulses.
 
     Examples
     --------
@@ -91,44 +104,35 @@ def newton(W: Real, u: Real, restitution: Real) -> Real:
     9.0
     """
     b = (1.0 + restitution) * u
-    if len(u) > IMPACT_SETS_MAX:
-        return _newton_sweeps(W, b)
-    return _newton_search(W, b, COMPLEMENTARITY_RTOL * float(np.abs(u).max()))
+    none = np.zeros(0)
+    tolerance = COMPLEMENTARITY_RTOL * max(float(np.abs(u).max(initial=0.0)), speed)
+    P = impulses(W, b, none, np.zeros(len(b)), tolerance)
+    if P is None:
+        raise SimulationError(CLOSING_IN)
+    shared = _shared(W, b, np.flatnonzero(np.abs(W @ P + b) <= tolerance))
+    return shared if violation(W, b, shared, none) <= tolerance else P
 
 
-def _newton_search(W: Real, b: Real, tolerance: float) -> Real:
-    """Try every set of stops that may receive an impulse; return the least violating one."""
-    k = len(b)
-    worst, best = math.inf, np.zeros(k)
-    # The largest sets first: a stop that closes nearly always receives an impulse.
-    for size in range(k, -1, -1):
-        for members in combinations(range(k), size):
-            s = list(members)
-            P = np.zeros(k)
-            if s:
-                P[s] = np.linalg.lstsq(W[np.ix_(s, s)], -b[s], rcond=IMPULSE_RANK_RTOL)[0]
-            violation = max(
-                float((-(W @ P + b)).max()),
-                float((-P * np.diag(W)).max()),
-                float(np.abs(P * np.diag(W) * (W @ P + b)).max()) ** 0.5,
-            )
-            if violation <= tolerance:
-                return np.maximum(P, 0.0)
-            if violation < worst:
-                worst, best = violation, np.maximum(P, 0.0)
-    return best
+def _shared(W: Real, b: Real, members: NDArray[np.int_]) -> Real:
+    """Return the least impulses of stops that open neither sooner nor later than they must.
 
-
-def _newton_sweeps(W: Real, b: Real) -> Real:
-    """Return the impulses by Gauss-Seidel, each step of which lowers P.W P/2 + b.P."""
+    Stops that would have to pull receive none.
+    """
     P = np.zeros(len(b))
-    for _ in range(SWEEPS_MAX):
-        for i in np.flatnonzero(np.diag(W) > 0.0):
-            P[i] = max(0.0, P[i] - float(W[i] @ P + b[i]) / W[i, i])
+    while len(members):
+        inside = W[np.ix_(members, members)]
+        P[members] = np.linalg.lstsq(inside, -b[members], rcond=IMPULSE_RANK_RTOL)[0]
+        pulls = P[members] < 0.0
+        if not pulls.any():
+            break
+        P[members[pulls]] = 0.0
+        members = members[~pulls]
     return P
 
 
-def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[float, float]:
+def stronge(
+    W: Real, u: Real, friction: float, restitution: float, speed: float = 0.0
+) -> tuple[float, float]:
     r"""Return the normal and tangential impulse of one hit with friction (Routh, Stronge).
 
     The normal impulse p grows; the contact slips (P_t' = -mu sign(u_t)), sticks or slips back
@@ -144,11 +148,18 @@ def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[floa
         Rate of the gap (negative: closing) and sliding velocity before [m/s].
     friction, restitution : float
         mu and eps [-].
+    speed : float
+        As in :func:`newton`.
 
     Returns
     -------
     P_n, P_t : float
         Impulses [N s].
+
+    Raises
+    ------
+    SimulationError
+        If a moving wall pushes in a direction that friction locks.
 
     Examples
     --------
@@ -158,7 +169,7 @@ def stronge(W: Real, u: Real, friction: float, restitution: float) -> tuple[floa
     (1.5, -0.15000000000000002)
     """
     hit = _Hit(float(W[0, 0]), float(W[0, 1]), float(W[1, 1]), friction, float(u[0]), float(u[1]))
-    work = hit.compress()
+    work = hit.compress(speed)
     hit.restore(restitution**2 * work)
     return hit.p_n, hit.p_t
 
@@ -179,8 +190,14 @@ class _Hit:
     rate_n: float = 0.0
     rate_t: float = 0.0
 
-    def compress(self) -> float:
-        """Apply the impulses of compression and return their work [J]."""
+    def compress(self, speed: float) -> float:
+        """Apply the impulses of compression and return their work [J].
+
+        Raises
+        ------
+        SimulationError
+            If no impulse ends the compression.
+        """
         nn, tt, u_n, u_t = self.nn, self.tt, abs(self.u_n), abs(self.u_t)
         small_n = ZERO_SPEED_RTOL * u_n
         small_t = ZERO_SPEED_RTOL * (u_t + u_n * math.sqrt(tt / nn) if nn > 0.0 else u_t)
@@ -190,10 +207,12 @@ class _Hit:
             closed = -self.u_n / self.rate_n if self.rate_n > WEDGED_RTOL * nn else math.inf
             step = min(sticking, closed)
             if step == math.inf:
-                break
+                break  # Without a mobility: round-off only, see below.
             work -= self.receive(step)
             self.u_n = 0.0 if step == closed else self.u_n + self.rate_n * step
             self.u_t = 0.0 if step == sticking else self.u_t + self.rate_t * step
+        if self.u_n < -max(small_n, COMPLEMENTARITY_RTOL * speed):
+            raise SimulationError(WEDGED)
         # With one degree of freedom both rates vanish together, up to round-off.
         self.u_n = self.u_n if self.u_n > small_n else 0.0
         self.u_t = self.u_t if abs(self.u_t) > small_t else 0.0
@@ -244,11 +263,11 @@ def _friction_ratio(nt: float, tt: float, u_t: float, friction: float) -> float:
     return -friction * math.copysign(1.0, nt)
 
 
-def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
+def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 0.0) -> Real:
     r"""Return the impulses of several hits at once with friction, without an order.
 
-    Compression: P_n >= 0, u_n >= 0, complementary, and Coulomb's law in each contact, solved by
-    Gauss-Seidel to a fixed point (where the order no longer matters).  Restitution: at least
+    Compression: P_n >= 0, u_n >= 0, complementary, and Coulomb's law in each contact, which is a
+    linear complementarity problem.  Restitution: at least
     s eps times each normal impulse again, more where a gap would close, with friction; s in
     [0, 1] is the largest for which the work of the normal impulses does not exceed eps^2 times
     that of the compression.
@@ -261,6 +280,8 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
         Rates of the gaps, then the sliding velocities [m/s].
     friction, restitution : (k,)
         mu and eps [-].
+    speed : float
+        As in :func:`newton`.
 
     Returns
     -------
@@ -270,16 +291,17 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
     Raises
     ------
     SimulationError
-        If the sweeps find no impulses that satisfy both laws.
+        If no impulses satisfy both laws.
     """
     k = len(friction)
-    P = _sweep(W, u, friction, np.zeros(k))
+    tolerance = COMPLEMENTARITY_RTOL * max(float(np.abs(u).max()), speed)
+    P = _resolved(W, u, friction, np.zeros(k), tolerance)
     after = u + W @ P
     lost = float(-(P[:k] * (u + after)[:k] / 2) @ restitution**2)
     wanted = restitution * P[:k]
 
     def rebound(s: float) -> tuple[Real, float]:
-        R = _sweep(W, after, friction, s * wanted)
+        R = _resolved(W, after, friction, s * wanted, tolerance)
         return R, float(R[:k] @ (2 * after + W @ R)[:k] / 2)
 
     R, gain = rebound(1.0)
@@ -290,28 +312,15 @@ def several(W: Real, u: Real, friction: Real, restitution: Real) -> Real:
     return P + (R if gain <= lost else rebound(low)[0])
 
 
-def _sweep(W: Real, u: Real, friction: Real, least: Real) -> Real:
-    """Gauss-Seidel over contacts: P_n >= least, u_n >= 0, complementary; Coulomb's law.
+def _resolved(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real:
+    """Return impulses with P_n >= least, u_n >= 0, complementary, and Coulomb's law.
 
-    The sweeps may cycle between strongly coupled contacts; relaxation ends the cycle.
+    Raises
+    ------
+    SimulationError
+        If there are none.
     """
-    k = len(friction)
-    for relaxation in SWEEP_RELAXATIONS:
-        P = np.concatenate([least, np.zeros(k)])
-        for _ in range(SWEEPS_MAX):
-            last = P.copy()
-            for i in range(k):
-                if W[i, i] > 0.0:
-                    wanted = P[i] - relaxation * float(u[i] + W[i] @ P) / W[i, i]
-                    P[i] = max(least[i], wanted)
-                j = k + i
-                if W[j, j] > 0.0:
-                    limit = friction[i] * P[i]
-                    wanted = P[j] - relaxation * float(u[j] + W[j] @ P) / W[j, j]
-                    P[j] = min(limit, max(-limit, wanted))
-            if np.abs(P - last).max() <= SWEEP_RTOL * relaxation * np.abs(P).max():
-                return P
-    raise SimulationError(
-        "several stops are hit at once with friction, and no impulses were found that satisfy "
-        "Coulomb's law at all of them; reduce the friction of the stops, or move them apart"
-    )
+    P = impulses(W, u, friction, least, tolerance)
+    if P is None:
+        raise SimulationError(CLOSING_IN)
+    return P

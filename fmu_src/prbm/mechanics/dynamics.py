@@ -369,6 +369,13 @@ class Equations:
         result: Real = self.system.gap_rows.rates(e, v) + walls
         return result
 
+    def gap_accelerations(self, t: float, e: Complex, v: Real, a: Real) -> Real:
+        """Return the accelerations of all gaps [m/s^2] for accelerations a (n,) [rad/s^2]."""
+        rows = self.system.gap_rows
+        walls = np.array([wall.motion(t)[2] for wall in self.inputs.walls])
+        result: Real = rows.jacobian(e) @ a - rows.convective(e, v) + walls
+        return result
+
     def stop_forces(self, lam: Real) -> Real:
         """Return the normal forces of all stops, (s,), zero where open [N]."""
         result = np.zeros(self.contacts.stops)

@@ -4,11 +4,10 @@
  */
 #include <math.h>
 
+#include "core/complementarity.h"
 #include "core/constraints.h"
 #include "core/contact.h"
 #include "core/matrix.h"
-
-static const double RELAXATIONS[] = SWEEP_RELAXATIONS;
 
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
                    double *X, Scratch *scratch, Problem *problem) {
@@ -32,112 +31,76 @@ PRBM bool response(int n, int r, int k, const double *M, const double *held, con
 
 /* --- without friction ------------------------------------------------------------------------- */
 
-/* The next of the sets of so many out of k, in lexical order; false after the last. */
-static bool next_set(int k, int size, int *members) {
-    int i = size - 1;
-    while (i >= 0 && members[i] == k - size + i) {
-        i--;
-    }
-    if (i < 0) {
-        return false;
-    }
-    members[i]++;
-    for (int j = i + 1; j < size; j++) {
-        members[j] = members[j - 1] + 1;
-    }
-    return true;
+static bool closing_in(Problem *problem) {
+    return fail(problem, "no impulses open all gaps: the walls close in on the mechanism; move "
+                         "them apart, or slow them down");
 }
 
-/* W_ss P_s = -b_s for the members s, none for the others */
-static void impulses_of_set(int k, int size, const int *members, const double *W, const double *b,
-                            double *P, Scratch *scratch) {
+/* W_ss P_s = -b_s for the members s; returns whether none of them pulls.  Those that do have no
+ * impulse and are members no longer. */
+static bool share_impulses(int k, int *size, int *members, const double *W, const double *b,
+                           double *P, Scratch *scratch) {
     size_t used = scratch->used;
-    double *part = take_matrix(scratch, size, size), *right = take(scratch, (size_t)size);
-    double *found = take(scratch, (size_t)size);
-    for (int i = 0; i < size; i++) {
+    int count = *size, pushing = 0;
+    double *part = take_matrix(scratch, count, count), *right = take(scratch, (size_t)count);
+    double *found = take(scratch, (size_t)count);
+    for (int i = 0; i < count; i++) {
         right[i] = -b[members[i]];
-        for (int j = 0; j < size; j++) {
-            part[i * size + j] = W[members[i] * k + members[j]];
+        for (int j = 0; j < count; j++) {
+            part[i * count + j] = W[members[i] * k + members[j]];
         }
     }
-    least_squares(size, size, part, right, IMPULSE_RANK_RTOL, found, scratch);
+    least_squares(count, count, part, right, IMPULSE_RANK_RTOL, found, scratch);
     zeros(k, P);
-    for (int i = 0; i < size; i++) {
-        P[members[i]] = found[i];
+    for (int i = 0; i < count; i++) {
+        if (!(found[i] < 0.0)) {
+            P[members[i]] = found[i];
+            members[pushing++] = members[i];
+        }
+    }
+    *size = pushing;
+    scratch->used = used;
+    return pushing == count;
+}
+
+/* Share the impulses between the stops that open neither sooner nor later than they must, as evenly
+ * as they can be shared. */
+static void share_evenly(int k, const double *W, const double *b, double tolerance, double *P,
+                         Scratch *scratch) {
+    size_t used = scratch->used;
+    double *shared = take(scratch, (size_t)k);
+    int *members = take_integers(scratch, k), size = 0;
+    for (int i = 0; i < k; i++) {
+        if (fabs(dot(k, W + i * k, P) + b[i]) <= tolerance) {
+            members[size++] = i;
+        }
+    }
+    zeros(k, shared);
+    bool pulling = size > 0;
+    while (pulling && size > 0) {
+        pulling = !share_impulses(k, &size, members, W, b, shared, scratch);
+    }
+    if (violation(k, 0, W, b, shared, NULL) <= tolerance) {
+        copy(k, shared, P);
     }
     scratch->used = used;
 }
 
-/* What W P + b >= 0, P >= 0, P (W P + b) = 0 is violated by, as a velocity. */
-static double violation_of(int k, const double *W, const double *b, const double *P) {
-    double worst = -HUGE_VAL, product = 0.0;
-    for (int i = 0; i < k; i++) {
-        double opening = dot(k, W + i * k, P) + b[i];
-        double push = P[i] * W[i * k + i];
-        worst = greater(worst, greater(-opening, -push));
-        product = greater(product, fabs(push * opening));
-    }
-    return greater(worst, sqrt(product));
-}
-
-static void keep_positive(int k, const double *P, double *kept) {
-    for (int i = 0; i < k; i++) {
-        kept[i] = P[i] > 0.0 ? P[i] : 0.0;
-    }
-}
-
-/* Gauss-Seidel, which lowers P.W P/2 + b.P with each step, where the sets are too many. */
-static void newton_sweeps(int k, const double *W, const double *b, double *P) {
-    zeros(k, P);
-    for (int sweep = 0; sweep < SWEEPS_MAX; ++sweep) {
-        for (int i = 0; i < k; i++) {
-            double mobility = W[i * k + i];
-            if (mobility > 0.0) {
-                P[i] = greater(0.0, P[i] - (dot(k, W + i * k, P) + b[i]) / mobility);
-            }
-        }
-    }
-}
-
-/* Try every set of stops that may receive an impulse; P becomes the least violating one. */
-static void newton_search(int k, const double *W, const double *b, double tolerance, double *P,
-                          Scratch *scratch) {
-    int *members = take_integers(scratch, k);
-    double *trial = take(scratch, (size_t)k), worst = HUGE_VAL;
-    zeros(k, P);
-    /* the largest sets first: a stop that closes nearly always receives an impulse */
-    for (int size = k; size >= 0; size--) {
-        for (int i = 0; i < size; i++) {
-            members[i] = i;
-        }
-        do {
-            impulses_of_set(k, size, members, W, b, trial, scratch);
-            double violation = violation_of(k, W, b, trial);
-            if (violation <= tolerance) {
-                keep_positive(k, trial, P);
-                return;
-            }
-            if (violation < worst) {
-                worst = violation;
-                keep_positive(k, trial, P);
-            }
-        } while (next_set(k, size, members));
-    }
-}
-
-PRBM void newton(int k, const double *W, const double *u, const double *restitution, double *P,
-                 Scratch *scratch) {
+PRBM bool newton(int k, const double *W, const double *u, const double *restitution, double speed,
+                 double *P, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
-    double *b = take(scratch, (size_t)k);
+    double *b = take(scratch, (size_t)k), *least = take(scratch, (size_t)k);
+    double tolerance = COMPLEMENTARITY_RTOL * greater(largest(k, u), speed);
+    zeros(k, least);
     for (int i = 0; i < k; i++) {
         b[i] = (1.0 + restitution[i]) * u[i];
     }
-    if (k <= IMPACT_SETS_MAX) {
-        newton_search(k, W, b, COMPLEMENTARITY_RTOL * largest(k, u), P, scratch);
-    } else {
-        newton_sweeps(k, W, b, P);
+    bool solved = impulses(k, 0, W, b, NULL, least, tolerance, P, scratch);
+    if (solved) {
+        share_evenly(k, W, b, tolerance, P, scratch);
     }
     scratch->used = used;
+    return solved || closing_in(problem);
 }
 
 /* --- one hit with friction -------------------------------------------------------------------- */
@@ -199,7 +162,7 @@ static double compress(Hit *hit) {
         double closed = hit->rate_n > WEDGED_RTOL * hit->nn ? -hit->u_n / hit->rate_n : HUGE_VAL;
         double step = lesser(sticking, closed);
         if (step == HUGE_VAL) {
-            break;
+            break; /* without a mobility: at most round-off is left, see stronge */
         }
         work -= work_of(hit, step);
         receive(hit, step);
@@ -228,89 +191,40 @@ static void restore(Hit *hit, double left) {
     }
 }
 
-PRBM void stronge(const double *W, const double *u, double friction, double restitution,
-                  double *P_n, double *P_t) {
+PRBM bool stronge(const double *W, const double *u, double friction, double restitution,
+                  double speed, double *P_n, double *P_t, Problem *problem) {
     Hit hit = {.nn = W[0], .nt = W[1], .tt = W[3], .friction = friction, .u_n = u[0], .u_t = u[1]};
     double reach = hit.nn > 0.0 ? fabs(hit.u_n) * sqrt(hit.tt / hit.nn) : 0.0;
     double small_n = ZERO_SPEED_RTOL * fabs(hit.u_n);
     double small_t = ZERO_SPEED_RTOL * (fabs(hit.u_t) + reach);
     double work = compress(&hit);
+    if (hit.u_n < -greater(small_n, COMPLEMENTARITY_RTOL * speed)) {
+        return fail(problem, "the wall pushes the mechanism in a direction that friction locks; "
+                             "reduce the friction of the stop, or the velocity of the wall");
+    }
     /* with one degree of freedom both rates vanish together, up to a rounding */
     hit.u_n = hit.u_n > small_n ? hit.u_n : 0.0;
     hit.u_t = fabs(hit.u_t) > small_t ? hit.u_t : 0.0;
     restore(&hit, restitution * restitution * work);
     *P_n = hit.p_n;
     *P_t = hit.p_t;
+    return true;
 }
 
 /* --- several hits with friction --------------------------------------------------------------- */
 
-static double between(double low, double x, double high) {
-    return lesser(high, greater(low, x));
-}
-
-/* One Gauss-Seidel step towards u_i + (W P)_i = 0, within the limits of the impulse. */
-static void relax(int size, const double *W, const double *u, double relaxation, int i, double low,
-                  double high, double *P) {
-    const double *row = W + i * size;
-    if (row[i] > 0.0) {
-        double wanted = P[i] - relaxation * (u[i] + dot(size, row, P)) / row[i];
-        P[i] = between(low, wanted, high);
-    }
-}
-
-/* Gauss-Seidel over contacts: P_n >= least, u_n >= 0, complementary; Coulomb's law.  last (2 k,) is
- * for its own use. */
-static bool relaxed_sweeps(int k, const double *W, const double *u, const double *friction,
-                           const double *least, double relaxation, double *P, double *last) {
-    copy(k, least, P);
-    zeros(k, P + k);
-    for (int sweep = 0; sweep < SWEEPS_MAX; ++sweep) {
-        copy(2 * k, P, last);
-        for (int i = 0; i < k; i++) {
-            relax(2 * k, W, u, relaxation, i, least[i], HUGE_VAL, P);
-            double limit = friction[i] * P[i];
-            relax(2 * k, W, u, relaxation, k + i, -limit, limit, P);
-        }
-        for (int i = 0; i < 2 * k; i++) {
-            last[i] -= P[i];
-        }
-        if (largest(2 * k, last) <= SWEEP_RTOL * relaxation * largest(2 * k, P)) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* Strongly coupled contacts can make the sweeps run in circles; shorter steps lead out. */
-static bool sweep_contacts(int k, const double *W, const double *u, const double *friction,
-                           const double *least, double *P, Scratch *scratch, Problem *problem) {
-    size_t used = scratch->used;
-    double *last = take(scratch, 2 * (size_t)k);
-    bool settled = false;
-    for (int i = 0; !settled && i < (int)(sizeof RELAXATIONS / sizeof *RELAXATIONS); i++) {
-        settled = relaxed_sweeps(k, W, u, friction, least, RELAXATIONS[i], P, last);
-    }
-    scratch->used = used;
-    return settled ||
-           fail(problem,
-                "several stops are hit at once with friction, and no impulses were found that "
-                "satisfy Coulomb's law at all of them; reduce the friction of the stops, or move "
-                "them apart");
-}
-
 /* The impulses R of restitution, at least s wanted, and the work of the normal ones. */
 static bool rebound(int k, const double *W, const double *after, const double *friction,
-                    const double *wanted, double s, double *R, double *gain, Scratch *scratch,
-                    Problem *problem) {
+                    const double *wanted, double s, double tolerance, double *R, double *gain,
+                    Scratch *scratch) {
     size_t used = scratch->used;
     double *least = take(scratch, (size_t)k);
     for (int i = 0; i < k; i++) {
         least[i] = s * wanted[i];
     }
-    bool settled = sweep_contacts(k, W, after, friction, least, R, scratch, problem);
+    bool settled = impulses(k, k, W, after, friction, least, tolerance, R, scratch);
     double work = 0.0;
-    for (int i = 0; i < k; i++) {
+    for (int i = 0; settled && i < k; i++) {
         work += R[i] * (2 * after[i] + dot(2 * k, W + i * 2 * k, R));
     }
     *gain = work / 2;
@@ -321,9 +235,9 @@ static bool rebound(int k, const double *W, const double *after, const double *f
 /* The rebound with the largest s whose work does not exceed what compression has left. */
 static bool restitution_of_several(int k, const double *W, const double *after,
                                    const double *friction, const double *wanted, double lost,
-                                   double *R, Scratch *scratch, Problem *problem) {
+                                   double tolerance, double *R, Scratch *scratch) {
     double gain, low = 0.0, high = 1.0;
-    if (!rebound(k, W, after, friction, wanted, 1.0, R, &gain, scratch, problem)) {
+    if (!rebound(k, W, after, friction, wanted, 1.0, tolerance, R, &gain, scratch)) {
         return false;
     }
     if (gain <= lost) {
@@ -331,34 +245,36 @@ static bool restitution_of_several(int k, const double *W, const double *after,
     }
     while (gain > lost && high - low > REBOUND_RTOL) {
         double s = (low + high) / 2, trial;
-        if (!rebound(k, W, after, friction, wanted, s, R, &trial, scratch, problem)) {
+        if (!rebound(k, W, after, friction, wanted, s, tolerance, R, &trial, scratch)) {
             return false;
         }
         low = trial <= lost ? s : low;
         high = trial <= lost ? high : s;
     }
-    return rebound(k, W, after, friction, wanted, low, R, &gain, scratch, problem);
+    return rebound(k, W, after, friction, wanted, low, tolerance, R, &gain, scratch);
 }
 
 PRBM bool several(int k, const double *W, const double *u, const double *friction,
-                  const double *restitution, double *P, Scratch *scratch, Problem *problem) {
+                  const double *restitution, double speed, double *P, Scratch *scratch,
+                  Problem *problem) {
     size_t used = scratch->used;
     double *after = take(scratch, 2 * (size_t)k), *R = take(scratch, 2 * (size_t)k);
     double *wanted = take(scratch, (size_t)k), lost = 0.0;
+    double tolerance = COMPLEMENTARITY_RTOL * greater(largest(2 * k, u), speed);
     zeros(k, wanted);
-    bool settled = sweep_contacts(k, W, u, friction, wanted, P, scratch, problem);
-    for (int i = 0; i < 2 * k; i++) {
+    bool settled = impulses(k, k, W, u, friction, wanted, tolerance, P, scratch);
+    for (int i = 0; settled && i < 2 * k; i++) {
         after[i] = u[i] + dot(2 * k, W + i * 2 * k, P);
     }
-    for (int i = 0; i < k; i++) {
+    for (int i = 0; settled && i < k; i++) {
         lost -= P[i] * (u[i] + after[i]) / 2 * (restitution[i] * restitution[i]);
         wanted[i] = restitution[i] * P[i];
     }
-    settled = settled && restitution_of_several(k, W, after, friction, wanted, lost, R, scratch,
-                                                problem);
+    settled = settled && restitution_of_several(k, W, after, friction, wanted, lost, tolerance, R,
+                                                scratch);
     for (int i = 0; settled && i < 2 * k; i++) {
         P[i] += R[i];
     }
     scratch->used = used;
-    return settled;
+    return settled || closing_in(problem);
 }

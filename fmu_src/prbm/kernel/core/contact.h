@@ -7,11 +7,13 @@
 /* Changes of velocity X (n, k) by unit impulses along the rows (k, n), while held (r, n) keep. */
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
                    double *X, Scratch *scratch, Problem *problem);
-PRBM void newton(int k, const double *W, const double *u, const double *restitution, double *P,
-                 Scratch *scratch);
-PRBM void stronge(const double *W, const double *u, double friction, double restitution,
-                  double *P_n, double *P_t);
+/* speed: a scale of speeds, of which violations may be round-off */
+PRBM bool newton(int k, const double *W, const double *u, const double *restitution, double speed,
+                 double *P, Scratch *scratch, Problem *problem);
+PRBM bool stronge(const double *W, const double *u, double friction, double restitution,
+                  double speed, double *P_n, double *P_t, Problem *problem);
 PRBM bool several(int k, const double *W, const double *u, const double *friction,
-                  const double *restitution, double *P, Scratch *scratch, Problem *problem);
+                  const double *restitution, double speed, double *P, Scratch *scratch,
+                  Problem *problem);
 
 #endif

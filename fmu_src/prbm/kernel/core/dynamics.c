@@ -95,6 +95,13 @@ PRBM double gap_rate(const Equations *equations, int i, double t, const Complex 
     return row_rate(&rows, i, e, v) + wall_motion(&equations->inputs.walls[i], t).v;
 }
 
+PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,
+                             const double *v, const double *a) {
+    Rows rows = gap_rows(equations->system);
+    return row_rate(&rows, i, e, a) - row_convective(&rows, i, e, v) +
+           wall_motion(&equations->inputs.walls[i], t).a;
+}
+
 /* --- reactions -------------------------------------------------------------------------------- */
 
 /* E (i w' - w^2) of the arms: a place accelerates by A times that. */

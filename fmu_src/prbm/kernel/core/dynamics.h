@@ -8,6 +8,8 @@
 PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
                Evaluation *result, double *dy, Problem *problem);
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e);
+PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,
+                             const double *v, const double *a);
 PRBM double gap_rate(const Equations *equations, int i, double t, const Complex *e,
                      const double *v);
 PRBM void base_reaction(const Equations *equations, const Complex *e, const double *v,

@@ -9,6 +9,11 @@ PRBM double zero_speed(const Configuration *configuration) {
     return ZERO_RATE_RTOL * scales->rate * scales->length;
 }
 
+PRBM double zero_acceleration(const Configuration *configuration) {
+    const Scales *scales = &configuration->scales;
+    return ZERO_RATE_RTOL * scales->rate * scales->rate * scales->length;
+}
+
 /* The scale of rates is the fundamental frequency or, without one, that of the stiffest spring;
  * the scale of energies is one radian against the stiffest torsion spring or, without one, a turn
  * by one radian in a period. */

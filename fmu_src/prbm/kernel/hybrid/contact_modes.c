@@ -1,17 +1,8 @@
 /* The choice of the contact state: the twin of hybrid/contact_modes.py. */
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 #include "hybrid/hybrid.h"
-
-enum { CONTACTS_MAX = 2 * STOPS_MAX };
-
-/* Set up the trial equations in the trial's contact state. */
-static void try_contacts(Simulation *sim) {
-    set_equations(&sim->trial.equations, &sim->equations.inputs, &sim->trial.contacts,
-                  sim->configuration.omega);
-}
 
 /* Set up the trial equations in the present contact state with one mode changed. */
 static void try_mode(Simulation *sim, int contact, int mode) {
@@ -19,218 +10,6 @@ static void try_mode(Simulation *sim, int contact, int mode) {
     memcpy(sim->trial.contacts.modes, sim->state.modes, bytes);
     sim->trial.contacts.modes[contact] = mode;
     try_contacts(sim);
-}
-
-static bool evaluate_trial(Simulation *sim, const double *q, const double *v, Problem *problem) {
-    return evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL, &sim->trial.evaluation, problem);
-}
-
-/* The mode of a closed contact with a sliding velocity, CONTACT_FRICTIONLESS at round-off. */
-static int slip_mode(const Simulation *sim, double speed) {
-    return fabs(speed) <= zero_speed(&sim->configuration) ? CONTACT_FRICTIONLESS
-                                                          : slipping_mode(speed);
-}
-
-/* --- resting stops ---------------------------------------------------------------------------- */
-
-/* The stops that touch, their rows and convective terms. */
-typedef struct {
-    int count, stops[RESTING_SETS_MAX];
-    const double *q, *v;
-    Inertia at;
-    double *G, *convective; /* (s, n), (s,) */
-} Touching;
-
-static bool has_stop(int count, const int *stops, int stop) {
-    for (int k = 0; k < count; k++) {
-        if (stops[k] == stop) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* Whether each of the rows keeps a mobility of its own beside the rows before it. */
-static bool independent_rows(Simulation *sim, int count, const double *rows, const Inertia *at,
-                             bool *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    int n = system_of(sim)->n, r = system_of(sim)->r;
-    double *held = take_matrix(&sim->scratch, r + count, n);
-    bool right = true;
-    *result = true;
-    copy(r * n, at->loops, held);
-    copy(count * n, rows, held + r * n);
-    for (int k = 1; right && *result && k < count; k++) {
-        double left, own;
-        right = mobility(sim, at, r + k, held, rows + k * n, &left, problem) &&
-                mobility(sim, at, r, at->loops, rows + k * n, &own, problem);
-        *result = right && left > DEPENDENT_STOP_RTOL * own;
-    }
-    sim->scratch.used = mark;
-    return right;
-}
-
-/* Set up the trial equations in which a set of stops is closed; what slides has friction. */
-PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const double *q,
-                      const double *v) {
-    size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    Complex *e = directions_at(sim, q);
-    for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool open = is_stop(system, contact) &&
-                    !has_stop(resting->count, resting->stops, contact);
-        double speed = sliding_velocity(system, contact, e, v);
-        sim->trial.contacts.modes[contact] = open ? CONTACT_OPEN : slip_mode(sim, speed);
-    }
-    sim->scratch.used = mark;
-    try_contacts(sim);
-}
-
-/* Whether all stops of a set are pressed, and at which acceleration the other stops open. */
-static bool try_set(Simulation *sim, const Touching *touching, HoldingSet *tried, bool *pressed,
-                    Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const Equations *q = &sim->trial.equations;
-    const Evaluation *evaluation = &sim->trial.evaluation;
-    int n = system_of(sim)->n;
-    double *rows = take_matrix(&sim->scratch, tried->count, n);
-    bool independent;
-    for (int k = 0; k < tried->count; k++) {
-        copy(n, touching->G + tried->stops[k] * n, rows + k * n);
-    }
-    *pressed = false;
-    tried->opening = HUGE_VAL;
-    bool right = independent_rows(sim, tried->count, rows, &touching->at, &independent, problem);
-    sim->scratch.used = mark;
-    if (!right || !independent) {
-        return right;
-    }
-    equations_holding(sim, tried, touching->q, touching->v);
-    if (!evaluate_trial(sim, touching->q, touching->v, problem)) {
-        return false;
-    }
-    *pressed = true;
-    for (int k = 0; k < q->held_count; k++) {
-        *pressed = *pressed && evaluation->lam[q->first_hold + k] > 0.0;
-    }
-    for (int k = 0; k < touching->count; k++) {
-        int i = touching->stops[k];
-        if (sim->trial.contacts.modes[i] == CONTACT_OPEN) {
-            double opening = dot(n, touching->G + i * n, evaluation->a) - touching->convective[i] +
-                             wall_motion(&sim->state.walls[i], sim->state.front_time).a;
-            tried->opening = lesser(tried->opening, opening);
-        }
-    }
-    tried->opening = tried->count == touching->count ? 0.0 : tried->opening;
-    return true;
-}
-
-/* The set of a size whose stops are all pressed and whose other stops open fastest; of count 0
- * without one. */
-static bool best_set(Simulation *sim, const Touching *touching, int size, HoldingSet *best,
-                     Problem *problem) {
-    int members[RESTING_SETS_MAX];
-    HoldingSet none = {0, {0}, -HUGE_VAL}, tried;
-    bool right = true;
-    *best = none;
-    for (int k = 0; k < size; k++) {
-        members[k] = k;
-    }
-    do {
-        bool pressed;
-        tried.count = size;
-        for (int k = 0; k < size; k++) {
-            tried.stops[k] = touching->stops[members[k]];
-        }
-        right = try_set(sim, touching, &tried, &pressed, problem);
-        if (right && pressed && (best->count == 0 || tried.opening > best->opening)) {
-            *best = tried;
-        }
-    } while (right && next_set(touching->count, size, members));
-    return right;
-}
-
-/* The names of stops, or as many of them as there is room for. */
-static void list_stops(const Mechanism *m, int count, const int *stops, char *text, size_t size) {
-    size_t length = 0;
-    text[0] = '\0';
-    for (int i = 0; i < m->stop_count; i++) {
-        size_t needed = strlen(m->stops[i].name) + sizeof ", " + sizeof ", ...";
-        if (!has_stop(count, stops, i)) {
-            continue;
-        }
-        if (length + needed > size) {
-            (void)snprintf(text + length, size - length, ", ...");
-            return;
-        }
-        (void)snprintf(text + length, size - length, "%s%s", length > 0 ? ", " : "",
-                       m->stops[i].name);
-        length = strlen(text);
-    }
-}
-
-/* Reject more stops than are tried in every combination. */
-static bool too_many_resting(const Simulation *sim, int count, const int *stops,
-                             Problem *problem) {
-    char names[300];
-    int many = 0;
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        many += has_stop(count, stops, i);
-    }
-    list_stops(sim->configuration.mechanism, count, stops, names, sizeof names);
-    return fail(problem,
-                "%d stops rest at once at t = %.9g s (%s), more than the %d of which every "
-                "combination can be tried; replace stops that touch together by one, or move them "
-                "apart",
-                many, sim->state.front_time, names, (int)RESTING_SETS_MAX);
-}
-
-static bool find_touching(Simulation *sim, int count, const int *candidates, Touching *touching,
-                          Problem *problem) {
-    const System *system = system_of(sim);
-    Rows gaps = gap_rows(system);
-    touching->count = 0;
-    for (int i = 0; i < system->s; i++) {
-        if (has_stop(count, candidates, i)) {
-            if (touching->count == RESTING_SETS_MAX) {
-                return too_many_resting(sim, count, candidates, problem);
-            }
-            touching->stops[touching->count++] = i;
-        }
-    }
-    touching->at = inertia_at(sim, touching->q);
-    touching->G = take_matrix(&sim->scratch, system->s, system->n);
-    touching->convective = take(&sim->scratch, (size_t)system->s);
-    jacobian(&gaps, touching->at.e, touching->G);
-    for (int i = 0; i < system->s; i++) {
-        touching->convective[i] = row_convective(&gaps, i, touching->at.e, touching->v);
-    }
-    return true;
-}
-
-/* The largest set of the candidates whose stops are pressed while the others open; what slides
- * has friction.  Of stops that can move only together one stays closed: that which keeps the
- * others from closing. */
-PRBM bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
-                       const double *v, HoldingSet *resting, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const Scales *scales = &sim->configuration.scales;
-    double closes = -ZERO_RATE_RTOL * scales->rate * scales->rate * scales->length;
-    HoldingSet none = {0, {0}, 0.0}, pressed_only = none, best = none;
-    Touching touching;
-    touching.q = q;
-    touching.v = v;
-    bool found = false, right = find_touching(sim, count, candidates, &touching, problem);
-    for (int size = right ? touching.count : 0; right && !found && size > 0; size--) {
-        right = best_set(sim, &touching, size, &best, problem);
-        found = right && best.count > 0 && best.opening >= closes;
-        if (right && best.count > 0 && !found && pressed_only.count == 0) {
-            pressed_only = best;
-        }
-    }
-    *resting = found ? best : pressed_only;
-    sim->scratch.used = mark;
-    return right;
 }
 
 /* --- friction of one contact ------------------------------------------------------------------ */
@@ -260,9 +39,11 @@ static bool has_mobility(Simulation *sim, int contact, const Inertia *at, const 
     return right;
 }
 
-/* Whether a contact that is at rest and may move sticks, or which way it slips. */
+/* Whether a contact that is at rest and may move sticks, or which way it slips; and whether this
+ * fits while all others keep their modes. */
 static bool mode_at_rest(Simulation *sim, int contact, const Inertia *at, const double *row,
-                         bool slips, int *mode, Problem *problem) {
+                         bool slips, int *mode, bool *fits, Problem *problem) {
+    double greatest = 0.0;
     const System *system = system_of(sim);
     const Evaluation *tried = &sim->trial.evaluation;
     const double *q = sim->state.front, *v = q + system->n;
@@ -284,12 +65,16 @@ static bool mode_at_rest(Simulation *sim, int contact, const Inertia *at, const 
         if (!evaluate_trial(sim, q, v, problem)) {
             return false;
         }
-        if (sign * (dot(system->n, row, tried->a) - convective) > 0.0) {
+        double acceleration = sign * (dot(system->n, row, tried->a) - convective);
+        if (acceleration > 0.0) {
             *mode = slipping_mode(sign);
             return true;
         }
+        greatest = greater(greatest, -acceleration);
     }
+    /* where there is as good as no friction, either of these fits */
     *mode = slips ? CONTACT_FRICTIONLESS : CONTACT_STICK;
+    *fits = greatest <= zero_acceleration(&sim->configuration);
     return true;
 }
 
@@ -297,20 +82,22 @@ static bool mode_at_rest(Simulation *sim, int contact, const Inertia *at, const 
  * is frictionless where the loops and the closed stops leave it no mobility of its own: they
  * carry all of the load.  Else it sticks as far as Coulomb's law allows, and beyond slips in the
  * direction in which sliding accelerates it. */
-static bool choose_mode(Simulation *sim, int contact, const FrictionEvent *event,
+static bool choose_mode(Simulation *sim, int contact, const FrictionEvent *event, bool *fits,
                         Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     bool this_one = event->contact == contact, mobile = false, right = true;
     double slow = this_one ? event->slow : 0.0, *row = take(&sim->scratch, (size_t)system->n);
     Inertia at = inertia_at(sim, sim->state.front);
+    *fits = true;
     tangential_row(system, contact, at.e, row);
     double speed = dot(system->n, row, sim->state.front + system->n);
     int mode = fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
     if (mode == CONTACT_FRICTIONLESS) {
         right = has_mobility(sim, contact, &at, row, &mobile, problem);
         if (right && mobile) {
-            right = mode_at_rest(sim, contact, &at, row, this_one && event->slips, &mode, problem);
+            right = mode_at_rest(sim, contact, &at, row, this_one && event->slips, &mode, fits,
+                                 problem);
         }
     }
     sim->scratch.used = mark;
@@ -425,64 +212,221 @@ static bool set_combination(Simulation *sim, int c, int count, const int *contac
 
 /* Choose the modes of the contacts at rest together, if choosing them one by one does not end.  It
  * is the first combination in which sticking needs no more than its friction, slipping accelerates
- * in its direction, and all closed stops are pressed.  Without one, or with too many at rest, the
- * modes stay as they are. */
+ * in its direction, and all closed stops are pressed.  None is found with too many at rest. */
 static bool settle_together(Simulation *sim, int count, const int *contacts,
-                            const FrictionEvent *event, Problem *problem) {
-    int kept[CONTACTS_MAX], mobile[CONTACTS_MAX], many, combinations = 1;
-    size_t bytes = (size_t)contact_count(sim) * sizeof(int);
-    bool found = false;
-    memcpy(kept, sim->state.modes, bytes);
+                            const FrictionEvent *event, bool *found, Problem *problem) {
+    int mobile[CONTACTS_MAX], many, combinations = 1;
     if (!mobile_at_rest(sim, count, contacts, event, &many, mobile, problem)) {
         return false;
     }
     for (int k = 0; k < many && many <= STICKING_SETS_MAX; k++) {
         combinations *= 3;
     }
-    for (int c = 0; many <= STICKING_SETS_MAX && !found && c < combinations; c++) {
+    for (int c = 0; many <= STICKING_SETS_MAX && !*found && c < combinations; c++) {
         if (set_combination(sim, c, many, mobile, event) &&
-            !state_agrees(sim, many, mobile, &found, problem)) {
+            !state_agrees(sim, many, mobile, found, problem)) {
             return false;
         }
-    }
-    if (!found) {
-        set_contacts(sim, kept);
     }
     return true;
 }
 
+/* The mode of a contact that slides faster than the event leaves; CONTACT_FRICTIONLESS at rest. */
+static int sliding_mode(Simulation *sim, int contact, const FrictionEvent *event) {
+    size_t mark = sim->scratch.used;
+    const double *q = sim->state.front, *v = q + system_of(sim)->n;
+    double speed = sliding_velocity(system_of(sim), contact, directions_at(sim, q), v);
+    double slow = event->contact == contact ? event->slow : 0.0;
+    sim->scratch.used = mark;
+    return fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
+}
+
+static double friction_of(const Simulation *sim, int contact) {
+    const System *system = system_of(sim);
+    return is_stop(system, contact) ? sim->equations.stop_friction[contact]
+                                    : sim->equations.rub_law[3 * (contact - system->s)];
+}
+
+/* Whether a contact at rest begins to slip, sticks, bears the limit of its friction, or none. */
+static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
+                           bool slipped, Problem *problem) {
+    bool mobile = false, at_limit = fabs(found->friction[j]) >= found->limit[j];
+    int mode = CONTACT_FRICTIONLESS;
+    if (fabs(found->slide[j]) > zero_acceleration(&sim->configuration)) {
+        set_mode(sim, contact, slipping_mode(found->slide[j]));
+        return true;
+    }
+    if (!(at_limit && slipped) && !is_mobile(sim, contact, &mobile, problem)) {
+        return false;
+    }
+    if (mobile) {
+        mode = CONTACT_STICK;
+    } else if (at_limit && found->limit[j] > 0.0) {
+        mode = slipping_mode(-found->friction[j]);
+    }
+    set_mode(sim, contact, mode);
+    return true;
+}
+
+/* Choose the modes of contacts at rest by their forces: first of those whose friction is below its
+ * limit. */
+static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
+                          const FrictionEvent *event, Problem *problem) {
+    bool right = true;
+    for (int limited = 0; limited < 2; limited++) {
+        for (int j = 0; right && j < rest->count; j++) {
+            int contact = rest->contacts[j];
+            bool at_limit = fabs(found->friction[j]) >= found->limit[j];
+            if (at_limit == (limited == 1) && sim->state.modes[contact] != CONTACT_OPEN) {
+                right = mode_of_forces(sim, found, j, contact,
+                                       event->slips && event->contact == contact, problem);
+            }
+        }
+    }
+    return right;
+}
+
+/* Whether a contact at rest satisfies its law in the trial equations, up to round-off. */
+static bool obeys_coulomb(Simulation *sim, int contact, const Complex *e, double *row) {
+    const System *system = system_of(sim);
+    const Equations *equations = &sim->trial.equations;
+    const Evaluation *tried = &sim->trial.evaluation;
+    const double *v = sim->state.front + system->n;
+    int mode = sim->state.modes[contact];
+    if (mode == CONTACT_STICK) {
+        return fabs(stick_force(equations, tried->lam, contact)) <=
+               (1.0 + FRICTION_EXCESS_RTOL) * friction_limit(equations, e, tried->lam, contact);
+    }
+    tangential_row(system, contact, e, row);
+    double slide = dot(system->n, row, tried->a) - tangential_convective(system, contact, e, v);
+    return !(slip_sign(mode) * slide < -zero_acceleration(&sim->configuration));
+}
+
+/* Whether the modes satisfy the laws of all contacts, up to round-off. */
+static bool modes_agree(Simulation *sim, const RestContacts *rest, bool *result,
+                        Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    const Equations *equations = &sim->trial.equations;
+    const Evaluation *tried = &sim->trial.evaluation;
+    const double *q = sim->state.front, *v = q + system->n;
+    double *row = take(&sim->scratch, (size_t)system->n);
+    Rows gaps = gap_rows(system);
+    Complex *e = directions_at(sim, q);
+    memcpy(sim->trial.contacts.modes, sim->state.modes, (size_t)contact_count(sim) * sizeof(int));
+    try_contacts(sim);
+    bool right = evaluate_trial(sim, q, v, problem);
+    *result = right;
+    for (int k = 0; *result && k < rest->stop_count; k++) {
+        int i = rest->stops[k];
+        row_jacobian(&gaps, i, e, row);
+        double opening = dot(system->n, row, tried->a) - row_convective(&gaps, i, e, v);
+        *result = sim->state.modes[i] != CONTACT_OPEN
+                      ? stop_force(equations, tried->lam, i) > 0.0
+                      : !(opening < -zero_acceleration(&sim->configuration));
+    }
+    for (int j = 0; *result && j < rest->count; j++) {
+        *result = obeys_coulomb(sim, rest->contacts[j], e, row);
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* The stops that touch and the contacts at rest; the modes of all that slides, stops open. */
+static void find_rest(Simulation *sim, int count, const int *touching, const FrictionEvent *event,
+                      RestContacts *rest, int *modes, int *sliding) {
+    const System *system = system_of(sim);
+    rest->stop_count = rest->count = 0;
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        bool stop = is_stop(system, contact);
+        modes[contact] = stop ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
+        sliding[contact] = sliding_mode(sim, contact, event);
+        if (stop && !has_contact(count, touching, contact)) {
+            continue;
+        }
+        if (stop) {
+            rest->stops[rest->stop_count] = contact;
+            rest->slips[rest->stop_count++] = slip_sign(sliding[contact]);
+        }
+        if (friction_of(sim, contact) > 0.0) {
+            modes[contact] = stop ? CONTACT_OPEN : sliding[contact];
+            if (sliding[contact] == CONTACT_FRICTIONLESS) {
+                rest->contacts[rest->count++] = contact;
+            }
+        }
+    }
+}
+
+/* Choose the modes of all contacts by the forces that satisfy all laws at once. */
+static bool settle_by_forces(Simulation *sim, int count, const int *touching,
+                             const FrictionEvent *event, Problem *problem) {
+    const System *system = system_of(sim);
+    const double *q = sim->state.front;
+    int modes[CONTACTS_MAX], sliding[CONTACTS_MAX], all[CONTACTS_MAX], many = 0;
+    size_t bytes = (size_t)contact_count(sim) * sizeof(int);
+    RestContacts rest;
+    RestForces found;
+    bool agree = false;
+    find_rest(sim, count, touching, event, &rest, modes, sliding);
+    memcpy(sim->trial.contacts.modes, modes, bytes);
+    try_contacts(sim);
+    if (!rest_forces(sim, q, q + system->n, &rest, &found, problem)) {
+        return false;
+    }
+    for (int k = 0; found.solved && k < rest.stop_count; k++) {
+        int i = rest.stops[k];
+        bool pressed = found.normal[k] > zero_acceleration(&sim->configuration);
+        modes[i] = pressed ? sliding[i] : CONTACT_OPEN;
+    }
+    set_contacts(sim, modes);
+    if (found.solved && !(stick_or_slip(sim, &rest, &found, event, problem) &&
+                          modes_agree(sim, &rest, &agree, problem))) {
+        return false;
+    }
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        bool touches = is_stop(system, contact) ? has_contact(count, touching, contact)
+                                                : friction_of(sim, contact) > 0.0;
+        all[many] = contact;
+        many += touches;
+    }
+    return agree || contacts_jammed(sim, many, all, problem);
+}
+
 /* The closed contacts that have friction. */
 static int contacts_with_friction(const Simulation *sim, int *contacts) {
-    const System *system = system_of(sim);
     int count = 0;
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        double friction = is_stop(system, contact)
-                              ? sim->equations.stop_friction[contact]
-                              : sim->equations.rub_law[3 * (contact - system->s)];
-        if (sim->state.modes[contact] != CONTACT_OPEN && friction > 0.0) {
+        if (sim->state.modes[contact] != CONTACT_OPEN && friction_of(sim, contact) > 0.0) {
             contacts[count++] = contact;
         }
     }
     return count;
 }
 
-/* Choose the modes one by one until none changes: one may change the mode of another. */
-static bool settle_friction(Simulation *sim, const FrictionEvent *event, Problem *problem) {
+/* Choose the modes one by one until none changes: one may change the mode of another.  Else choose
+ * them all at once. */
+static bool settle_friction(Simulation *sim, int touching_count, const int *touching,
+                            const FrictionEvent *event, Problem *problem) {
     int before[CONTACTS_MAX], contacts[CONTACTS_MAX];
     int count = contacts_with_friction(sim, contacts);
     size_t bytes = (size_t)contact_count(sim) * sizeof(int);
     for (int round = 0; round <= count; round++) {
+        bool fits = true;
         memcpy(before, sim->state.modes, bytes);
         for (int k = 0; k < count; k++) {
-            if (!choose_mode(sim, contacts[k], event, problem)) {
+            bool one_fits;
+            if (!choose_mode(sim, contacts[k], event, &one_fits, problem)) {
                 return false;
             }
+            fits = fits && one_fits;
         }
-        if (memcmp(before, sim->state.modes, bytes) == 0) {
+        if (fits && memcmp(before, sim->state.modes, bytes) == 0) {
             return true;
         }
     }
-    return settle_together(sim, count, contacts, event, problem);
+    bool found = false;
+    return settle_together(sim, count, contacts, event, &found, problem) &&
+           (found || settle_by_forces(sim, touching_count, touching, event, problem));
 }
 
 /* --- all -------------------------------------------------------------------------------------- */
@@ -568,14 +512,14 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
         return false;
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool open = is_stop(system, contact) && !has_stop(resting.count, resting.stops, contact);
+        bool open = is_stop(system, contact) && !has_contact(resting.count, resting.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
     set_contacts(sim, modes);
-    if (!settle_friction(sim, &friction, problem)) {
+    if (!settle_friction(sim, count, candidates, &friction, problem)) {
         return false;
     }
-    return resting.count == 0 ||
+    return sim->equations.held_count == 0 ||
            project(&sim->equations, sim->state.front_time, sim->state.front, &sim->scratch,
                    problem);
 }

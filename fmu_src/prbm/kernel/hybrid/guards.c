@@ -44,15 +44,28 @@ static void keep_earlier(Event *first, int kind, int contact, double time) {
 typedef struct {
     Simulation *sim;
     Guard *guard;
+    const char *event;
     bool forces;
     int contact;
     double sign, offset;
+    Problem *problem;
 } ArcGuard;
 
-static ArcGuard arc_guard(Simulation *sim, int kind, int contact) {
+static ArcGuard arc_guard(Simulation *sim, int kind, int contact, Problem *problem) {
     const Transition *row = transition(kind);
-    ArcGuard result = {sim, row->guard, row->forces, contact, 1.0, 0.0};
+    ArcGuard result = {sim, row->guard, row->name, row->forces, contact, 1.0, 0.0, problem};
     return result;
+}
+
+/* Fail with the name of the contact at which an event is sought; the value is no event. */
+static double no_guard(const ArcGuard *guard, double t, const char *cause) {
+    Simulation *sim = guard->sim;
+    if (!sim->stepping.guards_fail) {
+        (void)fail(guard->problem, "no %s of %s could be located at t = %.9g s: %s", guard->event,
+                   contact_name(sim->configuration.mechanism, guard->contact), t, cause);
+    }
+    sim->stepping.guards_fail = true;
+    return 1.0;
 }
 
 static double guard_at(const ArcGuard *guard, double t) {
@@ -63,9 +76,9 @@ static double guard_at(const ArcGuard *guard, double t) {
     Instant at = {t, y, y + system->n, sim->stepping.located_e, NULL};
     arc_at(sim, t, y);
     if (guard->forces) {
-        Problem ignored;
-        if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &ignored)) {
-            return 0.0;
+        Problem problem;
+        if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &problem)) {
+            return no_guard(guard, t, problem.text);
         }
         at.e = evaluation->at.e;
         at.lam = evaluation->lam;
@@ -74,6 +87,9 @@ static double guard_at(const ArcGuard *guard, double t) {
     }
     return guard->sign * guard->guard(&sim->equations, &at, guard->contact) + guard->offset;
 }
+
+static const char NOT_CONVERGED[] =
+    "the search did not converge; check the inputs and parameters";
 
 /* The next point of Brent's search, by inverse interpolation or bisection. */
 typedef struct {
@@ -115,7 +131,8 @@ static double locate(const ArcGuard *guard, double a, double b) {
         return b;
     }
     Bracket x = {a, b, a, fa, fb, fa, b - a, b - a};
-    for (int i = 0; i < 100 && x.fb != 0.0; i++) {
+    int iterations = 0;
+    for (; iterations < LOCATION_ITERATIONS_MAX && x.fb != 0.0; iterations++) {
         if ((x.fb > 0.0) == (x.f_other > 0.0)) {
             x.other = x.a;
             x.f_other = x.fa;
@@ -135,6 +152,9 @@ static double locate(const ArcGuard *guard, double a, double b) {
         x.fa = x.fb;
         x.b += fabs(x.step) > close ? x.step : (half > 0.0 ? close : -close);
         x.fb = guard_at(guard, x.b);
+    }
+    if (iterations == LOCATION_ITERATIONS_MAX) {
+        (void)no_guard(guard, x.b, NOT_CONVERGED);
     }
     return x.b;
 }
@@ -248,10 +268,11 @@ typedef struct {
  * gap that is opening at the start of the interval closes only after its apex: so the impact that
  * was resolved last, whose gap is zero up to round-off of either sign, is not found again.  A dip
  * below zero between two samples shows in the rates. */
-static bool detect_closing(Simulation *sim, int stop, int k, Closing *closing) {
+static bool detect_closing(Simulation *sim, int stop, int k, Closing *closing,
+                           Problem *problem) {
     const double *gaps = sim->stepping.sample_gap + k, *rates = sim->stepping.sample_rate + k;
     double length = system_of(sim)->length, near = TOUCHING_RTOL * length;
-    ArcGuard guard = arc_guard(sim, EVENT_IMPACT, stop), rate = guard;
+    ArcGuard guard = arc_guard(sim, EVENT_IMPACT, stop, problem), rate = guard;
     rate.guard = gap_rate_guard;
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
@@ -288,7 +309,7 @@ static bool detect_closing(Simulation *sim, int stop, int k, Closing *closing) {
 
 static bool locate_closing(Simulation *sim, int stop, const Closing *closing, double *time,
                            Problem *problem) {
-    ArcGuard guard = arc_guard(sim, EVENT_IMPACT, stop);
+    ArcGuard guard = arc_guard(sim, EVENT_IMPACT, stop, problem);
     if (closing->at_a) {
         *time = closing->a;
         return true;
@@ -313,7 +334,7 @@ static bool find_impact(Simulation *sim, int stop, Event *first, Problem *proble
     for (int k = 0; k < GUARD_INTERVALS; k++) {
         Closing closing;
         double time;
-        if (detect_closing(sim, stop, k, &closing)) {
+        if (detect_closing(sim, stop, k, &closing, problem)) {
             if (!locate_closing(sim, stop, &closing, &time, problem)) {
                 return false;
             }
@@ -328,9 +349,9 @@ static bool find_impact(Simulation *sim, int stop, Event *first, Problem *proble
 
 /* When a sliding velocity changes its sign.  A contact that begins to slide is at rest up to
  * round-off of either sign: it slides the other way if it does so at the end of the step. */
-static void find_reversal(Simulation *sim, int contact, Event *first) {
+static void find_reversal(Simulation *sim, int contact, Event *first, Problem *problem) {
     double z[GUARD_INTERVALS + 1];
-    ArcGuard guard = arc_guard(sim, EVENT_REVERSAL, contact);
+    ArcGuard guard = arc_guard(sim, EVENT_REVERSAL, contact, problem);
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
         Instant at = sample(sim, k);
         z[k] = guard.guard(&sim->equations, &at, contact);
@@ -364,8 +385,9 @@ static bool may_yield(const Simulation *sim) {
 }
 
 /* When a force is used up, from its guard at the start, the middle and the end of the step. */
-static void find_yield(Simulation *sim, int kind, int contact, Event *first) {
-    ArcGuard guard = arc_guard(sim, kind, contact);
+static void find_yield(Simulation *sim, int kind, int contact, Event *first,
+                       Problem *problem) {
+    ArcGuard guard = arc_guard(sim, kind, contact, problem);
     const Arc *arc = &sim->state.arc;
     double times[3] = {arc->start, arc->start + arc->h / 2, arc->start + arc->h};
     double before = guard_at(&guard, times[0]);
@@ -388,10 +410,12 @@ static bool find_contact_event(Simulation *sim, int kind, int contact, Event *fi
         return true;
     }
     switch (kind) {
-    case EVENT_IMPACT: return find_impact(sim, contact, first, problem);
-    case EVENT_REVERSAL: find_reversal(sim, contact, first); return true;
-    default: find_yield(sim, kind, contact, first); return true;
+    case EVENT_IMPACT:
+        return find_impact(sim, contact, first, problem) && !sim->stepping.guards_fail;
+    case EVENT_REVERSAL: find_reversal(sim, contact, first, problem); break;
+    default: find_yield(sim, kind, contact, first, problem); break;
     }
+    return !sim->stepping.guards_fail;
 }
 
 static bool find_events(Simulation *sim, int kind, Event *first, Problem *problem) {
@@ -407,6 +431,7 @@ PRBM bool first_event(Simulation *sim, Event *event, Problem *problem) {
     Event none = {EVENT_NONE, 0, 0.0};
     bool right = true, open = q->held_count < system_of(sim)->s && within_reach(sim);
     *event = none;
+    sim->stepping.guards_fail = false;
     if (open || q->slipping_count > 0) {
         sample_arc(sim);
     }

@@ -29,6 +29,7 @@ PRBM bool take_values(Simulation *sim, Problem *problem); /* the values set beco
 PRBM bool values_changed(const Simulation *sim);
 PRBM bool inputs_changed(const Simulation *sim); /* but those that move walls */
 PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
+PRBM double zero_acceleration(const Configuration *configuration); /* the same of accelerations */
 PRBM double stop_field(const Simulation *sim, Expression field);
 
 /* --- events.c --------------------------------------------------------------------------------- */
@@ -133,6 +134,7 @@ typedef struct {
     Complex *sample_e;
     double *located_y;     /* (ny,), (n,): a state of the dense output */
     Complex *located_e;
+    bool guards_fail;      /* whether a guard could not be evaluated in the step */
     double *reach;         /* (n,) largest changes of the arms */
 } Stepping;
 
@@ -230,14 +232,53 @@ PRBM bool impulses_changed(const Simulation *sim);
 PRBM const double *given_impulses(const Simulation *sim);
 PRBM bool receive_impulses(Simulation *sim, Problem *problem);
 
+PRBM void contact_mobility(int k, int n, const double *rows, const double *X, double *W);
+
+/* --- rest.c ----------------------------------------------------------------------------------- */
+
+enum { CONTACTS_MAX = 2 * STOPS_MAX, NAMES_LENGTH = PROBLEM_LENGTH / 2 };
+
+/* Stops that touch, with the signs of their sliding velocities; contacts with friction and without
+ * a sliding velocity: some of the stops, and points. */
+typedef struct {
+    int stop_count, stops[STOPS_MAX], slips[STOPS_MAX];
+    int count, contacts[CONTACTS_MAX];
+} RestContacts;
+
+/* Their forces and accelerations: the acceleration that each normal force alone gives its gap;
+ * friction, its limits and the accelerations of sliding. */
+typedef struct {
+    bool solved;
+    double normal[STOPS_MAX];
+    double friction[CONTACTS_MAX], limit[CONTACTS_MAX], slide[CONTACTS_MAX];
+} RestForces;
+
+typedef struct {
+    char text[NAMES_LENGTH];
+} ContactNames;
+
+/* The forces that satisfy the laws of all contacts.  In the trial equations all stops are open, and
+ * friction points at rest have no friction. */
+PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
+                      const RestContacts *rest, RestForces *found, Problem *problem);
+PRBM const char *contact_name(const Mechanism *m, int contact);
+PRBM bool has_contact(int count, const int *contacts, int contact);
+/* The names of contacts, or as many of them as there is room for. */
+PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, ContactNames *names);
+PRBM bool contacts_jammed(const Simulation *sim, int count, const int *contacts, Problem *problem);
+
 /* --- contact_modes.c -------------------------------------------------------------------------- */
 
-/* The stops that stay closed, and the acceleration at which the others open. */
+/* The stops that stay closed, and the acceleration at which the others open; whether there are any
+ * that are pressed while the others open. */
 typedef struct {
-    int count, stops[RESTING_SETS_MAX];
+    int count, stops[STOPS_MAX];
     double opening;
+    bool found;
 } HoldingSet;
 
+PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
+                             const double *v, HoldingSet *resting, Problem *problem);
 PRBM bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                        const double *v, HoldingSet *resting, Problem *problem);
 PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const double *q,

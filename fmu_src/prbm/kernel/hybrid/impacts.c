@@ -32,7 +32,7 @@ PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held
 }
 
 /* The inverse mass in contact space, W = rows X (k, k), of rows (k, n) and their response X. */
-static void contact_mobility(int k, int n, const double *rows, const double *X, double *W) {
+PRBM void contact_mobility(int k, int n, const double *rows, const double *X, double *W) {
     for (int a = 0; a < k; a++) {
         for (int b = 0; b < k; b++) {
             W[a * k + b] = 0.0;
@@ -77,6 +77,10 @@ static int partner(const Hits *hits, int a) {
     return a < hits->struck_count ? hits->struck[a] : hits->held[a - hits->struck_count];
 }
 
+static double motion_speed(const Simulation *sim) {
+    return sim->configuration.scales.rate * sim->configuration.scales.length;
+}
+
 static bool impulses_without_friction(Simulation *sim, const Approach *approach, Hits *hits,
                                       Problem *problem) {
     const System *system = system_of(sim);
@@ -99,7 +103,9 @@ static bool impulses_without_friction(Simulation *sim, const Approach *approach,
     for (int a = 0; a < k; a++) {
         W[a * k + a] += sim->equations.inputs.mobilities[partner(hits, a)];
     }
-    newton(k, W, rates, eps, P, &sim->scratch);
+    if (!newton(k, W, rates, eps, motion_speed(sim), P, &sim->scratch, problem)) {
+        return false;
+    }
     add_impulses(k, n, approach->v, X, P, hits->after);
     for (int a = 0; a < k; a++) {
         int i = partner(hits, a);
@@ -206,10 +212,11 @@ static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hi
     for (int a = 0; a < k; a++) {
         W[a * 2 * k + a] += sim->equations.inputs.mobilities[hits->struck[a]];
     }
-    if (k == 1) {
-        stronge(W, rates, approach->friction[0], hits->restitution[0], &P[0], &P[1]);
-    } else if (!several(k, W, rates, approach->friction, hits->restitution, P, &sim->scratch,
-                        problem)) {
+    double speed = motion_speed(sim);
+    if (k == 1 ? !stronge(W, rates, approach->friction[0], hits->restitution[0], speed, &P[0],
+                          &P[1], problem)
+               : !several(k, W, rates, approach->friction, hits->restitution, speed, P,
+                          &sim->scratch, problem)) {
         return false;
     }
     add_impulses(2 * k, n, approach->v, X, P, hits->after);
@@ -221,6 +228,67 @@ static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hi
     return true;
 }
 
+/* Rounds with friction until no kept stop would pull. */
+static bool rounds_with_friction(Simulation *sim, const Approach *approach, Hits *hits,
+                                 int *kept_count, int *kept, Problem *problem) {
+    bool pulling = true, right = true;
+    *kept_count = hits->held_count;
+    memcpy(kept, hits->held, (size_t)hits->held_count * sizeof(int));
+    while (right && pulling) {
+        size_t mark = sim->scratch.used;
+        right = impulses_with_friction(sim, approach, hits, kept_count, kept, &pulling, problem);
+        sim->scratch.used = mark;
+    }
+    return right;
+}
+
+/* If a held stop that has been released would close, the held stops are struck, too, without
+ * restitution and friction. */
+static bool with_released_stops(Simulation *sim, Approach *approach, Hits *hits,
+                                Problem *problem) {
+    int kept_count, kept[STOPS_MAX], k = hits->struck_count, held_count = hits->held_count;
+    bool closing = false;
+    if (!rounds_with_friction(sim, approach, hits, &kept_count, kept, problem)) {
+        return false;
+    }
+    for (int a = 0; a < held_count; a++) {
+        int i = hits->held[a];
+        double rate = gap_rate(&sim->equations, i, sim->state.front_time, approach->at->e, hits->after);
+        closing = closing || (!has_contact(kept_count, kept, i) &&
+                              rate < -zero_speed(&sim->configuration));
+    }
+    if (!closing) {
+        return true;
+    }
+    for (int a = 0; a < held_count; a++) {
+        hits->struck[k + a] = hits->held[a];
+        hits->restitution[k + a] = approach->friction[k + a] = 0.0;
+    }
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        hits->normal[i] = hits->tangential[i] = 0.0;
+        hits->with_normal[i] = false;
+    }
+    hits->struck_count = k + held_count;
+    hits->held_count = 0;
+    bool right = rounds_with_friction(sim, approach, hits, &kept_count, kept, problem);
+    hits->struck_count = k;
+    hits->held_count = held_count;
+    return right;
+}
+
+/* Name the stops that take part in an impact that has no solution. */
+static bool name_partners(const Simulation *sim, const Hits *hits, Problem *problem) {
+    int stops[2 * STOPS_MAX], count = hits->struck_count + hits->held_count;
+    ContactNames names;
+    Problem cause = *problem;
+    for (int a = 0; a < count; a++) {
+        stops[a] = partner(hits, a);
+    }
+    list_contacts(sim->configuration.mechanism, count, stops, &names);
+    return fail(problem, "impact at t = %.9g s (%s): %s", sim->state.front_time, names.text,
+                cause.text);
+}
+
 /* The velocities after an impact, the normal and the tangential impulses by stop.  Held stops take
  * part: without friction as partners of the complementarity problem, with friction as constraints
  * that are removed if they would pull.  Their own friction, and that of friction points, is finite
@@ -228,8 +296,7 @@ static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hi
 static bool impact_impulses(Simulation *sim, const double *q, const double *v, Hits *hits,
                             Problem *problem) {
     size_t mark = sim->scratch.used;
-    int kept_count = hits->held_count, kept[STOPS_MAX];
-    bool rough = false, pulling = true, right = true;
+    bool rough = false;
     Inertia at = inertia_at(sim, q);
     Approach approach = {&at, v, {0.0}, {0.0}};
     for (int i = 0; i < system_of(sim)->s; i++) {
@@ -242,19 +309,10 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
         approach.friction[a] = stop_field(sim, stop->friction);
         rough = rough || approach.friction[a] != 0.0;
     }
-    if (!rough) {
-        right = impulses_without_friction(sim, &approach, hits, problem);
-    } else {
-        memcpy(kept, hits->held, (size_t)hits->held_count * sizeof(int));
-        while (right && pulling) {
-            size_t round_mark = sim->scratch.used;
-            right = impulses_with_friction(sim, &approach, hits, &kept_count, kept, &pulling,
-                                           problem);
-            sim->scratch.used = round_mark;
-        }
-    }
+    bool right = rough ? with_released_stops(sim, &approach, hits, problem)
+                       : impulses_without_friction(sim, &approach, hits, problem);
     sim->scratch.used = mark;
-    return right;
+    return right || name_partners(sim, hits, problem);
 }
 
 /* --- captures --------------------------------------------------------------------------------- */
@@ -303,14 +361,14 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
     soft.restitution[0] = 0.0;
     soft.held_count = hits->held_count;
     memcpy(soft.held, hits->held, sizeof soft.held);
-    HoldingSet resting = {0, {0}, 0.0};
+    HoldingSet resting = {0, {0}, 0.0, false};
     candidates[0] = stop;
     memcpy(candidates + 1, hits->held, (size_t)hits->held_count * sizeof(int));
     bool rests = false;
     bool right = impact_impulses(sim, q, v, &soft, problem) &&
-                 holding_stops(sim, 1 + hits->held_count, candidates, q, soft.after, &resting,
-                              problem);
-    for (int k = 0; right && k < resting.count; k++) {
+                 find_holding_stops(sim, 1 + hits->held_count, candidates, q, soft.after,
+                                    &resting, problem);
+    for (int k = 0; right && resting.found && k < resting.count; k++) {
         rests = rests || resting.stops[k] == stop;
     }
     if (right && rests) {

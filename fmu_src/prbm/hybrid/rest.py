@@ -1,0 +1,86 @@
+"""Forces of all contacts at rest together: a complementarity problem on their accelerations.
+
+Stops that touch press or open; contacts without a sliding velocity stick or begin to slip.  While
+nothing slides there always are such forces; the friction of contacts that slide may exclude them
+(Painleve's paradox).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mechanics import contact
+from ..mechanics.arrays import Real
+from ..mechanics.complementarity import coulomb
+from ..mechanics.dynamics import Equations
+
+
+@dataclass(frozen=True)
+class RestForces:
+    """Forces and accelerations of contacts at rest.
+
+    Parameters
+    ----------
+    normal : (k,)
+        Acceleration that each normal force alone gives its gap [m/s^2].
+    friction, limit : (m,)
+        Friction forces and their limits [N].
+    slide : (m,)
+        Accelerations of sliding [m/s^2].
+    """
+
+    normal: Real
+    friction: Real
+    limit: Real
+    slide: Real
+
+
+def rest_forces(
+    equations: Equations,
+    t: float,
+    q: Real,
+    v: Real,
+    stops: Sequence[int],
+    slips: Sequence[int],
+    at_rest: Sequence[int],
+) -> RestForces | None:
+    """Return the forces that satisfy the laws of all contacts; None if there are none.
+
+    Parameters
+    ----------
+    equations : Equations
+        In which all stops are open, and friction points at rest have no friction.
+    t : float
+        Time, for the accelerations of walls [s].
+    q, v : (n,)
+        Angles and rates [rad], [rad/s].
+    stops : sequence of int
+        Stops that touch.
+    slips : sequence of int
+        Signs of their sliding velocities; 0: at rest.
+    at_rest : sequence of int
+        Contacts with friction and without a sliding velocity: some of the stops, and points.
+    """
+    e, M, loops = equations.mass_and_loops(q)
+    system, is_stop = equations.system, equations.contacts.is_stop
+    a, n, k = equations.evaluate(t, q, v).a, equations.n, len(stops)
+    G = system.gap_rows.jacobian(e)[list(stops)]
+    T = np.reshape([equations.slip_row(c, e) for c in at_rest], (-1, n))
+    # A stop that slides pushes and rubs.
+    rubs = [
+        equations.stop_friction[i] * sign * equations.slip_row(i, e)
+        for i, sign in zip(stops, slips, strict=True)
+    ]
+    rows, pushes = np.vstack([G, T]), np.vstack([G - np.reshape(rubs, (-1, n)), T])
+    W = rows @ contact.response(M, loops, pushes)
+    slide = [equations.slip_acceleration(c, e, v, a) for c in at_rest]
+    u = np.concatenate([equations.gap_accelerations(t, e, v, a)[list(stops)], slide])
+    friction = np.array([equations.stop_friction[c] if is_stop(c) else 0.0 for c in at_rest])
+    fixed = np.array([0.0 if is_stop(c) else equations.friction_limit(c, e) for c in at_rest])
+    normal = np.array([list(stops).index(c) if is_stop(c) else -1 for c in at_rest], int)
+    P = coulomb(W, u, friction, fixed, normal)
+    if P is None:
+        return None
+    limit = fixed + friction * np.append(P[:k], 0.0)[normal]
+    return RestForces((P * np.diag(W))[:k], P[k:], limit, (W @ P + u)[k:])

@@ -1,0 +1,268 @@
+/* Complementarity problems of unilateral contacts: Lemke's method, and Coulomb's law in the plane.
+ *
+ * Sources: as in the twin, mechanics/complementarity.py.
+ */
+#include <math.h>
+
+#include "core/complementarity.h"
+#include "core/matrix.h"
+
+/* --- Lemke's method --------------------------------------------------------------------------- */
+
+/* Columns of w (m), z (m), the covering variable, and the values; the variable of each row. */
+typedef struct {
+    int m, width;
+    double *rows;
+    int *basis;
+} Pivots;
+
+static Pivots first_pivots(int m, const double *M, const double *q, double size,
+                           Scratch *scratch) {
+    int width = 2 * m + 2;
+    Pivots pivots = {m, width, take_matrix(scratch, m, width), take_integers(scratch, m)};
+    for (int i = 0; i < m; i++) {
+        double *row = pivots.rows + i * width;
+        zeros(width, row);
+        row[i] = 1.0;
+        for (int j = 0; j < m; j++) {
+            row[m + j] = -M[i * m + j];
+        }
+        row[2 * m] = -1.0;
+        row[2 * m + 1] = q[i] / size;
+        pivots.basis[i] = i;
+    }
+    return pivots;
+}
+
+/* Make a column a unit vector. */
+static void pivot_at(Pivots *pivots, int row, int column) {
+    int width = pivots->width;
+    double *own = pivots->rows + row * width, pivot = own[column];
+    for (int j = 0; j < width; j++) {
+        own[j] /= pivot;
+    }
+    for (int i = 0; i < pivots->m; i++) {
+        double *other = pivots->rows + i * width, factor = other[column];
+        for (int j = 0; i != row && j < width; j++) {
+            other[j] -= factor * own[j];
+        }
+        other[column] = i == row ? 1.0 : 0.0;
+    }
+}
+
+/* The rows of a column that are positive. */
+static int falling_rows(const Pivots *pivots, int column, int *rows) {
+    double top = 1.0;
+    int count = 0;
+    for (int i = 0; i < pivots->m; i++) {
+        top = greater(top, fabs(pivots->rows[i * pivots->width + column]));
+    }
+    for (int i = 0; i < pivots->m; i++) {
+        if (pivots->rows[i * pivots->width + column] > PIVOT_RTOL * top) {
+            rows[count++] = i;
+        }
+    }
+    return count;
+}
+
+/* Keep the rows in which an entry has the least ratio to that of a column. */
+static int least_ratios(const Pivots *pivots, int entry, int column, int count, int *rows) {
+    double low = HUGE_VAL;
+    int kept = 0;
+    for (int pass = 0; pass < 2; pass++) {
+        for (int k = 0; k < count; k++) {
+            const double *row = pivots->rows + rows[k] * pivots->width;
+            double ratio = row[entry] / row[column];
+            ratio = entry == 2 * pivots->m + 1 ? greater(ratio, 0.0) : ratio;
+            if (pass == 0) {
+                low = lesser(low, ratio);
+            } else if (ratio <= low + RATIO_RTOL * greater(1.0, fabs(low))) {
+                rows[kept++] = rows[k];
+            }
+        }
+    }
+    return kept;
+}
+
+/* The row whose variable falls to zero first, or -1.  Of equal ratios, that of the covering
+ * variable comes first, else the least in lexicographic order, so that no basis comes back. */
+static int leaving_row(const Pivots *pivots, int column, int *rows) {
+    int m = pivots->m, count = falling_rows(pivots, column, rows);
+    if (count > 1) {
+        count = least_ratios(pivots, 2 * m + 1, column, count, rows);
+        for (int k = 0; k < count; k++) {
+            if (pivots->basis[rows[k]] == 2 * m) {
+                return rows[k];
+            }
+        }
+    }
+    for (int entry = 0; count > 1 && entry < m; entry++) {
+        count = least_ratios(pivots, entry, column, count, rows);
+    }
+    return count > 0 ? rows[0] : -1;
+}
+
+static void values_of(const Pivots *pivots, double size, double *z) {
+    int m = pivots->m;
+    zeros(m, z);
+    for (int i = 0; i < m; i++) {
+        int variable = pivots->basis[i];
+        if (variable >= m && variable < 2 * m) {
+            z[variable - m] = size * greater(pivots->rows[i * pivots->width + 2 * m + 1], 0.0);
+        }
+    }
+}
+
+/* Follow the path of pivots until the covering variable leaves. */
+static bool follow_pivots(Pivots *pivots, int row, int *rows) {
+    int m = pivots->m, entering = 2 * m;
+    for (int step = 0; row >= 0 && step < PIVOTS_FACTOR * m; step++) {
+        int leaving = pivots->basis[row];
+        pivot_at(pivots, row, entering);
+        pivots->basis[row] = entering;
+        if (leaving == 2 * m) {
+            return true;
+        }
+        entering = leaving < m ? leaving + m : leaving - m;
+        row = leaving_row(pivots, entering, rows);
+    }
+    return false;
+}
+
+PRBM bool lemke(int m, const double *M, const double *q, double *z, Scratch *scratch) {
+    size_t used = scratch->used;
+    int last = 0, exponent;
+    zeros(m, z);
+    for (int i = 0; i < m; i++) {
+        last = q[i] <= q[last] ? i : last; /* the least in lexicographic order */
+    }
+    if (m == 0 || q[last] >= 0.0) {
+        return true;
+    }
+    (void)frexp(largest(m, q), &exponent);
+    double size = ldexp(1.0, exponent);
+    Pivots pivots = first_pivots(m, M, q, size, scratch);
+    bool solved = follow_pivots(&pivots, last, take_integers(scratch, m));
+    if (solved) {
+        values_of(&pivots, size, z);
+    }
+    scratch->used = used;
+    return solved;
+}
+
+/* --- Coulomb's law ---------------------------------------------------------------------------- */
+
+/* The place of the a-th of the forces (P_n, P_t+, P_t-) in P, and its sign. */
+static int force_at(int k, int m, int a, double *sign) {
+    *sign = a < k + m ? 1.0 : -1.0;
+    return a < k + m ? a : a - m;
+}
+
+/* The problem for z = (P_n, P_t+, P_t-, speeds of sliding), scaled. */
+static void set_problem(int k, int m, const double *W, const double *u, const double *friction,
+                        const double *fixed, const int *normal, const double *scale, double *M,
+                        double *q) {
+    int forces = k + 2 * m, size = forces + m;
+    double sign_a, sign_b;
+    zeros(size * size, M);
+    for (int a = 0; a < forces; a++) {
+        int i = force_at(k, m, a, &sign_a);
+        for (int b = 0; b < forces; b++) {
+            int j = force_at(k, m, b, &sign_b);
+            M[a * size + b] = sign_a * sign_b * (scale[i] * W[i * (k + m) + j] * scale[j]);
+        }
+        q[a] = sign_a * (scale[i] * u[i]);
+    }
+    for (int j = 0; j < m; j++) {
+        int row = forces + j, positive = k + j, negative = k + m + j;
+        M[positive * size + row] = M[negative * size + row] = 1.0;
+        M[row * size + positive] = M[row * size + negative] = -1.0;
+        q[row] = fixed[j] / scale[k + j];
+        if (normal[j] >= 0) {
+            M[row * size + normal[j]] = friction[j] * scale[normal[j]] / scale[k + j];
+        }
+    }
+}
+
+PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *friction,
+                  const double *fixed, const int *normal, double *P, Scratch *scratch) {
+    size_t used = scratch->used;
+    int size = k + 3 * m;
+    double *scale = take(scratch, (size_t)(k + m)), *M = take_matrix(scratch, size, size);
+    double *q = take(scratch, (size_t)size), *z = take(scratch, (size_t)size);
+    for (int i = 0; i < k + m; i++) {
+        double mobility = fabs(W[i * (k + m) + i]);
+        scale[i] = mobility > 0.0 ? 1.0 / sqrt(mobility) : 1.0;
+    }
+    set_problem(k, m, W, u, friction, fixed, normal, scale, M, q);
+    bool solved = lemke(size, M, q, z, scratch);
+    for (int i = 0; solved && i < k + m; i++) {
+        P[i] = scale[i] * (i < k ? z[i] : z[i] - z[i + m]);
+    }
+    scratch->used = used;
+    return solved;
+}
+
+PRBM double violation(int k, int m, const double *W, const double *u, const double *P,
+                      const double *limit) {
+    double worst = 0.0;
+    for (int i = 0; i < k + m; i++) {
+        double mobility = W[i * (k + m) + i], share = P[i] * mobility;
+        double rate = dot(k + m, W + i * (k + m), P) + u[i];
+        if (i < k) {
+            worst = greater(fabs(lesser(rate, share)), worst);
+        } else {
+            double most = limit[i - k] * mobility;
+            /* friction that is less than its limit, or has the direction of sliding */
+            double missing = rate == 0.0 ? most : most + (rate > 0.0 ? share : -share);
+            worst = greater(fabs(share) - most, worst);
+            worst = greater(lesser(fabs(rate), fabs(missing)), worst);
+        }
+    }
+    return worst;
+}
+
+/* --- impacts ---------------------------------------------------------------------------------- */
+
+/* An attempt: the rates with the least impulses, opened a little; the indices of the normals. */
+static bool try_impulses(int k, int m, const double *W, const double *given, double opened,
+                         const double *friction, const double *least, double *P, double *limit,
+                         Scratch *scratch) {
+    size_t used = scratch->used;
+    double *rates = take(scratch, (size_t)(k + m)), *fixed = take(scratch, (size_t)m);
+    int *normal = take_integers(scratch, m);
+    for (int i = 0; i < k + m; i++) {
+        rates[i] = i < k ? given[i] + opened : given[i];
+    }
+    for (int j = 0; j < m; j++) {
+        fixed[j] = friction[j] * least[j];
+        normal[j] = j;
+    }
+    bool solved = coulomb(k, m, W, rates, friction, fixed, normal, P, scratch);
+    for (int j = 0; solved && j < m; j++) {
+        limit[j] = friction[j] * (least[j] + P[j]);
+    }
+    scratch->used = used;
+    return solved;
+}
+
+PRBM bool impulses(int k, int m, const double *W, const double *u, const double *friction,
+                   const double *least, double tolerance, double *P, Scratch *scratch) {
+    size_t used = scratch->used;
+    double *given = take(scratch, (size_t)(k + m)), *limit = take(scratch, (size_t)m);
+    bool solved = false;
+    for (int i = 0; i < k + m; i++) {
+        given[i] = u[i] + dot(k, W + i * (k + m), least);
+    }
+    /* where only round-off excludes a solution: that of gaps that open by half of the tolerance */
+    for (int attempt = 0; !solved && attempt < 2; attempt++) {
+        solved = try_impulses(k, m, W, given, attempt * (tolerance / 2), friction, least, P, limit,
+                              scratch) &&
+                 violation(k, m, W, given, P, limit) <= tolerance;
+    }
+    for (int i = 0; solved && i < k; i++) {
+        P[i] += least[i];
+    }
+    scratch->used = used;
+    return solved;
+}

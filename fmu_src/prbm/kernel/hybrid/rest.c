@@ -1,0 +1,143 @@
+/* Forces of all contacts at rest together: the twin of hybrid/rest.py. */
+#include <stdio.h>
+#include <string.h>
+
+#include "hybrid/hybrid.h"
+
+/* The rows of the gaps and of the slides, and the forces along them: a stop that slides pushes and
+ * rubs. */
+static void rest_rows(Simulation *sim, const RestContacts *rest, const Complex *e, double *rows,
+                      double *pushes) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    Rows gaps = gap_rows(system);
+    int n = system->n, k = rest->stop_count;
+    double *slide = take(&sim->scratch, (size_t)n);
+    for (int a = 0; a < k; a++) {
+        int i = rest->stops[a];
+        row_jacobian(&gaps, i, e, rows + a * n);
+        copy(n, rows + a * n, pushes + a * n);
+        if (rest->slips[a] != 0) {
+            tangential_row(system, i, e, slide);
+            add_scaled(n, -sim->trial.equations.stop_friction[i] * rest->slips[a], slide,
+                       pushes + a * n);
+        }
+    }
+    for (int j = 0; j < rest->count; j++) {
+        tangential_row(system, rest->contacts[j], e, rows + (k + j) * n);
+        copy(n, rows + (k + j) * n, pushes + (k + j) * n);
+    }
+    sim->scratch.used = mark;
+}
+
+/* The accelerations without the forces. */
+static void rest_accelerations(const Simulation *sim, const RestContacts *rest, const Complex *e,
+                               const double *v, const double *rows, double *u) {
+    const System *system = system_of(sim);
+    const double *a = sim->trial.evaluation.a;
+    int n = system->n, k = rest->stop_count;
+    for (int i = 0; i < k; i++) {
+        u[i] = gap_acceleration(&sim->trial.equations, rest->stops[i], sim->state.front_time, e, v,
+                                a);
+    }
+    for (int i = k; i < k + rest->count; i++) {
+        u[i] = dot(n, rows + i * n, a) - tangential_convective(system, rest->contacts[i - k], e, v);
+    }
+}
+
+/* The laws of friction of the contacts at rest. */
+static void rest_laws(const Simulation *sim, const RestContacts *rest, const Complex *e,
+                      double *friction, double *fixed, int *normal) {
+    const System *system = system_of(sim);
+    const Equations *equations = &sim->trial.equations;
+    for (int j = 0; j < rest->count; j++) {
+        int contact = rest->contacts[j];
+        bool stop = is_stop(system, contact);
+        friction[j] = stop ? equations->stop_friction[contact] : 0.0;
+        fixed[j] = stop ? 0.0 : rub_limit(equations, contact - system->s, e);
+        normal[j] = -1;
+        for (int a = 0; stop && a < rest->stop_count; a++) {
+            normal[j] = rest->stops[a] == contact ? a : normal[j];
+        }
+    }
+}
+
+PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
+                      const RestContacts *rest, RestForces *found, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int n = system->n, k = rest->stop_count, m = rest->count, size = k + m;
+    Inertia at = inertia_at(sim, q);
+    double *rows = take_matrix(&sim->scratch, size, n);
+    double *pushes = take_matrix(&sim->scratch, size, n);
+    double *X = take_matrix(&sim->scratch, n, size), *W = take_matrix(&sim->scratch, size, size);
+    double *u = take(&sim->scratch, (size_t)size), *P = take(&sim->scratch, (size_t)size);
+    double *friction = take(&sim->scratch, (size_t)m), *fixed = take(&sim->scratch, (size_t)m);
+    int *normal = take_integers(&sim->scratch, m);
+    bool right = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL,
+                                    &sim->trial.evaluation, problem);
+    rest_rows(sim, rest, at.e, rows, pushes);
+    right = right && response(n, system->r, size, at.M, at.loops, pushes, X, &sim->scratch, problem);
+    found->solved = false;
+    if (right) {
+        contact_mobility(size, n, rows, X, W);
+        rest_accelerations(sim, rest, at.e, v, rows, u);
+        rest_laws(sim, rest, at.e, friction, fixed, normal);
+        found->solved = coulomb(k, m, W, u, friction, fixed, normal, P, &sim->scratch);
+    }
+    for (int i = 0; found->solved && i < size; i++) {
+        int j = i - k;
+        if (i < k) {
+            found->normal[i] = P[i] * W[i * size + i];
+            continue;
+        }
+        found->friction[j] = P[i];
+        found->limit[j] = fixed[j] + (normal[j] < 0 ? 0.0 : friction[j] * P[normal[j]]);
+        found->slide[j] = dot(size, W + i * size, P) + u[i];
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* --- messages --------------------------------------------------------------------------------- */
+
+PRBM const char *contact_name(const Mechanism *m, int contact) {
+    return contact < m->stop_count ? m->stops[contact].name
+                                   : m->frictions[contact - m->stop_count].name;
+}
+
+PRBM bool has_contact(int count, const int *contacts, int contact) {
+    for (int k = 0; k < count; k++) {
+        if (contacts[k] == contact) {
+            return true;
+        }
+    }
+    return false;
+}
+
+PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, ContactNames *names) {
+    size_t length = 0, size = sizeof names->text;
+    names->text[0] = '\0';
+    for (int i = 0; i < m->stop_count + m->friction_count; i++) {
+        if (!has_contact(count, contacts, i)) {
+            continue;
+        }
+        if (length + strlen(contact_name(m, i)) + sizeof ", " + sizeof ", ..." > size) {
+            (void)snprintf(names->text + length, size - length, ", ...");
+            return;
+        }
+        (void)snprintf(names->text + length, size - length, "%s%s", length > 0 ? ", " : "",
+                       contact_name(m, i));
+        length = strlen(names->text);
+    }
+}
+
+PRBM bool contacts_jammed(const Simulation *sim, int count, const int *contacts,
+                          Problem *problem) {
+    ContactNames names;
+    list_contacts(sim->configuration.mechanism, count, contacts, &names);
+    return fail(problem,
+                "no forces satisfy the laws of contact and friction at t = %.9g s (%s): friction "
+                "jams the mechanism; reduce the coefficients of friction",
+                sim->state.front_time, names.text);
+}

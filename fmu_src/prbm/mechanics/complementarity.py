@@ -1,0 +1,207 @@
+r"""Complementarity problems of unilateral contacts: Lemke's method, and Coulomb's law in the plane.
+
+A linear complementarity problem asks for z with
+
+    z >= 0,    w = M z + q >= 0,    z . w = 0.
+
+Lemke's method follows a path of pivots.  For the problems of contacts it ends in a solution if
+there is one: without friction, with friction at contacts that are all at rest, and in impacts.
+With contacts that slide, forces that satisfy the laws may not exist (Painleve's paradox).
+
+Sources
+-------
+.. [1] R. W. Cottle, J.-S. Pang, R. E. Stone, The Linear Complementarity Problem, Academic Press,
+   1992, 4.4 (Lemke's method), 4.9 (lexicographic order of equal ratios).
+.. [2] M. Anitescu, F. A. Potra, Nonlinear Dynamics 14 (1997) 231 (solutions with friction).
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base.tolerances import PIVOT_RTOL, PIVOTS_FACTOR, RATIO_RTOL
+from .arrays import Real
+
+Integers = NDArray[np.int_]
+
+
+def lemke(M: Real, q: Real) -> Real | None:
+    """Return a solution z of a linear complementarity problem; None without one.
+
+    Parameters
+    ----------
+    M : (m, m)
+        Matrix, with entries near one in magnitude.
+    q : (m,)
+        Constant part.
+
+    Examples
+    --------
+    >>> lemke(np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-4.0, 1.0])).tolist()
+    [2.0, 0.0]
+    >>> lemke(np.array([[0.0]]), np.array([-1.0])) is None
+    True
+    """
+    m, size = len(q), math.ldexp(1.0, math.frexp(float(np.abs(q).max(initial=0.0)))[1])
+    if not m or q.min() >= 0.0:
+        return np.zeros(m)
+    # Columns of w (m), z (m), the covering variable, and the values.
+    table = np.hstack([np.eye(m), -M, -np.ones((m, 1)), (q / size)[:, None]])
+    basis = list(range(m))
+    row, entering = _first_row(q / size), 2 * m
+    for _ in range(PIVOTS_FACTOR * m):
+        leaving = basis[row]
+        _exchange(table, row, entering)
+        basis[row] = entering
+        if leaving == 2 * m:
+            return size * _values(table, basis)
+        entering = leaving + m if leaving < m else leaving - m
+        found = _leaving_row(table, basis, entering)
+        if found is None:
+            return None
+        row = found
+    return None
+
+
+def _first_row(values: Real) -> int:
+    """Return the last of the rows with the least value: the least in lexicographic order."""
+    return int(len(values) - 1 - np.argmin(values[::-1]))
+
+
+def _exchange(table: Real, row: int, column: int) -> None:
+    """Make a column of the table a unit vector."""
+    table[row] /= table[row, column]
+    factors = table[:, column].copy()
+    factors[row] = 0.0
+    table -= factors[:, None] * table[row]
+    table[:, column] = 0.0
+    table[row, column] = 1.0
+
+
+def _leaving_row(table: Real, basis: list[int], entering: int) -> int | None:
+    """Return the row whose variable falls to zero first; None if none falls.
+
+    Of equal ratios, that of the covering variable comes first, else the least in lexicographic
+    order, so that no basis comes back.
+    """
+    m, column = len(basis), table[:, entering]
+    least = PIVOT_RTOL * max(1.0, float(np.abs(column).max()))
+    rows = np.flatnonzero(column > least)
+    for k in range(-1, m):
+        if len(rows) < 2:
+            break
+        ratios = table[rows, k] / column[rows]
+        ratios = np.maximum(ratios, 0.0) if k < 0 else ratios
+        low = float(ratios.min())
+        rows = rows[ratios <= low + RATIO_RTOL * max(1.0, abs(low))]
+        covering = [int(row) for row in rows if basis[row] == 2 * m]
+        if k < 0 and covering:
+            return covering[0]
+    return int(rows[0]) if len(rows) else None
+
+
+def _values(table: Real, basis: list[int]) -> Real:
+    """Return z of a basis."""
+    m = len(basis)
+    z = np.zeros(2 * m + 1)
+    z[basis] = np.maximum(table[:, -1], 0.0)
+    return z[m : 2 * m]
+
+
+def coulomb(W: Real, u: Real, friction: Real, fixed: Real, normal: Integers) -> Real | None:
+    r"""Return normal and tangential forces (or impulses) of contacts; None without a solution.
+
+    The rates are W P + u.  Normal ones: P >= 0, rate >= 0, complementary.  Tangential ones:
+    abs(P) <= limit, and P = -limit sign(rate) where the rate is not zero; the limit is
+    fixed + friction P_n.
+
+    Parameters
+    ----------
+    W : (k + m, k + m)
+        Inverse mass in contact space, k normals, then m tangents [1/kg].
+    u : (k + m,)
+        Rates without the forces.
+    friction, fixed : (m,)
+        mu [-], and the part of the limit that no normal of the problem bears.
+    normal : (m,) int
+        The normal on which the limit of each tangent depends; -1: none.
+
+    Examples
+    --------
+    A block of 1 kg is pressed by 10 N and pushed by 3 N at mu = 0.5: it sticks.
+
+    >>> W, none = np.eye(2), np.zeros(1)
+    >>> coulomb(W, np.array([-10.0, 3.0]), none + 0.5, none, np.array([0])).tolist()
+    [10.0, -3.0]
+    """
+    m = len(fixed)
+    k = len(u) - m
+    diagonal = np.abs(np.diag(W))
+    scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
+    S, b = scale[:, None] * W * scale, scale * u
+    # z = (P_n, P_t+, P_t-, speed): the last are the speeds of sliding.
+    spread = np.zeros((k + m, k + 2 * m))
+    spread[:k, :k] = np.eye(k)
+    spread[k:, k:] = np.hstack([np.eye(m), -np.eye(m)])
+    size = k + 2 * m
+    M = np.zeros((size + m, size + m))
+    M[:size, :size] = spread.T @ S @ spread
+    M[k:size, size:] = np.vstack([np.eye(m), np.eye(m)])
+    M[size:, k:size] = -np.hstack([np.eye(m), np.eye(m)])
+    for j in range(m):
+        if normal[j] >= 0:
+            M[size + j, normal[j]] = friction[j] * scale[normal[j]] / scale[k + j]
+    z = lemke(M, np.concatenate([spread.T @ b, fixed / scale[k:]]))
+    return None if z is None else scale * (spread @ z[:size])
+
+
+def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real | None:
+    r"""Return impulses of an impact by :func:`coulomb`; None without a solution.
+
+    Without friction there are k normals, else k normals and k tangents.  Where only round-off
+    excludes a solution, it is one of gaps that open by half of the tolerance more.
+
+    Parameters
+    ----------
+    W, u : (k, k) or (2 k, 2 k), (k,) or (2 k,)
+        As in :func:`coulomb`.
+    friction : (m,)
+        mu [-].
+    least : (k,)
+        Least normal impulses [N s].
+    tolerance : float
+        Violation that is round-off [m/s].
+    """
+    k, m = len(least), len(friction)
+    given = u + W[:, :k] @ least
+    opened = given.copy()
+    opened[:k] += tolerance / 2
+    for rates in (given, opened):
+        P = coulomb(W, rates, friction, friction * least[:m], np.arange(m))
+        if P is not None:
+            limit = friction * (least + P[:k])[:m]
+            if violation(W, given, P, limit) <= tolerance:
+                P[:k] += least
+                return P
+    return None
+
+
+def violation(W: Real, u: Real, P: Real, limit: Real) -> float:
+    """Return the largest violation of the laws of :func:`coulomb`, as a rate.
+
+    Parameters
+    ----------
+    W, u, P : (k + m, k + m), (k + m,), (k + m,)
+        As in :func:`coulomb`, and its result.
+    limit : (m,)
+        Limits of the tangential forces.
+    """
+    k = len(u) - len(limit)
+    rates, share = W @ P + u, P * np.diag(W)
+    normal = np.abs(np.minimum(rates[:k], share[:k]))
+    excess = np.abs(share[k:]) - limit * np.diag(W)[k:]
+    # Friction that is less than its limit, or has the direction of sliding.
+    missing = limit * np.diag(W)[k:] + np.sign(rates[k:]) * share[k:]
+    sliding = np.minimum(np.abs(rates[k:]), np.abs(missing))
+    return float(max(x.max(initial=0.0) for x in (normal, excess, sliding)))
