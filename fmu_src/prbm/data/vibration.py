@@ -263,6 +263,11 @@ def _fitted(t: Real, x: Real, omega: float) -> Real:
     found = least_squares(
         residuals, start / scale, derivatives, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14
     )
+    if not found.success:
+        raise EvaluationError(
+            f"the damped sine could not be fitted to the record ({found.message}): give a part of "
+            "the record in which the vibration decays freely"
+        )
     y: Real = found.x * scale
     if y[4] < 0.0:
         y[[2, 4]] *= -1.0

@@ -7,7 +7,7 @@ from enum import IntEnum
 from ..base.errors import SimulationError
 from ..base.tolerances import EVENT_WINDOW_RTOL, EVENTS_MAX
 from . import contact_modes, guards, impacts
-from .configuration import Configuration, Scales
+from .configuration import Configuration, Scales, contact_names
 from .front import Front
 from .guards import Guard, Looks
 from .impacts import Impact
@@ -96,14 +96,32 @@ _RESETS = {row.kind: row.reset for row in TRANSITIONS}
 
 
 def first_event(looks: Looks) -> Event | None:
-    """Return the first event within a step, or None."""
+    """Return the first event within a step, or None.
+
+    Raises
+    ------
+    SimulationError
+        If an event cannot be located.
+    """
     first: Event | None = None
     for row in TRANSITIONS:
         for contact in row.watched(looks):
-            t = row.detect(looks, row.guard, contact)
+            t = _located(looks, row, contact)
             if t is not None and (first is None or t < first.time):
                 first = Event(row.kind, contact, t)
     return first
+
+
+def _located(looks: Looks, row: Transition, contact: int) -> float | None:
+    """Return when an event of a contact occurs in a step, or None."""
+    try:
+        return row.detect(looks, row.guard, contact)
+    except SimulationError as error:
+        mechanism = looks.equations.system.mechanism
+        raise SimulationError(
+            f"no {row.kind.name.lower()} of {contact_names(mechanism, [contact])} could be located "
+            f"within {looks.arc.h:.3g} s from t = {looks.arc.start:.9g} s: {error}"
+        ) from None
 
 
 def apply(configuration: Configuration, front: Front, event: Event) -> tuple[Front, list[Impact]]:

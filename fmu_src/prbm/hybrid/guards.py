@@ -11,6 +11,7 @@ from itertools import pairwise
 
 from scipy.optimize import brentq
 
+from ..base.errors import SimulationError
 from ..base.tolerances import (
     CONSTRAINT_RTOL,
     EVENT_CORRECTION_RTOL,
@@ -18,6 +19,7 @@ from ..base.tolerances import (
     EVENT_TIME_ATOL,
     FRICTION_EXCESS_RTOL,
     GUARD_INTERVALS,
+    LOCATION_ITERATIONS_MAX,
     RELEASE_WATCH_FACTOR,
 )
 from ..mechanics.arrays import Complex, Real
@@ -266,6 +268,11 @@ def fall_time(z: Scalar, a: float, b: float) -> float:
 
     Where round-off denies one of these signs, the result is the end of the interval there.
 
+    Raises
+    ------
+    SimulationError
+        If the search does not converge.
+
     Examples
     --------
     >>> round(fall_time(lambda t: 1.0 - t**2, 0.0, 4.0), 12)
@@ -275,4 +282,11 @@ def fall_time(z: Scalar, a: float, b: float) -> float:
         return float(a)
     if z(b) > 0.0:
         return float(b)
-    return float(brentq(z, a, b, xtol=EVENT_TIME_ATOL))
+    try:
+        return float(brentq(z, a, b, xtol=EVENT_TIME_ATOL, maxiter=LOCATION_ITERATIONS_MAX))
+    except SimulationError:
+        raise
+    except (RuntimeError, ValueError):
+        raise SimulationError(
+            "the search did not converge; check the inputs and parameters"
+        ) from None

@@ -270,7 +270,7 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
     linear complementarity problem.  Restitution: at least
     s eps times each normal impulse again, more where a gap would close, with friction; s in
     [0, 1] is the largest for which the work of the normal impulses does not exceed eps^2 times
-    that of the compression.
+    that of the compression, and energy is not gained.
 
     Parameters
     ----------
@@ -300,16 +300,20 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
     lost = float(-(P[:k] * (u + after)[:k] / 2) @ restitution**2)
     wanted = restitution * P[:k]
 
-    def rebound(s: float) -> tuple[Real, float]:
-        R = _resolved(W, after, friction, s * wanted, tolerance)
-        return R, float(R[:k] @ (2 * after + W @ R)[:k] / 2)
+    # The energy that compression takes away; friction, too, may return no more.
+    taken = -float(P @ (u + after)) / 2 + COMPLEMENTARITY_RTOL * abs(float(P @ u))
 
-    R, gain = rebound(1.0)
+    def rebound(s: float) -> tuple[Real, bool]:
+        R = _resolved(W, after, friction, s * wanted, tolerance)
+        work = R * (2 * after + W @ R) / 2
+        return R, float(work[:k].sum()) <= lost and float(work.sum()) <= taken
+
+    R, allowed = rebound(1.0)
     low, high = 0.0, 1.0
-    while gain > lost and high - low > REBOUND_RTOL:
+    while not allowed and high - low > REBOUND_RTOL:
         s = (low + high) / 2
-        low, high = (s, high) if rebound(s)[1] <= lost else (low, s)
-    return P + (R if gain <= lost else rebound(low)[0])
+        low, high = (s, high) if rebound(s)[1] else (low, s)
+    return P + (R if allowed else rebound(low)[0])
 
 
 def _resolved(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real:

@@ -30,6 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.errors import SimulationError
 from ..mechanics.arrays import Complex, Real
 
 GRAVITY = 9.81  # along +x [m/s^2]
@@ -83,6 +84,7 @@ K_THETA_2R = np.array([3.4710, 2.0682])
 
 PROJECTION_TOLERANCE = 1e-13  # the source's, on the loop's gap [m]
 PROJECTION_STEPS = 10
+PROJECTION_STALLED = 1e-11  # Gap at which round-off may end the iteration [m].
 
 
 @dataclass(frozen=True)
@@ -198,14 +200,26 @@ class Chain:
         return np.asarray(a, float)[:n]
 
     def project(self, q: Real) -> Real:
-        """Close the loop: Gauss-Newton steps with the pseudo-inverse, q of shape (n,) [rad]."""
+        """Close the loop: Gauss-Newton steps with the pseudo-inverse, q of shape (n,) [rad].
+
+        Raises
+        ------
+        SimulationError
+            If the loop stays open.
+        """
         for _ in range(PROJECTION_STEPS):
             le = self.loop * np.exp(1j * q)
             gap = le.sum() - self.distance
             if abs(gap) <= PROJECTION_TOLERANCE:
-                break
+                return q
             Phi_q = np.array([-le.imag, le.real])
             q = q - Phi_q.T @ np.linalg.solve(Phi_q @ Phi_q.T, np.array([gap.real, gap.imag]))
+        le = self.loop * np.exp(1j * q)
+        if not abs(le.sum() - self.distance) <= PROJECTION_STALLED:
+            raise SimulationError(
+                f"the loop of the chain cannot be closed here (by {abs(gap):.3g} m): shorten the "
+                "step"
+            )
         return q
 
     def impact(self, q: Real, v: Real, restitution: float) -> Real:

@@ -213,45 +213,54 @@ PRBM bool stronge(const double *W, const double *u, double friction, double rest
 
 /* --- several hits with friction --------------------------------------------------------------- */
 
-/* The impulses R of restitution, at least s wanted, and the work of the normal ones. */
+/* Limits of the work that restitution returns: of the normal impulses, and of all. */
+typedef struct {
+    double normal, all;
+} Returned;
+
+/* The impulses R of restitution, at least s wanted, and whether their work is allowed. */
 static bool rebound(int k, const double *W, const double *after, const double *friction,
-                    const double *wanted, double s, double tolerance, double *R, double *gain,
-                    Scratch *scratch) {
+                    const double *wanted, double s, const Returned *most, double tolerance,
+                    double *R, bool *allowed, Scratch *scratch) {
     size_t used = scratch->used;
     double *least = take(scratch, (size_t)k);
     for (int i = 0; i < k; i++) {
         least[i] = s * wanted[i];
     }
     bool settled = impulses(k, k, W, after, friction, least, tolerance, R, scratch);
-    double work = 0.0;
-    for (int i = 0; settled && i < k; i++) {
-        work += R[i] * (2 * after[i] + dot(2 * k, W + i * 2 * k, R));
+    double normal = 0.0, all = 0.0;
+    for (int i = 0; settled && i < 2 * k; i++) {
+        double work = R[i] * (2 * after[i] + dot(2 * k, W + i * 2 * k, R)) / 2;
+        normal += i < k ? work : 0.0;
+        all += work;
     }
-    *gain = work / 2;
+    *allowed = normal <= most->normal && all <= most->all;
     scratch->used = used;
     return settled;
 }
 
-/* The rebound with the largest s whose work does not exceed what compression has left. */
+/* The rebound with the largest s whose work is allowed. */
 static bool restitution_of_several(int k, const double *W, const double *after,
-                                   const double *friction, const double *wanted, double lost,
-                                   double tolerance, double *R, Scratch *scratch) {
-    double gain, low = 0.0, high = 1.0;
-    if (!rebound(k, W, after, friction, wanted, 1.0, tolerance, R, &gain, scratch)) {
+                                   const double *friction, const double *wanted,
+                                   const Returned *most, double tolerance, double *R,
+                                   Scratch *scratch) {
+    double low = 0.0, high = 1.0;
+    bool allowed, trial;
+    if (!rebound(k, W, after, friction, wanted, 1.0, most, tolerance, R, &allowed, scratch)) {
         return false;
     }
-    if (gain <= lost) {
+    if (allowed) {
         return true;
     }
-    while (gain > lost && high - low > REBOUND_RTOL) {
-        double s = (low + high) / 2, trial;
-        if (!rebound(k, W, after, friction, wanted, s, tolerance, R, &trial, scratch)) {
+    while (high - low > REBOUND_RTOL) {
+        double s = (low + high) / 2;
+        if (!rebound(k, W, after, friction, wanted, s, most, tolerance, R, &trial, scratch)) {
             return false;
         }
-        low = trial <= lost ? s : low;
-        high = trial <= lost ? high : s;
+        low = trial ? s : low;
+        high = trial ? high : s;
     }
-    return rebound(k, W, after, friction, wanted, low, tolerance, R, &gain, scratch);
+    return rebound(k, W, after, friction, wanted, low, most, tolerance, R, &trial, scratch);
 }
 
 PRBM bool several(int k, const double *W, const double *u, const double *friction,
@@ -259,7 +268,8 @@ PRBM bool several(int k, const double *W, const double *u, const double *frictio
                   Problem *problem) {
     size_t used = scratch->used;
     double *after = take(scratch, 2 * (size_t)k), *R = take(scratch, 2 * (size_t)k);
-    double *wanted = take(scratch, (size_t)k), lost = 0.0;
+    double *wanted = take(scratch, (size_t)k);
+    Returned most = {0.0, 0.0};
     double tolerance = COMPLEMENTARITY_RTOL * greater(largest(2 * k, u), speed);
     zeros(k, wanted);
     bool settled = impulses(k, k, W, u, friction, wanted, tolerance, P, scratch);
@@ -267,10 +277,14 @@ PRBM bool several(int k, const double *W, const double *u, const double *frictio
         after[i] = u[i] + dot(2 * k, W + i * 2 * k, P);
     }
     for (int i = 0; settled && i < k; i++) {
-        lost -= P[i] * (u[i] + after[i]) / 2 * (restitution[i] * restitution[i]);
+        most.normal -= P[i] * (u[i] + after[i]) / 2 * (restitution[i] * restitution[i]);
         wanted[i] = restitution[i] * P[i];
     }
-    settled = settled && restitution_of_several(k, W, after, friction, wanted, lost, tolerance, R,
+    for (int i = 0; settled && i < 2 * k; i++) {
+        most.all -= P[i] * (u[i] + after[i]) / 2;
+    }
+    most.all += settled ? COMPLEMENTARITY_RTOL * fabs(dot(2 * k, P, u)) : 0.0;
+    settled = settled && restitution_of_several(k, W, after, friction, wanted, &most, tolerance, R,
                                                 scratch);
     for (int i = 0; settled && i < 2 * k; i++) {
         P[i] += R[i];

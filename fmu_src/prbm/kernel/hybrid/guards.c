@@ -58,11 +58,13 @@ static ArcGuard arc_guard(Simulation *sim, int kind, int contact, Problem *probl
 }
 
 /* Fail with the name of the contact at which an event is sought; the value is no event. */
-static double no_guard(const ArcGuard *guard, double t, const char *cause) {
+static double no_guard(const ArcGuard *guard, const char *cause) {
     Simulation *sim = guard->sim;
+    const Arc *arc = &sim->state.arc;
     if (!sim->stepping.guards_fail) {
-        (void)fail(guard->problem, "no %s of %s could be located at t = %.9g s: %s", guard->event,
-                   contact_name(sim->configuration.mechanism, guard->contact), t, cause);
+        (void)fail(guard->problem, "no %s of %s could be located within %.3g s from t = %.9g s: %s",
+                   guard->event, contact_name(sim->configuration.mechanism, guard->contact), arc->h,
+                   arc->start, cause);
     }
     sim->stepping.guards_fail = true;
     return 1.0;
@@ -78,7 +80,7 @@ static double guard_at(const ArcGuard *guard, double t) {
     if (guard->forces) {
         Problem problem;
         if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &problem)) {
-            return no_guard(guard, t, problem.text);
+            return no_guard(guard, problem.text);
         }
         at.e = evaluation->at.e;
         at.lam = evaluation->lam;
@@ -154,7 +156,7 @@ static double locate(const ArcGuard *guard, double a, double b) {
         x.fb = guard_at(guard, x.b);
     }
     if (iterations == LOCATION_ITERATIONS_MAX) {
-        (void)no_guard(guard, x.b, NOT_CONVERGED);
+        (void)no_guard(guard, NOT_CONVERGED);
     }
     return x.b;
 }

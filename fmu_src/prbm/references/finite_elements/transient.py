@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 PENETRATION_ATOL = 1e-9  # m
 GAP_CLOSED_RTOL = 1e-10  # Gap at which an impact is located, relative to the size.
-LOCATIONS_MAX = 12  # Iterations of the location of an impact.
+SECANTS_MAX = 12  # Iterations of the location of an impact before it bisects.
+LOCATIONS_MAX = 60  # Iterations of the location of an impact.
 LOCATING_STEPS = (1, 4, 16, 64)  # Divisions of a step that does not converge.
 SHORT_STEPS = 8  # Short steps in succession after a step that failed.
 STEP_RATIO_MIN = 1 / 4096  # Shortest step, relative to the requested one.
@@ -155,26 +156,37 @@ class Transient:
         return True
 
     def _locate(self, a: State, b: State, struck: list[int]) -> tuple[float, Real, Real, int]:
-        """Return the state at which the first struck stop touches, found by shorter steps."""
+        """Return the state at which the first struck stop touches, found by shorter steps.
+
+        Raises
+        ------
+        SimulationError
+            If the iteration does not converge.
+        """
         small = GAP_CLOSED_RTOL * self.fe.model.size
         t, q, v = a
         i = struck[0]
         target = b[0] - t
         gap_a, gap_b = self.fe.gap(i, q), self.fe.gap(i, b[1])
         low, high, gap_low, gap_high = 0.0, target, gap_a, gap_b
-        best = b
-        for _ in range(LOCATIONS_MAX):
+        best, gap = b, gap_b
+        for k in range(LOCATIONS_MAX):
             if gap_low <= small:
-                break
-            h = low + (high - low) * gap_low / (gap_low - gap_high)
+                return (*best, i)
+            share = gap_low / (gap_low - gap_high) if k < SECANTS_MAX else 0.5
+            h = low + (high - low) * share
             best = self._reach(t, q, v, t + h)
             gap = self.fe.gap(i, best[1])
             if abs(gap) <= small:
-                break
+                return (*best, i)
             low, gap_low, high, gap_high = (
                 (h, gap, high, gap_high) if gap > 0.0 else (low, gap_low, h, gap)
             )
-        return (*best, i)
+        raise SimulationError(
+            f"the impact at {self.fe.mechanism.stops[i].name} could not be located within "
+            f"{target:.3g} s from t = {t:.6g} s: {LOCATIONS_MAX} iterations left a gap of "
+            f"{gap:.3g} m; shorten the step"
+        )
 
     def _reach(self, t: float, q: Real, v: Real, end: float) -> State:
         """Return the state at a time within a step; divide the step until it converges."""

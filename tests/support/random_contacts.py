@@ -1,0 +1,141 @@
+"""Random contacts: each ends in a solution that satisfies its laws, or in an error.
+
+``python tests/support/random_contacts.py 100000`` searches with both engines and prints, for each
+kind of contact, the number of draws, of errors, and the largest violation of a law.
+"""
+
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from kernel_library import KernelError, kernel
+from prbm.base.errors import SimulationError
+from prbm.mechanics import complementarity, contact
+
+CLOSING_SHARE = 0.2  # Of the draws: walls that move at random.
+RANKS_BELOW = 0.5  # Of the draws: fewer degrees of freedom than rows.
+
+
+@dataclass
+class Found:
+    """The results of a search: draws, errors by message, and the largest violation of a law."""
+
+    draws: int = 0
+    errors: dict[str, int] = field(default_factory=dict)
+    worst: float = 0.0
+
+    def __str__(self) -> str:
+        errors = sum(self.errors.values())
+        share = 100 * errors / max(self.draws, 1)
+        return f"{self.draws} draws, {errors} errors ({share:.3g} %), violation {self.worst:.1e}"
+
+
+def drawn(rng, rows, normals):
+    """Return W and rates of contacts, of which the normals close, and whether walls move."""
+    rank = int(rng.integers(1, rows + 1)) if rng.uniform() < RANKS_BELOW else rows + 2
+    A = rng.normal(size=(rows, rank)) * 10 ** rng.uniform(-2, 2)
+    moving = rng.uniform() < CLOSING_SHARE
+    u = A @ rng.normal(size=rank)
+    A[:normals] *= -np.sign(u[:normals])[:, None]
+    u[:normals] = -np.abs(u[:normals])
+    if moving:
+        u[:normals] = -np.abs(rng.normal(size=normals)) * np.abs(u).max()
+    return A @ A.T, u
+
+
+def newton(engine, rng):
+    """Return the violation of the laws of a frictionless impact of up to eight stops."""
+    k = int(rng.integers(2, 9))
+    W, u = drawn(rng, k, k)
+    u[rng.uniform(size=k) < 0.1] *= 1e-14  # held stops
+    eps, P = rng.uniform(0, 1, k), np.zeros(k)
+    if engine == "kernel":
+        kernel().newton(k, W, u, eps, 0.0, P)
+    else:
+        P = contact.newton(W, u, eps)
+    wrong = complementarity.violation(W, (1 + eps) * u, P, np.zeros(0))
+    return max(wrong, gain(W, u, P)) / np.abs(u).max()
+
+
+def stronge(engine, rng):
+    """Return the violation of the laws of an impact of one stop with friction."""
+    W, u = drawn(rng, 2, 1)
+    mu, eps, P = rng.uniform(0, 2), rng.uniform(0, 1), np.zeros(2)
+    if engine == "kernel":
+        kernel().stronge(W, u, mu, eps, 0.0, P[:1], P[1:])
+    else:
+        P = np.array(contact.stronge(W, u, mu, eps))
+    return friction_violation(W, u, np.array([mu]), P)
+
+
+def several(engine, rng):
+    """Return the violation of the laws of an impact of several stops with friction."""
+    k = int(rng.integers(2, 5))
+    W, u = drawn(rng, 2 * k, k)
+    mu, eps, P = rng.uniform(0, 2, k), rng.uniform(0, 1, k), np.zeros(2 * k)
+    mu[rng.uniform(size=k) < 0.2] = 0.0
+    if engine == "kernel":
+        kernel().several(k, W, u, mu, eps, 0.0, P)
+    else:
+        P = contact.several(W, u, mu, eps)
+    return friction_violation(W, u, mu, P)
+
+
+def rest(engine, rng):
+    """Return the violation of the laws of contacts at rest; some slide in one search of four."""
+    k, m = int(rng.integers(1, 5)), int(rng.integers(1, 5))
+    W, u = drawn(rng, k + m, k)
+    mu, fixed = rng.uniform(0, 1.5, m), np.zeros(m)
+    normal = np.array([j if j < k else -1 for j in range(m)])
+    fixed[normal < 0] = rng.uniform(0, 1) * np.abs(u).max() / np.diag(W).max()
+    P = np.zeros(k + m)
+    if engine == "kernel":
+        if not kernel().coulomb(k, m, W, u, mu, fixed, normal, P):
+            raise KernelError("no forces")
+    else:
+        found = complementarity.coulomb(W, u, mu, fixed, normal)
+        if found is None:
+            raise SimulationError("no forces")
+        P = found
+    limit = fixed + mu * np.append(P[:k], 0.0)[normal]
+    return complementarity.violation(W, u, P, limit) / np.abs(u).max()
+
+
+def gain(W, u, P):
+    """Return the energy that impulses add, as a speed."""
+    return max(float(P @ u + P @ W @ P / 2), 0.0) / max(float(np.abs(P).sum()), 1e-300)
+
+
+def friction_violation(W, u, mu, P):
+    """Return the violation of contact, Coulomb's cone and the balance of energy, as a rate."""
+    k = len(mu)
+    after, scale = u + W @ P, np.abs(u).max()
+    excess = (np.abs(P[k:]) - mu * P[:k]) * np.diag(W)[k:]
+    parts = (-after[:k], -P[:k] * np.diag(W)[:k], excess, [gain(W, u, P)])
+    return max(float(np.max(part)) for part in parts) / scale
+
+
+SEARCHES: dict[str, Callable[..., float]] = {
+    "newton": newton, "stronge": stronge, "several": several, "rest": rest,
+}  # fmt: skip
+
+
+def search(engine: str, kind: str, draws: int, seed: int = 0) -> Found:
+    """Search with an engine, "package" or "kernel"."""
+    rng, found = np.random.default_rng(seed), Found()
+    for _ in range(draws):
+        found.draws += 1
+        try:
+            found.worst = max(found.worst, SEARCHES[kind](engine, rng))
+        except (SimulationError, KernelError) as error:
+            found.errors[str(error)] = found.errors.get(str(error), 0) + 1
+    return found
+
+
+if __name__ == "__main__":
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 100_000
+    for kind in SEARCHES:
+        for engine in ("package", "kernel"):
+            print(f"{kind:8} {engine:8} {search(engine, kind, count)}", flush=True)
