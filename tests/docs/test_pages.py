@@ -66,9 +66,16 @@ def test_the_index_lists_every_page_of_its_folder_itself():
     assert set(DOCS.glob("*.md")) - listed == {DOCS / "index.md"}
 
 
-def test_the_readme_links_the_index_and_the_glossary():
-    linked = {target.resolve() for target, _ in links(ROOT / "README.md")}
-    assert {DOCS / "index.md", DOCS / "glossary.md"} <= linked
+WRITTEN = [
+    path for path in PAGES if path.parent == DOCS and path.stem not in ("index", "validation")
+]
+"""Pages of the folder but the index and the page that ``prbm validate`` generates."""
+
+
+@pytest.mark.parametrize("page", [ROOT / "README.md", *WRITTEN], ids=lambda path: path.name)
+def test_pages_link_the_index_and_the_glossary(page):
+    linked = {target.resolve() for target, _ in links(page)}
+    assert {DOCS / "index.md", DOCS / "glossary.md"} <= linked | {page}
 
 
 def test_the_glossary_is_in_alphabetical_order_and_has_the_terms():
