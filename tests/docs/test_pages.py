@@ -1,11 +1,13 @@
 """The pages are reachable from the index, and their links and the film of the README exist."""
 
 import re
+import shlex
 from pathlib import Path
 
 import pytest
 from PIL import Image
 
+from prbm.commands.command_line import main
 from support import ROOT
 
 DOCS = ROOT / "docs"
@@ -86,8 +88,23 @@ def test_the_glossary_is_in_alphabetical_order_and_has_the_terms():
         assert any(term in entry for entry in entries), term
 
 
-def test_the_readme_shows_a_film_that_is_small():
-    (film,) = re.findall(r"!\[.*?\]\((.*?\.gif)\)", prose(ROOT / "README.md"))
-    assert (ROOT / film).stat().st_size < FILM_SIZE_MAX
-    with Image.open(ROOT / film) as image:
-        assert image.n_frames > 50
+@pytest.fixture
+def film() -> Path:
+    """Return the film of the README."""
+    (name,) = re.findall(r"!\[.*?\]\((.*?\.gif)\)", prose(ROOT / "README.md"))
+    return ROOT / name
+
+
+def test_the_film_of_the_readme_is_small(film):
+    assert film.stat().st_size < FILM_SIZE_MAX
+
+
+@pytest.mark.slow
+def test_the_command_of_the_film_makes_it(film, tmp_path, monkeypatch):
+    """Same size and number of frames; pixels depend on the version of Matplotlib."""
+    monkeypatch.chdir(tmp_path)
+    (command,) = re.findall(r"`prbm (animate .*?)`", prose(ROOT / "README.md"))
+    assert main(shlex.split(command)) == 0
+    with Image.open(film.name) as made, Image.open(film) as shown:
+        assert (made.size, made.n_frames) == (shown.size, shown.n_frames)
+        assert made.n_frames > 50
