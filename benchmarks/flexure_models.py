@@ -51,8 +51,8 @@ TIPS = (
 TIP_MASS_MIN = 1e-8  # Scaled mass of a missing tip body; a body must have a mass.
 
 FE_GUIDE = (10.7206, 4.9065, 130.65, 209.82, 302.05, 327.65)
-"""Rest position [mm] and frequencies at rest [Hz] of the steel guide: 64 ANCF cable elements a
-flexure (Exudyn), which stretch and have no rotary inertia of their sections."""
+"""Rest position [mm] and frequencies at rest [Hz] of the steel guide: 64 ANCF cable elements
+per flexure (Exudyn), which stretch and whose sections have no rotary inertia."""
 FE_STRAIGHT = 4.6405  # Straight, without gravity; 32 elements [Hz].
 FE_RESTITUTION = {
     -4: (0.4089, 0.5483, 0.4084),

@@ -73,7 +73,8 @@ def instructions(given: Mechanism) -> float:
     stop_time = min(STOP_TIME_MAX, STEPS_MAX / steps(given, {}, Experiment(1.0)))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with patch.object(native_fmu, "reference", lambda *_: {}):  # Saves a second.
+        # Reference results are not needed here; their computation takes a second.
+        with patch.object(native_fmu, "reference", lambda *_: {}):
             write(folder / "model.fmu", native_fmu.build(given, {}, 2, ("host",)))
         unpack(folder / "model.fmu", folder / "model")
         library = kernel_library("profiled", ("-g",))

@@ -115,7 +115,7 @@ def figure(table: np.ndarray) -> Figure:
             textcoords="offset points", ha="center", fontsize=8,
         )  # fmt: skip
     axes.set_xlabel("stop.restitution [-]")
-    axes.set_ylabel("at rest from [s] (numbers: impacts)")
+    axes.set_ylabel("time of coming to rest [s] (labels: impacts)")
     axes.set_ylim(bottom=0.0, top=1.12 * table["rest_time"].max())
     axes.grid(color="#eeeeee")
     axes.legend(frameon=False)
