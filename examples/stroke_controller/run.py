@@ -143,7 +143,7 @@ def balance(record: np.ndarray) -> np.ndarray:
 def steady(record: np.ndarray) -> tuple[float, float] | None:
     """Return rate [1/s] and mean closing speed [m/s] of the impacts in the second half.
 
-    The result is None if there are fewer than two.
+    Fewer than two impacts give None.
     """
     new = np.flatnonzero(np.diff(record["stop.impact_count"], prepend=0.0))
     late = record[new][record["time"][new] >= record["time"][-1] / 2]

@@ -51,7 +51,7 @@ def is_picture(path: str | Path) -> bool:
 def test_each_page_has_a_lesson_a_figure_and_a_command(name):
     """The figure is the one that the command draws."""
     text = (EXAMPLES / name / "README.md").read_text()
-    assert "**What it teaches:**" in text
+    assert "**Lesson:**" in text
     assert f"({name}.png)" in text
     assert f"python examples/{name}/run.py" in text
     assert is_picture(EXAMPLES / name / f"{name}.png")
