@@ -1,4 +1,4 @@
-"""What every doctest may use without an import."""
+"""Names that are defined in every doctest."""
 
 import numpy as np
 import pytest
@@ -6,4 +6,5 @@ import pytest
 
 @pytest.fixture(autouse=True)
 def _numpy_in_doctests(doctest_namespace):
+    """Define ``np``."""
     doctest_namespace["np"] = np

@@ -1,11 +1,11 @@
-"""How good the flexure models are: cantilevers against beam theory, a guide against elements.
+"""Errors of the flexure models: cantilevers against beam theory, a guide against finite elements.
 
     python benchmarks/flexure_models.py
 
 writes the tables of ``docs/flexure-models.md`` (between their marks) and the figure
-``docs/figures/flexure-models.png``.  The tests compare the page with what is computed here.
+``docs/figures/flexure-models.png``.  The tests compare the page with the results of this script.
 
-Model errors alone: the equations of each model are solved to rounding.
+The tables contain model errors only: the equations of each model are solved to rounding.
 """
 
 import math
@@ -40,22 +40,27 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "flexure-models.md"
 FIGURE = ROOT / "docs" / "figures" / "flexure-models.png"
 MODELS = ("1R", "2R", "3R", "10R", "40R")
-FORCES = (0.1, 1.0, 2.0, 4.0, 8.0)  # P L^2/EI
-MOMENTS = (0.1, math.pi / 4, math.pi / 2, math.pi)  # M L/EI
-TIPS = ((0.0, 0.0), (1.0, 0.0), (10.0, 0.0), (1.0, 0.1))  # body at the tip: m, J of the beam's
-WEIGHTLESS = 1e-8  # mass of a tip body that is none, in units of the beam's
+FORCES = (0.1, 1.0, 2.0, 4.0, 8.0)  # Scaled forces P L^2/EI.
+MOMENTS = (0.1, math.pi / 4, math.pi / 2, math.pi)  # Scaled moments M L/EI.
+TIPS = (
+    (0.0, 0.0),
+    (1.0, 0.0),
+    (10.0, 0.0),
+    (1.0, 0.1),
+)  # Mass and inertia at the tip, over those of the beam.
+TIP_MASS_MIN = 1e-8  # Scaled mass of a missing tip body; a body must have a mass.
 
 FE_GUIDE = (10.7206, 4.9065, 130.65, 209.82, 302.05, 327.65)
-"""Rest position [mm] and frequencies at rest [Hz] of the steel guide: 64 ANCF cable elements a
-flexure (Exudyn), which stretch and have no rotary inertia of their sections."""
-FE_STRAIGHT = 4.6405  # Hz, without gravity; 32 elements
+"""Rest position [mm] and frequencies at rest [Hz] of the steel guide: 64 ANCF cable elements
+per flexure (Exudyn), which stretch and whose sections have no rotary inertia."""
+FE_STRAIGHT = 4.6405  # Straight, without gravity; 32 elements [Hz].
 FE_RESTITUTION = {
     -4: (0.4089, 0.5483, 0.4084),
     0: (0.4519, 0.5947, 0.4519),
     4: (0.4104, 0.5482, 0.4108),
 }
-"""Algebraic modal restitution by the same elements, eps = 0.6, without gravity: by offset of the
-hit from the centre of mass [mm], for walls at -10, 0 and 10 mm."""
+"""Algebraic modal restitution with the same elements for eps = 0.6, without gravity: by offset from
+the centre of mass [mm], for walls at -10, 0 and 10 mm."""
 
 # --- cantilevers --------------------------------------------------------------------------------
 
@@ -72,8 +77,8 @@ def kind(name: str, model: str, *, axial: bool = False) -> FlexureType:
 
 
 def cantilever(model: str, tip: tuple[float, float] = (0.0, 0.0), *, axial: bool = False) -> System:
-    """Return a cantilever with a body at its tip, its mass and inertia in units of m, m L^2."""
-    mass, inertia = (max(x, WEIGHTLESS) for x in tip)
+    """Return a cantilever with a body at its tip: mass and inertia in units of m and m L^2."""
+    mass, inertia = (max(x, TIP_MASS_MIN) for x in tip)
     mechanism = Mechanism(
         name="Cantilever",
         title="A flexure, clamped at one end",
@@ -89,7 +94,7 @@ def cantilever(model: str, tip: tuple[float, float] = (0.0, 0.0), *, axial: bool
 
 
 def tip_of(system: System, force: float = 0.0, moment: float = 0.0) -> Tip:
-    """Return the tip under P L^2/EI across the beam and M L/EI."""
+    """Return the tip under a scaled transverse force P L^2/EI and moment M L/EI."""
     loads = {"force.y": force * EI / L**2, "force.moment": moment * EI / L}
     q = equilibrium(system, loads=loads).q
     probe = system.probes[0]
@@ -98,7 +103,7 @@ def tip_of(system: System, force: float = 0.0, moment: float = 0.0) -> Tip:
 
 
 def displacement_error(found: Tip, exact: Tip) -> float:
-    """Return how far the tip is from where it should be, over its displacement [%]."""
+    """Return the error of the tip position, relative to the displacement of the tip [%]."""
     return 100 * abs(found.z - exact.z) / abs(exact.z - 1)
 
 
@@ -107,7 +112,7 @@ def frequency_error(system: System, tip: tuple[float, float], mode: int) -> floa
     found = modes(system, equilibrium(system)).frequency
     if mode > len(found):
         return None
-    b = wavenumber(mode, *(max(x, WEIGHTLESS) for x in tip))
+    b = wavenumber(mode, *(max(x, TIP_MASS_MIN) for x in tip))
     exact = b**2 * math.sqrt(EI / (MASS * L**3)) / (2 * math.pi)
     return 100 * (float(found[mode - 1]) / exact - 1)
 
@@ -126,7 +131,7 @@ def guide(model: str, *, axial: bool = False) -> Mechanism:
 
 @cache
 def guide_figures(model: str, *, axial: bool = False) -> Real:
-    """Return rest position [mm], five frequencies at rest and f1 straight [Hz]; NaN: no mode."""
+    """Return rest position [mm], five frequencies at rest and f1 straight [Hz]; NaN if missing."""
     mechanism = guide(model, axial=axial)
     system = assemble(mechanism, mechanism.values())
     f = modes(system, equilibrium(system)).frequency[:5]
@@ -154,7 +159,7 @@ def restitution_error(model: str, *, axial: bool) -> float:
 
 
 def table(head: Sequence[str], rows: Sequence[tuple[str, Sequence[Cell]]], form: str) -> str:
-    """Return a table in Markdown, its numbers in one form."""
+    """Return a table in Markdown with one number format."""
     lines = ["| " + " | ".join(head) + " |", "|---" + "|---:" * (len(head) - 1) + "|"]
     for name, cells in rows:
         written = ["-" if c is None or math.isnan(c) else format(c, form) for c in cells]
@@ -163,7 +168,7 @@ def table(head: Sequence[str], rows: Sequence[tuple[str, Sequence[Cell]]], form:
 
 
 def force_table() -> str:
-    """Error of the tip's place under an end force, over its displacement [%]."""
+    """Return the table of errors of the tip position under an end force [%]."""
     systems = [cantilever(model) for model in MODELS]
     rows = [
         (
@@ -176,7 +181,7 @@ def force_table() -> str:
 
 
 def moment_table() -> str:
-    """Error of the tip's place under an end moment [%], and the tip's slope over the exact one."""
+    """Return the table of errors of tip position [%] and tip slope under an end moment."""
     systems = [cantilever(model) for model in MODELS]
     rows = [
         (
@@ -194,7 +199,7 @@ def moment_table() -> str:
 
 
 def frequency_table() -> str:
-    """Errors of the first two frequencies with a body at the tip [%]."""
+    """Return the table of errors of the first two frequencies with a body at the tip [%]."""
     rows = []
     for tip in TIPS:
         systems = [cantilever(model, tip) for model in MODELS]
@@ -205,7 +210,7 @@ def frequency_table() -> str:
 
 
 def guide_table() -> str:
-    """Rest position and frequencies of the steel guide by model, and by finite elements."""
+    """Return the table of rest positions and frequencies of the steel guide."""
     names = ("rest, mm", "f1", "f2", "f3", "f4", "f5", "f1 straight")
     columns = [guide_figures(model) for model in MODELS]
     columns += [guide_figures(model, axial=True) for model in ("2R", "40R")]
@@ -216,7 +221,7 @@ def guide_table() -> str:
 
 
 def restitution_table() -> str:
-    """Largest difference of the modal restitution from finite elements [-]."""
+    """Return the table of largest differences of modal restitution from finite elements [-]."""
     rows = [
         (name, [restitution_error(model, axial=axial) for model in MODELS])
         for name, axial in (("inextensible", False), ("axial", True))
@@ -235,7 +240,7 @@ MARKED = r"(<!-- table: {} -->\n)(.*?)(<!-- end -->)"
 
 
 def shown(page: str, name: str) -> str:
-    """Return the table of a name as it stands on the page."""
+    """Return a table of the page by its name."""
     found = re.search(MARKED.format(name), page, re.DOTALL)
     assert found, f"the page has no table {name!r}"
     return found[2].strip()
@@ -247,7 +252,7 @@ CHAINS = (5, 10, 20, 40, 80)
 
 
 def richardson(values: Sequence[Real]) -> Real:
-    """Return the limit of figures at doubled n whose error falls as n^-2, and then n^-4."""
+    """Return the limit of values at doubled n, for errors with terms in n^-2 and n^-4."""
     a, b, c = values[-3:]
     once = (4 * b - a) / 3, (4 * c - b) / 3
     return (16 * once[1] - once[0]) / 15
@@ -260,7 +265,7 @@ def order(ns: Sequence[int], errors: Sequence[float]) -> float:
 
 COLOURS = dict(
     zip(MODELS, ("#d55e00", "#e69f00", "#cc79a7", "#009e73", "#0072b2"), strict=True)
-)  # also for those who see colours differently
+)  # Colours that colour-blind readers can distinguish.
 LOADS: dict[str, tuple[str, Callable[[float], Tip], float]] = {
     "force": ("end force, P L²/EI", end_force, 8.0),
     "moment": ("end moment, M L/EI", end_moment, math.pi),
@@ -272,23 +277,23 @@ def figure() -> None:
     fig, ((paths, chains), below) = plt.subplots(2, 2, figsize=(9.0, 7.6), layout="constrained")
     draw_paths(paths)
     draw_convergence(chains)
-    for axes, what in zip(below, LOADS, strict=True):
-        draw_errors(axes, what)
+    for axes, loading in zip(below, LOADS, strict=True):
+        draw_errors(axes, loading)
     FIGURE.parent.mkdir(exist_ok=True)
     fig.savefig(FIGURE, dpi=110, metadata={"Software": None})
     plt.close(fig)
 
 
 def draw_paths(axes: plt.Axes) -> None:
-    """Draw where the tip is under both loads."""
-    for what, (_, exact, most) in LOADS.items():
-        path = np.array([exact(x).z for x in np.linspace(0.0, most, 200)])
+    """Draw the path of the tip under both loads."""
+    for loading, (_, exact, largest) in LOADS.items():
+        path = np.array([exact(x).z for x in np.linspace(0.0, largest, 200)])
         axes.plot(path.real, path.imag, color="0.7", lw=4)
-        marks = np.array([exact(x).z for x in np.linspace(0, most, 5)])
+        marks = np.array([exact(x).z for x in np.linspace(0, largest, 5)])
         axes.plot(marks.real, marks.imag, "o", color="0.35", mfc="none", ms=10)
         for model in MODELS[:3]:
             system = cantilever(model)
-            z = np.array([tip_of(system, **{what: x}).z for x in np.linspace(0.0, most, 33)])
+            z = np.array([tip_of(system, **{loading: x}).z for x in np.linspace(0.0, largest, 33)])
             axes.plot(z.real, z.imag, color=COLOURS[model], lw=1.2)
             axes.plot(z.real[::8], z.imag[::8], "o", color=COLOURS[model], ms=4)
     axes.set(xlabel="x / L", ylabel="y / L", xlim=(-0.08, 1.08), title="Tip of a cantilever")
@@ -300,25 +305,25 @@ def draw_paths(axes: plt.Axes) -> None:
     axes.legend(lines, ["elastica", *MODELS[:3]], loc="lower left")
 
 
-def draw_errors(axes: plt.Axes, what: str) -> None:
-    """Draw the errors of the tip's place over a load."""
-    name, exact, most = LOADS[what]
-    loads = np.linspace(0.0, most, 60)[1:]
+def draw_errors(axes: plt.Axes, loading: str) -> None:
+    """Draw the errors of the tip position over a load."""
+    name, exact, largest = LOADS[loading]
+    loads = np.linspace(0.0, largest, 60)[1:]
     for model in MODELS:
         system = cantilever(model)
-        errors = [displacement_error(tip_of(system, **{what: x}), exact(x)) for x in loads]
+        errors = [displacement_error(tip_of(system, **{loading: x}), exact(x)) for x in loads]
         axes.semilogy(loads, errors, color=COLOURS[model], label=model)
     axes.set(
         xlabel=name,
         ylabel="error of the tip / its displacement, %",
         title=name.split(",")[0].capitalize(),
     )
-    axes.legend(loc=(0.5, 0.13 if what == "force" else 0.02), ncols=2)
+    axes.legend(loc=(0.5, 0.13 if loading == "force" else 0.02), ncols=2)
     axes.grid(alpha=0.3)
 
 
 def draw_convergence(axes: plt.Axes) -> None:
-    """Draw how the chain converges to finite elements on the steel guide."""
+    """Draw the convergence of chains to their limit on the steel guide."""
     chains = np.array([guide_figures(f"{n}R", axial=True) for n in CHAINS])
     limit = richardson(list(chains))
     for i, (name, mark) in enumerate((("rest position", "o"), ("f1", "s"), ("f2", "^"))):
@@ -335,7 +340,7 @@ def draw_convergence(axes: plt.Axes) -> None:
 
 
 def main() -> None:
-    """Bring the page and its figure up to date."""
+    """Update the page and its figure."""
     page = PAGE.read_text(encoding="utf-8")
     for name, make in TABLES.items():
         body = make()

@@ -1,12 +1,17 @@
-"""Fuzz the native FMUs for a while: their tables, and the functions of both standards.
+"""Fuzz the native FMUs: their tables, and the functions of FMI 2.0 and 3.0.
 
     python benchmarks/fuzz.py
     python benchmarks/fuzz.py --minutes 60 --keep build/fuzz
 
-The time is shared out: a quarter for arbitrary tables, a half for sequences of calls that libFuzzer
-searches (with clang; the tables, too, are then searched), a quarter for sequences that a generator
-of random numbers chooses, all under the address, undefined-behaviour and leak sanitizers.  Ends
-with status 1 and what was said when one of them finds something; the input that did it is kept.
+The time is divided:
+
+- a quarter for arbitrary tables;
+- a half for sequences of calls that libFuzzer searches;
+- a quarter for random sequences of calls.
+
+Without clang, the tables are mutated at random, and random sequences get three quarters.  All runs
+use the address, undefined-behaviour and leak sanitizers.  On a finding, the script prints the
+output of the sanitizer, keeps the input and ends with status 1.
 """
 
 import argparse
@@ -22,12 +27,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 from fuzzing import MODELS, Found, fuzz_calls, fuzz_tables, has_libfuzzer, search_calls
 
 VERSIONS = (2, 3)
-SEQUENCES = 200  # at once
-TELLING = ("Done ", "cov:", "tables,", "sequences")  # lines that say how much was tried
+SEQUENCES = 200  # Sequences per run.
+SUMMARIES = ("Done ", "cov:", "tables,", "sequences")  # Parts of lines with the number of trials.
 
 
 def searches(folder: Path, seconds: float, seed: int) -> Iterator[tuple[str, Callable[[], Found]]]:
-    """Yield what is to be done, each with its name; together they take the seconds."""
+    """Yield the searches with their names; together they take the seconds."""
     yield "tables", lambda: fuzz_tables(folder, seconds / 4, seed)
     pairs = [(model, fmi) for model in MODELS for fmi in VERSIONS]
     for model, fmi in pairs if has_libfuzzer() else []:
@@ -46,7 +51,7 @@ def searches(folder: Path, seconds: float, seed: int) -> Iterator[tuple[str, Cal
 
 
 def random_calls(folder: Path, model: str, fmi: int, seconds: float, seed: int) -> Found:
-    """Go on with further sequences until the time is over or one fails."""
+    """Run random sequences until the time is over or one fails."""
     end, tried = time.monotonic() + seconds, 0
     while True:
         found = fuzz_calls(folder, model, fmi, SEQUENCES, seed + tried)
@@ -56,11 +61,15 @@ def random_calls(folder: Path, model: str, fmi: int, seconds: float, seed: int) 
 
 
 def main() -> None:
-    """Fuzz, say how much, and fail if something was found."""
+    """Run all searches, print the number of trials, and fail on a finding."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--minutes", type=float, default=10.0)
-    parser.add_argument("--seed", type=int, default=None, help="default: another one each time")
-    parser.add_argument("--keep", type=Path, help="folder of the inputs; a temporary one if not")
+    parser.add_argument(
+        "--minutes", type=float, default=10.0, help="total time (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=None, help="first seed (default: from the clock)"
+    )
+    parser.add_argument("--keep", type=Path, help="folder of the inputs (default: a temporary one)")
     arguments = parser.parse_args()
     seed = int(time.time()) % 10**6 * 1000 if arguments.seed is None else arguments.seed
     print(f"seed {seed}, {'libFuzzer' if has_libfuzzer() else 'no clang: random mutations only'}")
@@ -70,7 +79,7 @@ def main() -> None:
         found = search()
         if found.status != 0:
             sys.exit(f"{name}: status {found.status}; inputs in {folder}\n{found.said[-20000:]}")
-        lines = [line for line in found.said.splitlines() if any(t in line for t in TELLING)]
+        lines = [line for line in found.said.splitlines() if any(t in line for t in SUMMARIES)]
         print(f"{name}: {'; '.join(line.strip() for line in lines[-2:])}", flush=True)
 
 

@@ -1,21 +1,20 @@
-"""What native FMUs cost: times real time, work over precision, beside others, instructions.
+"""Cost of native FMUs: speed, accuracy, comparison with other software, instructions.
 
     python benchmarks/native.py
     python benchmarks/native.py --only speed overhead --runs 9
 
-All ratios are of medians within one run on one machine.  Counted is CPU time, so that what else
-the machine does matters little.
+All ratios are ratios of medians within one run on one machine.  CPU time is measured, which hardly
+depends on other work on the machine.
 
-speed       the C importer of the tests steps through the default second (with its impacts) at
-            1 ms, with no, one and five readings a step: times real time, and the error of
-            shuttle.x over the run against the same at the tolerance 1e-12, for tolerances from
-            1e-4 to 1e-10
-overhead    FMPy's fmi2DoStep and five fmi2GetReal, with ours and with an FMU of the same interface
-            that computes nothing (trivial_fmu.c)
-exudyn      the 1R guide of bodies, joints and springs in Exudyn, without its wall, which Exudyn's
-            rigid bodies do not know: cost over error, both against the scalar equation
-octave      the source's algorithm (source_algorithm.m)
-profile     instructions of a right-hand side, counted by valgrind, against the floating-point
+speed       the C importer of the tests simulates the default second (with its impacts) at steps of
+            1 ms, with no, one and five readings per step: speed over real time, and the error of
+            shuttle.x against a run at the tolerance 1e-12, for tolerances from 1e-4 to 1e-10
+overhead    FMPy's fmi2DoStep and five fmi2GetReal, for this FMU and for an FMU with the same
+            interface that computes nothing (trivial_fmu.c)
+exudyn      the 1R guide without its wall, and the same guide in Exudyn, of bodies, joints and
+            springs: cost over error, both against the scalar equation
+octave      the algorithm of the thesis (thesis_algorithm.m)
+profile     instructions of a right-hand side, counted by valgrind, and the floating-point
             operations that the equations need
 """
 
@@ -51,18 +50,18 @@ MODELS = {"1R": "PRBDM", "2R": "PRBDM2R"}
 POINTS = 1e-3 * np.arange(1001)
 READ = ("shuttle.x", "shuttle.y", "stop.gap", "stop.force", "energy.kinetic")
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
-TIGHT = 1e-12
-RIGHT_HAND_SIDE = ("rates_of_motion",)  # of the kernel, in dynamics.c
-FREE = {"stop.position": 1.0}  # m: out of reach
-EXUDYN_STEPS = (1e-3, 2.5e-4, 1e-4, 2.5e-5, 1e-5)  # s, whole parts of a millisecond
-TARGETS = (1e-5, 1e-6, 1e-7)  # m
+REFERENCE_TOLERANCE = 1e-12
+RIGHT_HAND_SIDE = ("rates_of_motion",)  # Function of the kernel in dynamics.c.
+FREE = {"stop.position": 1.0}  # A wall that is never reached [m].
+EXUDYN_STEPS = (1e-3, 2.5e-4, 1e-4, 2.5e-5, 1e-5)  # A millisecond is a multiple of each [s].
+TARGETS = (1e-5, 1e-6, 1e-7)  # Errors at which costs are compared [m].
 
 
 # -- the C importer --
 
 
 def cost(job: Job, runs: int, readings: int = len(READ)) -> float:
-    """Return the median seconds of the stepping loop."""
+    """Return the median time of the stepping loop [s]."""
     done = run(job, "speed", runs, readings)
     return statistics.median(float(line) for line in done.output.split())
 
@@ -75,12 +74,12 @@ def motion(model: str, tolerance: float, **options: Any) -> Real:
 
 
 def speed(runs: int) -> None:
-    """Print times real time and errors."""
-    print("\nC importer, default run of 1 s at 1 ms; times real time and ms a simulated second")
-    heads = ("steps alone", "with one reading", "with five")
+    """Print the speed over real time and the errors."""
+    print("\nC importer, default run of 1 s at 1 ms; speed over real time, ms per simulated second")
+    heads = ("no readings", "one reading", "five readings")
     print(" " * 14 + "".join(f"{head:>20s}" for head in heads) + f"{'error of x':>12s}")
     for name, model in MODELS.items():
-        wanted = motion(model, TIGHT)
+        wanted = motion(model, REFERENCE_TOLERANCE)
         for tolerance in TOLERANCES:
             job = Job(native(model, 2), points=POINTS, records=READ, tolerance=tolerance)
             cells = ""
@@ -95,10 +94,10 @@ def speed(runs: int) -> None:
 
 
 def fmpy_cost(fmu: Path, folder: Path, runs: int) -> float:
-    """Return the median seconds of a step with five readings, through FMPy."""
+    """Return the median time of a step with five readings, through FMPy [s]."""
     description = fmpy.read_model_description(fmu)
     references = {v.name: v.valueReference for v in description.modelVariables}
-    asked = [[references[name]] for name in READ]
+    wanted = [[references[name]] for name in READ]
     instance = fmpy.instantiate_fmu(str(folder), description, fmi_type="CoSimulation")
     durations = []
     for _ in range(runs):
@@ -108,7 +107,7 @@ def fmpy_cost(fmu: Path, folder: Path, runs: int) -> float:
         started = time.process_time()
         for k in range(len(POINTS) - 1):
             instance.doStep(currentCommunicationPoint=k * 1e-3, communicationStepSize=1e-3)
-            for reference in asked:
+            for reference in wanted:
                 instance.getReal(reference)
         durations.append((time.process_time() - started) / (len(POINTS) - 1))
         instance.reset()
@@ -117,7 +116,7 @@ def fmpy_cost(fmu: Path, folder: Path, runs: int) -> float:
 
 
 def overhead(runs: int) -> None:
-    """Print what a step costs in FMPy, ours and the trivial FMU's."""
+    """Print the cost of a step in FMPy, for the native and for the trivial FMU."""
     print("\nFMPy, one fmi2DoStep of 1 ms and five fmi2GetReal, over the default run")
     with tempfile.TemporaryDirectory() as name:
         for label, model in MODELS.items():
@@ -140,7 +139,7 @@ def overhead(runs: int) -> None:
 
 
 def scalar_motion() -> Real:
-    """Return x of the 1R guide without a wall, by its scalar equation [m]."""
+    """Return x of the 1R guide without a wall by its scalar equation [m]."""
     guide, values = _guide()
     g, beta, inertia = guide.g, values["damping.beta"], guide.mass * guide.r**2
 
@@ -161,10 +160,10 @@ def _guide() -> tuple[ScalarGuide, dict[str, float]]:
 
 
 def exudyn_motion(exudyn: Any, step: float) -> tuple[Real, float]:
-    """Return x of the same guide in Exudyn [m] and the seconds that the solver took.
+    """Return x of the same guide in Exudyn [m] and the time of its solver [s].
 
-    Three rigid bodies in the plane, four revolute joints, four torsion springs with dampers; the
-    implicit trapezoidal rule, Exudyn's second order.
+    The model has three planar rigid bodies, four revolute joints and four torsion springs with
+    dampers.  The solver is Exudyn's implicit trapezoidal rule for index 2.
     """
     from exudyn import itemInterface as item
 
@@ -240,22 +239,22 @@ def exudyn_motion(exudyn: Any, step: float) -> tuple[Real, float]:
 
 
 def interpolated(errors: Sequence[float], costs: Sequence[float], target: float) -> float:
-    """Return the cost of an error, between powers; outside, that of the nearest point."""
+    """Return the cost at an error, interpolated in logarithms and constant outside the data."""
     order = np.argsort(errors)
     logs = np.log(np.array(errors)[order]), np.log(np.array(costs)[order])
     return float(np.exp(np.interp(math.log(target), *logs)))
 
 
 def exudyn_costs(runs: int) -> None:
-    """Print cost over error of the guide without a wall, ours and Exudyn's."""
+    """Print cost and error of the guide without a wall, native FMU and Exudyn."""
     if importlib.util.find_spec("exudyn") is None:
-        print("\nExudyn is not installed (python -m pip install exudyn)")
+        print("\nExudyn is not installed; install it with: python -m pip install exudyn")
         return
     import exudyn
 
     wanted = scalar_motion()
     print("\n1R guide without a wall, 1 s, x at 1 ms against the scalar equation")
-    curves: dict[str, tuple[list[float], list[float]]] = {"Exudyn": ([], []), "ours": ([], [])}
+    curves: dict[str, tuple[list[float], list[float]]] = {"Exudyn": ([], []), "FMU": ([], [])}
     for step in EXUDYN_STEPS:
         found = [exudyn_motion(exudyn, step) for _ in range(min(runs, 3))]
         seconds = statistics.median(elapsed for _, elapsed in found)
@@ -263,9 +262,9 @@ def exudyn_costs(runs: int) -> None:
     for tolerance in TOLERANCES:
         job = Job(native("PRBDM", 2), points=POINTS, records=READ, tolerance=tolerance, sets=FREE)
         x = motion("PRBDM", tolerance, sets=FREE)
-        _add(curves["ours"], x - wanted, cost(job, runs), f"ours, tolerance {tolerance:g}")
+        _add(curves["FMU"], x - wanted, cost(job, runs), f"FMU, tolerance {tolerance:g}")
     for target in TARGETS:
-        theirs, ours = (interpolated(*curves[name], target) for name in ("Exudyn", "ours"))
+        theirs, ours = (interpolated(*curves[name], target) for name in ("Exudyn", "FMU"))
         print(f"  at {target:g} m: {theirs / ours:.0f} times faster")
 
 
@@ -280,16 +279,16 @@ def _add(curve: tuple[list[float], list[float]], off: Real, seconds: float, labe
 
 
 def octave(runs: int) -> None:
-    """Print the cost of the source's algorithm and its ratio to ours."""
+    """Print the cost of the algorithm of the thesis and its ratio to that of the native FMU."""
     program = shutil.which("octave-cli")
     if program is None:
-        print("\noctave-cli is not installed, so the source's algorithm was not timed")
+        print("\noctave-cli is not installed: the algorithm of the thesis was not timed")
         return
     theirs = octave_cost(program, min(runs, 3))
-    print("\nThe source's algorithm in Octave, seconds per simulated second")
+    print("\nThe algorithm of the thesis in Octave, seconds per simulated second")
     for name, model in MODELS.items():
         ours = cost(Job(native(model, 2), points=POINTS, records=READ), runs)
-        print(f"{name:4s}{theirs[name]:8.1f}, ours at the default tolerance {ours:.2g}: "
+        print(f"{name:4s}{theirs[name]:8.1f}, FMU at the default tolerance {ours:.2g}: "
               f"{theirs[name] / ours:.0f} times faster")  # fmt: skip
 
 
@@ -297,10 +296,11 @@ def octave(runs: int) -> None:
 
 
 def operations(model: str) -> dict[str, int]:
-    """Return the floating-point operations that a right-hand side needs, by what they are for.
+    """Return the number of floating-point operations of a right-hand side, by purpose.
 
-    With blocks of coordinates that no mass couples: sine and cosine at 20 operations each, complex
-    products at 6, of symmetric matrices one half, of constant arrays what is not zero.
+    Assumptions: coordinates that no mass couples form separate blocks; a sine or cosine has 20
+    operations, a complex product 6; one half of a symmetric matrix is computed; zeros of constant
+    arrays are skipped.
     """
     given = mechanism(model)
     system = assemble(given, given.values())
@@ -329,7 +329,7 @@ def operations(model: str) -> dict[str, int]:
 
 
 def _blocks(coupled: Any) -> list[list[int]]:
-    """Return the sets of coordinates that masses couple."""
+    """Return the sets of coordinates that are coupled by masses."""
     from scipy.sparse.csgraph import connected_components
 
     count, label = connected_components(coupled, directed=False)
@@ -337,7 +337,7 @@ def _blocks(coupled: Any) -> list[list[int]]:
 
 
 def inclusive(profile: Path, functions: Sequence[str]) -> tuple[int, int]:
-    """Return how often a function was called and the instructions below it, from callgrind."""
+    """Return the calls and inclusive instructions of functions in a profile of callgrind."""
     names: dict[str, str] = {}
     calls = total = 0
     callee, pending = "", 0
@@ -354,24 +354,24 @@ def inclusive(profile: Path, functions: Sequence[str]) -> tuple[int, int]:
         elif line.startswith("calls="):
             pending = int(line.removeprefix("calls=").split()[0])
     if not calls:
-        raise RuntimeError(f"{functions[0]} was not called, or is no function of the compiler's")
+        raise RuntimeError(f"{functions[0]} was not called, or was inlined by the compiler")
     return calls, total
 
 
 def profile(runs: int) -> None:
-    """Print instructions of a right-hand side and of a whole run."""
+    """Print the instructions of a right-hand side and its share of a run."""
     del runs
     if shutil.which("valgrind") is None:
-        print("\nvalgrind is not installed, so no instructions were counted")
+        print("\nvalgrind is not installed: no instructions were counted")
         return
-    print("\nInstructions a right-hand side, over the default run until 0.1 s")
+    print("\nInstructions per right-hand side, over the default run until 0.1 s")
     library = kernel_library("profiled", ("-g",))
     for name, model in MODELS.items():
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "profile"
             job = Job(native(model, 2), points=POINTS[:101], records=READ, library=library)
-            counted = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={file}")
-            done: Done = execute(job, before=counted)
+            counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={file}")
+            done: Done = execute(job, before=counter)
             if done.status:
                 print(done.errors)
                 return
@@ -382,7 +382,7 @@ def profile(runs: int) -> None:
             f"{name:4s}{total / calls:8.0f} instructions, {sum(needed.values())} operations needed "
             f"({calls} right-hand sides, {100 * total / whole:.0f} % of fmi2DoStep)"
         )
-        print("    " + ", ".join(f"{what} {count}" for what, count in needed.items()))
+        print("    " + ", ".join(f"{purpose} {count}" for purpose, count in needed.items()))
 
 
 PARTS: dict[str, Callable[[int], None]] = {
@@ -392,10 +392,12 @@ PARTS: dict[str, Callable[[int], None]] = {
 
 
 def main() -> None:
-    """Print what was asked for."""
+    """Print the chosen parts."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--runs", type=int, default=7, help="runs of which to take the median")
-    parser.add_argument("--only", nargs="+", choices=PARTS, default=[*PARTS])
+    parser.add_argument("--runs", type=int, default=7, help="number of runs (default: %(default)s)")
+    parser.add_argument(
+        "--only", nargs="+", choices=PARTS, default=[*PARTS], help="parts (default: all)"
+    )
     arguments = parser.parse_args()
     for part in arguments.only:
         PARTS[part](arguments.runs)

@@ -1,14 +1,14 @@
-"""How the cost of a right-hand side grows with the number of links, and of loops.
+"""Cost of a right-hand side over the number of links and of loops.
 
     python benchmarks/scaling.py
 
-Counted by valgrind are the instructions of the native right-hand side; the exponent is the slope
-of a least-squares line through the logarithms of the upper half of the sizes.
+valgrind counts the instructions of the native right-hand side.  The exponent is the slope of a
+least-squares line through the logarithms, over the upper half of the sizes.
 
-links   the guide with two chains of n links each, 4 to 50: one loop, blocks of mass that grow
-axial   the same chains, whose links stretch: twice the coordinates
-loops   a shuttle on k two-rotation flexures that stretch, 2 to 12: k - 1 loops, blocks of mass
-        that do not grow (rigid links side by side would be over-constrained)
+links   the guide with two chains of n links each, 4 to 50: one loop, growing blocks of mass
+axial   the same chains with links that stretch: twice the coordinates
+loops   a shuttle on k 2R flexures that stretch, 2 to 12: k - 1 loops, blocks of mass of constant
+        size (parallel links that do not stretch would be over-constrained)
 """
 
 import argparse
@@ -36,10 +36,10 @@ from prbm.mechanism.parts import Flexure
 from prbm.runs.experiment import Experiment
 from support import mechanism
 
-LINKS = (4, 8, 12, 18, 25, 35, 50)  # a flexure
-LEAVES = (2, 3, 4, 6, 8, 10, 12)
-UNTIL = 2e-5  # s: enough steps for a mean
-STEPS = 20  # are enough, too, where they are short
+LINKS = (4, 8, 12, 18, 25, 35, 50)  # Links per flexure.
+LEAVES = (2, 3, 4, 6, 8, 10, 12)  # Parallel flexures.
+STOP_TIME_MAX = 2e-5  # Long enough for a mean over the steps [s].
+STEPS_MAX = 20  # Enough for a mean if the steps are short.
 
 
 def chains(n: int, axial: bool = False) -> Mechanism:
@@ -50,7 +50,7 @@ def chains(n: int, axial: bool = False) -> Mechanism:
 
 
 def leaves(k: int) -> Mechanism:
-    """Return a shuttle on k flexures side by side, of which the first and last are the guide's."""
+    """Return a shuttle on k parallel flexures; the first and the last are those of the guide."""
     guide = mechanism("PRBDM2RAxial")
     shuttle, x = guide.bodies[0], [f"{i / (k - 1):.17g}*shuttle.width" for i in range(k)]
     body = dataclasses.replace(
@@ -69,19 +69,23 @@ def leaves(k: int) -> Mechanism:
 
 
 def instructions(given: Mechanism) -> float:
-    """Return the instructions of a right-hand side of a mechanism, on average."""
-    until = min(UNTIL, STEPS / steps(given, {}, Experiment(1.0)))
+    """Return the mean number of instructions of a right-hand side of a mechanism."""
+    stop_time = min(STOP_TIME_MAX, STEPS_MAX / steps(given, {}, Experiment(1.0)))
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        with patch.object(native_fmu, "reference", lambda *_: {}):  # else a second in the engine
+        # Reference results are not needed here; their computation takes a second.
+        with patch.object(native_fmu, "reference", lambda *_: {}):
             write(folder / "model.fmu", native_fmu.build(given, {}, 2, ("host",)))
         unpack(folder / "model.fmu", folder / "model")
         library = kernel_library("profiled", ("-g",))
         job = Job(
-            folder / "model", points=np.array([0.0, until]), records=("shuttle.x",), library=library
+            folder / "model",
+            points=np.array([0.0, stop_time]),
+            records=("shuttle.x",),
+            library=library,
         )
-        counted = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")
-        done = execute(job, before=counted)
+        counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={folder / 'profile'}")
+        done = execute(job, before=counter)
         if done.status:
             raise RuntimeError(done.errors)
         calls, total = inclusive(folder / "profile", RIGHT_HAND_SIDE)
@@ -89,7 +93,7 @@ def instructions(given: Mechanism) -> float:
 
 
 def rows(sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Iterator[tuple[int, float]]:
-    """Print and yield size and cost of mechanisms."""
+    """Print and yield the sizes and costs of mechanisms."""
     for size in sizes:
         given = make(size)
         system = assemble(given, given.values())
@@ -102,7 +106,7 @@ def rows(sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Iterator[t
 
 
 def grows(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> float:
-    """Print costs and with which exponent they grow; return that."""
+    """Print the costs and the exponent of their growth, and return the exponent."""
     print(f"\n{title}")
     size, cost = np.array([*rows(sizes, make)]).T
     half = len(size) // 2
@@ -112,16 +116,21 @@ def grows(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) 
 
 
 def main() -> None:
-    """Print what was asked for."""
+    """Print the costs and exponents of all series."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--largest", type=int, default=50, help="links a chain, at most")
-    most = parser.parse_args().largest
+    parser.add_argument(
+        "--largest",
+        type=int,
+        default=50,
+        help="largest number of links per chain (default: %(default)s)",
+    )
+    largest = parser.parse_args().largest
     if shutil.which("valgrind") is None:
-        sys.exit("valgrind is not installed, so no instructions can be counted")
-    sizes = tuple(n for n in LINKS if n <= most)
+        sys.exit("valgrind is not installed; it is needed to count instructions")
+    sizes = tuple(n for n in LINKS if n <= largest)
     grows("Links: two chains of n links", sizes, chains)
     grows("Axial: two chains of n links that stretch", sizes, lambda n: chains(n, axial=True))
-    grows("Loops: k two-rotation flexures that stretch, side by side", LEAVES, leaves)
+    grows("Loops: k parallel 2R flexures that stretch", LEAVES, leaves)
 
 
 if __name__ == "__main__":

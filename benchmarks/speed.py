@@ -1,12 +1,12 @@
-"""What a simulated second costs: the exported FMUs beside the source's algorithm in Octave.
+"""Computing time per simulated second: FMUs compared with the algorithm of the thesis in Octave.
 
     python build_fmu.py
     python benchmarks/speed.py --dist dist/python
 
-Of an FMU only the stepping loop counts: the calls of fmi2DoStep and the reading of one output
-after each, through FMPy, over the default run (with its impacts) at the tolerance 1e-6.  Of
-the Octave script only its time loop counts, at the source's fixed step of 2^-15 s, until 8 ms
-after the first impact.  Extracting, loading and initialising are left out of both.
+Of an FMU only the stepping loop is measured: fmi2DoStep and one output after each step, through
+FMPy, over the default run with its impacts, at the tolerance 1e-6.  Of the Octave script only the
+time loop is measured, at the fixed step of the thesis, 2^-15 s, until 8 ms after the first impact.
+Extraction, loading and initialization are not included.
 """
 
 import argparse
@@ -24,22 +24,18 @@ MODELS = {"1R": "PRBDM.fmu", "2R": "PRBDM2R.fmu"}
 STOP_TIME, STEP = 1.0, 1e-3  # [s]
 TOLERANCE = 1e-6
 OUTPUT = "shuttle.x"
-OCTAVE_SCRIPT = Path(__file__).with_name("source_algorithm.m")
+OCTAVE_SCRIPT = Path(__file__).with_name("thesis_algorithm.m")
 
 
 def fmu_cost(path: Path, runs: int) -> float:
-    """Median time of the stepping loop of an FMU over its simulated time [-].
+    """Return the median time of the stepping loop of an FMU over its simulated time [-].
 
     Parameters
     ----------
     path : Path
         An FMI 2.0 co-simulation FMU with the parameter `solver.tolerance`.
     runs : int
-        Repetitions, all with one instance, which is reset between them.
-
-    Returns
-    -------
-    float
+        Number of repetitions, with one instance that is reset between them.
     """
     description = fmpy.read_model_description(path)
     reference = {v.name: v.valueReference for v in description.modelVariables}
@@ -64,7 +60,7 @@ def fmu_cost(path: Path, runs: int) -> float:
 
 
 def octave_cost(octave: str, runs: int) -> dict[str, float]:
-    """Median times of the source's algorithm over its simulated time, by model [-]."""
+    """Return the median times of the Octave script over its simulated time, by model [-]."""
     command = [octave, "--no-gui", "--quiet", str(OCTAVE_SCRIPT)]
     costs: dict[str, list[float]] = {model: [] for model in MODELS}
     for _ in range(runs):
@@ -78,28 +74,35 @@ def octave_cost(octave: str, runs: int) -> dict[str, float]:
 
 
 def main() -> None:
-    """Print the table."""
+    """Print the table of times."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--dist", type=Path, default=Path("dist/python"), help="where the FMUs are")
-    parser.add_argument("--runs", type=int, default=5, help="runs of which to take the median")
+    parser.add_argument(
+        "--dist",
+        type=Path,
+        default=Path("dist/python"),
+        help="folder of the FMUs (default: %(default)s)",
+    )
+    parser.add_argument("--runs", type=int, default=5, help="number of runs (default: %(default)s)")
     arguments = parser.parse_args()
 
     paths = {model: arguments.dist / name for model, name in MODELS.items()}
     for path in paths.values():
         if not path.is_file():
-            sys.exit(f"{path} does not exist; `python build_fmu.py` builds it.")
-    ours = {model: fmu_cost(path, arguments.runs) for model, path in paths.items()}
+            sys.exit(f"{path} does not exist; build it with `python build_fmu.py`")
+    fmu_costs = {model: fmu_cost(path, arguments.runs) for model, path in paths.items()}
 
     octave = shutil.which("octave-cli")
-    theirs = octave_cost(octave, arguments.runs) if octave else {}
+    octave_costs = octave_cost(octave, arguments.runs) if octave else {}
 
     print(f"Seconds per simulated second, median of {arguments.runs} runs; stepping loops only")
-    print(f"{'model':<6}{'FMU':>10}" + (f"{'Octave':>10}{'ratio':>8}" if theirs else ""))
-    for model, cost in ours.items():
-        beside = f"{theirs[model]:10.1f}{theirs[model] / cost:8.0f}" if theirs else ""
+    print(f"{'model':<6}{'FMU':>10}" + (f"{'Octave':>10}{'ratio':>8}" if octave_costs else ""))
+    for model, cost in fmu_costs.items():
+        beside = (
+            f"{octave_costs[model]:10.1f}{octave_costs[model] / cost:8.0f}" if octave_costs else ""
+        )
         print(f"{model:<6}{cost:10.4f}{beside}")
     if not octave:
-        print("octave-cli is not installed, so the source's algorithm was not timed.")
+        print("octave-cli is not installed: the algorithm of the thesis was not timed.")
 
 
 if __name__ == "__main__":

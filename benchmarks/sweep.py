@@ -1,16 +1,16 @@
-"""What a sweep costs beside its FMU, and what a second worker brings.
+"""Overhead of a sweep over its FMU, and speed-up by a second worker.
 
     python build_fmu.py --model PRBDM2R
     python benchmarks/sweep.py
     python benchmarks/sweep.py --stop-time 0.001
 
-Each run is a second of the 2R guide in a thousand steps, its restitution and the offset of its wall
-drawn at random; two final values and two reductions of one output are kept.  Beside the sweep stand
-the same FMU in a bare loop (reset, start values, initialization, steps, an output read after each)
-and FMPy's ``simulate_fmu``, both in one process and over rows of the same table.
+Each run is a second of the 2R guide in a thousand steps, with random restitution and offset; two
+final values and two reductions of one output are kept.  The sweep is compared with the same FMU in
+a bare loop (reset, start values, initialization, steps, one output after each) and with FMPy's
+``simulate_fmu``, both in one process and over rows of the same table.
 
-Two clocks: the one on the wall (medians for the loops), which other work on the machine slows down,
-and processor time of all processes that take part, which it does not, but for shared caches.
+The script prints wall time (for the loops: medians), which depends on other work on the machine,
+and the processor time of all processes of the run, which hardly does.
 """
 
 import argparse
@@ -37,14 +37,14 @@ RANGES = {"stop.restitution": (0.4, 0.8), "stop.offset": (-4e-3, 4e-3)}
 
 @dataclass(frozen=True)
 class Cost:
-    """Seconds a run: on the wall, and of processors on average."""
+    """Wall time and mean processor time of a run [s]."""
 
     wall: float
     processor: float
 
 
 def swept(fmu: Path, table: pd.DataFrame, stop_time: float, workers: int) -> Cost:
-    """Return what a run of a sweep costs, start of the workers included."""
+    """Return the cost of a run in a sweep, including the start of the workers."""
     with tempfile.TemporaryDirectory() as folder:
         wall, processor = time.perf_counter(), _processor()
         results = sweep(
@@ -59,12 +59,12 @@ def swept(fmu: Path, table: pd.DataFrame, stop_time: float, workers: int) -> Cos
 
 
 def _processor() -> float:
-    """Return processor time of this process and of those that it has waited for [s]."""
+    """Return the processor time of this process and of its finished children [s]."""
     return sum(os.times()[:4])
 
 
 def bare(fmu: Path, table: pd.DataFrame, stop_time: float) -> Cost:
-    """Return what a run costs in a loop that does nothing but move the FMU."""
+    """Return the cost of a run in a bare loop over the FMU."""
     description = fmpy.read_model_description(fmu)
     reference = {v.name: v.valueReference for v in description.modelVariables}
     with tempfile.TemporaryDirectory() as folder:
@@ -88,7 +88,7 @@ def bare(fmu: Path, table: pd.DataFrame, stop_time: float) -> Cost:
 
 
 def one_by_one(fmu: Path, table: pd.DataFrame, stop_time: float) -> Cost:
-    """Return what a run costs with FMPy's simulate_fmu, the FMU unpacked."""
+    """Return the cost of a run with FMPy's simulate_fmu and the unpacked FMU."""
     names = ["stop.impact_count", "stop.impact_time", READ]
     with tempfile.TemporaryDirectory() as folder:
         fmpy.extract(fmu, unzipdir=folder)
@@ -112,17 +112,28 @@ def _each(run: Callable[[dict[str, float]], object], table: pd.DataFrame) -> Cos
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Print the table."""
+    """Print the table of costs."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--fmu", type=Path, default=Path("dist/fmi2/PRBDM2R.fmu"), help="FMI 2.0")
-    parser.add_argument("--runs", type=int, default=10000, help="rows of the table")
-    parser.add_argument("--loops", type=int, default=200, help="rows for the loops beside it")
-    parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--stop-time", type=float, default=1.0, help="of a run [s]; of one step, "
-                        "0.001, what a sweep costs beside the steps is all there is")  # fmt: skip
+    parser.add_argument(
+        "--fmu", type=Path, default=Path("dist/fmi2/PRBDM2R.fmu"), help="FMU of FMI 2.0"
+    )
+    parser.add_argument(
+        "--runs", type=int, default=10000, help="rows of the table (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--loops",
+        type=int,
+        default=200,
+        help="rows of the loops for comparison (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--workers", type=int, nargs="+", default=[1, 2], help="numbers of workers (default: 1 2)"
+    )
+    parser.add_argument("--stop-time", type=float, default=1.0, help="duration of a run [s] "
+                        "(default: 1); with 0.001, one step, the overhead dominates")  # fmt: skip
     options = parser.parse_args(arguments)
     if not options.fmu.is_file():
-        sys.exit(f"{options.fmu} does not exist; `python build_fmu.py` builds it.")
+        sys.exit(f"{options.fmu} does not exist; build it with `python build_fmu.py`")
 
     table, stop_time = samples(RANGES, options.runs, method="latin"), options.stop_time
     few = table[: options.loops]
@@ -134,14 +145,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     rows["FMU alone (after)"] = bare(options.fmu, few, stop_time)
 
     print(f"{options.runs} runs of {stop_time:g} s; load of the machine {os.getloadavg()[0]:.1f}")
-    print(f"{'a run costs':<20}{'wall [ms]':>11}{'CPU [ms]':>11}{'runs/s':>9}")
+    print(f"{'cost of a run':<20}{'wall [ms]':>11}{'CPU [ms]':>11}{'runs/s':>9}")
     for name, cost in rows.items():
         wall, processor = 1e3 * cost.wall, 1e3 * cost.processor
         print(f"{name:<20}{wall:11.2f}{processor:11.2f}{1.0 / cost.wall:9.1f}")
     alone = statistics.mean(rows[f"FMU alone ({when})"].processor for when in ("before", "after"))
     for name, cost in rows.items():
         if name.startswith("sweep"):
-            print(f"{name}: {1e3 * (cost.processor - alone):.2f} ms CPU beyond the FMU")
+            print(f"{name}: {1e3 * (cost.processor - alone):.2f} ms CPU in addition to the FMU")
     if len(options.workers) > 1:
         first, *_, last = (rows[name].wall for name in rows if name.startswith("sweep"))
         print(f"from {options.workers[0]} to {options.workers[-1]} workers: x {first / last:.2f}")

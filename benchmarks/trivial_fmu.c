@@ -1,22 +1,23 @@
-/* An FMU without physics, behind the same interface: what importing costs by itself.
+/* An FMU without physics, with the interface of FMI 2.0 co-simulation, to measure the overhead of
+ * an importer.
  *
- * FMI 2.0, co-simulation: all variables may be set and read, a step adds up time.  Values lie in a
- * table of 1024 places, chosen by the lowest bits of the value reference.  Nothing is checked.
+ * All variables may be set and read; a step adds up time.  The values are in a table of 1024
+ * entries, indexed by the lowest bits of the value reference.  Arguments are not checked.
  */
 #include <stdlib.h>
 
 #include "fmi2FunctionTypes.h"
 #include "fmi2TypesPlatform.h"
 
-enum { PLACES = 1024 };
+enum { ENTRIES = 1024 };
 
 typedef struct {
-    double time, values[PLACES];
+    double time, values[ENTRIES];
 } Instance;
 
-static double *place(fmi2Component c, fmi2ValueReference reference) {
+static double *entry(fmi2Component c, fmi2ValueReference reference) {
     Instance *instance = c;
-    return instance->values + reference % PLACES;
+    return instance->values + reference % ENTRIES;
 }
 
 const char *fmi2GetTypesPlatform(void) {
@@ -50,7 +51,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean tolerant, fmi2Real t
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count,
                        fmi2Real values[]) {
     for (size_t i = 0; i < count; i++) {
-        values[i] = *place(c, references[i]);
+        values[i] = *entry(c, references[i]);
     }
     return fmi2OK;
 }
@@ -58,7 +59,7 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], s
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count,
                        const fmi2Real values[]) {
     for (size_t i = 0; i < count; i++) {
-        *place(c, references[i]) = values[i];
+        *entry(c, references[i]) = values[i];
     }
     return fmi2OK;
 }
@@ -70,7 +71,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real size, fmi2Boolean
     return fmi2OK;
 }
 
-/* What an importer of this FMU calls without effect, and what it only looks for. */
+/* Functions without effect that an importer calls, and functions that it only looks up. */
 
 #define IDLE(name)                                                                                 \
     fmi2Status name(fmi2Component c) {                                                             \

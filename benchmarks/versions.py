@@ -32,7 +32,7 @@ from typing import Any
 import fmpy
 import numpy as np
 
-LENGTH_TOLERANCE = 1e-9  # m; the largest difference of lengths before the runs diverge
+LENGTH_ATOL = 1e-9  # Largest difference of lengths before the runs diverge [m].
 KINDS = ("ModelExchange", "CoSimulation")
 
 
@@ -70,7 +70,7 @@ def units(path: Path) -> dict[str, str]:
 
 
 def compared(old: Path, new: Path, kind: str, divergence: float) -> Iterator[tuple[str, bool]]:
-    """Yield what the default runs of two FMUs have in common, and whether it is as it should be."""
+    """Yield lines that compare the default runs of two FMUs, and whether each is within limits."""
     before, after = run(old, kind), run(new, kind)
     rows = min(len(before), len(after))
     unit = units(new)
@@ -85,8 +85,8 @@ def compared(old: Path, new: Path, kind: str, divergence: float) -> Iterator[tup
             worst[symbol] = max(worst.get(symbol, 0.0), off)
     until = f"until {before['time'][end - 1]:g} s" if end < rows else "to the end"
     text = ", ".join(f"{off:.1e} {symbol}" for symbol, off in sorted(worst.items()) if off)
-    good = worst.get("m", 0.0) <= LENGTH_TOLERANCE
-    yield f"{kind}: {text or 'the same bits'} {until}", good
+    agrees = worst.get("m", 0.0) <= LENGTH_ATOL
+    yield f"{kind}: {text or 'the same bits'} {until}", agrees
     for name in before.dtype.names:
         if name.endswith("impact_count"):
             counts = int(before[name][-1]), int(after[name][-1])
@@ -103,8 +103,8 @@ def report(old: Path, new: Path, divergence: float) -> bool:
             print(f"  {name}: {one.get(name)} and {other.get(name)}")
     description = fmpy.read_model_description(str(new))
     kinds = (description.modelExchange, description.coSimulation)
-    for kind, there in zip(KINDS, kinds, strict=True):
-        if there is not None:
+    for kind, supported in zip(KINDS, kinds, strict=True):
+        if supported is not None:
             for line, fine in compared(old, new, kind, divergence):
                 good &= fine
                 print(f"  {line}{'' if fine else '   <-- differs'}")

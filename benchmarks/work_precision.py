@@ -1,21 +1,23 @@
-"""Which explicit Runge-Kutta pair: accuracy against right-hand sides, and the orders one sees.
+"""Comparison of explicit Runge-Kutta pairs: error over right-hand sides, and observed orders.
 
     python benchmarks/work_precision.py --out build
     python benchmarks/work_precision.py --orders
 
 Work: a smooth arc of the default 1R and 2R, from just after the first impact (0.043 s) to
 0.1 s, at tolerances 1e-3 to 1e-13.  Every pair has the same loop, the same step size control
-(here without a largest step) and the same projection after each step.  Counted are the
-right-hand sides of accepted and rejected steps and those that the dense output needs, on every
-step, because events are looked for on every step.  The error is the largest, over 201 times at
-which the dense output is read, of the root mean square over the state in the scales of the
-engine; the reference is SciPy's DOP853 at 1e-13, restarted at each of these times.
+(here without a largest step) and the same projection after each step.
 
-Orders: with fixed steps, on smooth arcs and across an impact that is located on the dense
-output, the slope of a least-squares line through the root mean square errors of six step sizes
-(five halvings), for all ladders that begin at a half of an octave.  This takes minutes.
+- The work is the number of right-hand sides of accepted and rejected steps, and of the dense
+  output on every step, because events are searched on every step.
+- The error at a time is the root mean square over the state in the scales of the engine.  The
+  result is the largest error over 201 times at which the dense output is evaluated.
+- The reference is SciPy's DOP853 at 1e-13, restarted at each of these times.
 
-All coefficients are held against the order conditions before they are used.
+Orders: fixed steps, on smooth arcs and across an impact that is located on the dense output.  The
+order is the slope of a least-squares line through the logarithms of the errors of six step sizes
+(five halvings).  It is computed for two sequences of step sizes per octave, which takes minutes.
+
+All coefficients are checked against the order conditions before use.
 
 Sources
 -------
@@ -59,12 +61,12 @@ Real = NDArray[np.float64]
 Tree = tuple["Tree", ...]
 
 MODELS = {"1R": "PRBDM", "2R": "PRBDM2R"}
-ARC = (0.043, 0.1)  # s; the default runs hit the stop before and after, not within
+ARC = (0.043, 0.1)  # Interval of the default runs without an impact [s].
 TOLERANCES = 10.0 ** -np.arange(3.0, 13.25, 0.5)
 TARGETS = (1e-4, 1e-6, 1e-8, 1e-10)
-SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # of the step size control, those of the engine
-LADDER = 6  # step sizes: five halvings
-OCTAVE = 2  # ladders an octave
+SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # Step size control of the engine.
+LADDER = 6  # Step sizes for one slope: five halvings.
+OCTAVE = 2  # Sequences of step sizes per octave.
 
 
 # -- pairs --
@@ -77,14 +79,14 @@ class Pair:
     Parameters
     ----------
     name : str
-        What the tables call it.
+        Name in the tables.
     order : int
-        Of the solution that is continued.
+        Order of the solution that is continued.
     dense_order : int
-        Of the interpolant.
+        Order of the interpolant.
     last : int
-        Stage whose row holds the weights and which is the first of the next step; those after
-        it serve the dense output alone.
+        Stage whose row contains the weights; it is the first stage of the next step.  Later stages
+        are for the dense output only.
     a : (s, s)
         Stages, strictly lower triangular.
     error : (s,)
@@ -106,12 +108,12 @@ class Pair:
 
     @property
     def cost(self) -> int:
-        """Right-hand sides of an accepted step, dense output included."""
+        """Right-hand sides of an accepted step, including dense output."""
         return len(self.a) - 1
 
 
 def table(text: str) -> Real:
-    """Return the rows of numbers, separated by semicolons, padded with zeros on the right.
+    """Return the rows of a text, separated by semicolons and padded with zeros on the right.
 
     Examples
     --------
@@ -127,7 +129,7 @@ def table(text: str) -> Real:
 def tabulated(
     name: str, orders: tuple[int, int], last: int, a: str, error: str, dense: str | Real
 ) -> Pair:
-    """Return a pair from its tables; ``a`` without the empty first row."""
+    """Return a pair from its tables; ``a`` lacks the empty first row."""
     rows = table("0;" + a)
     n = len(rows)
     square = np.zeros((n, n))
@@ -139,7 +141,7 @@ def tabulated(
 
 
 def factored(*factors: tuple[float, ...]) -> Real:
-    """Return a product of polynomials, lowest power first, without its constant term (4,)."""
+    """Return the coefficients of a product of polynomials without the constant term, (4,)."""
     product = np.polynomial.Polynomial([1.0])
     for factor in factors:
         product = product * np.polynomial.Polynomial(factor)
@@ -230,9 +232,9 @@ BOGACKI_SHAMPINE_ERROR = """-3817/1959552 0 140181/15491840 -4224731/272937600 8
 BOGACKI_SHAMPINE_NINTH = """; 455/6144 0 10256301/35409920 2307361/17971200 -387/102400
     73/5130 -7267/215040 1/32"""
 
-# Of the interpolants of order 4 on the eight stages with continuous derivative, two degrees of
-# freedom, the one whose conditions of order 5 are violated least over the step (least squares,
-# trees weighted by their symmetry).
+# The interpolants of order 4 on the eight stages with continuous derivative have two degrees of
+# freedom.  This one violates the conditions of order 5 least over the step (least squares, trees
+# weighted by their symmetry).
 BOGACKI_SHAMPINE = tabulated(
     "Bogacki-Shampine 5(4)",
     (5, 4),
@@ -245,8 +247,8 @@ BOGACKI_SHAMPINE = tabulated(
     3/2 -4 5/2""",
 )
 
-# With the first of the three published stages there is exactly one quintic of order 5 with
-# continuous derivative.
+# With the first of the three published stages, the quintic of order 5 with continuous derivative is
+# unique.
 BOGACKI_SHAMPINE_WITH_1 = tabulated(
     "Bogacki-Shampine 5(4), 1 further",
     (5, 5),
@@ -298,7 +300,7 @@ VERNER_STAGES = """3/50; 519479/27000000 2070721/27000000; 1439/40000 0 4317/400
 VERNER_ERROR = """0.008623404282200852 0 0 -0.019434029953152708 0.028450072588037983
     -2.109711061065291 103.45854289996399 -101.39980461914911 1/30"""
 
-# the quintic has two degrees of freedom, chosen as those of the quartic above
+# The quintic has two degrees of freedom, chosen like those of the quartic above.
 VERNER_WITH_1 = tabulated(
     "Verner 6(5), 1 further",
     (6, 5),
@@ -371,7 +373,7 @@ PAIRS = (
 
 @cache
 def trees(order: int) -> tuple[Tree, ...]:
-    """Return the rooted trees with so many nodes, each as the sorted tuple of its branches.
+    """Return the rooted trees with a number of nodes, each as the sorted tuple of its branches.
 
     Examples
     --------
@@ -411,10 +413,10 @@ def stage_weights(a: Real, tree: Tree) -> Real:
 
 
 def defect(pair: Pair) -> float:
-    """Return the largest violation of an order condition, in units of its rounding.
+    """Return the largest violation of an order condition, in units of its round-off.
 
-    Checked are the pair, the solution it is compared with (one order less; of DOP853 order 5),
-    and the dense output in each power of theta.
+    The conditions are those of the pair, of the embedded solution (one order less; order 5 for
+    DOP853), and of the dense output in each power of theta.
     """
     worst, n = 0.0, pair.last + 1
     compared = 5 if pair.second is not None else pair.order - 1
@@ -440,20 +442,20 @@ def defect(pair: Pair) -> float:
 
 @dataclass(frozen=True)
 class Problem:
-    """An initial value problem with the times at which its solution is read.
+    """An initial value problem with the times at which its solution is evaluated.
 
     Parameters
     ----------
     simulation : Simulation
         Equations, constraints and scales.
     start : float
-        [s].
+        Initial time [s].
     y : (n,)
         State at the start.
     times : (m,)
-        Where the dense output is read; the last one ends the motion [s].
+        Times of evaluation; the last one ends the motion [s].
     impact : bool
-        Whether the first closing of the stop is an impact.
+        Whether to apply an impact when the stop first closes.
     """
 
     simulation: Simulation
@@ -463,7 +465,7 @@ class Problem:
     impact: bool = False
 
     def error(self, found: Real, wanted: Real) -> Real:
-        """Return the root mean square over the state at each time, in scales, (m,)."""
+        """Return the root mean square of the scaled error of the state at each time, (m,)."""
         scales = np.array([self.simulation.configuration.scales.of_state(y) for y in wanted])
         result: Real = np.sqrt((((found - wanted) / scales) ** 2).mean(axis=1))
         return result
@@ -493,7 +495,7 @@ def problem(
     changes: Mapping[str, float] | None = None,
     impact: bool = False,
 ) -> Problem:
-    """Return the motion of a shipped mechanism from a time at which nothing has to happen."""
+    """Return the motion of a shipped mechanism from a time, which need not be an event."""
     simulation = Simulation(load(MODELS[model]), changes, tolerance=1e-12)
     simulation.advance(start)
     return Problem(simulation, start, simulation.state().copy(), times, impact)
@@ -519,7 +521,7 @@ def reference(problem: Problem) -> Real:
 
 @dataclass(frozen=True)
 class Run:
-    """A motion: the states that were read, and what they cost."""
+    """The states at the times of a problem, and the work of the integration."""
 
     states: Real
     calls: int
@@ -535,11 +537,11 @@ def integrate(pair: Pair, problem: Problem, *, tolerance: float = 0.0, step: flo
     pair : Pair
         The method.
     problem : Problem
-        What is integrated.
+        The problem to integrate.
     tolerance : float
-        Relative to the scales of the engine; 0 with fixed steps.
+        Tolerance relative to the scales of the engine; 0 for fixed steps.
     step : float
-        Fixed step size [s]; after an impact the steps start anew from there.
+        Fixed step size [s]; after an impact the steps restart at its time.
     """
     simulation, times = problem.simulation, problem.times
     equations, scales = simulation.equations, simulation.configuration.scales.of_state
@@ -602,24 +604,24 @@ def _size(ratio: Real) -> float:
     return math.sqrt(ratio @ ratio / len(ratio))
 
 
-# -- work and precision --
+# -- work and accuracy --
 
 
 @dataclass(frozen=True)
 class Curve:
-    """What a pair needs at each tolerance: largest errors, right-hand sides and steps."""
+    """Largest errors, right-hand sides and steps of a pair, by tolerance."""
 
     error: Real
     calls: Real
     steps: Real
 
-    def needed(self, target: float, what: str = "calls") -> float:
-        """Return what keeps the error below a target, interpolated between powers; or nan."""
+    def needed(self, target: float, quantity: str = "calls") -> float:
+        """Return the calls or steps for a target error, interpolated in logarithms, or NaN."""
         above = np.flatnonzero(self.error > target)
         if not len(above) or above[-1] + 1 == len(self.error):
             return math.nan
         i = above[-1]
-        amount = getattr(self, what)
+        amount = getattr(self, quantity)
         share = math.log(self.error[i] / target) / math.log(self.error[i] / self.error[i + 1])
         return float(amount[i] * (amount[i + 1] / amount[i]) ** share)
 
@@ -641,7 +643,7 @@ def work_and_precision(model: str) -> dict[str, Curve]:
 
 
 def print_work(model: str, curves: Mapping[str, Curve]) -> None:
-    """Print right-hand sides, relative to Dormand-Prince, and accepted steps."""
+    """Print right-hand sides, also relative to Dormand-Prince, and accepted steps."""
     base = curves[DORMAND_PRINCE.name]
     print(f"\n{model}: right-hand sides (ratio to {DORMAND_PRINCE.name}; accepted steps) for")
     print(f"{'a largest scaled error of':34s}" + "".join(f"{x:>22.0e}" for x in TARGETS))
@@ -656,7 +658,7 @@ def print_work(model: str, curves: Mapping[str, Curve]) -> None:
 
 
 def draw(work: Mapping[str, Mapping[str, Curve]], path: Path) -> None:
-    """Draw right-hand sides over errors, one panel a model."""
+    """Draw right-hand sides over errors, one panel per model."""
     figure, axes = plt.subplots(1, len(work), figsize=(11, 4.8), layout="constrained")
     colours = ("0.35", "tab:blue", *["tab:red"] * 3, *["tab:green"] * 2, "k", "0.6")
     lines = ("-", "-", "-", "--", ":", "-", ":", "--", "--")
@@ -670,12 +672,12 @@ def draw(work: Mapping[str, Mapping[str, Curve]], path: Path) -> None:
                 line,
                 color=colour,
                 lw=2.5 if chosen else 1.4,
-                label=f"{pair.name}: {pair.cost} a step",
+                label=f"{pair.name}: {pair.cost} per step",
             )
         axis.set(xlabel="largest scaled error", title=f"{model}, {ARC[0]} s to {ARC[1]} s")
         axis.set_xlim(1e-1, 1e-13)
         axis.grid(alpha=0.3)
-    axes[0].set_ylabel("right-hand sides, dense output included")
+    axes[0].set_ylabel("right-hand sides, including dense output")
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8)
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -687,7 +689,7 @@ def draw(work: Mapping[str, Mapping[str, Curve]], path: Path) -> None:
 
 
 def order_problems() -> dict[str, tuple[Problem, float, int]]:
-    """Return problems for fixed steps, each with its largest step and the octaves below it."""
+    """Return problems for fixed steps, each with its largest step and number of halvings."""
     damped = {"stop.position": -0.012, "damping.beta": 1e-3}
     return {
         "1R, smooth": (problem("1R", 0.043, np.linspace(0.07, 0.1, 101)), 0.024, 8),
@@ -706,17 +708,17 @@ def order_problems() -> dict[str, tuple[Problem, float, int]]:
 
 
 def slope(steps: Real, errors: Real) -> float:
-    """Return the slope of the least-squares line through the logarithms."""
+    """Return the slope of a least-squares line through logarithms."""
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
 def print_orders() -> None:
-    """Print, for each pair and problem, the ladder whose slope is closest to the order."""
+    """Print, for each pair and problem, the slopes of all sequences of step sizes."""
     for title, (given, largest, octaves) in order_problems().items():
         steps = largest * 2.0 ** (-np.arange(OCTAVE * octaves + 1) / OCTAVE)
         wanted = integrate(dop853(), given, step=float(steps[-1]) / 2).states
-        print(f"\n{title}, steps halved from {largest:g} s: order, closest slope and, in how many")
-        print("ladders, a slope within 0.1; errors; slopes of all ladders")
+        print(f"\n{title}, steps halved from {largest:g} s: order, closest slope, number of slopes")
+        print("within 0.1 of the order; errors; all slopes")
         for pair in PAIRS[:-1]:
             errors = np.array([_fixed(pair, given, float(h), wanted) for h in steps])
             slopes = []
@@ -734,7 +736,7 @@ def print_orders() -> None:
 
 
 def _fixed(pair: Pair, given: Problem, h: float, wanted: Real) -> float:
-    """Return the root mean square error with a fixed step, nan if the motion is lost."""
+    """Return the root mean square error with a fixed step, NaN if the integration fails."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             found = integrate(pair, given, step=h).states
@@ -744,15 +746,24 @@ def _fixed(pair: Pair, given: Problem, h: float, wanted: Real) -> float:
 
 
 def main() -> None:
-    """Check the pairs, then print the tables and draw the figure."""
+    """Check the pairs, print the tables and draw the figure."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("--out", type=Path, default=Path("build"), help="folder of the figure")
-    parser.add_argument("--orders", action="store_true", help="measure the orders instead")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("build"),
+        help="folder of the figure (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--orders", action="store_true", help="print observed orders instead of work"
+    )
     arguments = parser.parse_args()
     for pair in PAIRS:
         worst = defect(pair)
         if not worst < 50.0:
-            raise SystemExit(f"{pair.name} violates its order conditions by {worst:.3g} eps")
+            raise SystemExit(
+                f"{pair.name} violates its order conditions by {worst:.3g} times its round-off"
+            )
     if arguments.orders:
         print_orders()
         return

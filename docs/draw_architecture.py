@@ -3,8 +3,8 @@
     python docs/draw_architecture.py
 
 writes ``docs/figures/architecture.png``.  The layers are those that import-linter checks
-(``pyproject.toml``), the imports are read from the modules, and the picture carries both as JSON in
-its metadata, where a test compares them with the modules of the day.
+(``pyproject.toml``); the imports are read from the modules.  The metadata of the picture contain
+both as JSON, and a test compares them with the present modules.
 """
 
 import ast
@@ -32,7 +32,7 @@ ABOUT = {
     "systems": "coupled FMUs: master, SSP, containers, model exchange",
     "sweeps": "parameter sweeps and Monte Carlo with Dask",
     "analysis": "impact maps, spectra, holding forces, fits: numbers only",
-    "references": "finite elements, the source's algorithm, beam theory",
+    "references": "finite elements, algorithm of the thesis, beam theory",
     "data": "measured records, uncertainty, modulus, vibration",
     "fmu": "model description, documentation, archive, Python slave",
     "runs": "experiment, simulation without an FMU, result",
@@ -47,7 +47,8 @@ ABOUT = {
 }
 C_SUFFIXES = (".c", ".h")
 
-ROW, INDENT, BOX, HEIGHT = 1.0, 0.72, 2.35, 0.66  # of a row, of a column, of a box
+# Distance of rows, indentation per row, width and height of a box [units of the axes].
+ROW, INDENT, BOX, HEIGHT = 1.0, 0.72, 2.35, 0.66
 INK, PALE, LINE, DOT = "#1f2a36", "#7a8794", "#9fb3c8", "#2b6ca3"
 ARROW: dict[str, Any] = {"arrowstyle": "-|>,head_width=0.22,head_length=0.4", "color": LINE,
                          "linewidth": 1.0, "shrinkA": 0.0, "shrinkB": 0.0}  # fmt: skip
@@ -56,7 +57,7 @@ FILLS = {"base": GREEN, "mechanism": GREEN, "mechanics": GREEN, "hybrid": GREEN,
 
 
 def layers() -> list[list[str]]:
-    """Return the packages of each layer of the contract of imports, highest layer first."""
+    """Return the packages of each layer of the import contract, highest layer first."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     (contract,) = (c for c in settings["tool"]["importlinter"]["contracts"] if c["id"] == "layers")
     rows = [[name.strip() for name in line.split("|")] for line in contract["layers"]]
@@ -64,7 +65,7 @@ def layers() -> list[list[str]]:
 
 
 def imported(path: Path) -> Iterator[str]:
-    """Yield the package of every import of a module from a package of prbm."""
+    """Yield, for each import of a module from prbm, the imported package."""
     here = path.relative_to(PACKAGE.parent).with_suffix("").parts[:-1]
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
@@ -79,7 +80,7 @@ def imported(path: Path) -> Iterator[str]:
 
 
 def imports() -> Counter[tuple[str, str]]:
-    """Return how many imports each package has from each other one: (importer, imported)."""
+    """Return the number of imports by (importing package, imported package)."""
     found: Counter[tuple[str, str]] = Counter()
     for path in sorted(PACKAGE.glob("*/**/*.py")):
         package = path.relative_to(PACKAGE).parts[0]
@@ -88,7 +89,7 @@ def imports() -> Counter[tuple[str, str]]:
 
 
 def lines(package: str, suffixes: Sequence[str]) -> int:
-    """Return the number of lines of a package's files of some kinds."""
+    """Return the number of lines of a package's files with certain suffixes."""
     files = (p for p in (PACKAGE / package).rglob("*") if p.suffix in suffixes)
     return sum(len(path.read_text(encoding="utf-8").splitlines()) for path in files)
 
@@ -106,7 +107,7 @@ def data() -> dict[str, list[list[str]]]:
 
 
 def draw() -> Figure:
-    """Draw the packages down a diagonal, so that every import is one corner below it."""
+    """Draw the packages along a diagonal; each import is a line down and then right."""
     rows = layers()
     order = [name for row in rows for name in row]
     found = imports()
@@ -135,7 +136,7 @@ def _bands(axes: Axes, rows: Sequence[Sequence[str]], order: Sequence[str]) -> N
 def _arrows(
     axes: Axes, place: dict[str, tuple[float, float]], found: Counter[tuple[str, str]]
 ) -> None:
-    """Draw a line down from each importer, a line to each imported package, a dot an import."""
+    """Draw a line down from each importer, a line to each imported package, dots at crossings."""
     for name, (x, y) in place.items():
         down = [place[b][1] for a, b in found if a == name]
         if down:
@@ -149,7 +150,7 @@ def _arrows(
 
 
 def area(count: int) -> float:
-    """Return the area of the dot of some imports [pt2]."""
+    """Return the area of a dot for a number of imports [pt2]."""
     return 16.0 + 9.0 * float(count**0.8)
 
 
@@ -190,7 +191,7 @@ def _key(axes: Axes) -> None:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Write the picture, to another place if one is given."""
+    """Write the picture to ``docs/figures``, or to the given path."""
     path = Path(arguments[0]) if arguments else PICTURE
     with mpl.rc_context({"font.family": "DejaVu Sans"}):
         draw().savefig(path, metadata={"Software": None, "Architecture": json.dumps(data())})

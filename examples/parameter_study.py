@@ -1,12 +1,13 @@
-"""How long does it bounce?  Restitution against the time of coming to rest, 1R model.
+"""Time of coming to rest over the restitution, 1R model.
 
-Beside the FMU stands a solution of its own: the 1R guide is one scalar equation,
+The result of the FMU is compared with an independent solution.  The 1R guide obeys one scalar
+equation,
 
-    M r^2 theta'' = -4 k theta + M g r cos(theta),      r = gamma L,
+    M r^2 theta'' = -4 k theta + M g r cos(theta),      r = gamma L.
 
-so that a bounce that leaves the wall (theta = 0) at the speed v lasts
+A bounce that leaves the wall (theta = 0) at the speed v therefore lasts
 
-    T(v) = 2 int_0^theta_max d theta / |theta'|,        M r^2 theta'^2 / 2 = M v^2 / 2 - V(theta)
+    T(v) = 2 int_0^theta_max d theta / |theta'|,        M r^2 theta'^2 / 2 = M v^2 / 2 - V(theta),
 
 and the guide rests at t_1 + T(eps v_1) + T(eps^2 v_1) + ...
 """
@@ -27,7 +28,7 @@ from prbm import load
 from prbm.fmu.python_fmu import build
 
 RESTITUTIONS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
-REST_SPEED = 1e-5  # m/s; slower impacts end the bouncing, at most 0.1 ms early
+REST_SPEED = 1e-5  # Slower impacts end the bouncing, at most 0.1 ms early [m/s].
 OUTPUTS = [f"stop.{x}" for x in ("impact_count", "impact_time", "approach_speed", "rebound_speed")]
 
 
@@ -42,8 +43,8 @@ def study(restitutions: Sequence[float] = RESTITUTIONS) -> np.ndarray:
     Returns
     -------
     structured array
-        ``restitution``, ``rebound`` (opening over closing speed of the impact that is furthest
-        from it) [-], ``impacts``, ``rest_time`` and ``exact``, from the equation above [s].
+        ``restitution`` [-]; ``rebound``, the ratio of opening to closing speed that differs most
+        from it [-]; ``impacts``; ``rest_time`` by the FMU and ``exact`` by the scalar equation [s].
     """
     with tempfile.TemporaryDirectory() as folder:
         fmu = Path(folder) / "PRBDM.fmu"
@@ -75,8 +76,8 @@ def study(restitutions: Sequence[float] = RESTITUTIONS) -> np.ndarray:
 
 
 def exact_rest_time(restitution: float, release: float = -0.018, K_theta: float = 2.65) -> float:
-    """Return when the bounces of the scalar equation, released at rest, add up [s]."""
-    L, h, b, E, rho = 0.04, 1e-4, 8e-3, 181.5e9, 7800.0  # flexure
+    """Return the time of coming to rest by the scalar equation, after a release at rest [s]."""
+    L, h, b, E, rho = 0.04, 1e-4, 8e-3, 181.5e9, 7800.0  # Flexure.
     gamma = 0.8517
     flexure = rho * L * h * b
     M = 0.053187 + 2 * (flexure / 4 + flexure * L**2 / 12 / (gamma * L) ** 2)
@@ -86,7 +87,7 @@ def exact_rest_time(restitution: float, release: float = -0.018, K_theta: float 
         return 2 * k * theta**2 - M * g * r * math.sin(theta)
 
     def time_to_wall(theta_max: float) -> float:
-        # theta = theta_max (1 - s^2) takes the root out of the integrand
+        # The substitution theta = theta_max (1 - s^2) removes the singularity of the integrand.
         def integrand(s: float) -> float:
             kinetic = V(theta_max) - V(theta_max * (1 - s * s))
             return 2 * s * abs(theta_max) * math.sqrt(M * r**2 / 2 / kinetic)
@@ -103,7 +104,7 @@ def exact_rest_time(restitution: float, release: float = -0.018, K_theta: float 
 
 
 def figure(table: np.ndarray) -> Figure:
-    """Plot time of coming to rest and number of impacts over the restitution."""
+    """Plot the time of coming to rest and the number of impacts over the restitution."""
     result = Figure((7.0, 4.2), dpi=120, layout="constrained")
     axes = result.subplots()
     axes.plot(table["restitution"], table["exact"], color="#8fb4d8", label="scalar equation")
@@ -114,7 +115,7 @@ def figure(table: np.ndarray) -> Figure:
             textcoords="offset points", ha="center", fontsize=8,
         )  # fmt: skip
     axes.set_xlabel("stop.restitution [-]")
-    axes.set_ylabel("at rest from [s] (numbers: impacts)")
+    axes.set_ylabel("time of coming to rest [s] (labels: impacts)")
     axes.set_ylim(bottom=0.0, top=1.12 * table["rest_time"].max())
     axes.grid(color="#eeeeee")
     axes.legend(frameon=False)
@@ -122,7 +123,7 @@ def figure(table: np.ndarray) -> Figure:
 
 
 def main() -> None:
-    """Run the study, print the table, write the figure."""
+    """Run the study, print the table and write the figure."""
     table = study()
     print("restitution  rebound ratio  impacts  at rest from  scalar equation")
     for row in table:
@@ -134,7 +135,7 @@ def main() -> None:
     try:
         figure(table).savefig("parameter_study.png")
     except OSError as error:
-        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a writable folder")
     print("figure: parameter_study.png")
 
 

@@ -1,9 +1,9 @@
-"""Build an FMU, simulate it with FMPy, plot what it does.
+"""Build an FMU, simulate it with FMPy and plot the result.
 
     python -m pip install .
     python examples/quickstart.py
 
-writes PRBDM2R.fmu and quickstart.png into the current folder; with --gif a film too.
+writes PRBDM2R.fmu and quickstart.png to the current folder, with --gif also a film.
 """
 
 import argparse
@@ -21,24 +21,24 @@ from prbm.plots.figures import response, save
 from prbm.runs.result import rest_time
 
 MECHANISM = load("PRBDM2R")
-MEASURED = 4.82, 0.06  # Hz, of the steel structure, and its uncertainty
-FINITE_ELEMENTS = 4.907  # Hz, 32 ANCF elements a flexure
+MEASURED = 4.82, 0.06  # Frequency of the steel structure and its standard uncertainty [Hz].
+FINITE_ELEMENTS = 4.907  # Frequency with 32 ANCF elements per flexure [Hz].
 
 
 def simulate(folder: Path, stop_time: float = 1.0) -> np.ndarray:
-    """Build the FMU into a folder and simulate it from its release.
+    """Build the FMU in a folder and simulate it from its release.
 
     Parameters
     ----------
     folder : Path
-        Where the FMU goes.
+        Folder for the FMU.
     stop_time : float
-        [s].
+        End of the simulation [s].
 
     Returns
     -------
     structured array
-        Outputs and link angles by name, a row every millisecond, in SI units.
+        Outputs and link angles by name, one row per millisecond, in SI units.
     """
     fmu = folder / "PRBDM2R.fmu"
     fmu.write_bytes(build(MECHANISM))
@@ -48,26 +48,27 @@ def simulate(folder: Path, stop_time: float = 1.0) -> np.ndarray:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Simulate, print what happened, write the figure."""
-    parser = argparse.ArgumentParser(description="Build an FMU, simulate it, plot it.")
-    parser.add_argument("--gif", action="store_true", help="write quickstart.gif too")
+    """Simulate, print the frequency and the impacts, and write the figure."""
+    parser = argparse.ArgumentParser(description="Build an FMU, simulate it and plot the result.")
+    parser.add_argument("--gif", action="store_true", help="also write the film quickstart.gif")
     options = parser.parse_args(arguments)
     try:
-        _tell(simulate(Path.cwd()), film=options.gif)
+        report(simulate(Path.cwd()), film=options.gif)
     except OSError as error:
-        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a writable folder")
     except PrbmError as error:
         sys.exit(str(error))
 
 
-def _tell(result: np.ndarray, *, film: bool) -> None:
+def report(result: np.ndarray, *, film: bool) -> None:
+    """Print frequency and impacts, write the figure and, on request, the film."""
     print(
         f"fundamental frequency {result['mode.frequency'][-1]:.3f} Hz; measured "
         f"{MEASURED[0]} +- {MEASURED[1]} Hz, finite elements {FINITE_ELEMENTS} Hz"
     )
     rest = rest_time(result)
-    then = "not at rest yet" if rest is None else f"at rest from {rest:.3f} s on"
-    print(f"{result['stop.impact_count'][-1]} impacts, {then}")
+    state = "not yet at rest" if rest is None else f"at rest from {rest:.3f} s on"
+    print(f"{result['stop.impact_count'][-1]} impacts, {state}")
     print("figure:", save(response(result, MECHANISM), "quickstart.png"))
     if film:
         print("film:", animate(result, "quickstart.gif", MECHANISM))

@@ -1,9 +1,9 @@
-"""How straight is straight?  The path of a shuttle on leaf flexures, and what folding them gains.
+"""Lateral error of a shuttle on leaf flexures, single and folded.
 
-A shuttle on two parallel leaves goes down by 3 x^2 / (5 L) on its way x (Euler-Bernoulli beams of
-length L).  In a folded suspension each truss goes x/2 and down by as much as the outer leaves lift
-the shuttle above it.  Left over is what the truss turns, where there is one alone, and what differs
-from leaf to leaf.
+A shuttle on two parallel leaves moves down by 3 x^2 / (5 L) over a stroke x (Euler-Bernoulli beams
+of length L).  In a folded suspension each truss moves by x/2, and the descents of its inner and
+outer leaves cancel.  The remaining errors are the rotation of the truss, if there is only one, and
+differences between the leaves.
 """
 
 import sys
@@ -18,18 +18,18 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import equilibrium
 from prbm.plots.figures import save
 
-STROKES = np.linspace(0.0, 0.03, 16)  # m
-ROUNDING = 1e-12  # m; a lateral error below this is none
-THICKER = 1.05  # of the thickness: one leaf that is not like the others
+STROKES = np.linspace(0.0, 0.03, 16)  # [m]
+ROUNDING_ERROR_MAX = 1e-12  # Smaller lateral errors are round-off [m].
+THICKNESS_RATIO = 1.05  # Thickness of the one different leaf over that of the others.
 
 
 def lateral(mechanism: Mechanism, strokes: np.ndarray = STROKES) -> np.ndarray:
-    """Return by how much the shuttle leaves the straight line when it is pushed, at rest [m].
+    """Return the lateral displacement of the shuttle in static equilibrium at strokes [m].
 
     Parameters
     ----------
     mechanism : Mechanism
-        With a released body, which moves along x.
+        Its released body moves along x.
     strokes : (k,)
         Displacements of its centre of mass along x [m].
     """
@@ -40,7 +40,7 @@ def lateral(mechanism: Mechanism, strokes: np.ndarray = STROKES) -> np.ndarray:
 
 
 def single(folded: Mechanism) -> Mechanism:
-    """Return the shuttle on its two upper outer leaves alone, which stand on the ground."""
+    """Return the shuttle on its two upper outer leaves only, clamped to the ground."""
     leaves = [f for f in folded.flexures if f.name in ("upper_left_outer", "upper_right_outer")]
     truss = next(body for body in folded.bodies if body.name == "upper_truss")
     places = {leaf.start.rpartition(".")[2] for leaf in leaves}
@@ -54,7 +54,7 @@ def single(folded: Mechanism) -> Mechanism:
 
 
 def half(folded: Mechanism) -> Mechanism:
-    """Return the suspension with its upper truss alone."""
+    """Return the suspension with its upper truss only."""
     return replace(
         folded,
         ground={name: point for name, point in folded.ground.items() if "upper" in name},
@@ -65,10 +65,10 @@ def half(folded: Mechanism) -> Mechanism:
 
 
 def uneven(folded: Mechanism) -> Mechanism:
-    """Return the suspension with one leaf that is thicker than the others."""
+    """Return the suspension with one thicker leaf."""
     first, kind = folded.flexures[0], folded.flexure_types[0]
     assert isinstance(kind.thickness, float)
-    thick = replace(kind, name="thick", thickness=THICKER * kind.thickness)
+    thick = replace(kind, name="thick", thickness=THICKNESS_RATIO * kind.thickness)
     return replace(
         folded,
         flexure_types=(kind, thick),
@@ -77,7 +77,7 @@ def uneven(folded: Mechanism) -> Mechanism:
 
 
 def simulate(strokes: np.ndarray = STROKES) -> dict[str, np.ndarray]:
-    """Return the lateral errors by the names of the mechanisms [m]."""
+    """Return the lateral errors by name of the mechanism [m]."""
     folded = load("FoldedSuspension")
     return {
         "two leaves": lateral(single(folded), strokes),
@@ -94,8 +94,8 @@ def plot(errors: dict[str, np.ndarray], beam: np.ndarray) -> Figure:
     axes.plot(1e3 * STROKES[1:], 1e3 * beam[1:], "k--", linewidth=1.0, label="3 x² / (5 L)")
     for (name, error), marker in zip(errors.items(), "osd^", strict=True):
         size = np.abs(error)
-        if size.max() < ROUNDING:
-            size, name = np.full(len(error), ROUNDING), f"{name} (none but rounding)"
+        if size.max() < ROUNDING_ERROR_MAX:
+            size, name = np.full(len(error), ROUNDING_ERROR_MAX), f"{name} (round-off)"
         axes.plot(1e3 * STROKES[1:], 1e3 * size[1:], marker + "-", markersize=4, label=name)
     axes.set_yscale("log")
     axes.set_xlabel("stroke [mm]")
@@ -106,11 +106,11 @@ def plot(errors: dict[str, np.ndarray], beam: np.ndarray) -> Figure:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Print the lateral errors at the full stroke beside that of beam theory, and plot them."""
+    """Print the lateral errors at full stroke beside that of beam theory, and plot them."""
     length = load("FoldedSuspension").values()["flexure.length"]
     beam = 0.6 * STROKES**2 / length
     errors = simulate()
-    print(f"at a stroke of {1e3 * STROKES[-1]:g} mm:")
+    print(f"lateral errors at a stroke of {1e3 * STROKES[-1]:g} mm:")
     for name, error in errors.items():
         print(f"  {name}: {1e6 * abs(error[-1]):.3g} um")
     print(f"  two leaves, beam theory: {1e6 * beam[-1]:.3g} um")

@@ -1,13 +1,14 @@
-"""Drop a device, and see how hard the shuttle inside it hits its stop.
+"""Drop a device, and compute the speed at which the shuttle inside it hits its stop.
 
     python examples/drop_test/run.py
 
-In free fall nothing weighs anything.  When the housing lands, its velocity changes by
+In free fall the mechanism is weightless.  When the housing lands from the height H, its velocity
+changes by
 
     u = (1 + e) sqrt(2 g H)
 
-within a few milliseconds: a half sine of acceleration, base.acceleration.x of the guide, which goes
-on as it fell until its flexures stop it, or the stop does.
+within a few milliseconds.  The input base.acceleration.x of the guide is a half sine with this
+integral.  The shuttle continues its fall until its flexures or the stop decelerate it.
 """
 
 import argparse
@@ -29,49 +30,53 @@ from prbm.references.scalar_guide import Monolith, ScalarGuide
 from prbm.systems.cosimulation import simulate as cosimulate
 
 GUIDE = load("PRBDM")
-TRAVEL = 1e-3  # m, to the stop
+TRAVEL = 1e-3  # Distance from the shuttle to the stop [m].
 START = {
     "flexure.length": 0.01, "shuttle.width": 0.02, "shuttle.com_height": 0.003,
     "shuttle.mass": 5e-3, "shuttle.inertia": 2e-7, "gravity.x": 0.0,
     "release.displacement": 0.0, "stop.position": TRAVEL, "damping.beta": 0.0,
 }  # fmt: skip
-GRAVITY, REBOUND, SHOCK = 9.81, 0.3, 2e-3  # m/s2, e of the housing [-], duration of the shock [s]
-HEIGHTS = (0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)  # m
-STEP = 2e-5  # s
-SAID = ("impact_count", "impact_time", "approach_speed", "impulse")
+GRAVITY = 9.81  # [m/s2]
+HOUSING_RESTITUTION = 0.3  # Coefficient of restitution e of the housing [-].
+SHOCK_DURATION = 2e-3  # [s]
+HEIGHTS = (0.005, 0.01, 0.015, 0.02, 0.03, 0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)  # [m]
+STEP = 2e-5  # Communication step [s].
+OUTPUTS = ("impact_count", "impact_time", "approach_speed", "impulse")
 
 
-def change(height: float) -> float:
-    """Return the change of the housing's velocity by landing [m/s]."""
-    return (1 + REBOUND) * math.sqrt(2 * GRAVITY * height)
+def velocity_change(height: float) -> float:
+    """Return the change of the velocity of the housing at landing [m/s]."""
+    return (1 + HOUSING_RESTITUTION) * math.sqrt(2 * GRAVITY * height)
 
 
 def shock(height: float, begin: float, end: float) -> float:
-    """Return the mean acceleration of the housing from one time to another [m/s2].
+    """Return the mean acceleration of the housing between two times [m/s2].
 
-    Against the direction of the fall, which is +x.  Means add up to the change of the velocity:
+    The fall is along +x, the acceleration along -x.  The means times their durations add up to the
+    change of velocity:
 
-    >>> times = np.linspace(0.0, 2 * SHOCK, 12)
-    >>> means = [shock(0.5, a, b) * (b - a) for a, b in zip(times, times[1:])]
-    >>> bool(np.isclose(-sum(means), change(0.5)))
+    >>> times = np.linspace(0.0, 2 * SHOCK_DURATION, 12)
+    >>> changes = [shock(0.5, a, b) * (b - a) for a, b in zip(times, times[1:])]
+    >>> bool(np.isclose(-sum(changes), velocity_change(0.5)))
     True
     """
 
-    def gone(t: float) -> float:
-        return change(height) * (1 - math.cos(math.pi * min(max(t / SHOCK, 0.0), 1.0))) / 2
+    def speed_lost(t: float) -> float:
+        phase = math.pi * min(max(t / SHOCK_DURATION, 0.0), 1.0)
+        return velocity_change(height) * (1 - math.cos(phase)) / 2
 
-    return -(gone(end) - gone(begin)) / (end - begin)
+    return -(speed_lost(end) - speed_lost(begin)) / (end - begin)
 
 
 def drop(fmu: Path, height: float, stop_time: float = 8e-3) -> np.ndarray:
-    """Drop the guide.
+    """Simulate the guide in one drop.
 
     Returns
     -------
     structured array
         Time since the landing [s] and outputs by ``guide.name``.
     """
-    record = [f"guide.{name}" for name in ("shuttle.x", *(f"stop.{x}" for x in SAID))]
+    record = [f"guide.{name}" for name in ("shuttle.x", *(f"stop.{x}" for x in OUTPUTS))]
     return cosimulate(
         {"guide": fmu},
         {},
@@ -84,13 +89,13 @@ def drop(fmu: Path, height: float, stop_time: float = 8e-3) -> np.ndarray:
 
 
 def study(heights: Sequence[float] = HEIGHTS, progress: Progress | None = None) -> np.ndarray:
-    """Drop the guide from each height.
+    """Simulate the guide in a drop from each height.
 
     Returns
     -------
     structured array
         ``height`` [m], ``time`` [s], ``speed`` [m/s] and ``impulse`` [N s] of the first hit, zero
-        if there is none.
+        without a hit.
     """
     rows = []
     with tempfile.TemporaryDirectory() as folder:
@@ -100,57 +105,57 @@ def study(heights: Sequence[float] = HEIGHTS, progress: Progress | None = None) 
             result = drop(fmu, height)
             hit = result["guide.stop.impact_count"] > 0
             first = result[hit.argmax()]
-            said = [first[f"guide.stop.{name}"] if hit.any() else 0.0 for name in SAID[1:]]
-            rows.append((height, *said))
+            latched = [first[f"guide.stop.{name}"] if hit.any() else 0.0 for name in OUTPUTS[1:]]
+            rows.append((height, *latched))
             if progress is not None:
                 progress((k + 1) / len(heights))
     return np.array(rows, [(name, float) for name in ("height", "time", "speed", "impulse")])
 
 
 def guide() -> ScalarGuide:
-    """Return the guide as one scalar equation."""
+    """Return the scalar equation of the guide."""
     return ScalarGuide.of(GUIDE.values(START), [TRAVEL])
 
 
 def monolith(height: float) -> float:
-    """Return the speed of the first hit by the scalar equation [m/s]; 0 if there is none."""
+    """Return the speed of the first hit by the scalar equation, 0 without a hit [m/s]."""
     body = guide()
 
     def force(t: float, x: float, v: float, z: np.ndarray) -> float:
-        inside = math.sin(math.pi * t / SHOCK) if t < SHOCK else 0.0
-        return body.mass * change(height) * math.pi / (2 * SHOCK) * inside
+        sine = math.sin(math.pi * t / SHOCK_DURATION) if t < SHOCK_DURATION else 0.0
+        return body.mass * velocity_change(height) * math.pi / (2 * SHOCK_DURATION) * sine
 
     one = Monolith(body, force, substep=STEP)
-    one.advance(SHOCK)  # where the shock has a corner
+    one.advance(SHOCK_DURATION)  # The rate of the acceleration jumps here.
     one.advance(8e-3)
     return one.impacts[0][1] if one.impacts else 0.0
 
 
 def linear(height: float) -> float:
-    """Return the same of a beam theory oscillator without damping, in closed form [m/s].
+    """Return the speed of the first hit by beam theory in closed form, 0 without a hit [m/s].
 
-    w^2 = 24 E I / (L^3 m), m the shuttle and 13/35 of each flexure; a half sine
-    A sin(p t), A = u p / 2, p = pi / T, gives
+    The undamped oscillator has w^2 = 24 E I / (L^3 m), where m is the mass of the shuttle and 13/35
+    of each flexure.  The half sine A sin(p t) with A = u p / 2 and p = pi / T gives
 
-        x = A (p sin(w t) - w sin(p t)) / (w (p^2 - w^2)),      t <= T
+        x = A (p sin(w t) - w sin(p t)) / (w (p^2 - w^2)),      t <= T,
 
-    and then a free vibration.
+    followed by a free vibration.
     """
     v = GUIDE.values(START)
     L, h, b = (v[f"flexure.{name}"] for name in ("length", "thickness", "width"))
     mass = v["shuttle.mass"] + 2 * 13 / 35 * v["flexure.density"] * L * h * b
     w = math.sqrt(24 * v["flexure.youngs_modulus"] * b * h**3 / 12 / L**3 / mass)
-    p = math.pi / SHOCK
-    scale = change(height) * p / 2 / (w * (p * p - w * w))
+    p = math.pi / SHOCK_DURATION
+    scale = velocity_change(height) * p / 2 / (w * (p * p - w * w))
 
     def state(t: float) -> tuple[float, float]:
-        s = min(t, SHOCK)
+        s = min(t, SHOCK_DURATION)
         x = scale * (p * math.sin(w * s) - w * math.sin(p * s))
         v = scale * p * w * (math.cos(w * s) - math.cos(p * s))
         c, d = math.cos(w * (t - s)), math.sin(w * (t - s))
         return x * c + v / w * d, v * c - x * w * d
 
-    times = np.linspace(0.0, math.pi / w + SHOCK, 2000)
+    times = np.linspace(0.0, math.pi / w + SHOCK_DURATION, 2000)
     beyond = [t for t in times if state(t)[0] > TRAVEL]
     if not beyond:
         return 0.0
@@ -163,7 +168,7 @@ def figure(table: np.ndarray) -> Figure:
     axes = result.subplots()
     heights = np.geomspace(table["height"].min(), table["height"].max(), 300)
     lines = (
-        (change, "black", "change of the housing's velocity"),
+        (velocity_change, "black", "change of the housing's velocity"),
         (linear, "#8fb4d8", "beam theory, closed form"),
     )
     for law, colour, label in lines:
@@ -180,12 +185,14 @@ def figure(table: np.ndarray) -> Figure:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Drop from all heights, print the hits beside two others' values, write the figure."""
-    parser = argparse.ArgumentParser(description="How hard a dropped guide hits its stop.")
-    parser.add_argument("--heights", type=float, nargs="+", default=HEIGHTS, help="[m]")
+    """Simulate all drops, print the hits beside independent values and write the figure."""
+    parser = argparse.ArgumentParser(description="Speed at which a dropped guide hits its stop.")
+    parser.add_argument(
+        "--heights", type=float, nargs="+", default=HEIGHTS, help="drop heights [m]"
+    )
     options = parser.parse_args(arguments)
     if not all(0.0 < height <= 100.0 for height in options.heights):
-        parser.error("--heights: must be above 0 and up to 100 m")
+        parser.error("--heights: must be above 0 and at most 100 m")
     try:
         table = study(sorted(options.heights), reporter())
     except PrbmError as error:
@@ -199,7 +206,7 @@ def main(arguments: list[str] | None = None) -> None:
     try:
         figure(table).savefig("drop_test.png")
     except OSError as error:
-        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a writable folder")
     print("figure: drop_test.png")
 
 

@@ -1,9 +1,9 @@
-"""A coil near moving magnets, and the resistor that it feeds, as an FMU: runs inside pythonfmu.
+"""A coil near moving magnets with a load resistor, as an FMU made by pythonfmu.
 
     L di/dt = k v - (R + R_load) i,        force = -k i,        harvested' = R_load i^2
 
-The velocity v is held within a step; then the current is an exponential, and the integrals over
-the step are exact.  The force is its mean over the step.
+The velocity v is constant within a step.  The current is then an exponential, and the integrals
+over the step are exact.  The output force is the mean over the step.
 """
 
 import math
@@ -12,19 +12,19 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 VARIABLES = (
     ("resistance", "parameter", "Resistance of the coil [Ohm]"),
-    ("load", "parameter", "Resistance of what uses the power [Ohm]"),
+    ("load", "parameter", "Resistance of the load [Ohm]"),
     ("inductance", "parameter", "Inductance of the coil [H]"),
-    ("constant", "parameter", "Voltage for a velocity, force for a current [V s/m, N/A]"),
-    ("velocity", "input", "Of the magnets [m/s]"),
-    ("current", "output", "At the end of the step [A]"),
-    ("force", "output", "On the magnets, mean over the step [N]"),
-    ("harvested", "output", "Energy that the load got [J]"),
-    ("heat", "output", "Energy that the coil itself took [J]"),
+    ("constant", "parameter", "Voltage per velocity, equal to force per current [V s/m, N/A]"),
+    ("velocity", "input", "Velocity of the magnets [m/s]"),
+    ("current", "output", "Current at the end of the step [A]"),
+    ("force", "output", "Force on the magnets, mean over the step [N]"),
+    ("harvested", "output", "Energy delivered to the load [J]"),
+    ("heat", "output", "Energy dissipated in the coil [J]"),
 )
 
 
 class ElectricalLoad(Fmi2Slave):
-    """Current, force, and where the energy goes."""
+    """Current, force and energies of the coil and its load."""
 
     author = "the prbm-impact examples"
     description = "Coil of an energy harvester with a resistive load"
@@ -40,16 +40,17 @@ class ElectricalLoad(Fmi2Slave):
             )
 
     def do_step(self, current_time, step_size):
-        """Continue the current, final + away exp(-t / T)."""
+        """Continue the current i = final + difference exp(-t / T)."""
         total = self.resistance + self.load
         h, T = step_size, self.inductance / total
         final = self.constant * self.velocity / total
-        away = self.current - final
+        difference = self.current - final
         decay = math.exp(-h / T)
-        first = away * T * (1.0 - decay)
-        square = final**2 * h + 2.0 * final * first + away**2 * T * (1.0 - decay**2) / 2.0
+        integral = difference * T * (1.0 - decay)
+        square = final**2 * h + 2.0 * final * integral
+        square += difference**2 * T * (1.0 - decay**2) / 2.0
         self.harvested += self.load * square
         self.heat += self.resistance * square
-        self.current = final + away * decay
-        self.force = -self.constant * (final + (first / h if h > 0.0 else away))
+        self.current = final + difference * decay
+        self.force = -self.constant * (final + (integral / h if h > 0.0 else difference))
         return True

@@ -1,12 +1,13 @@
-"""Two FMUs: a shuttle between two stops on a shaken frame, and the coil and load that brake it.
+"""Two FMUs: a shuttle between two stops on a shaken frame, and an electrical load.
 
     guide --- shuttle.vx ---> load
       ^------- force ----------'
 
     python examples/energy_harvester/run.py
 
-The frequency goes up and then down again, each time when the vibration has settled: between the
-stops the resonance bends to higher frequencies, and the power depends on where one comes from.
+The frequency rises and then falls in steps; at each, the power is measured after the vibration has
+settled.  Between the stops the resonance bends to higher frequencies, so that the power depends on
+the direction of the sweep.
 """
 
 import argparse
@@ -32,9 +33,10 @@ from prbm.systems.cosimulation import System
 HERE = Path(__file__).resolve().parent
 MECHANISM = load(HERE / "Harvester.toml")
 LOAD = {"resistance": 50.0, "load": 100.0, "inductance": 0.02, "constant": 5.0}
-AMPLITUDE = 6.0  # of the base acceleration [m/s2]
-FREQUENCIES = tuple(np.arange(26.0, 50.1, 2.0))  # Hz
-SETTLING, MEASURED, STEPS = 30, 10, 64  # periods, periods, steps a period
+AMPLITUDE = 6.0  # Amplitude of the base acceleration [m/s2].
+FREQUENCIES = tuple(np.arange(26.0, 50.1, 2.0))  # [Hz]
+SETTLING, MEASURED = 30, 10  # Periods before and during the measurement.
+STEPS = 64  # Communication steps per period.
 CONNECTIONS = {"load.velocity": "guide.shuttle.vx", "guide.coil.x": "load.force"}
 WATCHED = (
     "load.harvested", "load.heat", "guide.left.impact_count", "guide.right.impact_count",
@@ -44,7 +46,7 @@ ROW = [(name, float) for name in ("frequency", "power", "heat", "impacts")]
 
 @contextmanager
 def system() -> Iterator[System]:
-    """Build the two FMUs, couple them, and start them at rest."""
+    """Build the two FMUs, couple them and start them at rest."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         (folder / "guide.fmu").write_bytes(build(MECHANISM, fmi=3))
@@ -58,20 +60,20 @@ def system() -> Iterator[System]:
 
 
 def sweep(frequencies: Sequence[float], progress: Progress | None = None) -> np.ndarray:
-    """Shake at one frequency after the other, without a pause between them.
+    """Shake at one frequency after the other, without a pause.
 
     Parameters
     ----------
     frequencies : sequence of float
-        In their order [Hz].
+        Frequencies in their order [Hz].
     progress : callable or None
-        Told the fraction that is done.
+        Called with the completed fraction.
 
     Returns
     -------
     structured array
         ``frequency`` [Hz], mean ``power`` of the load and ``heat`` of the coil [W], ``impacts``
-        a period, a row each frequency.
+        per period; one row per frequency.
     """
     rows = []
     with system() as coupled:
@@ -88,7 +90,7 @@ def sweep(frequencies: Sequence[float], progress: Progress | None = None) -> np.
 
 
 def shake(coupled: System, frequency: float, periods: int) -> None:
-    """Go on for some periods; the acceleration is held within a step, at that of its middle."""
+    """Continue for some periods; within a step the acceleration is that at its middle."""
     begin, h = coupled.time, 1.0 / frequency / STEPS
     for k in range(periods * STEPS):
         angle = 2 * math.pi * (k + 0.5) / STEPS
@@ -98,7 +100,7 @@ def shake(coupled: System, frequency: float, periods: int) -> None:
 
 
 def guide() -> ScalarGuide:
-    """Return the mechanism as one scalar equation."""
+    """Return the scalar equation of the mechanism."""
     values = MECHANISM.values()
     values |= {f"stop.{name}": values[f"left.{name}"] for name in ("restitution", "rest_speed")}
     return ScalarGuide.of(values, [values["travel"], -values["travel"]])
@@ -107,8 +109,11 @@ def guide() -> ScalarGuide:
 def linear(frequency: float | np.ndarray) -> float | np.ndarray:
     """Return the power of the load without stops, for small vibrations [W].
 
-    With K = 4 k / r^2, X (K + j w beta K - M w^2 + j w k_e^2 / (R + j w L)) = -M a, and the load
-    gets R_load |j w k_e X / (R + j w L)|^2 / 2, R all of the resistance.
+    With the stiffness K = 4 k / r^2 and the total resistance R, the amplitude X solves
+
+        X (K + j w beta K - M w^2 + j w k_e^2 / (R + j w L)) = -M a,
+
+    and the power of the load is R_load |j w k_e X / (R + j w L)|^2 / 2.
     """
     free, w = guide(), 2 * math.pi * frequency
     K = 4 * free.k / free.r**2
@@ -119,7 +124,7 @@ def linear(frequency: float | np.ndarray) -> float | np.ndarray:
 
 
 def monolith(frequencies: Sequence[float], stops: bool = True) -> list[float]:
-    """Return the powers of the load by one solver for all, shaken as in :func:`sweep` [W]."""
+    """Return the powers of the load by one solver for both systems, as in :func:`sweep` [W]."""
     R, k = LOAD["resistance"] + LOAD["load"], LOAD["constant"]
     body = guide() if stops else replace(guide(), stops=())
     begin = frequency = 0.0
@@ -131,7 +136,8 @@ def monolith(frequencies: Sequence[float], stops: bool = True) -> list[float]:
     def rates(t: float, x: float, v: float, z: np.ndarray) -> list[float]:
         return [(k * v - R * z[0]) / LOAD["inductance"], LOAD["load"] * z[0] ** 2]
 
-    one = Monolith(body, force, rates, [0.0, 0.0], substep=1e-4)  # s, of a time constant 1.3e-4
+    # The substep is below the time constant of the coil, 1.3e-4 s.
+    one = Monolith(body, force, rates, [0.0, 0.0], substep=1e-4)
     powers = []
     for frequency in frequencies:
         begin = one.time
@@ -154,7 +160,7 @@ def figure(up: np.ndarray, down: np.ndarray, checked: dict[float, float]) -> Fig
     )
     axes.plot(
         [*checked], [1e3 * p for p in checked.values()], "s", mfc="none", ms=11, color="#009e73",
-        label="one solver for all, rising",
+        label="one solver, frequency rising",
     )  # fmt: skip
     axes.set_xlabel("frequency of the base [Hz]")
     axes.set_ylabel("power of the load [mW]")
@@ -165,33 +171,37 @@ def figure(up: np.ndarray, down: np.ndarray, checked: dict[float, float]) -> Fig
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Sweep up and down, print the powers beside others, write the figure."""
+    """Sweep up and down, print the powers beside independent values and write the figure."""
     parser = argparse.ArgumentParser(description="Power of a harvester with stops.")
     parser.add_argument(
-        "--frequencies", type=float, nargs="+", default=FREQUENCIES, help="[Hz], rising"
+        "--frequencies",
+        type=float,
+        nargs="+",
+        default=FREQUENCIES,
+        help="frequencies of the base [Hz]",
     )
     options = parser.parse_args(arguments)
     rising = sorted(options.frequencies)
     if not 1.0 <= rising[0] <= rising[-1] <= 500.0:
-        parser.error("--frequencies: must be 1 to 500 Hz")
+        parser.error("--frequencies: must lie between 1 and 500 Hz")
     try:
         both = sweep([*rising, *rising[-2::-1]], reporter())
     except PrbmError as error:
         sys.exit(str(error))
     up, down = both[: len(rising)], both[len(rising) - 1 :]
     checked = dict(zip(rising[1:6:2], monolith(rising[1:6:2]), strict=True))
-    print("frequency [Hz]  rising [mW]  one solver  falling  without stops  impacts a period")
+    print("frequency [Hz]  rising [mW]  one solver  falling  without stops  impacts per period")
     for row, back in zip(up, down[::-1], strict=True):
         frequency = float(row["frequency"])
         one = f"{1e3 * checked[frequency]:12.4f}" if frequency in checked else " " * 12
         print(
             f"{frequency:14.1f}{1e3 * row['power']:13.4f}{one}{1e3 * back['power']:9.4f}"
-            f"{1e3 * linear(frequency):15.4f}{row['impacts']:18.1f}"
+            f"{1e3 * linear(frequency):15.4f}{row['impacts']:20.1f}"
         )
     try:
         figure(up, down, checked).savefig("energy_harvester.png")
     except OSError as error:
-        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a writable folder")
     print("figure: energy_harvester.png")
 
 

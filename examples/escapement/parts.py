@@ -1,4 +1,4 @@
-"""The mechanisms of the example: the wheel, the oscillator, and both as one mechanism."""
+"""The mechanisms of the example: wheel, oscillator, and both as one mechanism."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -2,17 +2,18 @@
 
     python examples/escapement/run.py
 
-The tooth of the wheel hits the pallet of the oscillator.  The wheel carries the stop; its wall is
-the pallet, which the oscillator moves:
+The tooth of the wheel hits the pallet of the oscillator.  The stop belongs to the wheel; its wall
+is the pallet, which moves with the oscillator:
 
     wheel.tooth.displacement, .velocity   <-  oscillator.shuttle.x, .vx
     wheel.tooth.mobility                  <-  oscillator.pallet.point.mobility
     oscillator.force.impulse.x            <-  wheel.tooth.impulse_sum
     oscillator.force.x                    <-  wheel.tooth.force
 
-With event mode a step ends where the tooth touches.  There the wheel hits what has the pallet's
-present velocity and effective mass, and the oscillator receives the impulse before time goes on:
-what one gains in momentum the other has lost.  Both parts as one mechanism are computed beside.
+With event mode a step ends when the tooth touches the pallet.  The wheel computes the impulse from
+the present velocity and effective mass of the pallet, and the oscillator receives it before time
+continues, so that momentum is conserved.  The result is compared with that of both parts as one
+mechanism.
 """
 
 import argparse
@@ -35,8 +36,10 @@ from prbm.fmu.native_fmu import build
 from prbm.hybrid.impacts import Impact
 from prbm.systems.cosimulation import simulate as cosimulate
 
-MOMENT, STOP_TIME, TOLERANCE = -1e-4, 0.3, 1e-9  # N m on the wheel, s
-STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # s
+MOMENT = -1e-4  # Moment on the wheel [N m].
+STOP_TIME = 0.3  # [s]
+TOLERANCE = 1e-9
+STEPS = (4e-3, 2e-3, 1e-3, 5e-4)  # Communication steps [s].
 CONNECTIONS = {
     "wheel.tooth.displacement": "oscillator.shuttle.x",
     "wheel.tooth.velocity": "oscillator.shuttle.vx",
@@ -55,7 +58,7 @@ RECORD = (
 
 
 def coupled(step: float, stop_time: float = STOP_TIME) -> np.ndarray:
-    """Return what the two FMUs do, exchanged every ``step`` [s] and at each impact.
+    """Return the motion of the two FMUs, coupled every ``step`` [s] and at each impact.
 
     Returns
     -------
@@ -81,31 +84,31 @@ def monolith(stop_time: float = STOP_TIME) -> tuple[Impact, ...]:
 
 
 def impacts(result: np.ndarray) -> np.ndarray:
-    """Return the rows right after each impact; those before them are right before it."""
+    """Return the rows just after each impact; the preceding rows are just before it."""
     count = result["wheel.tooth.impact_count"]
     return np.flatnonzero(np.diff(count) > 0) + 1
 
 
-def exchanged(result: np.ndarray) -> np.ndarray:
-    """Return what is lost of the momentum at each impact, over its impulse.
+def momentum_error(result: np.ndarray) -> np.ndarray:
+    """Return the change of momentum at each impact, relative to its impulse.
 
-    Both effective masses times the changes of the velocities: of the tooth and of the pallet.
+    The change is the sum over tooth and pallet of effective mass times change of velocity.
     """
     after = impacts(result)
-    lost = np.zeros(len(after))
+    error = np.zeros(len(after))
     for point, mobility in (
         ("wheel.tooth.point.velocity", "wheel.tooth.point.mobility"),
         ("oscillator.shuttle.vx", "oscillator.pallet.point.mobility"),
     ):
         change = result[point][after] - result[point][after - 1]
-        lost += change / result[mobility][after]
-    return np.abs(lost) / result["wheel.tooth.impulse"][after]
+        error += change / result[mobility][after]
+    return np.abs(error) / result["wheel.tooth.impulse"][after]
 
 
 def energy(result: np.ndarray) -> np.ndarray:
-    """Return the energy of both and of what they have lost, less the work of the moment [J].
+    """Return energy plus dissipation of both parts, less the work of the moment [J].
 
-    The work on the pallet is in the books of both, with opposite signs.
+    The work on the pallet cancels: it is part of ``energy.work`` of both, with opposite signs.
     """
     total = np.zeros(len(result))
     for part in ("wheel", "oscillator"):
@@ -129,7 +132,7 @@ def errors(result: np.ndarray, reference: Sequence[Impact]) -> tuple[float, floa
 def draw(
     result: np.ndarray, found: Sequence[tuple[float, float]], steps: Sequence[float]
 ) -> Figure:
-    """Draw the motion, and how the errors fall with the communication step."""
+    """Draw the motion, and the errors over the communication step."""
     figure = Figure(figsize=(8.0, 3.4), layout="constrained")
     motion, error = figure.subplots(1, 2, width_ratios=(2, 1))
     after = impacts(result)
@@ -151,29 +154,31 @@ def draw(
 
 
 def main(arguments: Sequence[str] | None = None, progress: Progress | None = None) -> int:
-    """Print momentum, energy and errors, and draw."""
+    """Print the errors of momentum, energy and impacts, and write the figure."""
     parser = argparse.ArgumentParser(description="An escape wheel hits an oscillator.")
-    parser.add_argument("--out", type=Path, default=Path("escapement.png"))
+    parser.add_argument(
+        "--out", type=Path, default=Path("escapement.png"), help="figure (default: %(default)s)"
+    )
     options = parser.parse_args(arguments)
-    told = progress or reporter()
+    report = progress or reporter()
     try:
         reference = monolith()
         results = []
         for k, step in enumerate(STEPS):
             results.append(coupled(step))
-            told((k + 1) / len(STEPS))
+            report((k + 1) / len(STEPS))
     except PrbmError as error:
         print(error, file=sys.stderr)
         return 1
     last, found = results[-1], [errors(result, reference) for result in results]
-    books = energy(last)
+    total = energy(last)
     print(f"impacts              {len(impacts(last))}, as one mechanism {len(reference)}")
-    print(f"momentum             exchanged to {exchanged(last).max():.1e} of each impulse")
-    print(f"energy               balanced to {np.abs(books - books[0]).max() / books[0]:.1e}")
+    print(f"momentum             conserved to {momentum_error(last).max():.1e} of each impulse")
+    print(f"energy               conserved to {np.abs(total - total[0]).max() / total[0]:.1e}")
     for step, (time, speed) in zip(STEPS, found, strict=True):
         print(f"step {step:7g} s       impacts off by {time:.1e} s and {speed:.1e} m/s")
     draw(last, found, STEPS).savefig(options.out, dpi=110)
-    print(f"drawn                {options.out}")
+    print(f"figure               {options.out}")
     return 0
 
 

@@ -1,8 +1,8 @@
-"""A controller of a position with a slow actuator, as an FMU: runs inside pythonfmu.
+"""A position controller with a slow actuator, as an FMU made by pythonfmu.
 
     force' = (command - force) / lag,       command = gain (wanted - position) - damping velocity
 
-Position and velocity are held within a step; then the force is an exponential.
+Position and velocity are constant within a step; the force is then an exponential.
 """
 
 import math
@@ -10,18 +10,18 @@ import math
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 VARIABLES = (
-    ("gain", "parameter", "Force for a missing distance [N/m]"),
-    ("damping", "parameter", "Force against a velocity [N s/m]"),
-    ("wanted", "parameter", "Position that is wanted [m]"),
+    ("gain", "parameter", "Force per position error [N/m]"),
+    ("damping", "parameter", "Force per velocity, against it [N s/m]"),
+    ("wanted", "parameter", "Set point of the position [m]"),
     ("lag", "parameter", "Time constant of the actuator [s]"),
-    ("position", "input", "Measured [m]"),
-    ("velocity", "input", "Measured [m/s]"),
-    ("force", "output", "At the end of the step [N]"),
+    ("position", "input", "Measured position [m]"),
+    ("velocity", "input", "Measured velocity [m/s]"),
+    ("force", "output", "Force at the end of the step [N]"),
 )
 
 
 class PositionController(Fmi2Slave):
-    """PD with an actuator of the first order."""
+    """PD controller with a first-order actuator."""
 
     author = "the prbm-impact examples"
     description = "Position controller with a slow actuator"
@@ -37,7 +37,7 @@ class PositionController(Fmi2Slave):
             )
 
     def do_step(self, current_time, step_size):
-        """Let the force go towards the command."""
+        """Continue the force towards the command."""
         command = self.gain * (self.wanted - self.position) - self.damping * self.velocity
         self.force = command + (self.force - command) * math.exp(-step_size / self.lag)
         return True

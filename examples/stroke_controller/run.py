@@ -1,10 +1,11 @@
-"""Two FMUs in a loop: the guide, and a controller that keeps it bouncing.
+"""Two coupled FMUs: the guide, and a controller that keeps it bouncing.
 
     guide --- shuttle.x, shuttle.vx ---> controller
       ^------------- force.x ----------------'
 
-The controller's force is constant within a step, so that its work is known without the guide:
-the sum of force times displacement.  The stroke that it holds follows from an energy balance.
+The force is constant within a step, so that its work is the sum of force times displacement.  The
+script compares it with the work that the guide reports, and the speed of the impacts with an energy
+balance.
 """
 
 import argparse
@@ -25,10 +26,10 @@ from prbm import load
 from prbm.files.mechanism_file import shipped
 from prbm.fmu.python_fmu import build
 
-STROKE = 0.008  # m
+STROKE = 0.008  # [m]
 RESTITUTION = 0.6
-STEP = 5e-4  # s
-MODEL = "PRBDM"  # the other one takes five times as long
+STEP = 5e-4  # Communication step [s].
+MODEL = "PRBDM"  # PRBDM2R takes five times as long.
 ENERGIES = tuple(
     f"energy.{name}" for name in ("kinetic", "elastic", "gravitational", "dissipated", "work")
 )
@@ -36,7 +37,7 @@ RECORDED = ("shuttle.x", "shuttle.vx", "stop.impact_count", "stop.approach_speed
 
 
 class Slave:
-    """An FMU of FMI 2.0 in a co-simulation, its variables by name."""
+    """An FMU of FMI 2.0 in a co-simulation, with access to its variables by name."""
 
     def __init__(self, fmu: Path, folder: Path, name: str) -> None:
         unzipped = fmpy.extract(fmu, folder / name)
@@ -59,11 +60,11 @@ class Slave:
         self.fmu.exitInitializationMode()
 
     def step(self, time: float, size: float) -> None:
-        """Continue from a time by a step [s]."""
+        """Make a step of a size from a time [s]."""
         self.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=size)
 
     def stop(self) -> None:
-        """End the simulation and give the instance back."""
+        """End the simulation and free the instance."""
         self.fmu.terminate()
         self.fmu.freeInstance()
 
@@ -78,7 +79,7 @@ class Slave:
 
 @contextmanager
 def slaves(model: str, stroke: float) -> Iterator[tuple[Slave, Slave]]:
-    """Build the guide and the controller, start both, and stop them in the end."""
+    """Build and start the guide and the controller, and stop them at the end."""
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         (folder / "guide.fmu").write_bytes(build(load(model)))
@@ -96,21 +97,21 @@ def slaves(model: str, stroke: float) -> Iterator[tuple[Slave, Slave]]:
 
 
 def simulate(stop_time: float = 3.0, model: str = MODEL, stroke: float = STROKE) -> np.ndarray:
-    """Let the controller drive the guide.
+    """Simulate the guide with its controller.
 
     Parameters
     ----------
     stop_time : float
-        [s].
+        End of the simulation [s].
     model : str
-        Name of the guide's mechanism.
+        Name of the mechanism.
     stroke : float
-        Distance from the stop to the far end of a bounce that is wanted [m].
+        Set point of the distance from the stop to the far end of a bounce [m].
 
     Returns
     -------
     structured array
-        Time, motion, force, stroke reached, energies and impacts, a row each step.
+        Time, motion, force, last stroke, energies and impacts, one row per step.
     """
     rows = []
     with slaves(model, stroke) as (guide, controller):
@@ -128,7 +129,7 @@ def simulate(stop_time: float = 3.0, model: str = MODEL, stroke: float = STROKE)
 
 
 def work(record: np.ndarray) -> np.ndarray:
-    """Return the work of the force as this side of the loop knows it, row by row [J]."""
+    """Return the work of the force as the sum of force times displacement, row by row [J]."""
     portions = record["force.x"][:-1] * np.diff(record["shuttle.x"])
     return np.concatenate([[0.0], np.cumsum(portions)])
 
@@ -142,7 +143,7 @@ def balance(record: np.ndarray) -> np.ndarray:
 def steady(record: np.ndarray) -> tuple[float, float] | None:
     """Return rate [1/s] and mean closing speed [m/s] of the impacts in the second half.
 
-    None if there are not two of them.
+    Fewer than two impacts give None.
     """
     new = np.flatnonzero(np.diff(record["stop.impact_count"], prepend=0.0))
     late = record[new][record["time"][new] >= record["time"][-1] / 2]
@@ -153,10 +154,10 @@ def steady(record: np.ndarray) -> tuple[float, float] | None:
 
 
 def expected_speed(stroke: float) -> float:
-    """Return the closing speed of a steady bounce over a stroke, of beam theory [m/s].
+    """Return the closing speed of a steady bounce over a stroke by beam theory [m/s].
 
-    Over the stroke s the springs and gravity store E = 12 EI s^2 / L^3 + m g s, and the force F
-    adds F s both on the way out and back: eps^2 (E + F s) + F s = E.
+    Over the stroke s the springs and gravity store E = 12 EI s^2 / L^3 + m g s.  The force F adds
+    F s on the way out and again on the way back: eps^2 (E + F s) + F s = E.
     """
     L, h, b, young, density = 0.04, 1e-4, 8e-3, 181.5e9, 7800.0
     mass = 0.053187 + 2 * 13 / 35 * density * L * h * b
@@ -171,7 +172,7 @@ def figure(record: np.ndarray) -> Figure:
     motion, force, energy = result.subplots(3, 1, sharex=True)
     t = record["time"]
     motion.plot(t, 1e3 * record["shuttle.x"], color="#1f4e79", linewidth=1.0)
-    motion.axhline(-1e3 * STROKE, color="#d55e00", linewidth=1.0, linestyle="--", label="wanted")
+    motion.axhline(-1e3 * STROKE, color="#d55e00", linewidth=1.0, linestyle="--", label="set point")
     motion.set_ylabel("shuttle.x [mm]")
     motion.legend(loc="lower right", frameon=False)
     force.plot(t, record["force.x"], color="#1f4e79", linewidth=0.8, drawstyle="steps-post")
@@ -190,30 +191,38 @@ def figure(record: np.ndarray) -> Figure:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the loop, print what it settles to, write the figure."""
+    """Simulate, print the settled state and write the figure."""
     parser = argparse.ArgumentParser(description="A controller FMU keeps a guide FMU bouncing.")
-    parser.add_argument("--model", default=MODEL, choices=sorted(shipped()))
-    parser.add_argument("--stop-time", type=float, default=3.0, help="[s]; %(default)s")
+    parser.add_argument(
+        "--model", default=MODEL, choices=sorted(shipped()),
+        help="shipped mechanism (default: %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--stop-time",
+        type=float,
+        default=3.0,
+        help="end of the simulation [s] (default: %(default)s)",
+    )
     options = parser.parse_args(arguments)
     if not STEP <= options.stop_time < math.inf:
-        parser.error(f"--stop-time {options.stop_time:g}: must be {STEP:g} s or longer")
+        parser.error(f"--stop-time {options.stop_time:g}: must be finite and at least {STEP:g} s")
     record = simulate(options.stop_time, options.model)
     settled = steady(record)
     if settled is None:
-        print("fewer than two impacts in the second half: simulate longer; ", end="")
+        print("fewer than two impacts in the second half: increase --stop-time; ", end="")
     else:
         print("impacts {:.2f} per second at {:.4f} m/s; ".format(*settled), end="")
     print(f"energy balance of a steady bounce {expected_speed(STROKE):.4f} m/s")
-    print(f"stroke {1e3 * record['reached'][-1]:.3f} mm, wanted {1e3 * STROKE:.3f} mm")
+    print(f"stroke {1e3 * record['reached'][-1]:.3f} mm, set point {1e3 * STROKE:.3f} mm")
     print(
         f"work of the controller {1e3 * work(record)[-1]:.6f} mJ, "
         f"energy.work of the guide {1e3 * record['energy.work'][-1]:.6f} mJ"
     )
-    print(f"energy balance varies by {1e3 * np.ptp(balance(record)):.1e} mJ")
+    print(f"energy balance constant to {1e3 * np.ptp(balance(record)):.1e} mJ")
     try:
         figure(record).savefig("stroke_controller.png")
     except OSError as error:
-        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a writable folder")
     print("figure: stroke_controller.png")
 
 

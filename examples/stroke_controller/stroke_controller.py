@@ -1,21 +1,21 @@
-"""A controller that keeps a shuttle bouncing, as an FMU: runs inside pythonfmu.
+"""A controller that keeps a shuttle bouncing, as an FMU made by pythonfmu.
 
-It pushes the shuttle the way it goes, which puts in work wherever it is, with a force that one
-bounce sets for the next: at the far end of each bounce the stroke is known, and
+The force acts in the direction of the velocity, so that its work is positive.  Its size changes
+once per bounce, at the far end, where the stroke is known:
 
-    force = integral + gain * (stroke wanted - stroke),     0 <= force <= limit
+    force = integral + gain * (set point - stroke),     0 <= force <= limit
 
-where ``integral`` gathers half of the second term every time.
+Each time, half of the second term is added to ``integral``.
 """
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
-STILL, NEAR = 1e-6, 1e-4  # m/s, m; slower and nearer, it lies at the stop: lift it off
-GATHERED = 0.5  # of gain * error, from bounce to bounce
+REST_SPEED_MAX, REST_DISTANCE_MAX = 1e-6, 1e-4  # Below both, the shuttle rests on the stop.
+INTEGRAL_SHARE = 0.5  # Share of gain * error that is added to the integral per bounce.
 
 
 class StrokeController(Fmi2Slave):
-    """Bang-bang along the velocity, PI from bounce to bounce."""
+    """Bang-bang control along the velocity, PI control from bounce to bounce."""
 
     author = "the prbm-impact examples"
     description = "Keeps a shuttle bouncing against a stop with a given stroke"
@@ -33,8 +33,8 @@ class StrokeController(Fmi2Slave):
         self.integral = 0.0
         self.outwards = False
         for name, text in (
-            ("stroke", "Distance from the stop to the far end of a bounce that is wanted [m]"),
-            ("gain", "Force for a missing stroke [N/m]"),
+            ("stroke", "Set point of the distance from the stop to the far end of a bounce [m]"),
+            ("gain", "Force per error of the stroke [N/m]"),
             ("limit", "Largest force [N]"),
         ):
             self.register_variable(
@@ -46,29 +46,29 @@ class StrokeController(Fmi2Slave):
                 )
             )
         for name, text in (
-            ("position", "Of the shuttle, 0 at the stop, negative away from it [m]"),
-            ("velocity", "Of the shuttle, positive towards the stop [m/s]"),
+            ("position", "Position of the shuttle, 0 at the stop, negative away from it [m]"),
+            ("velocity", "Velocity of the shuttle, positive towards the stop [m/s]"),
         ):
             self.register_variable(Real(name, description=text, causality=Fmi2Causality.input))
         for name, text in (
-            ("force", "On the shuttle, positive towards the stop [N]"),
+            ("force", "Force on the shuttle, positive towards the stop [N]"),
             ("reached", "Stroke of the last bounce [m]"),
         ):
             self.register_variable(Real(name, description=text, causality=Fmi2Causality.output))
 
     def do_step(self, current_time, step_size):
-        """Choose the force for the next step from what was measured at its start."""
+        """Set the force for the next step from the measurements at its start."""
         if self.outwards and self.velocity >= 0.0:
             self.reached = -self.position
             self._adapt(self.stroke - self.reached)
         self.outwards = self.velocity < 0.0
-        if abs(self.velocity) < STILL and abs(self.position) < NEAR:
+        if abs(self.velocity) < REST_SPEED_MAX and abs(self.position) < REST_DISTANCE_MAX:
             self.force = -self.limit
         else:
             self.force = self.size if self.velocity > 0.0 else -self.size
         return True
 
-    def _adapt(self, missing):
-        change = self.gain * missing
+    def _adapt(self, error):
+        change = self.gain * error
         self.size = min(max(self.integral + change, 0.0), self.limit)
-        self.integral = min(max(self.integral + GATHERED * change, 0.0), self.limit)
+        self.integral = min(max(self.integral + INTEGRAL_SHARE * change, 0.0), self.limit)

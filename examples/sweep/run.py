@@ -1,12 +1,13 @@
-"""How sure is the time of coming to rest?  Monte Carlo over restitution and wall, 2R model.
+"""Uncertainty of the time of coming to rest: Monte Carlo over restitution and wall, 2R model.
 
-A wall is never quite where it should be, and a coefficient of restitution is known to a few per
-cent.  A thousand runs of one FMU say what that makes of the time of the last impact, T.  Beside it
-stands the propagation of uncertainty to first order (GUM, 5.1.2, independent inputs),
+The position of a wall has a tolerance, and a coefficient of restitution is known to a few per cent.
+A thousand runs of one FMU give the distribution of the time T of the last impact.  It is compared
+with first-order propagation of uncertainty (GUM, 5.1.2, independent inputs),
 
     s_T^2 = (dT/de)^2 s_e^2 + (dT/dx)^2 s_x^2,
 
-with derivatives from four runs more.  It knows no skewness: T grows faster and faster with e.
+with derivatives from four more runs.  The first order has no skewness, although T grows faster than
+linearly with e.
 """
 
 import argparse
@@ -26,28 +27,28 @@ from prbm.base.progress import reporter
 from prbm.fmu.native_fmu import build
 from prbm.sweeps.sweep import samples, sweep
 
-MEAN = {"stop.restitution": 0.6, "stop.position": 0.0}  # -, m
-SPREAD = {"stop.restitution": 0.03, "stop.position": 0.3e-3}  # standard deviations
+MEAN = {"stop.restitution": 0.6, "stop.position": 0.0}  # -, m.
+SPREAD = {"stop.restitution": 0.03, "stop.position": 0.3e-3}  # Standard deviations, -, m.
 OUTPUTS = {"T": "stop.impact_time", "rests": "stop.contact"}
-STOP_TIME = 0.8  # s, beyond the slowest of all runs
+STOP_TIME = 0.8  # Later than the last impact of every run [s].
 
 
 def distribution(fmu: Path, runs: int, out: Path) -> pd.DataFrame:
-    """Run the guide with restitutions and walls drawn at random.
+    """Run the guide with random restitutions and wall positions.
 
     Parameters
     ----------
     fmu : Path
-        Of the guide.
+        FMU of the guide.
     runs : int
-        How many.
+        Number of runs.
     out : Path
-        Where the results go; if some are there, the rest is done.
+        Folder of the results; an interrupted sweep continues.
 
     Returns
     -------
     DataFrame
-        A row for each run, with T [s] and whether the guide rests in the end.
+        One row per run, with T [s] and whether the guide rests at the end.
     """
     law = {name: stats.norm(MEAN[name], SPREAD[name]) for name in MEAN}
     table = samples(law, runs, method="latin")
@@ -55,7 +56,7 @@ def distribution(fmu: Path, runs: int, out: Path) -> pd.DataFrame:
 
 
 def propagated(fmu: Path, out: Path) -> float:
-    """Return the standard deviation of T by propagation to first order [s]."""
+    """Return the standard deviation of T by first-order propagation [s]."""
     signs = ((1, 0), (-1, 0), (0, 1), (0, -1))
     rows = [
         {name: MEAN[name] + sign * SPREAD[name] for name, sign in zip(MEAN, pair, strict=True)}
@@ -66,7 +67,7 @@ def propagated(fmu: Path, out: Path) -> float:
 
 
 def figure(results: pd.DataFrame, spread: float) -> Figure:
-    """Plot the distribution of T beside the normal one, and T over the restitution."""
+    """Plot the distribution of T beside a normal distribution, and T over the restitution."""
     result = Figure((9.0, 3.8), dpi=120, layout="constrained")
     left, right = result.subplots(1, 2)
     T = 1e3 * results["T"]
@@ -90,9 +91,9 @@ def figure(results: pd.DataFrame, spread: float) -> Figure:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the sweep, or the rest of it; print the spread; write the figure."""
+    """Run or continue the sweep, print the spread and write the figure."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--runs", type=int, default=1000, help="rows of the table (1000)")
+    parser.add_argument("--runs", type=int, default=1000, help="number of runs (default: 1000)")
     runs = parser.parse_args(arguments).runs
     try:
         fmu = Path("PRBDM2R.fmu")
@@ -105,13 +106,13 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt as stop:
         sys.exit(str(stop))
     except OSError as error:
-        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a writable folder")
     T = 1e3 * results["T"]
     low, middle, high = np.quantile(T, [0.025, 0.5, 0.975])
     print(f"last impact at {middle:.1f} ms, 95 % of {runs} runs within {low:.1f} and {high:.1f} ms")
-    print(f"at rest in the end: {results['rests'].sum():.0f} of {runs}")
-    print(f"standard deviation {T.std():.2f} ms, to first order {1e3 * spread:.2f} ms")
-    print(f"skewness {T.skew():.2f}, to first order 0")
+    print(f"at rest at the end: {results['rests'].sum():.0f} of {runs}")
+    print(f"standard deviation {T.std():.2f} ms, first order {1e3 * spread:.2f} ms")
+    print(f"skewness {T.skew():.2f}, first order 0")
     print("figure: settling.png; results: settling.parquet")
 
 

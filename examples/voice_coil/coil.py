@@ -1,9 +1,9 @@
-"""A moving coil in the field of a magnet, as an FMU: runs inside pythonfmu.
+"""A moving coil in the field of a magnet, as an FMU made by pythonfmu.
 
     L di/dt = u - R i - k v,        force = k i
 
-The voltage u and the velocity v are held within a step.  Then the current is an exponential, and
-all integrals over the step are exact; the force is its mean over the step.
+The voltage u and the velocity v are constant within a step.  The current is then an exponential,
+and the integrals over the step are exact.  The output force is the mean over the step.
 """
 
 import math
@@ -13,19 +13,19 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 VARIABLES = (
     ("resistance", "parameter", "Resistance of the winding [Ohm]"),
     ("inductance", "parameter", "Inductance of the winding [H]"),
-    ("constant", "parameter", "Force for a current, voltage for a velocity [N/A, V s/m]"),
-    ("voltage", "input", "At the terminals [V]"),
-    ("velocity", "input", "Of the coil in the field [m/s]"),
-    ("current", "output", "In the winding, at the end of the step [A]"),
-    ("force", "output", "On the moving coil, mean over the step [N]"),
-    ("supplied", "output", "Energy that came in at the terminals [J]"),
-    ("heat", "output", "Energy that the resistance took [J]"),
+    ("constant", "parameter", "Force per current, equal to voltage per velocity [N/A, V s/m]"),
+    ("voltage", "input", "Voltage at the terminals [V]"),
+    ("velocity", "input", "Velocity of the coil in the field [m/s]"),
+    ("current", "output", "Current in the winding at the end of the step [A]"),
+    ("force", "output", "Force on the moving coil, mean over the step [N]"),
+    ("supplied", "output", "Energy supplied at the terminals [J]"),
+    ("heat", "output", "Energy dissipated in the resistance [J]"),
     ("magnetic", "output", "Energy in the inductance [J]"),
 )
 
 
 class Coil(Fmi2Slave):
-    """Current, force, and where the energy goes that is supplied."""
+    """Current, force and energies of a voice coil."""
 
     author = "the prbm-impact examples"
     description = "Voice coil: resistance, inductance, force constant"
@@ -42,16 +42,17 @@ class Coil(Fmi2Slave):
             )
 
     def do_step(self, current_time, step_size):
-        """Continue the current, final + away exp(-t / T)."""
+        """Continue the current i = final + difference exp(-t / T)."""
         h, T = step_size, self.inductance / self.resistance
         final = (self.voltage - self.constant * self.velocity) / self.resistance
-        away = self.current - final
+        difference = self.current - final
         decay = math.exp(-h / T)
-        first = away * T * (1.0 - decay)  # integral of what is left of the difference
-        second = away**2 * T * (1.0 - decay**2) / 2.0  # and of its square
-        self.supplied += self.voltage * (final * h + first)
-        self.heat += self.resistance * (final**2 * h + 2.0 * final * first + second)
-        self.current = final + away * decay
+        # Integrals of the decaying difference and of its square over the step.
+        integral = difference * T * (1.0 - decay)
+        square = difference**2 * T * (1.0 - decay**2) / 2.0
+        self.supplied += self.voltage * (final * h + integral)
+        self.heat += self.resistance * (final**2 * h + 2.0 * final * integral + square)
+        self.current = final + difference * decay
         self.magnetic = 0.5 * self.inductance * self.current**2
-        self.force = self.constant * (final + first / h)
+        self.force = self.constant * (final + integral / h)
         return True

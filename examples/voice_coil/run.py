@@ -1,11 +1,11 @@
-"""Three FMUs: a guide, a voice coil and the controller of its current, up to a hard stop and on.
+"""Three FMUs: a guide with a hard stop, a voice coil and a current controller.
 
     controller --- voltage ---> coil --- force ---> guide
         ^--------- current ------' ^--- velocity ----'
 
     python examples/voice_coil/run.py
 
-The current is switched on at rest; the shuttle runs into the stop, bounces and settles there.
+The current is switched on at rest.  The shuttle hits the stop, bounces and comes to rest there.
 """
 
 import argparse
@@ -31,23 +31,25 @@ GUIDE = load("PRBDM")
 START = {"gravity.x": 0.0, "release.displacement": 0.0, "stop.position": 0.002}
 COIL = {"resistance": 4.0, "inductance": 2e-3, "constant": 2.0}  # Ohm, H, N/A
 CONTROLLER = {"gain": 4.0, "rate": 8e3, "limit": 12.0, "wanted": 0.1}  # V/A, V/(A s), V, A
-STEP = 1e-4  # s, from sample to sample of the controller
+STEP = 1e-4  # Communication step and sampling time of the controller [s].
 CONNECTIONS = {
     "controller.current": "coil.current",
     "coil.voltage": "controller.voltage",
     "coil.velocity": "guide.shuttle.vx",
     "guide.force.x": "coil.force",
 }
-GUIDE_SAYS = ("shuttle.x", "energy.work", "energy.kinetic", "energy.elastic", "energy.dissipated")
-STOP_SAYS = tuple(f"stop.{x}" for x in ("contact", "impact_count", "impact_time", "approach_speed"))
+GUIDE_OUTPUTS = (
+    "shuttle.x", "energy.work", "energy.kinetic", "energy.elastic", "energy.dissipated",
+    "stop.contact", "stop.impact_count", "stop.impact_time", "stop.approach_speed",
+)  # fmt: skip
 RECORD = (
-    *(f"guide.{name}" for name in (*GUIDE_SAYS, *STOP_SAYS)),
+    *(f"guide.{name}" for name in GUIDE_OUTPUTS),
     *(f"coil.{name}" for name in ("supplied", "heat", "magnetic")),
 )
 
 
 def fmus(folder: Path) -> dict[str, Path]:
-    """Build the three FMUs, in the order in which they go."""
+    """Build the three FMUs, in the order of their steps."""
     guide = folder / "guide.fmu"
     guide.write_bytes(build(GUIDE, fmi=2))
     return {
@@ -64,7 +66,7 @@ def values() -> dict[str, float]:
 
 
 def simulate(stop_time: float = 0.35, step: float = STEP) -> np.ndarray:
-    """Couple the three FMUs.
+    """Simulate the three coupled FMUs.
 
     Parameters
     ----------
@@ -74,7 +76,7 @@ def simulate(stop_time: float = 0.35, step: float = STEP) -> np.ndarray:
     Returns
     -------
     structured array
-        Time [s] and the outputs by ``name.variable``, a row each step.
+        Time [s] and the outputs by ``name.variable``, one row per step.
     """
     with tempfile.TemporaryDirectory() as folder:
         return cosimulate(
@@ -83,12 +85,12 @@ def simulate(stop_time: float = 0.35, step: float = STEP) -> np.ndarray:
 
 
 def monolith(stop_time: float = 0.35, step: float = STEP) -> Monolith:
-    """Simulate the same system in one solver: the scalar guide, the coil, the sampled controller.
+    """Simulate the same system with one solver: scalar guide, coil and sampled controller.
 
     Returns
     -------
     Monolith
-        At the end, with the impacts that there were.
+        The system at the end, with its impacts.
     """
     R, L, k = COIL.values()
     guide = ScalarGuide.of(GUIDE.values(START), [START["stop.position"]])
@@ -101,9 +103,9 @@ def monolith(stop_time: float = 0.35, step: float = STEP) -> Monolith:
         substep=step,
     )
     for sample in range(round(stop_time / step)):
-        missing = CONTROLLER["wanted"] - float(system.z[0])
-        integral += CONTROLLER["rate"] * missing * step  # the voltage stays far from its limit
-        voltage = CONTROLLER["gain"] * missing + integral
+        error = CONTROLLER["wanted"] - float(system.z[0])
+        integral += CONTROLLER["rate"] * error * step  # The voltage does not reach its limit.
+        voltage = CONTROLLER["gain"] * error + integral
         system.advance((sample + 1) * step)
     return system
 
@@ -116,19 +118,19 @@ def impacts(record: np.ndarray) -> np.ndarray:
     )
 
 
-def books(record: np.ndarray) -> np.ndarray:
-    """Return what is supplied less all that it becomes, row by row [J].
+def energy_error(record: np.ndarray) -> np.ndarray:
+    """Return the supplied energy less its parts in coil and guide, row by row [J].
 
-    What the coil takes from the circuit and what the guide gets from it differ within a step, in
-    which the one sees the velocity at its beginning: an error of the coupling.
+    The error is that of the coupling: within a step the coil has the velocity at the beginning of
+    the step, whereas the velocity of the guide changes.
     """
-    becomes = ("coil.heat", "coil.magnetic", "guide.energy.kinetic", "guide.energy.elastic",
+    parts = ("coil.heat", "coil.magnetic", "guide.energy.kinetic", "guide.energy.elastic",
                "guide.energy.dissipated")  # fmt: skip
-    return record["coil.supplied"] - sum(record[name] for name in becomes)
+    return record["coil.supplied"] - sum(record[name] for name in parts)
 
 
 def figure(record: np.ndarray, reference: Monolith) -> Figure:
-    """Plot motion, current and energies."""
+    """Plot motion, current and energies over time."""
     result = Figure((8.0, 6.4), dpi=100, layout="constrained")
     motion, current, energy = result.subplots(3, 1, sharex=True)
     t = 1e3 * record["time"]
@@ -136,7 +138,7 @@ def figure(record: np.ndarray, reference: Monolith) -> Figure:
     times = 1e3 * np.array([time for time, _ in reference.impacts])
     motion.plot(
         times, np.full(len(times), 1e3 * START["stop.position"]), "o", mfc="none",
-        color="#d55e00", label="impacts of one solver for all three",
+        color="#d55e00", label="impacts by one solver for all three",
     )  # fmt: skip
     motion.set_ylabel("shuttle.x [mm]")
     motion.legend(loc="lower right", frameon=False)
@@ -155,12 +157,17 @@ def figure(record: np.ndarray, reference: Monolith) -> Figure:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Couple the FMUs, print how they settle beside one solver for all, write the figure."""
+    """Simulate, print the impacts beside those of one solver and write the figure."""
     parser = argparse.ArgumentParser(description="A guide, a coil and its controller: three FMUs.")
-    parser.add_argument("--stop-time", type=float, default=0.35, help="[s]; %(default)s")
+    parser.add_argument(
+        "--stop-time",
+        type=float,
+        default=0.35,
+        help="end of the simulation [s] (default: %(default)s)",
+    )
     options = parser.parse_args(arguments)
     if not STEP <= options.stop_time < math.inf:
-        parser.error(f"--stop-time {options.stop_time:g}: must be {STEP:g} s or longer")
+        parser.error(f"--stop-time {options.stop_time:g}: must be finite and at least {STEP:g} s")
     try:
         record = simulate(options.stop_time)
     except PrbmError as error:
@@ -171,19 +178,19 @@ def main(arguments: list[str] | None = None) -> None:
         print(f"{1e3 * time:14.4f}{1e3 * t:13.4f}{1e3 * speed:16.3f}{1e3 * v:13.3f}")
     settled = rest_time(record, "guide.stop")
     if settled is None or reference.rest_time is None:
-        print("not at rest yet: simulate longer")
+        print("not yet at rest: increase --stop-time")
     else:
         print(f"at rest from {1e3 * settled:.1f} ms on; one solver {1e3 * reference.rest_time:.1f}")
     supplied = record["coil.supplied"][-1]
     print(
-        f"supplied {1e3 * supplied:.4f} mJ, of which the guide got "
-        f"{1e6 * record['guide.energy.work'][-1]:.2f} uJ; the books of the three differ by "
-        f"{1e6 * np.abs(books(record)).max():.2f} uJ at most"
+        f"supplied {1e3 * supplied:.4f} mJ, delivered to the guide "
+        f"{1e6 * record['guide.energy.work'][-1]:.2f} uJ; largest error of the energy balance "
+        f"{1e6 * np.abs(energy_error(record)).max():.2f} uJ"
     )
     try:
         figure(record, reference).savefig("voice_coil.png")
     except OSError as error:
-        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a folder of yours")
+        sys.exit(f"cannot write {error.filename}: {error.strerror}; run this in a writable folder")
     print("figure: voice_coil.png")
 
 

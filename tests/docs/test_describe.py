@@ -1,4 +1,4 @@
-"""The page that teaches to describe a mechanism does what it shows, from an empty folder."""
+"""The code and the commands of docs/describe-your-mechanism.md run in an empty folder."""
 
 import os
 import re
@@ -22,41 +22,40 @@ def blocks(kind: str) -> list[str]:
 
 
 def write_file(folder: Path) -> Path:
-    """Fill the file of the page from top to bottom."""
+    """Write the mechanism file of the page, all pieces in order."""
     (folder / "lever").mkdir()
     path = folder / "lever" / "lever.toml"
     path.write_text("\n".join(blocks("toml")))
     return path
 
 
-def test_the_pieces_are_a_mechanism_file(tmp_path: Path) -> None:
+def test_the_pieces_of_the_page_are_a_mechanism_file(tmp_path: Path) -> None:
     lever = load(write_file(tmp_path))
     assert lever.name == "Lever"
     assert lever.drawing.splitlines()[-1].split() == ["left", "right"]
-    # all variables that the text names are there, but for those of an FMU's outputs
+    # All parameters that the text names exist; outputs of an FMU are not among the values.
     named = set(re.findall(r"`((?:leaf|petg|lever|stop)\.\w+)`", PAGE))
     outputs = {"lever.toml", "lever.x", "lever.angle", "stop.contact", "stop.impact_count"}
     assert named - outputs <= set(lever.values())
     assert len(named - outputs) >= 5
 
 
-def test_stretching_matters_to_the_impact_of_the_lever_as_the_page_says(tmp_path: Path) -> None:
+def test_the_page_gives_the_modal_restitution_with_and_without_stretch(tmp_path: Path) -> None:
     lever = load(write_file(tmp_path))
-    said = re.search(r"lever of this page goes from ([\d.]+) to ([\d.]+):", PAGE)
-    assert said is not None
-    as_it_is, stretched = map(float, said.groups())
-    (told,) = notes(lever, {})
-    assert "off the centre of mass of lever" in told
-    assert restitution(lever, {}, 0) == pytest.approx(as_it_is, abs=0.005)
+    match = re.search(r"lever of this page goes from ([\d.]+) to ([\d.]+):", PAGE)
+    assert match is not None
+    inextensible, stretched = map(float, match.groups())
+    (note,) = notes(lever, {})
+    assert "off the centre of mass of lever" in note
+    assert restitution(lever, {}, 0) == pytest.approx(inextensible, abs=0.005)
     assert restitution(stretching(lever), {}, 0) == pytest.approx(stretched, abs=0.005)
 
 
 @pytest.mark.fmu
 @pytest.mark.native
-def test_the_page_from_a_sketch_to_a_simulation(
+def test_commands_and_code_of_the_page_print_its_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Commands end well, code runs, and what the page says is printed is printed."""
     write_file(tmp_path)
     monkeypatch.chdir(tmp_path)
     paths = os.pathsep.join([str(ROOT / "fmu_src"), *os.environ.get("PYTHONPATH", "").split(":")])
@@ -82,5 +81,5 @@ def test_the_page_from_a_sketch_to_a_simulation(
     for block in blocks("python"):
         exec(compile(block, "describe-your-mechanism.md", "exec"), space)
     printed = capsys.readouterr().out.splitlines(keepends=True)
-    told = [line for line in printed if not line.startswith("Warning: missing input")]  # FMPy's
-    assert "".join(told) == "".join(blocks("text"))
+    lines = [line for line in printed if not line.startswith("Warning: missing input")]  # FMPy.
+    assert "".join(lines) == "".join(blocks("text"))

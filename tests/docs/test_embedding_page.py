@@ -1,4 +1,4 @@
-"""The page about embedding runs as it stands there, and its ways agree."""
+"""The code of docs/embedding.md runs, and its co-simulation masters agree."""
 
 import re
 from itertools import pairwise
@@ -14,13 +14,13 @@ pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
 
 def blocks() -> list[tuple[str, str]]:
-    """Return what stands behind the fence, and the code."""
+    """Return the attribute of each code block, and its code."""
     return re.findall(r"```python ?(.*?)\n(.*?)```", PAGE.read_text(), re.DOTALL)
 
 
 @pytest.fixture
 def printed(tmp_path, monkeypatch, capsys) -> str:
-    """Run the page in a folder with what the first command builds; return what it prints."""
+    """Run the page in a folder with the FMUs of the first command; return the printed text."""
     for version in (2, 3):
         there = tmp_path / "dist" / f"fmi{version}"
         there.mkdir(parents=True)
@@ -37,21 +37,21 @@ def printed(tmp_path, monkeypatch, capsys) -> str:
     return capsys.readouterr().out
 
 
-def test_embedding_page_runs_and_its_ways_agree(printed):
-    """Coupling errors halve with the step, to what one solver gives; three masters agree."""
+def test_coupling_errors_of_the_page_halve_with_the_step_and_masters_agree(printed):
+    """The limit of the errors is the result of one solver."""
     assert re.search(r"^base\.acceleration\.x \[m/s2\]: ", printed, re.MULTILINE)
     assert re.search(r"^alone: \d+ impacts$", printed, re.MULTILINE)
     pairs = re.findall(r"taken (\S+) mJ, given (\S+) mJ", printed)
     taken, given = ([float(pair[k]) for pair in pairs] for k in (0, 1))
-    *gaps, none = (a - b for a, b in zip(taken, given, strict=True))
+    *gaps, last = (a - b for a, b in zip(taken, given, strict=True))
     for longer, shorter in pairwise(gaps):
-        assert shorter == pytest.approx(longer / 2, rel=0.05)  # and terms of the second order
-    assert abs(none) < 2e-5  # mJ: both are rounded to 1e-5
+        assert shorter == pytest.approx(longer / 2, rel=0.05)  # Terms of second order remain.
+    assert abs(last) < 2e-5  # mJ; both are rounded to 1e-5.
     errors = [abs(x - taken[-1]) for x in taken[:-1]]
     assert errors == sorted(errors, reverse=True)
     speeds = re.findall(r"^(?:SSP in FMPy|SSP in libcosim|container): (\S+) m/s", printed, re.M)
     assert len(speeds) == 3
     assert len(set(speeds)) == 1
-    assert abs(float(speeds[0])) > 1e-2  # they do not agree on being at rest
-    happened = int(re.search(r"^(\d+) times something happened", printed, re.MULTILINE)[1])
-    assert happened >= 3
+    assert abs(float(speeds[0])) > 1e-2  # The agreement is not that of rest.
+    events = int(re.search(r"^(\d+) events", printed, re.MULTILINE)[1])
+    assert events >= 3

@@ -1,4 +1,4 @@
-"""The commands of docs/measurements.md run, on records made for them, and print what they find."""
+"""The code of docs/measurements.md runs on synthetic records and finds their parameters."""
 
 import re
 
@@ -10,7 +10,7 @@ from support import ROOT
 PAGE = ROOT / "docs" / "measurements.md"
 
 
-def test_the_commands_of_the_page_find_what_was_put_in(tmp_path, monkeypatch, capsys):
+def test_the_code_of_the_page_finds_the_parameters_of_the_records(tmp_path, monkeypatch, capsys):
     (block,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     records(tmp_path)
     monkeypatch.chdir(tmp_path)

@@ -1,10 +1,12 @@
-"""What the README and the page about native FMUs show runs as it stands there."""
+"""The code and the commands of the README and of the page on native FMUs run."""
 
 import re
+import shlex
 import shutil
 
 import pytest
 
+from prbm.commands.command_line import main
 from support import ROOT
 
 README = (ROOT / "README.md").read_text()
@@ -17,7 +19,7 @@ def blocks(text: str) -> list[str]:
 
 @pytest.fixture
 def _built(fmus, native, tmp_path, monkeypatch) -> None:
-    """Go to a folder that holds what the first command has built."""
+    """Change to a folder with the FMUs that the first command builds."""
     paths = {("python", name): path for name, path in fmus.items()}
     paths |= {(f"fmi{fmi}", name): path for (name, fmi), path in native.items()}
     for (folder, name), path in paths.items():
@@ -30,7 +32,7 @@ def _built(fmus, native, tmp_path, monkeypatch) -> None:
 @pytest.mark.fmu
 @pytest.mark.native
 @pytest.mark.usefixtures("_built")
-def test_python_blocks_run(capsys):
+def test_python_blocks_of_the_readme_run(capsys):
     assert len(blocks(README)) == 2
     for block in blocks(README):
         exec(compile(block, "README.md", "exec"), {})
@@ -42,8 +44,8 @@ def test_python_blocks_run(capsys):
 @pytest.mark.fmu
 @pytest.mark.native
 @pytest.mark.usefixtures("_built")
-def test_native_fmus_do_what_their_page_shows(capsys):
-    """Three ways to the same impacts; Newton's law at the first, e = 0.6."""
+def test_native_fmus_have_equal_impacts_in_all_interfaces_of_their_page(capsys):
+    """Newton's law holds at the first impact, with a coefficient of restitution of 0.6."""
     space: dict[str, object] = {}
     for block in blocks(NATIVE):
         exec(compile(block, "native-fmus.md", "exec"), space)
@@ -52,8 +54,8 @@ def test_native_fmus_do_what_their_page_shows(capsys):
         "co-simulation", "model exchange"
     ]  # fmt: skip
     before, after = map(float, re.findall(r"(-?0\.\d+) m/s", printed))
-    # the hit is off the centre of mass by nothing, and the wall stands still
-    assert after == pytest.approx(-0.6 * before, abs=1e-4)  # printed with four decimals
+    # The impact is centred, and the wall does not move.
+    assert after == pytest.approx(-0.6 * before, abs=1e-4)  # Printed with four decimals.
 
 
 def test_files_that_the_readme_names_exist():
@@ -64,7 +66,19 @@ def test_files_that_the_readme_names_exist():
         assert built or (ROOT / name).exists(), name
 
 
-def test_there_are_two_commands():
+def test_the_readme_prints_the_result_of_its_first_command(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (command,) = re.findall(r"^pip install \. && prbm (.*)$", README, re.MULTILINE)
+    assert main(shlex.split(command)) == 0
+    printed = capsys.readouterr().out
+    (block,) = re.findall(r"```text\n(.*?)```", README, re.DOTALL)
+    for line in block.splitlines():
+        assert line in printed
+    files = ("PRBDM2R.csv", "PRBDM2R-impacts.csv", "PRBDM2R.png")
+    assert {path.name for path in (tmp_path / "results").iterdir()} == set(files)
+
+
+def test_development_takes_two_commands():
     """The first installs, builds and simulates; the second runs the tests."""
     commands = README.split("<!-- commands -->")[1].split("<!-- end -->")[0]
     lines = [line for line in commands.splitlines() if line and not line.startswith("```")]

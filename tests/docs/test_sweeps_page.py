@@ -1,4 +1,4 @@
-"""What docs/sweeps.md shows runs as it stands there, and so does its command."""
+"""The code and the command of docs/sweeps.md run."""
 
 import re
 import shlex
@@ -16,7 +16,7 @@ PAGE = (ROOT / "docs" / "sweeps.md").read_text(encoding="utf-8")
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
 
-def test_the_page_and_its_command_give_the_same(native, tmp_path, monkeypatch, capsys):
+def test_code_and_command_of_the_page_give_equal_results(native, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("dist/fmi2").mkdir(parents=True)
     shutil.copy(native["PRBDM2R", 2], "dist/fmi2/PRBDM2R.fmu")

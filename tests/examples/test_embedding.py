@@ -1,4 +1,4 @@
-"""The examples of embedding: their headlines against one solver, closed forms, energy balances."""
+"""The examples of coupled systems against one solver, closed forms and energy balances."""
 
 import math
 import runpy
@@ -28,7 +28,7 @@ _built: dict[tuple[str, int], bytes] = {}
 
 
 def once(mechanism: Mechanism, fmi: int) -> bytes:
-    """Return a native FMU; the examples build the same ones again and again."""
+    """Return a native FMU, which is built only once for all examples."""
     key = mechanism.name, fmi
     if key not in _built:
         _built[key] = native_fmu.build(mechanism, fmi=fmi)
@@ -36,7 +36,7 @@ def once(mechanism: Mechanism, fmi: int) -> bytes:
 
 
 def example(name: str) -> SimpleNamespace:
-    """Return the functions of an example, as it is but for FMUs that have been built before."""
+    """Return the namespace of an example, with a cache for its FMUs."""
     found = runpy.run_path(str(EXAMPLES / name / "run.py"))
     found["main"].__globals__["build"] = once
     return SimpleNamespace(**found)
@@ -48,17 +48,17 @@ def is_picture(path: str | Path) -> bool:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_readme_teaches_and_shows(name):
-    """A sentence on what it teaches, the figure that it makes, the command that makes it."""
+def test_each_page_has_a_lesson_a_figure_and_a_command(name):
+    """The figure is the one that the command draws."""
     text = (EXAMPLES / name / "README.md").read_text()
-    assert "**What it teaches:**" in text
+    assert "**Lesson:**" in text
     assert f"({name}.png)" in text
     assert f"python examples/{name}/run.py" in text
     assert is_picture(EXAMPLES / name / f"{name}.png")
 
 
-def test_voice_coil_settles_as_one_solver_has_it(capsys):
-    """Impacts and rest, to the delay of a step; the rest ends what a step may err in each."""
+def test_voice_coil_impacts_and_rest_agree_with_one_solver(capsys):
+    """The coupling delays by up to a step, and the time of coming to rest by two."""
     run = example("voice_coil")
     record, reference = run.simulate(0.2), run.monolith(0.2)
     found, exact = run.impacts(record), np.array(reference.impacts)
@@ -69,30 +69,30 @@ def test_voice_coil_settles_as_one_solver_has_it(capsys):
     assert settled == pytest.approx(reference.rest_time, abs=2 * run.STEP)
 
 
-def test_voice_coil_errs_in_proportion_to_its_step_in_the_books():
-    """What coil and guide make of the same velocity within a step, before any impact."""
+def test_energy_error_of_the_voice_coil_is_proportional_to_the_step():
+    """Before any impact, the error is that of the velocity that is constant within a step."""
     run = example("voice_coil")
     records = [run.simulate(0.03, step) for step in (1e-4, 5e-5)]
-    longer, shorter = (abs(run.books(record)[-1]) for record in records)
+    longer, shorter = (abs(run.energy_error(record)[-1]) for record in records)
     assert shorter == pytest.approx(longer / 2, rel=0.1)
     assert longer < 0.01 * records[0]["guide.energy.work"][-1]
 
 
 def test_voice_coil_prints_and_plots(capsys):
     example("voice_coil").main(["--stop-time", "0.04"])
-    assert "not at rest yet: simulate longer" in capsys.readouterr().out
+    assert "not yet at rest: increase --stop-time" in capsys.readouterr().out
     assert is_picture("voice_coil.png")
 
 
 @pytest.mark.parametrize("time", ["0", "nan", "inf"])
-def test_voice_coil_refuses_a_time_that_is_none(time, capsys):
+def test_voice_coil_rejects_an_invalid_stop_time(time, capsys):
     with pytest.raises(SystemExit):
         example("voice_coil").main(["--stop-time", time])
-    assert f"--stop-time {time}: must be 0.0001 s or longer" in capsys.readouterr().err
+    assert f"--stop-time {time}: must be finite and at least 0.0001 s" in capsys.readouterr().err
 
 
-def test_harvester_has_the_power_of_one_solver_between_the_stops():
-    """Hitting each once a period; the load and the coil share it as their resistances."""
+def test_harvester_with_impacts_has_the_power_of_one_solver():
+    """It hits each stop once per period; load and coil share the power as their resistances."""
     run = example("energy_harvester")
     table = run.sweep([36.0])
     assert table["power"][0] == pytest.approx(run.monolith([36.0])[0], rel=2e-3)
@@ -102,8 +102,8 @@ def test_harvester_has_the_power_of_one_solver_between_the_stops():
 
 
 @pytest.mark.slow
-def test_harvester_has_the_power_of_the_closed_form_when_it_hits_nothing():
-    """A shift of the resonance by the delay of half a step, c w^2 h / 2 K, halves with it."""
+def test_error_of_the_harvester_without_impacts_halves_with_the_step():
+    """The delay by half a step shifts the resonance by c w^2 h / 2 K."""
     run = example("energy_harvester")
     exact, errors = run.monolith([28.0], stops=False)[0], []
     for steps in (64, 128):
@@ -115,15 +115,15 @@ def test_harvester_has_the_power_of_the_closed_form_when_it_hits_nothing():
     assert errors[1] == pytest.approx(errors[0] / 2, rel=0.1)
 
 
-def test_harvester_s_closed_form_is_that_of_one_solver():
-    """Without stops, to the amplitude: (x / r)^2 is 4e-4."""
+def test_closed_form_of_the_harvester_agrees_with_one_solver():
+    """Without stops; the tolerance is that of small amplitudes, (x / r)^2 = 4e-4."""
     run = example("energy_harvester")
     assert run.monolith([28.0], stops=False)[0] == pytest.approx(run.linear(28.0), rel=1e-3)
 
 
 @pytest.mark.slow
-def test_harvester_remembers_where_it_comes_from():
-    """Rising, it hits in step up to 44 Hz; from above it does not."""
+def test_power_of_the_harvester_depends_on_the_direction_of_the_sweep():
+    """With rising frequency it hits both stops up to 44 Hz; coming from 50 Hz it does not."""
     run = example("energy_harvester")
     table = run.sweep([36.0, 38.0, 40.0, 42.0, 44.0, 50.0, 44.0])
     assert table["impacts"].tolist() == [2.0] * 5 + [0.0, 0.0]
@@ -141,8 +141,8 @@ def test_harvester_prints_and_plots(capsys, monkeypatch):
     assert is_picture("energy_harvester.png")
 
 
-def test_drop_test_hits_as_hard_as_the_scalar_equation_and_nearly_beam_theory():
-    """An acceleration that is held within a step: 2e-4. The 1R is 4 % too stiff: 3 % of a speed."""
+def test_drop_test_speeds_agree_with_the_scalar_equation_and_beam_theory():
+    """An acceleration constant within a step errs by 2e-4; the stiff 1R by 3 % of the speed."""
     run = example("drop_test")
     heights = (0.01, 0.05, 0.5)
     table = run.study(heights)
@@ -151,8 +151,8 @@ def test_drop_test_hits_as_hard_as_the_scalar_equation_and_nearly_beam_theory():
     assert (table["speed"] > 0).tolist() == [False, True, True]
 
 
-def test_drop_test_s_impulse_is_momentum():
-    """P = (1 + eps) m v of a mass on a circle of radius r: m = M / cos(phi)^2 along x."""
+def test_impulse_of_the_drop_test_is_the_change_of_momentum():
+    """P = (1 + eps) m v for a mass on a circle of radius r, where m = M / cos(phi)^2 along x."""
     run = example("drop_test")
     table, body = run.study((0.3,)), run.guide()
     mass = body.mass / (1 - (run.TRAVEL / body.r) ** 2)
@@ -160,17 +160,17 @@ def test_drop_test_s_impulse_is_momentum():
     assert table["impulse"][0] == pytest.approx(expected, rel=1e-9)
 
 
-def test_drop_test_s_short_shock_is_a_velocity(monkeypatch):
-    """sqrt(u^2 - (w x)^2) is left at the stop of an impulse u, by conservation of energy."""
+def test_short_shock_of_the_drop_test_is_an_initial_velocity(monkeypatch):
+    """By conservation of energy, an initial speed u is sqrt(u^2 - (w x)^2) at the stop."""
     run = example("drop_test")
     for function in (run.linear, run.monolith):
-        monkeypatch.setitem(function.__globals__, "SHOCK", 1e-6)
+        monkeypatch.setitem(function.__globals__, "SHOCK_DURATION", 1e-6)
     monkeypatch.setitem(run.monolith.__globals__, "STEP", 1e-7)
-    u, body = run.change(0.1), run.guide()
+    u, body = run.velocity_change(0.1), run.guide()
     mass = 0.005 + 2 * 13 / 35 * 7800 * 0.01 * 8e-3 * 1e-4
     stiffness = 24 * 181.5e9 * 8e-3 * 1e-12 / 12 / 0.01**3
-    left = math.sqrt(u**2 - stiffness / mass * run.TRAVEL**2)
-    assert run.linear(0.1) == pytest.approx(left, rel=1e-5)
+    speed = math.sqrt(u**2 - stiffness / mass * run.TRAVEL**2)
+    assert run.linear(0.1) == pytest.approx(speed, rel=1e-5)
     assert body.mass == pytest.approx(mass, rel=0.02)
 
 
@@ -181,14 +181,14 @@ def test_drop_test_prints_and_plots(capsys):
     assert is_picture("drop_test.png")
 
 
-def test_drop_test_refuses_a_height_that_is_none(capsys):
+def test_drop_test_rejects_an_invalid_height(capsys):
     with pytest.raises(SystemExit):
         example("drop_test").main(["--heights", "0"])
-    assert "--heights: must be above 0 and up to 100 m" in capsys.readouterr().err
+    assert "--heights: must be above 0 and at most 100 m" in capsys.readouterr().err
 
 
-def test_cosimulation_is_of_the_first_order_and_event_mode_tells_in_time(capsys, monkeypatch):
-    """Before an impact, and after two with event mode; the news of an impact is at its time."""
+def test_cosimulation_is_of_first_order_and_event_mode_has_no_delay(capsys, monkeypatch):
+    """The order is that before an impact and, with event mode, after two."""
     run = example("model_exchange")
     found = run.study([1e-3, 5e-4, 2.5e-4, 1.25e-4])
     with_events = "Gauss-Seidel, event mode"
@@ -198,28 +198,28 @@ def test_cosimulation_is_of_the_first_order_and_event_mode_tells_in_time(capsys,
         found.after[with_events],
     ):
         assert run.order(found.steps, errors) == pytest.approx(1.0, abs=0.05)
-    assert (found.late[with_events] == 0.0).all()
-    for way in ("Jacobi", "Gauss-Seidel"):
-        assert (found.late[way] > 0.0).all()
-        assert (found.late[way] <= found.steps).all() or way == "Jacobi"
+    assert (found.delay[with_events] == 0.0).all()
+    for method in ("Jacobi", "Gauss-Seidel"):
+        assert (found.delay[method] > 0.0).all()
+        assert (found.delay[method] <= found.steps).all() or method == "Jacobi"
     monkeypatch.setitem(run.main.__globals__, "study", lambda: found)
     run.main([])
     printed = capsys.readouterr().out
-    assert "heard of it late by" in printed
+    assert "longest delay" in printed
     assert is_picture("model_exchange.png")
 
 
-def test_escapement_exchanges_momentum_and_is_the_one_mechanism():
-    """Momentum to rounding, energy to the tolerance, times with the square of the step."""
+def test_escapement_conserves_momentum_and_converges_to_one_mechanism():
+    """Momentum is exact to rounding, energy to the tolerance, times to the square of the step."""
     run = example("escapement")
     reference = run.monolith()
     found = []
     for step in (2e-3, 1e-3, 5e-4):
         result = run.coupled(step)
         assert len(run.impacts(result)) == len(reference) == 6
-        assert run.exchanged(result).max() < 1e-9
-        books = run.energy(result)
-        assert np.abs(books - books[0]).max() < 1e-7 * books[0]
+        assert run.momentum_error(result).max() < 1e-9
+        total = run.energy(result)
+        assert np.abs(total - total[0]).max() < 1e-7 * total[0]
         found.append(run.errors(result, reference))
     time, speed = np.array(found).T
     assert time[2] < 3e-5
@@ -231,5 +231,5 @@ def test_escapement_prints_and_plots(capsys, monkeypatch):
     run = example("escapement")
     run.main.__globals__["STEPS"] = (2e-3, 1e-3)
     assert run.main([]) == 0
-    assert "momentum             exchanged to" in capsys.readouterr().out
+    assert "momentum             conserved to" in capsys.readouterr().out
     assert is_picture("escapement.png")

@@ -1,4 +1,4 @@
-"""Every example runs, and its headline agrees with the independent value beside it."""
+"""Every example runs, and its main result agrees with an independent value."""
 
 import functools
 import re
@@ -24,7 +24,7 @@ def _elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def example(name: str) -> SimpleNamespace:
-    """Return the functions of an example."""
+    """Return the namespace of an example."""
     return SimpleNamespace(**runpy.run_path(str(EXAMPLES / name)))
 
 
@@ -33,10 +33,10 @@ def is_picture(path: str) -> bool:
         return image.format == "PNG" and min(image.size) > 300
 
 
-def test_quickstart_has_the_frequency_of_finite_elements(
+def test_quickstart_frequency_agrees_with_finite_elements_and_experiment(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Within the model error of the 2R, 0.5 %, and twice the uncertainty of the experiment."""
+    """The model error of the 2R is 0.5 %; the experiment has its standard uncertainty."""
     quickstart = example("quickstart.py")
     quickstart.main([])
     printed = capsys.readouterr().out
@@ -49,16 +49,16 @@ def test_quickstart_has_the_frequency_of_finite_elements(
     assert Path("PRBDM2R.fmu").exists()
 
 
-def test_quickstart_simulates_as_long_as_it_is_told(tmp_path: Path) -> None:
+def test_quickstart_simulates_until_the_given_time(tmp_path: Path) -> None:
     result = example("quickstart.py").simulate(tmp_path, stop_time=0.02)
     assert result["time"][-1] == pytest.approx(0.02)
     assert {"shuttle.x", "link[6].angle", "mode.frequency"} < set(result.dtype.names)
 
 
-def test_straight_line_is_that_of_beam_theory_and_far_better_when_folded(
+def test_folding_reduces_the_lateral_error_of_beam_theory(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Two leaves: 3 x^2 / (5 L), within the model error of the 3R."""
+    """The error of two leaves is 3 x^2 / (5 L), within the model error of the 3R."""
     example("straight_line.py").main([])
     printed = capsys.readouterr().out
     lines = [line for line in printed.splitlines() if line.endswith(" um")]
@@ -70,13 +70,13 @@ def test_straight_line_is_that_of_beam_theory_and_far_better_when_folded(
     assert is_picture("straight_line.png")
 
 
-def test_quickstart_says_where_it_cannot_write() -> None:
+def test_quickstart_names_the_file_that_it_cannot_write() -> None:
     Path("PRBDM2R.fmu").mkdir()
     with pytest.raises(SystemExit, match=r"cannot write .*PRBDM2R\.fmu: Is a directory; run this"):
         example("quickstart.py").main([])
 
 
-def test_quickstart_films_what_does_not_come_to_rest(
+def test_quickstart_writes_a_film_of_a_motion_without_rest(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     main = example("quickstart.py").main
@@ -86,12 +86,12 @@ def test_quickstart_films_what_does_not_come_to_rest(
     monkeypatch.setitem(main.__globals__, "animate", film)
     main(["--gif"])
     printed = capsys.readouterr().out
-    assert "0 impacts, not at rest yet" in printed
+    assert "0 impacts, not yet at rest" in printed
     assert Path("quickstart.gif").exists()
 
 
-def test_parameter_study_rests_when_the_scalar_equation_does() -> None:
-    """The bouncing ends early by 2 eps v_r / (a (1 - eps)) at most, a about g."""
+def test_parameter_study_agrees_with_the_scalar_equation() -> None:
+    """Capture ends the bouncing early, by at most 2 eps v_r / (a (1 - eps)) with a about g."""
     study = example("parameter_study.py")
     restitutions = (0.3, 0.6, 0.8)
     table = study.study(restitutions)
@@ -103,8 +103,8 @@ def test_parameter_study_rests_when_the_scalar_equation_does() -> None:
     assert (early < bound).all()
 
 
-def test_parameter_study_has_the_right_scalar_equation() -> None:
-    """Another program's times of the first impact and of the accumulation, to their digits."""
+def test_scalar_equation_of_the_parameter_study_has_known_impact_times() -> None:
+    """First impact and accumulation of the bounces, computed with another program."""
     rest_time = example("parameter_study.py").exact_rest_time
     assert rest_time(1e-9, release=-0.010, K_theta=2.5449) == pytest.approx(0.034981, abs=1e-6)
     assert rest_time(0.6, release=-0.010, K_theta=2.5449) == pytest.approx(0.18034, abs=1e-5)
@@ -123,31 +123,33 @@ def test_parameter_study_writes_its_table_and_figure(
 
 @pytest.mark.native
 @pytest.mark.slow
-def test_sweep_spreads_as_the_first_order_says(capsys: pytest.CaptureFixture[str]) -> None:
-    """Within four standard errors of a standard deviation, s / sqrt(2 n) each."""
+def test_sweep_has_the_standard_deviation_of_first_order_propagation(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """The tolerance is four standard errors of a standard deviation, s / sqrt(2 n) each."""
     main = example("sweep/run.py").main
     main(["--runs", "40"])
     printed = capsys.readouterr().out
     found, first_order = map(float, re.findall(r"([\d.]+) ms", printed.splitlines()[2]))
     assert found == pytest.approx(first_order, rel=4 / np.sqrt(2 * 40))
-    assert "at rest in the end: 40 of 40" in printed
+    assert "at rest at the end: 40 of 40" in printed
     assert is_picture("settling.png")
-    main(["--runs", "40"])  # which finds it done
+    main(["--runs", "40"])  # All rows are already done.
     assert capsys.readouterr().out == printed
 
 
-def test_stroke_controller_keeps_the_books_and_the_stroke(
+def test_stroke_controller_reaches_its_stroke_and_energies_balance(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Its work is known to the guide, its bounce to beam theory.
+    """Its work equals that of the guide, and the speed of its impacts that of beam theory.
 
-    Work and balance to the tolerance of the integration; the speed to the model error of the
-    1R, whose stiffness is 4 % above that of a beam, and the delay of a step.
+    Work and energy balance are exact to the tolerance of the integration.  The speed has the model
+    error of the 1R, which is 4 % stiffer than a beam, and that of a delay by one step.
     """
     run = example("stroke_controller/run.py")
     record = run.simulate(stop_time=2.0)
     np.testing.assert_allclose(run.work(record), record["energy.work"], atol=1e-9)
-    assert record["energy.work"][-1] > 0.1  # J, five times what the release put in
+    assert record["energy.work"][-1] > 0.1  # J, five times the energy of the release.
     assert np.ptp(run.balance(record)) < 1e-6 * record["energy.dissipated"][-1]
     rate, speed = run.steady(record)
     assert speed == pytest.approx(run.expected_speed(run.STROKE), rel=0.03)
@@ -159,26 +161,28 @@ def test_stroke_controller_keeps_the_books_and_the_stroke(
 def test_stroke_controller_prints_and_plots(capsys: pytest.CaptureFixture[str]) -> None:
     example("stroke_controller/run.py").main(["--stop-time", "1.0"])
     printed = capsys.readouterr().out
-    assert "wanted 8.000 mm" in printed
+    assert "set point 8.000 mm" in printed
     assert is_picture("stroke_controller.png")
 
 
 @pytest.mark.parametrize("time", ["0", "-1", "nan", "inf"])
-def test_stroke_controller_refuses_a_time_that_is_none(
+def test_stroke_controller_rejects_an_invalid_stop_time(
     time: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as end:
         example("stroke_controller/run.py").main(["--stop-time", time])
     assert end.value.code == 2
-    assert f"--stop-time {time}: must be 0.0005 s or longer" in capsys.readouterr().err
+    assert f"--stop-time {time}: must be finite and at least 0.0005 s" in capsys.readouterr().err
 
 
-def test_stroke_controller_tells_that_it_has_not_settled(
+def test_stroke_controller_reports_too_few_impacts(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """With the other model, in a tenth of a second."""
+    """A tenth of a second with the 2R model."""
     example("stroke_controller/run.py").main(["--stop-time", "0.1", "--model", "PRBDM2R"])
-    assert "fewer than two impacts in the second half: simulate longer" in capsys.readouterr().out
+    assert (
+        "fewer than two impacts in the second half: increase --stop-time" in capsys.readouterr().out
+    )
 
 
 def test_stroke_controller_counts_an_impact_at_the_start() -> None:
@@ -190,7 +194,7 @@ def test_stroke_controller_counts_an_impact_at_the_start() -> None:
     assert example("stroke_controller/run.py").steady(record[:1]) is None
 
 
-def test_stroke_controller_lifts_a_shuttle_that_lies_at_the_stop(tmp_path: Path) -> None:
+def test_stroke_controller_lifts_a_resting_shuttle_off_its_stop(tmp_path: Path) -> None:
     controller = example("stroke_controller/stroke_controller.py").StrokeController(
         instance_name="c", resources=str(tmp_path)
     )
@@ -201,7 +205,7 @@ def test_stroke_controller_lifts_a_shuttle_that_lies_at_the_stop(tmp_path: Path)
     assert controller.force == 0.0
 
 
-def test_stroke_controller_pushes_the_way_the_shuttle_goes(tmp_path: Path) -> None:
+def test_stroke_controller_pushes_in_the_direction_of_the_velocity(tmp_path: Path) -> None:
     controller = example("stroke_controller/stroke_controller.py").StrokeController(
         instance_name="c", resources=str(tmp_path)
     )

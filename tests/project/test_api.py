@@ -1,4 +1,4 @@
-"""The public names of the package."""
+"""The public names of the package, and the modules that they import."""
 
 import subprocess
 import sys
@@ -36,7 +36,7 @@ def test_simulation_from_python_imports_no_matplotlib_and_mechanisms_need_no_pyd
     assert in_new_process(script).split() == []
 
 
-def test_a_star_import_gives_the_public_names():
+def test_a_star_import_imports_the_public_names():
     script = "from prbm import *; print(*sorted({*dir()} & {*" + repr(PUBLIC) + "}))"
     assert in_new_process(script).split() == sorted(PUBLIC)
     assert sorted(prbm.__all__) == sorted(PUBLIC)
@@ -72,7 +72,7 @@ def test_a_name_in_place_of_a_mechanism_is_rejected_with_a_remedy(start):
 
 
 def test_simulate_takes_the_default_experiment_by_default():
-    """A second and a millisecond for the guides, less for a mechanism of high frequency."""
+    """The guides have one second in steps of a millisecond; the last step may be shorter."""
     result = prbm.simulate(prbm.load("PRBDM"), {"stop.restitution": 0.0})
     assert isinstance(result, prbm.Result)
     assert result["time"][-1] == 1.0

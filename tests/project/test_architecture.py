@@ -1,4 +1,4 @@
-"""The page on architecture and its picture agree with the modules."""
+"""The page on architecture and its picture describe the present modules."""
 
 import json
 import re
@@ -15,7 +15,7 @@ SCRIPT = runpy.run_path(str(ROOT / "docs" / "draw_architecture.py"))
 
 @pytest.fixture(scope="module")
 def drawn() -> dict[str, list[list[str]]]:
-    """Return the layers and arrows that the picture carries in its metadata."""
+    """Return the layers and arrows in the metadata of the picture."""
     with Image.open(SCRIPT["PICTURE"]) as picture:
         return json.loads(picture.text["Architecture"])
 
@@ -45,7 +45,7 @@ def test_drawing_twice_gives_the_same_bytes(tmp_path):
 
 
 def test_the_files_and_functions_that_the_page_names_exist():
-    """A path is relative to the package, a function stands behind the colon after its file."""
+    """Paths are relative to the package or the project; a function follows its file and a colon."""
     named = re.findall(r"`((?:[\w.]+/)+[\w.]*)`(?:: `([\w.]+)`)?", PAGE)
     assert len(named) > 20
     for path, function in named:

@@ -10,11 +10,11 @@ CHANGELOG = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
 ROWS = re.findall(r"^\| `([\w.]+)` \| `(prbm[\w.]*)` \| (.*?) ?\|$", CHANGELOG, re.MULTILINE)
 
 
-def test_the_latest_section_is_that_of_the_version():
+def test_the_latest_section_has_the_present_version():
     assert re.findall(r"^## (.*)$", CHANGELOG, re.MULTILINE)[0] == prbm.__version__
 
 
-def test_the_new_places_of_renamed_imports_exist():
+def test_the_new_modules_and_names_of_renamed_imports_exist():
     missing = []
     for _, new, text in ROWS:
         try:
@@ -31,7 +31,7 @@ def listed(text: str) -> list[str]:
     return re.findall(r"`(\w+)`", re.sub(r"\(.*?\)|, as .*|;.*", "", text))
 
 
-def test_the_table_has_every_module_of_the_version_before():
+def test_the_table_of_renamed_imports_has_the_modules_of_0_1():
     old = {old for old, _, _ in ROWS}
     assert len(old) > 80
     assert {"prbm.hybrid", "prbm_fmu.native_fmu", "prbm_tools.cli", "mechanisms"} < old

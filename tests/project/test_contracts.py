@@ -14,7 +14,7 @@ SHIPPED = ("base", "mechanism", "mechanics", "hybrid", "fmu/slave")
 
 
 def test_imports_keep_the_contracts_of_the_project(tmp_path):
-    """The layers, and who may import Matplotlib, pydantic and pint: see pyproject.toml."""
+    """The contracts are in pyproject.toml."""
     run = "from importlinter.cli import lint_imports_command; lint_imports_command()"
     done = subprocess.run(
         [sys.executable, "-c", run, "--cache-dir", str(tmp_path)],
@@ -26,7 +26,7 @@ def test_imports_keep_the_contracts_of_the_project(tmp_path):
 
 @pytest.mark.parametrize("package", SHIPPED)
 def test_packages_inside_python_fmus_import_each_other_relatively(package):
-    """Their absolute name is another one in every FMU."""
+    """The absolute name of these packages differs between FMUs."""
     files = sorted((PACKAGE / package).rglob("*.py"))
     assert files
     for path in files:

@@ -1,4 +1,4 @@
-"""What a mechanism costs: the growth with links and loops, and real time."""
+"""Computing time of a mechanism: growth with links and loops, and real time."""
 
 import importlib
 import sys
@@ -16,13 +16,13 @@ BENCHMARKS = ROOT / "benchmarks"
 
 @pytest.fixture
 def scaling(monkeypatch):
-    """Return the benchmark."""
+    """Return the benchmark ``scaling`` as a module."""
     monkeypatch.setattr(sys, "path", [str(BENCHMARKS), *sys.path])
     return importlib.import_module("scaling")
 
 
-def test_the_mechanisms_of_the_benchmark_have_the_links_and_loops_that_it_says(scaling):
-    assert max(scaling.LINKS) == 50  # of two chains: a hundred links
+def test_the_mechanisms_of_the_benchmark_have_the_stated_links_and_loops(scaling):
+    assert max(scaling.LINKS) == 50  # Two chains: a hundred links.
     for n in scaling.LINKS[:3]:
         for axial in (False, True):
             given = scaling.chains(n, axial)
@@ -39,22 +39,22 @@ def test_the_mechanisms_of_the_benchmark_have_the_links_and_loops_that_it_says(s
 
 @pytest.fixture
 def exponents() -> tuple[float, ...]:
-    """Return what the page says of links, of links that stretch, and of loops."""
+    """Return the exponents of the page for links, links that stretch, and loops."""
     page = (BENCHMARKS.parent / "docs" / "flexure-models.md").read_text()
     _, table = page.split("| exponent |\n", 1)
     rows = table.split("\n\n", 1)[0].splitlines()[1:]
     return tuple(float(row.split("|")[-2]) for row in rows)
 
 
-def test_the_page_says_that_the_cost_grows_with_less_than_the_cube(exponents):
+def test_the_exponents_of_the_page_are_below_three(exponents):
     links, stretching, loops = exponents
     assert 1.0 < links < stretching < loops < 3.0
 
 
 @pytest.mark.slow
 @pytest.mark.native
-def test_the_cost_grows_as_the_page_says(scaling, exponents):
-    """About: the page's are of larger sizes, where the highest power has more of the whole."""
+def test_the_cost_grows_with_the_exponents_of_the_page(scaling, exponents):
+    """The tolerance is wide: the page is for larger sizes, where the highest power dominates."""
     needs("cc", "valgrind")
     links, _, loops = exponents
     assert scaling.grows("Links", (8, 12, 18), scaling.chains) == pytest.approx(links, abs=0.6)
@@ -64,9 +64,9 @@ def test_the_cost_grows_as_the_page_says(scaling, exponents):
 @pytest.mark.slow
 @pytest.mark.native
 def test_the_folded_suspension_is_faster_than_real_time(native):
-    """With eight 3R flexures that stretch, 51 coordinates: the default second in less CPU time.
+    """It has eight 3R flexures that stretch, 51 coordinates.
 
-    FMPy's overhead of a thousand communication steps is in it.
+    The CPU time includes FMPy's overhead for a thousand communication steps.
     """
     fmu = str(native["FoldedSuspension", 3])
     costs = []

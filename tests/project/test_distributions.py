@@ -1,4 +1,4 @@
-"""The wheel and the sdist."""
+"""Contents of the wheel and the sdist."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ SOURCE = ROOT / "fmu_src"
 
 @pytest.fixture(scope="module")
 def dist(tmp_path_factory) -> Path:
-    """Return a folder with the wheel and the sdist of this source."""
+    """Return a folder with the wheel and the sdist of the project."""
     folder = tmp_path_factory.mktemp("dist")
     subprocess.run(
         [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-t", "sdist", "-d", folder],
@@ -52,5 +52,5 @@ def test_an_sdist_has_one_import_package_with_all_its_files(dist):
 
 
 @pytest.mark.parametrize("kind", [".c", ".h", ".toml", ".txt", ".py"])
-def test_sources_data_and_licences_are_among_these_files(kind):
+def test_c_sources_data_and_licences_are_files_of_the_package(kind):
     assert [name for name in source_files() if name.endswith(kind)]

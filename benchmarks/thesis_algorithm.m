@@ -1,20 +1,21 @@
-% The source's algorithm, its two errors corrected, in plain Octave: what it costs.
+% Computing time of the algorithm of the thesis in plain Octave, with its two errors corrected.
 %
-% The steel guide, held at -18 mm and released, hits a wall at 0 with the restitution 0.6: a chain
-% of links in absolute angles, the loop closed by Lagrange multipliers, Runge and Kutta's method at
-% the step 2^-15 s, the positions projected after every step, an impact when contact is noticed.
-% Prints for the 1R and the 2R model the seconds of wall time per simulated second:
+% The steel guide, held at -18 mm and released, hits a wall at 0 with the restitution 0.6.  The
+% guide is a chain of links in absolute angles, closed by Lagrange multipliers.  It is integrated by
+% the Runge-Kutta method of order 4 at the step 2^-15 s; positions are projected after every step,
+% and an impact is applied at the first step behind the wall.
+% The script prints for the 1R and the 2R model the seconds of wall time per simulated second:
 %
-%     octave-cli --no-gui --quiet benchmarks/source_algorithm.m [SPAN]
+%     octave-cli --no-gui --quiet benchmarks/thesis_algorithm.m [SPAN]
 %
 % SPAN is the time to simulate, 0.05 s by default; the first impact is at 0.04 s.
 % Method: S. Boersma, MSc thesis, TU Delft 2015, appendix A; in NumPy: fmu_src/prbm/references/source_model.py.
 
-1;  % a script file, not a function file
+1;  % Makes this a script file instead of a function file.
 
 
 function m = guide_1R()
-  % One pivot a half flexure; the flexures' masses are lumped at the moving pivots.
+  % One pivot per half flexure; the masses of the flexures are lumped at the moving pivots.
   p = steel();
   gamma = 0.8517;
   r = gamma * p.L;
@@ -33,7 +34,7 @@ end
 
 
 function m = guide_2R()
-  % Two pivots a half flexure; the links are slender rods.  The rates have no factor gamma.
+  % Two pivots per half flexure; links are slender rods.  The spring rates have no factor gamma.
   p = steel();
   h = p.L / 2;
   rods = h * [0.44; 2 * 0.46; 0.44];
@@ -52,7 +53,7 @@ end
 
 
 function p = steel()
-  % SI units
+  % Data of the steel guide in SI units.
   p.L = 40e-3;
   p.W = 80e-3;
   p.EI = 181.5e9 * 8e-3 * (0.1e-3)^3 / 12;
@@ -64,8 +65,7 @@ end
 
 
 function [Tx, Ty, Gx, Gy] = centres(m, q)
-  % Jacobians T of the links' centres of mass, T qd their velocities; G such that the
-  % accelerations are T qdd + G qd.^2.
+  % Jacobians T and G of the centres of mass: velocities T qd, accelerations T qdd + G qd.^2.
   n = length(q);
   along = tril(ones(n), -1) .* m.length' + diag(m.along);
   across = diag(m.across);
@@ -84,7 +84,7 @@ end
 
 
 function Q = force(m, q, Tx)
-  % Springs, between the links and at both clamps, and gravity along +x.
+  % Forces of the springs, between the links and at both clamps, and gravity along +x.
   bend = diff([0; q - m.straight; 0]);
   torque = m.rate .* bend;
   Q = diff(torque) + m.gravity * Tx' * m.mass;
@@ -124,7 +124,7 @@ end
 
 
 function y = project(m, y)
-  % Gauss-Newton steps close the loop; the rates are left alone.
+  % Close the loop by Gauss-Newton steps; rates are not changed.
   n = length(y) / 2;
   for iteration = 1:10
     [Phi, Phi_q] = loop(m, y(1:n), y(n+1:end));
@@ -137,7 +137,7 @@ end
 
 
 function [gap, G] = contact(m, q)
-  % Distance of the hit point, at the far side of the shuttle, from the wall; its gradient.
+  % Distance of the hit point, on the far side of the shuttle, from the wall, and its gradient.
   k = m.shuttle;
   x = m.length(1:k)' * cos(q(1:k)) - m.across(k) * sin(q(k));
   gap = m.distance - x;
@@ -162,8 +162,8 @@ end
 
 
 function q = held_shape(m, displacement)
-  % Equilibrium with the shuttle held at the displacement, in ten stages of Newton's method; the
-  % tangent by differences.
+  % Equilibrium with the shuttle held at the displacement, by Newton's method in ten stages with a
+  % tangent by finite differences.
   n = length(m.straight);
   z = [m.straight; zeros(3, 1)];
   for stage = 1:10
@@ -195,7 +195,7 @@ end
 
 
 function [t, y, impact_times] = simulate(m, y, span, h, restitution)
-  % As long as the body is behind the wall after an impact, no further impact is applied.
+  % While the body is behind the wall after an impact, no further impact is applied.
   n = length(m.straight);
   steps = round(span / h);
   t = h * (0:steps)';
