@@ -27,7 +27,7 @@ OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 REAL, INTEGER, BOOLEAN = "Real", "Integer", "Boolean"
 KINDS = {"Float64": REAL, "Int32": INTEGER}
 TYPES = {REAL: "Float64", INTEGER: "Int32", BOOLEAN: "Boolean"}
-WAYS = ((2, "cs"), (2, "me"), (3, "cs"), (3, "events"), (3, "me"))
+INTERFACES = ((2, "cs"), (2, "me"), (3, "cs"), (3, "events"), (3, "me"))
 """Version and interface; events: co-simulation with event mode and early return."""
 
 _folders: list[TemporaryDirectory[str]] = []
@@ -168,7 +168,7 @@ class Instance:
         """What was logged, without status and category."""
         return [text for _, _, text in self.log]
 
-    def said(self, sentence: str) -> bool:
+    def logged(self, sentence: str) -> bool:
         return any(sentence in text for text in self.messages)
 
     def call(self, name: str, *arguments: Any) -> int:
