@@ -47,7 +47,7 @@ typedef struct {
     unsigned modes[KINDS];
 } Rule;
 
-/* The function that leads from a mode to the next one, NULL if there is none. */
+/* The function that leads from a mode to the next one, NULL if no function does. */
 typedef struct {
     const char *function;
     Mode next;
@@ -132,7 +132,7 @@ struct Instance {
     unsigned char *refused; /* (slots.count,): 1 for variables whose last set was rejected. */
     double *acknowledged;   /* (stops,): impacts for which the clock of a stop has ticked. */
 
-    int *state_of;          /* (slots.count,): index of the state in a slot, -1 if there is none. */
+    int *state_of;          /* (slots.count,): index of the state in a slot, or -1. */
     double *before, *after; /* Saved states of the simulation: before a call, and to restore. */
     double *x, *dx, *du;    /* (states,), (states,), (inputs,) */
     double *dvalues;        /* (slots.count,) */

@@ -8,7 +8,8 @@
 
 /* --- the state machine ------------------------------------------------------------------------ */
 
-/* Return the next function to call in order to reach one of some modes, NULL if there is none. */
+/* Return the next function to call in order to reach one of some modes, NULL if no function leads
+ * there. */
 static const char *next_call(const Instance *instance, unsigned modes) {
     const ModeTransition *transitions = instance->standard->transitions[instance->kind];
     const ModeTransition *transition = &transitions[instance->mode];

@@ -113,8 +113,8 @@ static int write_state(Instance *instance, const Variable *variable, double x) {
     return FMU_OK;
 }
 
-/* Return false and log an error for a fixed parameter after the start of the simulation.  Values out
- * of bounds pass, because simulation_set rejects them. */
+/* Return false and log an error for a fixed parameter after the start of the simulation.  Values
+ * out of bounds pass, because simulation_set rejects them. */
 static bool check_changeable(const Instance *instance, int slot, double x, double present) {
     Problem problem;
     if (!is_parameter(instance->mechanism, slot) || !simulation_started(instance->simulation)) {
