@@ -471,8 +471,8 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
     scratch->used = mark;
     if (!sound) {
         return fail(problem,
-                    "something that can move has no mass: give the flexures a density and the "
-                    "bodies a mass and an inertia");
+                    "a part that can move has no mass: give the flexures a density and the bodies "
+                    "a mass and an inertia");
     }
     return true;
 }
@@ -553,9 +553,9 @@ static bool check_loops(const System *system, const Complex *e0, Scratch *scratc
     name_loops(system->mechanism, repeated, names, sizeof names);
     scratch->used = mark;
     return !any || fail(problem,
-                        "the loops closed by %s ask at the straight shape for what other loops "
-                        "already ask for: rigid links are over-constrained there; take a part "
-                        "away, move it out of line, or let flexures stretch (axial = true)",
+                        "the constraints of the loops closed by %s depend on those of other loops "
+                        "at the straight shape: rigid links are over-constrained there; remove a "
+                        "part, move it out of line, or let flexures stretch (axial = true)",
                         names);
 }
 

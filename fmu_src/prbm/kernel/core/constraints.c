@@ -9,8 +9,8 @@
 #include "core/matrix.h"
 
 static const char SINGULAR[] =
-    "the equations of motion are singular here: two constraints repeat each other, or a part that "
-    "can move has no mass";
+    "the equations of motion are singular in this shape: two constraints are linearly dependent, or "
+    "a part that can move has no mass";
 
 /* --- rows ------------------------------------------------------------------------------------- */
 
@@ -196,8 +196,8 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
     scratch->used = mark;
     if (right_way && !closed) {
         return fail(problem,
-                    "the loops of the mechanism cannot be closed here (by %.3g m): the parts do "
-                    "not reach each other",
+                    "the loops of the mechanism cannot be closed in this shape (gap %.3g m): the "
+                    "parts do not reach each other",
                     best);
     }
     return right_way;

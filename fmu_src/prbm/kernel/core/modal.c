@@ -60,7 +60,7 @@ static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y,
     double *column = take(scratch, (size_t)n);
     if (!cholesky(n, M)) {
         scratch->used = used;
-        return fail(problem, "the modes have no frequency here: a part that can move has no mass");
+        return fail(problem, "the modes cannot be computed: a part that can move has no mass");
     }
     divide_twice(n, M, K, column);
     symmetric_eigen(n, K, w, Y);

@@ -163,8 +163,8 @@ static bool unreachable(const System *system, bool held, double displacement, do
                     heavy ? "no static equilibrium under gravity was found: the flexures are too "
                             "weak for this load; reduce gravity or the masses, or stiffen the "
                             "flexures"
-                          : "no static equilibrium was found: the drawn shape is none, or the "
-                            "flexures are too weak to hold it");
+                          : "no static equilibrium was found: the drawn shape is not in "
+                            "equilibrium, or the flexures are too weak to hold it");
     }
     return fail(problem,
                 "release.displacement = %g m cannot be reached: no equilibrium was found beyond "
