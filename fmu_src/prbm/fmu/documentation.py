@@ -389,8 +389,9 @@ def _native_use(
         "longer step, a contact that begins and ends within the step may be missed (CVode in FMPy "
         "limits its steps to a fiftieth of the simulated time).</p>",
         "<p>An invalid value, call or step is rejected: the reason is logged and the instance does "
-        "not change. The state of an instance can be saved, serialized and restored bit for bit. "
-        "Instances are independent of each other; each may be used by one thread at a time.</p>",
+        "not change. Steps are rejected until an invalid value is corrected. The state of an "
+        "instance can be saved, serialized and restored bit for bit. Instances are independent of "
+        "each other; each may be used by one thread at a time.</p>",
     ]
     if version == 3 and not interface.clocks:
         parts.append(
@@ -425,9 +426,9 @@ def _exchange(interface: NativeInterface, version: int) -> str:
         f"call returns <code>{discard}</code>. Co-simulation has no such singularity, because it "
         "integrates all coordinates and projects them onto the constraints.</p>\n"
         "<p>Directional derivatives of outputs and of state derivatives with respect to states and "
-        "inputs are exact. A stop that holds is a constraint on accelerations; its drift "
-        "is removed at the end of each completed integrator step. Any state may change at an "
-        "event.</p>"
+        "inputs are exact. A stop that holds is a constraint on accelerations. If its gap has "
+        f"drifted after an integrator step, <code>fmi{version}CompletedIntegratorStep</code> "
+        "requests event mode, in which the drift is removed. Any state may change at an event.</p>"
     )
 
 
