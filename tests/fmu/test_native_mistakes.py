@@ -149,9 +149,9 @@ def test_an_invalid_value_rejects_steps_until_it_is_corrected(native, case, fmi,
         assert instance.values() == before
         update = instance.function("newDiscreteStates", "updateDiscreteStates") \
             if kind != "cs" else None  # fmt: skip
-        refused = (lambda: instance.step(1e-3, 1e-3)) if kind == "cs" else lambda: status(update)
+        rejected = (lambda: instance.step(1e-3, 1e-3)) if kind == "cs" else lambda: status(update)
         for _ in range(2):
-            assert refused() in (DISCARD, ERROR)
+            assert rejected() in (DISCARD, ERROR)
             assert instance.logged(f"{name} was set to a rejected value and is still")
         assert instance.values() == before
         assert instance.set({name: before[name]}) == OK

@@ -231,7 +231,7 @@ def with_checksum(data: bytes) -> bytes:
 @each_shipped
 def test_a_forged_state_is_rejected_or_valid(native, model, fmi, kind):
     """States with a valid checksum, but invalid modes, flags or numbers, do not crash."""
-    rng, refused, it = np.random.default_rng(1), 0, case(model)
+    rng, rejected, it = np.random.default_rng(1), 0, case(model)
     before, _ = spans(model)
     with Instance(native[model, fmi], kind, substep=it.substep(2e-4)).initialize() as instance:
         instance.run(before[:3])
@@ -259,11 +259,11 @@ def test_a_forged_state_is_rejected_or_valid(native, model, fmi, kind):
             state = instance.fmu.deserializeFMUState(with_checksum(bad))
             if status(instance.fmu.setFMUState, state) != OK:
                 assert instance.bytes() == here
-                refused += 1
+                rejected += 1
             instance.fmu.freeFMUState(state)
             instance.restore(data)
             assert instance.bytes() == here
-    assert refused > 150 / 4
+    assert rejected > 150 / 4
 
 
 @interfaces

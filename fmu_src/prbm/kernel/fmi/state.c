@@ -181,7 +181,7 @@ static bool read_fields(const Instance *instance, const unsigned char **at, Inst
                                                                          "damaged");
 }
 
-/* Return whether the simulation has started exactly if the mode requires it. */
+/* Return whether the simulation has started, or not, as the mode requires. */
 static bool is_consistent(const Simulation *simulation, Mode mode) {
     bool begun = simulation_started(simulation);
     return mode == MODE_INITIALIZATION || mode == MODE_TERMINATED ||
