@@ -1,6 +1,6 @@
-"""Build the FMUs: ``python build_fmu.py --help``.
+"""Build FMUs from the source beside this file, without an installation of the project.
 
-Puts the source beside this file first, so that it needs no installation of the project itself.
+Usage: ``python build_fmu.py --help``.
 """
 
 import sys

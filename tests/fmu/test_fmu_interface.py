@@ -1,4 +1,4 @@
-"""What an FMU declares: units, start values, references, structure, what it carries."""
+"""The model description of a Python FMU (units, start values, structure) and its contents."""
 
 import ast
 import importlib.metadata
@@ -32,13 +32,13 @@ pytestmark = pytest.mark.fmu
 
 
 @each_shipped
-def test_fmpy_finds_nothing_to_complain_about(fmus, model):
+def test_fmpy_validation_reports_no_problem(fmus, model):
     assert validate_fmu(str(fmus[model])) == []
 
 
 @each_shipped
 def test_every_variable_has_a_unit_a_description_and_an_exact_start(fmus, mechanisms, model):
-    """Start values survive the way through text: repr, not sixteen digits."""
+    """Start values are written with all digits, so that they read back exactly."""
     values = mechanisms[model].values()
     for v in read_model_description(str(fmus[model])).modelVariables:
         assert v.description, v.name
@@ -84,8 +84,7 @@ LINKS = {"PRBDM": 2, "PRBDM2R": 6}
 
 
 @pytest.mark.parametrize("model", GUIDES)
-def test_the_names_are_the_interface_that_was_agreed(fmus, model):
-    """Names and causalities are kept from version to version."""
+def test_names_and_causalities_do_not_change_between_versions(fmus, model):
     links = (f"link[{k + 1}].{what}" for k in range(LINKS[model]) for what in ("angle", "omega"))
     agreed = {(name, "local continuous") for name in links}
     for table in (NAMES, FLEXURES[model]):
@@ -94,7 +93,7 @@ def test_the_names_are_the_interface_that_was_agreed(fmus, model):
     assert {(v.name, f"{v.causality} {v.variability}") for v in listed} == agreed
 
 
-def test_units_are_the_products_that_their_names_say():
+def test_base_unit_exponents_follow_from_unit_names():
     """N.m = N m, kg/m3 = kg m^-3, ...: the exponents follow from the atoms."""
     atoms = {name: UNITS[name].base for name in ("m", "s", "rad", "kg", "N")} | {"1": {}}
     derived = {"Pa": "N/m2", "J": "N.m", "W": "N.m/s", "Hz": "1/s"}
@@ -109,12 +108,12 @@ def test_units_are_the_products_that_their_names_say():
         assert {b: n for b, n in exponents.items() if n} == dict(unit.base), name
 
 
-def test_display_units_are_scaled_as_their_prefixes_say():
+def test_display_unit_factors_follow_from_their_prefixes():
     prefixes = {"m": 1e-3, "u": 1e-6, "k": 1e3, "G": 1e9}
     for name, unit in UNITS.items():
         for display, factor in unit.display.items():
             if display in ("deg", "deg/s", "deg/s2", "g", "g.mm2", "g/cm3"):
-                continue  # not a prefix before the unit's own name
+                continue  # These differ from the unit by more than a prefix.
             by_parts = [
                 prefixes[part[0]] if part != plain else 1.0
                 for part, plain in zip(display.split("/"), name.split("/"), strict=True)
@@ -154,8 +153,8 @@ def test_declared_capabilities_and_default_experiment(fmus, model):
 
 
 @each_shipped
-def test_no_output_depends_at_once_on_an_input(fmus, model):
-    """ModelStructure says so; here every input is moved at a communication point."""
+def test_outputs_ignore_inputs_set_at_the_same_communication_point(fmus, model):
+    """ModelStructure declares it; this test changes every input at a communication point."""
     guide = case(model).mechanism
     with Instance(fmus[model]).initialize() as instance:
         assert instance.step(0.0, 0.01) == OK
@@ -181,15 +180,15 @@ def test_outputs_are_within_their_declared_bounds_through_a_run(fmus, model):
 
 
 @each_shipped
-def test_a_mechanism_survives_the_way_through_json(mechanisms, model):
+def test_a_mechanism_is_equal_after_a_round_trip_through_json(mechanisms, model):
     mechanism = mechanisms[model]
     data = json.loads(json.dumps(resolved(mechanism, ())))
     assert mechanism_from(data["mechanism"]) == mechanism
 
 
 @each_shipped
-def test_start_values_that_were_set_are_the_defaults_of_the_fmu(mechanisms, model):
-    """To the last bit: 0.1 + 0.2 needs seventeen digits."""
+def test_changed_start_values_are_written_exactly(mechanisms, model):
+    """The sum 0.1 + 0.2 needs seventeen digits."""
     name = f"{case(model).stop}.restitution"
     listed = interface(mechanisms[model], {name: 0.1 + 0.2})
     xml = ElementTree.fromstring(model_description(Heading("X", "", "", {}), listed))
@@ -197,7 +196,7 @@ def test_start_values_that_were_set_are_the_defaults_of_the_fmu(mechanisms, mode
     assert float(start) == 0.1 + 0.2 != 0.3
 
 
-def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
+def test_start_values_of_computed_or_unknown_variables_are_rejected(mechanisms):
     mechanism = mechanisms["PRBDM"]
     listed = variables(mechanism, start_sample(mechanism, {}))
     with pytest.raises(prbm.base.errors.ParameterError, match=r"shuttle\.x is computed"):
@@ -214,7 +213,7 @@ def test_what_is_computed_cannot_be_given_a_start_value(mechanisms):
     ],
 )  # fmt: skip
 def test_a_parameter_cannot_have_the_name_of_another_variable(mechanisms, name):
-    """Of none that is in any of the FMUs of a mechanism."""
+    """The variables of all kinds of FMUs of the mechanism are checked."""
     guide = mechanisms["PRBDM2R"]
     named = replace(
         guide, geometry=(*guide.geometry, prbm.mechanism.parameters.Parameter(name, 1.0))
@@ -249,7 +248,7 @@ def test_the_page_names_every_variable_and_the_limits(mechanisms, model):
 
 
 @each_shipped
-def test_an_fmu_carries_documentation_icon_and_licences_and_no_bytecode(fmus, model):
+def test_an_fmu_contains_documentation_icon_and_licences_but_no_bytecode(fmus, model):
     with zipfile.ZipFile(fmus[model]) as archive:
         names = archive.namelist()
         assert (
@@ -265,7 +264,7 @@ def test_an_fmu_carries_documentation_icon_and_licences_and_no_bytecode(fmus, mo
     assert not [name for name in names if "pyc" in name]
 
 
-def test_the_bundle_imports_nothing_but_itself_numpy_scipy_and_the_standard_library(fmus):
+def test_bundled_modules_import_only_numpy_scipy_and_the_standard_library(fmus):
     allowed = {"numpy", "scipy", "pythonfmu"} | sys.stdlib_module_names
     with zipfile.ZipFile(fmus["PRBDM"]) as archive:
         bundled = [n for n in archive.namelist() if n.endswith(".py") and "/prbm_" in n]
@@ -291,7 +290,7 @@ for name, module in sys.modules.items():
 """
 
 
-def test_an_fmu_carries_exactly_the_modules_of_the_package_that_it_imports(fmus, tmp_path):
+def test_an_fmu_contains_exactly_the_modules_that_it_imports(fmus, tmp_path):
     with zipfile.ZipFile(fmus["PRBDM2R"]) as archive:
         archive.extractall(tmp_path)
     resources = tmp_path / "resources"

@@ -1,4 +1,4 @@
-"""Whatever an importer does wrong: a sentence, a status that is not OK, a living process."""
+"""Errors of an importer of a Python FMU: each is logged and rejected, and the process survives."""
 
 import subprocess
 import sys
@@ -20,42 +20,42 @@ CYCLES = 50
 pytestmark = pytest.mark.fmu
 
 
-def said(instance: Instance, sentence: str) -> bool:
+def logged(instance: Instance, sentence: str) -> bool:
     return any(sentence in message for message in instance.messages)
 
 
 @pytest.mark.parametrize("case", AT_START)
-def test_a_mistake_at_the_start_is_told_and_refuses_the_first_step(fmus, case):
+def test_an_invalid_start_value_is_logged_and_rejects_the_first_step(fmus, case):
     name, value, sentence = AT_START[case]
     with Instance(fmus["PRBDM"]) as instance:
         instance.initialize(**{name.replace(".", "__"): value})
-        assert said(instance, sentence), instance.messages
+        assert logged(instance, sentence), instance.messages
         assert np.isnan(instance.values()["shuttle.x"])
         assert instance.step(0.0, 1e-3) == DISCARD
         assert instance.step(0.0, 1e-3) == DISCARD
 
 
-def test_links_longer_than_the_flexure_are_refused(fmus):
+def test_links_longer_than_the_flexure_are_rejected(fmus):
     with Instance(fmus["PRBDM2R"]).initialize(flexure__gamma1=0.7) as instance:
-        assert said(instance, "gamma0 = -0.16 < 0")
+        assert logged(instance, "gamma0 = -0.16 < 0")
         assert instance.step(0.0, 1e-3) == DISCARD
 
 
 @pytest.mark.parametrize("tolerance", [NAN, 0.0, -1e-6, 1.0])
-def test_a_tolerance_that_makes_no_sense_is_refused(fmus, tolerance):
+def test_an_invalid_tolerance_is_rejected(fmus, tolerance):
     with Instance(fmus["PRBDM"]).initialize(tolerance=tolerance) as instance:
-        assert said(instance, "the importer's relative tolerance")
+        assert logged(instance, "the importer's relative tolerance")
         assert instance.step(0.0, 1e-3) == DISCARD
 
 
 @pytest.mark.parametrize("case", LATER)
-def test_a_mistake_on_the_way_stops_the_run_until_it_is_put_right(fmus, case):
+def test_an_invalid_value_rejects_steps_until_it_is_corrected(fmus, case):
     name, value, sentence = LATER[case]
     with Instance(fmus["PRBDM"]).initialize() as instance:
         assert instance.step(0.0, 1e-3) == OK
         before = instance.values()
         instance.set({name: value})
-        assert said(instance, sentence), instance.messages
+        assert logged(instance, sentence), instance.messages
         assert instance.step(1e-3, 1e-3) == DISCARD
         assert instance.values() == before
         instance.set({name: before[name]})
@@ -63,25 +63,25 @@ def test_a_mistake_on_the_way_stops_the_run_until_it_is_put_right(fmus, case):
 
 
 @pytest.mark.parametrize("case", STEPS)
-def test_a_step_that_makes_no_sense_is_refused_and_the_next_one_is_not(fmus, case):
+def test_an_invalid_step_is_rejected_and_a_valid_one_succeeds_afterwards(fmus, case):
     time, size, sentence = STEPS[case]
     with Instance(fmus["PRBDM"]).initialize() as instance:
         assert instance.step(0.0, 1e-3) == OK
         before = instance.bytes()
         assert instance.step(time, size) == DISCARD
-        assert said(instance, sentence), instance.messages
+        assert logged(instance, sentence), instance.messages
         assert instance.bytes() == before
         assert instance.step(1e-3, 1e-3) == OK
 
 
-def test_a_step_before_initialization_is_refused(fmus):
+def test_a_step_before_initialization_is_rejected(fmus):
     with Instance(fmus["PRBDM"]) as instance:
         instance.fmu.setupExperiment(startTime=0.0)
         assert instance.step(0.0, 1e-3) == DISCARD
-        assert said(instance, "initialize the instance first")
+        assert logged(instance, "initialize the instance first")
 
 
-def test_a_value_that_is_put_right_before_the_start_leaves_nothing_behind(fmus):
+def test_a_value_corrected_before_the_start_has_no_effect(fmus):
     with Instance(fmus["PRBDM"]) as instance:
         instance.set({"stop.restitution": 1.5, "release.displacement": -0.2})
         instance.fmu.enterInitializationMode()
@@ -93,8 +93,8 @@ def test_a_value_that_is_put_right_before_the_start_leaves_nothing_behind(fmus):
 
 
 @pytest.mark.parametrize("name", ["stop.restitution", "shuttle.mass", "stop.position"])
-def test_a_good_value_after_the_start_puts_right_a_bad_one_before_it(fmus, name):
-    """Also a wall that is penetrated; then the motion starts."""
+def test_a_valid_value_after_the_start_corrects_an_invalid_one_before_it(fmus, name):
+    """The motion starts after the correction, also of a wall that was penetrated."""
     bad = {"stop.position": -0.03}.get(name, -1.0)
     good = {"stop.position": 1e-3}.get(name, 0.5)
     with Instance(fmus["PRBDM"]).initialize(**{name.replace(".", "__"): bad}) as instance:
@@ -108,16 +108,16 @@ def test_a_good_value_after_the_start_puts_right_a_bad_one_before_it(fmus, name)
         assert instance.values() == found
 
 
-def test_what_no_value_puts_right_asks_for_a_reset(fmus):
+def test_errors_that_no_value_corrects_ask_for_a_reset(fmus):
     with Instance(fmus["PRBDM"]).initialize() as instance:
         counter = instance.variables["stop.impact_count"].valueReference
         for wrong, sentence in (
-            (lambda: instance.fmu.setInteger([counter], [3]), "impact_count is no parameter or"),
+            (lambda: instance.fmu.setInteger([counter], [3]), "impact_count is not a parameter or"),
             (lambda: instance.fmu.setReal([12345], [3.0]), "value reference 12345 is not in"),
-            (lambda: instance.set({"shuttle.x": 0.1}), "shuttle.x is no parameter or input"),
+            (lambda: instance.set({"shuttle.x": 0.1}), "shuttle.x is not a parameter or input"),
         ):
             wrong()
-            assert said(instance, sentence), instance.messages
+            assert logged(instance, sentence), instance.messages
             assert "reset the instance" in instance.messages[-1]
             assert instance.step(0.0, 1e-3) == DISCARD
             instance.fmu.reset()
@@ -127,10 +127,10 @@ def test_what_no_value_puts_right_asks_for_a_reset(fmus):
             instance.initialize()
 
 
-def test_a_set_of_the_wrong_type_is_put_right_by_one_of_the_right_type(fmus):
+def test_a_set_of_the_wrong_type_is_corrected_by_one_of_the_right_type(fmus):
     with Instance(fmus["PRBDM"]).initialize() as instance:
         instance.fmu.setBoolean([instance.variables["force.x"].valueReference], [True])
-        assert said(instance, "force.x is of type Real: set it with fmi2SetReal")
+        assert logged(instance, "force.x is of type Real: set it with fmi2SetReal")
         assert instance.step(0.0, 1e-3) == DISCARD
         instance.set({"force.x": 0.0})
         assert instance.step(0.0, 1e-3) == OK
@@ -145,8 +145,8 @@ WRONG_GETS = {
 
 
 @pytest.mark.parametrize("getter", WRONG_GETS)
-def test_a_wrong_get_has_no_value_and_harms_nothing(fmus, getter):
-    """Through ctypes, which would show an exception that is left behind."""
+def test_a_get_of_the_wrong_type_logs_an_error_and_changes_nothing(fmus, getter):
+    """The call is made through ctypes, which raises an exception that was left pending."""
     with Instance(fmus["PRBDM"]).initialize() as instance:
         for name in WRONG_GETS[getter]:
             reference = instance.variables[name].valueReference if name else 12345
@@ -159,7 +159,7 @@ def test_a_wrong_get_has_no_value_and_harms_nothing(fmus, getter):
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError("by nothing"), KeyboardInterrupt()])
-def test_an_exception_while_it_starts_is_the_reason_that_is_given(
+def test_an_exception_during_the_start_is_the_reason_that_is_logged(
     error, fmus, tmp_path, monkeypatch, capsys
 ):
     def fails(*_: object, **__: object) -> None:
@@ -177,19 +177,19 @@ def test_an_exception_while_it_starts_is_the_reason_that_is_given(
     assert reason in slave.instance.failure
     assert not slave.do_step(0.0, 1e-3)
     assert reason in capsys.readouterr().err
-    assert not any("came before" in entry.msg for entry in slave.log_queue)
+    assert not any("was called before" in entry.msg for entry in slave.log_queue)
 
 
 def test_impacts_are_logged_with_their_numbers(fmus):
     with Instance(fmus["PRBDM"]).initialize() as instance:
         assert instance.step(0.0, 0.05) == OK
         values = instance.values()
-        told = [m for m in instance.messages if m.startswith("impact 1 at stop")]
-    assert len(told) == 1
-    assert f"t = {values['stop.impact_time']:.9g} s" in told[0]
+        found = [m for m in instance.messages if m.startswith("impact 1 at stop")]
+    assert len(found) == 1
+    assert f"t = {values['stop.impact_time']:.9g} s" in found[0]
 
 
-def test_fmpy_ends_early_and_the_reason_is_on_standard_error(fmus, capfd):
+def test_fmpy_ends_early_and_the_reason_is_printed_to_standard_error(fmus, capfd):
     result = simulate_fmu(str(fmus["PRBDM"]), start_values={"stop.restitution": 1.5})
     assert result["time"][-1] == 0.0
     assert "PRBDM: stop.restitution = 1.5 must be at most 1" in capfd.readouterr().err
@@ -231,8 +231,8 @@ def python(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-def test_the_process_survives_mistake_after_mistake(fmus):
-    """Every case, freed and loaded anew, and the instance works again after a reset."""
+def test_the_process_survives_repeated_errors(fmus):
+    """Every case runs in a new instance, which works again after a reset."""
     done = python(SURVIVAL, fmus["PRBDM"], CYCLES)
     assert (done.returncode, done.stdout) == (0, "survived\n"), done.stderr[-2000:]
 
@@ -240,7 +240,7 @@ def test_the_process_survives_mistake_after_mistake(fmus):
 WITHOUT_SCIPY = """
 import sys
 from fmu_host import Instance
-sys.modules["scipy"] = None  # what a Python without SciPy looks like to the FMU
+sys.modules["scipy"] = None  # Importing SciPy then fails, as if it were not installed.
 Instance._log = lambda self, *message: print(message[-1].decode())
 for attempt in range(3):
     try:
@@ -250,7 +250,7 @@ for attempt in range(3):
 """
 
 
-def test_a_missing_scipy_is_told_and_the_instance_refused(fmus):
+def test_a_missing_scipy_is_logged_and_the_instantiation_fails(fmus):
     done = python(WITHOUT_SCIPY, fmus["PRBDM"])
     assert done.returncode == 0, done.stderr[-2000:]
     assert done.stdout.count("PRBDM.fmu needs NumPy and SciPy in the Python that runs it") == 3
@@ -258,7 +258,7 @@ def test_a_missing_scipy_is_told_and_the_instance_refused(fmus):
     assert done.stdout.count("Failed to instantiate model") == 3
 
 
-def test_a_percent_sign_is_no_format_to_the_importers_printf():
+def test_a_percent_sign_is_doubled_for_the_importers_printf():
     slave = object.__new__(MechanismSlave)
     slave.log_queue = []
     slave.log("100 % of \udcff")

@@ -1,4 +1,4 @@
-"""An FMU does what the engine does, whatever else happens in its process."""
+"""A Python FMU computes the same values as the engine, also beside other FMUs in its process."""
 
 import re
 import subprocess
@@ -17,8 +17,8 @@ from prbm.fmu.python_fmu import interface
 from prbm.hybrid.simulation import Simulation
 from support import GUIDES, ROOT, SHIPPED, SUPPORT, case, record, selected
 
-END = 0.3  # s; the default run of the guides bounces until 0.243 s, then it rests
-SEEN = 6  # times at which all is compared
+END = 0.3  # s; the guides bounce until 0.243 s in the default run, then they rest.
+COMPARISONS = 6  # Times at which all values are compared.
 
 pytestmark = pytest.mark.fmu
 
@@ -28,13 +28,13 @@ def points(step: float, end: float = END) -> np.ndarray:
 
 
 def uneven(end: float) -> np.ndarray:
-    """Communication points with steps over three decades that include all that are compared."""
+    """Return communication points with steps over three decades, including those compared."""
     rng = np.random.default_rng(0)
     inner = end / END * np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
-    return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / SEEN, end)]))
+    return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / COMPARISONS, end)]))
 
 
-GRIDS = {"3000 steps": 3000, "300 steps": 300, "6 steps": SEEN, "uneven": 0}
+GRIDS = {"3000 steps": 3000, "300 steps": 300, "6 steps": COMPARISONS, "uneven": 0}
 
 
 def grid_of(name: str, end: float) -> np.ndarray:
@@ -43,20 +43,20 @@ def grid_of(name: str, end: float) -> np.ndarray:
 
 @cache
 def engine_run(model: str) -> tuple[dict, list[dict]]:
-    """Return what is listed, and what the engine says of all of it at the times compared."""
+    """Return the declared variables, and the engine's values of them at the times compared."""
     guide, end = case(model).mechanism, case(model).end
     listed = {v.name: v for v in interface(guide, {})}
     simulation = Simulation(guide)
     given = {n: v.start for n, v in listed.items() if v.start is not None}
     rows = []
-    for t in points(end / SEEN, end):
+    for t in points(end / COMPARISONS, end):
         simulation.advance(t)
         rows.append(given | simulation.outputs())
     return listed, rows
 
 
 def assert_equal(found: dict, expected: dict, listed: dict) -> None:
-    """Every declared variable, and nothing else, agrees to 1e-9 of its nominal value."""
+    """Check that exactly the declared variables are found, within 1e-9 of the nominal values."""
     assert found.keys() == expected.keys() == listed.keys()
     for name, value in expected.items():
         scale = max(listed[name].nominal or 1.0, abs(value))
@@ -67,7 +67,7 @@ LONG = ("3000 steps",)
 
 
 def on_grids() -> list:
-    """Return each mechanism with each grid; what is slow anyway with the hardest one alone."""
+    """Return each mechanism with each grid, but slow mechanisms with the uneven grid only."""
     return [
         pytest.param(
             *getattr(p, "values", (p,)),
@@ -81,18 +81,18 @@ def on_grids() -> list:
 
 
 @pytest.mark.parametrize(("model", "grid"), on_grids())
-def test_an_fmu_is_the_engine_whatever_the_communication_step(fmus, model, grid):
+def test_the_fmu_equals_the_engine_for_every_communication_step(fmus, model, grid):
     it, (listed, rows) = case(model), engine_run(model)
     with Instance(fmus[model]).initialize() as instance:
         assert_equal(instance.values(), rows[0], listed)
         compared = 0
         for begin, end in pairwise(grid_of(grid, it.end)):
             assert instance.step(begin, end - begin) == OK
-            k = round(SEEN * end / it.end)
-            if abs(end - k * it.end / SEEN) < 1e-12:
+            k = round(COMPARISONS * end / it.end)
+            if abs(end - k * it.end / COMPARISONS) < 1e-12:
                 assert_equal(instance.values(), rows[k], listed)
                 compared += 1
-    assert compared == len(rows) - 1 == SEEN
+    assert compared == len(rows) - 1 == COMPARISONS
     assert it.impacts(rows[-1]) == len(record(model)) > 0
     if model in GUIDES:
         assert rows[-1]["stop.contact"]
@@ -100,7 +100,7 @@ def test_an_fmu_is_the_engine_whatever_the_communication_step(fmus, model, grid)
 
 @pytest.mark.parametrize("model", selected(lambda name: name != "PRBDM2R"))
 def test_inputs_walls_and_tunable_parameters_reach_the_engine(fmus, model):
-    """From half the release and another start time, at the tolerance that the importer asks for."""
+    """The start values, start time and tolerance also differ from the defaults."""
     it, listed = case(model), {v.name: v for v in interface(case(model).mechanism, {})}
     start, changes, step = it.starts(), it.changes(), it.end / 30
     simulation = Simulation(it.mechanism, start, start_time=2.0, tolerance=1e-9)
@@ -120,8 +120,8 @@ def test_inputs_walls_and_tunable_parameters_reach_the_engine(fmus, model):
         assert simulation.outputs()["stop.impact_count"] > 0
 
 
-def test_a_wall_that_retreats_lets_go_and_captures_what_is_pressed_again(fmus):
-    """What the page says; gravity presses, and in the end the shuttle goes with the wall."""
+def test_a_retreating_wall_releases_and_recaptures_a_pressed_body(fmus):
+    """Gravity presses the shuttle onto the wall; in the end the shuttle moves with the wall."""
     speed, step = 0.02, 1e-3
     with Instance(fmus["PRBDM"]).initialize() as instance:
         assert instance.step(0.0, END) == OK
@@ -138,11 +138,11 @@ def test_a_wall_that_retreats_lets_go_and_captures_what_is_pressed_again(fmus):
     assert not held[0]  # the wall accelerates by 4 v / T = 40 m/s2
     assert held[-1]
     assert found["stop.impact_count"] > rested["stop.impact_count"]
-    assert found["shuttle.vx"] == pytest.approx(speed, rel=1e-9)  # tolerance of the integration
+    assert found["shuttle.vx"] == pytest.approx(speed, rel=1e-9)  # Tolerance of the integration.
     assert found["shuttle.x"] == pytest.approx(40 * speed * step, rel=1e-9)
 
 
-def test_the_importers_tolerance_wins_over_the_parameter(fmus):
+def test_the_importers_tolerance_overrides_the_parameter(fmus):
     def last(tolerance: float | None, parameter: float) -> bytes:
         with Instance(fmus["PRBDM2R"]) as instance:
             instance.initialize(tolerance=tolerance, solver__tolerance=parameter)
@@ -161,7 +161,7 @@ def test_values_in_initialization_mode_follow_the_parameters(fmus):
         stiffer = instance.values()
         instance.fmu.exitInitializationMode()
         assert instance.values() == stiffer
-    assert softer["shuttle.x"] == pytest.approx(-18e-3, abs=1e-12)  # tolerance of the statics
+    assert softer["shuttle.x"] == pytest.approx(-18e-3, abs=1e-12)  # Tolerance of the statics.
     assert stiffer["shuttle.x"] == pytest.approx(-5e-3, abs=1e-12)
     assert stiffer["mode.frequency"] > softer["mode.frequency"] > 0.0
 
@@ -179,7 +179,7 @@ for row in run_alone(sys.argv[1]):
 """
 
 
-def in_a_process_of_its_own(fmu: Path) -> list[bytes]:
+def run_in_new_process(fmu: Path) -> list[bytes]:
     paths = [str(SUPPORT), str(Path(__file__).parent), str(ROOT / "fmu_src")]
     script = f"import sys; sys.path[:0] = {paths!r}\n{ALONE}"
     done = subprocess.run(
@@ -190,7 +190,7 @@ def in_a_process_of_its_own(fmu: Path) -> list[bytes]:
 
 @pytest.mark.slow
 def test_instances_of_both_models_in_one_process_do_not_disturb_each_other(fmus):
-    alone = {model: in_a_process_of_its_own(fmus[model]) for model in GUIDES}
+    alone = {model: run_in_new_process(fmus[model]) for model in GUIDES}
     times = points(2e-3, 0.06)
     instances = [(m, Instance(fmus[m], f"{m} {k}").initialize()) for k in (1, 2) for m in GUIDES]
     for k, (begin, end) in enumerate(pairwise(times)):
@@ -218,8 +218,8 @@ def test_two_builds_of_one_model_in_one_process_keep_their_own_content(fmus, mec
 
 
 @pytest.mark.slow
-def test_hundreds_of_instances_one_after_the_other(fmus):
-    """The wrapper library releases a reference too many at each; the slave makes up for it."""
+def test_hundreds_of_consecutive_instances(fmus):
+    """The wrapper library releases one reference too many per instance; the slave adds one."""
     script = f"""
 import sys
 sys.path[:0] = {[str(SUPPORT)]!r}

@@ -1,4 +1,4 @@
-"""Saving, restoring, serializing and resetting the state of an FMU."""
+"""Saving, restoring, serializing and resetting the state of a Python FMU."""
 
 import json
 from ctypes import byref, c_void_p
@@ -10,15 +10,15 @@ from fmu_host import DISCARD, OK, Instance
 from support import around_first_impact, case, each_shipped
 
 STEP = 2.5e-3
-BEFORE = STEP * np.arange(17)  # the first impact comes at 0.041 s, within the next step
-AFTER = STEP * np.arange(16, 64)  # and six more come until 0.1575 s or later
+BEFORE = STEP * np.arange(17)  # The first impact is at 0.041 s, within the next step.
+AFTER = STEP * np.arange(16, 64)  # Six more impacts follow until 0.1575 s.
 
 pytestmark = pytest.mark.fmu
 
 
 @each_shipped
-def test_a_state_restored_before_an_impact_gives_the_same_bytes(fmus, model):
-    """Restored twice, the second time from a motion that has gone elsewhere."""
+def test_a_state_restored_before_an_impact_gives_identical_results(fmus, model):
+    """The state is restored twice, the second time after a motion with other inputs."""
     it, (before, after) = case(model), around_first_impact(model)
     with Instance(fmus[model]).initialize() as instance:
         instance.run(before)
@@ -38,8 +38,8 @@ def test_a_state_restored_before_an_impact_gives_the_same_bytes(fmus, model):
 
 
 @each_shipped
-def test_a_state_through_bytes_into_another_instance_gives_the_same_bytes(fmus, model):
-    """Fixed and tunable parameters, inputs, tolerance and time go with it."""
+def test_a_state_deserialized_in_another_instance_gives_identical_results(fmus, model):
+    """The state contains fixed and tunable parameters, inputs, tolerance and time."""
     it, (before, after) = case(model), around_first_impact(model)
     mass = 1.1 * it.mechanism.values()[f"{it.body}.mass"]
     with Instance(fmus[model]).initialize(tolerance=1e-7, **{f"{it.body}__mass": mass}) as instance:
@@ -58,7 +58,7 @@ def test_a_state_through_bytes_into_another_instance_gives_the_same_bytes(fmus, 
         assert other.values()[f"{it.body}.mass"] == mass
 
 
-def test_a_state_saved_before_initialization_is_one_too(fmus):
+def test_a_state_saved_before_initialization_can_be_restored(fmus):
     with Instance(fmus["PRBDM"]) as instance:
         instance.fmu.setupExperiment(startTime=0.0)
         instance.set({"release.displacement": -0.01})
@@ -72,7 +72,7 @@ def test_a_state_saved_before_initialization_is_one_too(fmus):
 
 
 @pytest.mark.parametrize("data", [b"no state", b"[1]", b"{}", b'{"model": "Other.Other_1"}'])
-def test_a_state_of_something_else_is_refused(fmus, data):
+def test_a_state_of_another_fmu_or_interface_is_rejected(fmus, data):
     with Instance(fmus["PRBDM"]).initialize() as instance:
         state = instance.fmu.deSerializeFMUstate(data)
         instance.fmu.setFMUState(state)
@@ -82,8 +82,8 @@ def test_a_state_of_something_else_is_refused(fmus, data):
 
 
 @pytest.mark.parametrize("lost", ["clock", "snapshot", "snapshot front", "snapshot course"])
-def test_a_state_that_misses_something_is_refused_whole(fmus, lost):
-    """Nothing of it is restored, and another state can be."""
+def test_an_incomplete_state_is_rejected_as_a_whole(fmus, lost):
+    """None of its values are restored, and a complete state can be restored afterwards."""
     with Instance(fmus["PRBDM"]).initialize() as instance:
         instance.run(BEFORE)
         good = instance.fmu.getFMUState()
@@ -103,7 +103,7 @@ def test_a_state_that_misses_something_is_refused_whole(fmus, lost):
         instance.fmu.freeFMUState(good)
 
 
-def test_a_state_of_the_other_model_is_refused(fmus):
+def test_a_state_of_another_model_is_rejected(fmus):
     with Instance(fmus["PRBDM2R"]).initialize() as instance:
         state = instance.fmu.getFMUState()
         data = instance.fmu.serializeFMUstate(state)
@@ -116,7 +116,7 @@ def test_a_state_of_the_other_model_is_refused(fmus):
 
 
 @each_shipped
-def test_reset_is_a_new_instance(fmus, model):
+def test_a_reset_instance_equals_a_new_one(fmus, model):
     it = case(model)
     times = np.linspace(0.0, (0.1 if it.costly else 0.25) * it.end, 30)
     changed = {f"{it.body}__mass": 0.1, f"{it.stop}__restitution": 0.2}
@@ -133,8 +133,8 @@ def test_reset_is_a_new_instance(fmus, model):
         assert used.run(times) == expected
 
 
-def test_a_freed_state_leaves_the_instance_alone(fmus):
-    """Many states, none of them leaked into the next."""
+def test_freeing_a_state_does_not_change_the_instance(fmus):
+    """Two hundred states are saved, restored and freed in turn."""
     with Instance(fmus["PRBDM"]).initialize() as instance:
         for k in range(200):
             state = instance.fmu.getFMUState()

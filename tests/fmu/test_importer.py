@@ -1,4 +1,4 @@
-"""Native FMUs outside Python: what a C importer of our own gets from them."""
+"""Native FMUs in an importer written in C (``tests/support/importer``), outside Python."""
 
 from functools import cache
 from itertools import pairwise
@@ -14,10 +14,10 @@ from support import GUIDES, SHIPPED, case, each_shipped, mechanism, record
 
 pytestmark = pytest.mark.native
 
-ROUNDING = {"PRBDM": 1e-11, "PRBDM2RAxial": 1e-5, TWO_STOPS: 1e-5}
-"""After 14 impacts, with axial modes of 1.5e5 rad/s, after 63 impacts; others 1e-8."""
-WAYS = ((2, "cs"), (3, "cs"), (3, "events"), (2, "me"), (3, "me"))
-END = 0.3  # s; the default run bounces until 0.243 s, then it rests
+ROUND_OFF_RTOL = {"PRBDM": 1e-11, "PRBDM2RAxial": 1e-5, TWO_STOPS: 1e-5}
+"""After 14 impacts; with axial modes of 1.5e5 rad/s; after 63 impacts; for others 1e-8."""
+INTERFACES = ((2, "cs"), (3, "cs"), (3, "events"), (2, "me"), (3, "me"))
+END = 0.3  # s; the guides bounce until 0.243 s in the default run, then they rest.
 POINTS = 1e-3 * np.arange(round(END / 1e-3) + 1)
 
 
@@ -28,7 +28,7 @@ def points_of(model: str) -> np.ndarray:
 
 @cache
 def engine(model: str) -> list[dict]:
-    """Return what the engine says at the communication points."""
+    """Return the outputs of the engine at the communication points."""
     sim = Simulation(given(model))
     rows = []
     for t in points_of(model):
@@ -38,12 +38,12 @@ def engine(model: str) -> list[dict]:
 
 
 def nominals(model: str) -> dict[str, float]:
-    """Return typical magnitudes of all variables of the common interface."""
+    """Return typical magnitudes of the variables that Python and native FMUs have in common."""
     return {v.name: v.nominal or 1.0 for v in interface(given(model), {})}
 
 
 def assert_close(rows: np.ndarray, expected: list[dict], model: str, tolerance: float) -> None:
-    """Every output of the engine agrees, relative to its nominal or its own magnitude."""
+    """Check every output of the engine, relative to its nominal value or its magnitude."""
     scales = nominals(model)
     for name in expected[0]:
         wanted = np.array([float(row[name]) for row in expected])
@@ -51,21 +51,21 @@ def assert_close(rows: np.ndarray, expected: list[dict], model: str, tolerance: 
         assert np.abs(rows[name] - wanted).max() <= (tolerance * scale).max(), name
 
 
-@pytest.mark.parametrize(("fmi", "kind"), WAYS[:3])
+@pytest.mark.parametrize(("fmi", "kind"), INTERFACES[:3])
 @pytest.mark.parametrize("model", [*SHIPPED, TWO_STOPS])
-def test_the_importer_gets_what_the_engine_computes(model, fmi, kind):
-    """The same equations, the same control of steps: rounding, which impacts amplify, differs."""
+def test_a_c_importer_reads_the_values_of_the_engine(model, fmi, kind):
+    """Equations and step control are the same; impacts amplify differences of round-off."""
     expected, points = engine(model), points_of(model)
     done = run(Job(native(model, fmi), kind, points))
     rows = done.rows()
     assert (rows["at"] == points).all()
-    assert_close(rows, expected, model, ROUNDING.get(model, 1e-8))
+    assert_close(rows, expected, model, ROUND_OFF_RTOL.get(model, 1e-8))
     if model in (*GUIDES, TWO_STOPS):
         assert sum(rows[f"{stop.name}.contact"][-1] for stop in given(model).stops) == 1.0
 
 
 @each_shipped
-def test_all_kinds_of_co_simulation_show_the_same_bytes(model):
+def test_co_simulation_of_both_versions_gives_identical_bytes(model):
     def rows(fmi: int, kind: str) -> np.ndarray:
         names = [v for v in nominals(model)]
         return run(Job(native(model, fmi), kind, points_of(model), records=names)).rows()
@@ -75,7 +75,7 @@ def test_all_kinds_of_co_simulation_show_the_same_bytes(model):
 
 
 @each_shipped
-def test_event_mode_shows_each_impact_before_and_after_at_its_time(model):
+def test_event_mode_records_values_before_and_after_each_impact(model):
     it, expected = case(model), record(model)
     done = run(Job(native(model, 3), "events", points_of(model)))
     before, after = done.rows("b"), done.rows("a")
@@ -96,8 +96,8 @@ def test_event_mode_shows_each_impact_before_and_after_at_its_time(model):
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @each_shipped
-def test_a_plain_integrator_in_model_exchange_finds_the_same_motion(model, fmi):
-    """Runge and Kutta's method at 20 us, events by bisection: fourth order, so 1e-6 is ample."""
+def test_a_runge_kutta_importer_of_model_exchange_computes_the_same_motion(model, fmi):
+    """Classical Runge-Kutta steps of 20 us, events by bisection; the error is below 1e-6 m."""
     it, expected, points = case(model), engine(model), points_of(model)
     rows = run(Job(native(model, fmi), "me", points, substep=it.substep(2e-5))).rows()
     wanted = np.array([row[it.released] for row in expected])
@@ -107,8 +107,8 @@ def test_a_plain_integrator_in_model_exchange_finds_the_same_motion(model, fmi):
         assert rows["stop.contact"][-1] == 1.0
 
 
-def test_a_plain_integrator_converges_to_co_simulation_at_its_order():
-    """Across impacts with friction at two stops, for Runge and Kutta's method: four."""
+def test_a_runge_kutta_importer_converges_at_fourth_order_across_impacts():
+    """The classical Runge-Kutta method has order 4, also across impacts with friction."""
     points, steps = POINTS[:61], 2e-5 / 2 ** np.arange(4)
     folder = native(TWO_STOPS, 2)
     exact = run(Job(folder, "cs", points, tolerance=1e-12)).rows()["shuttle.x"]
@@ -122,9 +122,9 @@ def test_a_plain_integrator_converges_to_co_simulation_at_its_order():
 
 
 @pytest.mark.parametrize("how", ["save", "serialize"])
-@pytest.mark.parametrize(("fmi", "kind"), WAYS)
-def test_a_restored_state_continues_to_the_bit(fmi, kind, how):
-    """Also in another instance, from bytes; in the middle of bouncing and at rest."""
+@pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
+def test_a_restored_state_continues_bit_for_bit(fmi, kind, how):
+    """Bouncing and at rest; in the same instance or, from bytes, in another one."""
     points = 2e-3 * np.arange(141)
     job = Job(native("PRBDM", fmi), kind, points)
     whole = run(job).output
@@ -132,8 +132,8 @@ def test_a_restored_state_continues_to_the_bit(fmi, kind, how):
         assert run(job, "interrupt", k, how).output == whole
 
 
-@pytest.mark.parametrize(("fmi", "kind"), WAYS)
-def test_instances_in_threads_show_what_one_shows_alone(fmi, kind):
+@pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
+def test_instances_in_threads_equal_one_alone(fmi, kind):
     job = Job(native("PRBDM2R", fmi), kind, POINTS[:101])
     assert run(job, "threads", 8).output == run(job).output
 
@@ -144,7 +144,7 @@ def test_the_library_can_be_unloaded_and_loaded_again(fmi):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_inputs_and_tunable_parameters_act_as_in_the_engine(fmi):
+def test_inputs_and_tunable_parameters_have_the_effect_they_have_in_the_engine(fmi):
     points = 2.0 + 0.01 * np.arange(21)
     start = {"release.displacement": -0.01, "stop.position": 2e-3, "force.x": 0.05}
     changes = {
@@ -164,7 +164,7 @@ def test_inputs_and_tunable_parameters_act_as_in_the_engine(fmi):
     assert expected[-1]["stop.impact_count"] > 0
 
 
-# -- where an FMU is unpacked --
+# -- the path of the unpacked FMU --
 
 LONG = "x" * 150 + "/" + "y" * 150
 PLACES = ("with spaces", "Prüfstand µ", "a#b", "a+b", "100%20 %", "q?x=1&y", LONG)
@@ -180,7 +180,7 @@ def test_an_fmu_runs_wherever_it_is_unpacked(tmp_path, fmi, place):
 
 
 def locations(resources: Path) -> dict[str, str]:
-    """Return how importers of FMI 2.0 name the folder of the resources."""
+    """Return the forms in which importers of FMI 2.0 pass the folder of the resources."""
     uri = NATIVE.uri(resources)
     path = uri.removeprefix("file://")
     return {
@@ -193,7 +193,7 @@ def locations(resources: Path) -> dict[str, str]:
 
 
 @pytest.mark.parametrize("form", locations(Path("/")))
-def test_every_form_of_the_location_is_understood(tmp_path, form):
+def test_every_form_of_the_resource_location_is_accepted(tmp_path, form):
     folder = unpack(native("PRBDM", 2).with_suffix(".fmu"), tmp_path / "Über #1")
     location = locations(folder / "resources")[form]
     expected = run(Job(folder)).output
@@ -207,7 +207,7 @@ def test_the_path_of_the_resources_may_end_in_a_slash(fmi, slash):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_resources_that_are_not_there_are_named(tmp_path, fmi):
+def test_the_error_about_missing_resources_names_the_path(tmp_path, fmi):
     place = str(tmp_path) if fmi == 3 else NATIVE.uri(tmp_path)
     done = execute(Job(native("PRBDM", fmi), resources=place))
     assert done.status == 1

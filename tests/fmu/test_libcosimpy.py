@@ -1,4 +1,4 @@
-"""A master in C++, libcosim, runs native FMUs of FMI 2.0 side by side."""
+"""Native FMUs of FMI 2.0, coupled by libcosim, a co-simulation master in C++."""
 
 from itertools import pairwise
 
@@ -10,7 +10,7 @@ from fmu_host import OK, Instance
 
 pytestmark = pytest.mark.native
 
-STEPS, STEP = 250, 1_000_000  # ns, in which libcosim counts
+STEPS, STEP = 250, 1_000_000  # The step is in ns, the unit of libcosim.
 START = {"stop.position": 0.02, "stop.restitution": 0.8}
 WIRES = {"stop.displacement": "shuttle.x", "stop.velocity": "shuttle.vx"}
 READ = ("shuttle.x", "shuttle.vx", "stop.gap", "stop.impulse", "energy.dissipated")
@@ -21,13 +21,13 @@ def fmu(model: str) -> str:
 
 
 def reference(name: str) -> int:
-    """Return the value reference of a variable: it depends on the name only."""
+    """Return the value reference of a variable, which is the same in both FMUs."""
     variables = read_model_description(fmu("PRBDM")).modelVariables
     return next(v.valueReference for v in variables if v.name == name)
 
 
 def by_fmpy() -> list[list[float]]:
-    """Return what is read of both mechanisms at each step, with a master of a few lines."""
+    """Return the variables READ of both mechanisms after each step, with a master in Python."""
     rows = []
     with Instance(fmu("PRBDM2R"), "carrier") as carrier, Instance(fmu("PRBDM"), "guide") as guide:
 
@@ -54,7 +54,7 @@ def by_fmpy() -> list[list[float]]:
 
 
 def by_libcosim() -> list[list[float]]:
-    """Return the same by libcosim's algorithm of fixed steps."""
+    """Return the same with libcosim's fixed-step algorithm."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
     from libcosimpy.CosimObserver import CosimObserver
@@ -70,16 +70,16 @@ def by_libcosim() -> list[list[float]]:
         assert execution.real_initial_value(guide, reference(name), value)
     for to, source in WIRES.items():
         execution.connect_real_variables(carrier, reference(source), guide, reference(to))
-    rows, asked = [], [reference(name) for name in READ]
+    rows, references = [], [reference(name) for name in READ]
     for _ in range(STEPS):
         assert execution.step()
         rows.append(
-            [x for slave in (carrier, guide) for x in observer.last_real_values(slave, asked)]
+            [x for slave in (carrier, guide) for x in observer.last_real_values(slave, references)]
         )
     return rows
 
 
-def test_a_wall_that_another_mechanism_carries_is_the_same_in_both_masters():
-    """The stop of the 1R guide rides on the shuttle of the 2R guide."""
+def test_a_coupled_wall_moves_identically_in_libcosim_and_fmpy():
+    """The wall of the 1R guide moves with the shuttle of the 2R guide."""
     pytest.importorskip("libcosimpy", reason="libcosimpy is not installed (PyPI: libcosimpy)")
     assert by_libcosim() == by_fmpy()

@@ -1,4 +1,4 @@
-"""FMUs of a mechanism with what the shipped ones do not have, in every flavour."""
+"""FMUs of mechanisms with parts that the shipped ones lack, such as walls on moving bodies."""
 
 import io
 import json
@@ -41,7 +41,7 @@ def expected():
     return rows
 
 
-def test_it_is_valid_and_moves_as_the_engine(fmu, expected):
+def test_the_fmu_is_valid_and_equals_the_engine(fmu, expected):
     assert validate_fmu(str(fmu)) == []
     result = simulate_fmu(
         str(fmu), fmi_type="CoSimulation", stop_time=END, output_interval=STEP, output=OUTPUTS
@@ -69,7 +69,7 @@ def test_strains_are_locals_and_states_and_probes_are_outputs(fmu):
         assert listed["der(link[3].strain_rate)"].unit == "1/s2"
 
 
-def test_descriptions_tell_what_a_wall_is_fixed_to_and_where_a_force_acts(fmu):
+def test_descriptions_name_the_body_of_a_wall_and_the_point_of_a_force(fmu):
     listed = {v.name: v.description for v in read_model_description(str(fmu)).modelVariables}
     assert "the wall on the stage" in listed["face.displacement"]
     assert "the stage" not in listed["side.displacement"]
@@ -80,7 +80,7 @@ def test_descriptions_tell_what_a_wall_is_fixed_to_and_where_a_force_acts(fmu):
     assert "do not stretch" not in page
 
 
-def test_model_exchange_goes_as_co_simulation(fmu, expected):
+def test_model_exchange_equals_co_simulation(fmu, expected):
     description = read_model_description(str(fmu))
     if description.modelExchange is None:
         pytest.skip("co-simulation only")
@@ -93,8 +93,8 @@ def test_model_exchange_goes_as_co_simulation(fmu, expected):
         assert result[name][-1] == pytest.approx(expected[-1][name], abs=1e-6)
 
 
-def test_velocities_are_the_rates_of_displacements_where_links_stretch():
-    """Of bodies and of points, which the strain rates move, too."""
+def test_velocities_are_the_rates_of_displacements_with_stretching_links():
+    """Strain rates contribute to the velocities of bodies and of points."""
     simulation, h = Simulation(anvil(), {"solver.tolerance": 1e-12}), 1e-6
     simulation.advance(0.01)
     before = simulation.outputs()
@@ -108,15 +108,15 @@ def test_velocities_are_the_rates_of_displacements_where_links_stretch():
             assert now[f"{name}.v{axis}"] == pytest.approx(slope, rel=1e-4, abs=1e-6)
 
 
-def test_energy_is_kept_by_bodies_that_hit_rub_and_stretch(expected):
-    """What the blow puts in is moved, bent, stretched, lifted or lost; to the tolerance's 1e-6."""
+def test_energy_is_conserved_with_impacts_friction_and_stretching_links(expected):
+    """The energy balance is constant within 1e-5 of the work of the blow."""
     kept = [energy_balance(row) for row in expected]
     moved = max(abs(row["energy.work"]) for row in expected)
     assert np.ptp(kept) <= 1e-5 * moved
 
 
-def test_a_first_step_that_is_far_too_long_is_shortened():
-    """With much damping, a step that is short beside the period leads to nothing but infinities."""
+def test_a_first_step_that_is_too_long_is_shortened():
+    """With strong damping, a step that is short compared with the period gives infinities."""
     simulation = Simulation(elastic(), {"damping.beta": 1e-4})
     simulation.advance(1e-7)
     assert 0.0 < simulation.controller.h < 1e-6
@@ -125,8 +125,8 @@ def test_a_first_step_that_is_far_too_long_is_shortened():
     assert kernel.get("tip.x") == pytest.approx(simulation.outputs()["tip.x"])
 
 
-def test_what_lets_go_while_it_is_pressed_again_does_not_chatter():
-    """The force of a hammer that is dragged over its anvil touches zero and comes back."""
+def test_a_contact_whose_force_touches_zero_does_not_chatter():
+    """The contact force of a hammer dragged over its anvil reaches zero and grows again."""
     simulation = Simulation(anvil(), {"face.friction": 0.05, "rub.coefficient": 0.0})
     for k, change in ((4, {"blow.y": -0.4}), (20, {"blow.x": 0.5, "blow.moment": 1e-3})):
         simulation.advance(k * 2.5e-3)
@@ -136,6 +136,6 @@ def test_what_lets_go_while_it_is_pressed_again_does_not_chatter():
 
 
 @pytest.mark.parametrize("guide", [anvil(), elastic()], ids=lambda guide: guide.name)
-def test_a_mechanism_survives_its_way_through_json(guide):
+def test_a_mechanism_is_equal_after_a_round_trip_through_json(guide):
     data = json.loads(json.dumps(resolved(guide, ())["mechanism"]))
     assert mechanism_from(data) == guide

@@ -1,4 +1,4 @@
-"""What native FMUs say about themselves: valid by the standards, and the same in every flavour."""
+"""The model descriptions and contents of native FMUs: valid, and consistent between versions."""
 
 import csv
 import io
@@ -58,7 +58,7 @@ def member(fmu: Path, name: str) -> bytes:
         return archive.read(name)
 
 
-def test_fmpy_finds_nothing_to_complain_about(fmu):
+def test_fmpy_validation_reports_no_problem(fmu):
     assert validate_fmu(str(fmu.path)) == []
 
 
@@ -74,9 +74,9 @@ def test_all_xml_passes_the_schemas_of_the_standards(fmu):
         assert checker.validate(etree.fromstring(member(fmu.path, name))), checker.error_log
 
 
-def test_the_manifest_of_the_reference_results_has_what_the_layered_standard_demands(fmu):
+def test_the_manifest_of_reference_results_follows_the_layered_standard(fmu):
     if fmu.name in COSTLY:
-        pytest.skip("built without reference results, which take the engine long")
+        pytest.skip("built without reference results, because they take the engine minutes")
     checker = etree.XMLSchema(file=str(SCHEMAS / "fmi3" / "fmi3LayeredStandardManifest.xsd"))
     folder = "extra/org.fmi-standard.fmi-ls-ref"
     root = etree.fromstring(member(fmu.path, f"{folder}/fmi-ls-manifest.xml"))
@@ -90,7 +90,7 @@ def test_the_manifest_of_the_reference_results_has_what_the_layered_standard_dem
     assert checker.validate(root), checker.error_log
 
 
-def test_the_reference_results_are_those_of_the_python_engine(native):
+def test_reference_results_equal_the_python_engine(native):
     text = member(native["PRBDM", 2], "extra/org.fmi-standard.fmi-ls-ref/PRBDM_out.csv").decode()
     rows = list(csv.DictReader(io.StringIO(text)))
     assert [float(row["time"]) for row in rows] == pytest.approx(np.arange(1001) * 1e-3)
@@ -98,27 +98,27 @@ def test_the_reference_results_are_those_of_the_python_engine(native):
     simulation.advance(0.1)
     for name, x in simulation.outputs().items():
         if name in rows[0]:
-            # printed with nine digits; communication points before change round-off alone
+            # Printed with nine digits; the communication points before affect round-off only.
             assert float(rows[100][name]) == pytest.approx(float(x), rel=1e-7, abs=1e-9)
 
 
-def test_an_experiment_that_does_not_come_to_its_end_has_no_reference_results(monkeypatch):
+def test_a_failing_default_experiment_has_no_reference_results(monkeypatch):
     def fails(*_: object, **__: object) -> None:
         raise SimulationError("too many impacts")
 
     monkeypatch.setattr(reference, "simulate", fails)
-    told: list[str] = []
-    built = native_fmu.build(load(shipped()["PRBDM"]), fmi=3, progress=told.append)
+    reported: list[str] = []
+    built = native_fmu.build(load(shipped()["PRBDM"]), fmi=3, progress=reported.append)
     with zipfile.ZipFile(io.BytesIO(built)) as archive:
         assert not [name for name in archive.namelist() if name.startswith("extra/")]
-    assert "no reference results: the default experiment does not come to its end" in told
+    assert "no reference results: the simulation of the default experiment fails" in reported
 
 
 @each_shipped
-def test_all_flavours_have_the_same_variables(fmus, native, clocked, model):
-    """A native FMU has all variables of the Python FMU and adds what its standard demands.
+def test_native_fmus_have_all_variables_of_the_python_fmu(fmus, native, clocked, model):
+    """Native FMUs add derivatives, event indicators and, in FMI 3.0, time.
 
-    That is, among others, for its states the nominal values that their solver takes.
+    The nominal values of states differ: those of native FMUs are for the importer's solver.
     """
 
     def listed(path) -> dict[str, tuple]:
@@ -145,8 +145,8 @@ def test_all_flavours_have_the_same_variables(fmus, native, clocked, model):
         assert clock.keys() - three.keys() == {"stop.impact"}
 
 
-def test_states_their_derivatives_and_indicators_belong_together(fmu, mechanisms):
-    """As many as there are ways to move, twice, and two energies; all may jump at an event."""
+def test_states_derivatives_and_indicators_are_consistent(fmu, mechanisms):
+    """States are an angle and a rate per degree of freedom and two energies; all have reinit."""
     description = read_model_description(str(fmu.path))
     guide = mechanisms[fmu.name]
     loops = 2 * (len(guide.flexures) - len(guide.bodies))
@@ -166,8 +166,8 @@ def test_states_their_derivatives_and_indicators_belong_together(fmu, mechanisms
     assert len(indicators) == 3 * len(guide.stops) + len(guide.frictions)
 
 
-def test_parameters_are_knowns_in_fmi_3_and_are_none_in_fmi_2(fmu):
-    """By the definitions of ``dependencies`` in the two standards."""
+def test_parameters_are_knowns_in_fmi_3_but_not_in_fmi_2(fmu):
+    """The two standards define ``dependencies`` differently."""
     description = read_model_description(str(fmu.path))
     parameters = {v.name for v in description.modelVariables if v.causality == "parameter"}
     of_parameters = set()
@@ -247,8 +247,8 @@ STRICT = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Wshado
 
 @pytest.mark.skipif(sys.platform != "linux", reason="calls cc and nm as they are on Linux")
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
-def test_the_source_makes_a_library_that_needs_no_resources(native, tmp_path, fmi):
-    """As a receiver compiles it who takes headers and flags of his own."""
+def test_the_compiled_source_needs_no_resources(native, tmp_path, fmi):
+    """The source is compiled with strict warnings and the headers of the importer."""
     with zipfile.ZipFile(native["PRBDM", fmi]) as archive:
         archive.extractall(tmp_path)
     sources = tmp_path / "sources"
@@ -267,7 +267,7 @@ def test_the_source_makes_a_library_that_needs_no_resources(native, tmp_path, fm
     shutil.rmtree(tmp_path / "resources")
     result = simulate_fmu(str(tmp_path), output=["stop.impact_count"])
     assert result["stop.impact_count"][-1] == 14
-    if fmi == 3:  # the headers of FMI 2.0 that FMPy brings know no prefix
+    if fmi == 3:  # The headers of FMI 2.0 in FMPy have no function prefix.
         subprocess.run([*command, "-c", "-o", "static.o"], cwd=sources, check=True)
         found = subprocess.check_output(["nm", "-g", "--defined-only", "static.o"], cwd=sources)
         shown = {line.split()[-1] for line in found.decode().splitlines()}
@@ -276,13 +276,13 @@ def test_the_source_makes_a_library_that_needs_no_resources(native, tmp_path, fm
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_two_builds_of_one_tree_are_the_same_bytes(native, mechanisms, fmi):
+def test_two_builds_of_one_source_are_identical(native, mechanisms, fmi):
     again = native_fmu.build(load(shipped()["PRBDM2R"]), fmi=fmi)
     assert native["PRBDM2R", fmi].read_bytes() == again
 
 
-def test_the_token_is_that_of_the_content(native, mechanisms):
-    """Other start values, another version of FMI or another kernel: another token."""
+def test_the_token_depends_on_the_content(native, mechanisms):
+    """Other start values, another mechanism or another version of FMI give another token."""
     built = [native[name, fmi] for name in GUIDES for fmi in (2, 3)]
     tokens = {
         read_model_description(str(path)).guid
@@ -298,13 +298,13 @@ def test_the_token_is_that_of_the_content(native, mechanisms):
         assert token + b"\0" in member(fmu, "resources/mechanism.bin")
 
 
-def test_start_values_that_were_changed_are_in_the_description(mechanisms):
+def test_changed_start_values_are_in_the_model_description(mechanisms):
     changed = native_fmu.build(mechanisms["PRBDM"], {"stop.restitution": 0.1 + 0.2}, fmi=3)
     listed = {v.name: v for v in read_model_description(io.BytesIO(changed)).modelVariables}
     assert float(listed["stop.restitution"].start) == 0.1 + 0.2
 
 
-def test_licences_of_all_that_is_inside_are_there(fmu):
+def test_licences_of_all_contents_are_included(fmu):
     folder = "documentation/licenses/"
     with zipfile.ZipFile(fmu.path) as archive:
         names = {n.removeprefix(folder) for n in archive.namelist() if n.startswith(folder)}
@@ -317,22 +317,22 @@ def test_the_page_names_every_variable_and_state(fmu):
     page = member(fmu.path, "documentation/index.html").decode()
     for v in read_model_description(str(fmu.path)).modelVariables:
         assert f"<code>{v.name}</code>" in page, v.name
-    assert "Python" not in page.split("<h2>Use</h2>")[1].split("</p>")[1].split("no Python")[0]
+    assert "Requirements: <strong>none</strong>" in page
     assert ("fmi3UpdateDiscreteStates" in page) == (fmu.fmi == 3)
 
 
-def test_the_report_is_told_the_mechanism(fmu, mechanisms):
+def test_the_report_reads_the_mechanism_from_the_fmu(fmu, mechanisms):
     run = report.simulate(fmu.path, lambda fraction: None)
     assert run.mechanism == mechanisms[fmu.name]
     assert run.finished
-    told, it = "\n".join(report.headline(run)), case(fmu.name)
-    assert re.search(rf"impacts at {it.stop} +\d+, the first at t = 0\.", told)
+    text, it = "\n".join(report.headline(run)), case(fmu.name)
+    assert re.search(rf"impacts at {it.stop} +\d+, the first at t = 0\.", text)
     if fmu.name in GUIDES:
-        assert re.search(r"impacts at stop +14, the first at t = 0\.04", told)
-        assert re.search(r"came to rest +at t = 0\.24", told)
+        assert re.search(r"impacts at stop +14, the first at t = 0\.04", text)
+        assert re.search(r"came to rest +at t = 0\.24", text)
 
 
-def test_a_clock_without_a_stop_is_refused(tmp_path):
+def test_clocks_without_a_stop_are_rejected(tmp_path):
     text = shipped()["PRBDM"].read_text()
     text = re.sub(r"\[\[stops\]\].*?\n\n", "", text, flags=re.DOTALL)
     path = tmp_path / "mine.toml"

@@ -1,4 +1,4 @@
-"""Whatever an importer does wrong: a status that is not OK, a sentence, and nothing is lost."""
+"""Errors of an importer of a native FMU: each is logged and rejected without side effects."""
 
 import shutil
 import struct
@@ -17,8 +17,8 @@ from importer_mistakes import AT_START, LATER, STEPS
 from native_host import (
     DISCARD,
     ERROR,
+    INTERFACES,
     OK,
-    WAYS,
     Instance,
     Integrator,
     callbacks,
@@ -30,8 +30,10 @@ from standards import ALLOWED, SIGNATURES, free, raw
 from support import ROOT, SUPPORT
 
 NAN, INF = float("nan"), float("inf")
-ways = pytest.mark.parametrize(("fmi", "kind"), WAYS)
-steps = pytest.mark.parametrize(("fmi", "kind"), [*(w for w in WAYS if w[1] != "me"), (3, "late")])
+interfaces = pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
+steps = pytest.mark.parametrize(
+    ("fmi", "kind"), [*(pair for pair in INTERFACES if pair[1] != "me"), (3, "late")]
+)
 versions = pytest.mark.parametrize("fmi", [2, 3])
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
@@ -42,23 +44,23 @@ def run_after(instance: Instance) -> bytes:
     return instance.bytes()
 
 
-# -- values, the same cases and sentences as in the Python FMUs --
+# -- values: the same cases and messages as in Python FMUs --
 
 
 @pytest.mark.parametrize("case", AT_START)
-@ways
-def test_a_mistake_at_the_start_is_told_and_keeps_it_from_starting(native, case, fmi, kind):
-    """Until it is put right; then the motion is as if it had never been made."""
+@interfaces
+def test_an_invalid_start_value_is_logged_and_prevents_initialization(native, case, fmi, kind):
+    """After the correction, the motion is the same as without the invalid value."""
     name, value, sentence = AT_START[case]
     with Instance(native["PRBDM", fmi], kind).initialize() as plain:
         expected = run_after(plain)
     with Instance(native["PRBDM", fmi], kind) as instance:
-        told = instance.set({name: value}) == ERROR
-        assert told == instance.said(sentence)
+        rejected = instance.set({name: value}) == ERROR
+        assert rejected == instance.logged(sentence)
         instance.enter()
         before = len(instance.log)
         assert instance.call("ExitInitializationMode") == ERROR
-        assert instance.said(sentence)
+        assert instance.logged(sentence)
         assert len(instance.log) > before
         assert instance.log[-1][:2] == (ERROR, "logStatusError")
         assert status(instance.get, "shuttle.vx") == ERROR
@@ -73,13 +75,13 @@ def test_a_mistake_at_the_start_is_told_and_keeps_it_from_starting(native, case,
         assert run_after(instance) == expected
 
 
-@ways
-def test_links_longer_than_the_flexure_are_refused(native, fmi, kind):
+@interfaces
+def test_links_longer_than_the_flexure_are_rejected(native, fmi, kind):
     with Instance(native["PRBDM2R", fmi], kind) as instance:
         assert instance.set({"flexure.gamma1": 0.7}) == OK
         instance.enter()
         assert instance.call("ExitInitializationMode") == ERROR
-        assert instance.said("gamma0 = -0.16 < 0")
+        assert instance.logged("gamma0 = -0.16 < 0")
         assert instance.set({"flexure.gamma1": 0.1}) == OK
         instance.begin()
 
@@ -97,43 +99,45 @@ EXPERIMENTS = {
 
 
 @pytest.mark.parametrize("case", EXPERIMENTS)
-@ways
-def test_an_experiment_that_makes_no_sense_is_refused(native, case, fmi, kind):
+@interfaces
+def test_an_invalid_experiment_is_rejected(native, case, fmi, kind):
     wrong, sentence = EXPERIMENTS[case]
     with Instance(native["PRBDM", fmi], kind) as instance:
         assert status(lambda: instance.enter(**wrong)) == ERROR
-        assert instance.said(sentence), instance.messages
+        assert instance.logged(sentence), instance.messages
         if fmi == 2:
             assert instance.call("EnterInitializationMode") == ERROR
-            assert instance.said("call fmi2SetupExperiment first, with values that it accepts")
+            assert instance.logged("call fmi2SetupExperiment first, with valid values")
         instance.enter().begin()
         assert instance.values()["stop.impact_count"] == 0
 
 
 @steps
-def test_a_step_beyond_the_stop_time_is_refused(native, fmi, kind):
+def test_a_step_beyond_the_stop_time_is_rejected(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind).initialize(stop=0.01) as instance:
         instance.advance(0.01)
         here = instance.bytes()
         assert instance.step(0.01, 1e-3) == ERROR
-        assert instance.said("the step would end at t = 0.011 s, but stopTime = 0.01 s")
+        assert instance.logged("the step would end at t = 0.011 s, but stopTime = 0.01 s")
         assert instance.bytes() == here
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_steps_whose_sum_is_a_rounding_past_the_stop_time_are_made(native, fmi):
-    """An importer that adds up 1e5 steps ends 2e-12 s late, a part of 2e-7 of its step."""
+def test_round_off_in_the_sum_of_steps_may_exceed_the_stop_time(native, fmi):
+    """The sum of 1e5 steps is 2e-12 s late, 2e-7 of a step."""
     with Instance(native["PRBDM", fmi], "cs").initialize(stop=0.1) as instance:
         instance.advance(0.1 - 1e-6)
         late = 0.1 - 1e-6 + 1e-10
-        assert instance.step(late, 1e-6) == DISCARD, "it does not begin where the last one ended"
+        assert instance.step(late, 1e-6) == DISCARD, (
+            "a step that does not begin at the present time"
+        )
         assert instance.step(0.1 - 1e-6, 1e-6 + 5e-10) == OK
         assert instance.step(0.1 + 5e-10, 1e-6) == ERROR
 
 
 @pytest.mark.parametrize("case", LATER)
-@ways
-def test_a_mistake_on_the_way_stops_the_run_until_it_is_put_right(native, case, fmi, kind):
+@interfaces
+def test_an_invalid_value_rejects_steps_until_it_is_corrected(native, case, fmi, kind):
     name, value, sentence = LATER[case]
     with Instance(native["PRBDM", fmi], kind).initialize() as instance:
         instance.advance(1e-3)
@@ -141,14 +145,14 @@ def test_a_mistake_on_the_way_stops_the_run_until_it_is_put_right(native, case, 
         if kind != "cs":
             instance.fmu.enterEventMode()
         assert instance.set({name: value}) == ERROR
-        assert instance.said(sentence), instance.messages
+        assert instance.logged(sentence), instance.messages
         assert instance.values() == before
         update = instance.function("newDiscreteStates", "updateDiscreteStates") \
             if kind != "cs" else None  # fmt: skip
-        refused = (lambda: instance.step(1e-3, 1e-3)) if kind == "cs" else lambda: status(update)
+        rejected = (lambda: instance.step(1e-3, 1e-3)) if kind == "cs" else lambda: status(update)
         for _ in range(2):
-            assert refused() in (DISCARD, ERROR)
-            assert instance.said(f"{name} was set to what is refused and is still")
+            assert rejected() in (DISCARD, ERROR)
+            assert instance.logged(f"{name} was set to a rejected value and is still")
         assert instance.values() == before
         assert instance.set({name: before[name]}) == OK
         if kind != "cs":
@@ -158,13 +162,13 @@ def test_a_mistake_on_the_way_stops_the_run_until_it_is_put_right(native, case, 
 
 @steps
 @pytest.mark.parametrize("case", STEPS)
-def test_a_step_that_makes_no_sense_is_refused_and_the_next_one_is_not(native, case, fmi, kind):
+def test_an_invalid_step_is_rejected_and_a_valid_one_succeeds_afterwards(native, case, fmi, kind):
     time, size, sentence = STEPS[case]
     with Instance(native["PRBDM", fmi], kind).initialize() as instance:
         instance.advance(1e-3)
         before = instance.bytes()
         assert instance.step(time, size) == DISCARD
-        assert instance.said(sentence), instance.messages
+        assert instance.logged(sentence), instance.messages
         assert instance.log[-1][:2] == (DISCARD, "logStatusDiscard")
         assert instance.bytes() == before
         instance.advance(2e-3)
@@ -177,15 +181,15 @@ CHATTER = {
 
 
 @pytest.mark.parametrize(("fmi", "kind"), [(2, "cs"), (3, "cs"), (3, "late")])
-def test_a_step_that_cannot_be_finished_leaves_everything_as_it_was(native, fmi, kind):
-    """Thousands of impacts in no time; what the sentence advises helps."""
+def test_a_failed_step_leaves_the_state_unchanged(native, fmi, kind):
+    """Thousands of impacts in a short time fail; the remedy in the message works."""
     rows = []
     for tried in (True, False):
         with Instance(native["PRBDM", fmi], kind).initialize(values=CHATTER) as instance:
             before = instance.bytes()
             if tried:
                 assert instance.step(0.0, 0.01) == DISCARD
-                assert instance.said("chatters; raise rest_speed")
+                assert instance.logged("chatters; raise rest_speed")
                 assert instance.bytes() == before
             instance.change({"stop.rest_speed": 1.0})
             rows += instance.run([0.01])
@@ -193,8 +197,8 @@ def test_a_step_that_cannot_be_finished_leaves_everything_as_it_was(native, fmi,
     assert rows[0] == rows[1]
 
 
-def test_what_became_of_a_refused_step_can_be_asked(native):
-    """So that an importer that gets fmi2Discard, as FMPy, ends instead of trying for ever."""
+def test_the_status_of_a_rejected_step_can_be_read(native):
+    """After fmi2Discard, importers such as FMPy read fmi2Terminated and end the simulation."""
     with Instance(native["PRBDM", 2]).initialize() as instance:
         assert instance.step(0.0, 1e-3) == OK
         assert (instance.fmu.getStatus(0), instance.fmu.getBooleanStatus(3)) == (OK, False)
@@ -205,15 +209,15 @@ def test_what_became_of_a_refused_step_can_be_asked(native):
         kinds = [("Status", 2), ("RealStatus", 0), ("IntegerStatus", 0), ("BooleanStatus", 1)]
         for getter, kind in [*kinds, ("StringStatus", 0), ("Status", 77)]:
             assert status(getattr(instance.fmu, f"get{getter}"), kind) == DISCARD
-            assert "does not tell" in instance.messages[-1]
+            assert "does not provide" in instance.messages[-1]
 
 
 @versions
-def test_parameters_of_model_exchange_wait_for_event_mode(native, fmi):
+def test_model_exchange_accepts_parameters_in_event_mode_only(native, fmi):
     with Instance(native["PRBDM", fmi], "me").initialize() as instance:
         assert instance.set({"force.x": 0.1}) == OK
         assert instance.set({"stop.restitution": 0.5}) == ERROR
-        assert instance.said("stop.restitution is a parameter: it can be set in Event Mode, not in")
+        assert instance.logged("stop.restitution is a parameter: it can be set in Event Mode")
         assert status(Integrator(instance).slope, 0.0, Integrator(instance).x()) == ERROR
         instance.fmu.enterEventMode()
         assert instance.set({"stop.restitution": 0.5}) == OK
@@ -222,40 +226,40 @@ def test_parameters_of_model_exchange_wait_for_event_mode(native, fmi):
 
 
 @versions
-def test_states_of_model_exchange_are_numbers_set_in_continuous_time_mode(native, fmi):
+def test_states_must_be_finite_and_are_set_in_continuous_time_mode(native, fmi):
     with Instance(native["PRBDM", fmi], "me").initialize() as instance:
         here, integrator = instance.bytes(), Integrator(instance)
         x = integrator.x()
         assert status(integrator.put, 0.0, np.full(len(x), NAN)) == DISCARD
-        assert instance.said("link[2].angle = nan must be a finite number")
+        assert instance.logged("link[2].angle = nan must be a finite number")
         assert status(integrator.put, INF, x) == ERROR
-        assert instance.said("time = inf s must be a finite number")
+        assert instance.logged("time = inf s must be a finite number")
         assert instance.set({"link[2].angle": NAN}) == DISCARD
         for count in (0, len(x) - 1, len(x) + 1):
             values = (c_double * 9)()
             assert instance.call("SetContinuousStates", values, count) == ERROR
-            assert instance.said(f"there are {len(x)} continuous states, not {count}")
+            assert instance.logged(f"there are {len(x)} continuous states, not {count}")
             assert instance.call("GetContinuousStates", values, count) == ERROR
             assert instance.call("GetEventIndicators", values, count) == ERROR
-            assert instance.said(f"there are 4 event indicators, not {count}")
+            assert instance.logged(f"there are 4 event indicators, not {count}")
         assert instance.bytes() == here
         instance.fmu.enterEventMode()
         assert instance.set({"link[2].angle": 0.1}) == ERROR
-        assert instance.said("link[2].angle is a state: it can be set in Continuous-Time Mode only")
+        assert instance.logged("link[2].angle is a state: it can be set in Continuous-Time Mode")
         assert instance.bytes() == here
 
 
 @versions
-def test_a_shape_that_the_states_do_not_determine_is_discarded_with_a_remedy(native, fmi):
-    """A parallelogram laid flat; an integrator may try again with a shorter step."""
+def test_a_singular_shape_is_discarded_with_a_remedy(native, fmi):
+    """The shape is a flat parallelogram; the integrator can repeat the step with a shorter one."""
     with Instance(native["PRBDM", fmi], "me").initialize() as instance:
         integrator, here = Integrator(instance), instance.bytes()
         x = integrator.x()
         flat = x.copy()
         flat[0] = 0.0
         assert status(integrator.slope, 0.0, flat) == DISCARD
-        assert instance.said("do not determine the other angles")
-        assert instance.said("use co-simulation")
+        assert instance.logged("do not determine the other angles")
+        assert instance.logged("use co-simulation")
         assert instance.log[-1][:2] == (DISCARD, "logStatusDiscard")
         assert status(instance.get, "shuttle.y") == DISCARD
         integrator.put(0.0, x)
@@ -264,50 +268,50 @@ def test_a_shape_that_the_states_do_not_determine_is_discarded_with_a_remedy(nat
 
 
 @versions
-def test_derivatives_of_or_along_what_has_none_are_refused(native, fmi):
+def test_invalid_directional_derivatives_are_rejected(native, fmi):
     with Instance(native["PRBDM", fmi], "me").initialize() as instance:
-        r, ask = instance.references, instance.fmu.getDirectionalDerivative
+        r, derivative = instance.references, instance.fmu.getDirectionalDerivative
         good = [r["shuttle.x"]], [r["link[2].angle"]], [1.0]
-        value = ask(*good)
+        value = derivative(*good)
         for unknowns, knowns, sentence in (
             (["stop.contact"], ["force.x"], "stop.contact has no derivative"),
             (["shuttle.mass"], ["force.x"], "shuttle.mass has no derivative"),
             (
                 ["shuttle.x"],
                 ["shuttle.mass"],
-                "no derivative with respect to shuttle.mass: it is no",
+                "no derivative with respect to shuttle.mass: the knowns are inputs and states",
             ),
             (["shuttle.x"], ["shuttle.y"], "no derivative with respect to shuttle.y"),
         ):
             numbers = [r[n] for n in unknowns], [r[n] for n in knowns], [1.0]
-            assert status(ask, *numbers) == ERROR
-            assert instance.said(sentence), instance.messages
-        assert status(ask, [12345], [r["force.x"]], [1.0]) == ERROR
-        assert status(ask, [r["shuttle.x"]], [12345], [1.0]) == ERROR
-        assert instance.said("12345 is not in modelDescription.xml: it has no derivative")
-        assert instance.said("12345 is not in modelDescription.xml: there is no derivative with")
-        assert ask(*good) == value
-        assert ask(good[0], [], []) == [0.0]
-        assert ask([], [], []) == []
+            assert status(derivative, *numbers) == ERROR
+            assert instance.logged(sentence), instance.messages
+        assert status(derivative, [12345], [r["force.x"]], [1.0]) == ERROR
+        assert status(derivative, [r["shuttle.x"]], [12345], [1.0]) == ERROR
+        assert instance.logged("12345 is not in modelDescription.xml: it has no derivative")
+        assert instance.logged("12345 is not in modelDescription.xml: there is no derivative with")
+        assert derivative(*good) == value
+        assert derivative(good[0], [], []) == [0.0]
+        assert derivative([], [], []) == []
 
 
 # -- references and types --
 
 
-@ways
-def test_what_no_value_puts_right_asks_for_a_reset(native, fmi, kind):
+@interfaces
+def test_errors_that_no_value_corrects_ask_for_a_reset(native, fmi, kind):
     set_integer = {2: "setInteger", 3: "setInt32"}[fmi]
     for wrong, sentence in (
         (lambda it: getattr(it.fmu, set_integer)([it.references["stop.impact_count"]], [3]),
-         "impact_count is no parameter or"),
+         "impact_count is not a parameter or"),
         (lambda it: it.function("setReal", "setFloat64")([12345], [3.0]),
          "value reference 12345 is not in modelDescription.xml: it cannot be set"),
         (lambda it: it.function("setReal", "setFloat64")([it.references["shuttle.x"]], [0.1]),
-         "shuttle.x is no parameter or input"),
+         "shuttle.x is not a parameter or input"),
     ):  # fmt: skip
         with Instance(native["PRBDM", fmi], kind).enter() as instance:
             assert status(wrong, instance) == ERROR
-            assert instance.said(sentence), instance.messages
+            assert instance.logged(sentence), instance.messages
             assert "reset the instance" in instance.messages[-1]
             assert instance.call("ExitInitializationMode") == ERROR
             assert "reset the instance" in instance.messages[-1]
@@ -317,7 +321,7 @@ def test_what_no_value_puts_right_asks_for_a_reset(native, fmi, kind):
 
 
 @versions
-def test_a_set_of_the_wrong_type_is_put_right_by_one_of_the_right_type(native, fmi):
+def test_a_set_of_the_wrong_type_is_corrected_by_one_of_the_right_type(native, fmi):
     name = {2: "Real", 3: "Float64"}[fmi]
     others = {2: ["Integer", "Boolean", "String"],
               3: ["Int32", "Boolean", "String", "Float32", "Int8", "UInt8", "Int16", "UInt16",
@@ -327,7 +331,7 @@ def test_a_set_of_the_wrong_type_is_put_right_by_one_of_the_right_type(native, f
             value = {"String": "1", "Binary": b"1"}.get(kind, 1)
             setter = getattr(instance.fmu, f"set{kind}")
             assert status(setter, [instance.references["force.x"]], [value]) == ERROR
-            assert instance.said(f"force.x is of type {name}: set it with fmi{fmi}Set{name}")
+            assert instance.logged(f"force.x is of type {name}: set it with fmi{fmi}Set{name}")
             assert instance.step(k * 1e-3, 1e-3) == DISCARD
             assert instance.set({"force.x": 0.0}) == OK
             assert instance.step(k * 1e-3, 1e-3) == OK
@@ -344,8 +348,8 @@ WRONG_GETS = {
 }  # fmt: skip
 
 
-@ways
-def test_a_wrong_get_is_an_error_and_harms_nothing(native, fmi, kind):
+@interfaces
+def test_a_get_of_the_wrong_type_is_an_error_and_changes_nothing(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind).initialize() as instance:
         before = instance.bytes()
         for getter, names in WRONG_GETS[fmi].items():
@@ -360,22 +364,22 @@ def test_a_wrong_get_is_an_error_and_harms_nothing(native, fmi, kind):
         instance.advance(1e-3)
 
 
-@ways
-def test_computed_values_are_not_known_before_initialization(native, fmi, kind):
+@interfaces
+def test_computed_variables_have_no_value_before_initialization(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind) as instance:
         assert status(instance.get, "shuttle.x") == ERROR
-        assert instance.said("shuttle.x is computed when the instance is initialized")
+        assert instance.logged("shuttle.x is computed when the instance is initialized")
         assert instance.get("shuttle.mass") == [float(instance.variables["shuttle.mass"].start)]
 
 
-def test_as_many_values_as_references_in_fmi_3(native):
+def test_fmi_3_requires_as_many_values_as_references(native):
     with Instance(native["PRBDM", 3]).initialize() as instance:
         references = (c_uint32 * 2)(*[instance.references[n] for n in ("force.x", "force.y")])
         values = (c_double * 3)(1.0, 2.0, 3.0)
         for count in (0, 1, 3):
             for call in ("GetFloat64", "SetFloat64"):
                 assert instance.call(call, references, 2, values, count) == ERROR
-                assert instance.said(f"fmi3{call}: 2 value references, but {count} values")
+                assert instance.logged(f"fmi3{call}: 2 value references, but {count} values")
         assert instance.get("force.x", "force.y") == [0.0, 0.0]
 
 
@@ -402,12 +406,12 @@ def at(native, fmi: int, kind: str, place: str) -> Instance:
     return instance
 
 
-@pytest.mark.parametrize(("fmi", "kind", "place"), [(fmi, kind, place) for fmi, kind in WAYS
+@pytest.mark.parametrize(("fmi", "kind", "place"), [(fmi, kind, place) for fmi, kind in INTERFACES
                                                     for place in PLACES[kind]])  # fmt: skip
-def test_a_call_in_the_wrong_state_says_what_to_call_first(native, fmi, kind, place):
-    """Every function of the standard, against its table of what is allowed when.
+def test_a_call_in_the_wrong_state_names_the_call_that_must_precede(native, fmi, kind, place):
+    """Every function is called in every state and compared with the tables of the standard.
 
-    Pointers are NULL, so that what is allowed is refused for another reason, or does nothing.
+    Pointers are NULL, so an allowed call is rejected for another reason or does nothing.
     """
     for name in SIGNATURES[fmi]:
         with at(native, fmi, kind, place) as instance:
@@ -430,7 +434,7 @@ def test_a_call_in_the_wrong_state_says_what_to_call_first(native, fmi, kind, pl
 
 
 @versions
-def test_no_instance_at_all_is_an_error_everywhere(native, fmi):
+def test_a_null_instance_is_an_error_in_every_function(native, fmi):
     with Instance(native["PRBDM", fmi]) as instance:
         for name in SIGNATURES[fmi]:
             assert raw(instance, name, instance=None) == ERROR, name
@@ -438,30 +442,29 @@ def test_no_instance_at_all_is_an_error_everywhere(native, fmi):
         assert not instance.log
 
 
-@ways
-def test_nothing_to_get_or_set_is_fine_and_nowhere_to_put_it_is_not(native, fmi, kind):
-    """Arrays of length zero may be NULL, others may not."""
+@interfaces
+def test_null_arrays_are_valid_for_length_zero_only(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind).initialize() as instance:
         before = instance.bytes()
         for kind_of in ("Real", "Integer", "Boolean", "String") if fmi == 2 else \
                 ("Float64", "Int32", "Boolean", "String", "UInt64"):  # fmt: skip
-            for way in ("Get", "Set"):
-                if raw(instance, way + kind_of) != OK:
+            for access in ("Get", "Set"):
+                if raw(instance, access + kind_of) != OK:
                     assert "cannot be called in Continuous-Time Mode" in instance.messages[-1]
                     continue
                 several = [c_void_p(), c_size_t(3), c_void_p()] + [c_size_t(3)] * (fmi == 3)
-                function = instance.fmu.dll[f"fmi{fmi}{way}{kind_of}"]
+                function = instance.fmu.dll[f"fmi{fmi}{access}{kind_of}"]
                 assert function(c_void_p(instance.fmu.component), *several) == ERROR
                 assert "was called with a pointer that is NULL" in instance.messages[-1]
         assert instance.bytes() == before
         instance.advance(1e-3)
 
 
-def test_where_nothing_can_be_told_of_a_step_it_is_not_made(native):
+def test_a_step_with_null_result_pointers_is_rejected(native):
     with Instance(native["PRBDM", 3]).initialize() as instance:
         before = instance.saved()
         assert instance.call("DoStep", 0.0, 1e-3, True, None, None, None, None) == ERROR
-        assert instance.said("fmi3DoStep was called with a pointer that is NULL")
+        assert instance.logged("fmi3DoStep was called with a pointer that is NULL")
         assert instance.saved() == before
 
 
@@ -484,7 +487,7 @@ REASONS = {
 
 
 @versions
-def test_what_this_fmu_does_not_have_says_why(native, fmi):
+def test_unsupported_functions_log_the_reason(native, fmi):
     with Instance(native["PRBDM", fmi]).initialize() as instance:
         for name, reason in REASONS[fmi].items():
             assert raw(instance, name) == ERROR
@@ -495,34 +498,34 @@ def test_what_this_fmu_does_not_have_says_why(native, fmi):
 
 
 def instantiated(fmu: Path, kind: str = "cs", **options) -> list[str]:
-    """Return what is said by an instance that is not made."""
-    heard: list[str] = []
+    """Return the messages of an instantiation that fails."""
+    messages: list[str] = []
 
-    class Heard(Instance):
+    class FailingInstance(Instance):
         def _instantiate(self, *arguments) -> None:
             try:
                 super()._instantiate(*arguments)
             finally:
-                heard.extend(self.messages)
+                messages.extend(self.messages)
 
     with pytest.raises(Exception, match="Failed to instantiate"):
-        Heard(fmu, kind, **options)
-    return heard
+        FailingInstance(fmu, kind, **options)
+    return messages
 
 
-@ways
-def test_a_wrong_token_is_refused(native, fmi, kind):
-    """A sentence that is a format, too, is passed on as it is; a # is doubled for FMI 2.0."""
+@interfaces
+def test_a_wrong_token_is_rejected(native, fmi, kind):
+    """Format characters in a message are kept, and # is doubled."""
     for token in ("", "{00000000-0000-0000-0000-000000000000}", "100 %s%n of #x#"):
-        (said,) = instantiated(native["PRBDM", fmi], kind, guid=token)
+        (message,) = instantiated(native["PRBDM", fmi], kind, guid=token)
         word = "GUID" if fmi == 2 else "instantiation token"
-        assert said.startswith(
-            f"the {word} {token.replace('#', '##')} is not the one of the tables"
+        assert message.startswith(
+            f"the {word} {token.replace('#', '##')} differs from that of the tables"
         )
 
 
 @versions
-def test_a_token_or_a_name_that_is_null_does_no_harm(native, fmi):
+def test_null_names_tokens_and_locations_do_not_crash(native, fmi):
     with Instance(native["PRBDM", fmi]) as instance:
         function = instance.fmu.dll[{2: "fmi2Instantiate", 3: "fmi3InstantiateModelExchange"}[fmi]]
         function.restype = c_void_p
@@ -547,7 +550,7 @@ def test_a_token_or_a_name_that_is_null_does_no_harm(native, fmi):
 
 @pytest.fixture
 def copied(native, tmp_path):
-    """Return a function that gives the folder of an FMU with other tables."""
+    """Return a function that copies an FMU, replaces its tables and returns the folder."""
 
     def copy(fmi: int, tables: bytes | None) -> Path:
         folder = tmp_path / f"copy{len([*tmp_path.iterdir()])}"
@@ -563,74 +566,72 @@ def tables_of(native, fmi: int, model: str = "PRBDM") -> bytes:
     return (unpacked(native[model, fmi])[0] / "resources" / "mechanism.bin").read_bytes()
 
 
-def sealed(tables: bytes) -> bytes:
+def with_checksum(tables: bytes) -> bytes:
     return tables[:12] + struct.pack("<I", zlib.crc32(tables[16:])) + tables[16:]
 
 
-@ways
-def test_tables_that_are_missing_or_damaged_are_told(native, copied, fmi, kind):
+@interfaces
+def test_missing_or_damaged_tables_are_rejected_with_the_reason(native, copied, fmi, kind):
     good = tables_of(native, fmi)
-    assert sealed(good) == good
-    cases = {
-        "there is no file": None, "mechanism.bin": b"", "another model": tables_of(native, 5 - fmi),
-    }  # fmt: skip
-    (said,) = instantiated(copied(fmi, cases["there is no file"]), kind)
-    assert said.startswith("the tables of the mechanism cannot be opened; unpack the whole FMU")
-    assert "resources/mechanism.bin" in said
+    assert with_checksum(good) == good
+    (message,) = instantiated(copied(fmi, None), kind)
+    assert message.startswith("the tables of the mechanism cannot be opened; unpack the whole FMU")
+    assert "resources/mechanism.bin" in message
     flipped = bytearray(good)
     flipped[len(good) // 2] ^= 1
     not_a_number = good.replace(struct.pack("<d", 0.04), struct.pack("<d", NAN))
     assert not_a_number != good
-    for bad in (b"", b"PRBM", good[:-1], good + b"x", bytes(flipped), sealed(not_a_number),
-                sealed(good[:4] + struct.pack("<I", 1) + good[8:]), b"x" * (17 << 20)):  # fmt: skip
-        (said,) = instantiated(copied(fmi, bad), kind)
-        assert "tables" in said or "mechanism" in said, said
-    (said,) = instantiated(copied(fmi, tables_of(native, 5 - fmi)), kind)
-    assert "belong to different FMUs" in said
-    (said,) = instantiated(copied(fmi, tables_of(native, fmi, "PRBDM2R")), kind)
-    assert "belong to different FMUs" in said
+    other_version = with_checksum(good[:4] + struct.pack("<I", 1) + good[8:])
+    for bad in (b"", b"PRBM", good[:-1], good + b"x", bytes(flipped), with_checksum(not_a_number),
+                other_version, b"x" * (17 << 20)):  # fmt: skip
+        (message,) = instantiated(copied(fmi, bad), kind)
+        assert "tables" in message or "mechanism" in message, message
+    (message,) = instantiated(copied(fmi, tables_of(native, 5 - fmi)), kind)
+    assert "belong to different FMUs" in message
+    (message,) = instantiated(copied(fmi, tables_of(native, fmi, "PRBDM2R")), kind)
+    assert "belong to different FMUs" in message
 
 
 @versions
-def test_an_fmu_that_was_not_unpacked_with_umlauts_and_percent_signs_is(native, tmp_path, fmi):
+def test_an_fmu_runs_from_a_path_with_umlauts_and_percent_signs(native, tmp_path, fmi):
     folder = tmp_path / "für 100 %20 #1"
     shutil.copytree(unpacked(native["PRBDM", fmi])[0], folder)
     with Instance(folder).initialize() as instance:
         instance.advance(1e-3)
 
 
-def test_what_is_asked_of_intermediate_updates_must_exist(native):
-    (said,) = instantiated(native["PRBDM", 3], requiredIntermediateVariables=[12345])
-    assert said.startswith("requiredIntermediateVariables has an entry that is not in")
+def test_required_intermediate_variables_must_exist(native):
+    (message,) = instantiated(native["PRBDM", 3], requiredIntermediateVariables=[12345])
+    assert message.startswith("requiredIntermediateVariables has an entry that is not in")
 
 
-def test_an_fmu_with_clocks_wants_event_mode():
-    """As the standard does; and clocks are read in Event Mode, and never set."""
+def test_an_fmu_with_clocks_requires_event_mode():
+    """As the standard requires; clocks can be read in Event Mode and cannot be set."""
     path = clocked("PRBDM")
-    (said,) = instantiated(path, "cs")
-    assert "instantiate it with eventModeUsed = true" in said
+    (message,) = instantiated(path, "cs")
+    assert "instantiate it with eventModeUsed = true" in message
     with Instance(path, "events").initialize() as instance:
         (clock,) = (v for v in instance.description.modelVariables if v.type == "Clock")
         reference = [clock.valueReference]
         assert status(instance.fmu.getClock, reference) == ERROR
-        assert instance.said("fmi3GetClock cannot be called in Step Mode: call fmi3EnterEventMode")
+        assert instance.logged("fmi3GetClock cannot be called in Step Mode: call fmi3Enter")
         assert status(instance.fmu.getFloat64, reference) == ERROR
-        assert instance.said("stop.impact is of type Clock: get it with fmi3GetClock")
+        assert instance.logged("stop.impact is of type Clock: get it with fmi3GetClock")
         instance.fmu.enterEventMode()
         assert status(instance.fmu.getClock, [instance.references["force.x"]]) == ERROR
-        assert instance.said("force.x is of type Float64: get it with fmi3GetFloat64")
+        assert instance.logged("force.x is of type Float64: get it with fmi3GetFloat64")
         assert instance.fmu.getClock(reference) == [False]
         assert status(instance.fmu.setClock, reference, [True]) == ERROR
-        assert instance.said("stop.impact is no parameter or input: it cannot be set")
+        assert instance.logged("stop.impact is not a parameter or input: it cannot be set")
 
 
-def test_scheduled_execution_is_refused_with_a_reason(native):
+def test_scheduled_execution_is_rejected_with_a_reason(native):
     with Instance(native["PRBDM", 3]) as instance:
         function = instance.fmu.dll["fmi3InstantiateScheduledExecution"]
         function.restype = c_void_p
-        heard = instance.fmu.logMessage
+        logger = instance.fmu.logMessage
         null = c_void_p()
-        assert not function(c_char_p(b"it"), null, null, c_int(0), c_int(1), null, heard, null,
+        assert not function(c_char_p(b"it"), null, null, c_int(0), c_int(1), null, logger, null,
                             null, null)  # fmt: skip
         assert "has no partitions to schedule" in instance.messages[-1]
     with Instance(native["PRBDM", 3], "cs").initialize() as instance:
@@ -642,16 +643,16 @@ def test_scheduled_execution_is_refused_with_a_reason(native):
 # -- the log --
 
 
-@ways
-def test_log_categories_are_honoured_and_others_are_refused(native, fmi, kind):
+@interfaces
+def test_log_categories_filter_messages_and_unknown_ones_are_rejected(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind, logging=False).initialize() as instance:
         categories = instance.fmu.setDebugLogging
         instance.advance(0.05)
         assert not instance.log
         assert status(categories, True, ["logStatusError", "logNonsense"]) == ERROR
-        told = [text for _, _, text in instance.log]
-        assert not told or "no log category logNonsense" in told[0]  # errors may be off
-        assert len(told) == (fmi == 2)
+        texts = [text for _, _, text in instance.log]
+        assert not texts or "unknown log category logNonsense" in texts[0]
+        assert len(texts) == (fmi == 2)  # FMI 3.0 does not log errors without logging.
         instance.log.clear()
         assert status(categories, True, ["logEvents"]) == OK
         instance.advance(0.12)
@@ -673,15 +674,15 @@ def test_log_categories_are_honoured_and_others_are_refused(native, fmi, kind):
         assert {"logEvents", "logStatusError", "logStatusDiscard"} <= declared
 
 
-def test_a_logger_that_formats_nothing_shows_messages_whole(native):
-    """As those written in languages without C's variable arguments, in FMI 2.0."""
-    told = []
+def test_a_logger_without_formatting_receives_complete_messages(native):
+    """Loggers of FMI 2.0 in languages without C's variable arguments do not format messages."""
+    messages = []
 
     def log(_, name, status, category, text):
-        told.append(text.decode())
+        messages.append(text.decode())
 
     listening = fmi2.fmi2CallbackFunctions()
-    listening.logger = fmi2.fmi2CallbackLoggerTYPE(log)  # which FMPy's proxy does not format
+    listening.logger = fmi2.fmi2CallbackLoggerTYPE(log)  # Without FMPy's formatting proxy.
     listening.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
     listening.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
     folder, description = unpacked(native["PRBDM", 2])
@@ -695,17 +696,17 @@ def test_a_logger_that_formats_nothing_shows_messages_whole(native):
     slave.exitInitializationMode()
     slave.doStep(0.0, 0.05)
     slave.freeInstance()
-    assert told[-1].startswith("impact 1 at stop, t = 0.041")
+    assert messages[-1].startswith("impact 1 at stop, t = 0.041")
 
 
-@ways
+@interfaces
 def test_impacts_are_logged_with_their_numbers(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind).initialize() as instance:
         instance.advance(0.05)
         values = instance.values()
-        ((code, category, told),) = instance.log
+        ((code, category, text),) = instance.log
     assert (code, category) == (OK, "logEvents")
-    assert told == (
+    assert text == (
         f"impact 1 at stop, t = {values['stop.impact_time']:.9g} s: closing at "
         f"{values['stop.approach_speed']:.6g} m/s, opening at {values['stop.rebound_speed']:.6g} "
         f"m/s, {values['stop.energy_lost']:.6g} J lost"
@@ -713,7 +714,7 @@ def test_impacts_are_logged_with_their_numbers(native, fmi, kind):
 
 
 @versions
-def test_fmpy_stops_and_shows_the_reason(native, fmi, capfd):
+def test_fmpy_stops_and_prints_the_reason(native, fmi, capfd):
     callbacks()
     with pytest.raises(FMICallException, match="failed with status 3"):
         simulate_fmu(
@@ -722,7 +723,7 @@ def test_fmpy_stops_and_shows_the_reason(native, fmi, capfd):
     assert "stop.restitution = 1.5 must be at most 1" in capfd.readouterr().out
 
 
-# -- all of it, often --
+# -- repetition --
 
 SURVIVAL = """
 import sys
@@ -741,19 +742,19 @@ def python(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
     )  # fmt: skip
 
 
-@ways
-def test_the_process_survives_thousands_of_wrong_calls(native, fmi, kind):
-    """Ten thousand over all interfaces: of every function, in any order and in every state.
+@interfaces
+def test_the_process_survives_thousands_of_invalid_calls(native, fmi, kind):
+    """Ten thousand calls over all interfaces, of every function in random order and every state.
 
-    With NULLs, wrong references, lengths and numbers.
+    Arguments are NULL pointers and invalid references, lengths and numbers.
     """
-    done = python(SURVIVAL, native["PRBDM2R", fmi], kind, 10_000 // len(WAYS))
+    done = python(SURVIVAL, native["PRBDM2R", fmi], kind, 10_000 // len(INTERFACES))
     assert done.returncode == 0, done.stderr[-2000:]
     assert 1_000 < int(done.stdout) < 2_000
 
 
-@ways
-def test_mistake_after_mistake_in_one_instance_and_then_it_works(native, fmi, kind):
+@interfaces
+def test_an_instance_works_after_repeated_errors_and_resets(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind).initialize() as plain:
         expected = run_after(plain)
     with Instance(native["PRBDM", fmi], kind) as instance:
@@ -773,8 +774,8 @@ def test_mistake_after_mistake_in_one_instance_and_then_it_works(native, fmi, ki
         assert run_after(instance) == expected
 
 
-def test_the_address_of_a_state_is_not_needed_to_free_it_twice(native):
-    """A state that was freed is NULL, and NULL may be freed."""
+def test_a_state_can_be_freed_twice(native):
+    """The first call sets the state to NULL, and NULL may be freed."""
     with Instance(native["PRBDM", 3]).initialize() as instance:
         state = instance.fmu.getFMUState()
         for _ in range(3):

@@ -1,4 +1,4 @@
-"""A native FMU does what the engine does, through every interface that it has."""
+"""A native FMU computes the same values as the engine through every interface."""
 
 import threading
 from ctypes import c_double
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from native_host import OK, WAYS, Instance, Integrator, clocked, unpacked
+from native_host import INTERFACES, OK, Instance, Integrator, clocked, unpacked
 from prbm.base.atomic import write
 from prbm.fmu import native_fmu
 from prbm.fmu.native_fmu import described
@@ -30,15 +30,14 @@ from support import (
     simulation,
 )
 
-END = 0.3  # s; the default run of the guides bounces until 0.243 s, then it rests
-SEEN = 30  # times at which all is compared
-IMPACTS = 14  # of the guides
-ways = pytest.mark.parametrize(("fmi", "kind"), WAYS)
-models = each_shipped
+END = 0.3  # s; the guides bounce until 0.243 s in the default run, then they rest.
+COMPARISONS = 30  # Times at which all values are compared.
+IMPACTS = 14  # Of the guides in the default run.
+interfaces = pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
-SNAP_ERROR = 2e-7  # m; a snap amplifies the solver's error, which depends on the processor
+SNAP_ATOL = 2e-7  # m; a snap amplifies the solver's error, which depends on the processor.
 
 
 def points(step: float, end: float = END) -> np.ndarray:
@@ -46,10 +45,10 @@ def points(step: float, end: float = END) -> np.ndarray:
 
 
 def uneven(end: float) -> np.ndarray:
-    """Communication points with steps over three decades that include all that are compared."""
+    """Return communication points with steps over three decades, including those compared."""
     rng = np.random.default_rng(0)
     inner = end / END * np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
-    return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / SEEN, end)]))
+    return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / COMPARISONS, end)]))
 
 
 GRIDS = {"3000 steps": 3000, "300 steps": 300, "6 steps": 6, "uneven": 0}
@@ -60,7 +59,7 @@ def grid_of(name: str, end: float) -> np.ndarray:
 
 
 def slopes(sim: Simulation, listed: dict, now: dict) -> dict[str, float]:
-    """Return the derivatives that are declared, by differences ahead of the present state."""
+    """Return the declared state derivatives by forward differences of the engine."""
     h, before, later = 1e-6, sim.snapshot(), []
     for step in (h, 2 * h):
         sim.advance(now["time"] + step)
@@ -77,12 +76,12 @@ def slopes(sim: Simulation, listed: dict, now: dict) -> dict[str, float]:
 
 @cache
 def engine_run(model: str) -> SimpleNamespace:
-    """Return what is listed, what the engine says of all of it, and its impacts."""
+    """Return the declared variables, their values in the engine, and the engine's impacts."""
     listed = {v.name: v for v in described(mechanism(model), {}, 3).variables}
     sim, end = simulation(model), case(model).end
     given = {n: v.start for n, v in listed.items() if v.start is not None}
     rows = []
-    for t in points(end / SEEN, end):
+    for t in points(end / COMPARISONS, end):
         sim.advance(t)
         rows.append(given | sim.outputs() | {"time": t})
         rows[-1] |= slopes(sim, listed, rows[-1])
@@ -90,12 +89,12 @@ def engine_run(model: str) -> SimpleNamespace:
 
 
 def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: float = 1e-7) -> None:
-    """Every variable that is declared agrees to a share of its nominal value.
+    """Check that every declared variable agrees within a fraction of its nominal value.
 
-    Event indicators are positive between events.  Derivatives (up to 2e5 rad/s2) are compared with
-    differences of the engine, which interpolates: its fast modes keep a noise of 1e-4 rad/s in
-    the worst case, which changes within 1e-3 s or less.  An error of a tenth of the tolerance in a
-    fast mode is one of omega^2 times as much in its acceleration: 20 for the axial modes.
+    Event indicators must be positive between events.  Derivatives (up to 2e5 rad/s2) are compared
+    with differences of the engine's dense output, in which fast modes have an error of up to 1e-4
+    rad/s that changes within 1e-3 s.  An error in a fast mode is multiplied by omega^2 in the
+    acceleration, which is hence compared with a bound in proportion to omega^2.
     """
     found, omega = instance.values(), fastest(instance.description.modelName)
     noise, tolerance = 1e-9 * omega**2, tolerance * max(1.0, omega / 1e4)
@@ -117,7 +116,7 @@ def worst(found: np.ndarray, expected: np.ndarray, name: str) -> float:
 
 
 def on_grids() -> list:
-    """Return each mechanism with each grid; what is slow anyway with the hardest one alone."""
+    """Return each mechanism with each grid, but slow mechanisms with the uneven grid only."""
     return [
         pytest.param(*getattr(p, "values", (p,)), grid, marks=getattr(p, "marks", ()))
         for p in SHIPPED
@@ -128,30 +127,30 @@ def on_grids() -> list:
 
 @pytest.mark.parametrize(("model", "grid"), on_grids())
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_co_simulation_is_the_engine_whatever_the_communication_step(native, model, fmi, grid):
-    """To 1e-7 of each nominal: rounding, times what the motion amplifies it by."""
+def test_co_simulation_equals_the_engine_for_every_communication_step(native, model, fmi, grid):
+    """Values agree within 1e-7 of their nominal values: round-off, amplified by the motion."""
     run, it = engine_run(model), case(model)
     with Instance(native[model, fmi]).initialize() as instance:
         assert_equal(instance, run.rows[0], run.listed)
         compared = 0
         for begin, end in pairwise(grid_of(grid, it.end)):
             assert instance.step(begin, end - begin) == OK
-            k = round(SEEN * end / it.end)
-            if abs(end - k * it.end / SEEN) < 1e-12:
+            k = round(COMPARISONS * end / it.end)
+            if abs(end - k * it.end / COMPARISONS) < 1e-12:
                 assert_equal(instance, run.rows[k], run.listed)
                 compared += 1
-    assert compared == (6 if grid == "6 steps" else SEEN)
+    assert compared == (6 if grid == "6 steps" else COMPARISONS)
     assert it.impacts(run.rows[-1]) == len(run.record) > 0
     if model in GUIDES:
         assert run.rows[-1]["stop.contact"]
         assert len(run.record) == IMPACTS
 
 
-@models
-def test_the_communication_step_leaves_no_trace(native, model):
-    """Nor does the version: the bytes at a time are the same however it was reached.
+@each_shipped
+def test_results_are_independent_of_the_communication_step(native, model):
+    """The bytes at a time are the same for all steps and versions of FMI.
 
-    Steps of so many 2^-16 s, so that their sums are exact.
+    Steps are multiples of 2^-16 s, so that their sums are exact.
     """
     rng, found, last = np.random.default_rng(0), set(), int(case(model).end * 2**16)
     inner = np.unique(rng.integers(1, last, 100))
@@ -168,8 +167,8 @@ def test_the_communication_step_leaves_no_trace(native, model):
 
 
 @pytest.mark.parametrize("kind", ["cs", "events", "late"])
-@models
-def test_event_mode_shows_the_same_trajectory(native, model, kind):
+@each_shipped
+def test_event_mode_computes_the_same_trajectory(native, model, kind):
     run = engine_run(model)
     with Instance(native[model, 3], kind).initialize() as instance:
         for row in run.rows[1:]:
@@ -177,11 +176,11 @@ def test_event_mode_shows_the_same_trajectory(native, model, kind):
             assert_equal(instance, row, run.listed)
 
 
-@models
-def test_a_native_fmu_is_the_python_fmu(fmus, native, model):
-    """In FMPy: to 1e-7 m and 1e-7 s in the times of all impacts.
+@each_shipped
+def test_a_native_fmu_equals_the_python_fmu(fmus, native, model):
+    """Positions agree within 1e-7 m and the times of all impacts within 1e-7 s in FMPy.
 
-    The default run; its beginning, where the engine takes long for it.
+    The run is the default experiment or, where the engine takes minutes for it, its beginning.
     """
     it = case(model)
     span = {"stop_time": it.end, "output_interval": it.end / 300} if it.costly else {}
@@ -203,12 +202,10 @@ def test_a_native_fmu_is_the_python_fmu(fmus, native, model):
 
 @each_shipped
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_the_default_experiment_in_fmpy_comes_to_its_end_with_the_books_balanced(
-    native, model, fmi
-):
-    """All is finite and energy kept through all impacts, to 2e-6 of what is stored at release.
+def test_the_default_experiment_in_fmpy_conserves_energy(native, model, fmi):
+    """All values are finite, and energy is constant within 2e-6 of the elastic energy at release.
 
-    The tolerance is that of a radian and of a unit stretch; the energies are smaller than those.
+    The tolerance of the integration refers to angles of 1 rad and stretches of 1.
     """
     found = simulate_fmu(str(native[model, fmi]))
     assert found["time"][-1] == pytest.approx(1.0)
@@ -222,12 +219,13 @@ def test_the_default_experiment_in_fmpy_comes_to_its_end_with_the_books_balanced
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
-def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
-    """At a relative tolerance of 1e-9: the guides to 1e-6 of the release, the same impacts.
+@each_shipped
+def test_model_exchange_with_cvode_equals_co_simulation(native, model, fmi):
+    """At a relative tolerance of 1e-9, positions agree and the impacts are the same.
 
-    The last bounces are slow (1 mm/s): an error of 1e-9 m in place is one of 1e-6 s in time.
-    FMPy gives CVode no more than 500 steps for a communication step: hence small ones.
+    Positions of the guides agree within 1e-6 of the release.  The last bounces are slow (1 mm/s),
+    so an error of 1e-9 m in position is an error of 1e-6 s in time.  FMPy limits CVode to 500 steps
+    per communication step; communication steps are therefore small.
     """
     it = case(model)
     options = {"stop_time": it.end, "output_interval": it.end / 300, "record_events": False}
@@ -236,15 +234,13 @@ def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
         str(native[model, fmi]), fmi_type="ModelExchange", relative_tolerance=1e-9, **options
     )
     assert found["time"] == pytest.approx(expected["time"], abs=1e-12)
-    bound = (
-        1e-6 * 0.018 if model in GUIDES else 2e-7
-    )  # m; a snap amplifies the error, CVode has other bits on every processor
+    bound = 1e-6 * 0.018 if model in GUIDES else SNAP_ATOL  # m
     for name in it.outputs("x", "y"):
         assert worst(found, expected, name) < bound, name
     for name in it.outputs("angle"):
         assert worst(found, expected, name) < 1e-6, name  # rad
     for name in it.outputs("vx"):
-        assert worst(found, expected, name) < 5e-6, name  # m/s: of 0.5; late impacts are a bit off
+        assert worst(found, expected, name) < 5e-6, name  # m/s, of 0.5; from the times of impacts.
     for name in it.at_stops("impact_time"):
         assert worst(found, expected, name) < 5e-6, name  # s
     for name in it.at_stops("impact_count"):
@@ -258,13 +254,12 @@ def test_model_exchange_with_cvode_is_co_simulation(native, model, fmi):
 
 @pytest.mark.parametrize("fmi", [2, 3])
 @pytest.mark.parametrize("model", selected(lambda name: name not in COSTLY))
-def test_model_exchange_at_fmpys_default_settings_tells_the_same_story(native, model, fmi):
-    """FMPy takes the default experiment's tolerance, 1e-8: within 1e-7 m, of a release by 18 mm.
+def test_model_exchange_with_fmpys_default_settings_equals_co_simulation(native, model, fmi):
+    """Positions agree within 1e-7 m at the tolerance of the default experiment, 1e-8.
 
-    The guides come to rest; what does not is followed for a few impacts, which amplify the errors.
-
-    What has fast modes needs more than the 500 steps that FMPy gives CVode for the communication
-    step of these settings.
+    The release is 18 mm.  The guides come to rest; other mechanisms are simulated for a few
+    impacts, which amplify errors.  Mechanisms with fast modes are left out, because they need more
+    than the 500 steps of CVode that FMPy allows per communication step.
     """
     it, path = case(model), str(native[model, fmi])
     span = {} if model in GUIDES else {"stop_time": it.end, "output_interval": it.end / 300}
@@ -283,8 +278,8 @@ def test_model_exchange_at_fmpys_default_settings_tells_the_same_story(native, m
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_model_exchange_with_cvode_shows_each_impact_before_and_after(native, fmi):
-    """Two rows at one time; the times as exact as the positions are."""
+def test_model_exchange_with_cvode_records_values_before_and_after_each_impact(native, fmi):
+    """The result has two rows at the time of each impact."""
     found = simulate_fmu(
         str(native["PRBDM2R", fmi]), fmi_type="ModelExchange", relative_tolerance=1e-9,
         stop_time=END, output=["stop.gap_rate", "stop.impact_count", "stop.impact_time"],
@@ -300,7 +295,7 @@ def test_model_exchange_with_cvode_shows_each_impact_before_and_after(native, fm
 
 @pytest.mark.parametrize(("model", "h"), [("PRBDM", 2e-5), ("PRBDM2R", 4e-6)])
 def test_model_exchange_with_eulers_steps_converges_to_co_simulation(native, model, h):
-    """First order until the first impact; there it sees the impact up to a step too late."""
+    """The order is 1 before the first impact, which is detected up to a step late."""
     outputs = {"output": ["shuttle.x", "stop.impact_count", "stop.impact_time"]}
     expected = simulate_fmu(str(native[model, 2]), stop_time=0.05, output_interval=1e-3, **outputs)
     errors = []
@@ -312,23 +307,23 @@ def test_model_exchange_with_eulers_steps_converges_to_co_simulation(native, mod
         stride = round(1e-3 / step)
         x = found["shuttle.x"][::stride]
         errors.append(np.abs(x[:41] - expected["shuttle.x"][:41]).max())
-        assert np.abs(x - expected["shuttle.x"]).max() < 5e-5  # m, of 18 mm
+        assert np.abs(x - expected["shuttle.x"]).max() < 5e-5  # m, of 18 mm.
         assert found["stop.impact_count"][-1] == expected["stop.impact_count"][-1] == 1
         late = found["stop.impact_time"][-1] - expected["stop.impact_time"][-1]
         assert abs(late) < 2 * step
-    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)  # first order
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)  # First order.
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
-def test_model_exchange_with_an_integrator_of_our_own_is_the_engine(native, model, fmi):
-    """Classical steps of 40 us: every declared variable to 1e-6 of its nominal, and on from there.
+@each_shipped
+def test_model_exchange_with_runge_kutta_steps_equals_the_engine(native, model, fmi):
+    """With steps of 40 us, all variables agree within 1e-6 of their nominal values.
 
-    Near the straight shape the 2R's fast modes feel the truncation of such steps, which falls
-    with their fourth power: at 0.06 s, after the first impact, 8e-7 m and then 6e-8 m.
+    Near the straight shape, the truncation error excites the fast modes of the 2R guide.  It falls
+    with the fourth power of the step: 8e-7 m at 0.06 s, after the first impact, then 6e-8 m.
     """
     run, it, errors = engine_run(model), case(model), []
-    share = 1e-6 if model in GUIDES else max(1e-6, 1e-9 * fastest(model))  # of the engine's own
+    share = 1e-6 if model in GUIDES else max(1e-6, 1e-9 * fastest(model))
     step = it.substep(4e-5 if model in GUIDES else 2e-5)
     for h in (step, step / 2):
         with Instance(native[model, fmi], "me", substep=h).initialize() as instance:
@@ -338,20 +333,20 @@ def test_model_exchange_with_an_integrator_of_our_own_is_the_engine(native, mode
             instance.advance(run.rows[6]["time"])
             (x,) = instance.get(it.released)
             errors.append(abs(x - run.rows[6][it.released]))
-    assert errors[1] < max(errors[0] / 10, 1e-9)  # m: what the engine's tolerance leaves
+    assert errors[1] < max(errors[0] / 10, 1e-9)  # m; the error of the engine is 1e-9 m.
 
 
 # -- events --
 
 
-@models
-def test_event_mode_records_each_impact_before_and_after_at_its_time(native, model):
-    """As FMPy records it: two rows at one time, and the time is the engine's to 1e-9 s."""
+@each_shipped
+def test_fmpy_records_values_before_and_after_each_impact_in_event_mode(native, model):
+    """FMPy records two rows at the time of each impact, which is the engine's within 1e-9 s."""
     it = case(model)
-    what = ("gap_rate", "gap", "impact_count", "impact_time", "approach_speed", "rebound_speed")
+    outputs = ("gap_rate", "gap", "impact_count", "impact_time", "approach_speed", "rebound_speed")
     found = simulate_fmu(
         str(native[model, 3]), use_event_mode=True, early_return_allowed=True, stop_time=it.end,
-        output_interval=it.end / 300, output=it.at_stops(*what, "contact"),
+        output_interval=it.end / 300, output=it.at_stops(*outputs, "contact"),
     )  # fmt: skip
     expected, seen = record(model), dict.fromkeys(it.at_stops("impact_time"), 0.0)
     twice = np.flatnonzero(np.diff(found["time"]) == 0.0)
@@ -364,7 +359,7 @@ def test_event_mode_records_each_impact_before_and_after_at_its_time(native, mod
         assert before[f"{stop}.gap_rate"] < 0.0 < after[f"{stop}.gap_rate"]
         assert (it.impacts(before), it.impacts(after)) == (n, n + 1)
         assert before[f"{stop}.impact_time"] == seen[f"{stop}.impact_time"]
-        assert abs(before[f"{stop}.gap"]) < 1e-12  # m: where the root was found
+        assert abs(before[f"{stop}.gap"]) < 1e-12  # m
         closing, opening = before[f"{stop}.gap_rate"], after[f"{stop}.gap_rate"]
         assert after[f"{stop}.approach_speed"] == pytest.approx(-closing, rel=1e-9)
         assert after[f"{stop}.rebound_speed"] == pytest.approx(opening, rel=1e-9)
@@ -372,11 +367,11 @@ def test_event_mode_records_each_impact_before_and_after_at_its_time(native, mod
     contact = np.any([found[name] for name in it.at_stops("contact")], axis=0)
     if engine_run(model).rows[-1][f"{expected[-1].stop}.contact"]:
         captured = [k for k in twice if contact[k + 1] and not contact[k]]
-        assert captured[-1] > hits[-1]  # coming to rest is an event as well, but no impact
+        assert captured[-1] > hits[-1]  # The capture is an event, but not an impact.
     assert contact[-1] or model not in GUIDES
 
 
-def test_without_early_return_the_step_ends_where_it_should_and_tells_of_its_events(native):
+def test_without_early_return_a_step_is_complete_and_reports_its_events(native):
     with Instance(native["PRBDM", 3], "late").initialize() as instance:
         seen = []
         for k in range(30):
@@ -393,9 +388,9 @@ def test_without_early_return_the_step_ends_where_it_should_and_tells_of_its_eve
     assert (count, contact) == (IMPACTS, True)
 
 
-@models
-def test_an_event_that_waits_shows_the_values_before_it_until_the_update(native, model):
-    """Also through gets in Event Mode, and through evaluateDiscreteStates."""
+@each_shipped
+def test_a_pending_event_keeps_the_values_before_it_until_the_update(native, model):
+    """Neither gets in Event Mode nor fmi3EvaluateDiscreteStates handle the event."""
     it, first = case(model), record(model)[0]
     with Instance(native[model, 3], "events").initialize() as instance:
         event, _, early, time = instance.fmu.doStep(0.0, it.end)
@@ -411,8 +406,8 @@ def test_an_event_that_waits_shows_the_values_before_it_until_the_update(native,
         assert it.impacts(values) == 1
 
 
-def test_rest_ends_when_the_wall_retreats_and_that_is_an_event(native):
-    """In event mode the release is seen; in co-simulation it happens within the step."""
+def test_the_release_by_a_retreating_wall_is_an_event(native):
+    """In event mode the step ends at the release; otherwise the release happens within the step."""
     found = {}
     for kind in ("cs", "events", "late"):
         with Instance(native["PRBDM", 3], kind).initialize() as instance:
@@ -428,9 +423,9 @@ def test_rest_ends_when_the_wall_retreats_and_that_is_an_event(native):
             found[kind] = instance.values()
         assert not held[0]  # its acceleration is 4 v / T = 40 m/s2
         assert held[-1]
-        assert found[kind]["shuttle.vx"] == pytest.approx(0.02, rel=1e-9)  # it goes with the wall
+        assert found[kind]["shuttle.vx"] == pytest.approx(0.02, rel=1e-9)  # Moves with the wall.
     assert found["cs"]["stop.impact_count"] > IMPACTS
-    for kind in ("events", "late"):  # where a velocity that is set in event mode is a jump
+    for kind in ("events", "late"):  # There, a velocity that is set in event mode is a jump.
         assert found[kind]["shuttle.x"] == pytest.approx(found["cs"]["shuttle.x"], abs=1e-9)
 
 
@@ -438,14 +433,14 @@ def test_rest_ends_when_the_wall_retreats_and_that_is_an_event(native):
 
 
 def watched(native, required, **options):
-    """Return an instance whose steps are watched, and what its callback saw."""
+    """Return an instance with intermediate updates, and the list of the callback's arguments."""
     seen = []
 
     def update(_, time, may_set, may_get, finished, may_return, early, early_time):
         references = [instance.references[name] for name in required]
         seen.append((time, may_set, may_get, finished, may_return,
                      instance.fmu.getFloat64(references)))  # fmt: skip
-        if len(seen) == instance.patience:
+        if len(seen) == instance.updates_before_return:
             early[0] = True
             early_time[0] = time
 
@@ -455,19 +450,19 @@ def watched(native, required, **options):
         native["PRBDM", 3], options.pop("kind", "cs"), intermediateUpdate=update,
         requiredIntermediateVariables=[references[name] for name in required], **options,
     )  # fmt: skip
-    instance.patience = 0
+    instance.updates_before_return = 0
     return instance, seen
 
 
-def test_intermediate_updates_show_the_motion_within_a_step(native):
-    """At increasing times, with the values of these times, and the result is the same."""
+def test_intermediate_updates_give_the_motion_within_a_step(native):
+    """Updates come at increasing times with the values then, and do not change the result."""
     instance, seen = watched(native, ["shuttle.x", "time"])
     with instance.initialize():
         instance.fmu.doStep(0.0, END)
         last = instance.values()
     times = np.array([time for time, *_ in seen])
     assert len(times) > 50
-    assert (np.diff(times) >= 0.0).all()  # twice the same where an event happens
+    assert (np.diff(times) >= 0.0).all()  # Equal at an event.
     assert times[-1] == END
     with Instance(native["PRBDM", 3]).initialize() as plain:
         for time, may_set, may_get, finished, may_return, (x, t) in seen:
@@ -483,7 +478,7 @@ def test_intermediate_updates_show_the_motion_within_a_step(native):
 def test_an_importer_may_end_a_step_in_an_intermediate_update(native, kind):
     instance, seen = watched(native, ["shuttle.x"], kind=kind, earlyReturnAllowed=True)
     with instance.initialize():
-        instance.patience = 5
+        instance.updates_before_return = 5
         _, _, early, time = instance.fmu.doStep(0.0, 0.03)
         assert early
         assert time == seen[-1][0] < 0.03
@@ -497,15 +492,15 @@ def test_an_importer_may_end_a_step_in_an_intermediate_update(native, kind):
         assert found == pytest.approx(plain.values(), rel=1e-9, abs=1e-12)
 
 
-def test_an_early_return_that_was_not_allowed_is_not_given(native):
+def test_an_early_return_that_is_not_allowed_is_ignored(native):
     instance, seen = watched(native, ["shuttle.x"])
     with instance.initialize():
-        instance.patience = 2
+        instance.updates_before_return = 2
         assert instance.fmu.doStep(0.0, 0.03)[2:] == (False, 0.03)
         assert len(seen) > 2
 
 
-def test_in_an_intermediate_update_only_what_was_asked_for_may_be_read(native):
+def test_only_required_variables_can_be_read_in_an_intermediate_update(native):
     statuses = []
 
     def update(*_):
@@ -523,9 +518,9 @@ def test_in_an_intermediate_update_only_what_was_asked_for_may_be_read(native):
     with instance.initialize():
         instance.advance(0.01)
         assert statuses == [3] * 5
-        assert instance.said("shuttle.y was not among the requiredIntermediateVariables")
-        assert instance.said("fmi3Reset cannot be called in Intermediate Update Mode")
-        assert instance.said("return from the callback first")
+        assert instance.logged("shuttle.y is not among the requiredIntermediateVariables")
+        assert instance.logged("fmi3Reset cannot be called in Intermediate Update Mode")
+        assert instance.logged("return from the callback first")
         instance.advance(0.02)
 
 
@@ -543,8 +538,8 @@ def in_flight_and_at_rest() -> list:
 
 @pytest.mark.parametrize(("model", "share"), in_flight_and_at_rest())
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_directional_derivatives_are_those_of_differences(native, model, fmi, share):
-    """Of all outputs and derivatives, along all states and inputs at once; flying and at rest."""
+def test_directional_derivatives_equal_finite_differences(native, model, fmi, share):
+    """The unknowns are all outputs and derivatives, the direction is random; in flight, at rest."""
     rng, it = np.random.default_rng(fmi), case(model)
     time = share * it.end
     rubbing = {"friction.coefficient": 0.1, "friction.normal_force": 0.2}
@@ -562,8 +557,8 @@ def test_directional_derivatives_are_those_of_differences(native, model, fmi, sh
         integrator = Integrator(instance)
         x, u = integrator.x(), np.array(instance.get(*inputs))
         dx, du = rng.standard_normal(len(x)), rng.standard_normal(len(u))
-        du[[name.endswith(".mobility") for name in inputs]] = 0.0  # which is never negative
-        dx[2 * ((len(x) - 2) // 2) :] = 0.0  # what was dissipated has no effect
+        du[[name.endswith(".mobility") for name in inputs]] = 0.0  # Mobilities are not negative.
+        dx[2 * ((len(x) - 2) // 2) :] = 0.0  # Dissipated energy and work have no effect.
 
         def at(step: float) -> np.ndarray:
             integrator.put(time, x + step * dx)
@@ -590,9 +585,9 @@ def test_directional_derivatives_are_those_of_differences(native, model, fmi, sh
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
-def test_what_depends_on_an_input_or_a_state_says_so(native, model, fmi):
-    """Move each alone: nothing changes but what has it among its dependencies."""
+@each_shipped
+def test_declared_dependencies_are_complete(native, model, fmi):
+    """A change of one input or state changes only unknowns that declare it as a dependency."""
     rng, it = np.random.default_rng(0), case(model)
     with Instance(native[model, fmi], "me", substep=it.substep(1e-4)).initialize() as instance:
         instance.advance(it.end / 15)
@@ -606,7 +601,7 @@ def test_what_depends_on_an_input_or_a_state_says_so(native, model, fmi):
                   if v.causality == "input" and v.variability == "continuous"]  # fmt: skip
         states = [u.variable.derivative.name for u in d.derivatives]
         listed = {u.variable.name for u in (*d.outputs, *d.derivatives)}
-        assert unknowns.keys() == listed  # the turning of a body may be an output and a derivative
+        assert unknowns.keys() == listed  # A body's rotation may be both output and derivative.
         before, moved = instance.values(), 0
         for name in inputs + states:
             assert instance.set({name: before[name] + 1e-3 * rng.uniform(0.5, 1.0)}) == OK
@@ -624,7 +619,7 @@ def test_what_depends_on_an_input_or_a_state_says_so(native, model, fmi):
 
 @cache
 def driven(model: str) -> tuple[dict, list[dict]]:
-    """Return what the engine says to changes, from another start time."""
+    """Return the declared variables and the engine's values, with changes of inputs on the way."""
     it = case(model)
     listed = {v.name: v for v in described(it.mechanism, {}, 3).variables}
     sim = Simulation(it.mechanism, it.starts(), start_time=2.0, tolerance=1e-9)
@@ -641,10 +636,12 @@ def driven(model: str) -> tuple[dict, list[dict]]:
     return listed, rows
 
 
-@pytest.mark.parametrize(("fmi", "kind"), [*(way for way in WAYS if way[1] != "me"), (3, "late")])
-@models
+@pytest.mark.parametrize(
+    ("fmi", "kind"), [*(pair for pair in INTERFACES if pair[1] != "me"), (3, "late")]
+)
+@each_shipped
 def test_inputs_walls_and_tunable_parameters_reach_the_equations(native, model, fmi, kind):
-    """From another start time than 0, at the tolerance that the importer asks for."""
+    """The start values, start time and tolerance also differ from the defaults."""
     it, (listed, rows) = case(model), driven(model)
     with Instance(native[model, fmi], kind) as instance:
         instance.initialize(start=2.0, tolerance=1e-9, values=it.starts())
@@ -655,9 +652,9 @@ def test_inputs_walls_and_tunable_parameters_reach_the_equations(native, model, 
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
+@each_shipped
 def test_inputs_and_tunable_parameters_reach_model_exchange(native, model, fmi):
-    """The same but for the wall, whose motion co-simulation interpolates."""
+    """Inputs of walls are left out, because co-simulation interpolates their motion."""
     it, step = case(model), case(model).end / 30
     changes = it.changes()
     changes = {3: changes[3], 4: changes[8], 5: {f"{it.force}.moment": 1e-3}}
@@ -672,14 +669,14 @@ def test_inputs_and_tunable_parameters_reach_model_exchange(native, model, fmi):
             sim.advance(2.0 + (k + 1) * step)
             found, expected = instance.values(), sim.outputs()
             for name in it.outputs("x", "y", "angle"):
-                # the truncation of the steps, through an impact
+                # Truncation error of the steps, across an impact.
                 assert found[name] == pytest.approx(expected[name], abs=1e-7), name
             assert it.impacts(found) == it.impacts(expected)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_wall_that_moves_is_met_in_model_exchange_where_its_inputs_say(native, fmi):
-    """Displacement and velocity as inputs that fit each other, at every step."""
+def test_model_exchange_locates_the_impact_with_a_moving_wall(native, fmi):
+    """Displacement and velocity are set consistently at every step."""
     speed = -0.03
     with Instance(native["PRBDM", fmi], "me") as instance:
         instance.initialize()
@@ -702,8 +699,8 @@ def test_a_wall_that_moves_is_met_in_model_exchange_where_its_inputs_say(native,
         assert after["stop.gap_rate"] == pytest.approx(-0.6 * met["stop.gap_rate"], rel=1e-9)
 
 
-@pytest.mark.parametrize(("fmi", "kind"), [way for way in WAYS if way[1] != "me"])
-def test_the_importers_tolerance_wins_over_the_parameter(native, fmi, kind):
+@pytest.mark.parametrize(("fmi", "kind"), [pair for pair in INTERFACES if pair[1] != "me"])
+def test_the_importers_tolerance_overrides_the_parameter(native, fmi, kind):
     def last(tolerance: float | None, parameter: float) -> float:
         with Instance(native["PRBDM2R", fmi], kind) as instance:
             instance.initialize(tolerance=tolerance, values={"solver.tolerance": parameter})
@@ -713,8 +710,8 @@ def test_the_importers_tolerance_wins_over_the_parameter(native, fmi, kind):
     assert last(1e-5, 1e-8) == last(1e-5, 1e-5) == last(None, 1e-5) != last(None, 1e-8)
 
 
-@ways
-@models
+@interfaces
+@each_shipped
 def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi, kind):
     it, values = case(model), mechanism(model).values()
     modulus = next(name for name in values if name.endswith(".youngs_modulus"))
@@ -726,15 +723,15 @@ def test_values_in_initialization_mode_follow_the_parameters(native, model, fmi,
         instance.begin()
         assert instance.values() == stiffer
     placed, size = it.released, abs(it.displacement)
-    assert abs(softer[placed]) == pytest.approx(size, abs=1e-12)  # tolerance of the statics
+    assert abs(softer[placed]) == pytest.approx(size, abs=1e-12)  # Tolerance of the statics.
     assert stiffer[placed] == pytest.approx(0.5 * softer[placed], abs=1e-12)
     assert stiffer["mode.frequency"] > softer["mode.frequency"] > 0.0
 
 
-@ways
-@models
-def test_time_that_starts_elsewhere_shifts_the_motion_and_nothing_else(native, model, fmi, kind):
-    """To what the rounding of the time leaves, 1e-14 s."""
+@interfaces
+@each_shipped
+def test_another_start_time_only_shifts_the_motion(native, model, fmi, kind):
+    """Differences come from the round-off of time, 1e-14 s."""
     shift, rows, it = -7.0, [], case(model)
     span, substep = it.end / 10, it.substep(1e-4)
     for start in (0.0, shift):
@@ -743,7 +740,7 @@ def test_time_that_starts_elsewhere_shifts_the_motion_and_nothing_else(native, m
             instance.advance(start + span)
             rows.append(instance.values())
     moved = {"time", *(n for n in it.at_stops("impact_time") if rows[0][n] > 0.0)}
-    for ders, share in ((False, 1e-6), (True, 1e-4)):  # stiff axial modes show in derivatives
+    for ders, share in ((False, 1e-6), (True, 1e-4)):  # Axial modes dominate derivatives.
         first, second = (
             {n: v for n, v in row.items() if n not in moved and n.startswith("der(") == ders}
             for row in rows
@@ -753,8 +750,8 @@ def test_time_that_starts_elsewhere_shifts_the_motion_and_nothing_else(native, m
         assert rows[1]["time"] == pytest.approx(shift + span)
 
 
-@ways
-@models
+@interfaces
+@each_shipped
 def test_values_are_within_their_declared_bounds_through_a_run(native, model, fmi, kind):
     it = case(model)
     with Instance(native[model, fmi], kind, substep=it.substep(1e-4)).initialize() as instance:
@@ -769,9 +766,9 @@ def test_values_are_within_their_declared_bounds_through_a_run(native, model, fm
 # -- the output clock --
 
 
-@models
-def test_the_clock_ticks_at_impacts_and_only_there(model):
-    """Once for each, in an instant of its own with the values after it; not for the capture."""
+@each_shipped
+def test_the_clock_ticks_at_impacts_only(model):
+    """It ticks once per impact, in a separate super-dense instant, and not for a capture."""
     ticked, events, it = [], 0, case(model)
     with Instance(clocked(model), "events").initialize() as instance:
         while instance.time < it.end:
@@ -792,20 +789,18 @@ def test_the_clock_ticks_at_impacts_and_only_there(model):
     assert ticked == pytest.approx(expected, abs=1e-9)
     assert events >= len(expected)
     if model in GUIDES:
-        assert events > len(expected)  # the capture is one
+        assert events > len(expected)  # The capture is an event, but not an impact.
 
 
-@models
-def test_the_clock_changes_nothing_of_the_motion(model):
-    """Also in FMPy, and in model exchange."""
+@each_shipped
+def test_the_clock_does_not_change_the_motion(model):
+    """The trajectory is the same in FMPy, with event mode and in model exchange."""
     run, it = engine_run(model), case(model)
-    bound = (
-        1e-8 if model in GUIDES else 2e-7
-    )  # m; a snap amplifies the error, CVode has other bits on every processor
+    bound = 1e-8 if model in GUIDES else SNAP_ATOL  # m
     names = [it.released, *it.at_stops("impact_count")]
     found = simulate_fmu(
         str(clocked(model)), use_event_mode=True, early_return_allowed=True, stop_time=it.end,
-        output_interval=it.end / SEEN, output=names,
+        output_interval=it.end / COMPARISONS, output=names,
     )  # fmt: skip
     expected = {round(row["time"], 9): row[it.released] for row in run.rows}
     rows = [(round(float(row["time"]), 9), row[it.released]) for row in found]
@@ -821,9 +816,9 @@ def test_the_clock_changes_nothing_of_the_motion(model):
     assert it.impacts(exchanged[-1]) == len(run.record)
 
 
-@models
-def test_the_clock_ticks_in_a_late_event_mode_too(model):
-    """Events inside a step are over at its end; one tick tells of all of them."""
+@each_shipped
+def test_the_clock_ticks_without_early_return(model):
+    """At the end of a step, a clock ticks once for all impacts inside the step."""
     with Instance(clocked(model), "late").initialize() as instance:
         total, it = 0, case(model)
         for k in range(6):
@@ -843,7 +838,7 @@ def test_the_clock_ticks_in_a_late_event_mode_too(model):
     assert total == len(record(model))
 
 
-# -- many of them --
+# -- several instances --
 
 SHORT = points(2e-3, 0.06)[1:]
 
@@ -854,7 +849,7 @@ def alone(fmu, kind: str) -> list[bytes]:
 
 
 def test_instances_of_all_fmus_in_one_process_do_not_disturb_each_other(native):
-    everything = [(model, fmi, kind) for model in QUICK for fmi, kind in WAYS]
+    everything = [(model, fmi, kind) for model in QUICK for fmi, kind in INTERFACES]
     expected = {key: alone(native[key[:2]], key[2]) for key in everything}
     instances = [(key, Instance(native[key[:2]], key[2]).initialize()) for key in everything * 2]
     for k, time in enumerate(SHORT):
@@ -865,7 +860,7 @@ def test_instances_of_all_fmus_in_one_process_do_not_disturb_each_other(native):
         instance.free()
 
 
-@ways
+@interfaces
 def test_instances_in_threads_do_not_disturb_each_other(native, fmi, kind):
     expected = alone(native["PRBDM2R", fmi], kind)
     found: list[list[bytes]] = []
@@ -883,18 +878,18 @@ def test_instances_in_threads_do_not_disturb_each_other(native, fmi, kind):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_hundreds_of_instances_at_once_and_one_after_the_other(native, fmi):
-    """Loaded and unloaded each time; then two hundred that live together."""
+def test_hundreds_of_consecutive_and_simultaneous_instances(native, fmi):
+    """A hundred instances load and unload the library; then two hundred exist together."""
     for k in range(100):
         kind = "cs" if k % 2 else "me"
         with Instance(native["PRBDM", fmi], kind).initialize() as instance:
             instance.advance(1e-3)
             assert instance.values()["shuttle.vx"] > 0.0
-    crowd = [Instance(native["PRBDM", fmi], name=f"it {k}").initialize() for k in range(200)]
-    for instance in crowd:
+    instances = [Instance(native["PRBDM", fmi], name=f"it {k}").initialize() for k in range(200)]
+    for instance in instances:
         instance.advance(0.05)
-    assert len({instance.bytes() for instance in crowd}) == 1
-    for instance in crowd:
+    assert len({instance.bytes() for instance in instances}) == 1
+    for instance in instances:
         instance.free()
 
 
@@ -914,12 +909,12 @@ def test_two_builds_of_one_model_in_one_process_keep_their_own_content(native, t
         )  # round-off
 
 
-# -- what the standards fix --
+# -- states and time --
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
-def test_states_derivatives_and_indicators_are_the_variables_that_the_xml_names(native, model, fmi):
+@each_shipped
+def test_states_derivatives_and_indicators_equal_their_declared_variables(native, model, fmi):
     with Instance(native[model, fmi], "me").initialize() as instance:
         states = [u.variable.derivative for u in instance.description.derivatives]
         nominals = (c_double * len(states))()
@@ -937,7 +932,7 @@ def test_states_derivatives_and_indicators_are_the_variables_that_the_xml_names(
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_the_time_is_a_variable_in_fmi_3_only(native, fmi):
+def test_time_is_a_variable_in_fmi_3_only(native, fmi):
     with Instance(native["PRBDM", fmi]) as instance:
         assert ("time" in instance.variables) == (fmi == 3)
         if fmi == 3:

@@ -1,4 +1,4 @@
-"""Saving, restoring, serializing and resetting the state of a native FMU, to the byte."""
+"""Saving, restoring, serializing and resetting the state of a native FMU, bit for bit."""
 
 import struct
 import zlib
@@ -8,44 +8,43 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
-from native_host import DISCARD, ERROR, OK, WAYS, Instance, Integrator, status
+from native_host import DISCARD, ERROR, INTERFACES, OK, Instance, Integrator, status
 from support import around_first_impact, case, each_shipped
 
 STEP = 2.5e-3
-TIMES = STEP * np.arange(1, 49)  # until 0.12 s: the first impact comes at 0.041 s, four till then
+TIMES = STEP * np.arange(1, 49)  # Until 0.12 s, with four impacts; the first is at 0.041 s.
 BEFORE, AFTER = TIMES[:16], TIMES[16:]
-EVERY = (*WAYS, (3, "late"))
-ways = pytest.mark.parametrize(("fmi", "kind"), EVERY)
-models = each_shipped
+EVERY = (*INTERFACES, (3, "late"))
+interfaces = pytest.mark.parametrize(("fmi", "kind"), EVERY)
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
 
 
 def spans(model: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return times until shortly before the first impact, and from there to some more."""
+    """Return times until shortly before the first impact, and times from there on."""
     before, after = around_first_impact(model)
     return before[1:], after[1:33]
 
 
-def waiting(instance: Instance) -> None:
-    """Go to the next event of co-simulation with early return and stop before it, in Event Mode."""
+def enter_event_mode(instance: Instance) -> None:
+    """Step to the next event of co-simulation with early return and enter Event Mode."""
     event, _, early, instance.time = instance.fmu.doStep(instance.time, 1.0)
     assert event
     assert early
     instance.fmu.enterEventMode()
 
 
-@ways
-@models
-def test_a_state_restored_gives_the_same_bytes(native, model, fmi, kind):
-    """Before an impact and after some; the second time from a motion that has gone elsewhere."""
+@interfaces
+@each_shipped
+def test_a_restored_state_gives_identical_results(native, model, fmi, kind):
+    """States before the first and after some impacts; also after a motion with other inputs."""
     it, (before, after) = case(model), spans(model)
     twice = ((before, after), (np.concatenate([before, after[:20]]), after[20:]))
     substep = it.substep(2e-4)
     with Instance(native[model, fmi], kind, substep=substep).initialize() as instance:
-        unborn = instance.saved()
+        initial = instance.saved()
         for first, then in twice:
-            instance.restore(unborn)
+            instance.restore(initial)
             instance.time = 0.0
             instance.run(first)
             state, here, data = instance.fmu.getFMUState(), instance.bytes(), instance.saved()
@@ -64,10 +63,10 @@ def test_a_state_restored_gives_the_same_bytes(native, model, fmi, kind):
             instance.fmu.freeFMUState(state)
 
 
-@ways
-@models
-def test_a_state_through_bytes_into_another_instance_gives_the_same_bytes(native, model, fmi, kind):
-    """Fixed and tunable parameters, inputs, tolerance and time go with it."""
+@interfaces
+@each_shipped
+def test_a_state_deserialized_in_another_instance_gives_identical_results(native, model, fmi, kind):
+    """The state contains fixed and tunable parameters, inputs, tolerance and time."""
     it, (before, after) = case(model), spans(model)
     name, substep = f"{it.body}.mass", it.substep(2e-4)
     mass = 1.1 * it.mechanism.values()[name]
@@ -84,15 +83,15 @@ def test_a_state_through_bytes_into_another_instance_gives_the_same_bytes(native
         other.time = before[-1]
         assert other.run(after) == expected
         assert other.values()[name] == mass
-    with Instance(native[model, fmi], kind, substep=substep) as fresh:  # not even initialized
+    with Instance(native[model, fmi], kind, substep=substep) as fresh:  # Not initialized.
         fresh.restore(data)
         fresh.time = before[-1]
         assert fresh.run(after) == expected
 
 
-@models
-def test_an_event_that_waits_is_part_of_the_state(native, model):
-    """Saved within Event Mode before the update, before entering it, and after the update."""
+@each_shipped
+def test_a_pending_event_is_part_of_the_state(native, model):
+    """The state is saved before Event Mode, in it before the update, and after the update."""
     it = case(model)
     with Instance(native[model, 3], "events").initialize() as instance:
         event, _, _, instance.time = instance.fmu.doStep(0.0, 1.0)
@@ -107,18 +106,18 @@ def test_an_event_that_waits_is_part_of_the_state(native, model):
         instance.advance(end)
         expected = instance.bytes()
     assert len({due, inside, over}) == 3
-    for data, ways_on in ((due, 3), (inside, 2), (over, 1)):
+    for data, calls_left in ((due, 3), (inside, 2), (over, 1)):
         with Instance(native[model, 3], "events") as other:
             other.restore(data)
             assert other.saved() == data
             other.time = time
-            if ways_on == 3:
+            if calls_left == 3:
                 assert status(other.fmu.doStep, time, 1e-3) == ERROR
-                assert other.said("an event waits at t = ")
+                assert other.logged("an event is pending at t = ")
                 other.fmu.enterEventMode()
-            if ways_on >= 2:
+            if calls_left >= 2:
                 assert status(other.fmu.enterStepMode) == ERROR
-                assert other.said("the event is not finished")
+                assert other.logged("the event is not finished")
                 assert it.impacts(other.values()) == 0
                 other.update()
             else:
@@ -129,9 +128,9 @@ def test_an_event_that_waits_is_part_of_the_state(native, model):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@models
+@each_shipped
 def test_a_trial_step_of_model_exchange_is_undone_by_a_restored_state(native, model, fmi):
-    """Time, states and derivatives are those of the saved instant again."""
+    """Time, states and derivatives are again those of the saved state."""
     it, (before, _) = case(model), spans(model)
     with Instance(native[model, fmi], "me", substep=it.substep(2e-4)).initialize() as instance:
         instance.run(before)
@@ -146,8 +145,8 @@ def test_a_trial_step_of_model_exchange_is_undone_by_a_restored_state(native, mo
         assert (integrator.x() == x).all()
 
 
-@ways
-def test_a_state_saved_before_initialization_is_one_too(native, fmi, kind):
+@interfaces
+def test_a_state_saved_before_initialization_can_be_restored(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind) as instance:
         assert instance.set({"release.displacement": -0.01}) == OK
         first = instance.saved()
@@ -161,7 +160,7 @@ def test_a_state_saved_before_initialization_is_one_too(native, fmi, kind):
         instance.restore(inside)
         instance.begin()
         assert instance.values()["shuttle.x"] == pytest.approx(-0.01, abs=1e-12)
-        instance.restore(first)  # back to before: initialize again
+        instance.restore(first)  # The instance is no longer initialized.
         instance.enter().begin()
         instance.advance(STEP)
         instance.fmu.terminate()
@@ -172,8 +171,8 @@ def test_a_state_saved_before_initialization_is_one_too(native, fmi, kind):
         assert instance.values()["shuttle.x"] > -0.01
 
 
-@ways
-def test_what_was_refused_is_part_of_the_state(native, fmi, kind):
+@interfaces
+def test_rejected_values_are_part_of_the_state(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind) as instance:
         assert instance.set({"stop.restitution": 1.5}) == ERROR
         data = instance.saved()
@@ -181,20 +180,20 @@ def test_what_was_refused_is_part_of_the_state(native, fmi, kind):
         instance.restore(data)
         instance.enter()
         assert instance.call("ExitInitializationMode") == ERROR
-        assert instance.said("stop.restitution was set to what is refused and is still 0.6")
+        assert instance.logged("stop.restitution was set to a rejected value and is still 0.6")
 
 
-# -- what is no state --
+# -- invalid states --
 
 
 def damages(data: bytes):
-    """Yield what may happen to bytes, each with what is said then."""
-    yield b"", "NULL|no saved state"
-    yield b"no state at all, but long enough to look into it", "no saved state"
-    yield data[:20], "no saved state"
+    """Yield damaged bytes of a state, each with parts of the possible messages."""
+    yield b"", "NULL|not a saved state"
+    yield b"other bytes, but long enough to contain a head", "not a saved state"
+    yield data[:20], "not a saved state"
     yield data[:-1], "another size"
     yield data[:40], "another size"
-    yield b"X" + data[1:], "no saved state"
+    yield b"X" + data[1:], "not a saved state"
     yield data[:8] + b"\x09" + data[9:], "another version"
     rng = np.random.default_rng(0)
     for place in rng.integers(36, len(data), 40):
@@ -203,42 +202,42 @@ def damages(data: bytes):
         yield bytes(flipped), "checksum|another model"
 
 
-def told(instance: Instance, sentences: str) -> bool:
-    return any(instance.said(sentence) for sentence in sentences.split("|"))
+def any_logged(instance: Instance, messages: str) -> bool:
+    return any(instance.logged(message) for message in messages.split("|"))
 
 
-@ways
-def test_damaged_bytes_are_refused_and_nothing_changes(native, fmi, kind):
+@interfaces
+def test_damaged_bytes_are_rejected_without_effect(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind, substep=2e-4).initialize() as instance:
         instance.run(BEFORE[:3])
         here, data = instance.bytes(), instance.saved()
-        for bad, sentences in damages(data):
+        for bad, messages in damages(data):
             instance.log.clear()
             assert status(instance.fmu.deserializeFMUState, bad) == ERROR
-            assert told(instance, sentences), (sentences, instance.messages)
+            assert any_logged(instance, messages), (messages, instance.messages)
             assert instance.bytes() == here
         assert instance.saved() == data
-        instance.restore(data + b"more room than needed")
+        instance.restore(data + b"more bytes than needed")
         assert instance.saved() == data
         instance.advance(BEFORE[3])
 
 
-def resealed(data: bytes) -> bytes:
-    """Return bytes with a checksum that fits."""
+def with_checksum(data: bytes) -> bytes:
+    """Return the bytes of a state with a valid checksum."""
     return data[:16] + struct.pack("<I", zlib.crc32(data[20:])) + data[20:]
 
 
-@ways
-@models
-def test_a_forged_state_is_refused_or_harmless(native, model, fmi, kind):
-    """With a right checksum: a mode that there is not, NaN, a clock that stands; never a crash."""
-    rng, refused, it = np.random.default_rng(1), 0, case(model)
+@interfaces
+@each_shipped
+def test_a_forged_state_is_rejected_or_valid(native, model, fmi, kind):
+    """States with a valid checksum, but invalid modes, flags or numbers, do not crash."""
+    rng, rejected, it = np.random.default_rng(1), 0, case(model)
     before, _ = spans(model)
     with Instance(native[model, fmi], kind, substep=it.substep(2e-4)).initialize() as instance:
         instance.run(before[:3])
         data, here = instance.saved(), instance.bytes()
         token = 36 + struct.unpack_from("<I", data, 32)[0]
-        assert resealed(data) == data
+        assert with_checksum(data) == data
         forged = [
             data[:token] + struct.pack("<I", 99) + data[token + 4 :],
             data[:token] + struct.pack("<I", 5) + data[token + 4 :],
@@ -247,9 +246,9 @@ def test_a_forged_state_is_refused_or_harmless(native, model, fmi, kind):
             data[: token + 16] + struct.pack("<d", np.nan) + data[token + 24 :],
         ]
         for bad in forged:
-            state = instance.fmu.deserializeFMUState(resealed(bad))
+            state = instance.fmu.deserializeFMUState(with_checksum(bad))
             assert status(instance.fmu.setFMUState, state) == ERROR
-            assert instance.said("damaged")
+            assert instance.logged("damaged")
             assert instance.bytes() == here
             instance.fmu.freeFMUState(state)
         numbers = (len(data) - token - 40) // 8
@@ -257,38 +256,38 @@ def test_a_forged_state_is_refused_or_harmless(native, model, fmi, kind):
             place = len(data) - 8 * int(rng.integers(1, numbers))
             value = rng.choice([np.nan, np.inf, -1.0, 0.5, 1e300, 7.0])
             bad = data[:place] + struct.pack("<d", value) + data[place + 8 :]
-            state = instance.fmu.deserializeFMUState(resealed(bad))
+            state = instance.fmu.deserializeFMUState(with_checksum(bad))
             if status(instance.fmu.setFMUState, state) != OK:
                 assert instance.bytes() == here
-                refused += 1
+                rejected += 1
             instance.fmu.freeFMUState(state)
             instance.restore(data)
             assert instance.bytes() == here
-    assert refused > 150 / 4
+    assert rejected > 150 / 4
 
 
-@ways
-def test_a_state_of_something_else_is_refused(native, fmi, kind):
-    """Of the other model, the other version, another interface."""
+@interfaces
+def test_a_state_of_another_fmu_or_interface_is_rejected(native, fmi, kind):
+    """The state is that of another model, another version of FMI or another interface."""
     with Instance(native["PRBDM", fmi], kind).initialize() as instance:
         here = instance.bytes()
         others = [("PRBDM2R", fmi, kind), ("PRBDM", 5 - fmi, "cs")]
         others += [("PRBDM", fmi, other) for version, other in EVERY
                    if version == fmi and other != kind]  # fmt: skip
-        for model, version, way in others:
+        for model, version, interface in others:
             instance.log.clear()
-            with Instance(native[model, version], way).initialize() as other:
+            with Instance(native[model, version], interface).initialize() as other:
                 data = other.saved()
-            if {kind, way} == {"events", "late"}:
-                continue  # the same use: whether a step may end early is asked at instantiation
+            if {kind, interface} == {"events", "late"}:
+                continue  # They differ only in early return, which is not part of the state.
             assert status(instance.fmu.deserializeFMUState, data) == ERROR
-            sentence = "another use" if (model, version) == ("PRBDM", fmi) else "another model"
-            assert instance.said(sentence), instance.messages
+            sentence = "another kind" if (model, version) == ("PRBDM", fmi) else "another model"
+            assert instance.logged(sentence), instance.messages
             assert instance.bytes() == here
 
 
-@ways
-def test_buffers_that_are_too_small_or_missing_are_refused(native, fmi, kind):
+@interfaces
+def test_buffers_that_are_too_small_or_missing_are_rejected(native, fmi, kind):
     word, de = {2: ("FMUstate", "DeSerialize"), 3: ("FMUState", "Deserialize")}[fmi]
     names = [f"Get{word}", f"Serialized{word}Size", f"Serialize{word}", f"{de}{word}"]
     names += [f"Set{word}", f"Free{word}"]
@@ -299,7 +298,7 @@ def test_buffers_that_are_too_small_or_missing_are_refused(native, fmi, kind):
         assert instance.call(size_of, state, byref(size)) == OK
         buffer = byte(size.value)
         assert instance.call(serialize, state, buffer, size.value - 1) == ERROR
-        assert instance.said(f"a saved state needs {size.value} bytes, not {size.value - 1}")
+        assert instance.logged(f"a saved state needs {size.value} bytes, not {size.value - 1}")
         assert instance.call(serialize, state, None, size.value) == ERROR
         assert instance.call(serialize, None, buffer, size.value) == ERROR
         assert instance.call(size_of, state, None) == ERROR
@@ -320,16 +319,16 @@ def test_buffers_that_are_too_small_or_missing_are_refused(native, fmi, kind):
 # -- reset --
 
 
-@ways
-@models
-def test_reset_is_a_new_instance(native, model, fmi, kind):
-    """To the byte: of the values, of the motion, and of the state itself."""
+@interfaces
+@each_shipped
+def test_a_reset_instance_equals_a_new_one(native, model, fmi, kind):
+    """Values, trajectory and saved state are identical."""
     it, times = case(model), np.linspace(0.0, spans(model)[0][-1], 20)[1:]
     substep = it.substep(2e-4)
     with Instance(native[model, fmi], kind, substep=substep) as new:
-        unborn = new.saved()
+        initial = new.saved()
         new.initialize()
-        born, start, expected = new.saved(), new.bytes(), new.run(times)
+        started, start, expected = new.saved(), new.bytes(), new.run(times)
         last = new.saved()
     wrong = {f"{it.body}.mass": 0.1, f"{it.stop}.restitution": 0.2}
     with Instance(native[model, fmi], kind, substep=substep) as used:
@@ -342,33 +341,33 @@ def test_reset_is_a_new_instance(native, model, fmi, kind):
             assert used.step(1.0 + times[-1], -1.0) == DISCARD
         for _ in range(2):
             used.reset()
-            assert used.saved() == unborn
+            assert used.saved() == initial
             used.initialize()
-            assert used.saved() == born
+            assert used.saved() == started
             assert used.bytes() == start
             assert used.run(times) == expected
             assert used.saved() == last
 
 
-@ways
+@interfaces
 def test_reset_from_every_state_of_the_state_machine(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind) as instance:
-        unborn = instance.saved()
+        initial = instance.saved()
         places = [lambda: None, instance.enter, lambda: instance.enter().begin(),
                   lambda: (instance.enter().begin(), instance.fmu.terminate())]  # fmt: skip
         if kind == "events":
-            places.append(lambda: (instance.enter().begin(), waiting(instance)))
+            places.append(lambda: (instance.enter().begin(), enter_event_mode(instance)))
         if kind == "me":
             places.append(lambda: (instance.enter().begin(), instance.fmu.enterEventMode()))
         for place in places:
             place()
             instance.reset()
-            assert instance.saved() == unborn
+            assert instance.saved() == initial
 
 
-@ways
-def test_many_states_leave_each_other_alone(native, fmi, kind):
-    """Kept at once, restored in any order, freed, and one buffer used again and again."""
+@interfaces
+def test_saved_states_are_independent_of_each_other(native, fmi, kind):
+    """Thirty states are restored in random order and freed; one buffer is used repeatedly."""
     rng = np.random.default_rng(0)
     name = {2: "GetFMUstate", 3: "GetFMUState"}[fmi]
     with Instance(native["PRBDM", fmi], kind).initialize() as instance:
@@ -388,8 +387,8 @@ def test_many_states_leave_each_other_alone(native, fmi, kind):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_fmpys_simulation_goes_on_from_a_serialized_state(native, fmi):
-    """As its users would: simulate, keep the state, simulate on from there."""
+def test_fmpy_continues_a_simulation_from_a_serialized_state(native, fmi):
+    """The state at 0.05 s is passed to a second simulation."""
     path, names = str(native["PRBDM", fmi]), ["shuttle.x", "stop.impact_count"]
     whole = simulate_fmu(path, stop_time=0.1, output_interval=STEP, output=names)
     with Instance(native["PRBDM", fmi]).initialize(tolerance=1e-8) as instance:
@@ -399,5 +398,5 @@ def test_fmpys_simulation_goes_on_from_a_serialized_state(native, fmi):
         path, fmu_state=data, start_time=0.05, stop_time=0.1, output_interval=STEP, output=names
     )
     assert len(half) == 21
-    for name in names:  # communication points differ in their rounding
+    for name in names:  # The communication points differ in round-off.
         assert half[name] == pytest.approx(whole[name][-21:], abs=1e-12)

@@ -1,4 +1,4 @@
-"""The tables that the C kernel reads: a reader of its own gives back what was written."""
+"""The tables of the C kernel, read back by an independent reader in Python."""
 
 import struct
 import zlib
@@ -85,7 +85,7 @@ displacement = -0.0001
 
 @dataclass
 class Reader:
-    """Reads one item after the other."""
+    """Reader of the items of the tables, one after the other."""
 
     data: bytes
     at: int = HEAD
@@ -132,14 +132,14 @@ def written(mechanism) -> bytes:
     return tables(mechanism, native.variables, TOKEN, native.independent)
 
 
-def test_the_head_tells_version_size_and_check_sum(written):
+def test_the_head_contains_version_size_and_checksum(written):
     magic, version, size, check = struct.unpack_from("<4sIII", written)
     assert (magic, version, size) == (b"PRBM", 2, len(written))
     assert check == zlib.crc32(written[16:])
 
 
-def same(mechanism: Mechanism, quantity, expected) -> None:
-    """Hold an expression against what it stands for, for defaults and for other values."""
+def assert_same(mechanism: Mechanism, quantity, expected) -> None:
+    """Compare the values of an expression for the default parameters and for others."""
     values = mechanism.values()
     for factor in (1.0, 1.25):
         scaled = {name: factor * x for name, x in values.items()}
@@ -147,7 +147,7 @@ def same(mechanism: Mechanism, quantity, expected) -> None:
 
 
 class Comparison:
-    """Reads tables in the order of the format and compares every item with the mechanism."""
+    """Comparison of the items of the tables, in the order of the format, with the mechanism."""
 
     def __init__(self, mechanism: Mechanism, written: bytes) -> None:
         self.mechanism, self.reader = mechanism, Reader(written)
@@ -162,13 +162,13 @@ class Comparison:
 
     def fields(self, part) -> None:
         for name in FIELDS[type(part)]:
-            same(
+            assert_same(
                 self.mechanism, self.reader.expression(), lambda v, name=name: value(part, name, v)
             )
 
     def point(self, drawn) -> None:
         x, y = (affine(coordinate) for coordinate in drawn)
-        same(self.mechanism, self.reader.point(), lambda v: (x(v), y(v)))
+        assert_same(self.mechanism, self.reader.point(), lambda v: (x(v), y(v)))
 
     def body(self) -> str:
         return self.bodies[self.reader.take("I")]
@@ -179,7 +179,7 @@ class Comparison:
             self.point(self.mechanism.point(end, part.name))
 
     def placed(self, part) -> None:
-        """Compare the point where a part acts: the centre of mass by default."""
+        """Compare the name, body and point of a part; the default is the centre of mass."""
         assert (self.reader.text(), self.body()) == (part.name, part.body)
         bodies = self.mechanism.bodies
         self.point(part.point or next(b for b in bodies if b.name == part.body).centre)
@@ -229,7 +229,7 @@ class Comparison:
                 given = kind.coefficients.get(c.name, 0.0)
                 expression = affine(given) if isinstance(given, str) else None
                 name = f"{kind.name}.{c.name}"
-                same(m, r.expression(), expression or (lambda v, name=name: v[name]))
+                assert_same(m, r.expression(), expression or (lambda v, name=name: v[name]))
 
     def connections(self) -> None:
         m, r = self.mechanism, self.reader
@@ -272,7 +272,7 @@ class Comparison:
         for part, name in self.bounds:
             unit, _, minimum, maximum, *_ = FIELDS[type(part)][name]
             assert (r.text(), r.text()) == (f"{part.name}.{name}", unit)
-            same(self.mechanism, r.expression(), affine(getattr(part, name)))
+            assert_same(self.mechanism, r.expression(), affine(getattr(part, name)))
             assert r.take("dd") == (minimum, maximum)
 
     def variables(self) -> None:
@@ -291,8 +291,8 @@ class Comparison:
         assert not by_name
 
 
-def test_everything_is_read_back_as_it_is_in_the_mechanism(mechanism, written):
-    """Every field of every part, in the order of the format, to the last byte."""
+def test_tables_contain_every_field_of_the_mechanism(mechanism, written):
+    """Every field of every part is compared, until the last byte of the tables."""
     comparison = Comparison(mechanism, written)
     comparison.head()
     comparison.parameters_and_inputs()
@@ -307,17 +307,17 @@ def test_everything_is_read_back_as_it_is_in_the_mechanism(mechanism, written):
 
 
 def test_start_values_are_those_of_the_variables(mechanism):
-    """An input's too: its name and then its start stand at the end of the inputs."""
+    """Start values of parameters and inputs are written."""
     changes = {"solver.tolerance": 1e-5, "base.acceleration.y": 2.5}
     native = described(mechanism, changes, 2)
     written = tables(mechanism, native.variables, TOKEN, native.independent)
     for name, start in changes.items():
         at = written.index(name.encode() + b"\0") + len(name) + 1
-        at += 5 if name == "solver.tolerance" else 0  # its unit, an empty text
+        at += 5 if name == "solver.tolerance" else 0  # Its unit, an empty text.
         assert struct.unpack_from("<d", written, at) == (start,)
 
 
-def test_every_output_of_the_engine_has_a_slot_of_its_own(mechanism):
+def test_every_output_of_the_engine_has_a_unique_slot(mechanism):
     chosen = independent(mechanism)
     place = slots(mechanism, chosen)
     assert sorted(place.values()) == [*range(len(place))]
@@ -326,46 +326,46 @@ def test_every_output_of_the_engine_has_a_slot_of_its_own(mechanism):
 
 
 @pytest.mark.parametrize(
-    ("many", "told"),
+    ("parts", "counted"),
     [("probes", "1025 probes"), ("forces", "1025 forces"), ("stops", "65 stops")],
 )
-def test_what_the_kernel_would_refuse_is_not_written(many, told):
+def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
     guide = anvil()
-    one = getattr(guide, many)[0]
-    count = int(told.split()[0])
+    one = getattr(guide, parts)[0]
+    count = int(counted.split()[0])
     more = tuple(replace(one, name=f"{one.name}{k}") for k in range(count))
-    large = replace(guide, **{many: more})
-    with pytest.raises(MechanismError, match=f"Anvil has {told}; a native FMU computes with"):
+    large = replace(guide, **{parts: more})
+    with pytest.raises(MechanismError, match=f"Anvil has {counted}; a native FMU supports at most"):
         tables(large, (), TOKEN, ())
 
 
 @pytest.mark.parametrize(
-    ("name", "places", "number", "told"),
+    ("name", "places", "number", "message"),
     [
-        ("knock", 1, 2, "a stop that is fixed to what it stops"),
-        ("knock", 1, 9, "a reference that leads nowhere"),
-        ("leaf", 3, 0, "a flexure of no kind"),
-        ("leaf", 4, 3, "a flexure of no kind"),
-        ("leaf", 2, 2, "a reference that leads nowhere"),
-        ("chain", 4, 100000, "a reference that leads nowhere"),
+        ("knock", 1, 2, "a stop whose wall is on its own body"),
+        ("knock", 1, 9, "an index out of range"),
+        ("leaf", 3, 0, "a flexure type with neither pivots nor links, or both"),
+        ("leaf", 4, 3, "a flexure type with neither pivots nor links, or both"),
+        ("leaf", 2, 2, "an index out of range"),
+        ("chain", 4, 100000, "an index out of range"),
         ("chain", 4, 256, "more parts than can be computed with"),
-        ("hook", 0, 1, "a part that joins nothing"),
+        ("hook", 0, 1, "a part that connects a body with itself"),
         ("hook", 0, 2, "a body that nothing holds"),
-        ("tip", 0, 9, "a reference that leads nowhere"),
+        ("tip", 0, 9, "an index out of range"),
     ],
 )
-def test_tables_that_make_no_mechanism_are_refused(name, places, number, told):
-    """A number behind the name of a part of the mechanism of many parts is replaced."""
+def test_tables_of_an_invalid_mechanism_are_rejected(name, places, number, message):
+    """One number after the name of a part is replaced, at an offset of so many numbers."""
     guide = elastic()
     written = bytearray(tables(guide, (), TOKEN, independent(guide)))
     at = written.index(struct.pack("<I", len(name)) + name.encode() + b"\0") + 5 + len(name)
     struct.pack_into("<I", written, at + 4 * places, number)
     struct.pack_into("<I", written, 12, zlib.crc32(written[16:]))
-    with pytest.raises(KernelError, match=told):
+    with pytest.raises(KernelError, match=message):
         kernel().mechanism_open(bytes(written), len(written))
 
 
-def test_names_of_any_alphabet_are_counted_in_bytes(tmp_path):
+def test_the_length_of_a_name_is_in_bytes(tmp_path):
     path = tmp_path / "mine.toml"
     text = shipped()["PRBDM"].read_text()
     path.write_text(text.replace('"left_flexure"', '"linke_Fläche"'), "utf-8")

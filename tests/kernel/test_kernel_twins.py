@@ -351,7 +351,7 @@ def test_loops_that_ask_for_the_same_are_named_in_the_same_words():
     guide = replace(guide, flexure_types=types, flexures=(one, other, *more))
     theirs, ours = refused(guide, 3)
     assert ours == theirs
-    assert "closed by a_fourth, third ask" in ours
+    assert "closed by a_fourth, third depend" in ours
 
 
 def test_points_that_a_joint_cannot_join_are_told_in_the_same_words():

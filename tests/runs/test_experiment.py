@@ -84,14 +84,14 @@ def test_reference_results_are_left_out_where_they_would_take_minutes():
     assert reference.reference(stiff, {}, (), experiment(stiff), told.append) == {}
     assert told == ["no reference results: the default experiment takes the Python engine minutes"]
     for name in ("PRBDM2R", *COSTLY):
-        assert reference.steps(mechanism(name), {}, Experiment()) < reference.MOST_STEPS
+        assert reference.steps(mechanism(name), {}, Experiment()) < reference.STEPS_MAX
 
 
 def test_damping_shortens_the_steps_that_are_expected():
     """By 1/(beta omega^2), of the fastest mode."""
     quiet = dataclasses.replace(guide(0.1), damping_beta=0.0)
     plain = reference.steps(quiet, {}, Experiment())
-    omega = plain * reference.STABLE
+    omega = plain * reference.STABLE_STEP_FACTOR
     damped = reference.steps(quiet, {"damping.beta": 10 / omega}, Experiment())
     assert damped == pytest.approx(10 * plain)
 

@@ -1,4 +1,4 @@
-"""An importer for the tests: FMPy's thin layer, with names for value references."""
+"""An importer of Python FMUs for the tests: FMPy's slave with names instead of references."""
 
 import shutil
 from ctypes import byref
@@ -18,7 +18,7 @@ from fmpy.logging import addLoggerProxy
 
 OK, DISCARD = 0, 2
 
-_kept: list[fmi2CallbackFunctions] = []  # FMPy's proxy calls the logger that it got last, for ever
+_kept: list[fmi2CallbackFunctions] = []  # FMPy's proxy calls the last logger, freed or not.
 
 
 class Instance:
@@ -102,7 +102,7 @@ class Instance:
         return result
 
     def bytes(self) -> bytes:
-        """Return all declared variables as the bytes they are."""
+        """Return the values of all declared variables as bytes."""
         return np.array([*self.values().values()], dtype=float).tobytes()
 
     def run(self, times: np.ndarray) -> list[bytes]:

@@ -1,4 +1,4 @@
-"""Mistakes of an importer: values, times and the words of the answer."""
+"""Errors of an importer: invalid values and steps, each with a part of the expected message."""
 
 NAN, INF = float("nan"), float("inf")
 AT_START = {
@@ -12,10 +12,10 @@ AT_START = {
     "a NaN input": ("force.x", NAN, "force.x = nan"),
     "a wall penetrated": ("stop.position", -0.03, "penetrated"),
     "a shape out of reach": ("release.displacement", -0.2, "cannot be reached"),
-    "an output": ("shuttle.x", 0.1, "shuttle.x is no parameter or input"),
+    "an output": ("shuttle.x", 0.1, "shuttle.x is not a parameter or input"),
 }
 LATER = {
-    "a fixed parameter": ("shuttle.mass", 0.1, "shuttle.mass = 0.1 kg refused: it is fixed once"),
+    "a fixed parameter": ("shuttle.mass", 0.1, "shuttle.mass = 0.1 kg rejected: the parameter is"),
     "a tunable one": ("stop.restitution", -0.1, "stop.restitution = -0.1 must be at least 0"),
     "a NaN input": ("force.x", NAN, "force.x = nan"),
     "an infinite input": ("base.acceleration.x", INF, "base.acceleration.x = inf"),
@@ -23,8 +23,8 @@ LATER = {
 STEPS = {
     "no step": (1e-3, 0.0, "communicationStepSize = 0 s must be positive"),
     "a step backwards": (1e-3, -1e-3, "communicationStepSize = -0.001 s must be positive"),
-    "time running backwards": (0.0, 1e-3, "the last one ended at t = 0.001 s"),
-    "a jump forwards": (0.5, 1e-3, "the last one ended at t = 0.001 s"),
+    "time running backwards": (0.0, 1e-3, "the last step ended at t = 0.001 s"),
+    "a jump forwards": (0.5, 1e-3, "the last step ended at t = 0.001 s"),
     "NaN for a time": (NAN, 1e-3, "not finite"),
     "infinity for a step": (1e-3, INF, "not finite"),
 }

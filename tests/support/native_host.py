@@ -1,4 +1,4 @@
-"""An importer of native FMUs for the tests: FMPy's thin layers of both versions behind one face."""
+"""An importer of native FMUs for the tests: one interface to FMPy's classes for both versions."""
 
 from collections.abc import Callable, Iterable, Mapping
 from ctypes import byref, c_double
@@ -27,7 +27,7 @@ OK, WARNING, DISCARD, ERROR = 0, 1, 2, 3
 REAL, INTEGER, BOOLEAN = "Real", "Integer", "Boolean"
 KINDS = {"Float64": REAL, "Int32": INTEGER}
 TYPES = {REAL: "Float64", INTEGER: "Int32", BOOLEAN: "Boolean"}
-WAYS = ((2, "cs"), (2, "me"), (3, "cs"), (3, "events"), (3, "me"))
+INTERFACES = ((2, "cs"), (2, "me"), (3, "cs"), (3, "events"), (3, "me"))
 """Version and interface; events: co-simulation with event mode and early return."""
 
 _folders: list[TemporaryDirectory[str]] = []
@@ -36,7 +36,7 @@ _listeners: dict[int, list[tuple[int, str, str]]] = {}
 
 @cache
 def unpacked(fmu: Path) -> tuple[Path, ModelDescription]:
-    """Return the folder of an unpacked FMU, which lasts as long as this process, and its XML."""
+    """Return the folder of an unpacked FMU, kept until the process ends, and the description."""
     folder = TemporaryDirectory(prefix="prbm_native_")
     _folders.append(folder)
     extract(str(fmu), folder.name)
@@ -44,7 +44,7 @@ def unpacked(fmu: Path) -> tuple[Path, ModelDescription]:
 
 
 def _log2(listener: int, _: bytes, status: int, category: bytes, text: bytes) -> None:
-    """Note a message at the instance that it is of; FMPy knows one logger for all of them."""
+    """Store a message for its instance; FMPy has one logger for all instances."""
     if listener in _listeners:
         _listeners[listener].append((status, category.decode(), text.decode()))
     else:
@@ -55,10 +55,10 @@ _LOGGER, _ALLOCATE, _FREE = Logger(_log2), Allocate(calloc), Free(free)
 
 
 def callbacks(listener: int | None = None) -> fmi2CallbackFunctions:
-    """Return what an FMU of FMI 2.0 calls.
+    """Return the callback functions for an FMU of FMI 2.0.
 
-    FMPy's proxy, which formats messages, calls the logger that it got last: so it gets ours,
-    which lasts as long as this process, each time.
+    FMPy's proxy, which formats messages, calls the logger that was passed to it last.  It therefore
+    gets the same logger every time, which exists until the process ends.
     """
     result = fmi2CallbackFunctions()
     result.logger, result.allocateMemory, result.freeMemory = _LOGGER, _ALLOCATE, _FREE
@@ -88,11 +88,11 @@ class Instance:
         ``cs``, ``me``, ``events`` (co-simulation with event mode and early return) or ``late``
         (event mode without early return).
     guid : str or None
-        Another token than the one of the FMU.
+        Token to pass instead of that of the FMU.
     substep : float
         Step of the integration in model exchange [s].
     options
-        Of FMPy's ``instantiate`` in FMI 3.0.
+        Arguments of FMPy's ``instantiate`` in FMI 3.0.
     """
 
     def __init__(
@@ -165,22 +165,23 @@ class Instance:
 
     @property
     def messages(self) -> list[str]:
-        """What was logged, without status and category."""
+        """The logged messages, without status and category."""
         return [text for _, _, text in self.log]
 
-    def said(self, sentence: str) -> bool:
-        return any(sentence in text for text in self.messages)
+    def logged(self, part: str) -> bool:
+        """Return whether a logged message contains a text."""
+        return any(part in text for text in self.messages)
 
     def call(self, name: str, *arguments: Any) -> int:
         """Call a function of the standard by its name without the prefix; return its status."""
         return status(getattr(self.fmu, f"fmi{self.version}{name}"), self.fmu.component, *arguments)
 
     def function(self, two: str, three: str) -> Callable[..., Any]:
-        """Return the method of FMPy for what both standards call differently."""
+        """Return the method of FMPy whose name differs between FMI 2.0 and 3.0."""
         return getattr(self.fmu, two if self.version == 2 else three)  # type: ignore[no-any-return]
 
     def name_of(self, kind: str) -> str:
-        """Return what the version calls a type."""
+        """Return the name of a type in this version of FMI."""
         return kind if self.version == 2 else TYPES[kind]
 
     # -- values --
@@ -207,10 +208,10 @@ class Instance:
         return result
 
     def bytes(self) -> bytes:
-        """Return all declared variables as the bytes they are."""
+        """Return the values of all declared variables as bytes."""
         return np.array([*self.values().values()], dtype=float).tobytes()
 
-    # -- life --
+    # -- initialization and events --
 
     def enter(
         self, *, start: float = 0.0, tolerance: float | None = None, stop: float | None = None
@@ -226,7 +227,7 @@ class Instance:
         return self
 
     def begin(self) -> Self:
-        """Leave Initialization Mode and do all that comes before the first step."""
+        """Leave Initialization Mode and, if there is one, the first Event Mode."""
         self.fmu.exitInitializationMode()
         if self.kind != "cs":
             self.update()
@@ -258,7 +259,7 @@ class Instance:
             self.update()
 
     def update(self) -> list[bool]:
-        """Let happen what is due in Event Mode and leave it; return whether clocks ticked."""
+        """Handle the events in Event Mode and leave it; return for each clock whether it ticked."""
         ticks, again = [], True
         clocks = [v.valueReference for v in self.description.modelVariables if v.type == "Clock"]
         while again:
@@ -275,7 +276,7 @@ class Instance:
         return status(self.fmu.doStep, time, size)
 
     def advance(self, end: float) -> None:
-        """Continue to a time by whatever interface, events included."""
+        """Advance to a time through any interface, with all events."""
         if self.exchanges:
             Integrator(self).advance(end)
         elif self.version == 2:
@@ -293,7 +294,7 @@ class Instance:
                 self.update()
 
     def run(self, times: Iterable[float]) -> list[bytes]:
-        """Go from communication point to communication point; return the bytes at each."""
+        """Advance to each communication point; return the bytes of the values there."""
         result = []
         for time in times:
             self.advance(time)
@@ -310,16 +311,16 @@ class Instance:
         return data
 
     def restore(self, data: bytes) -> None:
-        """Return to a state that was serialized."""
+        """Restore a serialized state."""
         state = self.fmu.deserializeFMUState(data)
         self.fmu.setFMUState(state)
         self.fmu.freeFMUState(state)
 
 
 class Integrator:
-    """Runge and Kutta's classical steps for model exchange, bisecting to the events."""
+    """Integrator for model exchange: classical Runge-Kutta steps, events located by bisection."""
 
-    ROOT = 1e-12  # s
+    EVENT_TIME_ATOL = 1e-12  # s
 
     def __init__(self, instance: Instance) -> None:
         self.it, self.fmu = instance, instance.fmu
@@ -357,7 +358,7 @@ class Integrator:
 
     def advance(self, end: float) -> None:
         time, x = self.it.time, self.x()
-        while end - time > self.ROOT:
+        while end - time > self.EVENT_TIME_ATOL:
             sign, h = self.z() > 0.0, min(self.it.substep, end - time)
             x1 = self.step(time, x, h)
             if crossed := ((self.z() > 0.0) != sign).any():
@@ -374,7 +375,7 @@ class Integrator:
         self, time: float, x: np.ndarray, h: float, sign: np.ndarray
     ) -> tuple[float, np.ndarray]:
         low, high = 0.0, h
-        while high - low > self.ROOT:
+        while high - low > self.EVENT_TIME_ATOL:
             middle = (low + high) / 2
             self.step(time, x, middle)
             low, high = (low, middle) if ((self.z() > 0.0) != sign).any() else (middle, high)
@@ -382,7 +383,7 @@ class Integrator:
 
 
 def status(function: Callable[..., Any], *arguments: Any) -> int:
-    """Return the status of a call."""
+    """Call a function of FMPy and return the status."""
     try:
         function(*arguments)
     except FMICallException as error:

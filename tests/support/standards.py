@@ -1,4 +1,4 @@
-"""What the standards say of their functions: their arguments, and when they may be called."""
+"""The functions of the standards: their arguments, and the states in which they are allowed."""
 
 import random
 from ctypes import c_bool, c_char_p, c_double, c_int, c_size_t, c_uint32, c_void_p
@@ -7,10 +7,10 @@ from typing import Any
 
 from native_host import OK, Instance
 
-# p pointer, n length, d number, b Boolean, r value reference, i Integer; after the instance
 OTHERS3 = ("Float32", "Int8", "UInt8", "Int16", "UInt16", "UInt32", "Int64", "UInt64")
 TYPES3 = ("Float64", "Int32", "Boolean", "String", *OTHERS3)
 TYPES2 = ("Real", "Integer", "Boolean", "String")
+# Arguments after the instance: p pointer, n length, d number, b Boolean, r reference, i Integer.
 SIGNATURES = {
     2: {
         **{way + kind: "pnp" for way in ("Get", "Set") for kind in TYPES2},
@@ -48,7 +48,7 @@ SIGNATURES = {
         "ActivateModelPartition": "rd",
     },
 }  # fmt: skip
-"""Functions without the prefix, but those that make and free instances."""
+"""Functions by name without the prefix, except those that create and free instances."""
 
 ALWAYS2 = {
     "SetDebugLogging", "Terminate", "Reset", "GetFMUstate", "SetFMUstate", "FreeFMUstate",
@@ -106,8 +106,8 @@ ALLOWED[3, "events"] = ALLOWED[3, "cs"] | {
     "event": ALWAYS3 | GET3 | SET3
     | {"GetClock", "SetClock", "EvaluateDiscreteStates", "UpdateDiscreteStates", "EnterStepMode"},
 }  # fmt: skip
-"""By version and interface, then by state: more than the standards allow only in FMI 2.0, where
-start values may be read before initialization."""
+"""Allowed functions by version and interface, then by state.  They are those of the standards; in
+FMI 2.0 start values may also be read before initialization."""
 
 NOTHING = {
     "p": lambda version: c_void_p(), "n": lambda version: c_size_t(0),
@@ -120,7 +120,7 @@ NOTHING = {
 def raw(it: Instance, name: str, *, instance: int | type | None = Instance) -> int:
     """Call a function with zeros and NULLs, without FMPy's signatures; return its status.
 
-    On the instance, if not on the one of another address.
+    The handle is that of ``it`` unless another address is given.
     """
     handle = it.fmu.component if instance is Instance else instance
     kinds = SIGNATURES[it.version][name]
@@ -135,15 +135,15 @@ def free(it: Instance, instance: int | None) -> None:
     function(c_void_p(instance))
 
 
-# -- calls at random --
+# -- random calls --
 
 NUMBERS = (0.0, 1e-3, -1.0, 0.5, 1e300, float("nan"), float("inf"), 1e-320)
 
 
 class Caller:
-    """Calls functions of an FMU at random, with arguments that are right or wrong.
+    """Caller of functions of an FMU with random arguments, valid or invalid.
 
-    Arrays hold more than any length that is passed, so that only the FMU can go astray.
+    Arrays are longer than any length that is passed, so only the FMU can access invalid memory.
     """
 
     ROOM = 4096
@@ -156,7 +156,7 @@ class Caller:
         self.words = (c_char_p * self.ROOM)(*[b"logAll"] * self.ROOM)
 
     def pointer(self, name: str, first: bool) -> Any:
-        """Return NULL, or an array of what the function takes."""
+        """Return NULL, or an array of the type that the function expects."""
         if self.chance.random() < 0.1:
             return c_void_p()
         if name in ("SetDebugLogging", "SetString", "SetBinary"):
@@ -194,12 +194,12 @@ class Caller:
 STATES = ("SetFMUstate", "SetFMUState", "FreeFMUstate", "FreeFMUState", "SerializedFMUstateSize",
           "SerializedFMUStateSize", "SerializeFMUstate", "SerializeFMUState",
           "GetFMUstate", "GetFMUState")  # fmt: skip
-"""They take the address of a state, and an address cannot be checked: not called at random."""
+"""Functions that take the address of a state; it cannot be checked, so they are left out."""
 
 
 def wrong_calls(fmu: Path, kind: str, count: int) -> int:
-    """Call functions at random, in every state; return how many calls were refused, all told."""
-    refused, rounds = 0, 100
+    """Call random functions in every state; return how many calls were rejected with a message."""
+    rejected, rounds = 0, 100
     for seed in range(count // rounds):
         with Instance(fmu, kind, f"it {seed}") as instance:
             chance, caller = random.Random(seed), Caller(instance, seed)
@@ -211,16 +211,16 @@ def wrong_calls(fmu: Path, kind: str, count: int) -> int:
                 instance.fmu.enterEventMode()
             names = [name for name in SIGNATURES[instance.version] if name not in STATES]
             for _ in range(rounds):
-                told, name = len(instance.log), chance.choice(names)
+                logged, name = len(instance.log), chance.choice(names)
                 found = caller.call(name)
                 if name == "SetDebugLogging":
                     assert instance.call(name, True, 0, None) == OK
                 else:
-                    assert found == OK or len(instance.log) > told, name
+                    assert found == OK or len(instance.log) > logged, name
                     assert 0 <= found <= 3, (name, found)
-                refused += found != OK
+                rejected += found != OK
             instance.reset()
             instance.initialize()
             instance.advance(1e-3)
             assert instance.values()["stop.impact_count"] == 0
-    return refused
+    return rejected

@@ -1,4 +1,4 @@
-"""FMUs as zip archives: the same bytes for the same content."""
+"""Reproducible zip archives: equal contents give equal bytes."""
 
 import io
 import zipfile
@@ -6,14 +6,14 @@ from collections.abc import Mapping
 
 from ..base.atomic import FILE_MODE
 
-TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip archive can hold
+TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # Of every file: the earliest time that a zip archive can hold.
 EXECUTABLE_MODE = 0o755
 LIBRARIES = (".so", ".dll", ".dylib")
-UNIX = 3  # the system whose permissions an archive keeps
+UNIX = 3  # System of origin; unpackers apply file permissions from Unix alone.
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:
-    """Return a zip archive whose bytes depend on names and contents alone."""
+    """Return a zip archive of files by path; its bytes depend on paths and contents alone."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name in sorted(contents):

@@ -1,20 +1,20 @@
-"""The date that an FMU carries."""
+"""The generation date in a model description."""
 
 import os
 from datetime import UTC, datetime
 
-EPOCH = datetime(1980, 1, 1, tzinfo=UTC)  # the one of the archive
+EPOCH = datetime(1980, 1, 1, tzinfo=UTC)  # Same as the time of the files in the archive.
 
 
 def date() -> str:
-    """Return the date of generation: that of SOURCE_DATE_EPOCH, else the archive's own, 1980.
+    """Return the generation date in ISO 8601: SOURCE_DATE_EPOCH if set, else 1980-01-01.
 
-    It may not be the time of the build, because the same input is to give the same bytes.
+    The time of the build is not used, so that equal inputs give equal bytes.
 
     Raises
     ------
     ValueError
-        If SOURCE_DATE_EPOCH is no time.
+        If SOURCE_DATE_EPOCH is not a number of seconds or is out of range.
     """
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     try:
@@ -22,6 +22,6 @@ def date() -> str:
     except (ValueError, OverflowError, OSError):
         raise ValueError(
             f"the environment variable SOURCE_DATE_EPOCH = {epoch[:30]!r} must be a number of "
-            "seconds since 1970, before the year 10000; unset it for a date that is always the same"
+            "seconds since 1970, before the year 10000; unset it to date FMUs 1980-01-01"
         ) from None
     return moment.isoformat().replace("+00:00", "Z")

@@ -18,7 +18,19 @@ TOLERANCE = "solver.tolerance"
 
 @dataclass(frozen=True)
 class Heading:
-    """What a model description says about the model as a whole."""
+    """Metadata of a model as a whole.
+
+    Parameters
+    ----------
+    name, description : str
+        Name of the model and one sentence about it.
+    guid : str
+        The guid (FMI 2.0) or instantiation token (FMI 3.0).
+    log_categories : mapping of str to str
+        Description of each category of log messages.
+    experiment : Experiment
+        The default experiment.
+    """
 
     name: str
     description: str
@@ -27,7 +39,7 @@ class Heading:
     experiment: Experiment = field(default_factory=Experiment)
 
     def attributes(self) -> dict[str, str]:
-        """Return the attributes of the model description that every version of FMI has."""
+        """Return the attributes that model descriptions of FMI 2.0 and 3.0 have in common."""
         return {
             "description": self.description,
             "version": __version__,
@@ -39,7 +51,7 @@ class Heading:
 
 
 def model_description(heading: Heading, variables: tuple[Variable, ...]) -> bytes:
-    """Return the XML of a Python FMU: FMI 2.0, co-simulation."""
+    """Return the modelDescription.xml of a Python FMU: FMI 2.0, co-simulation."""
     version = {"fmiVersion": "2.0", "modelName": heading.name, "guid": heading.guid}
     root = Element("fmiModelDescription", version | heading.attributes())
     _co_simulation(root, heading.name)
@@ -54,7 +66,7 @@ def model_description(heading: Heading, variables: tuple[Variable, ...]) -> byte
 
 
 def serialized(root: Element) -> bytes:
-    """Return XML as it is in a file."""
+    """Return the bytes of an XML file, indented, without unprintable characters."""
     ElementTree.indent(root)
     for element in root.iter():
         for name, value in element.items():
@@ -64,7 +76,7 @@ def serialized(root: Element) -> bytes:
 
 
 def number(value: float | int | bool | None) -> str:
-    """Return a number as XML has it, exactly."""
+    """Return a number as the text of an XML attribute that reads back exactly."""
     if isinstance(value, bool):
         return str(value).lower()
     return repr(value)
@@ -72,7 +84,7 @@ def number(value: float | int | bool | None) -> str:
 
 def _co_simulation(root: Element, identifier: str) -> None:
     true = (
-        "needsExecutionTool",  # Python with NumPy and SciPy
+        "needsExecutionTool",  # Python with NumPy and SciPy.
         "canHandleVariableCommunicationStepSize",
         "canNotUseMemoryManagementFunctions",
         "canGetAndSetFMUstate",
@@ -102,7 +114,7 @@ def add_experiment(root: Element, heading: Heading, variables: Iterable[Variable
 
 
 def add_units(root: Element, variables: Iterable[Variable]) -> None:
-    """Add the definitions of the units in use."""
+    """Add the definitions of the units that the variables have."""
     used = {v.unit for v in variables if v.unit}
     definitions = SubElement(root, "UnitDefinitions")
     for name, unit in UNITS.items():
@@ -114,7 +126,7 @@ def add_units(root: Element, variables: Iterable[Variable]) -> None:
 
 
 def add_types(root: Element, variables: Iterable[Variable]) -> None:
-    """Add the definitions of the quantities in use, as FMI 2.0 has them."""
+    """Add the definitions of the quantities that the variables have, in the form of FMI 2.0."""
     definitions = SubElement(root, "TypeDefinitions")
     for quantity, attributes in used_types(variables):
         simple = SubElement(definitions, "SimpleType", {"name": quantity})
@@ -122,7 +134,7 @@ def add_types(root: Element, variables: Iterable[Variable]) -> None:
 
 
 def used_types(variables: Iterable[Variable]) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the name and the attributes of each quantity in use."""
+    """Yield the name and the attributes of each quantity that the variables have."""
     used = {v.unit for v in variables if v.unit}
     for unit, quantity in QUANTITIES.items():
         if unit in used:
@@ -133,7 +145,7 @@ def used_types(variables: Iterable[Variable]) -> Iterator[tuple[str, dict[str, s
 
 
 def add_variables(root: Element, variables: Iterable[Variable], index: Mapping[str, str]) -> None:
-    """Add the variables as FMI 2.0 has them, given their indices by name."""
+    """Add the variables in the form of FMI 2.0; ``index`` maps their names to their indices."""
     listed = SubElement(root, "ModelVariables")
     for v in variables:
         attributes = {
@@ -150,9 +162,10 @@ def add_variables(root: Element, variables: Iterable[Variable], index: Mapping[s
 
 
 def value_attributes(v: Variable, index: Mapping[str, str]) -> dict[str, str]:
-    """Return the attributes that tell what values a variable has.
+    """Return the attributes of a variable's values: type, unit, bounds, nominal and start value.
 
-    ``index`` maps the name of a variable to what refers to it.
+    ``index`` maps variable names to the numbers that refer to them: indices in FMI 2.0, value
+    references in FMI 3.0.
     """
     value: dict[str, str] = {}
     if v.type == "Real":
@@ -176,10 +189,10 @@ def value_attributes(v: Variable, index: Mapping[str, str]) -> dict[str, str]:
 
 
 def _structure(variables: tuple[Variable, ...], index: Mapping[str, str]) -> Element:
-    """Return the dependencies of the unknowns.
+    """Return the ModelStructure: the dependencies of outputs and of initial unknowns.
 
-    At a communication point no output depends on the inputs set there: they act from there on.
-    Initially everything depends on the parameters and inputs, except what counts impacts.
+    At a communication point no output depends on the inputs that are set there, because they act
+    from the next step on.
     """
     structure = Element("ModelStructure")
     outputs = SubElement(structure, "Outputs")
@@ -196,9 +209,10 @@ def _structure(variables: tuple[Variable, ...], index: Mapping[str, str]) -> Ele
 
 
 def initial_dependencies(unknown: Variable, variables: Iterable[Variable]) -> list[str]:
-    """Return what a value depends on when it is initialized.
+    """Return the parameters and inputs that the initial value of an unknown depends on.
 
-    The stub of a flexure depends on its gammas; all else on everything that is given.
+    The length of a flexure's stub, ``gamma0``, depends on the other gammas of its type; every other
+    unknown depends on all parameters and inputs.
     """
     prefix = ""
     if unknown.causality == "calculatedParameter":

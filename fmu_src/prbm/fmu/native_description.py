@@ -24,16 +24,16 @@ from .description import (
 )
 
 LOG_CATEGORIES = {
-    "logEvents": "Impacts, with their time, speeds and loss of energy.",
-    "logStatusWarning": "What the importer should know though the simulation goes on.",
-    "logStatusDiscard": "Why something could not be computed here and now.",
-    "logStatusError": "Calls and values that were refused, with the reason and a remedy.",
-    "logStatusFatal": "What ended the instance for good.",
+    "logEvents": "Impacts, with time, speeds and energy loss.",
+    "logStatusWarning": "Warnings; the simulation continues.",
+    "logStatusDiscard": "Reasons why a value could not be computed in the present state.",
+    "logStatusError": "Rejected calls and values, with the reason and a remedy.",
+    "logStatusFatal": "Reasons why the instance cannot be used any more.",
     "logAll": "All messages.",
 }
 TYPES_3 = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", CLOCK: CLOCK}
 
-# capabilities that are not what the standard assumes
+# Capability flags whose default in the standard is false and that are true here.
 BOTH_2 = ("canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "canSerializeFMUstate")
 EXCHANGE_2 = (*BOTH_2, "providesDirectionalDerivative")
 SIMULATION_2 = (*BOTH_2, "canHandleVariableCommunicationStepSize")
@@ -56,20 +56,20 @@ def description(
     interface: NativeInterface,
     source: str,
 ) -> bytes:
-    """Return the modelDescription.xml.
+    """Return the modelDescription.xml of a native FMU.
 
     Parameters
     ----------
     version : {2, 3}
         Version of FMI.
     heading : Heading
-        What is said about the model as a whole.
+        Metadata of the model as a whole.
     mechanism : Mechanism
-        What is exported.
+        The mechanism to export.
     interface : NativeInterface
         Its variables.
     source : str
-        Name of the source file in ``sources``.
+        Name of the source file in ``sources``; FMI 2.0 lists it.
     """
     if version == 2:
         return _fmi2(heading, mechanism, interface, source)
@@ -116,12 +116,12 @@ def _fmi2(heading: Heading, mechanism: Mechanism, interface: NativeInterface, so
 def _unknown(
     reference: str, name: str, known: Iterable[str], index: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return the attributes of an unknown and what it depends on."""
+    """Return the attributes of an unknown: its reference and those of its dependencies."""
     return {reference: index[name], "dependencies": " ".join(index[k] for k in known)}
 
 
 def initial_unknowns(interface: NativeInterface) -> list[Variable]:
-    """Return what initialization computes: outputs, calculated parameters, states, derivatives."""
+    """Return the initial unknowns: outputs, calculated parameters, states and derivatives."""
     moving = {*interface.states, *interface.derivatives}
     return [
         v
@@ -157,7 +157,7 @@ def _fmi3(heading: Heading, mechanism: Mechanism, interface: NativeInterface) ->
         SubElement(structure, element, _unknown("valueReference", name, names, reference))
 
     def add_moving(element: str, name: str) -> None:
-        """Add what follows from states and inputs, and so from the parameters: knowns here too."""
+        """Add an unknown that is computed from states and inputs, and so from parameters too."""
         computed = {*known[name]} - {name}
         add(element, name, (*parameters, *known[name]) if computed else known[name])
 
@@ -205,9 +205,9 @@ BASE_MEMBERS = ("acceleration.x", "acceleration.y", "force.x", "force.y", "momen
 
 
 def terminals(mechanism: Mechanism) -> bytes:
-    """Return terminalsAndIcons.xml, which is of FMI 3.0 and used by FMI 2.0 as it is.
+    """Return terminalsAndIcons.xml: one terminal per stop, one per force, and one of the base.
 
-    A contact port for each stop, a port for each body that a force acts on, and the base.
+    FMI 2.0 has adopted this file of FMI 3.0 without change.
     """
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     corners = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
@@ -226,7 +226,7 @@ def terminals(mechanism: Mechanism) -> bytes:
         text = f"Force on {pushed(force)}, and the motion of the {force.body}"
         _terminal(ports, force.name, text, members)
     members = {member: f"base.{member}" for member in BASE_MEMBERS}
-    _terminal(ports, "base", "Acceleration of the base, and what it has to bear", members)
+    _terminal(ports, "base", "Acceleration of the base, force and moment on it", members)
     return serialized(root)
 
 
@@ -239,12 +239,12 @@ def _terminal(ports: Element, name: str, description: str, members: Mapping[str,
 
 
 def build_description(identifier: str, source: str) -> bytes:
-    """Return the buildDescription.xml of FMI 3.0: how the sources become a shared library."""
+    """Return the buildDescription.xml of FMI 3.0, from which importers compile the sources."""
     root = Element("fmiBuildDescription", {"fmiVersion": "3.0"})
     configuration = SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
     sources = SubElement(configuration, "SourceFileSet", {"language": "C99"})
     SubElement(sources, "SourceFile", {"name": source})
     override = {"name": OVERRIDE.format(3), "optional": "true"}
-    text = "Functions without the prefix of the model, as a shared library has them"
+    text = "Function names without the prefix of the model, as in a shared library"
     SubElement(sources, "PreprocessorDefinition", override | {"description": text})
     return serialized(root)

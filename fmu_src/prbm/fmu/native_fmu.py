@@ -1,4 +1,4 @@
-"""Native FMUs: the C kernel, the tables of a mechanism, and all that the standards ask for."""
+"""Builder of native FMUs: the C kernel, the tables of a mechanism and the files of the standard."""
 
 import hashlib
 import json
@@ -43,28 +43,33 @@ def build(
     Parameters
     ----------
     mechanism : Mechanism
-        What is exported.
+        The mechanism to export.
     changes : mapping
-        Start values of parameters and inputs that differ from the mechanism's own.
+        Start values of parameters and inputs that replace those of the mechanism.
     fmi : {2, 3}
         Version of FMI.
     platforms : sequence of str
-        Where it is to run, see :func:`prbm.kernel.compiler.libraries`.
+        Platforms to compile for, see :func:`prbm.kernel.compiler.libraries`.
     clock : bool
-        Whether each stop has an output clock, for FMI 3.0.
+        Whether each stop has an output clock (FMI 3.0).
     progress : callable
-        Is told what is being done.
+        Called with a description of each stage of the build.
+
+    Returns
+    -------
+    bytes
+        The zip archive; equal arguments give equal bytes.
 
     Raises
     ------
     PrbmError
-        If the mechanism cannot start with these values, one of them makes no sense, or there is no
+        If the mechanism cannot start with these values, one of them is invalid, or there is no
         compiler for a platform.
     """
-    from ..drawing.icon import icon  # here, because Matplotlib takes half a second
+    from ..drawing.icon import icon  # Imported here: Matplotlib takes half a second.
 
     changes = dict(changes or {})
-    progress("checking that it starts")
+    progress("checking the start")
     native = described(mechanism, changes, fmi, clock)
     compiled = libraries(platforms, progress)
     progress(f"collecting {len(native.variables)} variables and the tables")
@@ -105,18 +110,18 @@ def build(
 def described(
     mechanism: Mechanism, changes: Mapping[str, float], fmi: int, clock: bool = False
 ) -> NativeInterface:
-    """Return the interface of the native FMU of a mechanism with other start values.
+    """Return the interface of the native FMU of a mechanism with changed start values.
 
     Raises
     ------
     PrbmError
-        If the mechanism cannot start, a start value names no parameter or input, or there is
-        nothing that a clock could tick for.
+        If the mechanism cannot start, ``changes`` has a name that is not a parameter or input, or
+        clocks are requested for a mechanism without stops.
     """
     if clock and not mechanism.stops:
         raise MechanismError(
-            f"{mechanism.name} has no stop, so that there is nothing for a clock to tick for: "
-            "leave out the clock"
+            f"{mechanism.name} has no stop: a clock ticks at the impacts of a stop; build the FMU "
+            "without clocks"
         )
     return native_interface(
         mechanism,
@@ -132,7 +137,7 @@ def described(
 def _digest(
     mechanism: Mechanism, native: NativeInterface, fmi: int, source: str, heading: Heading
 ) -> str:
-    """Return a hash of all that decides what the FMU is and does; the heading has no token."""
+    """Return a hash of everything that determines the FMU's behaviour, except its token."""
     parts = kernel() | {
         "modelDescription.xml": description(fmi, heading, mechanism, native, source),
         FILE: tables(mechanism, native.variables, "", native.independent),
@@ -144,7 +149,7 @@ def _digest(
 
 
 def _model(mechanism: Mechanism, native: NativeInterface) -> bytes:
-    """Return the mechanism and its variables as data for tools; the FMU itself does not read it."""
+    """Return the mechanism and its variables as JSON for tools; the FMU itself does not read it."""
     listed = [v for v in native.variables if v.type != CLOCK]
     return json.dumps(resolved(mechanism, listed), indent=1, sort_keys=True).encode()
 
@@ -158,10 +163,10 @@ def _binaries(
 
 
 def _licenses(windows: bool) -> Iterator[tuple[str, bytes]]:
-    """Yield the licences of all that is inside, and the entry point that the standard wants."""
+    """Yield the licences of all contents and ``license.txt``, which the standard requires."""
     folder = files(__package__).joinpath("licenses")
     names = [*LICENSES, *([WINDOWS_LICENSE] if windows else [])]
-    entry = "The model and its engine are under the MIT licence.  All licences of what is inside:\n"
+    entry = "The model and its engine are under the MIT licence.  Licences of all contents:\n"
     yield "documentation/licenses/license.txt", "\n".join([entry, *names, ""]).encode()
     for name in names:
         yield f"documentation/licenses/{name}", folder.joinpath(name).read_bytes()

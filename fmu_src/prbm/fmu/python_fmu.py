@@ -22,21 +22,21 @@ from .slave.slave import MechanismSlave
 from .start import interface, start_sample
 
 NAMESPACE = uuid.UUID("6f1c6c1e-0c53-5d0e-9d6e-3b1f0b4f7a52")
-ROOT = __package__.rpartition(".")[0]  # the package that this one is part of
-SLAVE = "fmu.slave.slave"  # the module that the script of an FMU imports
-ENGINE = "engine"  # stands for the name of the shipped package until that is known
+ROOT = __package__.rpartition(".")[0]  # The parent package.
+SLAVE = "fmu.slave.slave"  # The module that the script of an FMU imports.
+ENGINE = "engine"  # Placeholder of the shipped package, whose name depends on its content.
 INIT = '"""The engine and the slave of this FMU, with relative imports only."""\n'
-TOKEN_DIGITS = 10  # hexadecimal digits that distinguish two contents in one process
+TOKEN_DIGITS = 10  # Hexadecimal digits of the content's hash in module names.
 
 SCRIPT = '''\
 """{title}.
 
-pythonfmu loads this module.  The folder {package} beside it holds the engine and the slave.
+pythonfmu loads this module.  The folder {package} beside it contains the engine and the slave.
 Its name is unique to this FMU and its content, because FMUs in one process share modules.
 
-At every instantiation pythonfmu 0.7.0 runs this file once more and then releases a reference to
-its names that it does not own; without the reference that is added here, they would be freed
-while they are used, and the process would end sooner or later.
+At every instantiation, pythonfmu 0.7.0 runs this file again and then releases a reference to its
+global names that it does not own.  The reference added here keeps them alive; without it they are
+freed while in use, and the process eventually crashes.
 """
 
 import builtins
@@ -79,19 +79,24 @@ def build(
     mechanism : Mechanism
         The mechanism to export.
     changes : mapping
-        Start values of parameters and inputs that differ from the mechanism's own.
+        Start values of parameters and inputs that replace those of the mechanism.
     progress : callable
-        Called with the name of each stage of the build.
+        Called with a description of each stage of the build.
+
+    Returns
+    -------
+    bytes
+        The zip archive; equal arguments give equal bytes.
 
     Raises
     ------
     PrbmError
         If the mechanism cannot start with these values, or one of them is out of bounds.
     """
-    from ..drawing.icon import icon  # here, because Matplotlib takes half a second
+    from ..drawing.icon import icon  # Imported here: Matplotlib takes half a second.
 
     changes = dict(changes or {})
-    progress("checking that it starts")
+    progress("checking the start")
     listed = interface(mechanism, changes)
     progress(f"collecting {len(listed)} variables and the engine")
     sources = dict(_sources(mechanism, listed))
@@ -120,7 +125,7 @@ def _digest(files: Mapping[str, bytes]) -> str:
 
 
 def _sources(mechanism: Mechanism, listed: tuple[Variable, ...]) -> Iterator[tuple[str, bytes]]:
-    """Yield the data and modules of the simulation; the name of the package depends on them."""
+    """Yield the data and modules of the simulation, which determine the package's name."""
     data = json.dumps(resolved(mechanism, listed), indent=1, sort_keys=True)
     yield FILE, data.encode()
     yield f"{ENGINE}/__init__.py", INIT.encode()
@@ -132,7 +137,7 @@ def _sources(mechanism: Mechanism, listed: tuple[Variable, ...]) -> Iterator[tup
 
 
 def shipped_modules() -> dict[str, bytes]:
-    """Return the slave and the modules that it imports, directly or not, by their paths."""
+    """Return the slave and all modules that it imports, directly or indirectly, by path."""
     found: dict[str, bytes] = {}
     waiting = [SLAVE]
     while waiting:
@@ -143,7 +148,7 @@ def shipped_modules() -> dict[str, bytes]:
         if folder.is_dir():
             parts, file = [*parts, "__init__"], folder.joinpath("__init__.py")
         path = "/".join(parts) + ".py"
-        if path in found or not file.is_file():  # a name that a module defines is no file
+        if path in found or not file.is_file():  # No file: an imported function, class or constant.
             continue
         found[path] = file.read_bytes()
         waiting += _imported(found[path], parts[:-1])
@@ -152,7 +157,7 @@ def shipped_modules() -> dict[str, bytes]:
 
 
 def _imported(source: bytes, package: Sequence[str]) -> Iterator[str]:
-    """Yield the names that a module of a package imports relatively, with their modules."""
+    """Yield the modules that a source file imports relatively, and the names from each."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.ImportFrom) and node.level:
             parts = [*package[: len(package) - node.level + 1], *(node.module or "").split(".")]
@@ -174,14 +179,14 @@ def _named(
         compile(script, token, "exec")
     except SyntaxError:
         raise MechanismError(
-            f"mechanism name {mechanism.name!r}: Python cannot give it to a class; choose another"
+            f"mechanism name {mechanism.name!r}: not a valid name of a Python class; choose another"
         ) from None
     yield f"{token}.py", script.encode()
     yield "slavemodule.txt", token.encode()
 
 
 def _plain(title: str) -> str:
-    """Return a title without characters that would end the docstring around it."""
+    """Return a title without characters that have a meaning in a docstring."""
     return printable(title).replace("\\", "/").replace('"', "'").rstrip(".")
 
 

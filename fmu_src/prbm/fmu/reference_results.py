@@ -1,6 +1,6 @@
-"""Reference results inside a native FMU, as the layered standard FMI-LS-REF describes them.
+"""Reference results inside a native FMU, in the format of the layered standard FMI-LS-REF.
 
-They come from the Python engine and are thus independent of the C kernel.
+The Python engine computes them, so they are independent of the C kernel.
 """
 
 import csv
@@ -32,9 +32,9 @@ ATTRIBUTES = {
     "fmi-ls-description": "Layered Standard providing information on related files included in "
     "an FMU.",
 }
-DIGITS = 9  # significant; the engine's own error is larger
-MOST_STEPS = 1e5  # of the Python engine, which takes a minute or two for them
-STABLE = 3.0  # the step in units of what the fastest motion lets an explicit method take, 1/omega
+DIGITS = 9  # Significant digits; the error of the engine is larger.
+STEPS_MAX = 1e5  # Steps of the Python engine, which take a minute or two.
+STABLE_STEP_FACTOR = 3.0  # Stable step of the explicit method, times the rate of fastest motion.
 
 
 def reference(
@@ -44,16 +44,33 @@ def reference(
     experiment: Experiment,
     progress: Callable[[str], None] = lambda step: None,
 ) -> dict[str, bytes]:
-    """Return the files by their paths in the FMU; none if the experiment cannot be finished.
+    """Return the reference results of the default experiment.
 
-    Nor are there any if the Python engine would take minutes for it; ``progress`` is told why.
+    Parameters
+    ----------
+    mechanism : Mechanism
+        The mechanism to export.
+    changes : mapping
+        Start values of parameters and inputs that replace those of the mechanism.
+    variables : iterable of Variable
+        The variables of the FMU; its outputs are recorded.
+    experiment : Experiment
+        The default experiment.
+    progress : callable
+        Called with the reason if there are no results.
+
+    Returns
+    -------
+    dict of str to bytes
+        Files by path in the FMU.  Empty if the simulation fails, or if the Python engine would
+        need more than ``STEPS_MAX`` steps.
     """
-    if steps(mechanism, changes, experiment) > MOST_STEPS:
+    if steps(mechanism, changes, experiment) > STEPS_MAX:
         progress("no reference results: the default experiment takes the Python engine minutes")
         return {}
     columns = _columns(_Hashed(mechanism), tuple(changes.items()), experiment)
     if columns is None:
-        progress("no reference results: the default experiment does not come to its end")
+        progress("no reference results: the simulation of the default experiment fails")
         return {}
     outputs = [v.name for v in variables if v.causality == "output" and v.name in names(columns)]
     file = f"{mechanism.name}_out.csv"
@@ -64,21 +81,21 @@ def reference(
 
 
 def steps(mechanism: Mechanism, changes: Mapping[str, float], experiment: Experiment) -> float:
-    """Return about how many steps the engine takes for an experiment, by the fastest mode.
+    """Return an estimate of the number of engine steps in an experiment, from the fastest mode.
 
-    An explicit step is stable up to some units of 1/omega and, of damping in proportion to
-    stiffness, of 1/(beta omega^2).  The estimate is made of frequencies and not of times, so that
-    the same FMU is built again.
+    An explicit step is stable up to a few units of 1/omega and, with stiffness-proportional
+    damping, of 1/(beta omega^2).  The estimate uses frequencies instead of a measured time, so
+    that every build of an FMU gives the same bytes.
     """
     simulation = Simulation(mechanism, changes)
     system, n = simulation.system, simulation.system.n
     omega = 2 * math.pi * float(abs(modes_at(system, simulation.state()[:n]).frequency).max())
     fastest = max(omega, simulation.values["damping.beta"] * omega**2)
-    return experiment.stop_time * fastest / STABLE
+    return experiment.stop_time * fastest / STABLE_STEP_FACTOR
 
 
 class _Hashed:
-    """A mechanism that is looked up by its identity: it holds mappings, which have no hash."""
+    """A cache key for a mechanism by identity, because its mappings cannot be hashed."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         self.mechanism = mechanism
@@ -94,7 +111,10 @@ class _Hashed:
 def _columns(
     hashed: _Hashed, changes: tuple[tuple[str, float], ...], experiment: Experiment
 ) -> NDArray[Any] | None:
-    """Return the result of the default experiment; the FMUs of one export share it."""
+    """Return the results of the default experiment, or None if it fails.
+
+    They are cached, because the FMUs of one export share them.
+    """
     try:
         result = simulate(
             hashed.mechanism, dict(changes), stop_time=experiment.stop_time, step=experiment.step
@@ -115,13 +135,13 @@ def _table(columns: NDArray[Any], outputs: Iterable[str]) -> bytes:
 
 
 def _manifest(file: str, experiment: Experiment) -> bytes:
-    told = (
+    description = (
         f"Outputs of the default experiment (0 to {experiment.stop_time:g} s, communication step "
         f"{1e3 * experiment.step:g} ms), computed by the Python engine"
     )
     ElementTree.register_namespace("fmi-ls", NAMESPACE)
     attributes = {f"{{{NAMESPACE}}}{name}": value for name, value in ATTRIBUTES.items()}
     root = Element("fmiReferences", attributes)
-    related = {"type": "text/csv", "source": file, "role": "result", "description": told}
-    SubElement(root, "Related", related)
+    related = {"type": "text/csv", "source": file, "role": "result"}
+    SubElement(root, "Related", related | {"description": description})
     return serialized(root)

@@ -1,4 +1,4 @@
-"""What every flavour of FMU of a mechanism begins with: its variables and their start values."""
+"""The variables and start values that Python and native FMUs of a mechanism have in common."""
 
 from collections.abc import Mapping
 
@@ -8,28 +8,28 @@ from ..mechanism.description import Mechanism
 
 
 def start_sample(mechanism: Mechanism, changes: Mapping[str, float]) -> dict[str, Number]:
-    """Return all outputs at the start, which also shows that the mechanism can start.
+    """Return all outputs at the start by name.
 
     Raises
     ------
     PrbmError
-        If it cannot, with these start values.
+        If the mechanism cannot start with these start values.
     """
     return dict(Simulation(mechanism, changes).outputs())
 
 
 def magnitudes(mechanism: Mechanism, changes: Mapping[str, float]) -> tuple[float, float, float]:
-    """Return what angles [rad], rates [rad/s] and energies [J] are measured against."""
+    """Return typical magnitudes of angles [rad], rates [rad/s] and energies [J]."""
     return Simulation(mechanism, changes).magnitudes()
 
 
 def interface(mechanism: Mechanism, changes: Mapping[str, float]) -> tuple[Variable, ...]:
-    """Return the variables that every FMU of a mechanism has, with other start values.
+    """Return the variables that every FMU of a mechanism has, with changed start values.
 
     Raises
     ------
     PrbmError
-        If the mechanism cannot start, or a start value names no parameter or input.
+        If the mechanism cannot start, or ``changes`` has a name that is not a parameter or input.
     """
     plain = variables(mechanism, start_sample(mechanism, {}))
     changed = with_starts(plain, changes)

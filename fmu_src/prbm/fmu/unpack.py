@@ -1,4 +1,4 @@
-"""Unpacking of FMUs: workarounds for differences between FMPy and pythonfmu."""
+"""Unpacking of FMUs to paths that pythonfmu can read."""
 
 import tempfile
 from collections.abc import Iterator
@@ -12,12 +12,12 @@ import fmpy  # type: ignore[import-untyped]
 
 @contextmanager
 def unpacked(fmu: Path | BinaryIO) -> Iterator[Path]:
-    """Unpack an FMU to a folder that pythonfmu can read, and remove it afterwards.
+    """Unpack an FMU to a temporary folder that pythonfmu can read; remove the folder afterwards.
 
     Raises
     ------
     RuntimeError
-        If every candidate has characters that a URI encodes.
+        If the path of every candidate has characters that a URI encodes.
     """
     candidates = (tempfile.gettempdir(), "/tmp", "/var/tmp", r"C:\Users\Public", ".")
     for candidate in map(Path, candidates):
@@ -33,7 +33,7 @@ def unpacked(fmu: Path | BinaryIO) -> Iterator[Path]:
 
 
 def plain(path: Path) -> bool:
-    """Whether pythonfmu can read a path: its URI encodes nothing but spaces.
+    """Return whether pythonfmu can read a path: its URI encodes no characters but spaces.
 
     Examples
     --------

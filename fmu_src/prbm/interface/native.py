@@ -1,4 +1,4 @@
-"""The variables of native FMUs: those of every flavour, and those of model exchange."""
+"""The variables of native FMUs: those of all FMUs, and those that model exchange adds."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,19 +19,19 @@ from .variables import (
 )
 
 DERIVATIVES = {
-    "energy.dissipated": "Power lost to damping and friction, impacts apart",
-    "energy.work": "Power of the inputs and of the moving walls, impacts apart",
+    "energy.dissipated": "Power lost to damping and friction, without impacts",
+    "energy.work": "Power of the inputs and of the moving walls, without impacts",
 }
-INDICATED = {
+INDICATOR_DESCRIPTIONS = {
     "impact": "Event indicator of an impact at {name}",
-    "release": "Event indicator of the release of what rests on {name}",
+    "release": "Event indicator of the release from rest on {name}",
     "slip": "Event indicator of the beginning and the end of sliding at {name}",
 }
 
 
 @dataclass(frozen=True)
 class NativeInterface:
-    """The variables of a native FMU, and which of them model exchange works with.
+    """The variables of a native FMU, and the names of those that model exchange uses.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ class NativeInterface:
     clocks : tuple of str
         Names of the output clocks.
     independent : tuple of int
-        The coordinates whose angles and rates are states.
+        Indices of the independent coordinates, whose values and rates are states.
     """
 
     variables: tuple[Variable, ...]
@@ -68,25 +68,25 @@ def native_interface(
     Parameters
     ----------
     mechanism : Mechanism
-        What is exported.
+        The mechanism to export.
     plain : sequence of Variable
-        The variables that every flavour has.
+        The variables that all FMUs of the mechanism have.
     sample : mapping
         All outputs at the start.
     magnitudes : tuple of float
-        Of those states that are angles, rates and energies; their nominal values are the next
-        powers of ten, as the C kernel gives them.
+        Typical magnitudes of angles [rad], rates [rad/s] and energies [J].  The nominal values of
+        states are the next powers of ten, as in the C kernel.
     independent : sequence of int
-        The coordinates whose angles and rates are states.
+        Indices of the independent coordinates, whose values and rates are states.
     time : bool
-        Whether time is a variable, as FMI 3.0 demands.
+        Whether time is a variable, as FMI 3.0 requires.
     clock : bool
         Whether each stop has an output clock that ticks at its impacts (FMI 3.0).
 
     Raises
     ------
     MechanismError
-        If two variables share a name or a value reference.
+        If two variables share a name or a value reference, or a name is not ASCII.
     """
     nominal = scales(mechanism, sample)
     names = coordinate_variables(mechanism)
@@ -122,7 +122,7 @@ def native_interface(
 
 
 def coordinate_variables(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
-    """Return the variables that each coordinate and its rate are: angles, or a link's strain."""
+    """Return the names of each coordinate and its rate: an angle, or the strain of a link."""
     system = assemble(mechanism, mechanism.values())
     names = {j: f"link[{number}]" for number, j in enumerate(system.links, start=1)}
     names |= {frame.j: name for name, frame in system.bodies.items()}
@@ -135,7 +135,7 @@ def coordinate_variables(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
 def state_derivatives(
     coordinates: Sequence[tuple[str, str]], independent: Sequence[int]
 ) -> tuple[str, ...]:
-    """Return the names of those derivatives of states that are no other variable."""
+    """Return the names of the state derivatives that only model exchange has as variables."""
     return (
         *(f"der({coordinates[j][1]})" for j in independent),
         *(f"der({name})" for name in STORED),
@@ -143,7 +143,7 @@ def state_derivatives(
 
 
 def counter_of(clock: str) -> str:
-    """Return the name of the variable that counts what a clock ticks for.
+    """Return the name of the variable that counts the impacts for which a clock ticks.
 
     Examples
     --------
@@ -172,7 +172,7 @@ def _indicators(mechanism: Mechanism) -> Iterator[Variable]:
     for name, kind in kinds:
         yield Variable(
             f"{name}.{kind}_indicator",
-            INDICATED[kind].format(name=name),
+            INDICATOR_DESCRIPTIONS[kind].format(name=name),
             "local", "continuous", "calculated", "1",
         )  # fmt: skip
 

@@ -1,8 +1,9 @@
 """The tables of a mechanism, as the C kernel reads them from ``resources/mechanism.bin``.
 
-Little-endian; a text is its length, its bytes in UTF-8 and a zero byte; an expression is its
-constant and pairs of a parameter's index and a factor; bodies are counted from 1, 0 is the ground.
-What a simulation computes has a place, its slot, in one vector of all values: :func:`slots`.
+Numbers are little-endian.  A text is its length, its bytes in UTF-8 and a zero byte.  An expression
+is its constant, the number of its terms, and a parameter index and a factor for each term.  Bodies
+are counted from 1; 0 is the ground.  Every value of a simulation has an index, its slot, in one
+vector of all values, see :func:`slots`.
 """
 
 import struct
@@ -44,13 +45,13 @@ from .variables import (
 
 FILE = "mechanism.bin"
 MAGIC, VERSION = b"PRBM", 2
-HEAD = 16  # Bytes before those of the checksum.
+HEAD = 16  # Bytes before those that the checksum covers.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
-COORDINATES_MAX = 512  # A mass matrix of 2 MB; no mechanism of this kind has as many.
-STOPS_MAX = 64  # Also of friction points.
-PLACES_MAX = 1024  # Forces, and probes.
-GROUND_POINTS_MAX = 4096  # Every pair of them has a distance.
-PIVOTS_MAX = 256  # Pivots of a flexure, and links of a chain.
+COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
+STOPS_MAX = 64  # Largest number of stops, and of friction points.
+PLACES_MAX = 1024  # Largest number of forces, and of probes.
+GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
+PIVOTS_MAX = 256  # Largest number of pivots of a flexure, and of links of a chain.
 GROUND_NUMBER = 0  # Bodies are counted from 1.
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
 
@@ -66,18 +67,18 @@ def tables(
     Parameters
     ----------
     mechanism : Mechanism
-        What is exported.
+        The mechanism to export.
     variables : iterable of Variable
-        The variables of the FMU, whose start values replace the mechanism's own.
+        The variables of the FMU, whose start values replace those of the mechanism.
     token : str
         The guid or instantiation token of the model description.
     independent : sequence of int
-        The coordinates whose angles and rates are states in model exchange.
+        Indices of the independent coordinates, whose values and rates are states in model exchange.
 
     Raises
     ------
     MechanismError
-        If it has more parts than the C kernel computes with.
+        If the mechanism has more parts than the C kernel supports.
     """
     check_size(mechanism)
     listed = tuple(variables)
@@ -87,15 +88,15 @@ def tables(
 
 
 def check_size(mechanism: Mechanism) -> None:
-    """Refuse a mechanism of more parts than the C kernel computes with.
+    """Check the numbers of parts of a mechanism against the limits of the C kernel.
 
     Raises
     ------
     MechanismError
-        If it has.
+        If a number is above its limit.
     """
     m = mechanism
-    for what, count, most in (
+    for parts, count, limit in (
         ("coordinates", assemble(m, m.values()).n, COORDINATES_MAX),
         ("stops", len(m.stops), STOPS_MAX),
         ("frictions", len(m.frictions), STOPS_MAX),
@@ -103,36 +104,37 @@ def check_size(mechanism: Mechanism) -> None:
         ("probes", len(m.probes), PLACES_MAX),
         ("points of the ground", len(m.ground), GROUND_POINTS_MAX),
     ):
-        if count > most:
+        if count > limit:
             raise MechanismError(
-                f"{m.name} has {count} {what}; a native FMU computes with {most} at most"
+                f"{m.name} has {count} {parts}; a native FMU supports at most {limit}"
             )
 
 
 def slots(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, int]:
-    """Return the slot of every value by its name, in the order of the vector of all values."""
+    """Return the slot of every value: its index in the vector of all values, by name."""
     return {name: slot for slot, name in enumerate(_names(mechanism, independent))}
 
 
 def _names(mechanism: Mechanism, independent: Sequence[int]) -> Iterator[str]:
+    """Yield the names of all values in the order of their slots."""
     stops = [stop.name for stop in mechanism.stops]
     yield from (p.name for p in mechanism.parameters)
     yield from input_names(mechanism)
-    yield from (f"{body.name}.{what}" for body in mechanism.bodies for what in BODY_OUTPUTS)
-    yield from (f"{stop}.{what}" for stop in stops for what in STOP_OUTPUTS)
+    yield from (f"{body.name}.{output}" for body in mechanism.bodies for output in BODY_OUTPUTS)
+    yield from (f"{stop}.{output}" for stop in stops for output in STOP_OUTPUTS)
     yield from BASE_OUTPUTS
     yield from ENERGIES
-    yield from (f"{stop}.{what}" for stop in stops for what in LATCHED)
+    yield from (f"{stop}.{output}" for stop in stops for output in LATCHED)
     coordinates = coordinate_variables(mechanism)
     for of_links in (LINK_ANGLE, LINK_STRAIN):
         yield from (name for pair in coordinates if of_links.search(pair[0]) for name in pair)
-    yield from (f"{probe.name}.{what}" for probe in mechanism.probes for what in PROBE_OUTPUTS)
+    yield from (f"{probe.name}.{output}" for probe in mechanism.probes for output in PROBE_OUTPUTS)
     yield "mode.frequency"
     for kind in mechanism.flexure_types:
         if len(mechanism.model(kind).gamma) > 1:
             yield f"{kind.name}.gamma0"
     yield from state_derivatives(coordinates, independent)
-    yield from (f"{stop}.{what}_indicator" for stop in stops for what in INDICATORS)
+    yield from (f"{stop}.{kind}_indicator" for stop in stops for kind in INDICATORS)
     yield from (f"{friction.name}.slip_indicator" for friction in mechanism.frictions)
     yield "time"
 
@@ -151,7 +153,7 @@ def _text(text: str) -> bytes:
 
 
 class _Writer:
-    """Writes the parts of a mechanism one after the other."""
+    """Writer of the tables of one mechanism, in the order in which the kernel reads them."""
 
     def __init__(
         self, mechanism: Mechanism, variables: Sequence[Variable], independent: Sequence[int]
@@ -242,7 +244,7 @@ class _Writer:
         return _f64(expression.constant) + _u32(len(expression.terms)) + b"".join(terms)
 
     def _field(self, name: str, quantity: Quantity) -> bytes:
-        """Return what a field of a part is: a parameter, or an expression in parameters."""
+        """Return the expression of a part's field, which is a parameter or an expression."""
         parameter = Affine(0.0, {name: 1.0})
         return self._expression(affine(quantity) if isinstance(quantity, str) else parameter)
 
@@ -272,7 +274,7 @@ class _Writer:
         )
 
     def _placed(self, part: Friction | Force) -> bytes:
-        """Return the name, the body and the point of a part: the centre of mass unless given."""
+        """Return the name, body and point of a part; the default point is the centre of mass."""
         body = self.mechanism.bodies[self.body[part.body] - 1]
         point = self._point(body.centre if part.point is None else part.point)
         return _text(part.name) + _u32(self.body[part.body]) + point

@@ -7,9 +7,14 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit by its exponents of the base units, with what it may be displayed in.
+    """A unit of the interface.
 
-    ``display`` maps a name to the factor in ``displayed value = factor * value``.
+    Parameters
+    ----------
+    base : mapping of str to int
+        Exponents of the base units.
+    display : mapping of str to float
+        Display units, with the factor in ``displayed value = factor * value``.
     """
 
     base: Mapping[str, int]
@@ -45,7 +50,7 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """A physical quantity: what a variable measures, in which unit, displayed in which."""
+    """A physical quantity with its unit and its display unit, None for the unit itself."""
 
     name: str
     unit: str

@@ -1,8 +1,8 @@
-"""The one list of a mechanism's FMI variables, for every flavour and version of FMI.
+"""The FMI variables of a mechanism, which all its FMUs have in common.
 
-Value references are part of the interface and depend on nothing but the name: the CRC-32 of the
-name in UTF-8, without its highest bit.  A variable keeps its reference when others are added,
-removed or moved, in every version and flavour, and nobody has to keep a register of them.
+The value reference of a variable depends on its name only: it is the CRC-32 of the name in UTF-8,
+without the highest bit.  A variable therefore keeps its reference when others are added, removed or
+moved, in Python and native FMUs and in every version of FMI.
 """
 
 import math
@@ -26,14 +26,14 @@ Number = float | int | bool
 BASE = "base"
 CLOCK = "Clock"
 
-# what is computed, in the order in which the C kernel keeps it
+# Computed variables of each part, in the order of their slots in the C kernel.
 BODY_OUTPUTS = ("x", "y", "angle", "vx", "vy", "omega")
 PROBE_OUTPUTS = ("x", "y", "vx", "vy")
 STOP_OUTPUTS = (
     "gap", "gap_rate", "force", "point.displacement", "point.velocity", "point.mobility",
 )  # fmt: skip
 BASE_OUTPUTS = (f"{BASE}.force.x", f"{BASE}.force.y", f"{BASE}.moment")
-STORED = ("energy.dissipated", "energy.work")  # energies that are states
+STORED = ("energy.dissipated", "energy.work")  # Energies that are integrated, hence states.
 ENERGIES = ("energy.kinetic", "energy.elastic", "energy.gravitational", *STORED)
 LATCHED = (
     "contact", "impact_count", "impact_time", "approach_speed", "rebound_speed", "impulse",
@@ -43,7 +43,7 @@ LINK_OUTPUTS = ("angle", "omega")
 STRETCH_OUTPUTS = ("strain", "strain_rate")
 LINK_ANGLE = re.compile(r"^link\[\d+\]\.angle$")
 LINK_STRAIN = re.compile(r"^link\[\d+\]\.strain$")
-INDICATORS = ("impact", "release", "slip")  # event indicators of a stop
+INDICATORS = ("impact", "release", "slip")  # Event indicators of a stop.
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Variable:
     name : str
         Structured name.
     description : str
-        What it is, for a person who does not know the model.
+        One sentence or phrase.
     causality, variability, initial : str
         As in FMI 2.0; ``initial`` is empty for inputs.
     unit : str
@@ -63,9 +63,9 @@ class Variable:
     type : {"Real", "Integer", "Boolean", "Clock"}
         Type in FMI 2.0, or a clock of FMI 3.0.
     start : number or None
-        Start value where there is one.
+        Start value of parameters and inputs.
     minimum, maximum : float
-        Inclusive bounds, infinite where there are none.
+        Inclusive bounds; infinite if unbounded.
     nominal : float or None
         Typical magnitude.
     derivative_of : str or None
@@ -93,12 +93,12 @@ class Variable:
 
     @property
     def reference(self) -> int:
-        """The value reference, see the module."""
+        """The value reference: the CRC-32 of the name without its highest bit."""
         return zlib.crc32(self.name.encode()) & 0x7FFFFFFF
 
     @property
     def quantity(self) -> Quantity:
-        """What a Real measures."""
+        """The physical quantity of a Real."""
         return QUANTITIES[self.unit]
 
 
@@ -109,12 +109,12 @@ class Scales:
     by_unit: Mapping[str, float]
 
     def __call__(self, unit: str) -> float | None:
-        """Return the nominal value in a unit, None where it says nothing."""
+        """Return the nominal value for a unit, None if the unit has no typical magnitude."""
         return self.by_unit.get(unit)
 
 
 def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
-    """Return typical magnitudes from the release, the masses and the fundamental frequency."""
+    """Return typical magnitudes, from the release, the masses and the fundamental frequency."""
     values = mechanism.values()
     span = extent(mechanism)
     x = abs(affine(mechanism.release.displacement)(values)) or span / 10
@@ -178,15 +178,15 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
     Parameters
     ----------
     mechanism : Mechanism
-        What is exported.
+        The mechanism to export.
     sample : mapping
-        All outputs of a simulation of it at its start: names and types.
+        All outputs of a simulation at its start, by name.
 
     Raises
     ------
     MechanismError
-        If two variables share a name or a value reference, a name is none of FMI, or a parameter
-        has a unit that is not known or a nominal value that is none.
+        If two variables share a name or a value reference, a name is not ASCII, or a parameter has
+        an unknown unit or an invalid nominal value.
     """
     nominal = scales(mechanism, sample)
     result = tuple(_variables(mechanism, sample, nominal))
@@ -197,16 +197,16 @@ def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Varia
     return result
 
 
-TIME = Variable("time", "Time", "independent", "continuous", "", "s")  # of FMI 3.0
+TIME = Variable("time", "Time", "independent", "continuous", "", "s")  # In FMI 3.0 only.
 
 
 def check_names(variables: Sequence[Variable]) -> None:
-    """Refuse names that FMI does not have, that are taken, or of the same value reference.
+    """Check that names are ASCII and that names and value references are unique.
 
     Raises
     ------
     MechanismError
-        If there is one.
+        If they are not.
     """
     seen: dict[int, str] = {}
     for variable in variables:
@@ -219,26 +219,26 @@ def check_names(variables: Sequence[Variable]) -> None:
             )
         if not variable.name.isascii():
             raise MechanismError(
-                f"{variable.name}: names of FMI are of the letters a to z, digits and _, without "
-                "accents; rename the part"
+                f"{variable.name}: variable names of FMI consist of the letters a to z without "
+                "accents, digits and _; rename the part"
             )
         other = seen.setdefault(variable.reference, variable.name)
         if other != variable.name:
             raise MechanismError(
-                f"{variable.name} and {other} happen to have the same value reference "
-                f"{variable.reference}: rename one of them"
+                f"{variable.name} and {other} have the same value reference "
+                f"{variable.reference} by coincidence: rename one of them"
             )
 
 
 def with_starts(
     variables: tuple[Variable, ...], changes: Mapping[str, float]
 ) -> tuple[Variable, ...]:
-    """Return the variables with other start values.
+    """Return the variables with changed start values.
 
     Raises
     ------
     ParameterError
-        If a name is unknown or has no start value that may be set.
+        If a name is not a parameter or input.
     """
     by_name = {v.name: v for v in variables}
     settable = {n: v for n, v in by_name.items() if v.causality in ("parameter", "input")}
@@ -263,8 +263,8 @@ def _variables(
         if name.endswith(".gamma0"):
             yield Variable(
                 name,
-                "Length of the stubs at the clamps in units of the length of the cantilever: "
-                "what the other gammas leave of 1",
+                "Length of the stubs at the clamps, as a fraction of the length of the cantilever: "
+                "1 minus the other gammas",
                 "calculatedParameter", "fixed", "calculated", "1", minimum=0.0, maximum=1.0,
             )  # fmt: skip
     yield from _inputs(mechanism, nominal)
@@ -288,17 +288,17 @@ def _variables(
 
 
 def _checked(parameter: Parameter) -> Parameter:
-    """Return a parameter whose unit and nominal value an FMU can have.
+    """Return a parameter after a check of its unit and its nominal value.
 
     Raises
     ------
     MechanismError
-        If its unit is unknown, or its nominal value not positive and finite.
+        If the unit is unknown, or the nominal value is not positive and finite.
     """
     if (parameter.unit or "1") not in QUANTITIES:
         raise MechanismError(
-            f"{parameter.name} has the unit {parameter.unit!r}, which no FMU of ours knows; "
-            f"give it in one of {', '.join(QUANTITIES)}"
+            f"{parameter.name} has the unknown unit {parameter.unit!r}; give it in one of "
+            f"{', '.join(QUANTITIES)}"
         )
     nominal_value = parameter.nominal
     if nominal_value is not None and not 0.0 < nominal_value < math.inf:
@@ -350,22 +350,22 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
             f"Velocity of the {wall(stop)}, rate of {stop.name}.displacement",
         )
     for force in mechanism.forces:
-        for axis, what in (
-            ("x", "Impulses along x"),
-            ("y", "Impulses along y"),
-            ("moment", "Angular impulses"),
+        for axis, total_of in (
+            ("x", "impulses along x"),
+            ("y", "impulses along y"),
+            ("moment", "angular impulses"),
         ):
             point = f"the {force.body}" if axis == "moment" else pushed(force)
             total = given(
                 f"{force.name}.impulse.{axis}",
-                f"{what} on {point}, all so far: what it grows by acts at once",
+                f"Sum of all {total_of} on {point}; an increase acts as an impulse at once",
             )
             yield replace(total, variability="discrete")
     for stop in mechanism.stops:
         mobility = given(
             f"{stop.name}.{MOBILITY}",
-            f"Inverse of the effective mass of the {wall(stop)}: an impulse changes its velocity "
-            "by so much times itself, 0 if it is immovable",
+            f"Inverse of the effective mass of the {wall(stop)}: its change of velocity per unit "
+            "impulse; 0 if it is immovable",
         )
         yield replace(mobility, minimum=0.0, maximum=WALL_MOBILITY_MAX)
     for axis in "xy":
@@ -376,13 +376,13 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
 
 
 def pushed(force: Force) -> str:
-    """Return where a force acts, in words."""
+    """Return the point of a force, in words."""
     return f"{'the centre of mass' if force.point is None else 'a point'} of the {force.body}"
 
 
 def wall(stop: Stop) -> str:
-    """Return what the wall of a stop is, in words: its motion is seen from there."""
-    return "wall" if stop.on == GROUND else f"wall on the {stop.on}, as seen from there"
+    """Return the wall of a stop and the frame of its motion, in words."""
+    return "wall" if stop.on == GROUND else f"wall on the {stop.on}, relative to this body"
 
 
 def _output(
@@ -403,8 +403,9 @@ def _output(
 def _displacements(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
     for axis in "xy":
         yield _output(
-            f"{name}.{axis}", "m", f"Displacement {point} along {axis} from straight", nominal
-        )
+            f"{name}.{axis}", "m", f"Displacement {point} along {axis} from the straight shape",
+            nominal,
+        )  # fmt: skip
 
 
 def _velocities(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
@@ -423,7 +424,9 @@ def _probe(name: str, point: str, nominal: Scales) -> Iterator[Variable]:
 def _body(body: str, nominal: Scales) -> Iterator[Variable]:
     centre = f"of the centre of mass of the {body}"
     yield from _displacements(body, centre, nominal)
-    yield _output(f"{body}.angle", "rad", f"Rotation of the {body} from straight", nominal)
+    yield _output(
+        f"{body}.angle", "rad", f"Rotation of the {body} from the straight shape", nominal
+    )
     yield from _velocities(body, centre, nominal)
     yield _output(
         f"{body}.omega", "rad/s", f"Angular velocity of the {body}", nominal,
@@ -434,24 +437,24 @@ def _body(body: str, nominal: Scales) -> Iterator[Variable]:
 def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     yield _output(f"{stop}.gap", "m", "Distance of the hit point from the wall", nominal)
     yield _output(
-        f"{stop}.gap_rate", "m/s", "Rate of the gap, negative while it closes", nominal,
+        f"{stop}.gap_rate", "m/s", "Rate of the gap, negative while the gap closes", nominal,
         derivative_of=f"{stop}.gap",
     )  # fmt: skip
     yield _output(
-        f"{stop}.force", "N", "Force of the wall while the stop holds; an impact is an impulse, "
-        "not a force", nominal, minimum=0.0,
+        f"{stop}.force", "N", "Force of the wall on the body in resting contact; impacts are "
+        "impulses and do not contribute", nominal, minimum=0.0,
     )  # fmt: skip
     yield _output(
-        f"{stop}.point.displacement", "m", "Displacement of the hit point, in the direction of the "
-        "wall's: the gap is closed where both are equal", nominal,
+        f"{stop}.point.displacement", "m", "Displacement of the hit point along the direction of "
+        f"the stop; the gap is closed if it equals {stop}.displacement", nominal,
     )  # fmt: skip
     yield _output(
-        f"{stop}.point.velocity", "m/s", "Velocity of the hit point in that direction", nominal,
-        derivative_of=f"{stop}.point.displacement",
+        f"{stop}.point.velocity", "m/s", "Velocity of the hit point along the direction of the "
+        "stop", nominal, derivative_of=f"{stop}.point.displacement",
     )  # fmt: skip
     yield _output(
-        f"{stop}.point.mobility", "1/kg", "Inverse of the effective mass of the hit point in that "
-        "direction, as if no stop held", nominal, minimum=0.0,
+        f"{stop}.point.mobility", "1/kg", "Inverse of the effective mass of the hit point along "
+        "the direction of the stop, without resting contacts", nominal, minimum=0.0,
     )  # fmt: skip
     latched = Variable(
         f"{stop}.contact", "Whether the stop holds the body in resting contact",
@@ -460,8 +463,8 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     yield latched
     yield replace(
         latched, name=f"{stop}.impact_count", type="Integer", minimum=0,
-        description="Number of impacts so far; the outputs of the last one mean something once "
-        "it is positive",
+        description="Number of impacts so far; the outputs of the last impact are valid if it is "
+        "positive",
     )  # fmt: skip
 
     def last(name: str, unit: str, description: str, minimum: float = -math.inf) -> Variable:
@@ -477,9 +480,9 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     yield last("energy_lost", "J", "Energy lost at the last impact")
     yield last(
         "modal_restitution", "1",
-        "Velocity of the fundamental mode after over before the last impact, sign changed",
+        "Velocity of the fundamental mode after over before the last impact, with reversed sign",
     )  # fmt: skip
-    yield last("impulse_sum", "N.s", "Impulses of the wall, all so far, those of captures too", 0.0)
+    yield last("impulse_sum", "N.s", "Sum of all impulses of the wall, including captures", 0.0)
 
 
 def _base(nominal: Scales) -> Iterator[Variable]:
@@ -497,17 +500,16 @@ def _base(nominal: Scales) -> Iterator[Variable]:
 def _energies(nominal: Scales) -> Iterator[Variable]:
     yield _output("energy.kinetic", "J", "Kinetic energy", nominal, minimum=0.0)
     yield _output(
-        "energy.elastic", "J", "Energy of the flexures, zero when straight", nominal, minimum=0.0
+        "energy.elastic", "J", "Elastic energy of the flexures, 0 in the straight shape", nominal,
+        minimum=0.0,
+    )  # fmt: skip
+    yield _output(
+        "energy.gravitational", "J", "Potential energy of gravity, 0 in the straight shape", nominal
     )
     yield _output(
-        "energy.gravitational", "J", "Potential energy of gravity, zero when straight", nominal
+        "energy.dissipated", "J", "Energy lost to damping, friction and impacts so far", nominal
     )
-    yield _output(
-        "energy.dissipated", "J", "Energy lost so far to damping, friction and impacts", nominal
-    )
-    yield _output(
-        "energy.work", "J", "Work done so far by the inputs and the moving walls", nominal
-    )
+    yield _output("energy.work", "J", "Work of the inputs and of the moving walls so far", nominal)
 
 
 def _link(link: str, nominal: Scales) -> Iterator[Variable]:
@@ -518,7 +520,7 @@ def _link(link: str, nominal: Scales) -> Iterator[Variable]:
             f"Angle of link {number} of the flexures, counter-clockwise from +x", nominal,
         ),
         causality="local",
-        nominal=1.0,  # it is absolute
+        nominal=1.0,  # An absolute angle, not a deflection.
     )  # fmt: skip
     yield angle
     yield replace(
@@ -531,7 +533,7 @@ def _strain(link: str) -> Iterator[Variable]:
     number = link.removeprefix("link[").removesuffix("]")
     strain = Variable(
         f"{link}.strain",
-        f"Strain of link {number} of the flexures: logarithm of its length over the straight one",
+        f"Logarithmic strain of link {number} of the flexures: ln(length / length when straight)",
         "local", "continuous", "calculated", "1",
     )  # fmt: skip
     yield strain
@@ -539,6 +541,3 @@ def _strain(link: str) -> Iterator[Variable]:
         strain, name=f"{link}.strain_rate", description=f"Rate of the strain of link {number}",
         unit="1/s", derivative_of=strain.name,
     )  # fmt: skip
-
-
-# --- native FMUs --------------------------------------------------------------------------------

@@ -1,8 +1,8 @@
-"""Compiling the C kernel: once for each platform, kept in the user's cache folder.
+"""Compilation of the C kernel, once for each platform, with a cache in the user's folder.
 
-The same library serves every mechanism, so that an export compiles nothing once the library is
-there.  The system's compiler serves this machine; the compiler of the Python package ``ziglang``
-serves every platform, Linux down to glibc 2.17.
+The library is the same for every mechanism, so an export compiles nothing if the cache has it.
+The system's compiler compiles for this machine; the compiler of the Python package ``ziglang``
+compiles for every platform, on Linux for glibc 2.17 or later.
 """
 
 import hashlib
@@ -27,7 +27,7 @@ from .sources import UNIT, kernel
 HOST, ALL = "host", "all"
 FLAGS = (
     "-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-g0",
-    # These change no result.  Loops that gain from vectors use them explicitly.
+    # These do not change results.  Loops that are faster with vectors use them explicitly.
     "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",
 )  # fmt: skip
 LINK = {
@@ -41,38 +41,38 @@ HEADERS = (
     "fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h",
     "fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h",
 )  # fmt: skip
-_made: dict[Path, bytes] = {}  # what this process has got already
-LAST_LINES = 6  # of what a compiler complains about
-TEMPORARY = ("TMPDIR", "TMP", "TEMP")  # where compilers leave their files if they are interrupted
+_loaded: dict[Path, bytes] = {}  # Libraries that this process has read or compiled, by cache entry.
+ERROR_LINES_MAX = 6  # Lines of a compiler's output in an error message.
+TEMPORARY = ("TMPDIR", "TMP", "TEMP")  # Variables that name the folder of a compiler's files.
 MAGIC = b"prbm library\n"
 INSTALL = (
     "install one (on Debian or Ubuntu 'apt install gcc', on macOS 'xcode-select --install'), or "
-    "the compiler that is a Python package with 'python -m pip install ziglang'"
+    "the compiler of the Python package ziglang with 'python -m pip install ziglang'"
 )
 
 
 class CompilerError(PrbmError):
-    """The kernel cannot be compiled; the message says why and what to do."""
+    """The kernel cannot be compiled; the message has the reason and a remedy."""
 
 
 class NoCompilerError(CompilerError):
-    """There is no compiler for what is to be compiled."""
+    """No compiler was found for a platform."""
 
 
 @dataclass(frozen=True)
 class Platform:
-    """Where a native FMU runs.
+    """A platform on which native FMUs run.
 
     Parameters
     ----------
     name : str
-        Platform tuple of FMI 3.0, which is the name of its folder there.
+        Platform tuple of FMI 3.0, which is also the name of the folder in ``binaries``.
     folder2 : str
-        Name of its folder in FMI 2.0, whose later texts take the tuple where they have no name.
+        Name of the folder in FMI 2.0; the tuple for platforms that FMI 2.0 does not name.
     suffix : str
-        Of shared libraries.
+        Suffix of shared libraries.
     target : str
-        What ziglang calls it.
+        Name of the platform for ziglang.
     """
 
     name: str
@@ -102,34 +102,39 @@ MACHINES = {"x86_64": "x86_64", "amd64": "x86_64", "aarch64": "aarch64", "arm64"
 
 
 def this_platform() -> Platform | None:
-    """Return the platform of this machine, None if it is none of ours."""
+    """Return the platform of this machine, None if it is not supported."""
     machine = MACHINES.get(platform.machine().lower())
     return PLATFORMS.get(f"{machine}-{SYSTEMS.get(sys.platform)}")
 
 
 def libraries(
-    asked: Sequence[str], progress: Callable[[str], None] = lambda step: None
+    platforms: Sequence[str], progress: Callable[[str], None] = lambda step: None
 ) -> dict[Platform, bytes]:
     """Return the compiled kernel for platforms.
 
     Parameters
     ----------
-    asked : sequence of str
+    platforms : sequence of str
         Names of platforms, :data:`HOST` or :data:`ALL`.
     progress : callable
-        Is told what is being done.
+        Called with a description of each stage.
+
+    Returns
+    -------
+    dict of Platform to bytes
+        The shared library of each platform.
 
     Raises
     ------
     CompilerError
-        If there is no compiler for one of them, or it fails.
+        If there is no compiler for one of the platforms, or it fails.
     """
     result = {}
-    for name in asked:
+    for name in platforms:
         if name == HOST:
             result[_host()] = _library(_host(), _host_compilers(), progress)
-    wanted = PLATFORMS if ALL in asked else [name for name in asked if name in PLATFORMS]
-    for name in wanted:
+    names = PLATFORMS if ALL in platforms else [name for name in platforms if name in PLATFORMS]
+    for name in names:
         chosen = PLATFORMS[name]
         result[chosen] = _library(chosen, _zig(chosen), progress)
     return result
@@ -139,8 +144,8 @@ def _host() -> Platform:
     here = this_platform()
     if here is None:
         raise NoCompilerError(
-            f"there is no native FMU for this machine ({platform.machine()}, {sys.platform}); "
-            f"--platform all makes one for {', '.join(PLATFORMS)}"
+            f"native FMUs do not support this machine ({platform.machine()}, {sys.platform}); "
+            f"--platform all builds them for {', '.join(PLATFORMS)}"
         )
     return here
 
@@ -150,7 +155,17 @@ def _host() -> Platform:
 
 @dataclass(frozen=True)
 class Compiler:
-    """A command that compiles, with what tells it from others."""
+    """A compiler.
+
+    Parameters
+    ----------
+    command : tuple of str
+        The command with its first arguments.
+    identity : str
+        Text that distinguishes compilers and their versions in the cache.
+    name : str
+        Name for messages.
+    """
 
     command: tuple[str, ...]
     identity: str
@@ -158,7 +173,7 @@ class Compiler:
 
 
 def _host_compilers() -> list[Compiler]:
-    """Return what may compile for this machine, best first; what CC names excludes others."""
+    """Return the compilers for this machine in order of preference; only CC if that is set."""
     found = [*_system_compilers()]
     if os.environ.get("CC", "").strip():
         return found
@@ -167,7 +182,7 @@ def _host_compilers() -> list[Compiler]:
     except NoCompilerError:
         if not found:
             raise NoCompilerError(
-                f"native FMUs need a C compiler, and there is none: {INSTALL}"
+                f"native FMUs need a C compiler, and none was found: {INSTALL}"
             ) from None
     return found
 
@@ -185,7 +200,7 @@ def _system_compilers() -> Iterator[Compiler]:
             yield Compiler((path, *command[1:], *own), version, text)
         elif chosen:
             raise CompilerError(
-                f"the environment variable CC = {chosen!r} is no C compiler that runs; unset it, "
+                f"the environment variable CC = {chosen!r} is not a working C compiler; unset it, "
                 "or set it to one"
             )
 
@@ -224,12 +239,12 @@ def _zig(wanted: Platform) -> list[Compiler]:
 
 
 def headers() -> dict[str, bytes]:
-    """Return the headers of FMI 2.0 and 3.0, which FMPy brings.
+    """Return the headers of FMI 2.0 and 3.0, which are part of FMPy, by name.
 
     Raises
     ------
     CompilerError
-        If they are not there.
+        If FMPy does not have them.
     """
     import fmpy  # type: ignore[import-untyped]
 
@@ -238,8 +253,8 @@ def headers() -> dict[str, bytes]:
         return {name: (folder / name).read_bytes() for name in HEADERS}
     except OSError as error:
         raise CompilerError(
-            f"the headers of FMI are not where FMPy keeps them ({error.filename}: "
-            f"{error.strerror}); this package knows FMPy 0.3.20 to 0.3.x: install one of them with "
+            f"the headers of FMI are missing in FMPy ({error.filename}: {error.strerror}); FMPy "
+            "0.3.20 to 0.3.x is supported: install it with "
             "'python -m pip install \"fmpy>=0.3.20,<0.4\"'"
         ) from None
 
@@ -247,7 +262,7 @@ def headers() -> dict[str, bytes]:
 def _library(
     wanted: Platform, compilers: Iterable[Compiler], progress: Callable[[str], None]
 ) -> bytes:
-    """Return the library of a platform by the first compiler that makes one."""
+    """Return the library of a platform from the first compiler that succeeds."""
     files = kernel() | headers()
     problem: CompilerError | None = None
     for compiler in compilers:
@@ -264,14 +279,14 @@ def _arguments(wanted: Platform) -> tuple[str, ...]:
 
 
 def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -> bytes:
-    """Return what a compiler makes of the kernel, in a folder that is removed afterwards.
+    """Return the library that a compiler makes of the kernel in a temporary folder.
 
-    All names are relative to that folder, so that none of it gets into the library.
+    All paths are relative to that folder, so that the library does not contain them.
 
     Raises
     ------
     CompilerError
-        If it fails.
+        If the compiler fails.
     """
     libraries = () if wanted.system == "windows" else ("-lm",)
     with tempfile.TemporaryDirectory(prefix="prbm_") as name:
@@ -296,12 +311,12 @@ def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -
                 f"{compiler.name} cannot be run ({error.strerror}); {INSTALL}"
             ) from None
     if done.returncode != 0 or not made:
-        raise CompilerError(_complaint(wanted, compiler, done))
+        raise CompilerError(_failure(wanted, compiler, done))
     return made
 
 
 def _zig_folders(folder: Path) -> dict[str, str]:
-    """Return where ziglang may write: what it builds of its own is worth keeping."""
+    """Return the cache folders of ziglang; the parts of C libraries that it compiles are kept."""
     kept = cache_folder() / "zig"
     with suppress(OSError):
         kept.mkdir(parents=True, exist_ok=True)
@@ -310,14 +325,13 @@ def _zig_folders(folder: Path) -> dict[str, str]:
     return {"ZIG_GLOBAL_CACHE_DIR": str(kept), "ZIG_LOCAL_CACHE_DIR": str(folder / "zig-local")}
 
 
-def _complaint(
-    wanted: Platform, compiler: Compiler, done: "subprocess.CompletedProcess[str]"
-) -> str:
+def _failure(wanted: Platform, compiler: Compiler, done: "subprocess.CompletedProcess[str]") -> str:
+    """Return the error message of a compiler that failed."""
     lines = [line for line in (done.stderr or done.stdout).splitlines() if line.strip()]
-    said = "; ".join(line.strip() for line in lines[-LAST_LINES:]) or "no message"
+    output = "; ".join(line.strip() for line in lines[-ERROR_LINES_MAX:]) or "no message"
     return (
         f"{compiler.name} cannot compile the kernel for {wanted.name} (status {done.returncode}: "
-        f"{said}); try another compiler: set the environment variable CC, or {INSTALL}"
+        f"{output}); try another compiler: set the environment variable CC, or {INSTALL}"
     )
 
 
@@ -325,7 +339,7 @@ def _complaint(
 
 
 def cache_folder() -> Path:
-    """Return the user's folder for what can be made again."""
+    """Return the cache folder of this package for the user."""
     home = Path(os.path.expanduser("~"))
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
@@ -342,9 +356,9 @@ def _cached(
     files: Mapping[str, bytes],
     progress: Callable[[str], None],
 ) -> bytes:
-    """Return the library from the cache, or compile it and put it there.
+    """Return the library from the cache, or compile it and write it to the cache.
 
-    The cache spares time and nothing else: what cannot be read or written is done without.
+    A cache that cannot be read or written is ignored.
     """
     digest = hashlib.sha256()
     for text in (wanted.name, compiler.identity, *compiler.command[1:], *_arguments(wanted)):
@@ -352,19 +366,19 @@ def _cached(
     for name in sorted(files):
         digest.update(name.encode() + b"\0" + hashlib.sha256(files[name]).digest())
     entry = cache_folder() / f"{digest.hexdigest()[:32]}{wanted.suffix}"
-    if entry not in _made:
-        _made[entry] = _read(entry) or _put(entry, wanted, compiler, files, progress)
-    return _made[entry]
+    if entry not in _loaded:
+        _loaded[entry] = _read(entry) or _compile(entry, wanted, compiler, files, progress)
+    return _loaded[entry]
 
 
-def _put(
+def _compile(
     entry: Path,
     wanted: Platform,
     compiler: Compiler,
     files: Mapping[str, bytes],
     progress: Callable[[str], None],
 ) -> bytes:
-    """Compile the library and put it into the cache, unless somebody else just has."""
+    """Compile the library and write it to the cache, unless another process just has."""
     with _locked(entry.parent):
         content = _read(entry)
         if content is None:
@@ -378,7 +392,7 @@ def _put(
 
 
 def _read(entry: Path) -> bytes | None:
-    """Return the library of an entry, None if there is none or it is damaged."""
+    """Return the library of a cache entry, None if it is missing or damaged."""
     try:
         kept = entry.read_bytes()
     except OSError:
@@ -392,10 +406,10 @@ def _read(entry: Path) -> bytes | None:
 
 @contextmanager
 def _locked(folder: Path) -> Iterator[None]:
-    """Keep other exports from compiling the same at the same time.
+    """Hold a lock, so that exports at the same time do not compile the same library.
 
-    The system takes the lock away with the process that holds it, however that ends.  Where there
-    is no such lock, some work is done twice, and nothing is lost.
+    The system releases the lock when the process ends.  Without a lock, the library is compiled
+    twice, with the same result.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,8 +1,8 @@
 """The constants that the C kernel shares with the Python engine.
 
-``generated.h`` is written from their only definitions, in Python: tolerances, enumerations, the
-places of values in their groups, the limits of the tables and the Runge-Kutta tableau.  It is
-committed, so that the kernel can be read and compiled without Python.
+``generated.h`` is generated from their definitions in Python: tolerances, enumerations, the order
+of values in their groups, the limits of the tables and the Runge-Kutta tableau.  It is committed,
+so that the kernel can be read and compiled without Python.
 
     python -m prbm.kernel.header          writes it
     python -m prbm.kernel.header --check  fails if it is stale
@@ -101,7 +101,7 @@ def _constant(name: str, value: float | tuple[float, ...]) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a double so that C reads the same bits."""
+    """Return a double as a C literal that reads back exactly."""
     return repr(float(value))
 
 
@@ -126,7 +126,7 @@ def _tables() -> Iterator[str]:
 
 
 def _groups() -> Iterator[str]:
-    """Yield the number of values of each group, and the place of each value in it."""
+    """Yield the number of values of each group, and the index of each value in its group."""
     for name, outputs in (
         ("BODY", BODY_OUTPUTS),
         ("STOP", STOP_OUTPUTS),

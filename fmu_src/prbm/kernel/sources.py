@@ -8,21 +8,21 @@ from importlib.resources.abc import Traversable
 from ..base.text import printable
 from ..base.version import GENERATION_TOOL
 
-UNIT = "prbm_fmu.c"  # the one file that is compiled: it includes all others
+UNIT = "prbm_fmu.c"  # The file that is compiled; it includes all others.
 TABLES = "mechanism_tables.h"
 WRAPPERS = {2: "fmi/fmi2.c", 3: "fmi/fmi3.c"}
 INCLUDE = re.compile(r'#\s*include\s+"([^"]+)"\s*')
 OVERRIDE = "FMI{}_OVERRIDE_FUNCTION_PREFIX"
-BYTES_A_LINE = 20
+BYTES_PER_LINE = 20
 
 HEAD = """\
 /* {name}: {title}.
  *
- * The C kernel of {tool} as one file.  Everything is static but the functions of
- * FMI {version}.0, whose headers the importer brings.  {tables} holds the mechanism, so
- * that no file has to be read where it runs.  Compile it without -ffast-math and, for results
- * that are the same on every platform, with -ffp-contract=off.  With the headers of the standard
- * its functions get the prefix {name}_, unless {override} is defined.
+ * The C kernel of {tool} as one file.  All functions are static except those of FMI {version}.0;
+ * its headers are not part of it.  {tables} contains the mechanism, so that no file is read at run
+ * time.  Compile without -ffast-math and, for the same results on every platform, with
+ * -ffp-contract=off.  With the headers of the standard, function names have the prefix {name}_,
+ * unless {override} is defined.
  */
 #ifndef {prefix}
 #define {prefix} {name}_
@@ -83,8 +83,8 @@ def _lines(file: str, texts: Mapping[str, str], done: set[str]) -> list[str]:
 def tables_header(tables: bytes) -> str:
     """Return the tables of a mechanism as a constant array."""
     rows = (
-        ", ".join(map(str, tables[i : i + BYTES_A_LINE])) + ","
-        for i in range(0, len(tables), BYTES_A_LINE)
+        ", ".join(map(str, tables[i : i + BYTES_PER_LINE])) + ","
+        for i in range(0, len(tables), BYTES_PER_LINE)
     )
     return (
         "/* resources/mechanism.bin as a constant array, for targets without a file system. */\n"

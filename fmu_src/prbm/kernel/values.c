@@ -93,7 +93,7 @@ PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *p
         return true;
     }
     if (!sim->state.started) {
-        return fail(problem, "it is computed when the model is initialized, and not known before");
+        return fail(problem, "it is computed when the model is initialized; it has no value before");
     }
     if (slot >= slots->derivatives && slot < slots->indicators) {
         return get_derivative(sim, slot - slots->derivatives, x, problem);

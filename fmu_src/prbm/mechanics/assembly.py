@@ -452,8 +452,8 @@ def check_masses(M: Real, J: Sequence[float]) -> None:
         if np.linalg.eigvalsh(scaled)[0] > MASSLESS_RTOL:
             return
     raise ParameterError(
-        "something that can move has no mass: give the flexures a density and the bodies a mass "
-        "and an inertia"
+        "a part that can move has no mass: give the flexures a density and the bodies a mass and "
+        "an inertia"
     )
 
 
@@ -483,9 +483,9 @@ def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
     repeated = sorted({names[row // 2] for row in order[: len(size)][size <= tolerance]})
     if repeated or len(loops) > len(e):
         raise MechanismError(
-            f"the loops closed by {', '.join(repeated or names)} ask at the straight shape for "
-            "what other loops already ask for: rigid links are over-constrained there; take a part "
-            "away, move it out of line, or let flexures stretch (axial = true)"
+            f"the constraints of the loops closed by {', '.join(repeated or names)} depend on "
+            "those of other loops at the straight shape: rigid links are over-constrained there; "
+            "remove a part, move it out of line, or let flexures stretch (axial = true)"
         )
     if len(loops) >= len(e):
         raise MechanismError(

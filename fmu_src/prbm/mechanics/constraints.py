@@ -55,8 +55,8 @@ def factor_and_solve(kkt: Real, right: Real) -> tuple[Real, Factors]:
     lu, pivots, x, info = dgesv(kkt, right)
     if info != 0:
         raise SimulationError(
-            "the equations of motion are singular here: two constraints repeat each other, or a "
-            "part that can move has no mass"
+            "the equations of motion are singular in this shape: two constraints are linearly "
+            "dependent, or a part that can move has no mass"
         )
     return x, (lu, pivots)
 
@@ -114,8 +114,8 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
         right[n:] = -s
         q = q + solve(saddle(inertia(system.H, J, e)[0], G, G), right)[:n]
     raise SimulationError(
-        f"the loops of the mechanism cannot be closed here (by {best:.3g} m): the parts do not "
-        "reach each other"
+        f"the loops of the mechanism cannot be closed in this shape (gap {best:.3g} m): the parts "
+        "do not reach each other"
     )
 
 

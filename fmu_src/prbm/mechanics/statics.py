@@ -231,8 +231,8 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
     if displacement is None:
         if not system.gravity:
             return (
-                "no static equilibrium was found: the drawn shape is none, or the flexures are too "
-                "weak to hold it"
+                "no static equilibrium was found: the drawn shape is not in equilibrium, or the "
+                "flexures are too weak to hold it"
             )
         return (
             "no static equilibrium under gravity was found: the flexures are too weak for this "

@@ -1,5 +1,5 @@
-"""The pythonfmu slave: shipped inside every Python FMU, thin, no physics.
+"""The pythonfmu slave inside every Python FMU: calls of FMI to the engine, without physics.
 
-Nothing here imports the engine by an absolute name: two FMUs in one process share ``sys.modules``,
-so every FMU carries its own copy of these packages under a name of its own.
+These modules import the engine by relative names only.  FMUs in one process share ``sys.modules``,
+so every FMU contains its own copy of the packages under a unique name.
 """

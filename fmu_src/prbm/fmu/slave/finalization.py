@@ -1,8 +1,8 @@
-"""The end of a process that has used pythonfmu's library (0.7.0).
+"""Finalization of pythonfmu's library (0.7.0) at the end of a process.
 
-The library has a static object; its destructor runs before the library's own final function, which
-assigns to that object once more and so writes to freed memory.  The library is therefore asked
-to release the object before the process ends.
+The library has a static object.  Its destructor runs before the library's final function, which
+assigns to the object again and so writes to freed memory.  The object is therefore released
+before the process ends.
 """
 
 import atexit
@@ -15,7 +15,7 @@ _libraries: set[str] = set()
 
 
 def note_library(resources: str, name: str) -> None:
-    """Remember the shared library of an FMU, given its folder of resources and its name."""
+    """Register the shared library of an FMU, given its folder of resources and its name."""
     if sys.platform == "linux":
         _libraries.add(str(Path(resources).parent / "binaries" / "linux64" / f"{name}.so"))
 
@@ -28,4 +28,4 @@ def _finalize_libraries() -> None:
             loaded = ctypes.CDLL(library, mode=os.RTLD_NOLOAD | os.RTLD_NOW)
             loaded.finalizePythonInterpreter()
         except (OSError, AttributeError):
-            continue  # unloaded already, or another version of pythonfmu
+            continue  # Unloaded already, or another version of pythonfmu.

@@ -12,7 +12,7 @@ from ...hybrid.simulation import Simulation
 from .messages import Messages
 from .resolved import EMPTY, Model
 
-START, EXPERIMENT = "the start", "setupExperiment"  # keys of refusals that are not of a variable
+START, EXPERIMENT = "the start", "setupExperiment"  # Keys of ``refused`` besides variable names.
 RESET = "reset the instance to start again"
 SAVED = (
     "given",
@@ -30,15 +30,15 @@ SAVED = (
 class Instance:
     """The values and the simulation of an instance.
 
-    A value that is refused, and everything else that is wrong, is logged at once; until it is
-    corrected every step is rejected.
+    A rejected value, or any other error, is logged at once.  Every step is rejected until the
+    error is corrected.
 
     Parameters
     ----------
     model : Model
         The mechanism and its variables.
     identity : str
-        Name of the model and its content; a saved state of another one is rejected.
+        Name of the model and its content; a saved state with another identity is rejected.
     messages : Messages
         The log.
 
@@ -49,7 +49,7 @@ class Instance:
     waiting : dict of str to float
         Those that were set since the last step.
     refused : dict of str to str
-        A sentence for each refused value; a good value removes it.
+        The error message of each rejected value; a valid value removes it.
     failure : str or None
         The reason why no step is possible any more.
     running : bool
@@ -57,7 +57,7 @@ class Instance:
     clock : float
         The end of the last step [s].
     table : dict or None
-        All values at the present time; None if they are to be computed.
+        All values at the present time; None if they have not been computed.
     """
 
     def __init__(self, model: Model, identity: str, messages: Messages) -> None:
@@ -126,7 +126,7 @@ class Instance:
     def step(self, time: float, size: float) -> bool:
         """Continue to the next communication point; log the reason if that is not possible."""
         if self.running:
-            self._start()  # an error may have been corrected since
+            self._start()  # An earlier failure to start may have been corrected.
         problem = self._problem(time, size) or self._apply()
         if problem is None:
             try:
@@ -145,17 +145,17 @@ class Instance:
         if self.failure:
             return self.failure
         if not self.running:
-            return "doStep came before exitInitializationMode: initialize the instance first"
+            return "doStep was called before exitInitializationMode: initialize the instance first"
         if self.refused:
             return "; ".join(self.refused.values())
         if not (math.isfinite(time) and math.isfinite(size)):
             return f"cannot step from t = {time} s by {size} s: not finite numbers"
         if size <= 0.0:
-            return f"communicationStepSize = {size:.9g} s must be positive; time only runs on"
+            return f"communicationStepSize = {size:.9g} s must be positive"
         slack = STEP_SUM_RTOL * size + TIME_SUM_RTOL * abs(self.clock)
         if abs(time - self.clock) > slack:
             return (
-                f"the step begins at t = {time:.12g} s, but the last one ended at "
+                f"the step begins at t = {time:.12g} s, but the last step ended at "
                 f"t = {self.clock:.12g} s: continue there, or restore a saved state"
             )
         return None
@@ -171,7 +171,7 @@ class Instance:
         return None
 
     def fail(self, error: BaseException) -> str:
-        """Reject all further steps because of an unexpected exception; return the sentence."""
+        """Reject all further steps because of an unexpected exception; return the message."""
         if isinstance(error, KeyboardInterrupt):
             self.failure = f"the simulation was interrupted; {RESET}"
             return self.failure
@@ -185,7 +185,7 @@ class Instance:
     # -- values --
 
     def set_real(self, references: list[int], values: list[float]) -> None:
-        """Set parameters and inputs; a refused value rejects steps until it is corrected."""
+        """Set parameters and inputs; an invalid value rejects steps until it is corrected."""
         for reference, value in zip(references, values, strict=True):
             name = self._settable(reference, "Real")
             if name is None:
@@ -196,17 +196,17 @@ class Instance:
                 self._refuse(name, str(error))
 
     def refuse_all(self, references: list[int], kind: str) -> None:
-        """Refuse values of a type that no parameter and no input has."""
+        """Reject values of a type that no parameter and no input has."""
         for reference in references:
             self._settable(reference, kind)
 
     def _settable(self, reference: int, kind: str) -> str | None:
-        """Return the name of a parameter or input of a type; refuse all other references."""
+        """Return the name of a parameter or input of a type; reject all other references."""
         name = self.model.names.get(reference)
         if name is None:
             self._refuse(str(reference), f"{_unknown(reference)}: it cannot be set; {RESET}")
         elif name not in self.given:
-            self._refuse(name, f"{name} is no parameter or input: it cannot be set; {RESET}")
+            self._refuse(name, f"{name} is not a parameter or input: it cannot be set; {RESET}")
         elif self.model.types[name] != kind:
             actual = self.model.types[name]
             self._refuse(name, f"{name} is of type {actual}: set it with fmi2Set{actual}")
@@ -225,9 +225,9 @@ class Instance:
         if started and value != before and parameter is not None and not parameter.tunable:
             unit = parameter.unit and f" {parameter.unit}"
             raise ParameterError(
-                f"{name} = {value:.10g}{unit} refused: it is fixed once the simulation has "
-                f"started; set it back to {before:.10g}{unit}, or reset the instance and set it "
-                "before"
+                f"{name} = {value:.10g}{unit} rejected: the parameter is fixed once the simulation "
+                f"has started; set it back to {before:.10g}{unit}, or reset the instance and set "
+                "it before initialization"
             )
         if self.refused.pop(name, None):
             self.table = None
@@ -267,7 +267,7 @@ class Instance:
     def _values(self) -> Mapping[str, float | int | bool]:
         """Return all values by name, computed once for the present time.
 
-        Without a simulation, the computed ones are NaN, 0 and False.
+        Without a simulation, computed variables are NaN, 0 or False.
         """
         self._start()
         self.table = {**self.model.computed, **self.given}
@@ -277,7 +277,7 @@ class Instance:
         return self.table
 
     def _log_impacts(self, table: Mapping[str, Any]) -> None:
-        """Log the last impact at each stop that was struck since the last call."""
+        """Log the last impact at each stop that had impacts since the last call."""
         for counter, before in self.counted.items():
             count = table[counter]
             if count == before:
@@ -317,7 +317,7 @@ class Instance:
         self.simulation, self.table = simulation, None
 
     def _restored(self, snapshot: Mapping[str, Any] | None) -> Any:
-        """Return a simulation in a saved state; the present one stays as it is."""
+        """Return a new simulation in a saved state, None if there was no simulation."""
         if snapshot is None:
             return None
         if self.simulation is None:

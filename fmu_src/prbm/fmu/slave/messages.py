@@ -8,10 +8,10 @@ from pythonfmu.enums import Fmi2Status  # type: ignore[import-untyped]
 
 EVENTS = "logEvents"
 CATEGORIES = {
-    EVENTS: "Impacts, with their time, speeds and loss of energy.",
-    "logStatusWarning": "What the importer should know though the simulation goes on.",
-    "logStatusDiscard": "Why a communication step was refused or could not be finished.",
-    "logStatusError": "Values that were refused, with their bounds and a remedy.",
+    EVENTS: "Impacts, with time, speeds and energy loss.",
+    "logStatusWarning": "Warnings; the simulation continues.",
+    "logStatusDiscard": "Reasons why a communication step was rejected or not completed.",
+    "logStatusError": "Rejected values, with their bounds and a remedy.",
 }
 
 
@@ -19,13 +19,14 @@ class Messages:
     """The messages of one instance.
 
     FMPy ends a simulation at ``fmi2Discard`` without a message, and pythonfmu forwards log messages
-    only if the importer has asked for logging.  So the reason of a rejected step is printed, too.
+    only if the importer requests logging.  The reason of a rejected step is therefore printed, too.
 
     Parameters
     ----------
     log : bound method
-        Logs a text with a status and a category, None for that of the status.  It is referred to
-        weakly: an instance is deleted when pythonfmu releases it, not by a later collection.
+        Logs a text with a status and a category; None is the category of the status.  The
+        reference is weak: an instance is deleted as soon as pythonfmu releases it, not by a later
+        garbage collection.
     name : str
         Name of the instance.
     """
@@ -49,7 +50,7 @@ class Messages:
         self._print(sentence)
 
     def error_once(self, sentence: str) -> None:
-        """Log and print an error that has no effect, unless that was done before."""
+        """Log and print an error without further effect, unless it has been printed before."""
         if sentence not in self.printed:
             self.error(sentence)
             self._print(sentence)

@@ -1,4 +1,4 @@
-"""A mechanism and its interface as plain data, read back where the FMU runs."""
+"""A mechanism and its interface as JSON data, which the FMU reads at its first instantiation."""
 
 import json
 from collections.abc import Callable, Iterable, Mapping
@@ -46,13 +46,13 @@ class Model:
     names : dict of int to str
         Variables by value reference.
     types : dict of str to str
-        Their types in FMI.
+        Types of FMI by variable name.
     given : dict of str to float
         Start values of the parameters and inputs.
     parameters : dict of str to Parameter
-        Their bounds and units.
+        The parameters, with bounds and units.
     computed : dict of str to number
-        All other variables, with the values that they have without a simulation.
+        All other variables, with their values when there is no simulation: NaN, 0 or False.
     """
 
     mechanism: Mechanism
@@ -64,7 +64,7 @@ class Model:
 
 
 def resolved(mechanism: Mechanism, variables: Iterable[Any]) -> dict[str, Any]:
-    """Return a mechanism and its variables as values that JSON keeps exactly."""
+    """Return a mechanism and its variables as values that JSON preserves exactly."""
     kept = ("name", "reference", "type", "start")
     table = [{key: getattr(variable, key) for key in kept} for variable in variables]
     return {"mechanism": asdict(mechanism), "variables": table}
@@ -93,7 +93,7 @@ def read(folder: str | Path) -> Model:
 
 
 def mechanism_from(data: Mapping[str, Any]) -> Mechanism:
-    """Return the mechanism that :func:`resolved` took apart."""
+    """Return a mechanism from its data, the inverse of :func:`resolved`."""
     parts: dict[str, Any] = {}
     for key, value in _tuples(data).items():
         if key in PARTS:
@@ -106,7 +106,7 @@ def mechanism_from(data: Mapping[str, Any]) -> Mechanism:
 
 
 def _tuples(value: Any) -> Any:
-    """Return JSON data with tuples for lists, as the frozen classes have them."""
+    """Return JSON data with lists converted to tuples, as in the frozen classes."""
     if isinstance(value, dict):
         return {key: _tuples(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -2,16 +2,16 @@
 
 Properties of the wrapper (0.7.0), and their consequences:
 
-* An exception out of any method becomes ``fmi2Fatal``; the wrapper then releases its references a
-  second time when the instance is freed, which ends the process.  So no method of an instance
+* An exception in any method becomes ``fmi2Fatal``.  When the instance is freed, the wrapper then
+  releases its references a second time and the process crashes.  So no method of an instance
   raises: :func:`_never_raises`.
-* Only ``doStep`` has a milder status: False becomes ``fmi2Discard``.  There is no way to return
-  ``fmi2Error``.  So every error is logged when it is found, and ``doStep`` returns False until it
-  is corrected, or for good: then the sentence says so.
+* ``doStep`` alone can return another status: False becomes ``fmi2Discard``.  No method can return
+  ``fmi2Error``.  So every error is logged at once, and ``doStep`` returns False until it is
+  corrected.  If only a reset corrects it, the message says so.
 * A get cannot be rejected either, and a value of another type than the requested one leaves a
-  pending exception.  So a wrong get is logged and returns NaN, 0 or False.
+  pending exception.  So an invalid get is logged and returns NaN, 0 or False.
 * Log messages reach the importer as formats of C's printf: a ``%`` must be doubled.
-* ``reset`` makes a new Python object of the same class: nothing needs to be undone.
+* ``reset`` creates a new Python object of the same class; no state has to be cleared.
 * The process may crash when it ends: see the module ``finalization``.
 """
 
@@ -49,8 +49,8 @@ def _never_raises(fallback: Any) -> Callable[[Callable[..., Any]], Callable[...,
 class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
     """One instance of a mechanism, as pythonfmu calls it.
 
-    The module that pythonfmu loads derives a class from this one, out of the FMU's own copy of the
-    package ``prbm``.
+    The script that pythonfmu loads imports this class from the FMU's copy of the package ``prbm``
+    and derives the class of the FMU from it.
     """
 
     model: ClassVar[Model | None] = None
@@ -75,7 +75,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
 
     @_never_raises(None)
     def enter_initialization_mode(self) -> None:
-        """Do nothing: the simulation is made when one of its values is requested."""
+        """Do nothing: the simulation is created when one of its values is requested."""
 
     @_never_raises(None)
     def exit_initialization_mode(self) -> None:
@@ -94,17 +94,17 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
 
     @_never_raises(None)
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
-        """Refuse: no Integer can be set."""
+        """Reject the values: no Integer can be set."""
         self.instance.refuse_all(vrs, "Integer")
 
     @_never_raises(None)
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
-        """Refuse: no Boolean can be set."""
+        """Reject the values: no Boolean can be set."""
         self.instance.refuse_all(vrs, "Boolean")
 
     @_never_raises(None)
     def set_string(self, vrs: list[int], values: list[str]) -> None:
-        """Refuse: there is no String."""
+        """Reject the values: the model has no String."""
         self.instance.refuse_all(vrs, "String")
 
     def get_real(self, vrs: list[int]) -> list[float]:
@@ -120,7 +120,7 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
         return self._get(vrs, "Boolean")
 
     def get_string(self, vrs: list[int]) -> list[str]:
-        """Return empty strings: there is no String."""
+        """Return empty strings: the model has no String."""
         return self._get(vrs, "String")
 
     def _get(self, vrs: list[int], kind: str) -> list[Any]:
@@ -157,6 +157,6 @@ class MechanismSlave(Fmi2Slave):  # type: ignore[misc]
         category: str | None = None,
         debug: bool | None = None,
     ) -> None:
-        """Log a sentence to the importer."""
+        """Send a message to the importer's log."""
         text = msg.encode(errors="replace").decode().replace("%", "%%")
         super().log(text, status, category, debug)

@@ -1,4 +1,4 @@
-/* From a mechanism and parameter values to the constant arrays: the twin of
+/* The constant arrays of a mechanism with its parameter values: the twin of
  * mechanics/assembly.py. */
 #include <math.h>
 #include <stdio.h>
@@ -10,13 +10,13 @@
 #include "core/kinetics.h"
 #include "core/matrix.h"
 
-/* --- values and places ------------------------------------------------------------------------ */
+/* --- values, points and masses ---------------------------------------------------------------- */
 
 static Complex at_point(const System *system, Point point) {
     return complex_of(evaluate(point.x, system->values), evaluate(point.y, system->values));
 }
 
-/* The place at the end of a vector fixed to a coordinate. */
+/* Move a place by a vector that turns with coordinate j. */
 static void extend(Place *spot, int j, Complex vector) {
     if (j == FIXED) {
         spot->c = plus(spot->c, vector);
@@ -32,14 +32,14 @@ static void copy_place(int n, Place *to, const Place *from) {
     memcpy(to->A, from->A, (size_t)n * sizeof *to->A);
 }
 
-/* The place of a drawn point of a body. */
+/* Set the place of a point of a body, given by its drawn position. */
 static void on_body(const System *system, int body, Complex drawn, Place *result) {
     const Place *origin = &system->origins[body];
     copy_place(system->n, result, origin);
     extend(result, origin->j, minus(drawn, origin->drawn));
 }
 
-/* A point mass, unless it is part of the ground. */
+/* Add a point mass, unless it is fixed to the ground. */
 static void add_mass(System *system, const Place *spot, double mass) {
     if (mass > 0.0 && spot->moves) {
         int n = system->n, i = system->p++;
@@ -49,11 +49,11 @@ static void add_mass(System *system, const Place *spot, double mass) {
     }
 }
 
-/* A uniform rod that is fixed to coordinate j: two points with its mass, centre and moments. */
+/* Add a uniform rod that turns with coordinate j, as two points with the same moments of mass. */
 static void add_rod(System *system, double mass, const Place *start, int j, Complex vector,
                     Place *spare) {
     static const double FRACTIONS[2] = {0.21132486540518708, 0.7886751345948129};
-    for (int i = 0; i < 2; i++) { /* 1/2 -+ 1/(2 sqrt 3) */
+    for (int i = 0; i < 2; i++) { /* At the fractions 1/2 -+ 1/(2 sqrt 3). */
         copy_place(system->n, spare, start);
         extend(spare, j, scaled(FRACTIONS[i], vector));
         add_mass(system, spare, mass / 2);
@@ -83,7 +83,7 @@ static Place new_place(int n, Scratch *scratch) {
     return result;
 }
 
-/* --- walking ---------------------------------------------------------------------------------- */
+/* --- flexures and joints, from the ground outwards -------------------------------------------- */
 
 static void take_segments(Segments *pieces, int longest, Scratch *scratch) {
     size_t most = (size_t)longest + 2;
@@ -120,7 +120,7 @@ static bool cut_flexure(const System *system, const Flexure *flexure, Segments *
                     pieces, problem);
 }
 
-/* Ask for two places to be one. */
+/* Add the loop constraint that two places coincide. */
 static void close_loop(System *system, const Place *spot, const Place *other) {
     int n = system->n;
     Complex *x = system->loops + system->r * n, *y = x + n;
@@ -134,7 +134,7 @@ static void close_loop(System *system, const Place *spot, const Place *other) {
     system->r += 2;
 }
 
-/* Where a drawn point of a body is that turns with coordinate j. */
+/* Set the origin of a body: a place, its drawn position and the coordinate of the body. */
 static void reach(System *system, int body, const Place *spot, Complex drawn, int j) {
     Place *origin = &system->origins[body];
     copy_place(system->n, origin, spot);
@@ -142,7 +142,7 @@ static void reach(System *system, int body, const Place *spot, Complex drawn, in
     origin->j = j;
 }
 
-/* From which body a step leads to which, and where both ends are drawn. */
+/* The bodies at the ends of a step, root first, and the drawn positions of both ends. */
 typedef struct {
     int root, far;
     Complex z_start, z_end;
@@ -175,7 +175,7 @@ static bool walk_joint(System *system, const Step *step, Scratch *scratch, Probl
     return true;
 }
 
-/* The angle of a link and, if it stretches, its stretch; returns the next coordinate. */
+/* Set the angle of a link and, if it stretches, its axial spring; return the next coordinate. */
 static int lay_link(System *system, Complex direction, double length, double axial, bool stretching,
                     int j) {
     system->q0[j] = phase(direction);
@@ -212,7 +212,7 @@ static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Pro
     }
     int last_one = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
     for (int i = 0; i <= pieces.n; i++) {
-        /* links carry their angle in q, bodies are drawn with q = 0 */
+        /* The direction of a link is in its coordinate q; a body is drawn with q = 0. */
         Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
                                 : complex_of(pieces.lengths[i], 0.0);
         add_rod(system, pieces.rods[i], &spot, owners[i], vector, &spare);
@@ -224,7 +224,7 @@ static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Pro
     if (step->closes) {
         on_body(system, span.far, minus(span.z_end, last), &spare);
         close_loop(system, &spot, &spare);
-        copy_place(n, &spot, &spare); /* the stub moves with its body: links share no mass with it */
+        copy_place(n, &spot, &spare); /* The stub then moves with its body only, not with links. */
     } else {
         reach(system, span.far, &spot, minus(span.z_end, last), last_one);
     }
@@ -247,7 +247,7 @@ static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
     return right;
 }
 
-/* Where a drawn point of a body is. */
+/* Set the frame of a point of a body, given by its drawn position. */
 static void add_frame(System *system, int body, Complex drawn, BodyFrame *frame,
                       Scratch *scratch) {
     size_t mark = scratch->used;
@@ -287,7 +287,7 @@ static void add_pushed_and_probes(System *system, Scratch *scratch) {
 
 /* --- arrays ----------------------------------------------------------------------------------- */
 
-/* B, c of the displacement of a place along u from the straight shape. */
+/* Set B and return c of the displacement of a place from the straight shape along u. */
 static double along(int n, Complex u, const Complex *A, const Complex *e0, Complex *B) {
     double c = 0.0;
     for (int j = 0; j < n; j++) {
@@ -297,8 +297,8 @@ static double along(int n, Complex u, const Complex *A, const Complex *e0, Compl
     return -c;
 }
 
-/* The gap of a stop, but for its wall's position, as seen from what the wall is fixed to, and the
- * displacement along it. */
+/* Set the rows of a stop, relative to the body that carries its wall: the gap without the wall's
+ * position, and the displacement along the wall. */
 static void add_stop(System *system, int i, const Complex *e0, Place *hit) {
     const Stop *stop = &system->mechanism->stops[i];
     const Place *origin = &system->origins[stop->on];
@@ -347,7 +347,7 @@ static void add_frictions(System *system, const Complex *e0, Scratch *scratch) {
     scratch->used = mark;
 }
 
-/* The first coordinate after a start with which none before it shares mass. */
+/* Return the end of a block of the mass matrix: no coordinate from there on shares mass with it. */
 static int end_of_block(const System *system, int start) {
     int n = system->n, end = start + 1;
     for (int j = start; j < end; j++) {
@@ -369,7 +369,7 @@ static void find_blocks(System *system) {
     }
 }
 
-/* What the equations of motion read again and again, as they go along it. */
+/* Copy the arrays that the equations of motion read often, in the order in which they are read. */
 static void pack_blocks(System *system) {
     int n = system->n;
     Complex *next = system->coupling;
@@ -384,7 +384,7 @@ static void pack_blocks(System *system) {
     pad(n, system->q0, system->straight);
 }
 
-/* The moments of one mass point, of the coordinates that it moves with alone. */
+/* Add the first and second moments of one mass point, for the coordinates that move it. */
 static void add_moments_of(System *system, double mass, const Complex *A) {
     int n = system->n;
     for (int j = 0; j < n; j++) {
@@ -413,8 +413,8 @@ static void add_moments(System *system) {
     pack_blocks(system);
 }
 
-/* The size of the mechanism as drawn: the largest distance between points of the ground and centres
-   of mass, or the length of the longest flexure, where all of these are at one place. */
+/* Return the size of the drawn mechanism [m]: the largest distance between points of the ground and
+ * centres of mass, but at least the length of the longest flexure. */
 static double size_of(const System *system, Scratch *scratch) {
     const Mechanism *m = system->mechanism;
     size_t mark = scratch->used;
@@ -471,13 +471,14 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
     scratch->used = mark;
     if (!sound) {
         return fail(problem,
-                    "something that can move has no mass: give the flexures a density and the "
-                    "bodies a mass and an inertia");
+                    "a part that can move has no mass: give the flexures a density and the bodies "
+                    "a mass and an inertia");
     }
     return true;
 }
 
-/* The longest of the rows from k on comes to k, with the number of its loop; its length. */
+/* Exchange row k with the longest row from k on, with the numbers of their loops; return its
+ * length. */
 static double choose_row(int k, int r, int n, double *rows, int *loop) {
     int best = k;
     double most = dot(n, rows + k * n, rows + k * n);
@@ -493,7 +494,7 @@ static double choose_row(int k, int r, int n, double *rows, int *loop) {
     return sqrt(most);
 }
 
-/* Which loops have rows that follow from others: Gram and Schmidt's way, the longest first. */
+/* Find the loops with linearly dependent rows by Gram-Schmidt orthogonalisation with pivoting. */
 static bool repeated_loops(int r, int n, double *rows, int *loop, double tolerance,
                            bool *repeated) {
     bool any = false;
@@ -511,7 +512,7 @@ static bool repeated_loops(int r, int n, double *rows, int *loop, double toleran
     return any;
 }
 
-/* The names of what closes these loops, in the order of the alphabet. */
+/* List the names of the flexures and joints that close these loops, in alphabetical order. */
 static void name_loops(const Mechanism *m, bool *repeated, char *text, size_t size) {
     text[0] = '\0';
     for (size_t used = 0;;) {
@@ -552,9 +553,9 @@ static bool check_loops(const System *system, const Complex *e0, Scratch *scratc
     name_loops(system->mechanism, repeated, names, sizeof names);
     scratch->used = mark;
     return !any || fail(problem,
-                        "the loops closed by %s ask at the straight shape for what other loops "
-                        "already ask for: rigid links are over-constrained there; take a part "
-                        "away, move it out of line, or let flexures stretch (axial = true)",
+                        "the constraints of the loops closed by %s depend on those of other loops "
+                        "at the straight shape: rigid links are over-constrained there; remove a "
+                        "part, move it out of line, or let flexures stretch (axial = true)",
                         names);
 }
 
@@ -581,7 +582,7 @@ static bool stubs(System *system, Scratch *scratch, Problem *problem) {
     return true;
 }
 
-/* --- the whole -------------------------------------------------------------------------------- */
+/* --- assembly --------------------------------------------------------------------------------- */
 
 static void clear(System *system) {
     size_t n = (size_t)system->n, b = (size_t)system->b;

@@ -1,5 +1,6 @@
-/* Scalars s = Re(f (B E + z)) + c of the position: the twin of Rows in mechanics/system.py.
- * Saddle-point systems and projections: the twin of mechanics/constraints.py. */
+/* Scalar functions s = Re(f (B E + z)) + c of the position: the twin of Rows in
+ * mechanics/system.py. Saddle-point systems and projections: the twin of
+ * mechanics/constraints.py. */
 #include <math.h>
 #include <string.h>
 
@@ -8,8 +9,8 @@
 #include "core/matrix.h"
 
 static const char SINGULAR[] =
-    "the equations of motion are singular here: two constraints repeat each other, or a part that "
-    "can move has no mass";
+    "the equations of motion are singular in this shape: two constraints are linearly dependent, or "
+    "a part that can move has no mass";
 
 /* --- rows ------------------------------------------------------------------------------------- */
 
@@ -36,7 +37,7 @@ static int seen_from(const Rows *rows, int i) {
     return rows->on == NULL ? FIXED : rows->on[i];
 }
 
-/* f (B E + z) of a row that is seen from a body. */
+/* Return f (B E + z) of a row that is measured relative to a body. */
 static Complex seen_value(const Rows *rows, int i, const Complex *e) {
     int n = rows->system->n;
     const Complex *B = rows->B + i * n;
@@ -60,7 +61,7 @@ PRBM double row_value(const Rows *rows, int i, const Complex *e) {
     return sum;
 }
 
-/* B E w */
+/* Return B E w, with the rates w of the arms. */
 static Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
     const System *system = rows->system;
     const Complex *B = rows->B + i * system->n;
@@ -101,7 +102,7 @@ PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row) {
     }
 }
 
-/* Re(f (B E (w - w_b)^2 + z w_b^2)), w_b of the body that a row is seen from */
+/* Return Re(f (B E (w - w_b)^2 + z w_b^2)), with w_b the rate of the body of reference. */
 PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v) {
     const System *system = rows->system;
     const Complex *B = rows->B + i * system->n;
@@ -195,8 +196,8 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
     scratch->used = mark;
     if (right_way && !closed) {
         return fail(problem,
-                    "the loops of the mechanism cannot be closed here (by %.3g m): the parts do "
-                    "not reach each other",
+                    "the loops of the mechanism cannot be closed in this shape (gap %.3g m): the "
+                    "parts do not reach each other",
                     best);
     }
     return right_way;

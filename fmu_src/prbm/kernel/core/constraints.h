@@ -1,24 +1,24 @@
-/* Scalar constraints on the position, and projection onto them. */
+/* Scalar functions of the position, and projection onto constraints. */
 #ifndef PRBM_CONSTRAINTS_H
 #define PRBM_CONSTRAINTS_H
 
 #include "core/system.h"
 
-/* Scalars s = Re(f (B E + z)) + c: f = 1, or conj(E) of the body that they are seen from. */
+/* Scalar functions s = Re(f (B E + z)) + c, with f = 1, or f = conj(E) of a body of reference. */
 typedef struct {
     const System *system;
     int count;
     const Complex *B;       /* (count, n) */
     const double *c;        /* (count,) */
     const Complex *z;       /* (count,) */
-    const int *on;          /* (count,) coordinates, FIXED: f = 1, z = 0; or NULL: all of them */
+    const int *on;          /* (count,) coordinates of the bodies; FIXED: f = 1; NULL: all FIXED */
 } Rows;
 
 PRBM Rows plain_rows(const System *system, int count, const Complex *B, const double *c);
 PRBM Rows gap_rows(const System *system);
 PRBM Rows slide_rows(const System *system);
 PRBM Rows rub_rows(const System *system);
-PRBM double row_value(const Rows *rows, int i, const Complex *e); /* without c */
+PRBM double row_value(const Rows *rows, int i, const Complex *e); /* Without c. */
 PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v);
 PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row);
 PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v);
@@ -26,9 +26,9 @@ PRBM void scalars(const Rows *rows, const Complex *e, double *s);
 PRBM void jacobian(const Rows *rows, const Complex *e, double *result); /* (count, n) */
 PRBM void saddle(int n, int r, const double *M, const double *columns, const double *rows,
                  double *kkt);
-/* Solve a saddle-point system by LU; right (n + r,) becomes the solution. */
+/* Solve a saddle-point system by LU; right (n + r,) is replaced by the solution. */
 PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem *problem);
-/* q (n,) moves onto the rows, of which c (count,) are the constants now; e: its directions. */
+/* Project q (n,) onto the rows with the constants c (count,); e becomes its directions. */
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
                             Complex *e, Scratch *scratch, Problem *problem);
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,

@@ -13,7 +13,7 @@ static bool is_stop(const System *system, int contact) {
     return contact < system->s;
 }
 
-/* The rows of sliding velocities that have that of a contact, and its place among them. */
+/* Return the rows that contain the sliding velocity of a contact; i is its index among them. */
 static Rows tangential_rows(const System *system, int contact, int *i) {
     *i = is_stop(system, contact) ? contact : contact - system->s;
     return is_stop(system, contact) ? slide_rows(system) : rub_rows(system);

@@ -5,8 +5,8 @@
 #include "core/constraints.h"
 
 /* Contacts are numbered in one list: the stops, then the friction points, which are never open.
- * CONTACT_FRICTIONLESS: closed, but other contacts carry the load, or without friction. */
-PRBM int slip_sign(int mode); /* of the sliding velocity: -1, 0 or +1 */
+ * CONTACT_FRICTIONLESS is a closed contact without friction, or whose load other contacts carry. */
+PRBM int slip_sign(int mode); /* Sign of the sliding velocity: -1, 0 or +1. */
 
 typedef struct {
     int *modes; /* (s + f,) */

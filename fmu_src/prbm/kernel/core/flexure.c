@@ -1,4 +1,4 @@
-/* Flexures as rigid segments, torsion springs and axial ones: the twin of mechanism/flexure.py. */
+/* Flexures as rigid segments, torsion and axial springs: the twin of mechanism/flexure.py. */
 #include <math.h>
 
 #include "core/flexure.h"
@@ -50,12 +50,12 @@ PRBM int links_of(const FlexureType *model, int start_end, int end_end) {
     return start_end == FREE || end_end == FREE ? model->pivots - 1 : model->pivots;
 }
 
-/* The middle link stands for all, but in a chain. */
+/* Return whether link i of n stretches: every link of a chain, else the middle link only. */
 PRBM bool stretches(const FlexureType *model, int i, int n) {
     return model->axial && (model->links > 0 || i == n / 2);
 }
 
-/* A chain of equal links. */
+/* Set the segments of a chain of equal links. */
 static void cut_chain(const FlexureType *model, int start_end, int end_end, double L, double EI,
                       Segments *result) {
     int n = model->links;
@@ -69,14 +69,14 @@ static void cut_chain(const FlexureType *model, int start_end, int end_end, doub
     result->rates[n] = end_end == PIN ? 0.0 : 2 * rate;
 }
 
-/* One link between two pins. */
+/* Set the segments of a flexure between two pins: one link. */
 static void cut_bar(double L, Segments *result) {
     result->lengths[0] = result->lengths[2] = 0.0;
     result->lengths[1] = L;
     result->rates[0] = result->rates[1] = 0.0;
 }
 
-/* One cantilever of the length h, from the clamp to the tip, or two mirrored ones. */
+/* Set the segments of one cantilever of length h, from the clamp to the tip, or of two mirrored. */
 static bool cut_cantilevers(const FlexureType *model, const double *gamma, const double *K_theta,
                             int start_end, int end_end, double L, double EI, Segments *result,
                             Problem *problem) {
@@ -98,7 +98,7 @@ static bool cut_cantilevers(const FlexureType *model, const double *gamma, const
             result->lengths[n + 1 - i] = result->lengths[i];
             result->rates[n - i] = result->rates[i];
         }
-    } else if (n == pivots) { /* a pin at the tip */
+    } else if (n == pivots) { /* A pin at the tip. */
         result->lengths[n + 1] = 0.0;
         result->rates[n] = 0.0;
     }

@@ -18,7 +18,7 @@ PRBM bool stretches(const FlexureType *model, int i, int n);
 PRBM bool segments(const FlexureType *model, const double *gamma, const double *K_theta,
                    int start_end, int end_end, double L, double EI, double mass, double EA,
                    Segments *result, Problem *problem);
-/* The same flexure from its end to its start. */
+/* Reverse the segments, so that they go from the end of the flexure to its start. */
 PRBM void reversed(Segments *pieces);
 
 #endif

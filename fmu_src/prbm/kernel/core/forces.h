@@ -8,7 +8,7 @@ PRBM void springs(int n, const double *K, const double *deflection, double *torq
 PRBM double elastic_energy(int n, const double *K, const double *deflection);
 PRBM void field_row(int n, const Complex *S, Complex acceleration, Complex *w);
 PRBM void force_row(int n, const Complex *A, Complex force, Complex *w);
-/* The generalised forces (3, n) of a unit force along x, along y and of a unit moment. */
+/* Set the generalised forces (3, n) of a unit force along x, along y and of a unit moment. */
 PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex *e, double *rows,
                     Scratch *scratch);
 PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q);

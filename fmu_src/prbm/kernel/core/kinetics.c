@@ -1,4 +1,4 @@
-/* Mass matrix and quadratic velocities: the twin of mechanics/kinetics.py. */
+/* Mass matrix and quadratic-velocity matrix: the twin of mechanics/kinetics.py. */
 #include "core/kinetics.h"
 
 PRBM void inertia(int n, const Complex *H, const double *J, const Complex *e, double *M,

@@ -1,4 +1,4 @@
-/* Mass matrix and quadratic velocities. */
+/* Mass matrix and quadratic-velocity matrix. */
 #ifndef PRBM_KINETICS_H
 #define PRBM_KINETICS_H
 

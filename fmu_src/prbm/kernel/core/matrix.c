@@ -8,7 +8,7 @@
 
 #include "core/matrix.h"
 
-enum { ROTATION_SWEEPS = 60 }; /* Jacobi's converge quadratically: about six are usual */
+enum { ROTATION_SWEEPS_MAX = 60 }; /* Jacobi sweeps converge quadratically; six are usual. */
 
 PRBM double dot(int n, const double *a, const double *b) {
     double sum = 0.0;
@@ -18,7 +18,7 @@ PRBM double dot(int n, const double *a, const double *b) {
     return sum;
 }
 
-/* Of vectors of an even length. */
+/* Return the dot product of vectors of even length. */
 static double even_dot(int even, const double *a, const double *b) {
     Lanes sum[SUMS] = {NO_LANES};
     for (int i = 0; i < even; i += LANES) {
@@ -72,7 +72,7 @@ static void exchange(int n, double *a, double *b) {
     }
 }
 
-/* The diagonal of U is left inverted, for lu_solve. */
+/* Factorise; the diagonal of U is stored inverted, for lu_solve. */
 PRBM bool lu_factor(int n, double *a, int *pivot) {
     for (int k = 0; k < n; k++) {
         double *row = a + k * n;
@@ -142,8 +142,8 @@ PRBM void backward(int n, const double *a, double *b) {
 
 /* --- singular values -------------------------------------------------------------------------- */
 
-/* The rotation p := c p - s q, q := s p + c q that makes [[p.p, p.q], [p.q, q.q]] diagonal: of the
- * two that do, the one by the smaller angle. */
+/* Compute the rotation p := c p - s q, q := s p + c q that makes [[p.p, p.q], [p.q, q.q]] diagonal;
+ * of the two solutions, the one with the smaller angle. */
 static void small_rotation(double pp, double pq, double qq, double *c, double *s) {
     double slope = (qq - pp) / (2.0 * pq);
     double t = (slope >= 0.0 ? 1.0 : -1.0) / (fabs(slope) + sqrt(1.0 + slope * slope));
@@ -159,13 +159,13 @@ static void rotate(int n, double c, double s, double *p, double *q, int stride) 
     }
 }
 
-/* One-sided Jacobi: turn the rows of g (k, n) until they are at right angles to each other, and
- * those of v (k, k), unless NULL, with them.  The norms of the rows are the singular values.
- * Rows below a rounding of the largest are at right angles as they are. */
+/* One-sided Jacobi: rotate the rows of g (k, n) until they are orthogonal, and the rows of v (k,
+ * k), unless NULL, with them.  The norms of the rows are then the singular values.  Rows shorter
+ * than the round-off of the longest count as orthogonal. */
 static void orthogonalise(int k, int n, double *g, double *v) {
     double noise = DBL_EPSILON * largest(k * n, g);
     bool turned = true;
-    for (int sweep = 0; turned && sweep < ROTATION_SWEEPS; ++sweep) {
+    for (int sweep = 0; turned && sweep < ROTATION_SWEEPS_MAX; ++sweep) {
         turned = false;
         for (int i = 0; i < k; i++) {
             for (int j = i + 1; j < k; j++) {
@@ -193,7 +193,7 @@ static void identity(int n, double *a) {
     }
 }
 
-/* g = a or its transpose, with no more rows than columns. */
+/* Set g to a or its transpose, so that it has no more rows than columns. */
 static void wide(int m, int n, const double *a, double *g) {
     for (int i = 0; i < m; i++) {
         for (int j = 0; j < n; j++) {
@@ -206,8 +206,8 @@ static double norm(int n, const double *x) {
     return sqrt(dot(n, x, x));
 }
 
-/* Singular values, and rows with the pairs of singular vectors: g_i = s_i u_i (k, n) and v_i
- * (k, k) or NULL, for a = sum s_i u_i v_i^T or its transpose, k = min(m, n). */
+/* Compute the singular values s (k,) of a = sum s_i u_i v_i^T or its transpose, k = min(m, n).  The
+ * rows of g (k, n) are s_i u_i, those of v (k, k), unless NULL, are v_i. */
 static void singular_values(int m, int n, const double *a, double *s, double *g, double *v) {
     int k = m < n ? m : n, length = m < n ? n : m;
     wide(m, n, a, g);
@@ -220,7 +220,8 @@ static void singular_values(int m, int n, const double *a, double *s, double *g,
     }
 }
 
-/* x = sum (left_i . b) right_i/s_i^2, one of the two of length s_i, over the s_i that count */
+/* x = sum (left_i . b) right_i/s_i^2 over the s_i above the limit, where either left_i or right_i
+ * has the norm s_i and the other the norm 1. */
 PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
                         Scratch *scratch) {
     size_t used = scratch->used;
@@ -259,7 +260,7 @@ static void jacobi_rotation(int n, double *a, double *z, int p, int q) {
 static void jacobi_sweeps(int n, double *a, double *z) {
     double negligible = 0.5 * DBL_EPSILON * DBL_EPSILON * largest(n * n, a);
     bool turned = true;
-    for (int sweep = 0; turned && sweep < ROTATION_SWEEPS; ++sweep) {
+    for (int sweep = 0; turned && sweep < ROTATION_SWEEPS_MAX; ++sweep) {
         turned = false;
         for (int p = 0; p < n; p++) {
             for (int q = p + 1; q < n; q++) {
@@ -273,7 +274,7 @@ static void jacobi_sweeps(int n, double *a, double *z) {
     }
 }
 
-/* Exchange eigenvalues, and columns of z, into rising order. */
+/* Sort the eigenvalues, and the columns of z with them, in ascending order. */
 static void sort_eigen(int n, double *w, double *z) {
     for (int i = 0; i < n; i++) {
         int least = i;
@@ -304,8 +305,8 @@ PRBM void symmetric_eigen(int n, double *a, double *w, double *z) {
 
 /* --- null space ------------------------------------------------------------------------------- */
 
-/* The u of Householder's reflection 1 - u u^T that sends x to a multiple of the first unit
- * vector, in place of x. */
+/* Replace x by the u of the Householder reflection 1 - u u^T that maps x to a multiple of the first
+ * unit vector. */
 static void householder(int n, double *x) {
     double length = norm(n, x);
     if (!(length > 0.0)) {
@@ -328,7 +329,7 @@ static void reflect(int n, const double *u, double *x) {
     }
 }
 
-/* The last columns of the orthogonal factor of rows^T. */
+/* The basis is the last columns of the orthogonal factor of rows^T. */
 PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch) {
     size_t used = scratch->used;
     double *u = take_matrix(scratch, r, n), *column = take(scratch, (size_t)n);

@@ -8,22 +8,22 @@ PRBM double dot(int n, const double *a, const double *b);
 PRBM void copy(int n, const double *from, double *to);
 PRBM void zeros(int n, double *x);
 PRBM void add_scaled(int n, double a, const double *x, double *y); /* y += a x */
-/* LU with partial pivoting, in place; false if a pivot is zero or not a number. */
+/* Factorise by LU with partial pivoting, in place; false if a pivot is zero or NaN. */
 PRBM bool lu_factor(int n, double *a, int *pivot);
 PRBM void lu_solve(int n, const double *a, const int *pivot, double *b);
-/* Cholesky L L^T of a symmetric matrix, of which the lower triangle is read and overwritten; the
- * diagonal is left inverted; false if a pivot is not positive. */
+/* Factorise a symmetric matrix as L L^T by Cholesky's method; false if a pivot is not positive. 
+ * The lower triangle is read and overwritten by L; the diagonal is stored inverted. */
 PRBM bool cholesky(int n, double *a);
 PRBM void forward(int n, const double *a, double *b);  /* b := L^-1 b */
 PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */
-/* The x of least norm among those that minimise |a x - b|, as np.linalg.lstsq: singular values
- * below rcond times the largest count as zero.  a is (m, n). */
+/* Compute the x of least norm that minimises |a x - b|, as np.linalg.lstsq.  a is (m, n); singular
+ * values below rcond times the largest count as zero. */
 PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
                         Scratch *scratch);
-/* Eigenvalues w in rising order and, unless NULL, orthonormal eigenvectors as columns of z, of a
- * symmetric matrix, which is destroyed (cyclic Jacobi). */
+/* Compute the eigenvalues w of a symmetric matrix in ascending order and, unless z is NULL, its
+ * orthonormal eigenvectors, the columns of z, by cyclic Jacobi rotations; a is overwritten. */
 PRBM void symmetric_eigen(int n, double *a, double *w, double *z);
-/* An orthonormal basis z (n, n - r) of what the rows (r, n), of full rank, send to zero. */
+/* Compute an orthonormal basis z (n, n - r) of the null space of rows (r, n) of full rank. */
 PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch);
 
 #endif

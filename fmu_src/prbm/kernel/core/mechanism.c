@@ -62,7 +62,7 @@ PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t referenc
     return found ? &mechanism->variables[low] : NULL;
 }
 
-/* Displacement and velocity of a wall, among some inputs (input_count,). */
+/* Return the displacement and velocity of a wall in the inputs (input_count,). */
 static const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop) {
     return inputs + mechanism->input.walls + PER_WALL * stop;
 }

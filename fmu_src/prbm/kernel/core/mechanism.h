@@ -31,13 +31,13 @@ typedef struct {
 typedef struct {
     const char *name;
     bool lumped, rate_with_gamma, axial;
-    int pivots; /* of a cantilever; 0: a chain */
-    int links;  /* of a chain; 0: a set of coefficients */
+    int pivots; /* Pivots of a cantilever; 0 for a chain. */
+    int links;  /* Links of a chain; 0 for a model with coefficients. */
     Expression thickness, width, youngs_modulus, density;
     const Expression *gamma, *K_theta; /* (pivots,) */
 } FlexureType;
 
-/* Two points of different bodies, GROUND or 1 ... */
+/* Two points of different bodies; bodies are numbered 1, 2, ..., and GROUND. */
 typedef struct {
     int start, end;
     Point start_point, end_point;
@@ -57,7 +57,7 @@ typedef struct {
 
 typedef struct {
     const char *name;
-    int body, on; /* 1 ...; the body that carries its wall, GROUND or 1 ... */
+    int body, on; /* The body that it stops, and the body that carries its wall, or GROUND. */
     Point point;
     double direction; /* deg */
     Expression position, offset, restitution, friction, rest_speed;
@@ -79,7 +79,7 @@ typedef struct {
 
 typedef struct {
     const char *name;
-    int body; /* GROUND or 1 ... */
+    int body; /* A body, or GROUND. */
     Point point;
 } Probe;
 
@@ -89,7 +89,7 @@ typedef struct {
     Expression displacement, velocity;
 } Release;
 
-/* A field of a part that is an expression, with the bounds of the parameter it stands for. */
+/* A field of a part that is an expression instead of a parameter, with its bounds. */
 typedef struct {
     const char *name, *unit;
     Expression expression;
@@ -99,35 +99,35 @@ typedef struct {
 typedef struct {
     uint32_t reference;
     int type; /* REAL, INTEGER, BOOLEAN, CLOCK; a clock has the slot of its impact_count */
-    int slot; /* in the vector of all values, see Slots */
+    int slot; /* Index in the vector of all values, see Slots. */
     const char *name;
 } Variable;
 
-/* The vector of all values: where each group begins. */
+/* The first slot of each group in the vector of all values. */
 typedef struct {
     int parameters, inputs, bodies, stops, base, energies, latched, links, stretches, probes,
         frequency, calculated, derivatives, indicators, time, count;
 } Slots;
 
-/* Where the groups of inputs begin; the forces are the first. */
+/* The first index of each group of inputs; the forces begin at 0. */
 typedef struct {
     int walls, impulses, mobilities, base;
 } InputGroups;
 
-/* A part that the assembly walks along, from what is held already. */
+/* A step of the assembly: a flexure or joint, from a body that is already placed. */
 typedef struct {
     const char *name;
     const Connection *between;
-    const Flexure *flexure; /* NULL: a joint */
-    bool backwards;         /* from its end to its start */
-    bool closes;            /* a loop: what it leads to is held, too */
-    int first;              /* of the coordinates that it adds */
+    const Flexure *flexure; /* NULL for a joint. */
+    bool backwards;         /* From its end to its start. */
+    bool closes;            /* It closes a loop: its far body is already placed, too. */
+    int first;              /* The first coordinate that it adds. */
 } Step;
 
 /* A coordinate: the angle of a link, its stretch, or the angle of a body. */
 typedef struct {
-    int link, body; /* 0 ... or -1; 1 ... or 0 */
-    int arm;        /* whose arm it turns or stretches: its own, or that of a link */
+    int link, body; /* The link, counted from 0, or -1; the body, counted from 1, or 0. */
+    int arm;        /* The coordinate of the arm that it turns or stretches. */
 } Coordinate;
 
 typedef struct {
@@ -146,23 +146,23 @@ typedef struct {
     const Probe *probes;
     const Point *ground;
     const Bound *bounds;
-    const Variable *variables; /* in rising order of their references */
+    const Variable *variables; /* In ascending order of their references. */
     const char *const *input_names;
     const double *input_starts; /* (input_count,) */
     InputGroups input;
-    const Step *steps;             /* flexures and joints in the order of the assembly */
+    const Step *steps;             /* Flexures and joints in the order of the assembly. */
     const Coordinate *coordinates; /* (coordinate_count,) */
-    const int *links, *stretches;  /* coordinates that are angles and stretches of links */
-    const int *independent; /* coordinates that are states, with their rates, in model exchange */
+    const int *links, *stretches;  /* Coordinates that are angles and stretches of links. */
+    const int *independent; /* Coordinates that are states, with their rates, in model exchange. */
     Release release;
-    int gravity[2], tolerance, damping_zeta, damping_beta; /* parameters */
-    /* of the assembled system */
+    int gravity[2], tolerance, damping_zeta, damping_beta; /* Indices of parameters. */
+    /* Sizes of the assembled system. */
     int coordinate_count, loop_count, link_count, stretch_count, mass_count, spring_count;
-    int longest; /* links of a flexure at most */
+    int longest; /* Largest number of links of a flexure. */
     Slots slots;
 } Mechanism;
 
-PRBM double evaluate(Expression quantity, const double *values); /* twin: mechanism.Affine */
+PRBM double evaluate(Expression quantity, const double *values); /* Twin: mechanism.Affine. */
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */
 PRBM bool check_values(const Mechanism *mechanism, const double *values, Problem *problem);

@@ -1,4 +1,4 @@
-/* Memory: one block that is laid out once, and scratch that is taken and given back. */
+/* Memory: blocks that are laid out once, and scratch that is taken and released. */
 #include <stdarg.h>
 #include <stdio.h>
 
@@ -14,8 +14,8 @@ PRBM bool fail(Problem *problem, const char *format, ...) {
     return false;
 }
 
-/* The next part of a block, aligned for anything; NULL while counting.  A block whose size does
- * not fit into a size_t counts as SIZE_MAX bytes, which no allocation grants. */
+/* Return the next part of a block, aligned for every type; NULL while counting.  A block whose size
+ * does not fit into a size_t counts as SIZE_MAX bytes, which cannot be allocated. */
 PRBM void *place(Memory *memory, size_t count, size_t size) {
     size_t start = memory->used;
     size_t room = SIZE_MAX - start;
@@ -27,7 +27,7 @@ PRBM void *place(Memory *memory, size_t count, size_t size) {
     return memory->base == NULL ? NULL : memory->base + start;
 }
 
-/* Requests beyond the size count, too, so that most is the size that would suffice. */
+/* Requests beyond the size are counted, too, so that most is the size that suffices. */
 PRBM double *take(Scratch *scratch, size_t count) {
     double *taken = scratch->base + scratch->used;
     bool enough = scratch->used <= scratch->size && count <= scratch->size - scratch->used;

@@ -25,9 +25,9 @@ typedef struct {
 
 PRBM void *place(Memory *memory, size_t count, size_t size);
 
-/* Working memory for one call: taken in order, given back by restoring the value of used.  A
- * request for more than is left yields the spare block, which is as large as any single request,
- * and sets exceeded: the results are then invalid, but nothing is overwritten. */
+/* Working memory for one call, taken in order and released by restoring the value of used.  If a
+ * request exceeds the rest, it gets the spare block, which is as large as any single request, and
+ * exceeded is set: the results are then invalid, but no other memory is overwritten. */
 typedef struct {
     double *base, *spare;
     size_t used, size, most;

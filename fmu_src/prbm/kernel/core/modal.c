@@ -1,5 +1,5 @@
-/* Small vibrations about a static shape, and what an impact leaves in the fundamental mode: the
- * twin of mechanics/modal.py. */
+/* Small vibrations about a static shape, and the fundamental mode at an impact: the twin of
+ * mechanics/modal.py. */
 #include <math.h>
 
 #include "core/constraints.h"
@@ -10,7 +10,7 @@
 
 #define FULL_TURN 6.283185307179586 /* rad */
 
-/* c = a^T b a for a (n, k), b (n, n) */
+/* Compute c = a^T b a for a (n, k), b (n, n). */
 static void congruent(int n, int k, const double *a, const double *b, double *c, Scratch *scratch) {
     size_t used = scratch->used;
     double *ba = take(scratch, (size_t)n);
@@ -31,10 +31,10 @@ static void congruent(int n, int k, const double *a, const double *b, double *c,
     scratch->used = used;
 }
 
-/* A := L^-1 A L^-T for symmetric A; column is (n,) of its own use. */
+/* Compute A := L^-1 A L^-T for symmetric A; column (n,) is work space. */
 static void divide_twice(int n, const double *L, double *A, double *column) {
     for (int i = 0; i < n; i++) {
-        forward(n, L, A + i * n); /* row i: L^-1 A e_i */
+        forward(n, L, A + i * n); /* Row i is L^-1 A e_i. */
     }
     for (int j = 0; j < n; j++) {
         for (int i = 0; i < n; i++) {
@@ -52,14 +52,15 @@ static void divide_twice(int n, const double *L, double *A, double *column) {
     }
 }
 
-/* K y = w M y with y^T M y = 1: w in rising order, y the columns of Y; K and M are destroyed. */
+/* Solve K y = w M y with y^T M y = 1: w in ascending order, y the columns of Y.  K and M are
+ * overwritten. */
 static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y, Scratch *scratch,
                               Problem *problem) {
     size_t used = scratch->used;
     double *column = take(scratch, (size_t)n);
     if (!cholesky(n, M)) {
         scratch->used = used;
-        return fail(problem, "the modes have no frequency here: a part that can move has no mass");
+        return fail(problem, "the modes cannot be computed: a part that can move has no mass");
     }
     divide_twice(n, M, K, column);
     symmetric_eigen(n, K, w, Y);
@@ -76,13 +77,13 @@ static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y,
     return true;
 }
 
-/* The row of gravity, spread. */
+/* Set the spread row w of gravity. */
 static void gravity_row(const System *system, Complex *w) {
     field_row(system->n, system->S, system->gravity, w);
     spread(system, 1, w, w);
 }
 
-/* Z (n, k): a basis of the motions that the loops leave. */
+/* Compute a basis Z (n, k) of the motions that the loops allow. */
 static void tangent_space(const System *system, const Complex *e, double *Z, Scratch *scratch) {
     size_t used = scratch->used;
     double *rows = take_matrix(scratch, system->r, system->n);
@@ -92,8 +93,9 @@ static void tangent_space(const System *system, const Complex *e, double *Z, Scr
     scratch->used = used;
 }
 
-/* K_t phi = omega^2 M phi on the tangent space of the loops, under the constraints B, which may
- * be more, with the multipliers lam (r,).  frequency (k,), phi (n, k), M (n, n). */
+/* Solve K_t phi = omega^2 M phi on the tangent space of the loops: frequency (k,), phi (n, k), with
+ * M (n, n).  The stiffness K_t is that of the rows B with the multipliers lam (r,); B may have a
+ * row more than the loops. */
 static bool modes_about(const System *system, const double *q, int r, const Complex *B,
                         const double *lam, double *frequency, double *phi, double *M,
                         Scratch *scratch, Problem *problem) {
@@ -104,7 +106,7 @@ static bool modes_about(const System *system, const double *q, int r, const Comp
     double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
     double *reduced = take_matrix(scratch, k, k);
     directions(system, q, e);
-    inertia(n, system->H, system->J, e, M, K_t); /* the velocity matrix is not needed */
+    inertia(n, system->H, system->J, e, M, K_t); /* K_t gets the velocity matrix, unused. */
     gravity_row(system, w);
     tangent_stiffness(system, r, w, B, lam, e, K_t);
     tangent_space(system, e, Z, scratch);
@@ -125,7 +127,7 @@ static bool modes_about(const System *system, const double *q, int r, const Comp
     return found;
 }
 
-/* The holding force of the shape stays as a dead load. */
+/* The holding force of the shape acts as a dead load. */
 PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
                 Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -141,7 +143,7 @@ PRBM bool modes(const System *system, const Equilibrium *shape, double *frequenc
     return found;
 }
 
-/* Zero if the equilibrium under gravity is unstable. */
+/* The frequency is 0 if the equilibrium under gravity is unstable. */
 PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
                                 Problem *problem) {
     size_t used = scratch->used;
@@ -158,8 +160,8 @@ PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch
     return found;
 }
 
-/* Multipliers of the shape held at rest by a force on the released body: -lam of
- * [M, rows^T; rows, 0] (a, -lam) = (Q, 0), the accelerations left over being the least ones. */
+/* Compute the multipliers of a shape that a force on the released body holds at rest: -lam of
+ * [M, rows^T; rows, 0] (a, -lam) = (Q, 0), which makes the remaining accelerations least. */
 static bool resting_multipliers(const System *system, const double *q, const Complex *B,
                                 double *lam, double *M, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;

@@ -4,12 +4,12 @@
 
 #include "core/statics.h"
 
-/* Frequencies [Hz] (k,) and mass-normalised modes (n, k), k = n - r. */
+/* Compute frequencies [Hz] (k,) and mass-normalised modes (n, k), k = n - r. */
 PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
                 Scratch *scratch, Problem *problem);
 PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch *scratch,
                                 Problem *problem);
-/* The fundamental mode phi (n,) at a shape and M (n, n) there. */
+/* Compute the fundamental mode phi (n,) and the mass matrix M (n, n) at a shape. */
 PRBM bool fundamental_at(const System *system, const double *q, double *phi, double *M,
                          Scratch *scratch, Problem *problem);
 PRBM double simulated_restitution(int n, const double *phi, const double *M, const double *before,

@@ -1,9 +1,10 @@
-/* Elementary functions from sums, products and quotients alone, whose rounding IEEE 754 fixes:
- * the same bits on every platform, where the functions of the C libraries differ in the last one.
+/* Elementary functions of sums, products and quotients, whose rounding IEEE 754 defines.  Results
+ * are the same bits on every platform, unlike those of the C libraries.
  *
- * The polynomials of sine and cosine are minimax ones on [-pi/4, pi/4], by Remez' exchange in
- * multiple precision; the others are Taylor's.  Reduction in parts: W. J. Cody, W. Waite,
- * Software Manual for the Elementary Functions, Prentice-Hall, 1980.
+ * The polynomials of sine and cosine are minimax polynomials on [-pi/4, pi/4], from a Remez
+ * exchange in multiple precision; the others are Taylor polynomials.  Source of the argument
+ * reduction: W. J. Cody, W. Waite, Software Manual for the Elementary Functions, Prentice-Hall,
+ * 1980.
  */
 #include <float.h>
 #include <math.h>
@@ -13,13 +14,13 @@
 
 /* --- exp(i q) --------------------------------------------------------------------------------- */
 
-#define LARGEST_ANGLE UINT64_C(0x40f86a0000000000) /* the bits of 1e5 rad */
+#define LARGEST_ANGLE UINT64_C(0x40f86a0000000000) /* The bits of 1e5 rad. */
 #define QUARTERS_PER_RADIAN 0.6366197723675814 /* 2/pi */
-/* pi/2 in three parts; the first two have 36 bits, so that up to 2^17 times them is exact. */
+/* pi/2 in three parts; the first two have 36 bits, so that their multiples up to 2^17 are exact. */
 #define QUARTER_HIGH 1.5707963267923333
 #define QUARTER_MIDDLE 2.5633441515839558e-12
 #define QUARTER_LOW 1.0562999066987428e-23
-/* Adding it rounds to an integer, which the last bits of the sum then are. */
+/* Adding it rounds to an integer, which is then in the last bits of the sum. */
 #define ROUNDER 6755399441055744.0 /* 1.5 2^52 */
 
 static LaneBits bits_of(Lanes x) {
@@ -38,14 +39,14 @@ static Lanes magnitudes(Lanes x) {
     return from_bits(bits_of(x) & (UINT64_MAX >> 1));
 }
 
-/* The angle, or something that is not a number (all bits set) unless it is below the limit. */
+/* Return the angle, or NaN (all bits set) if it is not below the limit. */
 static Lanes valid_angle(Lanes q) {
     LaneBits magnitude = bits_of(q) & (UINT64_MAX >> 1);
     LaneBits invalid = ((magnitude - LARGEST_ANGLE) >> 63) - UINT64_C(1);
     return from_bits(bits_of(q) | invalid);
 }
 
-/* The angle y + rest = q - k pi/2 in [-pi/4, pi/4], and k in the last bits of quarters. */
+/* Compute the angle y + rest = q - k pi/2 in [-pi/4, pi/4], and k in the last bits of quarters. */
 static void reduce_angle(Lanes q, Lanes *y, Lanes *rest, LaneBits *quarters) {
     Lanes shifted = q * QUARTERS_PER_RADIAN + ROUNDER;
     Lanes k = shifted - ROUNDER;
@@ -56,7 +57,7 @@ static void reduce_angle(Lanes q, Lanes *y, Lanes *rest, LaneBits *quarters) {
     *quarters = bits_of(shifted);
 }
 
-/* sin(y + rest) = y + y^3 S(y^2) + rest cos y.  The sum by pairs is done sooner than Horner's. */
+/* sin(y + rest) = y + y^3 S(y^2) + rest cos y.  A sum by pairs is faster than Horner's scheme. */
 static Lanes sine(Lanes y, Lanes rest) {
     Lanes z = y * y, zz = z * z;
     Lanes low = 0.008333333333322116 * z - 0.1666666666666663;
@@ -66,7 +67,8 @@ static Lanes sine(Lanes y, Lanes rest) {
     return y + (y * z * S + rest * (1.0 - 0.5 * z));
 }
 
-/* cos(y + rest) = 1 - y^2/2 + y^4 C(y^2) - y rest, where 1 - y^2/2 is rounded and mended */
+/* cos(y + rest) = 1 - y^2/2 + y^4 C(y^2) - y rest, with a correction for the rounding of 1 -
+ * y^2/2. */
 static Lanes cosine(Lanes y, Lanes rest) {
     Lanes z = y * y, zz = z * z;
     Lanes half = 0.5 * z;
@@ -78,9 +80,9 @@ static Lanes cosine(Lanes y, Lanes rest) {
     return most + (((1.0 - most) - half) + (zz * C - y * rest));
 }
 
-/* Choose between sine and cosine, and their signs, by the quarter, without a branch. */
+/* Select sine or cosine, and the sign, by the quarter turn, without a branch. */
 static void turn_quarters(LaneBits quarters, LaneBits s, LaneBits c, Lanes *re, Lanes *im) {
-    LaneBits swap = UINT64_C(0) - (quarters & UINT64_C(1)); /* all ones or none */
+    LaneBits swap = UINT64_C(0) - (quarters & UINT64_C(1)); /* All bits 1 or all bits 0. */
     LaneBits exchange = (s ^ c) & swap;
     LaneBits s_sign = (quarters & UINT64_C(2)) << 62;
     LaneBits c_sign = ((quarters + UINT64_C(1)) & UINT64_C(2)) << 62;
@@ -101,7 +103,7 @@ static void lane_directions(const double *q, Complex *e) {
     set_complex(e, re, im);
 }
 
-/* The last ones are done together with some before them, which are done twice. */
+/* The last group of lanes overlaps the one before it; the overlap is computed twice. */
 PRBM void unit_vectors(int n, const double *q, Complex *e) {
     int i = 0;
     for (; i + LANES <= n; i += LANES) {
@@ -118,7 +120,7 @@ PRBM void unit_vectors(int n, const double *q, Complex *e) {
     }
 }
 
-#define SMALL_TURN 0.0625 /* rad: below, Taylor's four terms are exact to rounding */
+#define SMALL_TURN_MAX 0.0625 /* rad; below, the error of four Taylor terms is round-off. */
 
 /* sin d = d - d^3/6 + ..., cos d - 1 = -d^2/2 + ... */
 SIZED void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
@@ -129,7 +131,7 @@ SIZED void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
     *c_less_1 = z * even;
 }
 
-/* e = exp(i q) by turning e_start = exp(i start): exp(i q) = e_start exp(i (q - start)).  False
+/* Compute e = exp(i q) = e_start exp(i (q - start)) from e_start = exp(i start); return false
  * unless all angles are near their start. */
 SIZED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
                              Parts parts, Complex *e) {
@@ -139,7 +141,7 @@ SIZED bool turned_directions(int even, const double *q, const double *start, Par
         Lanes d = lanes_at(q + i) - lanes_at(start + i), s, c_less_1;
         Lanes re = lanes_at(e_start.re + i), im = lanes_at(e_start.im + i);
         small_turn(d, &s, &c_less_1);
-        near &= bits_of(d * d - SMALL_TURN * SMALL_TURN); /* whose sign is one, then */
+        near &= bits_of(d * d - SMALL_TURN_MAX * SMALL_TURN_MAX); /* Sign bit set if small. */
         Lanes turned_re = re + (re * c_less_1 - im * s), turned_im = im + (im * c_less_1 + re * s);
         set_lanes(parts.re + i, turned_re);
         set_lanes(parts.im + i, turned_im);
@@ -154,10 +156,10 @@ SIZED bool turned_directions(int even, const double *q, const double *start, Par
 #define LN2_LOW 7.371002565167799e-13
 #define BINARY_DIGITS_PER_E 1.4426950408889634 /* 1/ln 2 */
 #define SQUARE_ROOT_OF_HALF 0.7071067811865476
-#define LARGEST_EXPONENT 710.0   /* beyond, exp is infinite */
-#define SMALLEST_EXPONENT -746.0 /* beyond, exp is zero */
+#define EXPONENT_MAX 710.0  /* Above, exp is infinite. */
+#define EXPONENT_MIN -746.0 /* Below, exp is zero. */
 
-/* The value of c_0 + c_1 z + c_2 z^2 + ... */
+/* Return c_0 + c_1 z + c_2 z^2 + ... */
 static double series(int count, const double *c, double z) {
     double sum = c[count - 1];
     for (int k = count - 2; k >= 0; k--) {
@@ -201,10 +203,10 @@ static double exponential_series(double r) {
 
 /* With x = k ln 2 + r, exp x = 2^k (1 + r + r^2 (1/2 + ...)). */
 PRBM double exponential(double x) {
-    if (!(x < LARGEST_EXPONENT)) {
-        return x >= LARGEST_EXPONENT ? HUGE_VAL : x;
+    if (!(x < EXPONENT_MAX)) {
+        return x >= EXPONENT_MAX ? HUGE_VAL : x;
     }
-    if (x < SMALLEST_EXPONENT) {
+    if (x < EXPONENT_MIN) {
         return 0.0;
     }
     double k = floor(x * BINARY_DIGITS_PER_E + 0.5);
@@ -214,7 +216,7 @@ PRBM double exponential(double x) {
     return ldexp(1.0 + (r + (rest + r * r * exponential_series(r))), (int)k);
 }
 
-/* The relative error grows with |y ln x|, of which a rounding is lost. */
+/* The relative error is |y ln x| times the rounding error of a double. */
 PRBM double power(double x, double y) {
     return y == 0.0 ? 1.0 : exponential(y * natural_log(x));
 }
@@ -278,7 +280,7 @@ PRBM double lesser(double a, double b) {
     return a < b ? a : b;
 }
 
-/* Once something is not a number, so is the result. */
+/* The result is NaN if an element is NaN. */
 PRBM double largest(int n, const double *x) {
     double top = 0.0;
     for (int i = 0; i < n; i++) {

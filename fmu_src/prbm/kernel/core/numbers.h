@@ -8,8 +8,8 @@ typedef struct {
     double re, im;
 } Complex;
 
-/* Complex numbers with their parts apart, in vectors that are padded with zeros to an even length,
- * so that they are worked on by pairs. */
+/* Complex vectors with separate real and imaginary parts, padded with zeros to an even length for
+ * operations on pairs. */
 typedef struct {
     double *re, *im;
 } Parts;
@@ -21,8 +21,8 @@ PRBM double power(double x, double y);                      /* x^y for x > 0 */
 PRBM double phase(Complex z);                               /* as cmath.phase, in (-pi, pi] */
 PRBM bool finite_number(double x);
 PRBM double largest(int n, const double *x);                /* max |x_i|, 0 for none */
-PRBM double greater(double a, double b); /* b unless a > b */
-PRBM double lesser(double a, double b);  /* b unless a < b */
+PRBM double greater(double a, double b); /* b unless a > b. */
+PRBM double lesser(double a, double b);  /* b unless a < b. */
 PRBM Complex unit(double degrees);
 PRBM Complex complex_of(double re, double im);
 PRBM Complex plus(Complex a, Complex b);

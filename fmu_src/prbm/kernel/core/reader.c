@@ -12,9 +12,9 @@ typedef struct {
 } Reader;
 
 static void *kept(Reader *reader, size_t count, size_t size) {
-    size_t left = reader->room - reader->memory.used; /* place rounds up to less than 32 bytes */
+    size_t left = reader->room - reader->memory.used; /* place adds less than 32 bytes. */
     if (reader->wrong || left < 32 || count > (left - 32) / size) {
-        reader->wrong = reader->wrong ? reader->wrong : "counts that its size does not bear";
+        reader->wrong = reader->wrong ? reader->wrong : "counts that are too large for its size";
         return NULL;
     }
     return place(&reader->memory, count, size);
@@ -22,7 +22,7 @@ static void *kept(Reader *reader, size_t count, size_t size) {
 
 static bool has(Reader *reader, size_t bytes) {
     if (!reader->wrong && reader->left < bytes) {
-        reader->wrong = "an end where there should be more";
+        reader->wrong = "an unexpected end";
     }
     return !reader->wrong;
 }
@@ -49,7 +49,7 @@ static double read_f64(Reader *reader) {
 static double read_bound(Reader *reader) {
     double x = read_f64(reader);
     if (x != x) {
-        reader->wrong = "a bound that is not a number";
+        reader->wrong = "a bound that is NaN";
     }
     return x;
 }
@@ -66,7 +66,7 @@ static const char *read_text(Reader *reader) {
     size_t length = read_u32(reader);
     if (length >= reader->left || !has(reader, length + 1) || reader->at[length] != 0 ||
         memchr(reader->at, 0, length)) {
-        reader->wrong = reader->wrong ? reader->wrong : "a text that does not end";
+        reader->wrong = reader->wrong ? reader->wrong : "a text without its terminating zero";
         return "";
     }
     char *text = kept(reader, length + 1, 1);
@@ -78,11 +78,11 @@ static const char *read_text(Reader *reader) {
     return text ? text : "";
 }
 
-/* An index below a count. */
+/* Read an index of at least from and below count. */
 static int read_index(Reader *reader, int from, int count) {
     uint32_t x = read_u32(reader);
     if (x < (uint32_t)from || x >= (uint32_t)count) {
-        reader->wrong = reader->wrong ? reader->wrong : "a reference that leads nowhere";
+        reader->wrong = reader->wrong ? reader->wrong : "an index out of range";
         return from;
     }
     return (int)x;
@@ -92,11 +92,11 @@ static bool read_flag(Reader *reader) {
     return read_index(reader, 0, 2) == 1;
 }
 
-/* The number of records that follow, each of at least so many bytes. */
+/* Read the number of records of at least so many bytes each that follow. */
 static int read_count(Reader *reader, size_t bytes) {
     uint32_t count = read_u32(reader);
     if (count > reader->left / bytes) {
-        reader->wrong = reader->wrong ? reader->wrong : "counts that its size does not bear";
+        reader->wrong = reader->wrong ? reader->wrong : "counts that are too large for its size";
         return 0;
     }
     return (int)count;

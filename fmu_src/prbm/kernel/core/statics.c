@@ -23,8 +23,8 @@ PRBM void stack_release(const System *system, Complex *B, double *c) {
     c[r] = system->release_c;
 }
 
-/* K + diag(Re(p)) with the pull p = (lam^T B - i w) e of each arm; a stretch has -Re(p) of its arm on
- * the diagonal and Im(p) beside the arm's angle. */
+/* The stiffness is K + diag(Re(p)) with the pull p = (lam^T B - i w) e of each arm.  A stretch has
+ * -Re(p) of its arm on the diagonal and Im(p) in the column and row of the arm's angle. */
 PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t) {
     int n = system->n;
@@ -44,14 +44,14 @@ PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const
     }
 }
 
-/* What must hold at a fraction of the load: s = Re(B e) + c = 0, and the dead loads of row w. */
+/* The equations at a fraction of the load: constraints s = Re(B e) + c = 0, dead loads of row w. */
 typedef struct {
     const System *system;
     Rows rows;
     Complex *w; /* (n,) spread */
 } Balance;
 
-/* Torques and openings at (q, lam), and the rows of the constraints. */
+/* Compute the residual torques and constraints at (q, lam), and the constraint rows. */
 static void unbalanced(const Balance *balance, const double *state, const Complex *e,
                        double *torque, double *open_by, double *rows, Scratch *scratch) {
     const System *system = balance->system;
@@ -74,7 +74,7 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
     scratch->used = used;
 }
 
-/* One Newton step, of no more than the largest turn; false if there is none. */
+/* Make one Newton step, no larger than STATICS_TURN_MAX; false if the system is singular. */
 static bool newton_step(const Balance *balance, const Complex *e, double *torque, double *open_by,
                         const double *rows, double *state, double *turned, Scratch *scratch) {
     size_t used = scratch->used;
@@ -125,7 +125,7 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     return done || (balanced && !going);
 }
 
-/* The balance at a fraction of gravity and, if held, of the displacement. */
+/* Solve the balance at a fraction of gravity and, if held, of the displacement. */
 static bool loaded(const System *system, bool held, double displacement, double fraction,
                    double *state, Scratch *scratch) {
     size_t used = scratch->used;
@@ -142,8 +142,8 @@ static bool loaded(const System *system, bool held, double displacement, double 
     return balanced;
 }
 
-/* The largest change between two states of what bends [rad]; what hangs on a pin alone may turn at
- * once. */
+/* Return the largest change of a coordinate between two states [rad].  Bodies without springs are
+ * left out, because they may turn freely. */
 static double jump(const System *system, const double *from, const double *to) {
     double top = 0.0;
     for (int j = 0; j < system->n; j++) {
@@ -163,8 +163,8 @@ static bool unreachable(const System *system, bool held, double displacement, do
                     heavy ? "no static equilibrium under gravity was found: the flexures are too "
                             "weak for this load; reduce gravity or the masses, or stiffen the "
                             "flexures"
-                          : "no static equilibrium was found: the drawn shape is none, or the "
-                            "flexures are too weak to hold it");
+                          : "no static equilibrium was found: the drawn shape is not in "
+                            "equilibrium, or the flexures are too weak to hold it");
     }
     return fail(problem,
                 "release.displacement = %g m cannot be reached: no equilibrium was found beyond "
@@ -173,8 +173,8 @@ static bool unreachable(const System *system, bool held, double displacement, do
                 heavy ? ", or reduce gravity across the motion" : "");
 }
 
-/* Raise the load and the displacement together from the straight, unloaded shape: state is
- * (q, lam, force), and the shape found the one that slow loading reaches. */
+/* Increase the load and the displacement together from the straight, unloaded shape, to follow the
+ * branch that slow loading reaches; state is (q, lam, force). */
 static bool load_slowly(const System *system, bool held, double displacement, double *state,
                         Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -183,7 +183,7 @@ static bool load_slowly(const System *system, bool held, double displacement, do
     while (done < 1.0 && fraction >= STATICS_LOAD_STEP_MIN) {
         double target = lesser(1.0, done + fraction);
         copy(size, state, trial);
-        /* a jump of a link leads to another branch, where slow loading does not take it */
+        /* A jump of a link leads to another branch, which slow loading does not reach. */
         if (loaded(system, held, displacement, target, trial, scratch) &&
             jump(system, state, trial) <= STATICS_TURN_MAX) {
             copy(size, trial, state);
@@ -212,7 +212,7 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     return found;
 }
 
-/* Whether the loops let the released body move: rows (r, n), its own the last. */
+/* Return whether the loops allow the released body to move; its row is the last of rows (r, n). */
 static bool releasable(const System *system, const double *M, int r, const double *rows,
                        double speed, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;

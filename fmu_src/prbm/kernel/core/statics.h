@@ -9,12 +9,12 @@ typedef struct {
     double force;
 } Equilibrium;
 
-/* B (r + 1, n), c (r + 1,): the loops and, below them, the row of the released body. */
+/* Set B (r + 1, n) and c (r + 1,): the loops, then the row of the released body. */
 PRBM void stack_release(const System *system, Complex *B, double *c);
-/* w is spread, B is not. */
+/* Compute the tangent stiffness; w is spread, B is not. */
 PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t);
-/* held: whether the released body is held at the displacement. */
+/* Compute the equilibrium; held: whether the released body is held at the displacement. */
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
                       Scratch *scratch, Problem *problem);
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,

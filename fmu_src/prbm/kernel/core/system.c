@@ -1,9 +1,9 @@
 /* The constant arrays of a mechanism, and the kinematics of its arms: the twin of
  * mechanics/system.py.
  *
- * Each link and body has an arm E = exp(s + i theta), E' = i w E, w = theta' - i s', and places are
- * z = c + A E.  A coordinate is an angle theta or a stretch s; e has E for angles and -i E for
- * stretches, so that dE/dq = i e for both.
+ * Each link and body has an arm E = exp(s + i theta), E' = i w E, w = theta' - i s'.  A point is at
+ * z = c + A E.  A coordinate is an angle theta or a stretch s.  The elements of e are E for angles
+ * and -i E for stretches, so that dE/dq = i e for both.
  */
 #include "core/system.h"
 
@@ -81,7 +81,7 @@ PRBM int arm_of(const System *system, int j) {
     return system->mechanism->coordinates[j].arm;
 }
 
-/* Unit vectors e become the arms and, at stretches, -i times those. */
+/* Replace the unit vectors e by the arms, and by -i times the arms for stretches. */
 static void stretch(const System *system, const double *q, Complex *e) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);

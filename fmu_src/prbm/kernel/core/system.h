@@ -4,17 +4,17 @@
 
 #include "core/mechanism.h"
 
-enum { NOWHERE = -2, FIXED = -1 }; /* coordinates of a body not reached yet, of the ground */
+enum { NOWHERE = -2, FIXED = -1 }; /* For coordinates: of a body not placed yet, of the ground. */
 
-/* Where a point of a body is, z = c + A E; its coordinate, and where it is drawn. */
+/* A point of a body, z = c + A E, with the coordinate of the body and the drawn position. */
 typedef struct {
     int j;
     Complex c, drawn;
     Complex *A; /* (n,) */
 } BodyFrame;
 
-/* A point of the mechanism, z = c + A E; as the origin of a body: with its coordinate and where it
- * is drawn. */
+/* A point of the mechanism, z = c + A E; for the origin of a body also the coordinate of the body
+ * and the drawn position. */
 typedef struct {
     Complex c, drawn;
     Complex *A; /* (n,) */
@@ -22,21 +22,21 @@ typedef struct {
     bool moves;
 } Place;
 
-/* A spring between two coordinates, n: the ground. */
+/* A spring between two coordinates; n is the ground. */
 typedef struct {
     double rate; /* N m/rad, N m */
     int a, b;
 } Spring;
 
-/* The mass matrix consists of dense blocks along its diagonal: the links of a flexure that closes a
- * loop, say, have no mass in common with the others. */
+/* A dense block on the diagonal of the mass matrix.  The links of a flexure that closes a loop, for
+ * example, have no mass in common with other links. */
 typedef struct {
     int start, size;
 } Block;
 
-/* The constant arrays of a mechanism, as in the twin; n coordinates, r loop rows, p mass points,
- * s stops, f friction points, b bodies.  Columns of A and of the rows are zero at stretches: see
- * spread.  Vectors over the coordinates are padded to an even length where that is said. */
+/* The constant arrays of a mechanism, as in the twin.  There are n coordinates, r loop rows, p mass
+ * points, s stops, f friction points and b bodies.  Columns of A and of the rows are zero at
+ * stretches, see spread.  Vectors with the shape (even,) are padded to an even length. */
 typedef struct {
     const Mechanism *mechanism;
     const double *values;
@@ -51,39 +51,39 @@ typedef struct {
     Complex *gaps, *slides;   /* (s, n) */
     double *gaps_c;           /* (s,) */
     Complex *gaps_z, *slides_z; /* (s,) */
-    int *on;                  /* (s,) the coordinate of what a wall is fixed to, or FIXED */
+    int *on;                  /* (s,) coordinate of the body that carries a wall, or FIXED */
     Complex *rubs, *lifts;    /* (f, n) */
     double *lifts_c;          /* (f,) */
     Complex *release;         /* (n,) */
     double release_c;
     BodyFrame *bodies;        /* (b,) */
-    BodyFrame *pushed;        /* where forces act */
-    BodyFrame *probes;        /* points that are watched */
-    Place *origins;           /* (b + 1,): the ground's first */
+    BodyFrame *pushed;        /* points of the forces */
+    BodyFrame *probes;        /* points of the probes */
+    Place *origins;           /* (b + 1,), the ground's first */
     int stretch_count;
     const int *stretches;     /* coordinates that are stretches */
     int spring_count;
-    Spring *spring;           /* what K is made of */
+    Spring *spring;           /* the springs whose rates make up K */
     int block_count;
     Block *blocks;            /* of M */
-    Complex *coupling;        /* of H, these blocks, one behind the other */
+    Complex *coupling;        /* the blocks of H, one after the other */
     double *own;              /* (n,) the diagonal of M */
     double *straight;         /* (even,) q0 */
-    double *calculated;       /* gamma0 of the flexure types of several pivots */
+    double *calculated;       /* gamma0 of the flexure types with several pivots */
     Complex anchor, gravity;
     double length;
 } System;
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory);
 PRBM int arm_of(const System *system, int j);
-/* e (n,): the arms exp(s + i theta), and -i times that for stretches. */
+/* Compute e (n,): the arms exp(s + i theta), and -i times the arm for stretches. */
 PRBM void directions(const System *system, const double *q, Complex *e);
-/* w (n,): the complex rates theta' - i s' of the arms, zero for stretches. */
+/* Compute w (n,): the complex rates theta' - i s' of the arms, zero for stretches. */
 PRBM void turning(const System *system, const double *v, Complex *w);
-/* The displacement from the straight shape and the velocity of a point. */
+/* Compute the displacement of a point from the straight shape, and its velocity. */
 PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
                  Complex *displacement, Complex *velocity);
-/* Rows (r, n) with the column of each arm repeated for its stretch; rows may be B. */
+/* Copy rows (r, n), with the column of each arm repeated for its stretch; rows may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
 
 #endif

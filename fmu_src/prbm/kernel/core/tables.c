@@ -5,8 +5,8 @@
 #include "core/tables.h"
 
 enum {
-    ROOM = 8,                /* bytes of memory for each byte of the tables, more than needed */
-    ROOM_OF_COORDINATE = 32, /* and for each coordinate */
+    ROOM = 8,                /* Bytes of memory per byte of the tables, more than needed. */
+    ROOM_OF_COORDINATE = 32, /* Bytes of memory per coordinate. */
 };
 
 /* --- parts ------------------------------------------------------------------------------------ */
@@ -92,7 +92,8 @@ static void read_types(Reader *reader, Mechanism *m) {
         t->pivots = read_index(reader, 0, PIVOTS_MAX + 1);
         t->links = read_index(reader, 0, PIVOTS_MAX + 1);
         if ((t->pivots == 0) == (t->links == 0)) {
-            reader->wrong = reader->wrong ? reader->wrong : "a flexure of no kind";
+            reader->wrong = reader->wrong ? reader->wrong
+                                          : "a flexure type with neither pivots nor links, or both";
         }
         t->thickness = read_expression(reader, m);
         t->width = read_expression(reader, m);
@@ -111,7 +112,7 @@ static Connection read_connection(Reader *reader, Mechanism *m) {
     result.end = read_index(reader, 0, m->body_count + 1);
     result.end_point = read_point(reader, m);
     if (result.start == result.end) {
-        reader->wrong = reader->wrong ? reader->wrong : "a part that joins nothing";
+        reader->wrong = reader->wrong ? reader->wrong : "a part that connects a body with itself";
     }
     return result;
 }
@@ -127,7 +128,7 @@ static void read_flexures(Reader *reader, Mechanism *m) {
         f->end_end = read_index(reader, CLAMP, FREE + 1);
         bool freed = f->start_end == FREE || f->end_end == FREE;
         if (freed && f->start_end != CLAMP && f->end_end != CLAMP) {
-            reader->wrong = reader->wrong ? reader->wrong : "a flexure that nothing clamps";
+            reader->wrong = reader->wrong ? reader->wrong : "a flexure without a clamp";
         }
     }
     m->flexures = flexures;
@@ -150,7 +151,7 @@ static void read_stops(Reader *reader, Mechanism *m) {
         s->body = read_index(reader, 1, m->body_count + 1);
         s->on = read_index(reader, 0, m->body_count + 1);
         if (s->on == s->body) {
-            reader->wrong = reader->wrong ? reader->wrong : "a stop that is fixed to what it stops";
+            reader->wrong = reader->wrong ? reader->wrong : "a stop whose wall is on its own body";
         }
         s->point = read_point(reader, m);
         s->direction = read_finite(reader);
@@ -233,7 +234,7 @@ static void read_independents(Reader *reader, Mechanism *m) {
         independent[i] = read_index(reader, i ? independent[i - 1] + 1 : 0, m->coordinate_count);
     }
     if (!reader->wrong && m->independent_count != m->coordinate_count - m->loop_count) {
-        reader->wrong = "another number of independent coordinates than the mechanism has";
+        reader->wrong = "a wrong number of independent coordinates";
     }
     m->independent = independent;
 }
@@ -252,13 +253,14 @@ static void read_variables(Reader *reader, Mechanism *m) {
         bool contact = output == LATCHED_CONTACT, counter = output == LATCHED_IMPACT_COUNT;
         bool fits = v->type == REAL ? !contact && !counter : v->type == BOOLEAN ? contact : counter;
         if (!fits || (i > 0 && v->reference <= variables[i - 1].reference)) {
-            reader->wrong = reader->wrong ? reader->wrong : "variables that contradict each other";
+            reader->wrong = reader->wrong ? reader->wrong
+                                          : "variables with inconsistent types or references";
         }
     }
     m->variables = variables;
 }
 
-/* --- the whole -------------------------------------------------------------------------------- */
+/* --- the file --------------------------------------------------------------------------------- */
 
 static uint32_t checksum(const unsigned char *bytes, size_t size) {
     uint32_t remainder = 0xFFFFFFFFu;
@@ -281,7 +283,7 @@ static void read_header(Reader *reader, const unsigned char *bytes, size_t size)
     if (read_u32(reader) != TABLES_VERSION) {
         reader->wrong = "tables of another version";
     } else if (read_u32(reader) != size) {
-        reader->wrong = "another size than it should have";
+        reader->wrong = "a size that differs from the one in its head";
     } else if (read_u32(reader) != checksum(bytes + TABLES_HEAD, size - TABLES_HEAD)) {
         reader->wrong = "a wrong checksum";
     }
@@ -306,7 +308,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     m->input_count = read_count(reader, 12);
     if (!reader->wrong && m->input_count != 2LL * LOADS * m->force_count +
                                                    (PER_WALL + 1LL) * m->stop_count + AXES) {
-        reader->wrong = "another number of inputs than the mechanism has";
+        reader->wrong = "a wrong number of inputs";
     }
     read_parameters(reader, m);
     read_inputs(reader, m);
@@ -325,13 +327,13 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     lay_out_coordinates(reader, m);
     read_independents(reader, m);
     if (reader->wrong) {
-        return; /* with counts of parts that may not be there */
+        return; /* The counts may be larger than the numbers of parts. */
     }
     lay_out_inputs(m);
     lay_out_slots(m);
     read_variables(reader, m);
     if (!reader->wrong && reader->left > 0) {
-        reader->wrong = "more than there should be";
+        reader->wrong = "surplus bytes at its end";
     }
 }
 

@@ -4,8 +4,8 @@
 
 #include "core/mechanism.h"
 
-/* Read untrusted tables; NULL and an error message if they are invalid.  The result is one block
- * and keeps no pointer to the bytes. */
+/* Read untrusted tables; return NULL and a problem if they are invalid.  The result is one block
+ * without pointers to the bytes. */
 PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem *problem);
 PRBM void mechanism_close(Mechanism *mechanism);
 

@@ -1,7 +1,7 @@
 /* Pairs of numbers, and vectors that are padded with zeros to an even length. */
 #include "core/numbers.h"
 
-/* Two numbers at a time where the compiler has vectors, else one: the same operations on each. */
+/* Two numbers at a time if the compiler has vectors, else one, with the same operations on each. */
 #if VECTORS
 typedef double Lanes __attribute__((vector_size(16)));
 typedef uint64_t LaneBits __attribute__((vector_size(16)));
@@ -30,8 +30,8 @@ static void set_lanes(double *x, Lanes lanes) {
     *(LanesInMemory *)x = lanes;
 }
 
-/* The sum of the even terms and that of the odd ones, added up in the end: Lanes sum[SUMS], whose
- * part for the term i is sum[SUM_OF(i)]. */
+/* Sums are computed as separate sums of the even and the odd terms, which are added at the end:
+ * Lanes sum[SUMS], to which term i contributes in sum[SUM_OF(i)]. */
 #define SUM_OF(i) ((i) / LANES % SUMS)
 
 static double total(const Lanes *sum) {
@@ -42,8 +42,8 @@ static int even_length(int n) {
     return n + n % PAIR;
 }
 
-/* What is loaded as a pair is stored as one, at the same even place: a load that finds its numbers
- * in two stores waits until both are in the cache. */
+/* Store two numbers as one pair at an even index.  A later load of the pair would have to wait for
+ * two separate stores to reach the cache. */
 SIZED void put_pair(double *x, double a, double b) {
 #if VECTORS
     Lanes pair = {a, b};
@@ -61,7 +61,7 @@ SIZED void copy_pairs(int even, const double *from, double *to) {
     }
 }
 
-/* to = what begins behind the first number of from. */
+/* Copy a vector without its first number. */
 SIZED void copy_shifted(int even, const double *from, double *to) {
     UNROLLED_BY_LANES
     for (int i = 0; i < even; i += LANES) {
@@ -74,13 +74,13 @@ SIZED void copy_shifted(int even, const double *from, double *to) {
     }
 }
 
-/* A vector padded with a zero to an even length. */
+/* Copy a vector, padded with a zero to an even length. */
 SIZED void pad_of(int even, int n, const double *x, double *padded) {
     copy_pairs(even - PAIR, x, padded);
     put_pair(padded + even - PAIR, x[even - PAIR], n == even ? x[even - 1] : 0.0);
 }
 
-/* The second of two vectors of n, one behind the other. */
+/* Copy the second of two consecutive vectors of length n, padded to an even length. */
 SIZED void pad_second(int even, int n, const double *both, double *padded) {
     if (n == even) {
         pad_of(even, n, both + n, padded);
@@ -90,7 +90,7 @@ SIZED void pad_second(int even, int n, const double *both, double *padded) {
     }
 }
 
-/* Two padded vectors of n, one behind the other without their paddings. */
+/* Copy two padded vectors of length n one after the other, without padding. */
 SIZED void join(int even, int n, const double *first, const double *second, double *both) {
     copy_pairs(even - PAIR, first, both);
     if (n == even) {

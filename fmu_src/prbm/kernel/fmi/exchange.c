@@ -11,17 +11,17 @@ PRBM int set_time(Instance *instance, double time) {
     return FMU_OK;
 }
 
-/* Whether an array has as many elements as it should; if not, it is told. */
-static bool as_many(const Instance *instance, const char *what, int expected, size_t count) {
+/* Check the number of elements of an array; log an error if it is wrong. */
+static bool check_count(const Instance *instance, const char *noun, int expected, size_t count) {
     if (count == (size_t)expected) {
         return true;
     }
-    refuse(instance, FMU_ERROR, "there are %d %s, not %lu", expected, what, (unsigned long)count);
+    refuse(instance, FMU_ERROR, "there are %d %s, not %lu", expected, noun, (unsigned long)count);
     return false;
 }
 
 PRBM int set_states(Instance *instance, const double *x, size_t count) {
-    if (!as_many(instance, "continuous states", instance->states, count)) {
+    if (!check_count(instance, "continuous states", instance->states, count)) {
         return FMU_ERROR;
     }
     for (size_t i = 0; i < count; i++) {
@@ -36,7 +36,8 @@ PRBM int set_states(Instance *instance, const double *x, size_t count) {
 }
 
 PRBM int get_states(Instance *instance, double *x, size_t count) {
-    if (!as_many(instance, "continuous states", instance->states, count) || !started(instance)) {
+    if (!check_count(instance, "continuous states", instance->states, count) ||
+        !started(instance)) {
         return FMU_ERROR;
     }
     exchange_get(instance->simulation, x);
@@ -44,11 +45,11 @@ PRBM int get_states(Instance *instance, double *x, size_t count) {
 }
 
 PRBM int get_nominals(Instance *instance, double *x, size_t count) {
-    if (!as_many(instance, "continuous states", instance->states, count)) {
+    if (!check_count(instance, "continuous states", instance->states, count)) {
         return FMU_ERROR;
     }
     for (size_t i = 0; i < count; i++) {
-        x[i] = 1.0; /* as the standards want it where nothing is known yet */
+        x[i] = 1.0; /* The default of both standards, before the start. */
     }
     if (simulation_started(instance->simulation)) {
         exchange_nominals(instance->simulation, x);
@@ -56,14 +57,15 @@ PRBM int get_nominals(Instance *instance, double *x, size_t count) {
     return FMU_OK;
 }
 
-/* Whether the equations can be evaluated; if not, it is told. */
+/* Return whether the equations can be evaluated; log the reason if not. */
 static bool evaluable(Instance *instance) {
-    return !stands(instance, FMU_ERROR) && started(instance);
+    return !has_rejected(instance, FMU_ERROR) && started(instance);
 }
 
 PRBM int get_derivatives(Instance *instance, double *dx, size_t count) {
     Problem problem;
-    if (!as_many(instance, "continuous states", instance->states, count) || !evaluable(instance)) {
+    if (!check_count(instance, "continuous states", instance->states, count) ||
+        !evaluable(instance)) {
         return FMU_ERROR;
     }
     if (!exchange_derivatives(instance->simulation, dx, &problem)) {
@@ -74,7 +76,7 @@ PRBM int get_derivatives(Instance *instance, double *dx, size_t count) {
 
 PRBM int get_indicators(Instance *instance, double *z, size_t count) {
     Problem problem;
-    if (!as_many(instance, "event indicators", instance->indicators, count) ||
+    if (!check_count(instance, "event indicators", instance->indicators, count) ||
         !evaluable(instance)) {
         return FMU_ERROR;
     }
@@ -97,7 +99,7 @@ PRBM int completed_step(Instance *instance, bool *event) {
 
 /* --- directional derivatives ------------------------------------------------------------------ */
 
-/* Add the seed of a known; false, and told, if nothing can be differentiated with respect to it. */
+/* Add the seed of a known.  Log an error and return false if it is not an input or a state. */
 static bool seeded(Instance *instance, uint32_t reference, double seed) {
     const Mechanism *mechanism = instance->mechanism;
     const Variable *variable = find_variable(mechanism, reference);
@@ -113,15 +115,15 @@ static bool seeded(Instance *instance, uint32_t reference, double seed) {
     } else if (state >= 0 && instance->mode != MODE_INITIALIZATION) {
         instance->dx[state] += seed;
     } else {
-        refuse(instance, FMU_ERROR, "there is no derivative with respect to %s: it is no input%s",
-               variable->name,
-               state >= 0 ? ", and states are no knowns in Initialization Mode" : " or state");
+        refuse(instance, FMU_ERROR, "there is no derivative with respect to %s: %s", variable->name,
+               state >= 0 ? "only inputs are knowns in Initialization Mode"
+                          : "the knowns are inputs and states");
         return false;
     }
     return true;
 }
 
-/* The slot of an unknown, -1 and told if it has no derivatives. */
+/* Return the slot of an unknown.  Log an error and return -1 if it has no derivatives. */
 static int differentiable(const Instance *instance, uint32_t reference) {
     const Mechanism *mechanism = instance->mechanism;
     const Variable *variable = find_variable(mechanism, reference);
@@ -133,7 +135,7 @@ static int differentiable(const Instance *instance, uint32_t reference) {
     }
     if (variable->type != REAL || settable(mechanism, variable->slot) ||
         variable->slot == mechanism->slots.time) {
-        refuse(instance, FMU_ERROR, "%s has no derivative: ask for those of outputs and of the "
+        refuse(instance, FMU_ERROR, "%s has no derivative: the unknowns are outputs and "
                                     "derivatives of states",
                variable->name);
         return -1;

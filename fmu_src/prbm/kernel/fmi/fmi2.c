@@ -6,17 +6,18 @@
 #include "fmi2Functions.h"
 #include "fmi/fmu.h"
 
-/* --- what the standard allows when ------------------------------------------------------------ */
+/* --- the state machine of the standard -------------------------------------------------------- */
 
 enum {
     ANY2 = IN_ANY_BUT_UPDATE,
     MAY_BE_SET2 = IN_INSTANTIATED | IN_INITIALIZATION | IN_EVENT | IN_STEP,
-    /* the standard says nothing of start values in Instantiated, but importers look at them */
+    /* The standard does not mention getting values in Instantiated; importers read start values. */
     MAY_BE_READ2 = MAY_BE_SET2 | IN_CONTINUOUS | IN_TERMINATED,
     EVALUATES2 = IN_INITIALIZATION | IN_EVENT | IN_CONTINUOUS | IN_TERMINATED
 };
 
-/* Function, model exchange, co-simulation: the tables of sections 3.2.3 and 4.2.4. */
+/* Functions and the modes in which model exchange and co-simulation allow them; FMI 2.0, sections
+ * 3.2.3 and 4.2.4. */
 #define FMI2_RULES(RULE)                                                        \
     RULE(SetDebugLogging, ANY2, ANY2)                                           \
     RULE(SetupExperiment, IN_INSTANTIATED, IN_INSTANTIATED)                     \
@@ -88,7 +89,7 @@ static const Standard STANDARD2 = {
       {"fmi2Reset", MODE_INSTANTIATED}}},
 };
 
-/* The instance if it may be called now and none of the pointers that it needs is NULL. */
+/* Return the instance if the call is allowed in its mode and the pointer is valid; else NULL. */
 static Instance *called2(fmi2Component c, int rule, size_t count, const void *pointer) {
     Instance *instance = allowed(c, &FMI2[rule]);
     return instance && given(instance, &FMI2[rule], count, pointer) ? instance : NULL;
@@ -108,7 +109,7 @@ const char *fmi2GetVersion(void) {
     return fmi2Version;
 }
 
-/* The text itself is the format, so that loggers that take no further arguments show it, too. */
+/* Pass the message as the format itself, for loggers without variable arguments. */
 static void send2(const Journal *journal, int status, const char *category, const char *text) {
     fmi2CallbackLogger logger = (fmi2CallbackLogger)journal->callback;
     logger(journal->environment, journal->instance, (fmi2Status)status, category, text);
@@ -123,15 +124,15 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
                     : fmi2Error;
 }
 
-/* --- life ------------------------------------------------------------------------------------- */
+/* --- creation and initialization -------------------------------------------------------------- */
 
-/* Without logging the standard still has errors told: "logger was called in the FMU". */
+/* Create an instance.  Errors are logged even if loggingOn is false, as FMI 2.0 requires. */
 fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
                               fmi2String fmuResourceLocation,
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible,
                               fmi2Boolean loggingOn) {
     Request request = {0};
-    (void)visible; /* there is nothing to see */
+    (void)visible; /* The FMU has no graphical interface. */
     request.standard = &STANDARD2;
     request.kind = fmuType == fmi2ModelExchange ? MODEL_EXCHANGE : CO_SIMULATION;
     request.token = fmuGUID;
@@ -145,7 +146,7 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
         request.journal.environment = functions->componentEnvironment;
     }
     if (fmuType != fmi2ModelExchange && fmuType != fmi2CoSimulation) {
-        report(&request.journal, FMU_ERROR, "fmi2Instantiate: there is no FMU type %d",
+        report(&request.journal, FMU_ERROR, "fmi2Instantiate: unknown FMU type %d",
                (int)fmuType);
         return NULL;
     }
@@ -173,7 +174,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     if (!instance->experiment || instance->experiment_refused) {
         return (fmi2Status)refuse(instance, FMU_ERROR,
                                   "fmi2EnterInitializationMode: call fmi2SetupExperiment first%s",
-                                  instance->experiment ? ", with values that it accepts" : "");
+                                  instance->experiment ? ", with valid values" : "");
     }
     instance->mode = MODE_INITIALIZATION;
     return fmi2OK;
@@ -196,7 +197,7 @@ fmi2Status fmi2Reset(fmi2Component c) {
 
 /* --- values ----------------------------------------------------------------------------------- */
 
-/* Both arrays of a get or a set. */
+/* Return the instance if a get or set is allowed and both of its arrays are valid; else NULL. */
 static Instance *accessed2(fmi2Component c, int rule, const fmi2ValueReference vr[], size_t nvr,
                            const void *value) {
     Instance *instance = called2(c, rule, nvr, vr);
@@ -237,7 +238,7 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
     return status;
 }
 
-/* There are no variables of type String: every reference is told what it is. */
+/* Log the type of each variable: none is of type String. */
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          fmi2String value[]) {
     Instance *instance = accessed2(c, RULE2_GetString, vr, nvr, value);
@@ -393,7 +394,7 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
     const Rule *rule = &FMI2[RULE2_CompletedIntegratorStep];
     Instance *instance = called2(c, RULE2_CompletedIntegratorStep, 1, enterEventMode);
     bool event = false;
-    (void)noSetFMUStatePriorToCurrentPoint; /* nothing is kept for going back */
+    (void)noSetFMUStatePriorToCurrentPoint; /* The FMU keeps no earlier state. */
     if (!instance || !given(instance, rule, 1, terminateSimulation)) {
         return fmi2Error;
     }
@@ -462,7 +463,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                       fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     Instance *instance = called2(c, RULE2_DoStep, 0, NULL);
     Outcome outcome;
-    (void)noSetFMUStatePriorToCurrentPoint; /* nothing is kept for going back */
+    (void)noSetFMUStatePriorToCurrentPoint; /* The FMU keeps no earlier state. */
     return instance ? (fmi2Status)make_step(instance, currentCommunicationPoint,
                                             communicationStepSize, &outcome)
                     : fmi2Error;
@@ -477,13 +478,13 @@ fmi2Status fmi2CancelStep(fmi2Component c) {
     return fmi2Error;
 }
 
-/* What cannot be told about the last step is discarded, as the standard wants it. */
+/* Discard a request for a status that the FMU does not provide, as the standard requires. */
 static fmi2Status no_status2(const Instance *instance, int rule, fmi2StatusKind kind) {
     static const char *const names[] = {"fmi2DoStepStatus", "fmi2PendingStatus",
                                         "fmi2LastSuccessfulTime", "fmi2Terminated"};
     bool known = (int)kind >= 0 && (int)kind < 4;
-    return (fmi2Status)refuse(instance, FMU_DISCARD, "%s does not tell %s", FMI2[rule].function,
-                              known ? names[(int)kind] : "that");
+    return (fmi2Status)refuse(instance, FMU_DISCARD, "%s does not provide %s", FMI2[rule].function,
+                              known ? names[(int)kind] : "this status");
 }
 
 fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
@@ -515,8 +516,8 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Int
     return instance ? no_status2(instance, RULE2_GetIntegerStatus, s) : fmi2Error;
 }
 
-/* A refused step asks for the end of the simulation: an importer that has no better idea would
- * repeat it for ever. */
+/* Request the end of the simulation after a rejected step, so that importers do not repeat it
+ * forever. */
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
     Instance *instance = called2(c, RULE2_GetBooleanStatus, 1, value);
     if (!instance) {

@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-/* the standard's header declares callbacks without prototypes */
+/* The standard's header declares callbacks without prototypes. */
 #if defined(__clang__)
 #pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wstrict-prototypes"
@@ -14,11 +14,11 @@
 #endif
 #include "fmi/fmu.h"
 
-/* --- what the standard allows when ------------------------------------------------------------ */
+/* --- the state machine of the standard -------------------------------------------------------- */
 
 enum {
     ANY3 = IN_ANY_BUT_UPDATE,
-    EVEN3 = IN_ANY, /* functions that are refused anyway */
+    REJECTED3 = IN_ANY, /* Functions that are rejected in every mode. */
     SET_ME3 = IN_INSTANTIATED | IN_INITIALIZATION | IN_EVENT,
     SET_CS3 = SET_ME3 | IN_STEP,
     GET_ME3 = SET_ME3 | IN_CONTINUOUS | IN_TERMINATED,
@@ -37,7 +37,8 @@ enum {
     TYPE(Int64)                \
     TYPE(UInt64)
 
-/* Function, model exchange, co-simulation: sections 2.3, 3.2 and 4.2. */
+/* Functions and the modes in which model exchange and co-simulation allow them; FMI 3.0, sections
+ * 2.3, 3.2 and 4.2. */
 #define FMI3_RULES(RULE)                                                       \
     RULE(SetDebugLogging, ANY3, ANY3)                                          \
     RULE(EnterInitializationMode, IN_INSTANTIATED, IN_INSTANTIATED)            \
@@ -73,8 +74,8 @@ enum {
     RULE(SetString, SET_ME3, SET_CS3)                                          \
     RULE(SetBinary, SET_ME3, SET_CS3)                                          \
     RULE(SetClock, IN_EVENT, IN_EVENT)                                         \
-    RULE(GetNumberOfVariableDependencies, EVEN3, EVEN3)                        \
-    RULE(GetVariableDependencies, EVEN3, EVEN3)                                \
+    RULE(GetNumberOfVariableDependencies, REJECTED3, REJECTED3)                \
+    RULE(GetVariableDependencies, REJECTED3, REJECTED3)                        \
     RULE(GetFMUState, ANY3, ANY3)                                              \
     RULE(SetFMUState, ANY3, ANY3)                                              \
     RULE(FreeFMUState, ANY3, ANY3)                                             \
@@ -82,17 +83,17 @@ enum {
     RULE(SerializeFMUState, ANY3, ANY3)                                        \
     RULE(DeserializeFMUState, ANY3, ANY3)                                      \
     RULE(GetDirectionalDerivative, EVALUATES3, IN_NONE)                        \
-    RULE(GetAdjointDerivative, EVEN3, EVEN3)                                   \
-    RULE(EnterConfigurationMode, EVEN3, EVEN3)                                 \
-    RULE(ExitConfigurationMode, EVEN3, EVEN3)                                  \
-    RULE(GetIntervalDecimal, EVEN3, EVEN3)                                     \
-    RULE(GetIntervalFraction, EVEN3, EVEN3)                                    \
-    RULE(GetShiftDecimal, EVEN3, EVEN3)                                        \
-    RULE(GetShiftFraction, EVEN3, EVEN3)                                       \
-    RULE(SetIntervalDecimal, EVEN3, EVEN3)                                     \
-    RULE(SetIntervalFraction, EVEN3, EVEN3)                                    \
-    RULE(SetShiftDecimal, EVEN3, EVEN3)                                        \
-    RULE(SetShiftFraction, EVEN3, EVEN3)                                       \
+    RULE(GetAdjointDerivative, REJECTED3, REJECTED3)                           \
+    RULE(EnterConfigurationMode, REJECTED3, REJECTED3)                         \
+    RULE(ExitConfigurationMode, REJECTED3, REJECTED3)                          \
+    RULE(GetIntervalDecimal, REJECTED3, REJECTED3)                             \
+    RULE(GetIntervalFraction, REJECTED3, REJECTED3)                            \
+    RULE(GetShiftDecimal, REJECTED3, REJECTED3)                                \
+    RULE(GetShiftFraction, REJECTED3, REJECTED3)                               \
+    RULE(SetIntervalDecimal, REJECTED3, REJECTED3)                             \
+    RULE(SetIntervalFraction, REJECTED3, REJECTED3)                            \
+    RULE(SetShiftDecimal, REJECTED3, REJECTED3)                                \
+    RULE(SetShiftFraction, REJECTED3, REJECTED3)                               \
     RULE(EvaluateDiscreteStates, IN_EVENT, IN_EVENT)                           \
     RULE(UpdateDiscreteStates, IN_EVENT, IN_EVENT)                             \
     RULE(EnterContinuousTimeMode, IN_EVENT, IN_NONE)                           \
@@ -106,9 +107,9 @@ enum {
     RULE(GetNumberOfEventIndicators, ANY3, IN_NONE)                            \
     RULE(GetNumberOfContinuousStates, ANY3, IN_NONE)                           \
     RULE(EnterStepMode, IN_NONE, IN_EVENT)                                     \
-    RULE(GetOutputDerivatives, EVEN3, EVEN3)                                   \
+    RULE(GetOutputDerivatives, REJECTED3, REJECTED3)                           \
     RULE(DoStep, IN_NONE, IN_STEP)                                             \
-    RULE(ActivateModelPartition, EVEN3, EVEN3)
+    RULE(ActivateModelPartition, REJECTED3, REJECTED3)
 
 #define FMI3_NUMBER(name, exchange, simulation) RULE3_##name,
 #define FMI3_ENTRY(name, exchange, simulation) {"fmi3" #name, {exchange, simulation}},
@@ -139,13 +140,13 @@ static const Standard STANDARD3 = {
       {"fmi3Reset", MODE_INSTANTIATED}}},
 };
 
-/* The instance if it may be called now and none of the pointers that it needs is NULL. */
+/* Return the instance if the call is allowed in its mode and the pointer is valid; else NULL. */
 static Instance *called3(fmi3Instance handle, int rule, size_t count, const void *pointer) {
     Instance *instance = allowed(handle, &FMI3[rule]);
     return instance && given(instance, &FMI3[rule], count, pointer) ? instance : NULL;
 }
 
-/* The same for the functions around Event Mode. */
+/* The same for functions of Event Mode, which need eventModeUsed = true in co-simulation. */
 static Instance *called_for_event3(fmi3Instance handle, int rule) {
     const Instance *instance = handle;
     if (instance && instance->kind == CO_SIMULATION && !instance->event_mode) {
@@ -161,7 +162,7 @@ static fmi3Status worse3(fmi3Status status, int another) {
     return another > (int)status ? (fmi3Status)another : status;
 }
 
-/* Refuse a function that this FMU does not have, and say why not. */
+/* Reject a call of a function that this FMU does not support, with the reason. */
 static fmi3Status absent3(fmi3Instance handle, int rule, const char *why) {
     const Instance *instance = handle;
     if (instance) {
@@ -189,7 +190,7 @@ fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, siz
               : fmi3Error;
 }
 
-/* --- life ------------------------------------------------------------------------------------- */
+/* --- creation and initialization -------------------------------------------------------------- */
 
 static Request request3(Kind kind, fmi3String instanceName, fmi3String instantiationToken,
                         fmi3String resourcePath, fmi3Boolean loggingOn,
@@ -215,11 +216,11 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String in
                                           fmi3LogMessageCallback logMessage) {
     Request request = request3(MODEL_EXCHANGE, instanceName, instantiationToken, resourcePath,
                                loggingOn, instanceEnvironment, logMessage);
-    (void)visible; /* there is nothing to see */
+    (void)visible; /* The FMU has no graphical interface. */
     return instance_open(&request);
 }
 
-/* After an internal step the importer may look at variables and ask for the end of the step. */
+/* Call the importer after an internal step; return whether it requests the end of the step. */
 static bool update3(Instance *instance) {
     fmi3IntermediateUpdateCallback callback =
         (fmi3IntermediateUpdateCallback)instance->intermediate;
@@ -240,7 +241,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     fmi3LogMessageCallback logMessage, fmi3IntermediateUpdateCallback intermediateUpdate) {
     Request request = request3(CO_SIMULATION, instanceName, instantiationToken, resourcePath,
                                loggingOn, instanceEnvironment, logMessage);
-    (void)visible; /* there is nothing to see */
+    (void)visible; /* The FMU has no graphical interface. */
     request.event_mode = eventModeUsed;
     request.early_return = earlyReturnAllowed;
     request.required = requiredIntermediateVariables;
@@ -356,7 +357,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
     return it ? (fmi3Status)enter_event_mode(it) : fmi3Error;
 }
 
-/* Nothing to do: what is due happens in fmi3UpdateDiscreteStates. */
+/* Do nothing: fmi3UpdateDiscreteStates handles events. */
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
     return called_for_event3(instance, RULE3_EvaluateDiscreteStates) ? fmi3OK : fmi3Error;
 }
@@ -399,7 +400,7 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
                                        fmi3Boolean *terminateSimulation) {
     Instance *it = called3(instance, RULE3_CompletedIntegratorStep, 1, enterEventMode);
     bool event = false;
-    (void)noSetFMUStatePriorToCurrentPoint; /* nothing is kept for going back */
+    (void)noSetFMUStatePriorToCurrentPoint; /* The FMU keeps no earlier state. */
     if (!it || !given(it, &FMI3[RULE3_CompletedIntegratorStep], 1, terminateSimulation)) {
         return fmi3Error;
     }
@@ -494,7 +495,7 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     Instance *it = called3(instance, RULE3_DoStep, 0, NULL);
     bool all = eventHandlingNeeded && terminateSimulation && earlyReturn && lastSuccessfulTime;
     Outcome outcome;
-    (void)noSetFMUStatePriorToCurrentPoint; /* nothing is kept for going back */
+    (void)noSetFMUStatePriorToCurrentPoint; /* The FMU keeps no earlier state. */
     if (!it || !given(it, &FMI3[RULE3_DoStep], 1, all ? it : NULL)) {
         return fmi3Error;
     }

@@ -1,4 +1,4 @@
-/* Part of fmi3.c: functions that this FMU refuses. */
+/* Part of fmi3.c: functions that this FMU does not support. */
 
 static const char NO_DEPENDENCIES[] =
     "dependencies are those of modelDescription.xml (providesPerElementDependencies = false)";
@@ -29,13 +29,13 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     (void)seed, (void)nSeed, (void)sensitivity, (void)nSensitivity;
     return absent3(instance, RULE3_GetAdjointDerivative,
                    "there are no adjoint derivatives (providesAdjointDerivatives = false); "
-                   "fmi3GetDirectionalDerivative gives the other product");
+                   "use fmi3GetDirectionalDerivative");
 }
 
 /* --- clocks ----------------------------------------------------------------------------------- */
 
 static const char NO_INTERVALS[] =
-    "no clock here has an interval or a shift: clocks are triggered by impacts";
+    "clocks have no interval and no shift: they are triggered by impacts";
 
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
                                   size_t nValueReferences, fmi3Float64 intervals[],

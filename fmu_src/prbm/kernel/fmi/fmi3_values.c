@@ -1,6 +1,7 @@
 /* Part of fmi3.c: values and their derivatives. */
 
-/* Both arrays of a get or a set, of as many values as references since all variables are scalar. */
+/* Return the instance if a get or set is allowed, both of its arrays are valid and have the same
+ * length (all variables are scalar); else NULL. */
 static Instance *accessed3(fmi3Instance handle, int rule, const fmi3ValueReference references[],
                            size_t n, const void *values, size_t count) {
     Instance *instance = called3(handle, rule, n, references);
@@ -80,7 +81,7 @@ fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     return status;
 }
 
-/* Parameters and inputs are all of type Float64: any other set is told what is wrong with it. */
+/* Reject a set of another type than Float64, which all parameters and inputs have. */
 static fmi3Status set_other3(Instance *instance, const fmi3ValueReference references[], size_t n,
                              int type) {
     fmi3Status status = instance ? fmi3OK : fmi3Error;
@@ -90,7 +91,7 @@ static fmi3Status set_other3(Instance *instance, const fmi3ValueReference refere
     return status;
 }
 
-/* The same for a get as a type that no variable has. */
+/* Reject a get of a type that no variable has. */
 static fmi3Status get_other3(Instance *instance, const fmi3ValueReference references[], size_t n) {
     fmi3Status status = instance ? fmi3OK : fmi3Error;
     for (size_t i = 0; i < n && instance; i++) {

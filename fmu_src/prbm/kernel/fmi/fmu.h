@@ -12,7 +12,7 @@
 /* The status of a call, with the same numbers in both standards. */
 enum { FMU_OK, FMU_WARNING, FMU_DISCARD, FMU_ERROR, FMU_FATAL };
 
-enum { NO_TYPE = -1 }; /* of a variable: one that no variable here has */
+enum { NO_TYPE = -1 }; /* A type of the standard that no variable of these FMUs has. */
 
 typedef enum { MODEL_EXCHANGE, CO_SIMULATION, KINDS } Kind;
 
@@ -47,33 +47,33 @@ typedef struct {
     unsigned modes[KINDS];
 } Rule;
 
-/* The function that leads from a mode to the next one, NULL where none does. */
+/* The function that leads from a mode to the next one, NULL if no function does. */
 typedef struct {
     const char *function;
     Mode next;
-} Way;
+} ModeTransition;
 
-/* How a standard calls things. */
+/* The names that a version of the standard gives to functions, types and modes. */
 typedef struct {
     int version;
-    const char *prefix;         /* of its functions */
+    const char *prefix; /* Of its functions. */
     const char *types[CLOCK + 1];
     const char *modes[MODES];
-    Way ways[KINDS][MODES];
+    ModeTransition transitions[KINDS][MODES];
 } Standard;
 
-/* Where messages go.  The callback is the importer's; send knows its type. */
+/* The destination of messages.  send casts the importer's callback to its type and calls it. */
 typedef void Callback(void);
 typedef struct Journal Journal;
 typedef void Send(const Journal *journal, int status, const char *category, const char *text);
 
 struct Journal {
-    const char *instance; /* its name */
+    const char *instance; /* Name of the instance. */
     void *environment;
-    Callback *callback; /* NULL: nobody listens */
+    Callback *callback; /* NULL if the importer has no logger. */
     Send *send;
-    const char *special; /* what is doubled in a message, because it would begin something */
-    unsigned categories; /* which are wanted, by their bits */
+    const char *special; /* Characters that are doubled in a message, as % in a format. */
+    unsigned categories; /* Bits of the categories that are logged. */
 };
 
 enum {
@@ -88,19 +88,19 @@ enum {
 
 typedef struct Instance Instance;
 
-/* An intermediate update; true if the importer wants the step to end here. */
+/* An intermediate update; returns whether the importer requests the end of the step. */
 typedef bool Update(Instance *instance);
 
-/* What the importer asks for when it instantiates. */
+/* The arguments of an instantiation. */
 typedef struct {
     const Standard *standard;
     Kind kind;
     Journal journal;
     const char *token, *resources;
-    bool event_mode, early_return; /* co-simulation of FMI 3.0 */
-    Update *update;                /* NULL: no intermediate updates */
-    Callback *intermediate;        /* the importer's */
-    const uint32_t *required;      /* variables to get in intermediate updates */
+    bool event_mode, early_return; /* Co-simulation of FMI 3.0. */
+    Update *update;                /* NULL if there are no intermediate updates. */
+    Callback *intermediate;        /* The importer's callback for them. */
+    const uint32_t *required;      /* References of variables that they may get. */
     size_t required_count;
 } Request;
 
@@ -113,38 +113,38 @@ struct Instance {
     Callback *intermediate;
     uint32_t *required;
     size_t required_count;
-    bool clocks; /* whether there are any */
+    bool clocks; /* Whether the FMU has clocks. */
     Mechanism *mechanism;
     Simulation *simulation;
-    int states, indicators; /* numbers of them in model exchange */
+    int states, indicators; /* Their numbers in model exchange. */
 
     Mode mode;
-    bool experiment;         /* whether it was set up (FMI 2.0) */
-    bool experiment_refused; /* and had a mistake in it */
+    bool experiment;         /* Whether fmi2SetupExperiment was called. */
+    bool experiment_refused; /* Whether its last call was rejected. */
     bool stop_defined, tolerance_defined;
     double start_time, stop_time, tolerance;
-    bool event_due; /* an event waits for the end of Event Mode */
-    bool updated;   /* the discrete states were, since Event Mode was entered */
-    int last_step;  /* status of the last step */
-    double depth_told; /* m in a wall, of the last warning */
+    bool event_due;      /* An event is to be handled in Event Mode before the next step. */
+    bool updated;        /* The discrete states are up to date since Event Mode was entered. */
+    int last_step;       /* Status of the last step. */
+    double depth_logged; /* Penetration of a wall at the last warning [m]. */
     bool unknown_refused;
-    uint32_t unknown;       /* a reference that was set and is none */
-    unsigned char *refused; /* (slots.count,): a set of it was refused and not yet put right */
-    double *acknowledged;   /* (stops,): impacts that its clock has ticked for */
+    uint32_t unknown;       /* Value reference of a rejected set that is not in the model. */
+    unsigned char *refused; /* (slots.count,): 1 for variables whose last set was rejected. */
+    double *acknowledged;   /* (stops,): impacts for which the clock of a stop has ticked. */
 
-    int *state_of;           /* (slots.count,): which state a slot is, -1 for none */
-    double *before, *after;  /* states of the simulation: to go back to, to go to */
-    double *x, *dx, *du;     /* (states,), (states,), (inputs,) */
-    double *dvalues;         /* (slots.count,) */
+    int *state_of;          /* (slots.count,): index of the state in a slot, or -1. */
+    double *before, *after; /* Saved states of the simulation: before a call, and to restore. */
+    double *x, *dx, *du;    /* (states,), (states,), (inputs,) */
+    double *dvalues;        /* (slots.count,) */
 };
 
-/* A copy of an instance's state, as bytes that mean the same on every platform. */
+/* A copy of an instance's state as bytes, in the same format on every platform. */
 typedef struct {
     size_t size;
     unsigned char *bytes;
 } Saved;
 
-/* What came of a step. */
+/* The result of a step: whether it has an event, whether it returns early, and its end time [s]. */
 typedef struct {
     bool event, early;
     double time;
@@ -173,9 +173,10 @@ PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t
 
 PRBM Instance *instance_open(const Request *request);
 PRBM void instance_close(Instance *instance);
-/* The instance of a handle if the rule allows the call; otherwise NULL, and the reason is logged. */
+/* Return the instance of a handle if the rule allows the call; otherwise log the reason and return
+ * NULL. */
 PRBM Instance *allowed(void *handle, const Rule *rule);
-/* Reject a NULL pointer to count elements; no pointer is needed for none. */
+/* Reject a NULL pointer to count elements; NULL is valid if count is 0. */
 PRBM bool given(const Instance *instance, const Rule *rule, size_t count, const void *pointer);
 PRBM int set_up(Instance *instance, bool tolerance_defined, double tolerance, double start_time,
                 bool stop_defined, double stop_time);

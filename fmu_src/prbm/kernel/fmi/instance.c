@@ -8,15 +8,16 @@
 
 /* --- the state machine ------------------------------------------------------------------------ */
 
-/* What to call next on the way to one of some modes, NULL if none leads there. */
+/* Return the next function to call in order to reach one of some modes, NULL if no function leads
+ * there. */
 static const char *next_call(const Instance *instance, unsigned modes) {
-    const Way *ways = instance->standard->ways[instance->kind];
-    const Way *way = &ways[instance->mode];
-    for (int i = 0; i < MODES && way->function; i++) {
-        if (modes >> way->next & 1u) {
-            return ways[instance->mode].function;
+    const ModeTransition *transitions = instance->standard->transitions[instance->kind];
+    const ModeTransition *transition = &transitions[instance->mode];
+    for (int i = 0; i < MODES && transition->function; i++) {
+        if (modes >> transition->next & 1u) {
+            return transitions[instance->mode].function;
         }
-        way = &ways[way->next];
+        transition = &transitions[transition->next];
     }
     return NULL;
 }
@@ -58,7 +59,7 @@ PRBM bool given(const Instance *instance, const Rule *rule, size_t count, const 
     return true;
 }
 
-/* --- what was refused and not yet put right --------------------------------------------------- */
+/* --- rejected values -------------------------------------------------------------------------- */
 
 static bool is_parameter(const Mechanism *mechanism, int slot) {
     return slot >= mechanism->slots.parameters && slot < mechanism->slots.inputs;
@@ -81,40 +82,40 @@ static const char *name_of(const Mechanism *mechanism, int slot) {
     return "a variable";
 }
 
-/* Tell that a set was refused and how to put it right. */
-static void tell_refused(const Instance *instance, int status, int slot) {
+/* Log that the last set of a variable was rejected, with its present value and a remedy. */
+static void log_rejected(const Instance *instance, int status, int slot) {
     const Mechanism *mechanism = instance->mechanism;
     const char *name = name_of(mechanism, slot), *unit = "";
     Problem problem;
     double present;
     if (!settable(mechanism, slot) ||
         !simulation_get(instance->simulation, slot, &present, &problem)) {
-        refuse(instance, status, "%s was set, which is refused: " TO_RESET, name);
+        refuse(instance, status, "%s was set, but it cannot be set: " TO_RESET, name);
         return;
     }
     if (is_parameter(mechanism, slot)) {
         unit = mechanism->parameters[slot].unit;
     }
-    refuse(instance, status, "%s was set to what is refused and is still %.10g%s%s: set it to a "
-                             "value that it may have, or reset the instance",
+    refuse(instance, status, "%s was set to a rejected value and is still %.10g%s%s: set it to a "
+                             "valid value, or reset the instance",
            name, present, *unit ? " " : "", unit);
 }
 
-/* Whether something was refused and still stands; it is told again. */
-static bool stands(const Instance *instance, int status) {
+/* Return whether a rejected value has not been corrected yet; if so, log the first again. */
+static bool has_rejected(const Instance *instance, int status) {
     size_t count = (size_t)instance->mechanism->slots.count;
     const unsigned char *first = memchr(instance->refused, 1, count);
     if (first) {
-        tell_refused(instance, status, (int)(first - instance->refused));
+        log_rejected(instance, status, (int)(first - instance->refused));
     } else if (instance->unknown_refused) {
-        refuse(instance, status, "value reference %lu was set, which is not in "
+        refuse(instance, status, "value reference %lu was set, but it is not in "
                                  "modelDescription.xml: " TO_RESET,
                (unsigned long)instance->unknown);
     }
     return first || instance->unknown_refused;
 }
 
-/* --- life ------------------------------------------------------------------------------------- */
+/* --- creation and release --------------------------------------------------------------------- */
 
 static char *place_text(Memory *memory, const char *text) {
     size_t size = strlen(text) + 1;
@@ -125,7 +126,7 @@ static char *place_text(Memory *memory, const char *text) {
     return copy;
 }
 
-/* Lay out an instance and its arrays in one block; memory.base NULL: only count. */
+/* Place an instance and its arrays in one block; without a block, only count the bytes. */
 static Instance *place_instance(Memory *memory, const Request *request, const Mechanism *mechanism,
                                 const Simulation *simulation) {
     Instance scrap, *instance = place(memory, 1, sizeof *instance);
@@ -187,15 +188,16 @@ static void fill_instance(Instance *instance, const Request *request, Mechanism 
         instance->clocks |= mechanism->variables[i].type == CLOCK;
     }
     find_states(instance);
-    simulation_listen(simulation, hear_impact, instance);
+    simulation_listen(simulation, log_impact, instance);
 }
 
-/* Whether the request and the tables fit each other; if not, it is told. */
-static bool suits(const Request *request, const Mechanism *mechanism) {
+/* Check the arguments of an instantiation against the tables; log an error and return false if
+ * they are inconsistent. */
+static bool check_request(const Request *request, const Mechanism *mechanism) {
     const Journal *journal = &request->journal;
     if (!request->token || strcmp(request->token, mechanism->token) != 0) {
         report(journal, FMU_ERROR,
-               "the %s %s is not the one of the tables in the FMU's folder resources, %s: "
+               "the %s %s differs from that of the tables in the FMU's folder resources, %s: "
                "modelDescription.xml and the tables belong to different FMUs",
                request->standard->version == 2 ? "GUID" : "instantiation token",
                request->token ? request->token : "NULL", mechanism->token);
@@ -229,7 +231,7 @@ PRBM Instance *instance_open(const Request *request) {
         report(&request->journal, FMU_ERROR, "%s", problem.text);
         return NULL;
     }
-    if (!suits(request, mechanism)) {
+    if (!check_request(request, mechanism)) {
         mechanism_close(mechanism);
         return NULL;
     }
@@ -251,7 +253,7 @@ PRBM void instance_close(Instance *instance) {
     if (!instance) {
         return;
     }
-    if (instance->mode == MODE_INTERMEDIATE) { /* its step is still running */
+    if (instance->mode == MODE_INTERMEDIATE) { /* The step that called back is still running. */
         refuse(instance, FMU_ERROR, "%sFreeInstance cannot be called in %s: return from the "
                                     "callback first",
                instance->standard->prefix, instance->standard->modes[instance->mode]);
@@ -262,7 +264,7 @@ PRBM void instance_close(Instance *instance) {
     free(instance);
 }
 
-static bool sound_times(const Instance *instance, double start_time, bool stop_defined,
+static bool check_times(const Instance *instance, double start_time, bool stop_defined,
                         double stop_time) {
     if (!finite_number(start_time)) {
         refuse(instance, FMU_ERROR, "startTime = %g s must be a finite number", start_time);
@@ -276,14 +278,14 @@ static bool sound_times(const Instance *instance, double start_time, bool stop_d
     return true;
 }
 
-/* What the importer wants of the whole run; a mistake has to be put right by another call. */
+/* Set the times and the tolerance of the simulation.  After an error it must be called again. */
 PRBM int set_up(Instance *instance, bool tolerance_defined, double tolerance, double start_time,
                 bool stop_defined, double stop_time) {
     const Mechanism *mechanism = instance->mechanism;
     const Parameter *bounds = &mechanism->parameters[mechanism->tolerance];
     Problem problem;
     instance->experiment = instance->experiment_refused = true;
-    if (!sound_times(instance, start_time, stop_defined, stop_time)) {
+    if (!check_times(instance, start_time, stop_defined, stop_time)) {
         return FMU_ERROR;
     }
     if (tolerance_defined && !check_parameter(bounds, tolerance, &problem)) {
@@ -306,24 +308,24 @@ static double impact_count(const Instance *instance, int stop) {
     return count;
 }
 
-/* The clocks have ticked for all impacts until now. */
+/* Mark all impacts so far as those for which the clocks have ticked. */
 static void acknowledge(Instance *instance) {
     for (int i = 0; i < instance->mechanism->stop_count; i++) {
         instance->acknowledged[i] = impact_count(instance, i);
     }
 }
 
-/* Start the motion if it has not; false, and told, if something stands against it. */
+/* Start the simulation if needed.  Log the reason and return false on failure. */
 static bool started(Instance *instance) {
     Problem problem;
     if (simulation_started(instance->simulation)) {
         return true;
     }
-    if (stands(instance, FMU_ERROR)) {
+    if (has_rejected(instance, FMU_ERROR)) {
         return false;
     }
     if (instance->mode != MODE_INITIALIZATION) {
-        refuse(instance, FMU_ERROR, "the instance was never initialized: there is no motion");
+        refuse(instance, FMU_ERROR, "the instance was never initialized: " TO_RESET);
         return false;
     }
     if (!simulation_start(instance->simulation, instance->start_time, instance->tolerance,
@@ -336,13 +338,13 @@ static bool started(Instance *instance) {
 }
 
 PRBM int exit_initialization(Instance *instance) {
-    if (stands(instance, FMU_ERROR) || !started(instance)) {
+    if (has_rejected(instance, FMU_ERROR) || !started(instance)) {
         return FMU_ERROR;
     }
     bool event_mode = instance->kind == MODEL_EXCHANGE || instance->event_mode;
     instance->mode = event_mode ? MODE_EVENT : MODE_STEP;
     instance->updated = instance->event_due = false;
-    instance->depth_told = 0.0;
+    instance->depth_logged = 0.0;
     return FMU_OK;
 }
 

@@ -16,7 +16,7 @@ static const struct {
     {"logStatusFatal", LOG_FATAL},     {"logAll", LOG_EVERYTHING},
 };
 
-/* Shorten a text that was cut so that it ends with a whole character. */
+/* Cut a UTF-8 text to a length, or shorter so that it ends with a whole character. */
 static void cut_text(char *text, size_t length) {
     while (length > 0 && ((unsigned char)text[length] & 0xC0) == 0x80) {
         length--;
@@ -24,7 +24,8 @@ static void cut_text(char *text, size_t length) {
     text[length] = '\0';
 }
 
-/* Double what would begin something, as # the reference of a variable, as far as there is room. */
+/* Copy a text with its special characters doubled, as far as there is room.  In FMI a # begins the
+ * reference of a variable, and a % a conversion of printf. */
 static void escape(const char *text, const char *special, char *out, size_t room) {
     for (; *text && room > 2; text++, room--) {
         if (strchr(special, *text)) {
@@ -50,7 +51,7 @@ static void send(const Journal *journal, int status, const char *format, va_list
     journal->send(journal, status, CATEGORIES[status].name, escaped);
 }
 
-/* Tell the importer something, in the category of its status; FMU_OK: about an event. */
+/* Log a message in the category of its status; FMU_OK is the category of events. */
 PRBM void report(const Journal *journal, int status, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
@@ -58,7 +59,7 @@ PRBM void report(const Journal *journal, int status, const char *format, ...) {
     va_end(arguments);
 }
 
-/* Tell why something was refused; returns the status. */
+/* Log the reason of a rejection and return its status. */
 PRBM int refuse(const Instance *instance, int status, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
@@ -86,7 +87,7 @@ PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t
         unsigned bits = category_bits(names[i]);
         if (!bits) {
             return refuse(instance, FMU_ERROR,
-                          "%s: there is no log category %s; modelDescription.xml lists them all",
+                          "%s: unknown log category %s; modelDescription.xml lists all categories",
                           rule->function, names[i] ? names[i] : "NULL");
         }
         chosen |= bits;
@@ -96,7 +97,7 @@ PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t
     return FMU_OK;
 }
 
-static void hear_impact(void *listener, const Impact *impact) {
+static void log_impact(void *listener, const Impact *impact) {
     const Instance *instance = listener;
     report(&instance->journal, FMU_OK,
            "impact %d at %s, t = %.9g s: closing at %.6g m/s, opening at %.6g m/s, %.6g J lost",

@@ -1,4 +1,4 @@
-/* Where the tables of the mechanism come from: a file in the FMU, or an array compiled in. */
+/* The source of the mechanism's tables: a file in the FMU, or an array that is compiled in. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -24,7 +24,7 @@ enum { TABLES_LIMIT = 16 * 1024 * 1024, TABLES_BLOCK = 64 * 1024 };
 
 static const char TABLES_NAME[] = "mechanism.bin";
 
-/* --- from what the importer gives to a path --------------------------------------------------- */
+/* --- the path of the tables ------------------------------------------------------------------- */
 
 static char lower(char c) {
     return (char)(c >= 'A' && c <= 'Z' ? c - 'A' + 'a' : c);
@@ -47,8 +47,8 @@ static int hexadecimal(char c) {
     return c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
 }
 
-/* Decode %XX in place.  A % that is followed by something else stands for itself, since there are
- * importers that do not encode; a byte 0 would end the path: false. */
+/* Decode %XX in place; return false for %00, which would end the path.  A % before other characters
+ * is kept, because some importers do not encode paths. */
 static bool percent_decoded(char *text) {
     char *out = text;
     for (; *text; out++) {
@@ -77,13 +77,13 @@ static bool slash(char c) {
 #endif
 }
 
-/* The path within file:///x, file:/x, file://localhost/x and file://server/x. */
+/* Return the path in file:///x, file:/x, file://localhost/x or file://server/x. */
 static char *path_of_uri(char *uri) {
     char *path = uri + strlen("file:");
     if (slash(path[0]) && slash(path[1])) {
-        bool here = slash(path[2]) || drive(path + 2); /* file://C:/x is seen, too */
+        bool here = slash(path[2]) || drive(path + 2); /* Some importers pass file://C:/x. */
         bool local = begins(path + 2, "localhost") && slash(path[11]);
-        path += here ? 2 : local ? 11 : 0; /* else a server: //server/x */
+        path += here ? 2 : local ? 11 : 0; /* Otherwise a server: //server/x. */
     }
 #if defined(_WIN32)
     if (slash(path[0]) && drive(path + 1)) {
@@ -93,13 +93,13 @@ static char *path_of_uri(char *uri) {
     return path;
 }
 
-/* The path of the tables in UTF-8, to be freed; NULL and a sentence if there is none.  FMI 2.0
- * passes a URI and FMI 3.0 a path; as no absolute path begins with file:, one may do for the
- * other. */
+/* Return the path of the tables in UTF-8, which the caller frees; NULL and a problem on failure.
+ * FMI 2.0 passes a URI and FMI 3.0 a path.  Both are accepted in both versions, because no absolute
+ * path begins with file:. */
 static char *tables_path(const char *resources, Problem *problem) {
     if (!resources || !*resources) {
-        fail(problem, "the importer has not told where the FMU's folder resources is, and without "
-                      "the tables in it there is no model: pass its location at instantiation");
+        fail(problem, "the importer passed no location of the FMU's folder resources, which "
+                      "contains the tables of the mechanism: pass it at instantiation");
         return NULL;
     }
     size_t length = strlen(resources);
@@ -113,12 +113,13 @@ static char *tables_path(const char *resources, Problem *problem) {
     if (begins(text, "file:")) {
         path = path_of_uri(text);
         if (!percent_decoded(path)) {
-            fail(problem, "the location of the FMU's folder resources has %%00 in it");
+            fail(problem, "the location of the FMU's folder resources contains %%00");
             free(text);
             return NULL;
         }
     } else if (strstr(text, "://")) {
-        fail(problem, "the FMU's folder resources can only be read at a file: location, not at %s",
+        fail(problem, "the location of the FMU's folder resources must be a file: URI or a path, "
+                      "not %s",
              resources);
         free(text);
         return NULL;
@@ -136,9 +137,9 @@ static char *tables_path(const char *resources, Problem *problem) {
 
 #if defined(_WIN32)
 
-enum { LONG_PATH = 248 }; /* longer ones need the prefix \\?\ and no . or .. or / in them */
+enum { LONG_PATH = 248 }; /* Longer paths need the prefix \\?\ and must not contain . or .. or /. */
 
-/* The code point at *text, which moves on; -1 for what is not UTF-8. */
+/* Return the code point at *text and advance *text; -1 for invalid UTF-8. */
 static int32_t code_point(const unsigned char **text) {
     static const int32_t least[4] = {0, 0x80, 0x800, 0x10000};
     const unsigned char *at = *text;
@@ -157,7 +158,7 @@ static int32_t code_point(const unsigned char **text) {
     return code < least[more] || code > 0x10FFFF || (code >> 11) == 0x1B ? -1 : code;
 }
 
-/* The same text in UTF-16, with \ for /; false for what is not UTF-8. */
+/* Convert a text to UTF-16, with \ for /; return false for invalid UTF-8. */
 static bool widened(const char *text, wchar_t *wide) {
     const unsigned char *at = (const unsigned char *)text;
     while (*at) {
@@ -175,7 +176,7 @@ static bool widened(const char *text, wchar_t *wide) {
     return true;
 }
 
-/* Copy the names between backslashes of an absolute path, without empty ones and ., and undo ... */
+/* Copy an absolute path without empty names and ., and resolve every .. in it. */
 static void normalized(const wchar_t *path, wchar_t *out) {
     wchar_t *root = out;
     while (*path) {
@@ -195,7 +196,7 @@ static void normalized(const wchar_t *path, wchar_t *out) {
     *out = L'\0';
 }
 
-/* Open by the path's UTF-16 name; with the prefix of long paths where it needs one. */
+/* Open a file by its path in UTF-16, with the prefix of long paths if needed. */
 static FILE *opened(const char *path) {
     size_t room = strlen(path) + 16;
     wchar_t *wide = calloc(2 * room, sizeof *wide);
@@ -211,7 +212,7 @@ static FILE *opened(const char *path) {
         }
         file = _wfopen(name, L"rb");
     } else if (wide) {
-        file = fopen(path, "rb"); /* an importer that uses the code page */
+        file = fopen(path, "rb"); /* The importer passed a path in the code page of the system. */
     }
     free(wide);
     return file;
@@ -225,7 +226,7 @@ static FILE *opened(const char *path) {
 
 #endif
 
-/* All bytes of a file, to be freed, or NULL and a sentence. */
+/* Return all bytes of a file, which the caller frees; NULL and a problem on failure. */
 static unsigned char *contents(FILE *file, size_t *size, Problem *problem) {
     unsigned char *bytes = NULL;
     size_t room = 0;
@@ -242,7 +243,7 @@ static unsigned char *contents(FILE *file, size_t *size, Problem *problem) {
         *size += fread(bytes + *size, 1, room - *size, file);
     } while (*size == room && room <= TABLES_LIMIT);
     if (ferror(file) || *size > TABLES_LIMIT) {
-        fail(problem, ferror(file) ? "the tables of the mechanism (%s) cannot be read to their end"
+        fail(problem, ferror(file) ? "the tables of the mechanism (%s) cannot be read completely"
                                    : "the tables of the mechanism (%s) are larger than 16 MiB: "
                                      "this is not the file that belongs to the FMU",
              TABLES_NAME);
@@ -259,8 +260,8 @@ PRBM Mechanism *tables_read(const char *resources, Problem *problem) {
     }
     FILE *file = opened(path);
     if (!file) {
-        fail(problem, "the tables of the mechanism cannot be opened; unpack the whole FMU, its "
-                      "folder resources too: there is no file %s", path);
+        fail(problem, "the tables of the mechanism cannot be opened; unpack the whole FMU, "
+                      "including its folder resources: there is no readable file %s", path);
         free(path);
         return NULL;
     }

@@ -1,10 +1,16 @@
 /* Saved states.
  *
- * All little-endian: "PRBMSTAT"; u32 version, size of the whole, CRC-32 of what follows, standard,
- * kind, whether Event Mode is used, length of the token; the token; u32 mode, flags, last step,
- * unknown reference; f64 start time, stop time, tolerance; one byte a slot, refused; f64 a stop,
- * acknowledged impacts; f64 each, the state of the simulation.  A copy in memory has the same
- * bytes, but no checksum. */
+ * The format is little-endian:
+ *   8 bytes   "PRBMSTAT"
+ *   u32       version of the format, total size, CRC-32 of the bytes after it
+ *   u32       version of FMI, kind, whether Event Mode is used, length of the token
+ *   bytes     the token
+ *   u32       mode, flags, status of the last step, unknown value reference
+ *   f64       start time, stop time, tolerance
+ *   bytes     one per slot: whether the last set of the variable was rejected
+ *   f64       one per stop: acknowledged impacts
+ *   f64       the state of the simulation
+ * A copy in memory has the same bytes, with 0 for the checksum. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -105,13 +111,13 @@ static void put_state(const Instance *instance, unsigned char *bytes, size_t siz
     }
 }
 
-/* Whether bytes are a state of such an instance, as far as their head tells. */
-static bool own_state(const Instance *instance, const unsigned char *bytes, size_t size,
+/* Check by their head whether bytes are a state of this FMU and of an instance of the same kind. */
+static bool check_head(const Instance *instance, const unsigned char *bytes, size_t size,
                       Problem *problem) {
     const char *token = instance->mechanism->token;
     size_t length = strlen(token);
     if (size < STATE_HEAD || memcmp(bytes, STATE_MAGIC, sizeof STATE_MAGIC) != 0) {
-        return fail(problem, "the bytes are no saved state");
+        return fail(problem, "the bytes are not a saved state");
     }
     if (u32_at(bytes + 8) != STATE_VERSION) {
         return fail(problem, "the state was saved by another version of this FMU");
@@ -127,8 +133,8 @@ static bool own_state(const Instance *instance, const unsigned char *bytes, size
     if (u32_at(bytes + 20) != (uint32_t)instance->standard->version ||
         u32_at(bytes + 24) != (uint32_t)instance->kind ||
         u32_at(bytes + 28) != (uint32_t)instance->event_mode) {
-        return fail(problem, "the state was saved by an instance that was made for another use: "
-                             "FMI version, interface type and eventModeUsed must be the same");
+        return fail(problem, "the state was saved by an instance of another kind: FMI version, "
+                             "interface type and eventModeUsed must be the same");
     }
     if (size != saved_size(instance)) {
         return fail(problem, "the state was saved by another version of this FMU");
@@ -136,7 +142,7 @@ static bool own_state(const Instance *instance, const unsigned char *bytes, size
     return true;
 }
 
-/* The modes that an instance of a kind can be in between calls. */
+/* Return whether an instance of this kind can be in a mode between calls. */
 static bool possible_mode(const Instance *instance, uint32_t mode) {
     unsigned modes = IN_INSTANTIATED | IN_INITIALIZATION | IN_TERMINATED;
     if (instance->kind == MODEL_EXCHANGE) {
@@ -147,8 +153,8 @@ static bool possible_mode(const Instance *instance, uint32_t mode) {
     return mode < MODES && modes >> mode & 1u;
 }
 
-/* Read all but the arrays into an instance that is otherwise not looked at. */
-static bool got_fields(const Instance *instance, const unsigned char **at, Instance *it,
+/* Read everything but the arrays into a scratch instance. */
+static bool read_fields(const Instance *instance, const unsigned char **at, Instance *it,
                        Problem *problem) {
     const Mechanism *mechanism = instance->mechanism;
     uint32_t mode = get_u32(at), flags = get_u32(at), last_step = get_u32(at);
@@ -175,14 +181,15 @@ static bool got_fields(const Instance *instance, const unsigned char **at, Insta
                                                                          "damaged");
 }
 
-/* Whether the simulation is as far as the mode says. */
-static bool agrees(const Simulation *simulation, Mode mode) {
+/* Return whether the simulation has started, or not, as the mode requires. */
+static bool is_consistent(const Simulation *simulation, Mode mode) {
     bool begun = simulation_started(simulation);
     return mode == MODE_INITIALIZATION || mode == MODE_TERMINATED ||
            begun == (mode != MODE_INSTANTIATED);
 }
 
-static bool got_simulation(Instance *instance, const unsigned char *at, Mode mode,
+/* Restore the simulation, or leave it unchanged. */
+static bool restore_simulation(Instance *instance, const unsigned char *at, Mode mode,
                            Problem *problem) {
     Simulation *simulation = instance->simulation;
     size_t count = simulation_state_count(simulation);
@@ -193,29 +200,29 @@ static bool got_simulation(Instance *instance, const unsigned char *at, Mode mod
     if (!simulation_restore(simulation, instance->after, problem)) {
         return false;
     }
-    if (!agrees(simulation, mode)) {
+    if (!is_consistent(simulation, mode)) {
         go_back(instance);
         return fail(problem, "the saved state is damaged");
     }
     return true;
 }
 
-/* Take over a state, or leave everything as it is. */
-static bool got_state(Instance *instance, const unsigned char *bytes, size_t size,
+/* Restore an instance from the bytes of a state, or leave it unchanged. */
+static bool restore_bytes(Instance *instance, const unsigned char *bytes, size_t size,
                       Problem *problem) {
     const Mechanism *mechanism = instance->mechanism;
     size_t slots = (size_t)mechanism->slots.count;
-    if (!own_state(instance, bytes, size, problem)) {
+    if (!check_head(instance, bytes, size, problem)) {
         return false;
     }
     const unsigned char *at = bytes + STATE_HEAD + strlen(mechanism->token);
     Instance read = *instance;
-    if (!got_fields(instance, &at, &read, problem)) {
+    if (!read_fields(instance, &at, &read, problem)) {
         return false;
     }
     const unsigned char *refused = at, *acknowledged = at + slots;
     at = acknowledged + (size_t)mechanism->stop_count * sizeof(double);
-    if (!got_simulation(instance, at, read.mode, problem)) {
+    if (!restore_simulation(instance, at, read.mode, problem)) {
         return false;
     }
     *instance = read;
@@ -256,7 +263,7 @@ PRBM int save_state(const Instance *instance, void **state) {
 PRBM int restore_state(Instance *instance, const void *state) {
     const Saved *saved = state;
     Problem problem;
-    if (!got_state(instance, saved->bytes, saved->size, &problem)) {
+    if (!restore_bytes(instance, saved->bytes, saved->size, &problem)) {
         return refuse(instance, FMU_ERROR, "%s", problem.text);
     }
     return FMU_OK;
@@ -282,10 +289,10 @@ PRBM int serialize(const Instance *instance, const void *state, unsigned char *b
 PRBM int deserialize(const Instance *instance, const unsigned char *bytes, size_t size,
                      void **state) {
     Problem problem;
-    /* the buffer may be larger than the state */
-    size_t told = size < STATE_HEAD ? 0 : u32_at(bytes + 12);
-    size = told >= STATE_HEAD && told < size ? told : size;
-    if (!own_state(instance, bytes, size, &problem)) {
+    /* The buffer may be larger than the state. */
+    size_t declared = size < STATE_HEAD ? 0 : u32_at(bytes + 12);
+    size = declared >= STATE_HEAD && declared < size ? declared : size;
+    if (!check_head(instance, bytes, size, &problem)) {
         return refuse(instance, FMU_ERROR, "%s", problem.text);
     }
     if (u32_at(bytes + STATE_CHECKED_FROM - 4) !=

@@ -19,12 +19,12 @@ static int check_step(const Instance *instance, double time, double size) {
     double now = simulation_time(instance->simulation), target = time + size;
     double slack = STEP_SUM_RTOL * size + TIME_SUM_RTOL * (now < 0.0 ? -now : now);
     double sums = slack + STOP_TIME_RTOL * size;
-    if (stands(instance, FMU_DISCARD)) {
+    if (has_rejected(instance, FMU_DISCARD)) {
         return FMU_DISCARD;
     }
     if (instance->event_due) {
-        return refuse(instance, FMU_ERROR, "an event waits at t = %.12g s: call %sEnterEventMode "
-                                           "first",
+        return refuse(instance, FMU_ERROR, "an event is pending at t = %.12g s: call "
+                                           "%sEnterEventMode first",
                       now, instance->standard->prefix);
     }
     if (!finite_number(time) || !finite_number(size)) {
@@ -32,19 +32,18 @@ static int check_step(const Instance *instance, double time, double size) {
                       "cannot step from t = %g s by %g s: not finite numbers", time, size);
     }
     if (size <= 0.0) {
-        return refuse(instance, FMU_DISCARD, "communicationStepSize = %.9g s must be positive; "
-                                             "time only runs on",
+        return refuse(instance, FMU_DISCARD, "communicationStepSize = %.9g s must be positive",
                       size);
     }
     if (time - now > slack || now - time > slack) {
         return refuse(instance, FMU_DISCARD,
-                      "the step begins at t = %.12g s, but the last one ended at t = %.12g s: "
+                      "the step begins at t = %.12g s, but the last step ended at t = %.12g s: "
                       "continue there, or restore a saved state",
                       time, now);
     }
     if (!(target > now)) {
-        return refuse(instance, FMU_DISCARD, "communicationStepSize = %.9g s is lost in round-off "
-                                             "at t = %.12g s: make a longer step",
+        return refuse(instance, FMU_DISCARD, "communicationStepSize = %.9g s is below the rounding "
+                                             "error of t = %.12g s: make a longer step",
                       size, now);
     }
     if (instance->stop_defined && target - instance->stop_time > sums) {
@@ -56,9 +55,10 @@ static int check_step(const Instance *instance, double time, double size) {
     return FMU_OK;
 }
 
-/* Continue event by event, and internal step by internal step where the importer wants to see
- * them.  Stops at the first event if the importer handles events and lets a step end early. */
-static bool walk(Instance *instance, double target, Outcome *outcome, Problem *problem) {
+/* Advance from event to event, and from internal step to internal step if there are intermediate
+ * updates.  Stop at the first event if the importer handles events and allows early return. */
+static bool advance_by_events(Instance *instance, double target, Outcome *outcome,
+                              Problem *problem) {
     Simulation *simulation = instance->simulation;
     bool stops = instance->event_mode && instance->early_return, each = instance->update != NULL;
     bool enough = false;
@@ -80,22 +80,23 @@ static bool walk(Instance *instance, double target, Outcome *outcome, Problem *p
     return true;
 }
 
-/* Continue to a time; on failure the state stays as it was. */
+/* Advance to a time; on failure, leave the state unchanged. */
 static bool advanced(Instance *instance, double target, Outcome *outcome, Problem *problem) {
     Simulation *simulation = instance->simulation;
     if (!instance->event_mode && !instance->update) {
         return simulation_advance(simulation, target, problem);
     }
     keep(instance);
-    if (walk(instance, target, outcome, problem)) {
+    if (advance_by_events(instance, target, outcome, problem)) {
         return true;
     }
     go_back(instance);
     return false;
 }
 
-/* In Event Mode without early return, an event inside the step is over when the step ends; the
- * importer is still told of it, since discrete variables have new values and clocks may tick. */
+/* Make a communication step.  With event mode but without early return, an event inside the step
+ * has been handled when the step ends.  It is still reported to the importer, because discrete
+ * variables have new values and clocks may tick. */
 PRBM int make_step(Instance *instance, double time, double size, Outcome *outcome) {
     Problem problem;
     Outcome result = {false, false, 0.0};
@@ -129,26 +130,25 @@ static bool any_tick(const Instance *instance) {
     return false;
 }
 
-/* Tell of a wall that was put deep into a body, or a body that was taken through it; again when it is
- * twice as deep. */
+/* Log a warning if a wall penetrates a body; again when the penetration has doubled. */
 static int warn_of_depth(Instance *instance) {
     double depth;
     const char *stop = exchange_deepest(instance->simulation, &depth);
-    if (!stop || depth <= 2.0 * instance->depth_told) {
+    if (!stop || depth <= 2.0 * instance->depth_logged) {
         return FMU_OK;
     }
-    instance->depth_told = depth;
+    instance->depth_logged = depth;
     return refuse(instance, FMU_WARNING,
                   "%s.gap = %.6g m: the wall is inside the body, which is not pushed out; move it "
                   "continuously, with %s.displacement and %s.velocity, or integrate in shorter steps",
                   stop, -depth, stop, stop);
 }
 
-/* Let happen what is due.  A clock that ticks because of it does so in a super-dense instant of
- * its own, in which its variables have the values after the impact; the next call ends it. */
+/* Handle the pending events.  A clock ticks in a separate super-dense instant after an impact, in
+ * which variables have their values after the impact; the next call ends this instant. */
 PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed) {
     Problem problem;
-    if (stands(instance, FMU_ERROR)) {
+    if (has_rejected(instance, FMU_ERROR)) {
         return FMU_ERROR;
     }
     acknowledge(instance);
@@ -166,11 +166,11 @@ PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed) 
 
 PRBM int leave_event_mode(Instance *instance, const Rule *rule, Mode next) {
     if (!instance->updated) {
-        return refuse(instance, FMU_ERROR, "%s: the event is not finished; call %s until it asks "
-                                           "for no further call",
+        return refuse(instance, FMU_ERROR, "%s: the event is not finished; call %s = false",
                       rule->function,
-                      instance->standard->version == 2 ? "fmi2NewDiscreteStates"
-                                                       : "fmi3UpdateDiscreteStates");
+                      instance->standard->version == 2
+                          ? "fmi2NewDiscreteStates until newDiscreteStatesNeeded"
+                          : "fmi3UpdateDiscreteStates until discreteStatesNeedUpdate");
     }
     instance->mode = next;
     return FMU_OK;

@@ -14,7 +14,8 @@ static bool required(const Instance *instance, uint32_t reference) {
     return false;
 }
 
-/* The variable of a reference if it may be read as some type; otherwise NULL, and it is told. */
+/* Return the variable of a reference if it can be read as a type; otherwise log an error and return
+ * NULL. */
 static const Variable *readable(const Instance *instance, uint32_t reference, int type) {
     const Variable *variable = find_variable(instance->mechanism, reference);
     if (!variable) {
@@ -26,8 +27,8 @@ static const Variable *readable(const Instance *instance, uint32_t reference, in
         refuse(instance, FMU_ERROR, "%s is of type %s: get it with %sGet%s", variable->name,
                actual, instance->standard->prefix, actual);
     } else if (instance->mode == MODE_INTERMEDIATE && !required(instance, reference)) {
-        refuse(instance, FMU_ERROR, "%s was not among the requiredIntermediateVariables: get it "
-                                    "after the step, or name it at instantiation",
+        refuse(instance, FMU_ERROR, "%s is not among the requiredIntermediateVariables: get it "
+                                    "after the step, or list it at instantiation",
                variable->name);
     } else {
         return variable;
@@ -52,8 +53,8 @@ PRBM int read_value(Instance *instance, uint32_t reference, int type, double *x)
         return FMU_ERROR;
     }
     if (!settable(mechanism, slot) && !simulation_started(instance->simulation)) {
-        return refuse(instance, FMU_ERROR, "%s is computed when the instance is initialized, and "
-                                           "not known before",
+        return refuse(instance, FMU_ERROR, "%s is computed when the instance is initialized; it "
+                                           "has no value before",
                       variable->name);
     }
     if (!simulation_get(instance->simulation, slot, x, &problem)) {
@@ -70,7 +71,8 @@ static int refuse_set(Instance *instance, int slot) {
     return FMU_ERROR;
 }
 
-/* The variable of a reference if it may be set as some type; otherwise NULL, and it is told. */
+/* Return the variable of a reference if it can be set as a type; otherwise log an error and return
+ * NULL. */
 static const Variable *writable(Instance *instance, uint32_t reference, int type) {
     const Variable *variable = find_variable(instance->mechanism, reference);
     if (!variable) {
@@ -85,7 +87,7 @@ static const Variable *writable(Instance *instance, uint32_t reference, int type
     int slot = variable->slot;
     bool state = instance->kind == MODEL_EXCHANGE && instance->state_of[slot] >= 0;
     if (!settable(instance->mechanism, slot) && !state) {
-        refuse(instance, FMU_ERROR, "%s is no parameter or input: it cannot be set; " TO_RESET,
+        refuse(instance, FMU_ERROR, "%s is not a parameter or input: it cannot be set; " TO_RESET,
                variable->name);
     } else if (variable->type != type) {
         refuse(instance, FMU_ERROR, "%s is of type %s: set it with %sSet%s", variable->name,
@@ -111,9 +113,9 @@ static int write_state(Instance *instance, const Variable *variable, double x) {
     return FMU_OK;
 }
 
-/* Whether a variable is not a fixed parameter, which may have any value within its bounds only
- * before the start; if it is, it is told. */
-static bool not_fixed(const Instance *instance, int slot, double x, double present) {
+/* Return false and log an error for a fixed parameter after the start of the simulation.  Values
+ * out of bounds pass, because simulation_set rejects them. */
+static bool check_changeable(const Instance *instance, int slot, double x, double present) {
     Problem problem;
     if (!is_parameter(instance->mechanism, slot) || !simulation_started(instance->simulation)) {
         return true;
@@ -123,15 +125,16 @@ static bool not_fixed(const Instance *instance, int slot, double x, double prese
         return true;
     }
     const char *unit = parameter->unit, *space = *unit ? " " : "";
-    refuse(instance, FMU_ERROR, "%s = %.10g%s%s refused: it is fixed once the simulation has "
-                                "started; set it back to %.10g%s%s, or reset the instance and set "
-                                "it before",
+    refuse(instance, FMU_ERROR, "%s = %.10g%s%s rejected: the parameter is fixed once the "
+                                "simulation has started; set it back to %.10g%s%s, or reset the "
+                                "instance and set it before initialization",
            parameter->name, x, space, unit, present, space, unit);
     return false;
 }
 
-/* What a variable is that may change in event mode alone, now that events have one; or NULL. */
-static const char *waits_for_event(const Instance *instance, int slot) {
+/* Return the kind of a variable that can be set only in Event Mode, NULL for other variables and if
+ * the present mode allows the change. */
+static const char *event_mode_kind(const Instance *instance, int slot) {
     const Mechanism *m = instance->mechanism;
     int impulses = m->slots.inputs + m->input.impulses;
     bool exchange = instance->mode == MODE_CONTINUOUS;
@@ -154,11 +157,11 @@ PRBM int write_value(Instance *instance, uint32_t reference, int type, double x)
     }
     double present = 0.0;
     bool known = simulation_get(instance->simulation, slot, &present, &problem);
-    if (known && present == x) { /* also a fixed parameter that is put back */
+    if (known && present == x) { /* Corrects a rejected value of a fixed parameter. */
         instance->refused[slot] = 0;
         return FMU_OK;
     }
-    const char *discrete = waits_for_event(instance, slot);
+    const char *discrete = event_mode_kind(instance, slot);
     if (discrete) {
         refuse(instance, FMU_ERROR, "%s is %s: it can be set in %s, not in %s", variable->name,
                discrete, instance->standard->modes[MODE_EVENT],
@@ -168,7 +171,7 @@ PRBM int write_value(Instance *instance, uint32_t reference, int type, double x)
     if (instance->mode == MODE_INITIALIZATION) {
         simulation_unstart(instance->simulation);
     }
-    if (!not_fixed(instance, slot, x, present)) {
+    if (!check_changeable(instance, slot, x, present)) {
         return refuse_set(instance, slot);
     }
     if (!simulation_set(instance->simulation, slot, x, &problem)) {
@@ -184,7 +187,7 @@ static bool ticks(const Instance *instance, const Variable *clock) {
     return impact_count(instance, stop) != instance->acknowledged[stop];
 }
 
-/* Whether a clock ticks in this super-dense instant: its stop has had an impact. */
+/* Read whether a clock ticks in this super-dense instant, because its stop has had an impact. */
 PRBM int read_clock(Instance *instance, uint32_t reference, bool *active) {
     const Variable *variable = readable(instance, reference, CLOCK);
     if (!variable) {
