@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..analysis.impact_map import (
-    HEIGHTS,
     OFFSETS,
+    WALLS,
     ImpactMap,
     algebraic,
     by_elements,
@@ -69,7 +69,7 @@ def transients(tell: Progress) -> tuple[ImpactMap, ImpactMap]:
     two, one = guide("PRBDM2R"), guide("PRBDM")
     first, read = np.zeros((5, 5)), np.zeros((5, 5))
     for n, (i, j) in enumerate(np.ndindex(5, 5)):
-        h, d = HEIGHTS[j], OFFSETS[i]
+        h, d = WALLS[j], OFFSETS[i]
         run = element_run(two, h, d)
         first[i, j] = run.impacts[0].latched.modal_restitution
         times = np.linspace(0.0, run["time"][-1], SAMPLES)
@@ -77,7 +77,7 @@ def transients(tell: Progress) -> tuple[ImpactMap, ImpactMap]:
         found = fit_response(one, ["stop.restitution", K], times, wanted, {"stop.position": h})
         read[i, j] = found.values["stop.restitution"]
         tell((n + 1) / 25)
-    where = np.array(HEIGHTS), np.array(OFFSETS)
+    where = np.array(WALLS), np.array(OFFSETS)
     return (
         ImpactMap("finite elements, released", *where, first),
         ImpactMap("1R fitted to these responses", *where, read),
@@ -114,7 +114,7 @@ def _discussion(maps: Sequence[ImpactMap]) -> str:
         "symmetric, and a first impact hardly does. The response does: a guide that has passed "
         "its straight shape (h > 0, in the direction of gravity) rebounds towards it, where the "
         "other modes become stiffer and take energy from the fundamental one, and the fitted "
-        "restitution is much lower there. That is the thesis' finding if its heights count "
+        "restitution is much lower there. That is the thesis' finding if its walls count "
         "upwards: 10 mm below the straight shape, where the velocity points into the buckling "
         "direction of the flexures (its section 8.2.1), is +10 mm along gravity. If its -10 mm "
         "is a wall before the straight shape, the sign is the opposite one.\n"
