@@ -298,6 +298,41 @@ def test_a_stopped_sweep_reports_the_number_of_stored_runs(mishap, log):
     assert runs(log) == Counter(set(LONG["x"]) - set(done["x"]))
 
 
+def test_a_second_sweep_into_the_same_folder_is_rejected(mishap, log):
+    """It repeats no run, keeps the drafts of the first one and names its process."""
+    LONG.to_csv("table.csv", index=False)
+    process = started(mishap, 3)
+    draft = Path("results.parquet/_part.draft")
+    draft.write_bytes(b"")
+    with pytest.raises(ParameterError, match=rf"in use by another sweep \(process {process.pid} "):
+        sweep(mishap, "table.csv", step=0.5, workers=1)
+    with pytest.raises(ParameterError, match="in use by another sweep"):
+        sweep(mishap, "table.csv", step=0.5, workers=1, anew=True)
+    assert process.poll() is None
+    assert draft.exists()
+    process.communicate(timeout=60)
+    assert runs(log) == Counter(LONG["x"])
+    assert len(sweep(mishap, "table.csv", step=0.5)) == len(LONG)
+    assert not draft.exists()
+
+
+def test_two_sweeps_of_one_process_into_the_same_folder_are_rejected(mishap, log):
+    table = pd.DataFrame({"x": [1.0, 2.0]})
+
+    def second(fraction):
+        with pytest.raises(ParameterError, match=rf"process {os.getpid()} on"):
+            sweep(mishap, table, step=0.5, workers=1)
+
+    assert len(sweep(mishap, table, step=0.5, workers=1, progress=second)) == 2
+    assert runs(log).total() == 2
+
+
+def test_the_lock_of_a_sweep_that_never_began_does_not_block_the_folder(mishap, log):
+    Path("results.parquet").mkdir()
+    Path("results.parquet/_sweep.lock").write_text("process 1 on nowhere")
+    assert len(sweep(mishap, pd.DataFrame({"x": [1.0]}), step=0.5, workers=1)) == 1
+
+
 def test_only_added_rows_are_computed(mishap, log):
     table = pd.DataFrame({"x": [1.0, 2.0, 3.0]})
     sweep(mishap, table[:2], step=0.5, workers=1)

@@ -1,6 +1,7 @@
 """Results of a sweep on disk: a Parquet dataset that grows part by part and survives a kill.
 
     results.parquet/_sweep.json            settings of the sweep
+    results.parquet/_sweep.lock            locked while a sweep runs
     results.parquet/part-000000-1f3a.parquet, ...
 
 A part has the runs of one batch.  It is written under another name and then renamed, so that it is
@@ -10,6 +11,7 @@ complete whenever it exists.  pandas, pyarrow and Dask read the folder as one ta
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +20,10 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ..base.errors import ParameterError
+from ..base.lock import LockedError, locked
 from .runs import GOOD, Outcome
 
-SETTINGS = "_sweep.json"
+SETTINGS, LOCK = "_sweep.json", "_sweep.lock"
 ROW, STATUS, MESSAGE, SECONDS = "row", "status", "message", "seconds"
 OWN = (ROW, STATUS, MESSAGE, SECONDS)
 """Columns of every sweep; no parameter or output may have these names."""
@@ -54,21 +57,47 @@ class Results:
         self.schema = pa.schema([(ROW, pa.int64()), *numbers, *own])
         self.count = 0
 
-    def begin(self, anew: bool = False) -> None:
-        """Create the folder, or continue in a folder of a sweep with the same settings.
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Keep other sweeps from using the folder during a ``with`` block.
 
         Raises
         ------
         ParameterError
-            If the folder has other contents, cannot be written, or has a sweep with other settings
-            and ``anew`` is false.
+            If another sweep uses the folder, or it has other contents.
+        """
+        self._check_contents()
+        try:
+            with locked(self.folder / LOCK, wait=False):
+                yield
+        except LockedError as error:
+            raise ParameterError(
+                f"{self.folder} is in use by another sweep ({error}); wait until it ends, stop it, "
+                "or give another name for the results"
+            ) from None
+
+    def _check_contents(self) -> None:
+        """Reject a folder that was not made by a sweep."""
+        if (self.folder / SETTINGS).exists() or not self.folder.exists():
+            return
+        if not (self.folder.is_dir() and {p.name for p in self.folder.iterdir()} <= {LOCK}):
+            raise ParameterError(
+                f"{self.folder} exists without a sweep in it; give another name for the results"
+            )
+
+    def begin(self, anew: bool = False) -> None:
+        """Create the folder, or continue in a folder of a sweep with the same settings.
+
+        The folder must be locked, since drafts of an interrupted sweep are deleted.
+
+        Raises
+        ------
+        ParameterError
+            If the folder cannot be written, or has a sweep with other settings and ``anew`` is
+            false.
         """
         file = self.folder / SETTINGS
         try:
-            if self.folder.exists() and not file.exists() and not _is_empty(self.folder):
-                raise ParameterError(
-                    f"{self.folder} exists without a sweep in it; give another name for the results"
-                )
             for draft in self.folder.glob("_*.draft"):
                 draft.unlink()
             if file.exists() and anew:
@@ -170,10 +199,6 @@ class Results:
             draft.replace(part)
         finally:
             draft.unlink(missing_ok=True)
-
-
-def _is_empty(folder: Path) -> bool:
-    return folder.is_dir() and next(folder.iterdir(), None) is None
 
 
 def _short(value: object) -> str:

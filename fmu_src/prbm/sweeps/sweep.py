@@ -131,8 +131,8 @@ def sweep(
     Raises
     ------
     ParameterError
-        If the table, an output, a setting or ``out`` is invalid, or ``out`` has the results of
-        another sweep.
+        If the table, an output, a setting or ``out`` is invalid, ``out`` has the results of another
+        sweep, or another sweep is writing to it.
     SweepError
         If the FMU cannot be read or loaded, the scheduler does not respond, or a package is not
         installed.
@@ -145,7 +145,9 @@ def sweep(
     _check_counts(workers, retries, timeout)
     results = _results(plan, Path(out))
     report = progress or (lambda fraction: None)
-    with ExitStack() as stack:  # Keep earlier results until there is a client.
+    with ExitStack() as stack:
+        stack.enter_context(results.lock())
+        # Earlier results are deleted only after the scheduler has responded.
         client = stack.enter_context(_client(scheduler, workers)) if anew else None
         results.begin(anew)
         done = results.read()
