@@ -1,4 +1,4 @@
-"""Parameters fitted to frequencies, responses and forces, and what the data do not determine."""
+"""Parameters fitted to frequencies, responses and forces, and undetermined parameters."""
 
 import dataclasses
 import math

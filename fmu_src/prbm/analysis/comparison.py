@@ -292,7 +292,7 @@ def _without(mechanism: Mechanism) -> dict[str, float]:
 def _restitutions(
     mechanism: Mechanism, values: Mapping[str, float], elements: int, notes: list[str]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the modal restitution at each stop by both; add a note where there is none."""
+    """Yield the modal restitution of each stop by both; add a note if a wall is out of reach."""
     known = mechanism.values(values)
     for stop in mechanism.stops:
         place, d = value(stop, "position", known), value(stop, "offset", known)

@@ -97,7 +97,7 @@ def free(system: System) -> Held:
     Raises
     ------
     EquilibriumError
-        If there is none.
+        If no such shape is found.
     """
     return _described(system, free_displacement(system), equilibrium(system))
 
