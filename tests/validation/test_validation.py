@@ -109,7 +109,7 @@ def test_verdicts_of_the_page_follow_from_its_numbers():
 
 
 def test_the_amplitude_of_a_1r_is_compared_with_the_closed_form_of_the_same_model():
-    """r sin(v/(r omega)) with the model's own frequency, not v/omega with that of the elements."""
+    """The closed form is r sin(v/(r omega)) at the model's own frequency."""
     frequency, amplitude = crossings(*chapter_4.swing(K_THESIS))
     assert chapter_4.harmonic_amplitude(frequency) == pytest.approx(amplitude, rel=1e-5)
     (row,) = [cells for cells in rows(parts(PAGE, "table-4-1")[1]) if "2.5449" in cells[0]]

@@ -292,7 +292,9 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
         "do not stretch.",
         planar,
         "Links that do not stretch keep a body on parallel, straight flexures from turning, so "
-        "that a hit off its centre of mass costs less than it does in reality.",
+        "that the place of a hit has no effect there. With flexures that stretch, a rigid impact "
+        "off the centre of mass loses more energy of the fundamental mode. The loss of a real one "
+        "depends on the duration of its contact.",
     ]
     items = [impact, planar] if _stretches(mechanism) else rigid
     for model in sorted(models & END_MOMENT.keys()):
