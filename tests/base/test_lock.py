@@ -3,6 +3,7 @@
 import errno
 import importlib.util
 import os
+import platform
 import subprocess
 import sys
 import threading
@@ -52,7 +53,7 @@ def test_a_held_lock_is_rejected_with_its_owner(holder, tmp_path):
 def test_the_lock_of_a_killed_process_is_free(holder, tmp_path):
     holder.kill()
     holder.wait()
-    assert (tmp_path / "lock").read_text() == f"process {holder.pid} on {os.uname().nodename}"
+    assert (tmp_path / "lock").read_text() == f"process {holder.pid} on {platform.node()}"
     with locked(tmp_path / "lock", wait=False):
         assert str(os.getpid()) in (tmp_path / "lock").read_text()
     assert (tmp_path / "lock").read_text() == ""

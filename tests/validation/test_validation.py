@@ -70,6 +70,16 @@ def test_all_other_numbers_of_the_page_equal_computed_ones(key):
     check(key)
 
 
+def test_the_command_prints_the_verdicts_of_the_page(capsys):
+    keys = CHEAP[:2]
+    assert main(["validate", "--only", *keys]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    for key, line in zip(keys, printed, strict=True):
+        (cells,) = rows(parts(PAGE, key)[0])
+        where = re.search(r"\[([^\]]*)\]", cells[0])[1]
+        assert line == f"{where}: {cells[-1]}"
+
+
 def test_every_result_is_on_the_page_with_its_figures():
     found = re.findall(r"<!-- result: (\S+) -->", PAGE)
     assert found == KEYS

@@ -22,9 +22,11 @@ METHODS = ("random", "latin", "sobol")
 SEPARATORS = {";": "semicolons", "\t": "tabs"}  # separators of CSV dialects that are rejected
 WORDS = {"true": 1.0, "false": 0.0}
 PROBABILITY_MIN = 2.0**-53  # Probabilities stay this far from 0 and 1: quantiles may be infinite.
+NAMES_LISTED_MAX = 10  # Longer lists of settable variables are left to "fmpy info".
+HINT_LENGTH_MAX = 200  # characters
 RANGES = {"Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31, "Int64": 53,
           "UInt8": 8, "UInt16": 16, "UInt32": 32, "UInt64": 53}  # fmt: skip
-"""Bits of FMI's integer types; 53 is the largest number that a float represents exactly."""
+"""Bits of FMI's integer types; a float represents 53 bits exactly."""
 
 
 def samples(
@@ -188,7 +190,7 @@ def check_settable(name: str, variables: Mapping[str, Any]) -> None:
     if name in settable:
         return
     hint = proposal(name, settable)
-    if len(settable) > 10 and hint.startswith("known"):
+    if len(settable) > NAMES_LISTED_MAX and hint.startswith("known"):
         hint = "fmpy info lists the variables"
     if name not in variables:
         raise ParameterError(f"the FMU has no variable {name!r}; {hint}")
@@ -252,7 +254,7 @@ def check_outputs(names: Iterable[tuple[str, str]], variables: Mapping[str, Any]
         variable = variables.get(name)
         if variable is None:
             hint = proposal(name, variables)
-            hint = "fmpy info lists the variables" if len(hint) > 200 else hint
+            hint = "fmpy info lists the variables" if len(hint) > HINT_LENGTH_MAX else hint
             raise ParameterError(f"output {text}: the FMU has no variable {name!r}; {hint}")
         if variable.type in ("String", "Binary", "Clock") or variable.shape:
             raise ParameterError(
