@@ -1,4 +1,4 @@
-"""A mechanism beside finite elements and measurements: what must agree does, the rest is said."""
+"""Comparison of a mechanism with finite elements and measurements."""
 
 import csv
 import io
@@ -24,13 +24,13 @@ MEASURED = {"frequency 1 at rest": Estimate(4.82, 0.06, "Hz")}
 
 @pytest.fixture(scope="module")
 def guide():
-    pytest.importorskip("exudyn", reason="the finite elements are Exudyn's: pip install exudyn")
+    pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
     return compare(mechanism("PRBDM2R"), elements=8, measured=MEASURED)
 
 
-def test_a_chain_of_many_links_is_the_beam():
-    """40 links that stretch: every quantity within 0.9 % (1/n^2) of the elements."""
-    pytest.importorskip("exudyn", reason="the finite elements are Exudyn's: pip install exudyn")
+def test_a_chain_of_40_links_agrees_with_finite_elements():
+    """Every quantity is within 0.9 %, the order of 1/n^2."""
+    pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
     base = mechanism("PRBDM2R")
     kind = replace(base.flexure_types[0], model="nR", n=40, axial=True, coefficients={})
     found = compare(replace(base, flexure_types=(kind,)), elements=16)
@@ -41,9 +41,9 @@ def test_a_chain_of_many_links_is_the_beam():
 
 
 @pytest.mark.slow
-def test_a_chain_with_twice_the_links_is_four_times_as_near():
-    """Order two in the rest position and the fundamental frequency."""
-    pytest.importorskip("exudyn", reason="the finite elements are Exudyn's: pip install exudyn")
+def test_chains_of_links_converge_with_order_two():
+    """Rest position and fundamental frequency: twice the links, a quarter of the error."""
+    pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
     base, errors = mechanism("PRBDM2R"), []
     for n in (8, 16):
         kind = replace(base.flexure_types[0], model="nR", n=n, axial=True, coefficients={})
@@ -52,24 +52,24 @@ def test_a_chain_with_twice_the_links_is_four_times_as_near():
     np.testing.assert_allclose(np.divide(*errors), 4.0, rtol=0.1)
 
 
-def test_the_holding_force_is_the_weight(guide):
-    """Straight flexures carry nothing across: m g of all that hangs on them, by both sides."""
+def test_the_holding_force_of_the_straight_guide_is_the_weight(guide):
+    """Straight flexures carry no transverse force."""
     values = mechanism("PRBDM2R").values()
     leaf = math.prod(values[f"flexure.{x}"] for x in ("density", "length", "width", "thickness"))
-    weight = -9.81 * (values["shuttle.mass"] + leaf)  # half of each flexure is the ground's
+    weight = -9.81 * (values["shuttle.mass"] + leaf)  # The ground carries half of each flexure.
     row = guide["holding force, straight"]
     assert row.model == pytest.approx(weight, rel=1e-4)
     assert row.elements == pytest.approx(weight, rel=1e-4)
 
 
-def test_the_stiffness_is_that_of_two_beams(guide):
-    """24 EI/L^3, which the elements have to 1e-4 and the 2R to 0.7 %."""
+def test_the_stiffness_of_the_straight_guide_is_that_of_two_beams(guide):
+    """24 EI/L^3; the elements agree to 2e-4 and the 2R to 0.8 %."""
     exact = 24 * (181.5e9 * 8e-3 * 1e-12 / 12) / 40e-3**3
     assert guide["stiffness, straight"].elements == pytest.approx(exact, rel=2e-4)
     assert guide["stiffness, straight"].model == pytest.approx(exact, rel=0.008)
 
 
-def test_model_values_are_the_engines(guide):
+def test_model_frequencies_equal_those_of_the_engine(guide):
     m = mechanism("PRBDM2R")
     system = assemble(m, m.values())
     f = modes(system, equilibrium(system)).frequency
@@ -77,7 +77,7 @@ def test_model_values_are_the_engines(guide):
         assert guide[f"frequency {i} at rest"].model == pytest.approx(f[i - 1], rel=1e-12)
 
 
-def test_measurements_are_off_in_units_of_their_uncertainty(guide):
+def test_differences_from_measurements_are_in_units_of_their_uncertainty(guide):
     row = guide["frequency 1 at rest"]
     assert row.away(row.model) == pytest.approx((row.model - 4.82) / 0.06, rel=1e-12)
     assert math.isnan(guide["rest position"].away(1.0))
@@ -85,7 +85,7 @@ def test_measurements_are_off_in_units_of_their_uncertainty(guide):
     assert math.isnan(exact.away(1.0))
 
 
-def test_a_comparison_is_a_table_a_file_and_a_figure(guide, tmp_path):
+def test_a_comparison_can_be_printed_written_and_drawn(guide, tmp_path):
     text = str(guide)
     assert "4.820 ± 0.060 Hz" in text
     assert len(text.splitlines()) == 3 + len(guide.rows)
@@ -98,21 +98,21 @@ def test_a_comparison_is_a_table_a_file_and_a_figure(guide, tmp_path):
     assert png(comparison_figure(guide)).startswith(b"\x89PNG")
 
 
-def test_walls_that_cannot_be_moved_are_noted_and_zeros_are_zeros():
-    """No gravity: rest and holding force are 0; the hammer's wall has a place of its own."""
-    pytest.importorskip("exudyn", reason="the finite elements are Exudyn's: pip install exudyn")
-    told: list[float] = []
-    found = compare(mechanism("ImpactOscillator"), elements=2, progress=told.append)
+def test_an_unmovable_wall_gives_a_note_and_round_off_is_zero():
+    """Without gravity rest position and holding force are 0; the hammer's wall is an expression."""
+    pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
+    fractions: list[float] = []
+    found = compare(mechanism("ImpactOscillator"), elements=2, progress=fractions.append)
     assert found["rest position"].elements == found["rest position"].model == 0.0
     assert math.isnan(found["rest position"].relative)
     assert any("impact" in note for note in found.notes)
-    assert told[-1] == 1.0
-    assert told == sorted(told)
+    assert fractions[-1] == 1.0
+    assert fractions == sorted(fractions)
 
 
-def test_friction_and_damping_in_proportion_to_mass_are_left_out():
-    """They change no shape and no frequency here, and the elements do not know them."""
-    pytest.importorskip("exudyn", reason="the finite elements are Exudyn's: pip install exudyn")
+def test_friction_and_mass_proportional_damping_have_no_effect():
+    """The comparison sets them to zero, since the elements do not have them."""
+    pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
     rubbed = {"friction.coefficient": 0.3, "friction.normal_force": 1.0, "damping.zeta": 0.1}
     plain, with_friction = (
         compare(mechanism("PRBDM"), values, elements=2) for values in ({}, rubbed)
@@ -120,10 +120,10 @@ def test_friction_and_damping_in_proportion_to_mass_are_left_out():
     assert str(plain) == str(with_friction)
 
 
-def test_what_is_not_compared_is_refused(guide):
+def test_unknown_quantities_are_rejected(guide):
     with pytest.raises(ParameterError, match="'frequency' was measured but is not compared"):
         compare(mechanism("PRBDM"), elements=2, measured={"frequency": Estimate(4.8, 0.1)})
-    with pytest.raises(ParameterError, match="was not compared; there are rest position"):
+    with pytest.raises(ParameterError, match="was not compared; compared are rest position"):
         guide["frequency"]
 
 
@@ -147,7 +147,7 @@ def test_without_exudyn_the_error_names_the_installation(monkeypatch):
         (Row("rest position", "m", 0.0, 0.0), " 0"),
     ],
 )
-def test_percents_are_told_where_they_have_a_meaning(row, last):
-    told = str(Comparison("some", 8, (row,)))
-    assert told.endswith(last)
+def test_differences_above_100_percent_and_of_ratios_are_absolute(row, last):
+    line = str(Comparison("some", 8, (row,)))
+    assert line.endswith(last)
     assert png(comparison_figure(Comparison("some", 8, (row,)))).startswith(b"\x89PNG")

@@ -1,4 +1,4 @@
-"""Parameters fitted to frequencies, responses and forces, and what the data do not determine."""
+"""Parameters fitted to frequencies, responses and forces, and undetermined parameters."""
 
 import dataclasses
 import math
@@ -32,7 +32,7 @@ from prbm.mechanics.statics import equilibrium
 from prbm.plots.fit import force_figure, response_figure, valley_figure
 from support import PMMA, ScalarGuide, mechanism
 
-RATE, NOISE = 750.0, 4e-6  # Hz, m: the source's laser
+RATE, NOISE = 750.0, 4e-6  # Hz, m: the laser sensor of the thesis
 K = "flexure.K_theta"
 F5 = Frequency(Estimate(5.0, 0.01))
 DROPPED = {"release.displacement": -0.01, "damping.beta": 0.0, K: 2.5449}
@@ -87,10 +87,10 @@ def record(restitution, duration=0.2, wall=0.0, seed=0, shift=0.0, noise=NOISE):
 
 
 @pytest.mark.parametrize("measured", [5.6375, 5.6348])
-def test_the_1r_of_the_pmma_guide_is_stiffened_to_2_55(measured):
-    """Finite elements have 5.6375 Hz, the source's 5.6348: K_theta = 2.545 -+ 0.01.
+def test_k_theta_of_the_pmma_guide_fits_to_2_545(measured):
+    """Our finite elements give 5.6375 Hz, those of the thesis 5.6348 Hz: K_theta = 2.545 -+ 0.01.
 
-    Without gravity the frequency goes with the root of K_theta, so that the fit has a closed form.
+    Without gravity the frequency is proportional to sqrt(K_theta): the fit has a closed form.
     """
     found = fit(mechanism("PRBDM"), [K], Frequency(Estimate(measured, 5e-5)), PMMA)
     expected = 2.65 * (measured / frequency(PMMA)) ** 2
@@ -102,11 +102,11 @@ def test_the_1r_of_the_pmma_guide_is_stiffened_to_2_55(measured):
     assert found.values[K] == found[K].value
 
 
-def test_the_1r_of_the_steel_guide_takes_2_586():
-    """Finite elements have 4.907 Hz at rest: above the 2.545 of the straight PMMA guide.
+def test_k_theta_of_the_steel_guide_fits_to_2_586():
+    """Finite elements give 4.907 Hz at rest; K_theta is above the 2.545 of the straight PMMA guide.
 
-    Gravity deflects the steel guide by a quarter of its length and stiffens it, which the 1R has
-    less of than the flexures.
+    Gravity deflects the steel guide by a quarter of its length, which stiffens it, and the 1R model
+    underestimates this effect.
     """
     found = fit(mechanism("PRBDM"), [K], Frequency(Estimate(4.907, 5e-4)))
     expected = brentq(lambda k: frequency({K: k}) - 4.907, 2.0, 3.0, xtol=1e-13)
@@ -114,8 +114,8 @@ def test_the_1r_of_the_steel_guide_takes_2_586():
     assert found[K].value == pytest.approx(2.586, abs=1e-3)
 
 
-def test_frequencies_can_be_of_held_shapes_and_higher_modes():
-    """The value that the target has for true parameters is the engine's own; fits go back."""
+def test_fits_to_frequencies_of_held_shapes_and_higher_modes_recover_the_parameters():
+    """The data are the engine's frequencies for known parameters."""
     m, truth = mechanism("PRBDM2R"), {"flexure.K_theta1": 3.9, "flexure.K_theta2": 1.9}
     system = assemble(m, m.values(truth))
     targets = []
@@ -143,31 +143,31 @@ def test_stated_uncertainties_of_a_fit_cover_the_truth():
     assert 0.585 < hits / 200 < 0.781
 
 
-# --- what cannot be told apart ------------------------------------------------------------------
+# --- undetermined parameters -------------------------------------------------------------------
 
 BOTH = ["flexure.K_theta1", "flexure.K_theta2"]
 
 
 @pytest.fixture(scope="module")
 def ambiguous() -> Fit:
-    """Both stiffness coefficients of the 2R to one frequency, as the source fitted them."""
+    """Fit both stiffness coefficients of the 2R to one frequency, as in the thesis."""
     return fit(mechanism("PRBDM2R"), BOTH, Frequency(Estimate(5.6375, 5e-5)), PMMA)
 
 
-def test_one_frequency_does_not_tell_two_coefficients_apart(ambiguous):
-    """The fit meets the frequency and says that it determines neither, and the direction."""
+def test_one_frequency_cannot_separate_two_coefficients(ambiguous):
+    """The fit meets the frequency and reports the undetermined direction."""
     assert ambiguous.rms["frequency 1 at rest"] < 1e-6
     assert not ambiguous.identifiable
     assert ambiguous.singular[1] == 0.0
     assert all(math.isinf(ambiguous[name].uncertainty) for name in BOTH)
     (note,) = ambiguous.notes
-    assert "flexure.K_theta1 and flexure.K_theta2 cannot be told apart" in note
-    assert "changes nothing" in note
+    assert "cannot separate flexure.K_theta1 and flexure.K_theta2" in note
+    assert "has no effect" in note
     assert "not determined" in str(ambiguous)
 
 
-def test_the_direction_of_the_valley_leaves_the_frequency_alone(ambiguous):
-    """A step of 1e-3 along it changes the frequency to second order, across it to first."""
+def test_the_frequency_is_constant_along_the_valley(ambiguous):
+    """A step of 1e-3 changes the frequency to second order along it, to first order across it."""
     direction = np.array(list(ambiguous.valleys[0].shares.values())) * ambiguous.p
     target = ambiguous.problem.targets[0]
 
@@ -180,8 +180,8 @@ def test_the_direction_of_the_valley_leaves_the_frequency_alone(ambiguous):
     assert changed(1e-3 * across) > 1e-4
 
 
-def test_the_valley_is_a_level_curve_and_a_figure(ambiguous):
-    """Along the profile every pair has the frequency; the published pair is next to it."""
+def test_every_point_of_the_valley_has_the_measured_frequency(ambiguous):
+    """The valley can be printed and drawn."""
     found = valley(ambiguous, BOTH[0], (2.9, 6.0), 7)
     assert found.points[[0, -1], 0].tolist() == [2.9, 6.0]
     assert np.all(np.diff(found.points, axis=0)[:, 0] > 0)
@@ -194,8 +194,8 @@ def test_the_valley_is_a_level_curve_and_a_figure(ambiguous):
     assert valley(ambiguous, points=2).along in BOTH
 
 
-def test_the_head_of_a_valley_is_apart_as_its_columns_are(ambiguous):
-    """Names are longer than numbers: words of the head end where the numbers under them end."""
+def test_the_header_of_a_valley_is_aligned_with_its_columns():
+    """Long names end at the same column as the numbers below them."""
     names = ("flexure.K_theta", "flexure_of_a_long_name.youngs_modulus", "release.displacement")
     points = np.array([[2.65, 181.5e9, -0.01]])
     head, row = str(Valley(names, names[0], points, np.zeros(1), points[0])).splitlines()
@@ -204,8 +204,8 @@ def test_the_head_of_a_valley_is_apart_as_its_columns_are(ambiguous):
     assert ends[0] == ends[1]
 
 
-def test_three_coefficients_and_one_frequency_leave_two_valleys():
-    """The 3R: two directions change nothing, the third is as sharp as the frequency."""
+def test_three_coefficients_and_one_frequency_have_two_undetermined_directions():
+    """The third direction of the 3R is as accurate as the frequency."""
     m = mechanism("PRBDM2R")
     kinds = tuple(dataclasses.replace(kind, model="3R") for kind in m.flexure_types)
     m = dataclasses.replace(m, flexure_types=kinds)
@@ -216,8 +216,8 @@ def test_three_coefficients_and_one_frequency_leave_two_valleys():
     assert found.singular[0] > 1e4
 
 
-def test_a_product_cannot_be_taken_apart():
-    """The stiffness has E K_theta only: the valley is (1, -1)/sqrt 2 in relative changes."""
+def test_factors_of_a_product_are_not_determined():
+    """The stiffness depends on E K_theta: the valley is (1, -1)/sqrt 2 in relative changes."""
     free = [K, "flexure.youngs_modulus"]
     found = fit(mechanism("PRBDM"), free, Frequency(Estimate(4.9, 1e-3)))
     shares = np.array(list(found.valleys[0].shares.values()))
@@ -228,10 +228,10 @@ def test_a_product_cannot_be_taken_apart():
 
 
 def test_a_parameter_without_effect_is_not_determined():
-    """The static shape does not know of the restitution."""
+    """The frequency at rest does not depend on the restitution."""
     target = Frequency(Estimate(5.6375, 1e-3))
     found = fit(mechanism("PRBDM"), [K, "stop.restitution"], target, PMMA)
-    assert str(found.valleys[0]) == "stop.restitution cannot be determined by these data"
+    assert str(found.valleys[0]) == "these data cannot determine stop.restitution"
     assert math.isinf(found["stop.restitution"].uncertainty)
     assert found[K].uncertainty == pytest.approx(found[K].value * 2e-3 / 5.6375, rel=1e-3)
     assert np.isnan(found.correlation[0, 1])
@@ -247,14 +247,14 @@ def held(values, x):
     return 4 * one.k * phi / (one.r * np.cos(phi)) - one.mass * one.g
 
 
-def test_forces_of_the_1r_are_those_of_the_scalar_equation():
+def test_forces_of_the_1r_equal_those_of_the_scalar_equation():
     x = np.linspace(-0.015, 0.015, 7)
     target = ForceDeflection(x, np.zeros(7))
     np.testing.assert_allclose(target.model(mechanism("PRBDM"), {}), held({}, x), rtol=1e-8)
 
 
-def test_stiffness_and_sensor_zero_come_back_from_a_force_deflection_curve():
-    """A cell of 1 mN; gravity and its zero are told from the stiffness by the curve's slope."""
+def test_a_fit_to_a_force_deflection_curve_recovers_stiffness_and_sensor_zero():
+    """The noise is 1 mN; the slope of the curve separates the stiffness from the sensor's zero."""
     x = np.linspace(-0.01, 0.01, 60)
     F = held({K: 2.5}, x) + 0.02 + 1e-3 * np.random.default_rng(1).standard_normal(60)
     found = fit(mechanism("PRBDM"), [K, Free("record.zero", -0.1, 0.1)], ForceDeflection(x, F))
@@ -262,34 +262,34 @@ def test_stiffness_and_sensor_zero_come_back_from_a_force_deflection_curve():
     assert found["record.zero"].value == pytest.approx(0.02, abs=1e-3)
     assert found.rms["force over deflection"] == pytest.approx(1e-3, rel=0.3)
     assert found[K].freedom == 58
-    assert abs(found.correlation[0, 1]) < 0.1, "a symmetric range keeps them apart"
+    assert abs(found.correlation[0, 1]) < 0.1, "a symmetric range decouples them"
 
 
-def test_a_model_that_errs_more_than_the_data_is_said():
-    """Forces of a cubic spring: the residuals exceed the stated uncertainty, which is widened."""
+def test_uncertainties_are_widened_if_the_model_does_not_fit():
+    """Forces of a cubic spring: the residuals exceed the stated uncertainty; a note reports it."""
     x = np.linspace(-0.01, 0.01, 40)
     F = held({}, x) * (1 + 2e3 * x**2)
     found = fit(mechanism("PRBDM"), [K], ForceDeflection(x, F, 1e-4))
     assert found.reduced > 10
-    assert any("the model errs" in note for note in found.notes)
+    assert any("the error of the model exceeds" in note for note in found.notes)
     close = fit(mechanism("PRBDM"), [K], ForceDeflection(x, held({}, x), 1e-4))
     assert found[K].uncertainty > 10 * close[K].uncertainty
     assert close.notes == ()
 
 
-def test_bounds_hold_and_are_said():
+def test_a_parameter_at_its_bound_is_reported():
     found = fit(mechanism("PRBDM"), [Free(K, 2.6, 3.0)], Frequency(Estimate(4.7, 1e-3)))
     assert found[K].value == pytest.approx(2.6, rel=1e-6)
     assert any("ended at its bound 2.6" in note for note in found.notes)
-    assert "2.6 (not determined)" in str(found), "the data would have it below"
+    assert "2.6 (not determined)" in str(found), "the best value is below the bound"
     assert not found.identifiable
-    assert found.valleys == (), "it is the bound that holds it, not the data that say nothing"
+    assert found.valleys == (), "the data determine it; the bound limits it"
     wide = fit(mechanism("PRBDM"), [K, Free("stop.restitution", -1.0, 5.0)], F5).problem
-    assert (wide.lower[1], wide.upper[1]) == (0.0, 1.0), "the mechanism's own bounds hold, too"
+    assert (wide.lower[1], wide.upper[1]) == (0.0, 1.0), "bounds of the mechanism are kept"
 
 
 def test_the_title_of_a_fit_is_not_wider_than_its_figure():
-    """What is known to twelve digits takes a line a parameter, what is short shares one."""
+    """Parameters with twelve digits take one line each; short ones share a line."""
     m = mechanism("PRBDM")
     d = np.array([-0.01, 0.005, 0.01])
     system = assemble(m, m.values())
@@ -306,8 +306,8 @@ def test_the_title_of_a_fit_is_not_wider_than_its_figure():
 # --- responses ----------------------------------------------------------------------------------
 
 
-def test_stiffness_comes_back_from_a_free_response():
-    """As the source fitted, by the RMSE over time; here it ends at the noise of the sensor."""
+def test_a_fit_to_a_free_response_recovers_the_stiffness():
+    """By the RMSE over time, as in the thesis; it converges to the noise of the sensor."""
     series = record(1.0, 0.3, 0.03)  # the wall is out of reach
     values = DROPPED | {"stop.position": 0.03, K: 2.65}
     found = fit(mechanism("PRBDM"), [Free(K, 2.0, 3.2)], Response(series), values)
@@ -318,8 +318,8 @@ def test_stiffness_comes_back_from_a_free_response():
 
 
 @pytest.mark.parametrize("restitution", [0.25, 0.6, 0.95])
-def test_restitution_comes_back_from_a_bouncing_response(restitution):
-    """Within 0.01 whatever it starts from; the record is of another integrator."""
+def test_a_fit_to_a_bouncing_response_recovers_the_restitution(restitution):
+    """Within 0.01 from a start at 0.5; the record is computed by another integrator."""
     found = fitted_restitution(
         mechanism("PRBDM"), record(restitution, 0.13), DROPPED | {"stop.restitution": 0.5}
     )
@@ -330,8 +330,8 @@ def test_restitution_comes_back_from_a_bouncing_response(restitution):
 
 
 @pytest.mark.slow
-def test_restitution_wall_and_start_come_back_together():
-    """The wall 0.4 mm off, the record 0.7 ms late: none of it spoils the restitution."""
+def test_a_fit_recovers_restitution_wall_and_start_together():
+    """The wall is 0.4 mm off and the record 0.7 ms late."""
     series = record(0.6, 0.2, 0.4e-3, 0, 0.7e-3)
     more = [Free("stop.position", -2e-3, 2e-3), Free("record.shift", -2e-3, 2e-3)]
     found = fitted_restitution(mechanism("PRBDM"), series, DROPPED, uncertainty=NOISE, free=more)
@@ -358,11 +358,11 @@ def test_stated_uncertainty_of_the_restitution_covers_the_truth():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("wall", "low", "high"), [(0.0, -0.01, 0.01), (-0.01, 0.04, 0.12)])
-def test_the_1r_reads_the_modal_restitution_of_a_model_with_more_modes(wall, low, high):
-    """A 2R that stretches, eps 0.6: the 1R finds (1 + eps) mu_1 - 1 where flexures are straight.
+def test_a_1r_fitted_to_a_2r_has_its_modal_restitution_at_straight_flexures(wall, low, high):
+    """For a 2R with stretching flexures the fit is (1 + eps) mu_1 - 1 at straight flexures.
 
-    Deflected by 10 mm it finds more, because later impacts meet what the first left in other
-    modes: the number is of all impacts of the record.
+    At -10 mm it is larger: it is one number for all impacts of the record, and the later impacts
+    depend on the energy that the first one left in other modes.
     """
     m = mechanism("PRBDM2R")
     kinds = tuple(dataclasses.replace(kind, axial=True) for kind in m.flexure_types)
@@ -379,13 +379,13 @@ def test_the_1r_reads_the_modal_restitution_of_a_model_with_more_modes(wall, low
     assert low < found["stop.restitution"].value - arriving < high
 
 
-def test_the_starts_are_tried_and_told():
+def test_all_starts_are_evaluated_and_reported():
     """Five along the one parameter, and the given one."""
-    told = []
-    found = fit(mechanism("PRBDM"), [K], F5, starts=5, progress=told.append)
-    assert told[:6] == pytest.approx([1 / 12, 2 / 12, 3 / 12, 4 / 12, 5 / 12, 6 / 12])
-    assert told == sorted(told), "then the fit from the best"
-    assert told[-1] == 1.0
+    fractions = []
+    found = fit(mechanism("PRBDM"), [K], F5, starts=5, progress=fractions.append)
+    assert fractions[:6] == pytest.approx([1 / 12, 2 / 12, 3 / 12, 4 / 12, 5 / 12, 6 / 12])
+    assert fractions == sorted(fractions), "then the minimisation from the best start"
+    assert fractions[-1] == 1.0
     assert found[K].value == pytest.approx(fit(mechanism("PRBDM"), [K], F5)[K].value, rel=1e-8)
 
 
@@ -393,13 +393,13 @@ def test_a_fit_without_convergence_has_a_note(monkeypatch):
     monkeypatch.setattr("prbm.analysis.fit.problem.STEPS_MAX", 1)
     found = fit(mechanism("PRBDM"), [K], F5)
     assert not found.converged
-    assert "did not lead to a least misfit" in str(found)
+    assert "no convergence in" in str(found)
     monkeypatch.undo()
     assert fit(mechanism("PRBDM"), [K], F5).converged
 
 
-def test_what_is_known_of_the_record_is_given():
-    """A zero of the sensor that is not fitted is taken as it is."""
+def test_record_parameters_can_be_given_or_fitted():
+    """A sensor zero that is not fitted keeps its given value."""
     x = np.linspace(-0.01, 0.01, 20)
     target = ForceDeflection(x, held({K: 2.5}, x) + 0.05)
     found = fit(mechanism("PRBDM"), [K], target, {"record.zero": 0.05})
@@ -409,18 +409,18 @@ def test_what_is_known_of_the_record_is_given():
     assert freed["record.zero"].value == pytest.approx(0.05, rel=1e-8), "bounds are about 0.04"
 
 
-def test_a_record_without_impact_has_no_restitution():
+def test_a_record_without_impact_is_rejected():
     with pytest.raises(EvaluationError, match="no impact in the record"):
         fitted_restitution(mechanism("PRBDM"), record(1.0, 0.5, 0.03), DROPPED)
 
 
-# --- refusals -----------------------------------------------------------------------------------
+# --- invalid fits -------------------------------------------------------------------------------
 
-REFUSED = {
+INVALID = {
     "nothing": (lambda m: fit(m, [], F5), "nothing to fit"),
     "no target": (lambda m: fit(m, [K], []), "nothing to fit"),
-    "twice": (lambda m: fit(m, [K, K], F5), "fitted twice"),
-    "bounds": (lambda m: fit(m, [Free(K, 3.0, 2.0)], F5), "leave nothing to fit"),
+    "twice": (lambda m: fit(m, [K, K], F5), "listed twice"),
+    "bounds": (lambda m: fit(m, [Free(K, 3.0, 2.0)], F5), "are not an interval"),
     "zero without bounds": (lambda m: fit(m, ["stop.position"], F5), "give Free"),
     "mixed uncertainties": (
         lambda m: fit(m, [K], [F5, ForceDeflection(np.zeros(2), np.zeros(2))]), "some targets only"
@@ -431,7 +431,7 @@ REFUSED = {
     "exact frequency": (lambda m: Frequency(Estimate(5.0, 0.0)), "standard uncertainty"),
     "frequency without uncertainty": (lambda m: Frequency(5.0), "^frequency = 5.0 has no uncert"),
     "frequency as text": (lambda m: Frequency("5 Hz"), r"give Frequency\(Estimate\(value, stand"),
-    "target that is none": (lambda m: fit(m, [K], 3.0), "3.0 is no target"),
+    "number as target": (lambda m: fit(m, [K], 3.0), "3.0 must be a target"),
     "mode 0": (lambda m: Frequency(Estimate(5.0, 0.1), 0), "the fundamental is 1"),
     "mode 2 of one": (lambda m: fit(m, [K], Frequency(Estimate(5.0, 0.1), 2)), "has 1 modes"),
     "pairs": (lambda m: ForceDeflection(np.zeros(2), np.zeros(3)), "give pairs"),
@@ -447,19 +447,18 @@ REFUSED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_fits_that_cannot_be_are_refused(name):
-    """Each with a sentence of its own."""
-    attempt, says = REFUSED[name]
-    with pytest.raises(EvaluationError, match=says):
+@pytest.mark.parametrize("name", INVALID)
+def test_invalid_fits_are_rejected(name):
+    attempt, message = INVALID[name]
+    with pytest.raises(EvaluationError, match=message):
         attempt(mechanism("PRBDM"))
 
 
 @dataclasses.dataclass(frozen=True)
 class Own:
-    """A target of a user's, whose model says what it is told to."""
+    """A user's target whose model returns given values."""
 
-    said: object
+    returned: object
     label: str = "rest position"
     unit: str = "m"
     uncertainty: float | None = 1e-5
@@ -469,24 +468,24 @@ class Own:
         return np.array([0.01])
 
     def model(self, mechanism, values):
-        return self.said
+        return self.returned
 
 
 @pytest.mark.parametrize(
-    ("said", "words"),
+    ("returned", "message"),
     [
         ([1.0, 2.0], "an array of length 2, its data are an array of length 1"),
         (np.ones((1, 1)), r"an array of shape \(1, 1\), its data are an array of length 1"),
         (1.0, r"an array of shape \(\), its data are an array of length 1"),
     ],
 )
-def test_a_model_of_another_length_than_its_data_is_refused(said, words):
-    """Not stretched to the data: a fit to that is none."""
-    with pytest.raises(EvaluationError, match=f"rest position: its model returns {words}"):
-        fit(mechanism("PRBDM"), [K], Own(said))
+def test_a_model_with_another_shape_than_its_data_is_rejected(returned, message):
+    """NumPy would broadcast it to the shape of the data."""
+    with pytest.raises(EvaluationError, match=f"rest position: its model returns {message}"):
+        fit(mechanism("PRBDM"), [K], Own(returned))
 
 
-def test_unknown_names_are_refused_with_the_nearest():
+def test_errors_on_unknown_names_propose_the_nearest():
     with pytest.raises(ParameterError, match=r"did you mean .*flexure\.K_theta"):
         fit(mechanism("PRBDM"), ["flexure.K_thet"], F5)
     with pytest.raises(EvaluationError, match=r"did you mean .*shuttle\.x") as caught:
@@ -498,7 +497,7 @@ def test_unknown_names_are_refused_with_the_nearest():
 
 @pytest.mark.parametrize("amount", [1, 2])
 def test_exact_data_give_exact_parameters(amount):
-    """Forces of the model itself leave no residual: that is knowledge, not the lack of it."""
+    """A residual of zero must not be mistaken for a lack of information."""
     names, x = ["flexure.youngs_modulus", "shuttle.mass"][:amount], np.linspace(-0.015, 0.015, 7)
     guide = mechanism("PRBDM")
     F = ForceDeflection(x, np.ones(7)).model(guide, {})
@@ -509,8 +508,8 @@ def test_exact_data_give_exact_parameters(amount):
         assert found[name].relative < 1e-7
 
 
-def test_a_response_may_be_the_displacement_along_the_release():
-    """Of a guide released along x it is x; along any other direction the projection."""
+def test_a_displacement_response_is_the_projection_on_the_release_direction():
+    """For a release at 30 degrees it is cos(30) x + sin(30) y."""
     guide = mechanism("PRBDM")
     turned = dataclasses.replace(guide, release=dataclasses.replace(guide.release, direction=30.0))
     t = np.arange(20) * 2e-3
@@ -523,9 +522,9 @@ def test_a_response_may_be_the_displacement_along_the_release():
     assert along[0] == pytest.approx(-5e-3, abs=1e-9)
 
 
-def test_a_valley_tells_how_much_of_it_is_followed():
-    told = []
+def test_a_valley_reports_its_progress():
+    fractions = []
     both = fit(mechanism("PRBDM2R"), ["flexure.K_theta1", "flexure.K_theta2"], F5)
-    found = valley(both, points=3, progress=told.append)
-    assert len(told) == len(found.misfit)
-    assert told[-1] == 1.0
+    found = valley(both, points=3, progress=fractions.append)
+    assert len(fractions) == len(found.misfit)
+    assert fractions[-1] == 1.0

@@ -1,4 +1,4 @@
-"""Maps of impact efficiency: laws of energy, independent routes, finite elements."""
+"""Maps of the modal restitution: conservation of energy, closed forms, finite elements."""
 
 import csv
 import io
@@ -23,7 +23,7 @@ from support import mechanism
 
 WEIGHTLESS = {"gravity.x": 0.0}
 TIMES = np.linspace(0.0, 0.1, 20)
-CORNERS = {"heights": (-10e-3, 0.0, 10e-3), "offsets": (-4e-3, 0.0, 4e-3)}
+CORNERS = {"walls": (-10e-3, 0.0, 10e-3), "offsets": (-4e-3, 0.0, 4e-3)}
 
 
 def guide(model="2R", *, axial=False, n=0):
@@ -31,7 +31,7 @@ def guide(model="2R", *, axial=False, n=0):
 
 
 def test_energies_of_a_pure_mode_add_up():
-    """Sum of what the modes keep and the contact takes, for any rows and restitution."""
+    """The energies in the modes and the loss in the contact add up to the arriving energy."""
     rng = np.random.default_rng(0)
     for restitution in (0.0, 0.3, 1.0):
         G = rng.standard_normal(6)
@@ -42,8 +42,8 @@ def test_energies_of_a_pure_mode_add_up():
 
 @pytest.mark.parametrize("model", ["1R", "2R", "3R"])
 @pytest.mark.parametrize("axial", [False, True])
-def test_algebraic_restitution_is_that_of_an_impulse(model, axial):
-    """The sum over modes against the mass matrix on the tangent of the loops."""
+def test_algebraic_restitution_equals_that_of_an_impulse(model, axial):
+    """The sum over modes equals the solution with the constrained mass matrix."""
     values = WEIGHTLESS | {"stop.offset": 3e-3, "stop.position": -7e-3}
     system = assemble(m := guide(model, axial=axial), m.values(values))
     shape = impact_shape(system, 0, -7e-3)
@@ -60,61 +60,57 @@ def test_algebraic_restitution_is_that_of_an_impulse(model, axial):
     assert pytest.approx(-(v @ M @ after), abs=1e-9) == C
 
 
-def test_the_inextensible_1r_knows_neither_wall_nor_offset():
-    """One degree of freedom: what arrives is the mode, and Newton's law is all there is."""
+def test_restitution_of_the_inextensible_1r_is_newtons_at_every_wall_and_offset():
+    """With one degree of freedom the motion is the fundamental mode."""
     flat = impact_map.algebraic(guide("1R"), **CORNERS, values=WEIGHTLESS)
     np.testing.assert_allclose(flat.restitution, 0.6, atol=1e-12)
     hit = impact_map.simulated(guide("1R"), [-5e-3], [4e-3], WEIGHTLESS)
     np.testing.assert_allclose(hit.restitution, 0.6, atol=1e-9)
 
 
-def test_the_closed_form_is_near_the_model_that_stretches():
-    """A free body on the path: within 0.0064 of finite elements, and about that of the 2R."""
+def test_the_closed_form_is_near_the_2r_with_stretching_flexures():
+    """The closed form on the 2R's path and the 2R differ by at most 0.0064."""
     closed = impact_map.closed_form(guide(), values=WEIGHTLESS)
     model = impact_map.algebraic(guide(axial=True), values=WEIGHTLESS)
     np.testing.assert_allclose(closed.restitution, model.restitution, atol=0.0064)
     centre = closed.restitution[2, 2]
-    assert centre == pytest.approx(0.6, abs=1e-6)  # straight and centred: nothing is in the way
+    assert centre == pytest.approx(0.6, abs=1e-6)  # straight and centred: eps itself
 
 
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R", "PRBDM2RAxial", "PRBDM3R"])
-def test_the_closed_form_fits_every_guide(name):
+def test_the_closed_form_applies_to_every_guide(name):
     """A straight guide hit off its centre: (1 + eps)/(1 + m d^2/J) - 1, J = m (a^2 + b^2)/12."""
     m = mechanism(name)
     known = m.values()
     ratio = known["shuttle.mass"] * 3e-3**2 / known["shuttle.inertia"]
     found = impact_map.closed_form(m, [0.0, -17e-3], [3e-3], WEIGHTLESS).restitution
     assert found[0, 0] == pytest.approx(1.6 / (1 + ratio) - 1, abs=1e-6)
-    assert found[0, 1] < found[0, 0]  # its path is no longer along the direction of the stop
+    assert found[0, 1] < found[0, 0]  # The path is oblique to the stop there.
 
 
 @pytest.mark.parametrize(
-    ("name", "height", "offset", "said"),
+    ("name", "wall", "offset", "message"),
     [
         ("Cantilever", 3e-3, 0.0, "tip turns"),  # by 3/2 of its path over its length
-        (
-            "FoldedSuspension",
-            1e-7,
-            0.0,
-            r"shuttle along its path is 8\d",
-        ),  # 200 g of 230 and leaves
+        # The shuttle has 200 g; the stages at half its speed add 30 g, the flexures the rest.
+        ("FoldedSuspension", 1e-7, 0.0, r"shuttle along its path is 8\d"),
     ],
 )
-def test_the_closed_form_is_refused_where_the_body_turns_or_others_move(name, height, offset, said):
+def test_the_closed_form_is_rejected_if_the_body_turns_or_others_move(name, wall, offset, message):
     m = mechanism(name)
-    with pytest.raises(ParameterError, match=said) as error:
-        impact_map.closed_form(m, [height], [offset])
-    assert "choose another way" in str(error.value)
+    with pytest.raises(ParameterError, match=message) as error:
+        impact_map.closed_form(m, [wall], [offset])
+    assert "choose another method" in str(error.value)
 
 
-def test_the_closed_form_is_refused_where_a_lever_makes_a_little_turning_much():
-    """Far aside of the centre of mass the little that a deflected guide turns is a motion."""
+def test_the_closed_form_is_rejected_if_a_long_lever_amplifies_the_rotation():
+    """A deflected guide turns slightly, which moves a hit point far from the centre of mass."""
     impact_map.closed_form(guide(), [-15e-3], [10e-3], WEIGHTLESS)
     with pytest.raises(ParameterError, match="shuttle turns"):
         impact_map.closed_form(guide(), [-15e-3], [0.2], WEIGHTLESS)
 
 
-def test_the_closed_form_is_refused_at_a_stop_that_moves():
+def test_the_closed_form_is_rejected_at_a_stop_on_a_moving_body():
     two = guide()
     other = replace(two.bodies[0], name="other")
     on = replace(two.stops[0], on="other")
@@ -131,8 +127,8 @@ def test_the_closed_form_is_refused_at_a_stop_that_moves():
         impact_map.closed_form(moving)
 
 
-def test_the_stretching_2r_agrees_with_finite_elements_everywhere():
-    """To 0.005 at the source's 25 points, nothing fitted; without stretching it does not."""
+def test_the_2r_with_stretching_flexures_agrees_with_finite_elements():
+    """To 0.005 at the 25 points of the thesis without a fit; 0.03 off without stretching."""
     pytest.importorskip(
         "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
     )
@@ -149,8 +145,8 @@ def test_the_stretching_2r_agrees_with_finite_elements_everywhere():
     ("model", "n", "error"),
     [("1R", 0, 0.014), ("2R", 0, 0.003), ("3R", 0, 0.006), ("nR", 40, 5e-4)],
 )
-def test_models_that_stretch_are_as_near_to_finite_elements_as_is_said(model, n, error):
-    """Section 2.6 of the design: 1R 0.013, 2R 0.003, 3R 0.006; the long chain converges."""
+def test_errors_of_models_with_stretching_flexures_are_as_documented(model, n, error):
+    """Largest difference from finite elements: 1R 0.013, 2R 0.003, 3R 0.006, 40R 5e-4."""
     pytest.importorskip(
         "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
     )
@@ -160,18 +156,18 @@ def test_models_that_stretch_are_as_near_to_finite_elements_as_is_said(model, n,
 
 
 def test_energies_of_a_simulated_impact_add_up():
-    """What arrives is in the modes, what leaves in the modes and the contact."""
+    """The modes have the arriving energy; after the impact the modes and the contact have it."""
     hit = impact_map.simulated(guide(), [-10e-3], [4e-3], WEIGHTLESS).hits[0][0]
-    assert (hit.height, hit.offset) == (-10e-3, 4e-3)
+    assert (hit.wall, hit.offset) == (-10e-3, 4e-3)
     assert hit.before.sum() == pytest.approx(1.0, rel=1e-12)
     assert hit.after.sum() + hit.lost == pytest.approx(1.0, rel=1e-9)
     assert hit.after[0] / hit.before[0] == pytest.approx(hit.restitution**2, rel=1e-9)
-    assert hit.before[0] > 0.95  # nearly, but never, the pure mode
+    assert hit.before[0] > 0.95  # nearly the pure mode
     assert "contact" in hit.table()
 
 
 def test_modes_at_a_static_shape_are_those_of_the_shape():
-    """Gauss' multipliers are the static ones where the body is held."""
+    """At a held shape the multipliers of Gauss' principle are the static ones."""
     system = assemble(m := guide(axial=True), m.values(WEIGHTLESS))
     shape = impact_shape(system, 0, -5e-3)
     np.testing.assert_allclose(
@@ -179,8 +175,8 @@ def test_modes_at_a_static_shape_are_those_of_the_shape():
     )
 
 
-def test_a_1r_is_recovered_from_its_own_response():
-    """What it was given: 0.47 and 2.7; and the map by fits of a 1R is its own restitution."""
+def test_a_fit_recovers_a_1r_from_its_own_response():
+    """Restitution 0.47 and K_theta 2.7; the map by fits of a 1R is its restitution."""
     truth = {"stop.restitution": 0.47, "flexure.K_theta": 2.7}
     wall = WEIGHTLESS | {"stop.position": -2e-3}
     times = np.linspace(0.0, 0.12, 60)
@@ -193,8 +189,8 @@ def test_a_1r_is_recovered_from_its_own_response():
     assert of_map.item() == pytest.approx(0.47, abs=1e-4)
 
 
-def test_a_response_goes_along_the_release():
-    """A cantilever is released upwards: nearly its y, and where it starts is where it was put."""
+def test_a_response_is_the_displacement_along_the_release():
+    """A cantilever is released upwards: nearly its y, from the displacement of the release."""
     leaf = mechanism("Cantilever")
     start = {"release.displacement": 6e-3}
     seen = impact_map.response(leaf, start, np.linspace(0.0, 0.04, 20))
@@ -204,17 +200,17 @@ def test_a_response_goes_along_the_release():
     assert seen[-1] == pytest.approx(simulation.outputs()["tip.y"], abs=1e-7)
 
 
-def test_the_fit_finds_the_simulated_restitution():
-    """The source's way and the mode's own velocity, where the flexures are straight."""
-    point = {"heights": [0.0], "offsets": [0.0], "values": WEIGHTLESS}
+def test_the_fitted_restitution_agrees_with_the_simulated_one_at_straight_flexures():
+    """The method of the thesis and the velocity of the mode agree to 0.01."""
+    point = {"walls": [0.0], "offsets": [0.0], "values": WEIGHTLESS}
     fit = impact_map.fitted(guide(), **point).restitution.item()
     assert fit == pytest.approx(impact_map.simulated(guide(), **point).restitution.item(), abs=0.01)
 
 
 @pytest.mark.slow
-def test_a_rebound_through_straight_is_fitted_lower_than_one_outwards():
-    """Modes whose frequency rises on the way take energy from the fundamental one, and back."""
-    point = {"heights": [-10e-3, 10e-3], "offsets": [0.0], "values": WEIGHTLESS}
+def test_a_rebound_through_the_straight_shape_is_fitted_lower_than_one_outwards():
+    """Modes whose frequency rises during the rebound take energy from the fundamental mode."""
+    point = {"walls": [-10e-3, 10e-3], "offsets": [0.0], "values": WEIGHTLESS}
     outwards, through = impact_map.fitted(guide(), **point).restitution[0]
     direct = impact_map.simulated(guide(), **point).restitution[0]
     assert outwards > direct[0] + 0.03
@@ -236,21 +232,21 @@ def test_a_map_is_written_and_drawn(tmp_path):
     assert png(figures.heat_map([point])).startswith(b"\x89PNG")
 
 
-def test_every_way_tells_how_much_of_it_is_done():
-    for way in (impact_map.algebraic, impact_map.closed_form, impact_map.simulated):
-        told = []
-        way(guide("1R"), [-2e-3, 0.0], [0.0], WEIGHTLESS, progress=told.append)
-        assert told == [0.5, 1.0]
+def test_every_method_reports_its_progress():
+    for method in (impact_map.algebraic, impact_map.closed_form, impact_map.simulated):
+        fractions = []
+        method(guide("1R"), [-2e-3, 0.0], [0.0], WEIGHTLESS, progress=fractions.append)
+        assert fractions == [0.5, 1.0]
 
 
-def test_walls_out_of_reach_and_unknown_stops_are_told():
-    with pytest.raises(EquilibriumError, match="release further away"):
+def test_walls_out_of_reach_and_unknown_stops_are_rejected():
+    with pytest.raises(EquilibriumError, match="release further from it"):
         impact_map.simulated(
             guide(), [17.9e-3], [0.0], WEIGHTLESS | {"release.displacement": -5e-3}
         )
     with pytest.raises(ParameterError, match="no stop bumper"):
         impact_map.algebraic(guide(), stop="bumper")
-    with pytest.raises(ParameterError, match="no variable"):
+    with pytest.raises(ParameterError, match=r"variable 'stop\.bounce'"):
         impact_map.fit_response(guide(), ["stop.bounce"], TIMES, TIMES)
     with pytest.raises(RecordError, match="too few"):
         impact_map.fit_response(guide(), ["stop.restitution"], TIMES[:9], TIMES[:9])
@@ -258,8 +254,8 @@ def test_walls_out_of_reach_and_unknown_stops_are_told():
         impact_map.algebraic(mechanism("ImpactOscillator"))
 
 
-def test_the_first_impact_is_that_of_the_stop_that_was_asked_for():
-    """The body starts backwards, into a wall behind it: that impact is not the one of the map."""
+def test_the_first_impact_is_that_of_the_given_stop():
+    """The body hits a second stop behind it first; that impact is skipped."""
     one = guide("1R")
     behind = replace(one.stops[0], name="behind", direction=180.0, position=9e-3)
     sim = Simulation(
@@ -270,32 +266,36 @@ def test_the_first_impact_is_that_of_the_stop_that_was_asked_for():
     assert sim.record[0].stop == "behind"
 
 
-def test_own_coefficients_stay_where_the_model_does():
+def test_coefficients_are_kept_only_for_the_same_model():
     own = replace(guide("1R").flexure_types[0], coefficients={"K_theta": 2.5449})
     parts = replace(guide("1R"), flexure_types=(own,))
     assert impact_map.with_flexures(parts, "1R", axial=True).values()["flexure.K_theta"] == 2.5449
     assert impact_map.with_flexures(parts, "2R").values()["flexure.K_theta1"] == 3.4710
 
 
-def test_a_note_tells_what_flexures_that_do_not_stretch_hide():
-    """Off the centre of mass, C of the free body that the flexures leave: 1.6/(1 + m d^2/J) - 1."""
+def test_a_note_compares_stretching_with_inextensible_flexures():
+    """With stretching ones C is near that of a free body, 1.6/(1 + m d^2/J) - 1."""
     values = WEIGHTLESS | {"stop.offset": 4e-3, "stop.position": 0.0}
     known = guide().values()
     free = 1.6 / (1 + known["shuttle.mass"] * 4e-3**2 / known["shuttle.inertia"]) - 1
-    told = stretching.note(guide(), values, 0)
-    assert "stop hits 4 mm off the centre of mass of shuttle" in told
-    rigid, stretched = map(float, re.search(r"is ([-\d.]+), and would be ([-\d.]+)", told).groups())
-    assert rigid == pytest.approx(0.6, abs=0.005)
+    note = stretching.note(guide(), values, 0)
+    assert "stop hits 4 mm off the centre of mass of shuttle" in note
+    pattern = r"is ([-\d.]+) with inextensible flexures and ([-\d.]+) with stretching"
+    inextensible, stretched = map(float, re.search(pattern, note).groups())
+    assert inextensible == pytest.approx(0.6, abs=0.005)
     assert stretched == pytest.approx(free, abs=0.005)
 
 
 @pytest.mark.parametrize(
     ("model", "values"),
     [
-        (guide(), {}),  # in the middle
+        (guide(), {}),  # centred
         (guide(), {"stop.offset": 0.5e-3}),  # nearly
-        (guide(axial=True), {"stop.offset": 4e-3}),  # stretches
-        (mechanism("Cantilever"), {"stop.offset": 4e-3}),  # off the centre, but nothing to give way
+        (guide(axial=True), {"stop.offset": 4e-3}),  # stretches already
+        (
+            mechanism("Cantilever"),
+            {"stop.offset": 4e-3},
+        ),  # off-centre, but stretching has no effect
         (guide(), {"stop.offset": 4e-3, "stop.position": 1.0}),  # out of reach
     ],
 )

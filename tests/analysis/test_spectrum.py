@@ -1,4 +1,4 @@
-"""Spectra after an impact: amplitudes of known sines, lines at the modes of small motions."""
+"""Spectra after an impact: amplitudes of known sines, peaks at the modes of small motions."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from support import mechanism
 
 
 def test_amplitudes_and_frequencies_of_known_sines_are_found():
-    """Two sines off the lines of the transform, on a slope: to 1 % of a line, 15 % of height."""
+    """Two sines between the lines of the transform, plus a slope: amplitudes to 15 %."""
     t = np.arange(2000) * 5e-4
     f, a = spectrum(
         t, 2.0 * np.sin(2 * np.pi * 40.37 * t) + 0.3 * np.cos(2 * np.pi * 211.6 * t) + 50 * t
@@ -24,7 +24,7 @@ def test_amplitudes_and_frequencies_of_known_sines_are_found():
 
 @pytest.fixture(scope="module")
 def small_motion():
-    """Return what follows a small hit, off the centre of mass, beside the static equilibrium."""
+    """Return the motion after a small off-centre impact near the static equilibrium."""
     values = {
         "release.displacement": 10.6e-3,
         "stop.position": 10.8e-3,
@@ -35,7 +35,7 @@ def small_motion():
 
 
 def test_small_motions_ring_at_the_modes_of_the_impact_shape(small_motion):
-    """Nearly linear vibration: each mode is a line, to 0.2 %, for modes depend on the shape."""
+    """Each mode has a peak, to 0.2 %; the modes depend on the shape, so it is not exact."""
     found = np.concatenate([
         peaks(*spectrum(small_motion.time, getattr(small_motion, name)), share=0.005)
         for name in ("along", "across", "turning")
@@ -44,14 +44,14 @@ def test_small_motions_ring_at_the_modes_of_the_impact_shape(small_motion):
         assert np.abs(found - mode).min() < 2e-3 * mode + 0.05
 
 
-def test_the_wall_is_gone_after_the_impact(small_motion):
-    """The slowest mode passes where the wall was."""
+def test_the_wall_is_removed_after_the_impact(small_motion):
+    """The body moves past the former position of the wall."""
     x = np.cumsum(small_motion.along) * 1e-3
     assert x.max() > 1e-5
 
 
-def test_a_centred_hit_does_not_turn_a_symmetric_guide_much():
-    """What a hit off the centre does to the rotation is more than what a centred one does."""
+def test_an_off_centre_impact_turns_the_guide_more_than_a_centred_one():
+    """The largest angular velocity is more than 1.5 times as high."""
     turning = []
     for offset in (0.0, 4e-3):
         values = {"stop.offset": offset, "gravity.x": 0.0}
@@ -60,7 +60,7 @@ def test_a_centred_hit_does_not_turn_a_symmetric_guide_much():
     assert turning[1] > 1.5 * turning[0]
 
 
-def test_too_few_or_unequal_samples_are_refused():
+def test_too_few_or_unequal_samples_are_rejected():
     with pytest.raises(ParameterError, match="samples"):
         after_impact(mechanism("PRBDM"), duration=1e-3, step=5e-4)
     with pytest.raises(ParameterError, match="equal steps"):
@@ -72,18 +72,18 @@ def test_the_figure_is_drawn(small_motion):
     assert len(spectrum_figure(small_motion, ("along",)).axes) == 1
 
 
-def test_after_the_last_impact_a_1r_rings_at_its_one_frequency():
-    """The hammer bounces off once, and vibrates at small amplitude in 20 periods of a record."""
+def test_after_the_last_impact_the_oscillator_vibrates_at_its_frequency():
+    """The hammer bounces once, then vibrates at a small amplitude for 20 periods."""
     values = {"release.displacement": -3e-3, "impact.restitution": 0.5, "damping.beta": 0.0}
     result = simulate(mechanism("ImpactOscillator"), values, stop_time=1.0)
-    heard = after_last_impact(result)
-    assert heard.time[0] > 0.0
-    assert heard.impact is result.impacts[-1]
-    (hammer,) = peaks(*spectrum(heard.time, heard.along), share=0.3)
-    assert hammer == pytest.approx(heard.modes[1], rel=0.01)  # nearly linear
+    motion = after_last_impact(result)
+    assert motion.time[0] > 0.0
+    assert motion.impact is result.impacts[-1]
+    (hammer,) = peaks(*spectrum(motion.time, motion.along), share=0.3)
+    assert hammer == pytest.approx(motion.modes[1], rel=0.01)  # nearly linear
 
 
-def test_there_is_nothing_to_hear_at_rest_or_without_an_impact():
+def test_a_result_without_free_motion_after_an_impact_is_rejected():
     guide = mechanism("PRBDM")
     with pytest.raises(ParameterError, match="shuttle rests on stop"):
         after_last_impact(simulate(guide, {"stop.restitution": 0.0}, stop_time=0.2))

@@ -190,13 +190,13 @@ def test_a_fit_finds_what_a_model_was_given(capsys):
     assert float(found["value"][0]) == pytest.approx(363e9, rel=1e-8)
     assert float(found["standard uncertainty"][0]) < 1e-6 * 363e9
     assert Path("PRBDM2R-force.png").exists()
-    assert "cannot be told apart" not in capsys.readouterr().out
+    assert "these data cannot separate" not in capsys.readouterr().out
 
 
 def test_two_coefficients_and_one_frequency_are_a_valley(capsys):
     line = "fit PRBDM2R --free flexure.K_theta1 --free flexure.K_theta2 --out . --frequency"
     assert run(f"{line} '4.82 Hz +- 0.06'") == cli.OK
-    assert "cannot be told apart" in capsys.readouterr().out
+    assert "these data cannot separate" in capsys.readouterr().out
     along = np.array(table("PRBDM2R-valley.csv")["misfit"], float)
     assert len(along) >= 11
     assert along.max() < 1e-6  # every point of the valley has the frequency
@@ -372,7 +372,7 @@ MISTAKES = [
     ("impact-map ImpactOscillator", "position of impact is an expression"),
     ("impact-map PRBDM --heights 1 1 mm", "a place stands there twice"),
     ("impact-map PRBDM --set release.displacement=0", "no default heights: give --heights"),
-    ("impact-map Cantilever --heights 3mm --way closed-form", "choose another way"),
+    ("impact-map Cantilever --heights 3mm --way closed-form", "choose another method"),
     ("impact-map PRBDM --way magic", "invalid choice: 'magic'"),
     ("impact-map PRBDM --axial", "--axial goes with --model"),
     ("impact-map PRBDM --model nR --links 0", "a chain has one link or more"),

@@ -178,6 +178,84 @@ def test_a_cache_that_cannot_be_written_is_done_without(cache, monkeypatch):
     assert len(told) == 2
 
 
+def planted(cache: Path, folder: Path, monkeypatch) -> Path:
+    """Put a valid entry with other contents into a folder of the cache; return the entry."""
+    libraries([HOST])
+    (entry,) = entries(cache)
+    content = b"planted library"
+    valid = compiler.MAGIC + hashlib.sha256(content).digest() + content
+    folder.mkdir(exist_ok=True)
+    (folder / entry.name).write_bytes(valid)
+    (folder / entry.name).chmod(0o644)
+    monkeypatch.setattr(compiler, "_made", {})
+    assert only(libraries([HOST])) == content  # It is valid as long as it is private.
+    monkeypatch.setattr(compiler, "_made", {})
+    return folder / entry.name
+
+
+def owned_by_another(monkeypatch, *paths: Path) -> None:
+    """Let files appear as those of another user."""
+    stats, fstat = os.stat, os.fstat
+    others = {(stats(path).st_dev, stats(path).st_ino) for path in paths}
+
+    def changed(found: os.stat_result) -> os.stat_result:
+        if (found.st_dev, found.st_ino) not in others:
+            return found
+        return os.stat_result((*found[:4], os.geteuid() + 1, *found[5:]))
+
+    monkeypatch.setattr(os, "fstat", lambda handle: changed(fstat(handle)))
+    monkeypatch.setattr(Path, "stat", lambda path, **options: changed(stats(path, **options)))
+
+
+def test_a_library_that_others_could_write_is_not_used(cache, monkeypatch):
+    entry = planted(cache, cache, monkeypatch)
+    entry.chmod(0o664)
+    assert b"planted" not in only(libraries([HOST]))
+    assert entry.stat().st_mode & 0o777 == 0o644
+    assert b"planted" not in entry.read_bytes()
+
+
+def test_a_library_of_another_user_is_not_used(cache, monkeypatch):
+    entry = planted(cache, cache, monkeypatch)
+    owned_by_another(monkeypatch, entry)
+    assert b"planted" not in only(libraries([HOST]))
+
+
+def test_a_cache_of_another_user_is_replaced_by_a_private_one(cache, monkeypatch):
+    """Several users may share XDG_CACHE_HOME."""
+    planted(cache, cache, monkeypatch)
+    owned_by_another(monkeypatch, cache)
+    reported: list[str] = []
+    assert b"planted" not in only(libraries([HOST], reported.append))
+    own = cache.with_name(f"prbm-impact-{os.geteuid()}")
+    assert len(entries(own)) == 1
+    assert own.stat().st_mode & 0o777 == 0o700
+    assert len(reported) == 1
+
+
+def test_without_a_private_folder_the_library_is_compiled_and_not_stored(cache, monkeypatch):
+    own = cache.with_name(f"prbm-impact-{os.geteuid()}")
+    planted(cache, cache, monkeypatch)
+    own.mkdir()
+    owned_by_another(monkeypatch, cache, own)
+    reported: list[str] = []
+    assert b"planted" not in only(libraries([HOST], reported.append))
+    assert reported[1].startswith(f"cannot write to {cache}: no folder that only this user")
+    assert entries(own) == []
+
+
+def test_an_own_cache_that_others_could_write_is_restricted(cache, monkeypatch):
+    """The mode of a folder made with the umask 002; the compiler's files in it are rebuilt."""
+    cache.mkdir(parents=True)
+    (cache / "zig").mkdir()
+    (cache / "zig" / "planted.o").write_bytes(b"")
+    cache.chmod(0o777)
+    libraries([HOST])
+    assert cache.stat().st_mode & 0o777 == 0o700
+    assert not (cache / "zig" / "planted.o").exists()
+    assert len(entries(cache)) == 1
+
+
 @pytest.mark.parametrize("damage", [b"", b"garbage", "truncated", "flipped"])
 def test_a_damaged_entry_is_made_again(cache, monkeypatch, damage):
     made = libraries([HOST])

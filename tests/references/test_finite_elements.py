@@ -1,4 +1,4 @@
-"""Finite elements against beam theory, known numbers of the guides, and their own laws."""
+"""Finite elements compared with beam theory, conservation laws and results for the guides."""
 
 import math
 
@@ -16,9 +16,7 @@ from prbm.references.finite_elements import FiniteElementError, FiniteElements
 from prbm.references.finite_elements.transient import StepError, Transient
 from support import PMMA, mechanism
 
-pytest.importorskip(
-    "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
-)
+pytest.importorskip("exudyn", reason="finite elements need exudyn: python -m pip install exudyn")
 
 WEIGHTLESS = {"gravity.x": 0.0}
 
@@ -47,18 +45,18 @@ def beam(ends=("clamp", "free"), mass=1e-9, **options):
 
 
 @pytest.mark.parametrize("load", [0.5, 2.0, 5.0])
-def test_a_cantilever_takes_the_shape_of_the_elastica(load):
-    """Tip force P across, P L^2/EI = load (Bisshopp and Drucker 1945).
+def test_a_loaded_cantilever_has_the_shape_of_the_elastica(load):
+    """Transverse tip force P with P L^2/EI = load (Bisshopp and Drucker 1945).
 
     L theta' = sqrt(2 load (sin t - sin theta)), t the slope at the tip; theta = t - s^2.
     """
     from scipy.integrate import quad
     from scipy.optimize import brentq
 
-    def along(t, what):
+    def along(t, function):
         def integrand(s):  # sin t - sin theta = 2 cos((t + theta)/2) sin((t - theta)/2)
             half = np.sinc(s * s / (2 * math.pi))
-            return 2 * what(t - s * s) / math.sqrt(math.cos(t - s * s / 2) * half)
+            return 2 * function(t - s * s) / math.sqrt(math.cos(t - s * s / 2) * half)
 
         return quad(integrand, 0.0, math.sqrt(t), epsabs=1e-12)[0] / math.sqrt(2 * load)
 
@@ -71,7 +69,7 @@ def test_a_cantilever_takes_the_shape_of_the_elastica(load):
 
 
 def test_a_moment_at_the_tip_bends_a_cantilever_into_a_circle():
-    """Curvature M/EI: the tip turns by M L/EI and stands on the circle."""
+    """The curvature is M/EI; the tip turns by M L/EI and lies on the circle."""
     turn = 1.2
     found = FiniteElements(beam(), {"push.moment": turn * EI / L}, elements=32)
     moved, angle = found.body("tip", found.equilibrium().q)
@@ -81,7 +79,7 @@ def test_a_moment_at_the_tip_bends_a_cantilever_into_a_circle():
     assert moved.imag == pytest.approx(radius * (1 - math.cos(turn)), rel=2e-4)
 
 
-def test_modes_of_a_cantilever_are_those_of_euler_and_bernoulli():
+def test_modes_of_a_cantilever_match_euler_bernoulli_theory():
     """cos(b) cosh(b) = -1, omega = b^2 sqrt(EI/(rho A L^4))."""
     found = FiniteElements(beam(), elements=32)
     b = np.array([1.8751040687, 4.6940911330, 7.8547574382])
@@ -90,8 +88,8 @@ def test_modes_of_a_cantilever_are_those_of_euler_and_bernoulli():
     np.testing.assert_allclose(frequency, wanted, rtol=3e-4)
 
 
-def test_elements_converge():
-    """Each halving takes away at least three quarters of the difference to the next."""
+def test_the_rest_position_converges_with_order_two_or_more():
+    """Twice the elements, at most a quarter of the change."""
     at_rest = []
     for elements in (4, 8, 16, 32):
         fe = guide(elements=elements)
@@ -100,8 +98,7 @@ def test_elements_converge():
     assert np.all(change[1:] <= change[:-1] / 4), change
 
 
-def test_free_equilibrium_needs_no_force():
-    """Held where it would rest anyway, the holding force vanishes."""
+def test_the_holding_force_vanishes_at_the_rest_position():
     fe = guide(elements=8)
     free = fe.equilibrium()
     held = fe.equilibrium(fe.displacement(free.q))
@@ -109,7 +106,7 @@ def test_free_equilibrium_needs_no_force():
     np.testing.assert_allclose(held.q, free.q, atol=1e-7)
 
 
-def test_a_shape_can_be_reached_from_another():
+def test_a_shape_does_not_depend_on_the_start_of_the_iteration():
     fe = guide(elements=8)
     direct = fe.equilibrium(-0.01)
     onward = fe.equilibrium(-0.01, near=fe.equilibrium(-0.008))
@@ -117,8 +114,8 @@ def test_a_shape_can_be_reached_from_another():
     assert onward.force == pytest.approx(direct.force, rel=1e-6)
 
 
-def test_tangents_are_derivatives():
-    """C of Phi, G of the gap, K - d(C mu)/dq of the balance: central differences."""
+def test_tangents_match_central_differences():
+    """C of the constraints, G of the gap, d(C mu)/dq of the reactions."""
     fe = guide({"stop.offset": 3e-3, "stop.position": 0.02}, elements=4)
     shape = fe.equilibrium(-0.01)
     rng, h = np.random.default_rng(0), 1e-6
@@ -134,13 +131,13 @@ def test_tangents_are_derivatives():
     )
     assert slope(lambda q: fe.gap(0, q)) == pytest.approx(fe.gap_row(0, shape.q) @ d, abs=1e-9)
     reactions = slope(lambda q: equations.constraint_columns(q) @ shape.mu)
-    assert np.abs(reactions).max() > 1e-3  # there is something to be right about
+    assert np.abs(reactions).max() > 1e-3  # not trivially zero
     stiffness = equations.constraint_stiffness(shape.q, shape.mu)
     np.testing.assert_allclose(-stiffness @ d, reactions, atol=1e-5)
 
 
-def test_a_wall_on_a_body_turns_with_it():
-    """The gap's row by central differences, where wall and body both move and turn."""
+def test_the_gap_of_a_wall_on_a_body_follows_its_motion():
+    """The derivatives of the gap match central differences when both bodies move and turn."""
     two = Mechanism(
         name="two",
         title="Two bodies",
@@ -165,8 +162,7 @@ def test_a_wall_on_a_body_turns_with_it():
     assert fe.gap(0, np.zeros(fe.n)) == pytest.approx(0.01)
 
 
-def test_gaps_are_those_of_the_model():
-    """The same rigid motion, told to the elements and to the engine."""
+def test_gaps_of_elements_and_engine_agree_for_the_same_motion():
     fe = guide({"stop.offset": -2e-3, "stop.position": 5e-3}, elements=2)
     sim = Simulation(
         mechanism("PRBDM2R"), {"stop.offset": -2e-3, "stop.position": 5e-3}, tolerance=1e-6
@@ -178,8 +174,8 @@ def test_gaps_are_those_of_the_model():
     assert fe.gap(0, q) == pytest.approx(out["stop.gap"], abs=1e-12)
 
 
-def test_pins_do_not_clamp():
-    """Two pinned rods make a parallelogram: no stiffness but gravity's, f = sqrt(g/L)/(2 pi)."""
+def test_pins_transmit_no_moment():
+    """Two pinned rods form a pendulum with the frequency sqrt(g/L)/(2 pi)."""
     hung = Mechanism(
         name="hung",
         title="A body on two rods",
@@ -200,8 +196,8 @@ def test_pins_do_not_clamp():
     assert f == pytest.approx(math.sqrt(9.81 / 0.1) / (2 * math.pi), rel=1e-5)
 
 
-def test_joints_join():
-    """A pendulum hung by a joint from a body on a stiff leaf swings as a physical pendulum."""
+def test_a_joint_is_a_free_hinge():
+    """A body hung by a joint from a stiff leaf has the frequency of a physical pendulum."""
     m, J, r = 0.3, 2e-4, 0.05
     hung = Mechanism(
         name="pendulum",
@@ -234,7 +230,7 @@ def test_an_impact_obeys_newton_and_carnot():
     assert G @ after == pytest.approx(-0.6 * (G @ v), rel=1e-9)
     assert np.abs(after @ fe.equations.constraint_columns(q)).max() < 1e-9 * np.abs(after).max()
     lost = (v @ fe.M @ v - after @ fe.M @ after) / 2
-    # the effective mass by another route: from all modes
+    # The effective mass is computed independently, from all modes.
     modes = fe.modes(fe.equilibrium(-5e-3)).shape
     mobility = float(((G @ modes) ** 2).sum())
     assert lost == pytest.approx((1 - 0.6**2) * (G @ v) ** 2 / (2 * mobility), rel=1e-6)
@@ -263,11 +259,11 @@ def test_without_exudyn_the_error_names_the_installation(monkeypatch):
         guide()
 
 
-# --- the guides' known numbers (section 3 of the design) --------------------------------------
+# --- reference numbers of the guides ----------------------------------------------------------
 
 
-def test_steel_guide_at_rest_has_the_known_place_and_frequencies():
-    """10.720 mm; 4.907, 130.7, 209.8 Hz with 32 elements a flexure."""
+def test_rest_position_and_frequencies_of_the_steel_guide():
+    """10.720 mm; 4.907, 130.7 and 209.8 Hz with 32 elements per flexure."""
     fe = guide(elements=32)
     rest = fe.equilibrium()
     assert fe.displacement(rest.q) == pytest.approx(10.720e-3, abs=2e-6)
@@ -276,12 +272,12 @@ def test_steel_guide_at_rest_has_the_known_place_and_frequencies():
     np.testing.assert_allclose(frequency[1:], [130.7, 209.8], atol=0.06)
 
 
-def test_straight_steel_guide_has_the_known_frequency():
+def test_frequency_of_the_straight_steel_guide():
     fe = guide(WEIGHTLESS, elements=32)
     assert fe.modes(fe.equilibrium()).frequency[0] == pytest.approx(4.6405, abs=1e-4)
 
 
-MODAL_RESTITUTION = {  # by offset; wall at -10, 0, 10 mm; restitution 0.6
+MODAL_RESTITUTION = {  # by offset [m]; walls at -10, 0, 10 mm; restitution 0.6
     -4e-3: (0.4089, 0.5483, 0.4084),
     0.0: (0.4519, 0.5947, 0.4519),
     4e-3: (0.4104, 0.5482, 0.4108),
@@ -289,26 +285,26 @@ MODAL_RESTITUTION = {  # by offset; wall at -10, 0, 10 mm; restitution 0.6
 
 
 @pytest.mark.parametrize("offset", MODAL_RESTITUTION)
-def test_modal_restitution_is_the_known_one(offset):
+def test_modal_restitution_of_the_steel_guide(offset):
     fe = guide(WEIGHTLESS | {"stop.offset": offset})
     found = [fe.modal_restitution(fe.equilibrium(h), 0, 0.6) for h in (-0.01, 0.0, 0.01)]
     np.testing.assert_allclose(found, MODAL_RESTITUTION[offset], atol=3e-4)
 
 
-def test_free_swing_of_the_pmma_guide_has_the_known_frequency():
-    """5.6375 Hz, 26.2 to 28.1 mm from straight at 1 m/s: between the crossings of zero."""
+def test_frequency_and_amplitude_of_the_free_pmma_guide():
+    """Started straight at 1 m/s: 5.6375 Hz between zero crossings, 26.2 to 28.1 mm."""
     response = guide(PMMA, elements=16).transient(0.4, 2e-4)
     t, x = response["time"], response["shuttle.x"]
     upward = (x[:-1] < 0) & (x[1:] >= 0)
-    i = np.flatnonzero(upward & (t[:-1] > 0.1))  # the first samples are zero up to round-off
+    i = np.flatnonzero(upward & (t[:-1] > 0.1))  # The first samples are round-off.
     crossings = np.append(0.0, t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i]))
     assert 1 / np.diff(crossings).mean() == pytest.approx(5.6375, abs=5e-3)
     assert 26.2e-3 < x.max() < 28.1e-3
 
 
 @pytest.mark.parametrize("name", sorted(shipped()))
-def test_elements_and_model_agree_about_every_shipped_mechanism(name):
-    """The fundamental frequency at rest to 2.5 %: clamps, pins, joints and bodies are the same."""
+def test_elements_and_model_agree_for_every_shipped_mechanism(name):
+    """The fundamental frequencies at rest agree to 2.5 %."""
     parts = mechanism(name)
     system = assemble(parts, parts.values())
     model = modes(system, equilibrium(system)).frequency[0]
@@ -327,8 +323,8 @@ def default_run():
 
 
 @pytest.mark.slow
-def test_bounces_of_the_default_run_are_those_of_the_long_chain(default_run):
-    """Times and closing speeds of the first five impacts against a chain of 12 links."""
+def test_bounces_of_the_default_run_match_those_of_a_chain_of_links(default_run):
+    """Times and closing speeds of the first five impacts, compared with a chain of 12 links."""
     from dataclasses import replace
 
     base = mechanism("PRBDM2R")
@@ -353,8 +349,8 @@ def test_the_default_run_comes_to_rest_on_the_wall(default_run):
     np.testing.assert_allclose(rebounds, 0.6, rtol=1e-9)
 
 
-def test_a_wall_that_pulls_lets_go():
-    """Captured softly where the flexures pull away from the wall: it holds for no time."""
+def test_a_held_stop_is_released_when_its_force_would_pull():
+    """The flexures pull the captured body away from the wall."""
     fe = guide(
         WEIGHTLESS
         | {"release.displacement": -5.012e-3, "stop.position": 5e-3, "stop.rest_speed": 0.05},
@@ -368,7 +364,7 @@ def test_a_wall_that_pulls_lets_go():
 
 
 def test_first_impact_converges_with_the_step():
-    """The modal restitution of the first impact at an offset: 1e-3 between steps."""
+    """The modal restitution of an off-centre impact changes by less than 1e-3."""
     found = [
         guide({"stop.offset": 4e-3, "stop.position": -5e-3}, elements=8)
         .transient(0.1, step, impacts=1)
@@ -380,8 +376,8 @@ def test_first_impact_converges_with_the_step():
     assert restitution[0] == pytest.approx(restitution[1], abs=1e-3)
 
 
-def test_a_step_that_fails_is_divided_where_an_impact_is_located(monkeypatch):
-    """The whole step to the wall never converges: the impact is found by shorter ones."""
+def test_a_failed_step_is_divided_to_locate_an_impact(monkeypatch):
+    """Undivided steps to the wall fail here; shorter ones locate the impact."""
     values = {"stop.position": -5e-3}
     plain = guide(values, elements=4).transient(0.1, 1e-4, impacts=1).impacts[0]
     integrate, failed = Transient._integrate, []
@@ -395,16 +391,16 @@ def test_a_step_that_fails_is_divided_where_an_impact_is_located(monkeypatch):
     monkeypatch.setattr(Transient, "_integrate", sometimes)
     divided = guide(values, elements=4).transient(0.1, 1e-4, impacts=1).impacts[0]
     assert failed
-    assert divided.time == pytest.approx(plain.time, abs=1e-7)  # shorter steps, smaller errors
+    assert divided.time == pytest.approx(plain.time, abs=1e-7)  # Shorter steps have smaller errors.
 
 
 @pytest.mark.parametrize("end", [0.0028, 0.0123, 0.0201, 0.0283])
-def test_a_transient_ends_at_its_end(end):
-    """Whatever rounding leaves of the last step."""
+def test_a_transient_ends_at_its_stop_time(end):
+    """Rounding may leave a tiny last step, which is skipped."""
     fe = guide({"stop.position": 0.03}, elements=2)
     run = fe.transient(end, 1e-4)
     assert run["time"][-1] == pytest.approx(end, abs=1e-9)
     interrupted = Transient(fe, 1e-4, 0.9)
     q, v = fe.release()
-    t, *_ = interrupted._fly(end * (1 - 1e-13), q, v, end)  # nothing is left to do
+    t, *_ = interrupted._fly(end * (1 - 1e-13), q, v, end)  # only round-off is left
     assert t == pytest.approx(end, rel=1e-12)

@@ -1,4 +1,4 @@
-"""The source's integration: fourth order on a smooth arc, impacts up to a step late."""
+"""The integration of the thesis: fourth order on a smooth arc, impacts up to a step late."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ FREE = {"stop.position": 0.05, "damping.beta": 0.0}
 
 
 def test_rk4_with_projection_is_of_fourth_order():
-    """Least-squares slope over five halvings, against the adaptive pair at 1e-13."""
+    """The slope of the error over five halvings; the reference is the engine at 1e-13."""
     exact = Simulation(mechanism("PRBDM"), FREE, tolerance=1e-13)
     exact.advance(0.128)
     steps = 0.008 / 2.0 ** np.arange(6)
@@ -25,7 +25,7 @@ def test_rk4_with_projection_is_of_fourth_order():
 
 
 @pytest.mark.parametrize("step", [2**-9, 2**-11, 2**-13])
-def test_first_impact_is_noticed_up_to_a_step_late(step):
+def test_first_impact_is_detected_up_to_a_step_late(step):
     values = {"release.displacement": -0.01}
     guide = ScalarGuide.of(mechanism("PRBDM").values(values))
     (exact,), _ = guide.bounces(-0.01, 0.6, 1)
@@ -34,7 +34,7 @@ def test_first_impact_is_noticed_up_to_a_step_late(step):
     assert -1e-6 <= late <= step * (1 + 1e-6)
 
 
-def test_a_step_that_is_none_is_refused():
+def test_an_invalid_step_is_rejected():
     for step in (0.0, -1e-3, 2.0):
         with pytest.raises(ParameterError, match="step = "):
             march(mechanism("PRBDM"), stop_time=1.0, step=step)

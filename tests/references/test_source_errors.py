@@ -1,4 +1,4 @@
-"""The source's errors, shown on its own algorithm, and that the cures cure."""
+"""Errors of the thesis, shown with its own algorithm, and the effect of their corrections."""
 
 import numpy as np
 import pytest
@@ -32,7 +32,7 @@ EI, LENGTH, FLEXURE_MASS, SHUTTLE_MASS = (
 )  # fmt: skip
 REFITTED_K_THETA_2R = np.array([8.7614, 4.0104])
 FIXED_GUIDED_PAIR = 24 * EI / LENGTH**3  # Euler-Bernoulli stiffness of the guide [N/m]
-SPAN = 0.25  # more than a period [s]
+SPAN = 0.25  # s; more than a period
 
 
 def released(chain: Chain, displacement: float, step: float, **options: float) -> Run:
@@ -42,7 +42,7 @@ def released(chain: Chain, displacement: float, step: float, **options: float) -
 
 
 def relative_energy(run: Run) -> np.ndarray:
-    """Energy gained since the start, in units of that at the start (elastic, gravitational)."""
+    """Return the energy gained since the start, relative to the energy at the start."""
     return run.energy / run.energy[0] - 1
 
 
@@ -50,7 +50,7 @@ def relative_energy(run: Run) -> np.ndarray:
 
 
 def test_2R_cantilever_without_the_factor_deflects_a_third():
-    """F h^3/(3 EI) at the tip (Euler-Bernoulli); the published coefficients come to 0.3357."""
+    """F h^3/(3 EI) at the tip (Euler-Bernoulli); the published coefficients give 0.3357."""
     assert cantilever_deflection(stiffness_factor=False) == pytest.approx(0.3357, abs=5e-5)
     assert cantilever_deflection(stiffness_factor=False) == pytest.approx(1 / 3, rel=0.01)
 
@@ -61,24 +61,24 @@ def test_2R_guide_without_the_factor_is_as_stiff_as_two_fixed_guided_beams():
 
 
 def test_2R_guide_with_the_factor_is_2_26_times_too_soft():
-    """The stiffness of the source's 2R model is 24 EI/L^3 divided by 2.26."""
+    """The stiffness of the 2R model in the thesis is 24 EI/L^3 divided by 2.26."""
     soft = stiffness(guide_2R(stiffness_factor=True, gravity=0.0))
     assert FIXED_GUIDED_PAIR / soft == pytest.approx(2.26, abs=0.005)
 
 
 def test_the_refitted_coefficients_times_the_factor_are_about_the_published_ones():
-    """gamma_i K_theta_i of the source's fit: 3.855 and 1.845 for the published 3.471 and 2.068.
+    """gamma_i K_theta_i fitted in the thesis: 3.855 and 1.845; published: 3.471 and 2.068.
 
-    One is 11 % too high, one 11 % too low: two rates fitted to one frequency are not unique.
+    One is 11 % too high, the other 11 % too low: two rates fitted to one frequency are not unique.
     """
     rates = GAMMA_2R * REFITTED_K_THETA_2R
-    np.testing.assert_allclose(rates, [3.855, 1.845], rtol=0, atol=5e-4)  # as quoted
+    np.testing.assert_allclose(rates, [3.855, 1.845], rtol=0, atol=5e-4)  # last printed digit
     np.testing.assert_allclose(rates, K_THETA_2R, rtol=0.12)
     assert (rates[0] > K_THETA_2R[0]) != (rates[1] > K_THETA_2R[1])
 
 
 def test_the_refitted_2R_guide_is_the_untuned_1R_guide():
-    """The target of the source's fit was its 1R model with K_theta 2.65, 3.7 % too stiff."""
+    """The thesis fitted its 2R to its 1R model with K_theta 2.65, which is 3.7 % too stiff."""
     refitted = guide_2R(stiffness_factor=True, K_theta=REFITTED_K_THETA_2R, gravity=0.0)
     target = stiffness(guide_1R(gravity=0.0))
     assert target / FIXED_GUIDED_PAIR == pytest.approx(K_THETA_1R / (3 * GAMMA_1R), rel=1e-6)
@@ -90,8 +90,8 @@ def test_the_refitted_2R_guide_is_the_untuned_1R_guide():
 
 @pytest.mark.parametrize("wall", [np.inf, 0.0], ids=["no wall", "wall"])
 @pytest.mark.parametrize("stiffness_factor", [True, False])
-def test_2R_as_printed_gains_energy_and_ends_in_no_number(stiffness_factor, wall):
-    """Nothing drives the released guide, and the wall only takes energy: it cannot gain any."""
+def test_2R_as_printed_gains_energy_and_ends_without_a_finite_state(stiffness_factor, wall):
+    """The released guide is not driven and a wall only dissipates: energy must not grow."""
     chain = guide_2R(stiffness_factor)
     run = released(chain, -18e-3, 2**-14, convective=False, wall=wall)
     assert not run.finite
@@ -101,7 +101,7 @@ def test_2R_as_printed_gains_energy_and_ends_in_no_number(stiffness_factor, wall
 @pytest.mark.parametrize("wall", [np.inf, 0.0], ids=["no wall", "wall"])
 @pytest.mark.parametrize("stiffness_factor", [True, False])
 def test_2R_with_the_convective_term_gains_no_energy(stiffness_factor, wall):
-    """The same run at the source's step: truncation leaves 1e-4 (1e-3: it is chaotic)."""
+    """The same run with the step of the thesis: the truncation error is below 1e-3."""
     run = released(guide_2R(stiffness_factor), -18e-3, 2**-15, convective=True, wall=wall)
     gained = relative_energy(run)
     assert run.finite
@@ -109,8 +109,8 @@ def test_2R_with_the_convective_term_gains_no_energy(stiffness_factor, wall):
     assert (gained[-1] < -0.5) if np.isfinite(wall) else (gained.min() > -1e-3)
 
 
-def test_the_energy_from_nothing_is_no_truncation_error():
-    """A released guide conserves energy; half the step leaves the gain of 17 % where it was."""
+def test_the_energy_gain_as_printed_does_not_depend_on_the_step():
+    """A released guide conserves energy; the gain of 17 % is the same with half the step."""
     coarse, fine = (
         relative_energy(released(guide_2R(), -10e-3, step, convective=False)).max()
         for step in (2**-13, 2**-14)
@@ -119,8 +119,8 @@ def test_the_energy_from_nothing_is_no_truncation_error():
     assert coarse == pytest.approx(fine, rel=0.02)
 
 
-def test_the_energy_error_with_the_convective_term_is_truncation():
-    """Runge and Kutta's order is 4: half the step, a sixteenth of the error (here: 8)."""
+def test_the_energy_error_with_the_convective_term_vanishes_with_the_step():
+    """With half the step a method of order 4 has a sixteenth of the error (at most an eighth)."""
     coarse, fine = (
         np.abs(relative_energy(released(guide_2R(), -10e-3, step))).max()
         for step in (2**-13, 2**-14)
@@ -130,7 +130,7 @@ def test_the_energy_error_with_the_convective_term_is_truncation():
 
 
 def test_projection_closes_the_loop_after_every_step():
-    """Loop e = distance, to the source's tolerance; unprojected, truncation opens it."""
+    """Loop e = distance, to the tolerance of the thesis."""
     chain = guide_2R()
     run = released(chain, -10e-3, 2**-13)
     gap = np.exp(1j * run.q) @ chain.loop - chain.distance
@@ -139,7 +139,7 @@ def test_projection_closes_the_loop_after_every_step():
 
 @pytest.mark.parametrize("wall", [np.inf, 0.0], ids=["no wall", "wall"])
 def test_in_the_1R_parallelogram_the_missing_term_cancels(wall):
-    """Equal links, opposite directions, equal rates: e_1 v_1^2 + e_3 v_3^2 = 0, and v_2 = 0."""
+    """Equal links with opposite directions and equal rates: e_1 v_1^2 + e_3 v_3^2 = 0, v_2 = 0."""
     printed, right = (
         released(guide_1R(), -18e-3, 2**-13, convective=convective, wall=wall)
         for convective in (False, True)
@@ -161,11 +161,11 @@ def test_in_a_four_bar_linkage_with_unequal_links_the_missing_term_does_not_canc
     assert gained[1] < 1e-5
 
 
-# --- Events noticed between steps -------------------------------------------------------------
+# --- Impacts detected between steps -----------------------------------------------------------
 
 
 @pytest.mark.parametrize("step", [2**-11, 2**-13, 2**-15])
-def test_an_impact_is_noticed_up_to_a_step_late(step):
+def test_an_impact_is_detected_up_to_a_step_late(step):
     """The 1R guide is one equation, theta'^2 = 2 (E - V)/(m r^2), solved by quadrature.
 
     V(theta) = 2 k theta^2 - m g r sin(theta), m with the lumped masses; theta = start + s^2
@@ -185,12 +185,12 @@ def test_an_impact_is_noticed_up_to_a_step_late(step):
         return 2 * s * np.sqrt(m / 2) * r / np.sqrt(potential(start) - potential(start + s**2))
 
     exact, _ = quad(dt_ds, 1e-9, np.sqrt(-start), epsabs=1e-12)
-    noticed = released(chain, -18e-3, step, wall=0.0).impact_times[0]
-    assert exact < noticed <= exact + step
+    detected = released(chain, -18e-3, step, wall=0.0).impact_times[0]
+    assert exact < detected <= exact + step
 
 
-def test_the_bounces_end_behind_the_wall():
-    """Gravity presses the guide onto the wall, where it rests; the source's passes through it.
+def test_the_guide_of_the_thesis_passes_through_the_wall_after_its_bounces():
+    """Gravity presses the guide onto the wall, where it should rest.
 
     Once the rebound is too slow to leave the wall within a step, no further impact is applied,
     and the guide falls to its equilibrium at 10.4 mm and beyond.
@@ -206,7 +206,7 @@ def test_the_bounces_end_behind_the_wall():
 
 
 def test_our_guide_has_the_stiffness_of_two_beams():
-    """dF/dx of the straight guide against 24 EI/L^3: the factor gamma is not there."""
+    """dF/dx of the straight guide is 24 EI/L^3: the engine has no factor gamma."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values({"gravity.x": 0.0}))
     slope = equilibrium(system, 1e-5).force / 1e-5
@@ -214,8 +214,8 @@ def test_our_guide_has_the_stiffness_of_two_beams():
 
 
 @pytest.mark.parametrize("wall", [0.0, 0.05])
-def test_our_energy_grows_from_nothing_in_no_case(wall):
-    """The run in which the printed equations blow up, undamped: at no time more than at first."""
+def test_the_energy_of_the_engine_does_not_grow(wall):
+    """The undamped run in which the printed equations gain energy."""
     sim = simulation("PRBDM2R", {"damping.beta": 0.0, "stop.position": wall})
     start, most = energy_balance(sim.outputs()), 0.0
     for t in np.linspace(0, 0.14, 141)[1:]:
@@ -225,10 +225,10 @@ def test_our_energy_grows_from_nothing_in_no_case(wall):
     assert most < 1e-7 * start
 
 
-def test_our_trajectory_is_that_of_the_corrected_source():
-    """One chain against a tree, mass against geometry as the metric: the same free period.
+def test_the_engine_follows_the_corrected_algorithm_of_the_thesis():
+    """Chain and tree of links, unweighted and mass-weighted projection: the same motion.
 
-    The source leaves out the mass of the stubs (0.1 % of what moves).
+    The thesis omits the mass of the stubs, 0.1 % of the moving mass.
     """
     q, _ = held_shape(guide_2R(), -10e-3)
     run = simulate(guide_2R(), q, np.zeros_like(q), 0.1, 2**-14)

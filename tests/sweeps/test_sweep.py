@@ -1,4 +1,4 @@
-"""A sweep is its runs one by one, whatever happens to them on the way."""
+"""A sweep gives the same results as its runs one by one, also after crashes and interruptions."""
 
 import json
 import os
@@ -27,7 +27,7 @@ from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
 from prbm.sweeps import sweep as sweeps
 from prbm.sweeps.results import OWN
-from prbm.sweeps.runs import Job, Output, Runner, parsed, reduced
+from prbm.sweeps.runs import Job, Output, Runner, parse_output, reduce
 from prbm.sweeps.sweep import SweepError, samples, sweep
 from support import SUPPORT
 
@@ -44,31 +44,31 @@ def _elsewhere(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def mishap(tmp_path_factory) -> Path:
-    """Return the FMU in which things go wrong."""
+    """Return an FMU that fails, crashes or hangs as its inputs say."""
     script = SUPPORT / "mishap.py"
     return FmuBuilder.build_FMU(script, dest=tmp_path_factory.mktemp("mishap"))
 
 
 @pytest.fixture
 def log(tmp_path, monkeypatch) -> Path:
-    """Return the file to which the FMU adds a line a run."""
+    """Return the file to which the FMU adds one line per run."""
     monkeypatch.setenv("MISHAP_LOG", str(tmp_path / "mishap.log"))
     return tmp_path / "mishap.log"
 
 
 def runs(log: Path) -> Counter[float]:
-    """Return how often which x was run."""
+    """Return the number of runs for each value of x."""
     return Counter(float(line) for line in log.read_text().split()) if log.exists() else Counter()
 
 
 def alone(fmu: Path, row: dict[str, float], **options) -> np.ndarray:
-    """Return what FMPy makes of one row, with the variables behind OUTPUTS."""
+    """Return FMPy's result for one row, with the variables used in OUTPUTS."""
     names = ["shuttle.x", "stop.impact_count", "shuttle.vx", "stop.contact"]
     return fmpy.simulate_fmu(fmu, start_values=row, output=names, **options)
 
 
 def assert_rows_are(results: pd.DataFrame, each) -> None:
-    """Compare the columns OUTPUTS to the last bit with what FMPy makes of the rows of GRID."""
+    """Compare the columns OUTPUTS to the last bit with FMPy's results for the rows of GRID."""
     assert list(results["status"]) == ["ok"] * len(GRID)
     for (_, row), found in zip(GRID.iterrows(), results[OUTPUTS].to_numpy(), strict=True):
         one = each(dict(row))
@@ -78,12 +78,12 @@ def assert_rows_are(results: pd.DataFrame, each) -> None:
         np.testing.assert_array_equal(found, [*expected, first])
 
 
-# --- the same numbers as one by one -------------------------------------------------------------
+# --- equality with single runs ------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_row_is_the_run_that_fmpy_makes_to_the_last_bit(native, fmi):
-    """A step that does not divide the end, and a tolerance; parameters stand beside."""
+def test_a_row_equals_a_run_by_fmpy_to_the_last_bit(native, fmi):
+    """The step does not divide the stop time; the result contains the parameters."""
     fmu = native["PRBDM2R", fmi]
     results = sweep(
         fmu, GRID, outputs=OUTPUTS, stop_time=0.1005, step=7e-4, tolerance=1e-6, workers=1
@@ -98,8 +98,8 @@ def test_a_row_is_the_run_that_fmpy_makes_to_the_last_bit(native, fmi):
     assert (results["seconds"] > 0.0).all()
 
 
-def test_a_row_is_the_run_that_fmpy_makes_in_event_mode():
-    """What has a clock must be run in event mode."""
+def test_a_row_equals_a_run_by_fmpy_in_event_mode():
+    """FMUs with a clock must run in event mode."""
     fmu = clocked("PRBDM")
     results = sweep(fmu, GRID, outputs=OUTPUTS, stop_time=0.1, step=1e-3, workers=1)
     assert_rows_are(
@@ -109,20 +109,18 @@ def test_a_row_is_the_run_that_fmpy_makes_in_event_mode():
 
 
 @pytest.mark.parametrize("works", [True, False])
-def test_an_instance_is_reset_only_if_that_leaves_nothing_behind(
-    native, tmp_path, monkeypatch, works
-):
-    """The runs are those of fresh instances either way."""
+def test_an_instance_is_reset_only_if_the_reset_works(native, tmp_path, monkeypatch, works):
+    """The results are those of new instances in both cases."""
     folder = Path(fmpy.extract(native["PRBDM", 2], tmp_path / "fmu"))
     job = Job(0.0, 0.05, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"), Output("v", "shuttle.vx")))
     rows = [{"release.displacement": x} for x in (-0.01, -0.012, -0.015, -0.018)]
     fresh = [Runner(folder, job).run(row).values for row in rows]
     runner = Runner(folder, job)
     if not works:
-        leaky = runner.fmu.reset
+        original = runner.fmu.reset
 
         def reset():
-            leaky()
+            original()
             runner.fmu.setReal([runner.description.modelVariables[0].valueReference], [0.03])
 
         assert runner.description.modelVariables[0].name == "flexure.length"
@@ -131,43 +129,43 @@ def test_an_instance_is_reset_only_if_that_leaves_nothing_behind(
     assert runner.resets is works
 
 
-def test_defaults_are_those_of_the_default_experiment(mishap, log, native):
-    """And where it has none, a second in steps of a millisecond; all outputs are kept."""
+def test_defaults_without_a_default_experiment_are_one_second_and_all_outputs(mishap, log):
+    """The default step is a thousandth of the run."""
     results = sweep(mishap, pd.DataFrame({"x": [2.0]}), workers=1)
     assert results.columns.tolist() == ["row", "x", "y", "status", "message", "seconds"]
     assert results["y"].tolist() == [2.0]
     assert json.loads(Path("results.parquet/_sweep.json").read_text())["step [s]"] == 1e-3
 
 
-def test_reductions_are_those_of_a_known_trajectory():
+def test_reductions_match_a_closed_form():
     """X = t (2 - t) on [0, 2]: maximum 1, mean 2/3, x > 0.75 within (0.5, 1.5)."""
     t = np.concatenate((np.linspace(0.0, 1.0, 2001), np.linspace(1.0, 2.0, 501)[1:]))
     x = t * (2.0 - t)
 
     def of(text):
-        return reduced(parsed(text, {"x"}), t, x)
+        return reduce(parse_output(text, {"x"}), t, x)
 
     assert of("x") == of("final(x)") == 0.0
     assert (of("max(x)"), of("min(x)")) == (1.0, 0.0)
     assert of("mean(x)") == pytest.approx(2 / 3, abs=2e-3**2 / 6)  # the trapezoidal rule's error
-    assert of("first(x > 0.75)") == pytest.approx(0.5, abs=1e-3)  # and 5e-4 here
-    assert of("since(x < 0.75)") == pytest.approx(1.5, abs=2.5e-3)  # a step is 2e-3
+    assert of("first(x > 0.75)") == pytest.approx(0.5, abs=1e-3)  # a step is 5e-4 here
+    assert of("since(x < 0.75)") == pytest.approx(1.5, abs=2.5e-3)  # a step is 2e-3 here
     assert of("since(x <= 1)") == 0.0
     assert np.isnan([of("first(x > 1.5)"), of("since(x > 0.5)"), of("first(x >= 2)")]).all()
 
 
-def test_a_reduction_gives_way_to_a_variable_of_its_name():
-    assert parsed("max(x)", {"max(x)"}) == Output("max(x)", "max(x)")
-    assert parsed("first(a < b)", {"a < b"}).variable == "a < b"
+def test_a_variable_name_takes_precedence_over_a_reduction():
+    assert parse_output("max(x)", {"max(x)"}) == Output("max(x)", "max(x)")
+    assert parse_output("first(a < b)", {"a < b"}).variable == "a < b"
 
 
-def test_columns_may_have_names_of_their_own(native):
+def test_a_mapping_of_outputs_names_the_columns(native):
     outputs = {"end [m]": "shuttle.x", "longest [m]": "max(shuttle.x)"}
     results = sweep(native["PRBDM", 2], GRID[:1], outputs=outputs, stop_time=0.01, workers=1)
     assert [*results.columns[3:5]] == [*outputs]
 
 
-# --- what goes wrong ----------------------------------------------------------------------------
+# --- failed runs --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -181,10 +179,10 @@ def test_one_failure_in_a_hundred_costs_one_row(native, fmi):
     assert bad["shuttle.x"].isna().all()
     good = out.drop(41)["shuttle.x"]
     assert good.notna().all()
-    assert good.nunique() == 1  # the stop is not reached yet
+    assert good.nunique() == 1  # The stop has not been reached.
 
 
-def test_a_crash_an_exit_a_hang_and_an_error_cost_a_row_each(mishap, log):
+def test_a_crash_an_exit_a_hang_and_an_error_cost_one_row_each(mishap, log):
     trouble = [FINE, RAISES, FINE, CRASHES, EXITS, FINE, HANGS, FINE]
     table = pd.DataFrame({"x": np.arange(8.0), "trouble": trouble})
     out = sweep(mishap, table, step=0.5, workers=1, retries=0, timeout=1.0)
@@ -192,24 +190,27 @@ def test_a_crash_an_exit_a_hang_and_an_error_cost_a_row_each(mishap, log):
         "ok", "failed", "ok", "crashed", "crashed", "ok", "timeout", "ok",
     ]  # fmt: skip
     assert "the spring is broken" in out["message"][1]
-    assert out["message"][3] == "the process of the FMU died: killed by SIGSEGV"
-    assert out["message"][4] == "the process of the FMU died: exit code 3"
-    assert out["message"][6] == "not done after 1 s"
+    assert out["message"][3] == "the process of the FMU crashed: killed by SIGSEGV"
+    assert out["message"][4] == "the process of the FMU crashed: exit code 3"
+    assert out["message"][6] == "not finished after 1 s"
     fine = out["status"] == "ok"
     np.testing.assert_array_equal(out["y"][fine], out["x"][fine])
     assert runs(log) == Counter(table["x"])
 
 
-def test_a_crash_that_does_not_come_again_costs_nothing(mishap, log):
+def test_a_crash_that_is_not_reproduced_costs_no_row(mishap, log):
     table = pd.DataFrame({"x": [1.0, 2.0, 3.0], "trouble": [FINE, CRASHES_ONCE, CRASHES]})
     out = sweep(mishap, table, step=0.5, workers=1)
     assert out["status"].tolist() == ["ok", "ok", "crashed"]
-    assert out["message"][2] == "the process of the FMU died: killed by SIGSEGV, 2 times out of 2"
+    assert (
+        out["message"][2]
+        == "the process of the FMU crashed: killed by SIGSEGV, in each of 2 attempts"
+    )
     assert runs(log) == {1.0: 1, 2.0: 2, 3.0: 2}
 
 
-def test_what_failed_is_done_again_when_asked_for(mishap, log):
-    """And nothing else, though other runs are in the part with it."""
+def test_only_failed_runs_are_repeated_on_request(mishap, log):
+    """Other runs in the same part are kept."""
     table = pd.DataFrame({"x": np.arange(12.0), "trouble": FINE})
     table.loc[4, "trouble"] = CRASHES_ONCE
     out = sweep(mishap, table, step=0.5, workers=1, retries=0)
@@ -222,7 +223,7 @@ def test_what_failed_is_done_again_when_asked_for(mishap, log):
     assert runs(log) == Counter([*table["x"], 4.0])
 
 
-# --- going on where it was ----------------------------------------------------------------------
+# --- continued sweeps ---------------------------------------------------------------------------
 
 LONG = pd.DataFrame({"x": np.arange(24.0), "pause": 0.15})
 SCRIPT = """
@@ -233,7 +234,7 @@ sys.exit(main(["sweep", {!r}, "table.csv", "--workers", "2", "--step", "0.5"]))
 
 
 def started(fmu: Path, wanted: int) -> subprocess.Popen[str]:
-    """Start the sweep in another process; return it when so many runs are on disk."""
+    """Start the sweep in another process; return it once ``wanted`` runs are on disk."""
     paths = [str(Path(prbm.__file__).parents[1]), os.environ.get("PYTHONPATH", "")]
     process = subprocess.Popen(
         [sys.executable, "-c", SCRIPT.format(str(fmu))],
@@ -249,13 +250,14 @@ def started(fmu: Path, wanted: int) -> subprocess.Popen[str]:
 
 
 def on_disk() -> int:
+    """Return the number of stored runs."""
     if not list(Path("results.parquet").glob("*.parquet")):
         return 0
     return len(pd.read_parquet("results.parquet"))
 
 
-def test_a_sweep_that_is_killed_does_only_the_rest(mishap, log):
-    """No run that is on disk is done again, and no part is written again."""
+def test_a_killed_sweep_continues_with_the_missing_runs(mishap, log):
+    """No stored run is repeated, and no part is rewritten."""
     LONG.to_csv("table.csv", index=False)
     process = started(mishap, 5)
     process.kill()
@@ -265,27 +267,28 @@ def test_a_sweep_that_is_killed_does_only_the_rest(mishap, log):
     before = {path: path.stat().st_mtime_ns for path in Path("results.parquet").glob("part*")}
     log.unlink()
 
-    told: list[float] = []
-    results = sweep(mishap, "table.csv", step=0.5, workers=2, progress=told.append)
+    fractions: list[float] = []
+    results = sweep(mishap, "table.csv", step=0.5, workers=2, progress=fractions.append)
     assert runs(log) == Counter(set(LONG["x"]) - set(done["x"]))
     assert results["x"].tolist() == results["y"].tolist() == LONG["x"].tolist()
-    assert told == sorted(told)
-    assert (told[0], told[-1]) == (pytest.approx(len(done) / 24), 1.0)
+    assert fractions == sorted(fractions)
+    assert (fractions[0], fractions[-1]) == (pytest.approx(len(done) / 24), 1.0)
     assert sweep(mishap, "table.csv", step=0.5).equals(results)
     assert runs(log).total() == 24 - len(done)
     assert before == {path: path.stat().st_mtime_ns for path in before}
 
 
 @pytest.mark.slow
-def test_a_sweep_that_is_stopped_says_what_it_keeps(mishap, log):
-    """Ctrl-C ends it with a sentence; no process of the FMU is left to go on with runs."""
+def test_a_stopped_sweep_reports_the_number_of_stored_runs(mishap, log):
+    """Ctrl-C ends the sweep with one sentence and ends all processes of the FMU."""
     LONG.to_csv("table.csv", index=False)
     process = started(mishap, 5)
     process.send_signal(signal.SIGINT)
-    _, said = process.communicate(timeout=30)
-    assert process.returncode == 130, said
-    assert f"the sweep was stopped: {on_disk()} of 24 runs are kept in results.parquet" in said
-    assert "Traceback" not in said
+    _, stderr = process.communicate(timeout=30)
+    assert process.returncode == 130, stderr
+    message = f"the sweep was stopped: {on_disk()} of 24 runs are stored in results.parquet"
+    assert message in stderr
+    assert "Traceback" not in stderr
     before = runs(log)
     time.sleep(1.0)
     assert runs(log) == before
@@ -295,26 +298,61 @@ def test_a_sweep_that_is_stopped_says_what_it_keeps(mishap, log):
     assert runs(log) == Counter(set(LONG["x"]) - set(done["x"]))
 
 
-def test_rows_that_are_added_are_the_rest(mishap, log):
+def test_a_second_sweep_into_the_same_folder_is_rejected(mishap, log):
+    """It repeats no run, keeps the drafts of the first one and names its process."""
+    LONG.to_csv("table.csv", index=False)
+    process = started(mishap, 3)
+    draft = Path("results.parquet/_part.draft")
+    draft.write_bytes(b"")
+    with pytest.raises(ParameterError, match=rf"in use by another sweep \(process {process.pid} "):
+        sweep(mishap, "table.csv", step=0.5, workers=1)
+    with pytest.raises(ParameterError, match="in use by another sweep"):
+        sweep(mishap, "table.csv", step=0.5, workers=1, anew=True)
+    assert process.poll() is None
+    assert draft.exists()
+    process.communicate(timeout=60)
+    assert runs(log) == Counter(LONG["x"])
+    assert len(sweep(mishap, "table.csv", step=0.5)) == len(LONG)
+    assert not draft.exists()
+
+
+def test_two_sweeps_of_one_process_into_the_same_folder_are_rejected(mishap, log):
+    table = pd.DataFrame({"x": [1.0, 2.0]})
+
+    def second(fraction):
+        with pytest.raises(ParameterError, match=rf"process {os.getpid()} on"):
+            sweep(mishap, table, step=0.5, workers=1)
+
+    assert len(sweep(mishap, table, step=0.5, workers=1, progress=second)) == 2
+    assert runs(log).total() == 2
+
+
+def test_the_lock_of_a_sweep_that_never_began_does_not_block_the_folder(mishap, log):
+    Path("results.parquet").mkdir()
+    Path("results.parquet/_sweep.lock").write_text("process 1 on nowhere")
+    assert len(sweep(mishap, pd.DataFrame({"x": [1.0]}), step=0.5, workers=1)) == 1
+
+
+def test_only_added_rows_are_computed(mishap, log):
     table = pd.DataFrame({"x": [1.0, 2.0, 3.0]})
     sweep(mishap, table[:2], step=0.5, workers=1)
     assert sweep(mishap, table, step=0.5, workers=1)["y"].tolist() == [1.0, 2.0, 3.0]
     assert runs(log) == {1.0: 1, 2.0: 1, 3.0: 1}
 
 
-def test_another_sweep_is_refused_or_begins_anew(mishap, log, native):
-    """Another step, output, value, table, FMU; a refusal leaves everything as it was."""
+def test_results_of_another_sweep_are_rejected_or_replaced(mishap, log, native):
+    """Another step, output, value, table or FMU; an error leaves the results unchanged."""
     table = pd.DataFrame({"x": [1.0, 2.0]})
     sweep(mishap, table, step=0.5, workers=1)
-    for change, what in (
+    for change, message in (
         ({"step": 0.25}, r"another step \[s\] \(0.5, now 0.25\)"),
         ({"outputs": ["max(y)"]}, "another outputs"),
         ({"values": {"pause": 0.01}}, "another values"),
-        ({"table": pd.DataFrame({"x": [1.0, 3.0]})}, "another table: row 1 is another one now"),
-        ({"table": table[:1]}, "another table: row 1 is gone"),
+        ({"table": pd.DataFrame({"x": [1.0, 3.0]})}, "another table: row 1 has changed"),
+        ({"table": table[:1]}, "another table: row 1 is missing now"),
         ({"table": table.assign(pause=0.0)}, "another parameters"),
     ):
-        with pytest.raises(ParameterError, match=rf"{what}.*begin anew"):
+        with pytest.raises(ParameterError, match=rf"{message}.*delete the old"):
             sweep(**({"fmu": mishap, "table": table, "step": 0.5, "workers": 1} | change))
     with pytest.raises(ParameterError, match="another FMU"):
         sweep(native["PRBDM", 2], GRID)
@@ -323,16 +361,16 @@ def test_another_sweep_is_refused_or_begins_anew(mishap, log, native):
     assert runs(log).total() == 4
 
 
-def test_a_folder_of_something_else_is_left_alone(mishap):
+def test_a_folder_with_other_contents_is_rejected_and_unchanged(mishap):
     Path("results.parquet").mkdir()
     Path("results.parquet/letter.txt").write_text("keep me")
     for anew in (False, True):
-        with pytest.raises(ParameterError, match=r"results\.parquet exists and holds no sweep"):
+        with pytest.raises(ParameterError, match=r"results\.parquet exists without a sweep"):
             sweep(mishap, pd.DataFrame({"x": [1.0]}), anew=anew)
     assert Path("results.parquet/letter.txt").read_text() == "keep me"
 
 
-def test_a_broken_part_is_named(mishap, log):
+def test_a_damaged_part_is_reported(mishap, log):
     table = pd.DataFrame({"x": [1.0]})
     sweep(mishap, table, step=0.5, workers=1)
     (part,) = Path("results.parquet").glob("part-*")
@@ -341,11 +379,11 @@ def test_a_broken_part_is_named(mishap, log):
         sweep(mishap, table, step=0.5, workers=1)
 
 
-# --- a scheduler by its address -----------------------------------------------------------------
+# --- scheduler by address -----------------------------------------------------------------------
 
 
-def test_a_scheduler_by_address_does_the_same(native, mishap, log):
-    """On one worker with two threads; the processes and the FMU are gone afterwards."""
+def test_a_scheduler_by_address_gives_the_same_results(native, mishap, log):
+    """One worker with two threads; the plugin is removed afterwards."""
     options = {"outputs": OUTPUTS, "stop_time": 0.05}
     here = sweep(native["PRBDM2R", 2], GRID, "here.parquet", **options)
     with cluster(threads_per_worker=2) as there:
@@ -359,7 +397,7 @@ def test_a_scheduler_by_address_does_the_same(native, mishap, log):
 
 @pytest.mark.slow
 def test_a_run_that_kills_its_worker_costs_one_row(mishap, log):
-    """The scheduler gives up after one death, the sweep after two."""
+    """The scheduler gives up after one crash, the sweep after two."""
     trouble = [FINE, FINE, KILLS_WORKER, FINE, FINE]
     table = pd.DataFrame({"x": np.arange(5.0), "trouble": trouble})
     with (
@@ -368,22 +406,23 @@ def test_a_run_that_kills_its_worker_costs_one_row(mishap, log):
     ):
         out = sweep(mishap, table, step=0.5, scheduler=there.scheduler_address)
     assert out["status"].tolist() == ["ok", "ok", "crashed", "ok", "ok"]
-    assert out["message"][2] == "the workers that had it died, one after the other"
+    assert out["message"][2] == "every worker that ran it crashed"
     assert out["y"].drop(2).tolist() == [0.0, 1.0, 3.0, 4.0]
 
 
 def cluster(**options) -> LocalCluster:
+    """Return a scheduler with one worker process."""
     return LocalCluster(
         n_workers=1, processes=True, dashboard_address="127.0.0.1:0", silence_logs=100, **options
     )
 
 
-def test_a_scheduler_without_an_answer_is_reported(mishap, log, monkeypatch):
+def test_a_missing_scheduler_or_worker_is_reported(mishap, log, monkeypatch):
     monkeypatch.setattr(sweeps, "CONNECTION_TIMEOUT", 0.5)
     table = pd.DataFrame({"x": [1.0]})
-    with pytest.raises(SweepError, match=r"no scheduler answers at tcp://127.*dask scheduler"):
+    with pytest.raises(SweepError, match=r"no scheduler responds at tcp://127.*dask scheduler"):
         sweep(mishap, table, scheduler="tcp://127.0.0.1:1")
-    with pytest.raises(SweepError, match="no scheduler answers at nonsense://a"):
+    with pytest.raises(SweepError, match="no scheduler responds at nonsense://a"):
         sweep(mishap, table, scheduler="nonsense://a")
     with (
         LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as empty,
@@ -392,17 +431,17 @@ def test_a_scheduler_without_an_answer_is_reported(mishap, log, monkeypatch):
         sweep(mishap, table, scheduler=empty.scheduler_address)
 
 
-# --- mistakes -----------------------------------------------------------------------------------
+# --- invalid input ------------------------------------------------------------------------------
 
 TABLES = {
     "an unknown parameter": ({"stop.restituton": [0.5]}, "no variable 'stop.restituton'; did you "
                              "mean stop.restitution"),
-    "an output": ({"shuttle.x": [0.5]}, "shuttle.x is a output variable of type Real, which no "
-                  "table can set"),
-    "NaN": ({"stop.offset": [0.0, np.nan]}, "row 1 of the table has stop.offset = nan, which is "
-            "no finite number"),
-    "infinity": ({"stop.offset": [np.inf]}, "row 0 of the table has stop.offset = inf, which"),
-    "a word": ({"stop.offset": [0.0, "wide"]}, "row 1 of the table has stop.offset = wide, which"),
+    "an output": ({"shuttle.x": [0.5]}, "shuttle.x (output variable of type Real) cannot be set by "
+                  "a table"),
+    "NaN": ({"stop.offset": [0.0, np.nan]}, "row 1 of the table: stop.offset = nan must be a "
+            "finite number"),
+    "infinity": ({"stop.offset": [np.inf]}, "row 0 of the table: stop.offset = inf must"),
+    "a word": ({"stop.offset": [0.0, "wide"]}, "row 1 of the table: stop.offset = wide must"),
     "no rows": ({"stop.offset": []}, "the table has 0 rows and 1 columns; give"),
     "semicolons": ({"release.displacement;stop.offset": [0.5]}, "the table has the column "
                    "'release.displacement;stop.offset': its columns seem to be separated by semi"),
@@ -412,7 +451,7 @@ TABLES = {
 
 
 @pytest.mark.parametrize("case", TABLES)
-def test_a_malformed_table_is_refused_with_a_sentence(native, case):
+def test_an_invalid_table_is_rejected_with_one_sentence(native, case):
     columns, sentence = TABLES[case]
     with pytest.raises(ParameterError) as refusal:
         sweep(native["PRBDM2R", 2], pd.DataFrame(columns))
@@ -424,47 +463,47 @@ def test_a_malformed_table_is_refused_with_a_sentence(native, case):
 FILES = {
     "missing": ("no.csv", None, "no.csv does not exist; give a CSV or Parquet file"),
     "empty": ("t.csv", b"", "t.csv has 0 rows and 0 columns"),
-    "a header alone": ("t.csv", b"stop.offset\n", "t.csv has 0 rows and 1 columns"),
-    "a missing cell": ("t.csv", b"stop.offset,gravity.x\n0,1\n0,\n", "row 1 of the table has "
-                       "gravity.x = , which is no finite number"),
+    "only a header": ("t.csv", b"stop.offset\n", "t.csv has 0 rows and 1 columns"),
+    "a missing cell": ("t.csv", b"stop.offset,gravity.x\n0,1\n0,\n", "row 1 of the table: "
+                       "gravity.x =  must be a finite number"),
     "semicolons": ("t.csv", b"gravity.x;stop.offset\n1;0,5\n", "separate them by commas, and write "
                    "numbers with a decimal point"),
     "tabs": ("t.csv", b"gravity.x\tstop.offset\n1\t0\n", "seem to be separated by tabs; separate"),
-    "ragged": ("t.csv", b"stop.offset\n0,1\n0,1,2\n", "t.csv is no table that can be read"),
-    "binary": ("t.csv", b"\xff\xfe\x00stop", "t.csv is no table that can be read"),
-    "no Parquet": ("t.parquet", b"stop.offset\n0\n", "t.parquet is no table that can be read"),
+    "ragged": ("t.csv", b"stop.offset\n0,1\n0,1,2\n", "t.csv cannot be read as a table"),
+    "binary": ("t.csv", b"\xff\xfe\x00stop", "t.csv cannot be read as a table"),
+    "text named Parquet": ("t.parquet", b"stop.offset\n0\n", "t.parquet cannot be read as a table"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("case", FILES)
-def test_a_malformed_file_is_refused_with_a_sentence(native, capsys, case):
+def test_an_invalid_file_is_rejected_with_one_sentence(native, capsys, case):
     name, content, sentence = FILES[case]
     if content is not None:
         Path(name).write_bytes(content)
     assert main(["sweep", str(native["PRBDM2R", 2]), name]) == 2
-    said = capsys.readouterr().err
-    assert sentence in said
-    assert said.count("\n") == 1
+    stderr = capsys.readouterr().err
+    assert sentence in stderr
+    assert stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("name", ["r.csv", "deep/r.XLSX", "r.json"])
-def test_a_name_of_one_file_is_refused_for_the_folder_of_the_results(native, capsys, name):
-    """Before anything is read: the FMU and the table need not be there."""
+def test_a_file_name_is_rejected_for_the_folder_of_the_results(native, capsys, name):
+    """The name is checked before the FMU and the table are read; both are missing here."""
     assert main(["sweep", "none.fmu", "none.csv", "--out", name]) == 2
-    said = capsys.readouterr().err
-    assert f"{name} is the name of a {Path(name).suffix} file, but the results are a folder" in said
-    assert f"choose a name such as {Path(name).with_suffix('.parquet')}" in said
+    stderr = capsys.readouterr().err
+    assert f"out = {name}: the results are a folder of Parquet files, not a" in stderr
+    assert f"choose a name such as {Path(name).with_suffix('.parquet')}" in stderr
     assert list(Path().iterdir()) == []
 
 
-def test_whole_numbers_and_booleans_are_checked(mishap):
-    with pytest.raises(ParameterError, match=r"trouble = 0\.5; it is a whole number \(Integer\)"):
+def test_integers_are_checked(mishap):
+    with pytest.raises(ParameterError, match=r"trouble = 0\.5 must be a whole number \(Integer\)"):
         sweep(mishap, pd.DataFrame({"trouble": [0, 0.5]}))
-    with pytest.raises(ParameterError, match=r"trouble = 3e\+09; it is a whole number"):
+    with pytest.raises(ParameterError, match=r"trouble = 3e\+09 must be a whole number"):
         sweep(mishap, pd.DataFrame({"trouble": [3e9]}))
 
 
-def test_a_table_survives_csv_and_parquet_to_the_last_bit(mishap, log):
+def test_csv_and_parquet_keep_a_table_to_the_last_bit(mishap, log):
     table = samples({"x": stats.norm()}, 5)
     table.to_csv("t.csv", index=False)
     table.to_parquet("t.parquet")
@@ -476,24 +515,24 @@ def test_a_table_survives_csv_and_parquet_to_the_last_bit(mishap, log):
 
 SETTINGS = {
     "an unknown output": ({"outputs": ["shutle.x"]}, "no variable 'shutle.x'; did you mean"),
-    "no output": ({"outputs": []}, "there is no output to keep"),
-    "no number": ({"outputs": ["first(shuttle.x > up)"]}, "'up' is no number; write a condition"),
+    "no output": ({"outputs": []}, "no output is selected"),
+    "no number": ({"outputs": ["first(shuttle.x > up)"]}, "bound 'up' must be a number, as in"),
     "a column twice": ({"outputs": {"row": "shuttle.x"}}, "would have the column 'row' twice"),
     "an unknown value": ({"values": {"mass": 1.0}}, "the FMU has no variable 'mass'"),
     "a value twice": ({"values": {"stop.offset": 1.0}}, "stop.offset is in the table and among"),
-    "a value that is none": ({"values": {"gravity.x": np.nan}}, "gravity.x = nan among the"),
-    "no time": ({"stop_time": 0.0}, "stop_time = 0 s must be finite and after 0 s"),
-    "no step": ({"step": 0.0}, "step = 0 s must be positive and finite"),
-    "too small a step": ({"step": 1e-9}, "step = 1e-09 s makes 1000000000 steps in 1 s"),
-    "no tolerance": ({"tolerance": -1.0}, "tolerance = -1 must be positive and finite"),
-    "no workers": ({"workers": 0}, "workers = 0 must be 1 or more"),
-    "no retries": ({"retries": -1}, "retries = -1 must be 0 or more"),
-    "no patience": ({"timeout": 0.0}, "timeout = 0 s must be positive"),
+    "a NaN value": ({"values": {"gravity.x": np.nan}}, "gravity.x = nan among the"),
+    "zero stop time": ({"stop_time": 0.0}, "stop_time = 0 s must be finite and after 0 s"),
+    "zero step": ({"step": 0.0}, "step = 0 s must be positive and finite"),
+    "too many steps": ({"step": 1e-9}, "step = 1e-09 s makes 1000000000 steps in 1 s"),
+    "negative tolerance": ({"tolerance": -1.0}, "tolerance = -1 must be positive and finite"),
+    "zero workers": ({"workers": 0}, "workers = 0 must be 1 or more"),
+    "negative retries": ({"retries": -1}, "retries = -1 must be 0 or more"),
+    "zero timeout": ({"timeout": 0.0}, "timeout = 0 s must be positive"),
 }
 
 
 @pytest.mark.parametrize("case", SETTINGS)
-def test_a_setting_that_makes_no_sense_is_refused_with_a_sentence(native, case):
+def test_an_invalid_setting_is_rejected_with_one_sentence(native, case):
     options, sentence = SETTINGS[case]
     with pytest.raises(ParameterError) as refusal:
         sweep(native["PRBDM2R", 2], GRID, **options)
@@ -501,7 +540,7 @@ def test_a_setting_that_makes_no_sense_is_refused_with_a_sentence(native, case):
     assert not Path("results.parquet").exists()
 
 
-def test_what_is_no_fmu_is_told(native, tmp_path, capsys):
+def test_an_unreadable_fmu_is_reported(native, tmp_path, capsys):
     GRID.to_csv("t.csv", index=False)
     Path("text.fmu").write_text("no archive")
     for name, sentence in (
@@ -512,7 +551,7 @@ def test_what_is_no_fmu_is_told(native, tmp_path, capsys):
         assert sentence in capsys.readouterr().err
 
 
-def test_an_fmu_without_a_library_for_this_machine_is_no_row_but_a_sentence(native, tmp_path):
+def test_an_fmu_without_a_library_for_this_platform_ends_the_sweep(native, tmp_path):
     folder = Path(fmpy.extract(native["PRBDM", 2], tmp_path / "fmu"))
     shutil.rmtree(folder / "binaries")
     fmu = shutil.make_archive("bare", "zip", folder)
@@ -520,13 +559,13 @@ def test_an_fmu_without_a_library_for_this_machine_is_no_row_but_a_sentence(nati
         sweep(fmu, GRID, workers=1)
 
 
-def test_a_missing_package_is_told(mishap, monkeypatch):
+def test_a_missing_package_is_reported(mishap, monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SweepError, match=r"need the package distributed; install .*sweep"):
         sweep(mishap, GRID)
 
 
-def test_the_command_sums_up(native, capsys):
+def test_the_command_prints_a_summary(native, capsys):
     table = pd.DataFrame({"stop.restitution": [0.5, 2.0]})
     table.to_csv("t.csv", index=False)
     assert main(["sweep", str(native["PRBDM", 2]), "t.csv", "--out", "r", "--output", "shuttle.x",
@@ -546,24 +585,24 @@ def test_the_command_sums_up(native, capsys):
     assert first == alone["shuttle.x"][-1]
 
 
-WORDS = {
-    "no number": ("--set gravity.x=down", "--set gravity.x= down: "),
-    "no variable": ("--set gravity.X=1", "--set gravity.X=1: "),
-    "another unit": ("--set 'gravity.x=1 kg'", "'kg' is the unit of something else"),
-    "no time": ("--stop-time 3mm", "--stop-time 3mm: 'mm' is the unit of something else"),
-    "no count": ("--workers two", "argument --workers: invalid int value: 'two'"),
+ARGUMENTS = {
+    "text for a number": ("--set gravity.x=down", "--set gravity.x= down: "),
+    "unknown variable": ("--set gravity.X=1", "--set gravity.X=1: "),
+    "wrong unit": ("--set 'gravity.x=1 kg'", "'kg' is the unit of something else"),
+    "length for a time": ("--stop-time 3mm", "--stop-time 3mm: 'mm' is the unit of something else"),
+    "text for a count": ("--workers two", "argument --workers: invalid int value: 'two'"),
 }
 
 
-@pytest.mark.parametrize("case", WORDS)
-def test_words_of_the_command_that_make_no_sense_are_told(native, capsys, case):
+@pytest.mark.parametrize("case", ARGUMENTS)
+def test_invalid_arguments_are_rejected_with_one_sentence(native, capsys, case):
     GRID.to_csv("t.csv", index=False)
-    words, sentence = WORDS[case]
+    words, sentence = ARGUMENTS[case]
     assert main(["sweep", str(native["PRBDM", 2]), "t.csv", *shlex.split(words)]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith("prbm sweep: ")
-    assert sentence in said
-    assert said.count("\n") == 1
+    stderr = capsys.readouterr().err
+    assert stderr.startswith("prbm sweep: ")
+    assert sentence in stderr
+    assert stderr.count("\n") == 1
 
 
 # --- samples ------------------------------------------------------------------------------------
@@ -571,7 +610,7 @@ def test_words_of_the_command_that_make_no_sense_are_told(native, capsys, case):
 
 @pytest.mark.parametrize("method", ["latin", "sobol"])
 def test_stratified_samples_have_one_row_in_each_stratum(method):
-    """F(x) falls once into each of n intervals of equal probability, in every column."""
+    """In every column F(x) has one value in each of n intervals of equal probability."""
     n = 64
     law = {"a": stats.norm(1.0, 0.1), "b": (2.0, 4.0), "c": stats.weibull_min(2.0)}
     table = samples(law, n, seed=3, method=method)
@@ -594,30 +633,33 @@ def test_random_samples_follow_their_distribution_and_seed():
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (({}, 5), "5 rows of 0 parameters are no table"),
-        (({"a": (0.0, 1.0)}, 0), "0 rows of 1 parameters are no table"),
-        (({"a": 3.0}, 5), "a: 3.0 is no distribution"),
-        (({"a": stats.norm(0.0, -1.0)}, 5), "a: the distribution gives what is no finite number"),
-        (({"a": (0.0, 1.0)}, 5, 0, "sobol"), "n = 5 is no power of two"),
-        (({"a": (0.0, 1.0)}, 5, 0, "halton"), "there is no method 'halton'; methods are random"),
+        (({}, 5), "5 rows of 0 parameters: draw at least one"),
+        (({"a": (0.0, 1.0)}, 0), "0 rows of 1 parameters: draw at least one"),
+        (({"a": 3.0}, 5), "a: 3.0 must be a distribution"),
+        (({"a": stats.norm(0.0, -1.0)}, 5), "a: the quantiles of the distribution must be"),
+        (
+            ({"a": (0.0, 1.0)}, 5, 0, "sobol"),
+            "n = 5: Sobol's sequence needs a power of two, such as 4",
+        ),
+        (({"a": (0.0, 1.0)}, 5, 0, "halton"), "unknown method 'halton'; methods are random"),
     ],
 )
-def test_samples_that_make_no_sense_are_refused(arguments, sentence):
+def test_invalid_samples_are_rejected(arguments, sentence):
     with pytest.raises(ParameterError, match=sentence):
         samples(*arguments)
 
 
-def test_no_column_of_its_own_is_a_variable_of_ours(native):
+def test_fixed_columns_differ_from_the_variables_of_the_guide(native):
     description = fmpy.read_model_description(native["PRBDM2R", 3])
     assert not {v.name for v in description.modelVariables} & set(OWN)
 
 
-def test_an_fmu_that_talks_too_much_is_not_listened_to(native, tmp_path):
-    """What it says is kept of a failure only; its numbers stay the same."""
+def test_logging_is_switched_off_after_many_messages(native, tmp_path):
+    """The results stay the same, and failures are still reported."""
     folder = Path(fmpy.extract(native["PRBDM", 3], tmp_path / "fmu"))
     runner = Runner(folder, Job(0.0, 0.01, 1e-3, 1e-8, {}, (Output("x", "shuttle.x"),)))
     expected = runner.run({}).values
-    runner.heard = 1000
+    runner.logged = 1000
     assert runner.run({}).values == expected
     assert not runner.logging
     assert runner.run({"stop.restitution": 2.0}).status == "failed"

@@ -1,4 +1,4 @@
-"""Our master: schemes against closed forms, events against FMUs alone, mistakes as sentences."""
+"""The co-simulation master: schemes against closed forms, events against FMPy, error messages."""
 
 import gc
 import math
@@ -27,7 +27,7 @@ IMPACTS = ("stop.impact_count", "stop.impact_time", "stop.approach_speed")
 
 
 def circle(scheme):
-    """Return a' = b, b' = -a from (1, 0)."""
+    """Simulate a' = b, b' = -a from (1, 0); return time, a and b."""
     fmus = {"a": integrator(), "b": integrator()}
     found = simulate(fmus, CIRCLE, STEPS * H, H, START, scheme=scheme)
     return found["time"], found["a.value"], found["b.value"]
@@ -41,28 +41,28 @@ def test_jacobi_is_explicit_euler():
 
 
 def test_gauss_seidel_is_symplectic_euler():
-    """The first goes by what the second was: a^2 + b^2 + h a b is kept."""
+    """The first FMU uses the old output of the second: a^2 + b^2 + h a b is conserved."""
     _, a, b = circle(GAUSS_SEIDEL)
     np.testing.assert_allclose(a**2 + b**2 + H * a * b, 1.0, rtol=1e-12)
     assert a[1] == 1.0
-    assert b[1] == -H  # of the new a
+    assert b[1] == -H  # computed with the new a
 
 
-def test_outputs_reach_inputs_before_the_first_step():
-    """Within initialization mode, on which the start of an instance may depend."""
+def test_outputs_reach_inputs_in_initialization_mode():
+    """The start of an instance may depend on its connected inputs."""
     fmus = {"sum": integrator(), "guide": guide(2)}
     with System(fmus, {"sum.rate": "guide.shuttle.x"}, watched=["sum.value"]) as system:
         system.start({"sum.passed": 2.0, "guide.release.displacement": -3e-3})
         assert system.values["sum.value"] == pytest.approx(-6e-3, rel=1e-12)
 
 
-def test_a_last_step_may_be_shorter():
+def test_the_last_step_may_be_shorter():
     found = simulate({"a": integrator()}, {}, 1.0, 0.3, {"a.rate": 1.0}, ["a.value"])
     np.testing.assert_allclose(found["a.value"], found["time"], rtol=1e-15)
     assert found["time"][-1] == 1.0
 
 
-def test_integers_and_booleans_are_given_as_what_they_are():
+def test_integers_and_booleans_keep_their_type():
     values = {"a.rate": 1.0, "a.skipped": 2, "b.rate": 1.0, "b.off": True}
     fmus = {"a": integrator(), "b": integrator()}
     found = simulate(fmus, {}, 4.0, 1.0, values, ["a.value", "b.value"])
@@ -70,7 +70,7 @@ def test_integers_and_booleans_are_given_as_what_they_are():
     assert not found["b.value"].any()
 
 
-def test_a_source_acts_in_the_step_that_begins():
+def test_source_inputs_act_in_the_step_that_begins():
     seen = []
     found = simulate(
         {"a": integrator()}, {}, 3.0, 1.0, record=["a.value"],
@@ -81,8 +81,8 @@ def test_a_source_acts_in_the_step_that_begins():
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_an_accelerated_base_is_a_gravity(fmi):
-    """-a of the base adds to gravity, the same to rounding."""
+def test_base_acceleration_acts_as_gravity(fmi):
+    """The negative acceleration of the base adds to gravity, exact to rounding."""
     values = {"guide.gravity.x": 0.0, "guide.release.displacement": 0.0}
     by_base = simulate(
         {"guide": guide(fmi)}, {}, 0.1, 1e-3, values, ["guide.shuttle.x"],
@@ -90,12 +90,12 @@ def test_an_accelerated_base_is_a_gravity(fmi):
     )  # fmt: skip
     values["guide.gravity.x"] = 2.0
     found = simulate({"guide": guide(fmi)}, {}, 0.1, 1e-3, values, ["guide.shuttle.x"])
-    # gravity acts on the shape at release, which a force holds; both are straight here
+    # Gravity would change the shape at release; here both guides are straight.
     np.testing.assert_allclose(by_base["guide.shuttle.x"], found["guide.shuttle.x"], atol=1e-12)
 
 
 def alone(**values):
-    """Return the impacts of the guide by FMPy, shape (n, 2): time and closing speed."""
+    """Return the impacts of one guide simulated by FMPy, shape (n, 2): time and closing speed."""
     start = {name.replace("__", "."): x for name, x in values.items()}
     found = simulate_fmu(guide(2), stop_time=0.2, output_interval=1e-4,
                          start_values=start, output=IMPACTS)  # fmt: skip
@@ -103,12 +103,13 @@ def alone(**values):
 
 
 def impacts(found, prefix):
+    """Return time and closing speed of each impact in a result, shape (n, 2)."""
     new = np.flatnonzero(np.diff(found[f"{prefix}stop.impact_count"], prepend=0))
     return np.column_stack([found[f"{prefix}{name}"][new] for name in IMPACTS[1:]])
 
 
-def test_partners_come_to_the_time_of_an_event():
-    """Steps that are cut at impacts add up to the time, and the rows are at the impacts."""
+def test_all_instances_stop_at_the_time_of_an_event():
+    """The shortened steps add up to the time, and there are rows at the impacts."""
     fmus = {"clock": integrator(), "guide": guide(3)}
     record = ["clock.value", *(f"guide.{name}" for name in IMPACTS)]
     found = simulate(fmus, {}, 0.2, 0.01, {"clock.rate": 1.0}, record, events=True)
@@ -116,7 +117,7 @@ def test_partners_come_to_the_time_of_an_event():
     new = np.flatnonzero(np.diff(found["guide.stop.impact_count"], prepend=0))
     assert len(new) >= 2
     assert (found["time"][new] == found["guide.stop.impact_time"][new]).all()
-    assert (found["time"][new] == found["time"][new - 1]).all()  # a row before, a row after
+    assert (found["time"][new] == found["time"][new - 1]).all()  # one row before, one after
     assert (
         found["guide.stop.impact_count"][new - 1] == found["guide.stop.impact_count"][new] - 1
     ).all()
@@ -128,16 +129,16 @@ def test_without_events_rows_are_the_communication_points():
     np.testing.assert_allclose(found["time"], 0.01 * np.arange(11), rtol=1e-15)
 
 
-STILL = {"guide.gravity.x": 0.0, "guide.release.displacement": 0.0, "guide.stop.position": 0.1}
-STRUCK = "guide.force.impulse.x"
+AT_REST = {"guide.gravity.x": 0.0, "guide.release.displacement": 0.0, "guide.stop.position": 0.1}
+IMPULSE = "guide.force.impulse.x"
 
 
 @pytest.mark.parametrize("events", [False, True])
-def test_a_discrete_input_may_be_given_at_any_step(events):
-    """A blow on a guide at rest brings in P^2 / 2 M; in event mode, where there is one."""
+def test_a_discrete_input_may_be_set_at_any_step(events):
+    """An impulse P on a guide of mass M at rest adds the energy P^2 / (2 M)."""
     found = simulate(
-        {"guide": guide(3)}, {}, 0.011, 1e-3, STILL, ["guide.shuttle.vx", "guide.energy.work"],
-        events=events, source=lambda t: {STRUCK: 0.0 if t < 0.0095 else 0.01},
+        {"guide": guide(3)}, {}, 0.011, 1e-3, AT_REST, ["guide.shuttle.vx", "guide.energy.work"],
+        events=events, source=lambda t: {IMPULSE: 0.0 if t < 0.0095 else 0.01},
     )  # fmt: skip
     mass = ScalarGuide.of(mechanism("PRBDM").values()).mass
     assert (found["guide.shuttle.vx"][found["time"] < 0.0105] == 0.0).all()
@@ -146,22 +147,24 @@ def test_a_discrete_input_may_be_given_at_any_step(events):
 
 @pytest.mark.parametrize("events", [False, True])
 def test_a_discrete_input_may_be_connected(events):
-    """An impulse that grows with the time is a force: of 0.2 N, in blows of a step."""
+    """An impulse sum that grows by 0.2 N s per second acts as a force of 0.2 N."""
     fmus = {"sum": integrator(), "guide": guide(3)}
-    values = STILL | {"sum.rate": 0.2}
+    values = AT_REST | {"sum.rate": 0.2}
     found = simulate(
-        fmus, {STRUCK: "sum.value"}, 0.02, 1e-4, values, ["guide.shuttle.vx"], events=events
+        fmus, {IMPULSE: "sum.value"}, 0.02, 1e-4, values, ["guide.shuttle.vx"], events=events
     )
     pushed = simulate(
-        {"guide": guide(3)}, {}, 0.02, 1e-4, STILL | {"guide.force.x": 0.2}, ["guide.shuttle.vx"]
+        {"guide": guide(3)}, {}, 0.02, 1e-4, AT_REST | {"guide.force.x": 0.2}, ["guide.shuttle.vx"]
     )
     expected = pushed["guide.shuttle.vx"][-1]
-    assert found["guide.shuttle.vx"][-1] == pytest.approx(expected, rel=0.01)  # half a step, 0.5 %
+    assert found["guide.shuttle.vx"][-1] == pytest.approx(
+        expected, rel=0.01
+    )  # half a step of 200: 0.5 %
 
 
 @pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
 def test_an_impulse_reaches_the_partner_at_the_time_of_the_impact(scheme):
-    """Two equal guides: momentum is kept to rounding, and the speeds part by Newton's law."""
+    """Two equal guides: momentum is conserved to rounding; Newton's law holds for the speeds."""
     wires = {
         "b.stop.displacement": "a.shuttle.x",
         "b.stop.velocity": "a.shuttle.vx",
@@ -184,8 +187,8 @@ def test_an_impulse_reaches_the_partner_at_the_time_of_the_impact(scheme):
 
 
 @pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
-def test_two_with_events_do_what_each_does_alone(scheme):
-    """One ends its step, the other is put back and follows: to the tolerance of the FMUs."""
+def test_two_unconnected_guides_with_events_move_as_each_does_alone(scheme):
+    """At an event of one the other is restored and repeats the step, to the FMUs' tolerance."""
     fmus = {"one": guide(3), "other": guide(3)}
     values = {"one.stop.restitution": 0.6, "other.stop.restitution": 0.5}
     record = [f"{name}.{x}" for name in fmus for x in IMPACTS]
@@ -196,8 +199,8 @@ def test_two_with_events_do_what_each_does_alone(scheme):
     assert (np.diff(found["time"]) >= 0.0).all()
 
 
-def test_a_follower_sees_the_leader_at_the_end_of_the_step():
-    """Gauss and Seidel: those without events go by what those with events have become."""
+def test_an_fmu_without_events_uses_the_new_outputs_of_one_with_events():
+    """In the Gauss-Seidel scheme FMUs with events step first."""
     fmus = {"sum": integrator(), "guide": guide(3)}
     wires = {"sum.rate": "guide.shuttle.vx"}
     found = simulate(fmus, wires, 0.03, 1e-3, record=["sum.value"], events=True)
@@ -207,18 +210,18 @@ def test_a_follower_sees_the_leader_at_the_end_of_the_step():
     assert found["guide.shuttle.vx"][-1] > 0.1
 
 
-def test_one_that_cannot_be_put_back_is_told(monkeypatch):
+def test_an_fmu_that_cannot_restore_its_state_is_rejected():
     with System({"a": guide(3), "b": guide(3)}, {}, events=True) as system:
         system.start()
         system.instances["b"].restorable = False
-        with pytest.raises(CouplingError, match="b cannot return to a state that it has left"):
+        with pytest.raises(CouplingError, match="b cannot restore a saved state"):
             system.advance(0.01)
 
 
-def test_events_without_an_end_are_told(monkeypatch):
+def test_an_endless_event_iteration_is_reported(monkeypatch):
     monkeypatch.setattr(cosimulation.Instance, "update", lambda self: True)
     with (
-        pytest.raises(CouplingError, match=r"at 0 s the instances have exchanged 100 times"),
+        pytest.raises(CouplingError, match=r"iteration at 0 s does not end after 100 updates"),
         System({"a": guide(3)}, {}, events=True) as system,
     ):
         system.start()
@@ -227,24 +230,24 @@ def test_events_without_an_end_are_told(monkeypatch):
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"connections": {"a.rate": "x.value"}}, "'x.value' belongs to none of a, guide"),
-        ({"connections": {"a.rat": "guide.shuttle.x"}}, "a has no variable 'rat'; near it are ra"),
+        ({"connections": {"a.rate": "x.value"}}, "'x.value': unknown .* one of a, guide"),
+        ({"connections": {"a.rat": "guide.shuttle.x"}}, "a has no variable 'rat'; similar names"),
         ({"connections": {"a.rate": "guide.shuttle"}}, "guide has no variable 'shuttle'"),
-        ({"connections": {"a.value": "guide.shuttle.x"}}, "a.value is no input: connect guide"),
+        ({"connections": {"a.value": "guide.shuttle.x"}}, "a.value is not an input: connect guide"),
         ({"record": ["guide.nothing"]}, "guide has no variable 'nothing'"),
-        ({"values": {"a.value": 1.0}}, "a.value = 1.0 cannot be given: it is neither"),
+        ({"values": {"a.value": 1.0}}, "a.value = 1.0 cannot be set: it is neither"),
         ({"values": {"guide.force.x": "much"}}, "guide.force.x = 'much' must be a number"),
-        ({"values": {"guide.force.x": math.nan}}, "guide.force.x = nan is no number"),
+        ({"values": {"guide.force.x": math.nan}}, "guide.force.x = nan: must be a number"),
         ({"values": {"guide.force.x": np.ones(2)}}, "guide.force.x = array.* must be a number"),
         ({"values": {"a.skipped": 1.5}}, "a.skipped = 1.5 must be a whole number"),
         ({"values": {"a.off": 2}}, "a.off = 2 must be True or False"),
         ({"scheme": "newton"}, "scheme = 'newton' must be 'gauss-seidel' or 'jacobi'"),
         ({"values": {"guide.flexure.length": -1.0}}, "guide: fmi2.* returned the status 3"),
-        ({"fmus": {"a.b": "x.fmu"}}, "'a.b' is no name for an instance: leave out dots"),
-        ({"fmus": {"a": "missing.fmu"}}, "a: missing.fmu is no FMU that can be read"),
+        ({"fmus": {"a.b": "x.fmu"}}, "instance name 'a.b': must be non-empty and without"),
+        ({"fmus": {"a": "missing.fmu"}}, "a: missing.fmu cannot be read as an FMU"),
     ],
 )  # fmt: skip
-def test_mistakes_are_sentences(changes, sentence):
+def test_error_messages_name_variable_and_remedy(changes, sentence):
     system = {"fmus": {"a": integrator(), "guide": guide(2)}, "connections": {}} | changes
     with pytest.raises(CouplingError, match=sentence):
         simulate(stop_time=0.01, step=1e-3, **system)
@@ -268,7 +271,7 @@ def test_every_number_is_taken_as_the_type_of_its_variable(name, kind):
     assert found[-1] == pytest.approx(end)
 
 
-def test_enumerations_are_whole_numbers_and_strings_are_strings(tmp_path):
+def test_enumerations_are_integers_and_strings_are_strings(tmp_path):
     one = Component("a", integrator(), tmp_path, CO_SIMULATION)
     one.instantiate()
     skipped = one.variable("skipped")
@@ -282,8 +285,8 @@ def test_enumerations_are_whole_numbers_and_strings_are_strings(tmp_path):
 
 
 @pytest.mark.parametrize("library", [None, b"damaged"])
-def test_an_fmu_that_cannot_be_loaded_is_told(library, tmp_path):
-    """Made for other platforms, or damaged; the working directory stays."""
+def test_an_fmu_that_cannot_be_loaded_is_reported(library, tmp_path):
+    """Without a library for this platform, or with a damaged one; the working directory is kept."""
     here, path = Path.cwd(), tmp_path / "x.fmu"
     with zipfile.ZipFile(guide(3)) as whole, zipfile.ZipFile(path, "w") as part:
         for name in whole.namelist():
@@ -295,11 +298,11 @@ def test_an_fmu_that_cannot_be_loaded_is_told(library, tmp_path):
     assert Path.cwd() == here
 
 
-def test_what_the_fmu_says_is_in_the_sentence():
+def test_errors_contain_the_message_of_the_fmu():
     with pytest.raises(CouplingError, match=r"status 3: flexure\.length = -1 m must be at least"):
         simulate({"guide": guide(3)}, {}, 0.1, 0.01, {"guide.flexure.length": -1.0})
 
 
-def test_a_step_that_is_none_is_refused():
+def test_a_step_of_zero_is_rejected():
     with pytest.raises(ParameterError, match=re.escape("step = 0 s must be positive and finite")):
         simulate({"a": integrator()}, {}, 1.0, 0.0)

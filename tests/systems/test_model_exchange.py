@@ -1,4 +1,4 @@
-"""One solver for a model and a partner, and the scalar guide that it is held against."""
+"""Model and partner in one solver, compared with the scalar equation of the guide."""
 
 import math
 
@@ -19,6 +19,7 @@ RECORD = ("shuttle.x", "shuttle.vx", "stop.impact_count", "stop.impact_time", "s
 
 
 def rate(x, v, f):
+    """Return the derivative of the partner's force."""
     return [(-GAIN * x - DAMPING * v - f) / LAG]
 
 
@@ -40,8 +41,8 @@ def monolith(end, start=START, wall=1e-30, **options):
 @pytest.mark.native
 @pytest.mark.fmu
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_one_solver_moves_model_and_partner_as_the_scalar_equation(fmi):
-    """To what Runge and Kutta's classical steps of 0.05 ms err, across two impacts."""
+def test_model_and_partner_move_as_the_scalar_equation(fmi):
+    """Two impacts; the tolerances are the error of the reference, RK4 with steps of 0.05 ms."""
     found = simulate(guide(fmi), partner, [0.0], END, 1e-3, START, SEEN, RECORD)
     one = monolith(END, substep=5e-5)
     last = found[-1]
@@ -69,7 +70,7 @@ def test_an_impact_has_two_rows_with_newtons_law_between_them():
 @pytest.mark.native
 @pytest.mark.fmu
 def test_one_solver_comes_to_rest_at_the_stop():
-    """Pushed by a constant force: rest, as a discrete state of the FMU, and all bounces before."""
+    """Under a constant force the FMU bounces, then rests; rest is a discrete state of the FMU."""
     start = START | {"stop.restitution": 0.5}
     found = simulate(
         guide(3), lambda t, outputs, z: ({"force.x": 0.3}, []), [], 0.3, 1e-3, start,
@@ -92,24 +93,24 @@ def test_one_solver_comes_to_rest_at_the_stop():
         ({"values": {"flexure.length": -1.0}}, "returned the status 3: "),
     ],
 )
-def test_mistakes_are_sentences(changes, sentence):
+def test_error_messages_name_variable_and_status(changes, sentence):
     options = {"stop_time": 0.01, "step": 1e-3} | changes
     with pytest.raises(CouplingError, match=sentence):
         simulate(guide(2), lambda t, outputs, z: ({}, []), [], **options)
 
 
-def test_what_an_fmu_of_fmi_3_says_is_in_the_sentence():
+def test_errors_contain_the_message_of_an_fmu_of_fmi_3():
     with pytest.raises(CouplingError, match=r"flexure\.length = -1 m must be at least"):
         simulate(guide(3), lambda t, outputs, z: ({}, []), [], 0.01, 1e-3, {"flexure.length": -1.0})
 
 
-def test_what_has_no_model_exchange_is_told():
+def test_an_fmu_without_model_exchange_is_rejected():
     with pytest.raises(CouplingError, match="has no model exchange of FMI"):
         simulate(integrator(), lambda t, outputs, z: ({}, []), [], 0.01, 1e-3)
 
 
-def test_scalar_guide_bounces_when_quadrature_says():
-    """Times and speeds of the thesis' guide under gravity, by energy and quadrature, to 1e-8."""
+def test_scalar_guide_bounces_at_the_times_found_by_quadrature():
+    """Times and speeds of the steel guide under gravity, from energy and quadrature, to 1e-8."""
     values = mechanism("PRBDM").values({"damping.beta": 0.0, "release.displacement": -0.01})
     body = ScalarGuide.of(values, [1e-30])
     one = Monolith(body, lambda t, x, v, z: 9.81 * body.mass, x=-0.01, substep=2e-5)
@@ -120,8 +121,8 @@ def test_scalar_guide_bounces_when_quadrature_says():
     np.testing.assert_allclose(found[:, 1], speeds, rtol=1e-7)
 
 
-def test_scalar_guide_is_of_the_fourth_order_across_an_impact():
-    """The impact is located; else the order would be one."""
+def test_scalar_guide_converges_with_order_four_across_an_impact():
+    """The order would be one if the impact were not located."""
     steps = [8e-4, 4e-4, 2e-4, 1e-4]
     exact = monolith(0.06, substep=2e-5)
     errors = [abs(monolith(0.06, substep=h).x - exact.x) for h in steps]
@@ -130,7 +131,7 @@ def test_scalar_guide_is_of_the_fourth_order_across_an_impact():
 
 
 def test_scalar_guide_swings_at_its_frequency():
-    """A small vibration, a tenth of the period off straight: cos(w t)."""
+    """A small vibration about the straight shape, after a tenth of the period: x = x0 cos(w t)."""
     values = mechanism("PRBDM").values({"damping.beta": 0.0})
     body = ScalarGuide.of(values)
     one = Monolith(body, lambda t, x, v, z: 0.0, x=1e-6, substep=1e-4)
@@ -139,7 +140,7 @@ def test_scalar_guide_swings_at_its_frequency():
 
 
 def test_scalar_guide_rests_and_is_released():
-    """Held while it is pressed; let go when the force turns round."""
+    """The guide rests while the force presses it on the stop, and leaves when it reverses."""
     body = ScalarGuide.of(mechanism("PRBDM").values(START), [1e-3])
     force = 0.3
     one = Monolith(body, lambda t, x, v, z: force)

@@ -1,4 +1,4 @@
-"""Packages and containers: valid by the standard's schemas, the same in all masters."""
+"""SSP packages and containers: valid by the standard's schemas, equal results in all masters."""
 
 import hashlib
 import zipfile
@@ -31,11 +31,11 @@ VALUES = {
     "follower.release.displacement": -5e-3, "follower.stop.position": 1e-3,
     "follower.stop.restitution": 0.8, "sum.gain": -4.0, "sum.skipped": 3, "sum.off": False,
 }  # fmt: skip
-"""All outputs that are connected are zero at the start, as FMPy's master takes them to be."""
+"""Connected outputs are zero at the start, since FMPy's master starts with zero inputs."""
 
 
 def fmus(fmi: int = 2) -> dict[str, Path]:
-    """Return a guide that a spring of its own holds, and one whose stop is on the first."""
+    """Return an integrator (a spring), a guide on it, and a guide whose stop is on the first."""
     return {"sum": integrator(), "carrier": guide(fmi), "follower": guide(fmi)}
 
 
@@ -53,7 +53,7 @@ def ours() -> np.ndarray:
 
 
 def test_description_is_valid(package):
-    """By the schema of SSP 1.0; the parameter sets in it by theirs."""
+    """The description matches the schema of SSP 1.0, and its parameter sets match theirs."""
     with zipfile.ZipFile(package) as archive:
         root = etree.fromstring(archive.read("SystemStructure.ssd"))
     etree.XMLSchema(etree.parse(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(
@@ -70,20 +70,20 @@ def test_description_is_valid(package):
     assert sorted(names) == sorted(VALUES)
 
 
-def test_a_single_fmu_is_a_package_too(tmp_path):
-    """Valid without connections and start values, where the schema wants no empty lists."""
+def test_a_package_may_contain_a_single_fmu(tmp_path):
+    """Without connections and start values there are no empty lists, which the schema forbids."""
     path = tmp_path / "one.ssp"
     ssp.package(path, {"guide": guide(2)}, {})
     assert len(ssp.simulate(path, 0.01, 1e-3)) == 10
 
 
-def test_package_holds_the_fmus_as_they_are(package):
+def test_package_contains_the_unchanged_fmus(package):
     with zipfile.ZipFile(package) as archive:
         for name, fmu in fmus().items():
             assert archive.read(f"resources/{name}.fmu") == fmu.read_bytes()
 
 
-def test_equal_systems_are_equal_bytes(package, tmp_path):
+def test_equal_systems_give_equal_bytes(package, tmp_path):
     again = tmp_path / "again.ssp"
     ssp.package(again, fmus(), WIRES, VALUES, STOP, "Walls")
     with zipfile.ZipFile(again) as archive:
@@ -93,7 +93,7 @@ def test_equal_systems_are_equal_bytes(package, tmp_path):
 
 
 def test_fmpy_runs_the_package_as_our_master_does(package, ours):
-    """To rounding: FMPy adds its steps up to the time."""
+    """Equal to rounding, since FMPy sums its steps."""
     found = ssp.simulate(package, STOP, STEP)
     assert ours["follower.stop.impact_count"][-1] >= 2
     np.testing.assert_allclose(found["time"], ours["time"][1:], rtol=1e-12)
@@ -126,8 +126,8 @@ def slow(*values):
 
 
 @pytest.mark.parametrize(("outer", "inner"), [(2, 2), (3, 3), slow(3, 2), slow(2, 3)])
-def test_container_does_as_our_master_does(outer, inner, ours, tmp_path):
-    """An FMU of either version, validated, with either inside."""
+def test_container_moves_as_in_our_master(outer, inner, ours, tmp_path):
+    """A valid FMU of either version, with FMUs of either version inside."""
     path = tmp_path / "walls.fmu"
     shown = ["follower.shuttle.x", "follower.stop.impact_count"]
     container(path, fmus(inner), WIRES, STEP, VALUES, shown, outer, STOP)
@@ -140,7 +140,7 @@ def test_container_does_as_our_master_does(outer, inner, ours, tmp_path):
     assert (found["follower.stop.impact_count"] == ours["follower.stop.impact_count"]).all()
 
 
-def test_a_start_value_of_the_container_reaches_what_is_inside(ours, tmp_path):
+def test_a_start_value_of_the_container_reaches_the_inner_fmu(ours, tmp_path):
     path = tmp_path / "walls.fmu"
     container(path, fmus(), WIRES, STEP, VALUES, ["follower.stop.impact_count"])
     found = simulate_fmu(
@@ -153,14 +153,14 @@ def test_a_start_value_of_the_container_reaches_what_is_inside(ours, tmp_path):
 @pytest.mark.parametrize(
     ("wires", "values"),
     [
-        ({"sum.rate": "nobody.x"}, {}),
+        ({"sum.rate": "unknown.x"}, {}),
         ({"sum.nothing": "carrier.shuttle.x"}, {}),
         ({}, {"carrier.nothing": 1.0}),
-        ({}, {"nobody.x": 1.0}),
+        ({}, {"unknown.x": 1.0}),
     ],
 )
-def test_names_that_do_not_fit_are_told(wires, values, tmp_path):
-    sentence = "there is no such variable; write name.variable"
+def test_unknown_names_are_rejected(wires, values, tmp_path):
+    sentence = "unknown variable; write INSTANCE.VARIABLE"
     with pytest.raises(CouplingError, match=sentence):
         ssp.package(tmp_path / "x.ssp", fmus(), wires, values)
     with pytest.raises(CouplingError, match=sentence):
@@ -170,12 +170,12 @@ def test_names_that_do_not_fit_are_told(wires, values, tmp_path):
 @pytest.mark.parametrize(
     ("wires", "values", "sentence"),
     [
-        ({"carrier.shuttle.x": "sum.value"}, {}, "carrier.shuttle.x is no input: connect sum"),
-        ({}, {"carrier.shuttle.x": 1.0}, "carrier.shuttle.x = 1.0 cannot be given"),
+        ({"carrier.shuttle.x": "sum.value"}, {}, "carrier.shuttle.x is not an input: connect sum"),
+        ({}, {"carrier.shuttle.x": 1.0}, "carrier.shuttle.x = 1.0 cannot be set"),
         ({}, {"carrier.force.x": "1 N"}, "carrier.force.x = '1 N' must be a number"),
     ],
 )
-def test_causalities_that_do_not_fit_are_told(wires, values, sentence, tmp_path):
+def test_wrong_causalities_and_values_are_rejected(wires, values, sentence, tmp_path):
     with pytest.raises(CouplingError, match=sentence):
         ssp.package(tmp_path / "x.ssp", fmus(), wires, values)
     with pytest.raises(CouplingError, match=sentence):
@@ -185,7 +185,7 @@ def test_causalities_that_do_not_fit_are_told(wires, values, sentence, tmp_path)
 
 @pytest.mark.parametrize("number", [np.float32(1.0), np.int64(1), np.bool_(True), True])
 def test_every_number_may_be_a_start_value(number, tmp_path):
-    """Packages and containers are the same as with Python's float."""
+    """Packages and containers are equal to those with Python's float."""
     found = []
     for value in (1.0, number):
         ssp.package(tmp_path / "x.ssp", fmus(), {}, {"carrier.force.x": value})
@@ -196,33 +196,33 @@ def test_every_number_may_be_a_start_value(number, tmp_path):
 
 
 @pytest.mark.parametrize("name", ["text.fmu", "missing.fmu"])
-def test_what_is_no_fmu_is_told(name, tmp_path):
+def test_an_unreadable_fmu_is_rejected(name, tmp_path):
     (tmp_path / "text.fmu").write_text("no FMU")
-    with pytest.raises(CouplingError, match=rf"a: .*{name} is no FMU that can be read"):
+    with pytest.raises(CouplingError, match=rf"a: .*{name} cannot be read as an FMU"):
         ssp.package(tmp_path / "x.ssp", {"a": tmp_path / name}, {})
-    with pytest.raises(CouplingError, match=rf"a: .*{name} is no FMU that can be read"):
+    with pytest.raises(CouplingError, match=rf"a: .*{name} cannot be read as an FMU"):
         container(tmp_path / "x.fmu", {"a": tmp_path / name}, {}, 1e-3)
 
 
-def test_a_package_connects_outputs_alone(tmp_path):
-    with pytest.raises(CouplingError, match=r"carrier\.flexure\.length is no output"):
+def test_a_package_connects_only_outputs_to_inputs(tmp_path):
+    with pytest.raises(CouplingError, match=r"carrier\.flexure\.length is not an output"):
         ssp.package(tmp_path / "x.ssp", fmus(), {"sum.rate": "carrier.flexure.length"})
 
 
-def test_what_a_container_cannot_show_is_told(tmp_path):
-    with pytest.raises(CouplingError, match=r"link\[1\]\.angle is neither parameter nor input"):
+def test_a_container_rejects_local_variables(tmp_path):
+    with pytest.raises(CouplingError, match=r"link\[1\]\.angle: must be a parameter, an input"):
         container(tmp_path / "x.fmu", fmus(), {}, 1e-3, shown=["carrier.link[1].angle"])
 
 
-def test_what_is_no_package_is_told(tmp_path):
+def test_a_file_that_is_not_a_package_is_rejected(tmp_path):
     path = tmp_path / "x.ssp"
     path.write_bytes(b"nothing")
     with pytest.raises(CouplingError, match=r"x\.ssp: FMPy cannot simulate it \(File is not"):
         ssp.simulate(path, 1.0, 0.1)
 
 
-def test_fmpy_does_not_run_packages_of_fmi_3(tmp_path):
-    """Told in a sentence, whatever FMPy stumbles over."""
+def test_a_package_of_fmi_3_is_rejected(tmp_path):
+    """FMPy's master does not support FMI 3.0; its error is reported with the package's name."""
     path = tmp_path / "three.ssp"
     ssp.package(path, {"guide": guide(3)}, {})
     with pytest.raises(
@@ -231,11 +231,11 @@ def test_fmpy_does_not_run_packages_of_fmi_3(tmp_path):
         ssp.simulate(path, 0.01, 1e-3)
 
 
-def test_what_fmpy_would_get_wrong_is_refused(package, tmp_path):
-    """A last step that is shorter; names of which one begins with the other."""
-    with pytest.raises(CouplingError, match=r"stop_time = 1 s is no multiple of step = 0\.3 s"):
+def test_systems_that_fmpy_would_simulate_wrongly_are_rejected(package, tmp_path):
+    """A shorter last step; instance names of which one begins with the other."""
+    with pytest.raises(CouplingError, match=r"stop_time = 1 s: FMPy needs a multiple of step = 0"):
         ssp.simulate(package, 1.0, 0.3)
     path = tmp_path / "names.ssp"
     ssp.package(path, {"ab": integrator(), "a": integrator()}, {})
-    with pytest.raises(CouplingError, match="FMPy takes start values of ab as those of a: let no"):
+    with pytest.raises(CouplingError, match="FMPy would apply start values of ab to a; rename"):
         ssp.simulate(path, 1.0, 0.5)

@@ -3,7 +3,7 @@
 :func:`compare` evaluates the same quantities by the pseudo-rigid-body model and by finite elements
 of the same file, and compares them with measured values and their uncertainties:
 
-* the place of rest of the released body, and the lowest frequencies about that shape;
+* the rest position of the released body, and the lowest frequencies about that shape;
 * the holding force in the drawn shape, the stiffness and the frequencies there;
 * the modal restitution of an arriving fundamental mode, for every wall that a force on the released
   body reaches.
@@ -107,7 +107,7 @@ class Comparison:
             if row.name == name:
                 return row
         known = ", ".join(row.name for row in self.rows)
-        raise ParameterError(f"{name!r} was not compared; there are {known}")
+        raise ParameterError(f"{name!r} was not compared; compared are {known}")
 
     def __str__(self) -> str:
         head = f"{'':<34}{'model':>12}{'elements':>12}{'difference':>12}"
@@ -117,7 +117,9 @@ class Comparison:
         lines = [f"{self.title}, {self.elements} elements per flexure", head]
         lines += [_line(row, measured) for row in self.rows]
         if measured:
-            lines.append("the last two columns: distances in the measurement's uncertainties")
+            lines.append(
+                "last two columns: difference from the measured value in its uncertainties"
+            )
         return "\n".join([*lines, *self.notes])
 
     def csv(self) -> str:
@@ -263,7 +265,7 @@ def compare(
     for name in known:
         if name not in model:
             raise ParameterError(
-                f"{name!r} was measured but is not compared; there are {', '.join(model)}"
+                f"{name!r} was measured but is not compared; compared are {', '.join(model)}"
             )
     least = ZERO_RTOL * system.length
     small = {"m": least, "N": least * abs(found["stiffness, straight"])}
@@ -290,7 +292,7 @@ def _without(mechanism: Mechanism) -> dict[str, float]:
 def _restitutions(
     mechanism: Mechanism, values: Mapping[str, float], elements: int, notes: list[str]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the modal restitution at each stop by both; add a note where there is none."""
+    """Yield the modal restitution of each stop by both; add a note if a wall is out of reach."""
     known = mechanism.values(values)
     for stop in mechanism.stops:
         place, d = value(stop, "position", known), value(stop, "offset", known)

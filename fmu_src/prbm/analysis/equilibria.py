@@ -1,4 +1,4 @@
-"""Force over displacement of a held body, and its places of rest without a force.
+"""Force over displacement of a held body, and its rest positions without a force.
 
 The displacement is given, not the force.  The curve then continues through the extrema of the
 force, where a mechanism under a given load snaps through.
@@ -16,12 +16,12 @@ from ..mechanics.modal import modes
 from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System
 
-REST_RTOL = 1e-12  # Tolerance of a place of rest, relative to the size of the mechanism.
+REST_RTOL = 1e-12  # Tolerance of a rest position, relative to the size of the mechanism.
 
 
 @dataclass(frozen=True)
 class Rest:
-    """A place of rest of the released body without a holding force.
+    """A rest position of the released body without a holding force.
 
     Parameters
     ----------
@@ -59,15 +59,15 @@ def force_curve(system: System, displacements: Sequence[float] | Real) -> Real:
 def rests(
     system: System, displacements: Sequence[float] | Real, forces: Real | None = None
 ) -> list[Rest]:
-    """Return the places of rest within displacements, in order.
+    """Return the rest positions within a range of displacements, in order.
 
     Parameters
     ----------
     system : System
         The mechanism.
     displacements : (k,)
-        Increasing [m], with at most one change of sign of the force between two of them, and a
-        force other than zero at the first and the last.
+        Increasing displacements [m], with at most one change of sign of the force between two of
+        them, and a force other than zero at the first and the last.
     forces : (k,) or None
         Holding forces, if known [N].
 
@@ -90,14 +90,14 @@ def rests(
 
 
 def snap(system: System, low: float, high: float) -> tuple[float, float]:
-    """Return the holding force of largest magnitude between two places of rest.
+    """Return the holding force of largest magnitude between two rest positions.
 
     Parameters
     ----------
     system : System
         The mechanism.
     low, high : float
-        Displacements of neighbouring places of rest [m].
+        Displacements of neighbouring rest positions [m].
 
     Returns
     -------

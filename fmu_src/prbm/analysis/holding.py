@@ -36,7 +36,7 @@ class Held:
         Displacement of the released body along the direction of the release, from the drawn shape
         [m].
     force : float
-        Holding force on the body along that direction [N]; 0 at a place of rest.
+        Holding force on the body along that direction [N]; 0 at a rest position.
     stiffness : float
         Derivative of the force by the displacement [N/m]; NaN where the loops prevent a further
         motion along that direction.
@@ -97,7 +97,7 @@ def free(system: System) -> Held:
     Raises
     ------
     EquilibriumError
-        If there is none.
+        If no such shape is found.
     """
     return _described(system, free_displacement(system), equilibrium(system))
 
@@ -111,9 +111,9 @@ class Curve:
     points : tuple of Held
         Points in the order of the displacements.
     rests : tuple of Rest
-        Places of rest without a holding force.
+        Rest positions without a holding force.
     snaps : tuple of (float, float)
-        Displacement [m] and force [N] of the largest force between neighbouring places of rest:
+        Displacement [m] and force [N] of the largest force between neighbouring rest positions:
         there the mechanism snaps through under a force.
     """
 
@@ -125,7 +125,7 @@ class Curve:
 def curve(
     system: System, displacements: Sequence[float] | Real, progress: Progress | None = None
 ) -> Curve:
-    """Return the holding forces at displacements, with the places of rest and the snaps.
+    """Return the holding forces at displacements, with the rest positions and the snaps.
 
     Parameters
     ----------

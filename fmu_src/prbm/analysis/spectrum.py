@@ -33,7 +33,7 @@ from .impact_map import first_impact
 REMOVED_WALL = 10.0  # Displacement of a removed wall, in sizes of the mechanism.
 SAMPLES_MIN = 16  # Least number of samples of a spectrum.
 STEP_RTOL = 1e-6  # Largest relative difference between equal steps.
-MODES_SHOWN = 6
+MODES_SHOWN = 6  # Number of modes in a figure.
 SIGNALS = {
     "along": "velocity along the impact [m/s]",
     "across": "velocity across it [m/s]",
@@ -169,9 +169,9 @@ def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
     Parameters
     ----------
     time : (m,)
-        In equal steps [s].
+        Times in equal steps [s].
     signal : (m,)
-        In any unit.
+        Samples in any unit.
 
     Returns
     -------

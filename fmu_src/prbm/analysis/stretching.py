@@ -3,7 +3,8 @@
 Such an impact turns the body.  Inextensible flexures may leave the body a single degree of freedom,
 with or without rotation, and the rebound then does not depend on the place of the hit.  Stretching
 flexures permit the rotation.  :func:`note` compares the modal restitution of the mechanism with
-that of the same mechanism with ``axial = true``.
+that of the same mechanism with ``axial = true``.  Both follow Newton's law of a rigid impact; the
+effect is smaller, or absent, for a contact that lasts as long as a period of the excited modes.
 """
 
 from collections.abc import Mapping
@@ -64,17 +65,17 @@ def note(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> str | 
     if abs(off) <= LEVER_MIN * system.length:
         return None
     try:
-        as_it_is = restitution(mechanism, values, stop)
+        inextensible = restitution(mechanism, values, stop)
         stretched = restitution(stretching(mechanism), values, stop)
     except PrbmError:
         return None
-    if not abs(as_it_is - stretched) > DIFFERENCE_MIN:  # Or one is not a number.
+    if not abs(inextensible - stretched) > DIFFERENCE_MIN:  # Or one is not a number.
         return None
     place = value(s, "position", system.values)
     return (
-        f"{s.name} hits {1e3 * abs(off):.3g} mm off the centre of mass of {s.body}, and no "
-        f"flexure stretches: with the wall at {1e3 * place:.3g} mm the modal restitution is "
-        f"{as_it_is:.3f}, and would be {stretched:.3f} if they did (axial = true)"
+        f"{s.name} hits {1e3 * abs(off):.3g} mm off the centre of mass of {s.body}; with the wall "
+        f"at {1e3 * place:.3g} mm the modal restitution of a rigid impact is {inextensible:.3f} "
+        f"with inextensible flexures and {stretched:.3f} with stretching ones (axial = true)"
     )
 
 

@@ -23,7 +23,7 @@ def stop_index(mechanism: Mechanism, name: str | None) -> int:
     Raises
     ------
     ParameterError
-        If there is no stop, or none with that name.
+        If the mechanism has no stop, or no stop with that name.
     """
     names = [stop.name for stop in mechanism.stops]
     if not names or (name is not None and name not in names):
@@ -35,7 +35,7 @@ def stop_index(mechanism: Mechanism, name: str | None) -> int:
 def touching(
     hold: Callable[[float, S | None], S],
     gap: Callable[[S], float],
-    height: float,
+    wall: float,
     size: float,
     near: S | None = None,
 ) -> S:
@@ -47,7 +47,7 @@ def touching(
         Returns the shape held at a displacement [m], near a given shape.
     gap : callable
         Returns the gap of the stop in a shape [m].
-    height : float
+    wall : float
         Position of the wall [m].
     size : float
         Size of the mechanism [m].
@@ -57,9 +57,9 @@ def touching(
     Raises
     ------
     EquilibriumError
-        If there is none.
+        If no such shape is found in :data:`SECANT_STEPS_MAX` steps.
     """
-    x, shape = height, hold(height, near)
+    x, shape = wall, hold(wall, near)
     g = gap(shape)
     last_x, last_g = x - g, math.nan
     for _ in range(SECANT_STEPS_MAX):
@@ -71,30 +71,39 @@ def touching(
         shape = hold(x, shape)
         g = gap(shape)
     raise EquilibriumError(
-        f"no shape held by a force on the released body touches the wall at {height:g} m"
+        f"no shape held by a force on the released body touches the wall at {wall:g} m"
     )
 
 
-def impact_shape(system: System, stop: int, height: float) -> Equilibrium:
-    """Return the shape at which a stop touches its wall at a height, held by a force.
+def impact_shape(system: System, stop: int, wall: float) -> Equilibrium:
+    """Return the shape in which a stop touches its wall, held by a force on the released body.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    stop : int
+        Index of the stop.
+    wall : float
+        Position of its wall [m].
 
     Raises
     ------
     EquilibriumError
-        If there is none.
+        If no such shape is found.
     """
     rows = system.gap_rows
 
     def gap(shape: Equilibrium) -> float:
-        return float(rows.values(system.directions(shape.q))[stop]) + height
+        return float(rows.values(system.directions(shape.q))[stop]) + wall
 
-    return touching(lambda x, _: equilibrium(system, x), gap, height, system.length)
+    return touching(lambda x, _: equilibrium(system, x), gap, wall, system.length)
 
 
 def lever(system: System, stop: int) -> float:
-    """Return the distance from the centre of mass of a body to the line of an impact [m].
+    """Return the distance from the centre of mass of a body to the line of an impact, signed [m].
 
-    It is that in the drawn shape, positive to the left of the direction of the stop.
+    The distance is taken in the drawn shape, positive to the left of the direction of the stop.
     """
     s = system.mechanism.stops[stop]
     point = complex(*(affine(coordinate)(system.values) for coordinate in s.point))

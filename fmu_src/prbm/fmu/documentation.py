@@ -296,8 +296,10 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
         "vibrations of the flexures (0.5 ms in the steel structure of source 1). This model has no "
         "axial vibrations, because its links do not stretch.",
         planar,
-        "On parallel, straight flexures, links that do not stretch prevent the rotation of the "
-        "body. An impact off its centre of mass therefore loses less energy than in reality.",
+        "Links that do not stretch keep a body on parallel, straight flexures from turning, so "
+        "that the place of a hit has no effect there. With flexures that stretch, a rigid impact "
+        "off the centre of mass loses more energy of the fundamental mode. The loss of a real one "
+        "depends on the duration of its contact.",
     ]
     items = [impact, planar] if _stretches(mechanism) else rigid
     for model in sorted(models & END_MOMENT.keys()):

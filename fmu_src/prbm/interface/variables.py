@@ -480,7 +480,8 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     yield last("energy_lost", "J", "Energy lost at the last impact")
     yield last(
         "modal_restitution", "1",
-        "Velocity of the fundamental mode after over before the last impact, with reversed sign",
+        "Velocity of the fundamental mode after over before the last impact, with reversed sign; "
+        "far below -1 or above 1 where little of this mode arrives",
     )  # fmt: skip
     yield last("impulse_sum", "N.s", "Sum of all impulses of the wall, including captures", 0.0)
 

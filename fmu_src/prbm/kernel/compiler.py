@@ -12,16 +12,18 @@ import os
 import platform
 import shlex
 import shutil
+import stat
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..base.atomic import write
 from ..base.errors import PrbmError
+from ..base.lock import locked
 from .sources import UNIT, kernel
 
 HOST, ALL = "host", "all"
@@ -41,10 +43,11 @@ HEADERS = (
     "fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h",
     "fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h",
 )  # fmt: skip
-_loaded: dict[Path, bytes] = {}  # Libraries that this process has read or compiled, by cache entry.
+_loaded: dict[str, bytes] = {}  # Libraries of this process by the names of their cache entries.
 ERROR_LINES_MAX = 6  # Lines of a compiler's output in an error message.
 TEMPORARY = ("TMPDIR", "TMP", "TEMP")  # Variables that name the folder of a compiler's files.
 MAGIC = b"prbm library\n"
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 INSTALL = (
     "install one (on Debian or Ubuntu 'apt install gcc', on macOS 'xcode-select --install'), or "
     "the compiler of the Python package ziglang with 'python -m pip install ziglang'"
@@ -316,8 +319,9 @@ def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -
 
 
 def _zig_folders(folder: Path) -> dict[str, str]:
-    """Return the cache folders of ziglang; the parts of C libraries that it compiles are kept."""
-    kept = cache_folder() / "zig"
+    """Return the folders of ziglang, which keeps the libraries that it builds for itself."""
+    private = private_cache()
+    kept = (private or folder) / "zig"
     with suppress(OSError):
         kept.mkdir(parents=True, exist_ok=True)
     if not os.access(kept, os.W_OK):
@@ -339,7 +343,7 @@ def _failure(wanted: Platform, compiler: Compiler, done: "subprocess.CompletedPr
 
 
 def cache_folder() -> Path:
-    """Return the cache folder of this package for the user."""
+    """Return the folder of the cache, which may not exist or belong to another user."""
     home = Path(os.path.expanduser("~"))
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
@@ -350,25 +354,102 @@ def cache_folder() -> Path:
     return base / "prbm-impact"
 
 
+def private_cache() -> Path | None:
+    """Return a folder of the cache to which no other user can write; None if there is none.
+
+    The folder is created if necessary.  If the usual one belongs to another user, which is possible
+    where several users share ``XDG_CACHE_HOME``, it is one with the number of this user.
+    """
+    usual = cache_folder()
+    if sys.platform == "win32":  # The access control list of the profile protects it.
+        return usual if _created(usual) else None
+    for folder in (usual, usual.with_name(f"{usual.name}-{os.geteuid()}")):
+        if _created(folder) and _private(folder):
+            return folder
+    return None
+
+
+def _created(folder: Path) -> bool:
+    """Create a folder for this user alone, if it does not exist; return success."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
+    except OSError:
+        return False
+    return True
+
+
+def _private(folder: Path) -> bool:
+    """Return whether only this user can write to a folder.
+
+    A folder of this user to which others could write is restricted.  The files of ziglang in it,
+    which others may have changed, are removed; :func:`_read` checks all other files.
+    """
+    try:
+        found = folder.stat()
+        if found.st_uid == _user() and found.st_mode & OTHERS_WRITE:
+            folder.chmod(0o700)
+            shutil.rmtree(folder / "zig", ignore_errors=True)
+            found = folder.stat()
+    except OSError:
+        return False
+    return _trusted(found)
+
+
+def _trusted(found: os.stat_result) -> bool:
+    """Return whether only this user, or the administrator, can write to a file or folder."""
+    if sys.platform == "win32":  # Modes and numbers of users have no meaning there.
+        return True
+    return found.st_uid in (_user(), 0) and not found.st_mode & OTHERS_WRITE
+
+
+def _user() -> int:
+    """Return the number of this user; 0 on Windows."""
+    if sys.platform == "win32":
+        return 0
+    return os.geteuid()
+
+
 def _cached(
     wanted: Platform,
     compiler: Compiler,
     files: Mapping[str, bytes],
     progress: Callable[[str], None],
 ) -> bytes:
-    """Return the library from the cache, or compile it and write it to the cache.
+    """Return the library from the cache, or compile it and store it there.
 
-    A cache that cannot be read or written is ignored.
+    Without a private folder, or if it cannot be read or written, each process compiles the library.
     """
     digest = hashlib.sha256()
     for text in (wanted.name, compiler.identity, *compiler.command[1:], *_arguments(wanted)):
         digest.update(text.encode(errors="surrogateescape") + b"\0")
     for name in sorted(files):
         digest.update(name.encode() + b"\0" + hashlib.sha256(files[name]).digest())
-    entry = cache_folder() / f"{digest.hexdigest()[:32]}{wanted.suffix}"
-    if entry not in _loaded:
-        _loaded[entry] = _read(entry) or _compile(entry, wanted, compiler, files, progress)
-    return _loaded[entry]
+    name = f"{digest.hexdigest()[:32]}{wanted.suffix}"
+    if name not in _loaded:
+        folder = private_cache()
+        if folder is None:
+            content = _compiled(wanted, compiler, files, progress)
+            progress(
+                f"cannot write to {cache_folder()}: no folder that only this user can write to; "
+                "the next export compiles again"
+            )
+        else:
+            entry = folder / name
+            content = _read(entry) or _compile(entry, wanted, compiler, files, progress)
+        _loaded[name] = content
+    return _loaded[name]
+
+
+def _compiled(
+    wanted: Platform,
+    compiler: Compiler,
+    files: Mapping[str, bytes],
+    progress: Callable[[str], None],
+) -> bytes:
+    """Report and compile."""
+    progress(f"compiling the kernel for {wanted.name} with {compiler.name}")
+    return compiled(wanted, compiler, files)
 
 
 def _compile(
@@ -378,12 +459,11 @@ def _compile(
     files: Mapping[str, bytes],
     progress: Callable[[str], None],
 ) -> bytes:
-    """Compile the library and write it to the cache, unless another process just has."""
+    """Compile the library and store it in the cache, unless another process has just done so."""
     with _locked(entry.parent):
         content = _read(entry)
         if content is None:
-            progress(f"compiling the kernel for {wanted.name} with {compiler.name}")
-            content = compiled(wanted, compiler, files)
+            content = _compiled(wanted, compiler, files, progress)
             try:
                 write(entry, MAGIC + hashlib.sha256(content).digest() + content)
             except OSError:
@@ -392,9 +472,13 @@ def _compile(
 
 
 def _read(entry: Path) -> bytes | None:
-    """Return the library of a cache entry, None if it is missing or damaged."""
+    """Return the library of an entry; None if it is missing, damaged, or others can write to it."""
     try:
-        kept = entry.read_bytes()
+        with entry.open("rb") as file:
+            found = os.fstat(file.fileno())
+            if not (stat.S_ISREG(found.st_mode) and _trusted(found)):
+                return None
+            kept = file.read()
     except OSError:
         return None
     head = len(MAGIC) + hashlib.sha256().digest_size
@@ -404,33 +488,6 @@ def _read(entry: Path) -> bytes | None:
     return content
 
 
-@contextmanager
-def _locked(folder: Path) -> Iterator[None]:
-    """Hold a lock, so that exports at the same time do not compile the same library.
-
-    The system releases the lock when the process ends.  Without a lock, the library is compiled
-    twice, with the same result.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        file = open(folder / "lock", "a+b")  # noqa: SIM115
-    except OSError:
-        yield
-        return
-    with file:
-        with suppress(OSError):
-            _lock(file.fileno())
-        yield
-
-
-if sys.platform == "win32":
-    import msvcrt
-
-    def _lock(handle: int) -> None:
-        msvcrt.locking(handle, msvcrt.LK_LOCK, 1)
-
-else:
-    import fcntl
-
-    def _lock(handle: int) -> None:
-        fcntl.flock(handle, fcntl.LOCK_EX)
+def _locked(folder: Path) -> AbstractContextManager[None]:
+    """Keep other exports from compiling into a folder at the same time, during a ``with`` block."""
+    return locked(folder / "lock")

@@ -91,7 +91,8 @@ def modes_at(system: System, q: Real) -> Modes:
 
     The multipliers are those of the shape held at rest by a force on the released body (Gauss'
     principle: the accelerations left over are the least ones); at a static shape they are
-    exact.
+    exact.  At other shapes the modes depend on the choice of the coordinates.  They may include
+    unstable ones, which come first.
     """
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
@@ -104,9 +105,11 @@ def modes_at(system: System, q: Real) -> Modes:
 
 
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:
-    """Return the modal restitution of an impact, -phi^T M v+ / phi^T M v- [-].
+    """Return the modal restitution C of an impact, -phi^T M v+ / phi^T M v- [-].
 
-    Zero if the fundamental mode arrives with round-off alone.
+    Zero if the velocity of the fundamental mode before the impact is round-off.  Otherwise
+    |C| <= 1/sqrt(s), with s the share of this mode in the kinetic energy before the impact: C is
+    far below -1 or above 1 where s is small.
 
     Examples
     --------

@@ -43,7 +43,7 @@ def heat_map(maps: Sequence[ImpactMap], columns: int = 3) -> Figure:
     low = min(float(m.restitution.min()) for m in maps)
     high = max(float(m.restitution.max()) for m in maps)
     for axes, one in zip(every, maps, strict=False):
-        x, y = 1e3 * one.heights, 1e3 * one.offsets
+        x, y = 1e3 * one.walls, 1e3 * one.offsets
         mesh = axes.pcolormesh(
             _edges(x), _edges(y), one.restitution, vmin=low, vmax=high, cmap="viridis"
         )
@@ -73,7 +73,7 @@ def surface(maps: Sequence[ImpactMap]) -> Figure:
     figure = Figure((7.0, 5.4), dpi=120)
     axes: Any = figure.add_axes((0.0, 0.02, 0.9, 0.94), projection="3d")
     for k, one in enumerate(maps):
-        X, Y = np.meshgrid(1e3 * one.heights, 1e3 * one.offsets)
+        X, Y = np.meshgrid(1e3 * one.walls, 1e3 * one.offsets)
         colour = SURFACES[k % len(SURFACES)]
         if k == 0:
             axes.plot_surface(
@@ -83,7 +83,7 @@ def surface(maps: Sequence[ImpactMap]) -> Figure:
         else:
             axes.plot_wireframe(X, Y, one.restitution, color=colour, linewidth=1.2)
             axes.plot([], [], [], color=colour, linewidth=1.2, label=one.label)
-    axes.set_xticks(1e3 * maps[0].heights)
+    axes.set_xticks(1e3 * maps[0].walls)
     axes.set_yticks(1e3 * maps[0].offsets)
     axes.set_xlabel("position of the wall [mm]", labelpad=8)
     axes.set_ylabel("offset of the hit [mm]", labelpad=8)
@@ -103,7 +103,7 @@ def energies(one: ImpactMap) -> Figure:
     colours = [FUNDAMENTAL, *HIGHER, LOST]
     for i, axes in enumerate(every[::-1]):
         shares_of = np.array([[*grouped(hit.after), hit.lost] for hit in one.hits[i]])
-        _bars(axes, 1e3 * one.heights, shares_of, names, colours)
+        _bars(axes, 1e3 * one.walls, shares_of, names, colours)
         axes.annotate(
             f"offset\n{1e3 * one.offsets[i]:g} mm", (1.01, 0.5), xycoords="axes fraction",
             va="center", fontsize=9,

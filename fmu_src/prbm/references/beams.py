@@ -1,8 +1,8 @@
 r"""Cantilevers in closed form, as references for the flexure models.
 
-The beam of Euler and Bernoulli: it bends, it neither stretches nor shears, and however far it
-bends its moment is EI times its curvature (the elastica).  Lengths are in units of the length L of
-the beam; it is clamped at the origin and points along +x.
+The beam is that of Euler and Bernoulli, for large deflections (the elastica): its moment is EI
+times its curvature, and it neither stretches nor shears.  It is clamped at the origin and points
+along +x.  Lengths are in units of the length L of the beam.
 
 Sources
 -------
@@ -18,19 +18,19 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
-SMALLEST_LOAD = 1e-9  # below, the elliptic integrals lose the difference that they are used for
+LOAD_MIN = 1e-9  # Below this load the difference of the elliptic integrals is round-off.
 
 
 @dataclass(frozen=True)
 class Tip:
-    """Where the end of a cantilever is, in units of L, and its slope [rad]."""
+    """Position of the end of a cantilever, in units of L, and its slope [rad]."""
 
     z: complex
     slope: float
 
 
 def end_force(load: float) -> Tip:
-    r"""Return the tip under an end force across the unloaded beam that keeps its direction.
+    r"""Return the tip under an end force of constant direction, normal to the unloaded beam.
 
     With alpha = P L^2/EI and the slope Theta of the tip, k^2 = (1 + sin Theta)/2 and
     sin phi = 1/(k sqrt 2) (eqs. 8 to 16 of [1]):
@@ -53,7 +53,7 @@ def end_force(load: float) -> Tip:
     (0.333333, 0.5)
     """
     alpha = abs(load)
-    if alpha < SMALLEST_LOAD:
+    if alpha < LOAD_MIN:
         return Tip(complex(1.0, load / 3), load / 2)
 
     def excess(slope: float) -> float:
@@ -74,7 +74,7 @@ def _modulus(slope: float) -> tuple[float, float]:
 
 
 def end_moment(load: float) -> Tip:
-    """Return the tip under an end moment: the beam is an arc of a circle.
+    """Return the tip under an end moment, which bends the beam to an arc of a circle.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def end_moment(load: float) -> Tip:
 
     Examples
     --------
-    Half a circle ends above its clamp, by its diameter 2/pi:
+    Half a circle ends above its clamp, at the distance of its diameter 2/pi:
 
     >>> tip = end_moment(math.pi)
     >>> round(tip.z.real, 12), round(tip.z.imag * math.pi, 12)
@@ -109,9 +109,9 @@ def wavenumber(mode: int, mass: float = 0.0, inertia: float = 0.0) -> float:
     Parameters
     ----------
     mode : int
-        1: the fundamental.
+        Number of the mode, 1 for the fundamental.
     mass, inertia : float
-        mu, nu [-].
+        mu, nu [-] (default: 0, no body).
 
     Examples
     --------
@@ -123,17 +123,17 @@ def wavenumber(mode: int, mass: float = 0.0, inertia: float = 0.0) -> float:
     mu, nu = mass, inertia
 
     def determinant(b: float) -> float:
-        grow = math.exp(-b)  # keeps the hyperbolic functions of order one
-        ch, sh = (1 + grow * grow) / 2, (1 - grow * grow) / 2
-        c, s = grow * math.cos(b), grow * math.sin(b)
+        scale = math.exp(-b)  # keeps the hyperbolic functions of order one
+        ch, sh = (1 + scale * scale) / 2, (1 - scale * scale) / 2
+        c, s = scale * math.cos(b), scale * math.sin(b)
         W, slope = (ch - c, sh - s), (sh + s, ch - c)
         moment, shear = (ch + c, sh + s), (sh - s, ch + c)
         bend = [m - nu * b**3 * w for m, w in zip(moment, slope, strict=True)]
         force = [q + mu * b * w for q, w in zip(shear, W, strict=True)]
         return bend[0] * force[1] - bend[1] * force[0]
 
-    looks = np.geomspace(1e-3, (mode + 1) * math.pi, 400 * (mode + 1))
-    values = [determinant(float(b)) for b in looks]
-    changes = [i for i in range(len(looks) - 1) if values[i] * values[i + 1] < 0]
+    grid = np.geomspace(1e-3, (mode + 1) * math.pi, 400 * (mode + 1))
+    values = [determinant(float(b)) for b in grid]
+    changes = [i for i in range(len(grid) - 1) if values[i] * values[i + 1] < 0]
     i = changes[mode - 1]
-    return float(brentq(determinant, looks[i], looks[i + 1], xtol=1e-15, rtol=1e-14))
+    return float(brentq(determinant, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-14))

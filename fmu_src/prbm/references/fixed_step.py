@@ -1,8 +1,11 @@
-"""The source's way of integrating, for comparison: RK4 at a fixed step, projection, late impacts.
+"""The integration of the thesis for comparison: RK4 at a fixed step, projection, late impacts.
 
-The loop of the thesis (A.3): a step of the classical Runge-Kutta method, a projection onto the
-loops, a look whether the wall is penetrated, and if it is, Newton's impact there and then, up to a
-step late; no further impact until the body has left the wall.  The equations are ours.
+After each step of the classical Runge-Kutta method the state is projected onto the loops.  If a
+wall is penetrated then, Newton's impact law is applied at once, up to a step late; the next impact
+follows only after the body has left the wall.  The equations of motion are those of this package.
+
+Source: S. Boersma, Modelling and Validation of the Impact Response in Compliant Mechanisms, MSc
+thesis, TU Delft 2015, appendix A.3.
 """
 
 from collections.abc import Mapping
@@ -23,16 +26,16 @@ from ..mechanism.parts import value
 
 @dataclass(frozen=True)
 class March:
-    """What a fixed-step run gives.
+    """The result of a run with a fixed step.
 
     Parameters
     ----------
     time : (m,)
-        [s].
+        Times [s].
     q, v : (m, n)
-        Angles and rates after each step [rad], [rad/s].
+        Angles [rad] and rates [rad/s] after each step.
     impacts : tuple of (float, str)
-        Times at which impacts were noticed [s] and their stops.
+        Detection time of each impact [s], and the name of its stop.
     """
 
     time: Real
@@ -48,23 +51,23 @@ def march(
     stop_time: float,
     step: float,
 ) -> March:
-    """Simulate as the source does, without friction, from the release.
+    """Simulate from the release with the integration of the thesis, without friction.
 
     Parameters
     ----------
     mechanism : Mechanism
-        What moves.
+        The mechanism.
     values : mapping
         Parameters that differ from their defaults.
     stop_time, step : float
-        End and step size [s].
+        Duration and step size [s].
 
     Raises
     ------
     ParameterError
-        If the step is not positive, or a value is refused by :class:`prbm.Simulation`.
+        If the step is not positive, or :class:`prbm.Simulation` rejects a value.
     SimulationError
-        If the step is so long that the motion is lost.
+        If the state is no longer finite, because the step is too long.
     """
     if not 0.0 < step <= stop_time:
         raise ParameterError(f"step = {step:g} s must be positive and within {stop_time:g} s")
@@ -78,7 +81,7 @@ def march(
         t = k * step
         y = equations.project(t, rk4(equations.rate, t - step, y, step))
         if not np.isfinite(y).all():
-            raise SimulationError(f"the step of {step:g} s is too long: lost at t = {t:g} s")
+            raise SimulationError(f"step = {step:g} s is too long: no finite state at t = {t:g} s")
         e = system.directions(y[:n])
         gaps = equations.gaps(t, e)
         for i, stop in enumerate(mechanism.stops):

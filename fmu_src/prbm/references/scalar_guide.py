@@ -1,12 +1,12 @@
 """The 1R guide as one scalar equation: a reference for systems that contain it.
 
-A parallelogram does not turn its shuttle, so that the guide is a pendulum of one angle phi from
-straight, x = r sin(phi) with r = gamma L,
+A parallelogram does not turn its shuttle.  The guide is therefore a pendulum with one angle phi
+from straight, x = r sin(phi) and r = gamma L,
 
     M r^2 phi'' = -4 k (phi + beta phi') + r cos(phi) F,        k = 2 gamma K_theta E I / L
 
-with M the shuttle and two lumped masses.  The force F may depend on states of a partner, which
-are integrated along: the whole system is in one solver.  Nothing of the engine is used.
+with M the mass of the shuttle and two lumped masses.  The force F may depend on states of a
+partner, which are integrated by the same solver.  This module uses no code of the engine.
 """
 
 import math
@@ -21,7 +21,7 @@ from scipy.optimize import brentq
 Real = NDArray[np.float64]
 Force = Callable[[float, float, float, Real], float]
 Rates = Callable[[float, float, float, Real], Sequence[float]]
-LOCATED = 1e-14  # s, to which an impact is located
+IMPACT_TIME_ATOL = 1e-14  # s
 
 
 @dataclass(frozen=True)
@@ -31,12 +31,12 @@ class ScalarGuide:
     Parameters
     ----------
     r, k, mass, beta : float
-        Length of the links [m], spring of each of the four pivots [N m/rad], all that moves [kg],
-        damping in proportion to stiffness [s].
+        Length of the links [m], spring rate of each of the four pivots [N m/rad], moving mass [kg],
+        stiffness-proportional damping [s].
     stops : tuple of float
-        Displacements x at which there is a wall, positive ones to the right [m].
+        Positions of walls along x, positive to the right of the guide, negative to its left [m].
     restitution, rest_speed : float
-        Of all walls [-], [m/s].
+        Restitution [-] and rest speed [m/s] of all walls.
     """
 
     r: float
@@ -87,7 +87,7 @@ class ScalarGuide:
 
     @property
     def frequency(self) -> float:
-        """Of small vibrations [Hz]."""
+        """Frequency of small vibrations [Hz]."""
         return math.sqrt(4 * self.k / self.mass) / self.r / (2 * math.pi)
 
     def acceleration(self, phi: float, omega: float, force: float) -> float:
@@ -97,19 +97,19 @@ class ScalarGuide:
 
 
 class Monolith:
-    """The guide and a partner in one solver: Runge and Kutta's classical steps, impacts located.
+    """The guide and a partner in one solver: classical Runge-Kutta steps with located impacts.
 
     Parameters
     ----------
     guide : ScalarGuide
-        What hits.
+        The guide.
     force : callable
-        ``force(t, x, v, z)`` along x on the guide [N], with displacement and velocity along x and
-        the states of the partner.
+        ``force(t, x, v, z)`` returns the force along x on the guide [N]; x and v are displacement
+        and velocity along x, z the states of the partner.
     rates : callable
-        ``rates(t, x, v, z)``, the derivatives of these states.
+        ``rates(t, x, v, z)`` returns the derivatives of the states of the partner.
     z : sequence of float
-        The states at the start, time 0.
+        States of the partner at time 0.
     x, v : float
         Displacement [m] and velocity [m/s] of the guide at the start.
     substep : float
@@ -130,7 +130,7 @@ class Monolith:
         phi = math.asin(x / guide.r)
         self.time = 0.0
         self.y: Real = np.array([phi, v / (guide.r * math.cos(phi)), *z])
-        self.held: float | None = None  # the wall that it rests at
+        self.held: float | None = None  # position of the wall on which the guide rests [m]
         self.impacts: list[tuple[float, float]] = []  # time [s] and closing speed [m/s]
         self.rest_time: float | None = None
 
@@ -150,6 +150,7 @@ class Monolith:
         return self.y[2:]
 
     def _slope(self, t: float, y: Real) -> Real:
+        """Return the derivatives of all states."""
         r, (phi, omega) = self.guide.r, y[:2]
         x, v, z = r * math.sin(phi), r * math.cos(phi) * omega, y[2:]
         turned = (omega, self.guide.acceleration(phi, omega, self.force(t, x, v, z)))
@@ -158,6 +159,7 @@ class Monolith:
         )
 
     def _step(self, h: float) -> Real:
+        """Return the states after a step h [s]."""
         t, y = self.time, self.y
         k1 = self._slope(t, y)
         k2 = self._slope(t + h / 2, y + h / 2 * k1)
@@ -171,13 +173,13 @@ class Monolith:
         return math.copysign(1.0, wall) * (wall - self.guide.r * math.sin(y[0]))
 
     def _pressed(self, wall: float) -> float:
-        """Return the acceleration with which a wall at rest is pressed [rad/s^2]."""
+        """Return the acceleration of the guide at rest towards a wall [rad/s^2]."""
         phi, r = float(self.y[0]), self.guide.r
         force = self.force(self.time, r * math.sin(phi), 0.0, self.z)
         return math.copysign(1.0, wall) * self.guide.acceleration(phi, 0.0, force)
 
     def advance(self, end: float) -> None:
-        """Continue to a time [s]."""
+        """Integrate to a time [s]."""
         while self.time < end:
             if self.held is not None and self._pressed(self.held) <= 0.0:
                 self.held = None
@@ -185,19 +187,20 @@ class Monolith:
             y = self._step(h)
             hit = [w for w in self.guide.stops if self._gap(w, y) < 0.0 and self.held != w]
             if not hit:
-                last = self.time + h >= end - LOCATED
+                last = self.time + h >= end - IMPACT_TIME_ATOL
                 self.time, self.y = end if last else self.time + h, y
                 continue
             self._reach(hit[0], h)
             self._impact(hit[0])
 
     def _reach(self, wall: float, h: float) -> None:
-        """Go to where the gap of a wall closes, within a step [s]."""
+        """Advance to the time within a step [s] at which the gap of a wall closes."""
         if self._gap(wall, self.y) > 0.0:
-            h = brentq(lambda s: self._gap(wall, self._step(s)), 0.0, h, xtol=LOCATED)
+            h = brentq(lambda s: self._gap(wall, self._step(s)), 0.0, h, xtol=IMPACT_TIME_ATOL)
             self.time, self.y = self.time + h, self._step(h)
 
     def _impact(self, wall: float) -> None:
+        """Apply Newton's impact law, or rest if the speed is below ``rest_speed``."""
         self.y[0] = math.asin(wall / self.guide.r)
         speed = abs(self.v)
         if speed < self.guide.rest_speed and self._pressed(wall) > 0.0:

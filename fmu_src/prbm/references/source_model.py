@@ -1,4 +1,4 @@
-r"""The source's algorithm, derived again: a witness of its errors and an oracle.
+r"""The algorithm of the thesis, derived again to show its errors and to compare with it.
 
 The guide is *one* open chain of rigid links from the left clamp, over the shuttle, to the right
 clamp, where the loop is closed::
@@ -12,14 +12,14 @@ clamp, where the loop is closed::
       ##|##        ##|##         o--> x    gravity along +x
 
 The chain begins and ends at the pivots next to the clamps; the rigid stubs there only shift the
-positions.  Time advances by a fixed step of Runge and Kutta's fourth-order method, after which
+positions.  Time advances by a fixed step of Runge and Kutta's fourth-order method.  After each step
 the positions, not the velocities, are projected onto the closed loop (unweighted).  Contact is
-looked for between steps, so an impact comes up to a step late; as long as the body is still
-behind the wall after it, no further impact is applied.
+checked between steps, so that an impact is up to a step late.  As long as the body remains behind
+the wall after it, no further impact is applied.
 
-Two of the source's errors are switches: `stiffness_factor` (a factor gamma too many in the
-rates of the 2R pivots) and `convective` (whether the acceleration constraint has its right
-side).  One of its habits is not kept: its clock stands still during the steps behind the wall.
+Two errors of the thesis are switches: `stiffness_factor` (an extra factor gamma in the rates of the
+2R pivots) and `convective` (whether the acceleration constraint has its right side).  One feature
+is not reproduced: in the thesis, time does not advance during the steps behind the wall.
 
 Source: S. Boersma, Modelling and Validation of the Impact Response in Compliant Mechanisms, MSc
 thesis, TU Delft 2015, appendix A.
@@ -44,13 +44,13 @@ class Structure:
     Parameters
     ----------
     length, thickness, width : float
-        Of a flexure [m].
+        Dimensions of a flexure [m].
     youngs_modulus, density : float
-        Of its material [Pa], [kg/m^3].
+        Young's modulus [Pa] and density [kg/m^3] of its material.
     shuttle_width, shuttle_mass : float
         Distance of the flexures [m], mass [kg]; the inertia is m W^2/12.
     com_height : float
-        Of the shuttle's centre of mass above the flexures' ends [m].
+        Height of the shuttle's centre of mass above the flexures' ends [m].
     """
 
     length: float
@@ -69,20 +69,20 @@ class Structure:
 
     @property
     def flexure_mass(self) -> float:
-        """[kg]."""
+        """Mass of a flexure [kg]."""
         return self.density * self.length * self.thickness * self.width
 
 
 STEEL = Structure(40e-3, 0.1e-3, 8e-3, 181.5e9, 7800.0, 80e-3, 53.187e-3, 17.77e-3)
-"""The guide that was measured."""
+"""The steel guide of the experiment in the thesis."""
 PMMA = Structure(0.2, 2e-3, 1e-2, 3.21e9, 1190.0, 0.2, 1190 * 0.2 * 0.02 * 0.01, 0.0)
-"""The guide of the source's chapter 4 and of its listing A.1."""
+"""The PMMA guide of chapter 4 and listing A.1 of the thesis."""
 
 GAMMA_1R, K_THETA_1R = 0.8517, 2.65
 GAMMA_2R = np.array([0.44, 0.46])
 K_THETA_2R = np.array([3.4710, 2.0682])
 
-PROJECTION_TOLERANCE = 1e-13  # the source's, on the loop's gap [m]
+PROJECTION_TOLERANCE = 1e-13  # Tolerance of the thesis for the loop's gap [m].
 PROJECTION_STEPS = 10
 PROJECTION_STALLED = 1e-11  # Gap at which round-off may end the iteration [m].
 
@@ -94,13 +94,13 @@ class Link:
     Parameters
     ----------
     length : float
-        From its first pivot to its second [m].
+        Distance of its two pivots [m].
     mass : float
-        [kg].
+        Mass [kg].
     centre : complex
-        Of its mass, from the first pivot, the real axis along the link [m].
+        Centre of mass relative to the first pivot, the real axis along the link [m].
     inertia : float
-        About its centre of mass [kg m^2].
+        Inertia about its centre of mass [kg m^2].
     straight : float
         Absolute angle in the straight shape, where the springs are relaxed [rad].
     """
@@ -113,7 +113,7 @@ class Link:
 
 
 class Chain:
-    r"""The constant arrays of a chain of links, springs between them and at both clamps.
+    r"""Constant arrays of a chain of links with springs between them and at both clamps.
 
     With e = exp(i q), every position is linear in e: the loop's gap is loop e - distance, the
     shuttle's centre of mass is com e, its hit point hit e.
@@ -121,13 +121,13 @@ class Chain:
     Parameters
     ----------
     links : sequence of n Link
-        From the left clamp to the right one.
+        Links from the left clamp to the right one.
     rates : sequence of n + 1 float
         Torsion springs: left clamp, between the links, right clamp [N m/rad].
     shuttle : int
-        Which link is the shuttle.
+        Index of the shuttle.
     gravity : float
-        Along +x [m/s^2].
+        Gravity along +x [m/s^2].
     hit_offset : float
         Height of the hit point above the shuttle's centre of mass [m].
     """
@@ -184,7 +184,7 @@ class Chain:
             [ M      Phi_q^T ] [ a   ]   [ Q - C v^2         ]
             [ Phi_q  0       ] [ lam ] = [ -(d/dt Phi_q) v   ]
 
-        The last entry is Re and Im of (loop e) v^2; the source has zeros there.
+        The last entry is Re and Im of (loop e) v^2; the thesis has zeros there.
         """
         e = np.exp(1j * q)
         n = len(q)
@@ -249,9 +249,9 @@ def guide_1R(
     hit_offset: float = 0.0,
     of: Structure = STEEL,
 ) -> Chain:
-    r"""Return a guide with one pivot a half flexure: k = 2 gamma K_theta EI/L.
+    r"""Return a guide with one pivot per half flexure: k = 2 gamma K_theta EI/L.
 
-    The flexures' masses are lumped, at the moving pivots only: m/4 + (m L^2/12)/(gamma L)^2.
+    The mass of each flexure is lumped at its moving pivot: m/4 + (m L^2/12)/(gamma L)^2.
     """
     length, m = GAMMA_1R * of.length, of.flexure_mass
     lumped = m / 4 + m * of.length**2 / 12 / length**2
@@ -271,9 +271,9 @@ def guide_2R(
     hit_offset: float = 0.0,
     of: Structure = STEEL,
 ) -> Chain:
-    """Return a guide with two pivots a half flexure (see `rates_2R` for the switch).
+    """Return a guide with two pivots per half flexure; `rates_2R` explains the switch.
 
-    The links are slender rods; the stubs' mass, a tenth of the flexures', is left out.
+    The links are slender rods.  The mass of the stubs, a tenth of the flexures', is omitted.
     """
     h = of.length / 2
     lengths = h * GAMMA_2R[[0, 1, 0]] * [1, 2, 1]
@@ -297,7 +297,7 @@ def shuttle(stub: float, of: Structure = STEEL) -> Link:
 
 
 def rates_2R(stiffness_factor: bool, K_theta: Real = K_THETA_2R) -> Real:
-    """Rates of the 2R pivots: gamma K_theta as in the source, or K_theta [EI/h]."""
+    """Rates of the 2R pivots: gamma K_theta as in the thesis, or K_theta [EI/h]."""
     return GAMMA_2R * K_theta if stiffness_factor else K_theta
 
 
@@ -319,9 +319,9 @@ def held_shape(chain: Chain, displacement: float) -> tuple[Real, float]:
     Returns
     -------
     q : (n,)
-        [rad].
+        Angles [rad].
     force : float
-        On the shuttle, along +x [N].
+        Force on the shuttle along +x [N].
 
     Raises
     ------
@@ -346,7 +346,7 @@ def held_shape(chain: Chain, displacement: float) -> tuple[Real, float]:
             tangent = chain.K + np.diag((chain.weight * e - lam @ points).real)
             turn = np.linalg.solve(bordered(tangent, W), residual)
             q, lam = q + turn[:n], lam + turn[n:]
-            if np.abs(turn[:n]).max() < 1e-12:  # rad; converged quadratically
+            if np.abs(turn[:n]).max() < 1e-12:  # rad; the remaining error is of its square
                 break
         else:
             raise ArithmeticError(f"no shape found that holds the shuttle at x = {x} m")
@@ -361,22 +361,22 @@ def stiffness(chain: Chain, of: Structure = STEEL) -> float:
 
 @dataclass(frozen=True)
 class Run:
-    """Samples at every step, from the start to the end or to the last finite state.
+    """Samples after every step, from the start to the end or to the last finite state.
 
     Parameters
     ----------
     t : (steps + 1,)
-        [s].
+        Times [s].
     q, v : (steps + 1, n)
         Angles [rad] and rates [rad/s] of the links.
     x : (steps + 1,)
         Displacement of the shuttle's centre of mass [m].
     energy : (steps + 1,)
-        [J].
+        Total energy [J].
     impact_times : (impacts,)
-        Of the steps at which contact was noticed [s].
+        Times of the steps at which contact was detected [s].
     finite : bool
-        False if the run ended because a state was not a finite number.
+        False if the run ended at a state that was not finite.
     """
 
     t: Real
@@ -399,18 +399,18 @@ def simulate(
     wall: float = np.inf,
     restitution: float = RESTITUTION,
 ) -> Run:
-    """Simulate from the angles q [rad] and the rates v [rad/s] for a `span` [s] in fixed steps.
+    """Simulate with a fixed step from the angles q [rad] and the rates v [rad/s].
 
     Parameters
     ----------
     chain : Chain
         The guide.
     q, v : (n,)
-        Initial state; on the closed loop.
+        Initial state, which must satisfy the loop closure.
     span, step : float
-        [s].
+        Duration and step size [s].
     convective : bool
-        Whether the acceleration constraint has its right side; the source: False.
+        Whether the acceleration constraint has its right side (in the thesis: False).
     wall : float
         Displacement of the hit point at which it touches the wall [m]; infinite: no wall.
     restitution : float
@@ -427,7 +427,7 @@ def simulate(
     y = np.array([q, v])
     states, impact_times = [y], []
     behind = False
-    with np.errstate(over="ignore", invalid="ignore"):  # the state is checked instead
+    with np.errstate(over="ignore", invalid="ignore"):  # The state is checked below.
         for k in range(round(span / step)):
             contact = chain.displacement(chain.hit, y[0]) > wall
             if contact and not behind:

@@ -1,15 +1,17 @@
 """Results of a sweep on disk: a Parquet dataset that grows part by part and survives a kill.
 
-    results.parquet/_sweep.json            what was asked for
+    results.parquet/_sweep.json            settings of the sweep
+    results.parquet/_sweep.lock            locked while a sweep runs
     results.parquet/part-000000-1f3a.parquet, ...
 
-A part holds the runs of one batch and is there entirely or not at all.  pandas, pyarrow and Dask
-read the folder as one table.
+A part has the runs of one batch.  It is written under another name and then renamed, so that it is
+complete whenever it exists.  pandas, pyarrow and Dask read the folder as one table.
 """
 
 import json
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +20,13 @@ import pyarrow as pa  # type: ignore[import-untyped]
 import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ..base.errors import ParameterError
+from ..base.lock import LockedError, locked
 from .runs import GOOD, Outcome
 
-SETTINGS = "_sweep.json"
+SETTINGS, LOCK = "_sweep.json", "_sweep.lock"
 ROW, STATUS, MESSAGE, SECONDS = "row", "status", "message", "seconds"
 OWN = (ROW, STATUS, MESSAGE, SECONDS)
-"""The columns that every sweep has; no parameter or output may be called like them."""
+"""Columns of every sweep; no parameter or output may have these names."""
 
 
 class Results:
@@ -32,11 +35,12 @@ class Results:
     Parameters
     ----------
     folder : Path
-        Where it is, or will be.
+        Folder of the dataset.
     settings : mapping
-        All that the results depend on but the table, for JSON; a line of each is compared.
+        All settings that the results depend on, except for the table.  They are stored as JSON and
+        compared when a sweep continues.
     parameters, outputs : sequence of str
-        Columns.
+        Names of the columns.
     """
 
     def __init__(
@@ -53,20 +57,47 @@ class Results:
         self.schema = pa.schema([(ROW, pa.int64()), *numbers, *own])
         self.count = 0
 
-    def begin(self, anew: bool = False) -> None:
-        """Make the folder, or go on in one of a sweep with the same settings.
+    @contextmanager
+    def lock(self) -> Iterator[None]:
+        """Keep other sweeps from using the folder during a ``with`` block.
 
         Raises
         ------
         ParameterError
-            If there is something else, or the settings differ and it is not to begin anew.
+            If another sweep uses the folder, or it has other contents.
+        """
+        self._check_contents()
+        try:
+            with locked(self.folder / LOCK, wait=False):
+                yield
+        except LockedError as error:
+            raise ParameterError(
+                f"{self.folder} is in use by another sweep ({error}); wait until it ends, stop it, "
+                "or give another name for the results"
+            ) from None
+
+    def _check_contents(self) -> None:
+        """Reject a folder that was not made by a sweep."""
+        if (self.folder / SETTINGS).exists() or not self.folder.exists():
+            return
+        if not (self.folder.is_dir() and {p.name for p in self.folder.iterdir()} <= {LOCK}):
+            raise ParameterError(
+                f"{self.folder} exists without a sweep in it; give another name for the results"
+            )
+
+    def begin(self, anew: bool = False) -> None:
+        """Create the folder, or continue in a folder of a sweep with the same settings.
+
+        The folder must be locked, since drafts of an interrupted sweep are deleted.
+
+        Raises
+        ------
+        ParameterError
+            If the folder cannot be written, or has a sweep with other settings and ``anew`` is
+            false.
         """
         file = self.folder / SETTINGS
         try:
-            if self.folder.exists() and not file.exists() and not _is_empty(self.folder):
-                raise ParameterError(
-                    f"{self.folder} exists and holds no sweep; give another name for the results"
-                )
             for draft in self.folder.glob("_*.draft"):
                 draft.unlink()
             if file.exists() and anew:
@@ -83,15 +114,17 @@ class Results:
                 f"{self.folder} cannot be written ({error.strerror}); give another name"
             ) from None
         except json.JSONDecodeError:
-            raise ParameterError(f"{file} is broken; remove {self.folder}, or begin anew") from None
+            raise ParameterError(f"{file} is damaged; remove {self.folder}") from None
 
     def _compare(self, before: Mapping[str, Any]) -> None:
+        """Reject a sweep whose settings differ from the stored ones."""
         for name in {**before, **self.settings}:
             old, new = before.get(name), self.settings.get(name)
             if old != new:
                 raise ParameterError(
-                    f"{self.folder} holds a sweep with another {name} ({_short(old)}, now "
-                    f"{_short(new)}); give another name for the results, or begin anew (--anew)"
+                    f"{self.folder} contains a sweep with another {name} ({_short(old)}, now "
+                    f"{_short(new)}); give another name for the results, or delete the old ones "
+                    "with --anew"
                 )
 
     def _clear(self) -> None:
@@ -103,7 +136,7 @@ class Results:
         return sorted(self.folder.glob("part-*.parquet"))
 
     def read(self) -> pd.DataFrame:
-        """Return what is done, ordered by row, each row once.
+        """Return the stored runs, ordered by row, each row once.
 
         Raises
         ------
@@ -124,11 +157,11 @@ class Results:
             except (OSError, ValueError, pa.ArrowException) as error:
                 reason = str(error).splitlines()[0]
                 raise ParameterError(
-                    f"{part} cannot be read ({reason}); remove it, and its runs are done again"
+                    f"{part} cannot be read ({reason}); remove it, and its runs are repeated"
                 ) from None
 
     def forget_failures(self) -> None:
-        """Remove the rows of runs that failed, so that they are done again."""
+        """Remove the rows of failed runs, so that these are repeated."""
         for part, table in list(self._tables()):
             good = table.filter(pa.compute.is_in(table[STATUS], pa.array(GOOD)))
             if good.num_rows == 0:
@@ -156,7 +189,7 @@ class Results:
         self.count += 1
 
     def _write(self, table: Any, part: Path) -> None:
-        """Write a part under another name first: a kill leaves a draft, which nobody reads."""
+        """Write a draft and rename it to the part; a killed process leaves only the draft."""
         draft = part.with_name(f"_{part.name}.draft")
         try:
             with draft.open("wb") as file:
@@ -166,10 +199,6 @@ class Results:
             draft.replace(part)
         finally:
             draft.unlink(missing_ok=True)
-
-
-def _is_empty(folder: Path) -> bool:
-    return folder.is_dir() and next(folder.iterdir(), None) is None
 
 
 def _short(value: object) -> str:

@@ -1,8 +1,8 @@
-"""Runs of an FMU for a sweep, in a process of their own that may crash: ``sweep_worker`` starts it.
+"""Runs of an FMU for a sweep, in a separate process that may crash; :mod:`.worker` starts it.
 
-It needs FMPy and NumPy only and is quick to start.  The FMU is instantiated once.  Between runs it
-is reset if that leaves nothing behind, which the second run finds out: it is done twice, after a
-reset and after a new instantiation, and only if both agree to the last bit do resets go on.
+The module imports only FMPy and NumPy, and so starts quickly.  The FMU is instantiated once and
+reset between runs if its reset works.  To check this, the second run is computed twice: after a
+reset and with a new instance.  Unless both agree to the last bit, every run gets a new instance.
 """
 
 import os
@@ -49,7 +49,7 @@ from numpy.typing import NDArray
 Real = NDArray[np.float64]
 
 OK, ENDED, FAILED, CRASHED, TIMEOUT = "ok", "ended", "failed", "crashed", "timeout"
-"""How a run went: to its end; to an end that the FMU set; refused; its process died; too long."""
+"""Status of a run: complete; ended early by the FMU; error; crash of the process; time limit."""
 GOOD = OK, ENDED
 
 DISCARD, FATAL = 2, 4  # fmi2Status, fmi3Status
@@ -60,13 +60,13 @@ C_TYPES_3: dict[str, Any] = {
     "Int8": c_int8, "Int16": c_int16, "Int32": c_int32, "Int64": c_int64,
     "UInt8": c_uint8, "UInt16": c_uint16, "UInt32": c_uint32, "UInt64": c_uint64,
 }  # fmt: skip
-IDLE = 600.0  # s without a run after which the process ends, for nobody may be left to end it
-PRESENT = 5  # messages of the FMU that a failure tells at most
-CHATTY = 100  # messages in a run after which the FMU is asked for no more of them
+IDLE_MAX = 600.0  # s without a run after which the process ends, in case its parent was killed
+MESSAGES_MAX = 5  # messages of the FMU in the message of a failed run
+LOGGED_MAX = 100  # messages in a run above which logging is switched off for the next runs
 
 
 class SpecificationError(ValueError):
-    """An output is none: the message says what is wrong with it."""
+    """The text of an output is invalid; the message names the reason."""
 
 
 # --- outputs ------------------------------------------------------------------------------------
@@ -74,18 +74,18 @@ class SpecificationError(ValueError):
 
 @dataclass(frozen=True)
 class Output:
-    """A number that a run leaves behind.
+    """One number computed from the trajectory of a variable.
 
     Parameters
     ----------
     column : str
-        Its name in the results.
+        Name of the column of the results.
     variable : str
-        Of the FMU.
+        Name of the variable of the FMU.
     reduction : str
         ``final``, ``max``, ``min``, ``mean``, ``first`` or ``since``.
     relation, bound : str, float
-        When ``first`` and ``since`` hold: ``>``, ``>=``, ``<`` or ``<=`` and a number.
+        Condition of ``first`` and ``since``: ``>``, ``>=``, ``<`` or ``<=``, and a number.
     """
 
     column: str
@@ -102,19 +102,19 @@ _REDUCTION = re.compile(r"(final|max|min|mean|first|since)\((.*)\)", re.DOTALL)
 _CONDITION = re.compile(r"(.*?)\s*(<=|>=|<|>)\s*([^<>=]+)", re.DOTALL)
 
 
-def parsed(text: str, known: Container[str], column: str | None = None) -> Output:
-    """Return the output that a text means, as ``max(shuttle.x)`` or ``since(stop.contact)``.
+def parse_output(text: str, known: Container[str], column: str | None = None) -> Output:
+    """Parse an output such as ``max(shuttle.x)`` or ``since(stop.contact)``.
 
     Raises
     ------
     SpecificationError
-        If the bound of a condition is no number.
+        If the bound of a condition is not a number.
 
     Examples
     --------
-    >>> parsed("shuttle.x", {"shuttle.x"})
+    >>> parse_output("shuttle.x", {"shuttle.x"})
     Output(column='shuttle.x', variable='shuttle.x', reduction='final', relation='>', bound=0.0)
-    >>> parsed("first(shuttle.x < -1e-3)", {"shuttle.x"}, "there").bound
+    >>> parse_output("first(shuttle.x < -1e-3)", {"shuttle.x"}, "there").bound
     -0.001
     """
     name = text if column is None else column
@@ -129,33 +129,35 @@ def parsed(text: str, known: Container[str], column: str | None = None) -> Outpu
         bound = float(condition[3])
     except ValueError:
         raise SpecificationError(
-            f"{text}: {condition[3]!r} is no number; write a condition as first(shuttle.x > 0.001)"
+            f"{text}: bound {condition[3]!r} must be a number, as in first(shuttle.x > 0.001)"
         ) from None
     return Output(name, condition[1], reduction, condition[2], bound)
 
 
-def reduced(output: Output, t: Real, x: Real) -> float:
-    """Return the number that a trajectory is reduced to.
+def reduce(output: Output, t: Real, x: Real) -> float:
+    """Return the value of an output for a trajectory.
 
     Parameters
     ----------
+    output : Output
+        The reduction and its condition.
     t : (m,)
         Communication points [s].
     x : (m,)
-        The variable there.
+        Values of the variable at these times.
 
     Returns
     -------
     float
-        ``final``, ``max``, ``min``: in the unit of the variable. ``mean``: over time, the
-        variable taken as linear in between. ``first``: the first communication point at which
-        the condition holds [s]; ``since``: the first one from which on it holds to the end [s];
-        NaN if there is none.
+        ``final``, ``max``, ``min``: in the unit of the variable.  ``mean``: average over time by
+        the trapezoidal rule.  ``first``: the first communication point at which the condition
+        holds [s]; ``since``: the first one from which on it holds to the end [s]; NaN if no point
+        qualifies.
 
     Examples
     --------
     >>> t, x = np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.0, 2.0, 0.0, 2.0])
-    >>> [reduced(Output("", "x", how), t, x) for how in ("final", "max", "mean", "first", "since")]
+    >>> [reduce(Output("", "x", how), t, x) for how in ("final", "max", "mean", "first", "since")]
     [2.0, 2.0, 1.0, 1.0, 4.0]
     """
     match output.reduction:
@@ -181,20 +183,20 @@ def reduced(output: Output, t: Real, x: Real) -> float:
 
 @dataclass(frozen=True)
 class Job:
-    """What all runs of a sweep have in common.
+    """Settings common to all runs of a sweep.
 
     Parameters
     ----------
     start, stop, step : float
-        Beginning, end and distance of the communication points [s].
+        Start time, stop time and communication step [s].
     tolerance : float or None
-        Relative tolerance that the FMU is given; None: none.
+        Relative tolerance passed to the FMU; None: not passed.
     values : mapping
-        Start values that all runs have.
+        Start values of all runs.
     outputs : tuple of Output
-        What is kept.
+        Recorded outputs.
     reuse : bool
-        Whether to reset the instance, if it passes the test, instead of making a new one.
+        Reset the instance between runs if its reset works (default: True).
     """
 
     start: float
@@ -208,10 +210,10 @@ class Job:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a run.
+    """The result of a run.
 
-    ``values`` are the outputs in their order, empty if there are none; ``seconds`` is what it
-    took, and ``spent`` whether the process must not be used any more.
+    ``values`` are the outputs in the order of the job, empty for a failed run.  ``seconds`` is the
+    duration of the computation.  ``spent``: the process must not be used for further runs.
     """
 
     status: str
@@ -222,7 +224,7 @@ class Outcome:
 
 
 def communication_points(start: float, stop: float, step: float) -> list[float]:
-    """Return start, start + step, start + 2 step, ... [s], to the last bit as FMPy chooses them.
+    """Return start, start + step, start + 2 step, ... [s], bit by bit as in FMPy.
 
     Examples
     --------
@@ -241,19 +243,24 @@ def communication_points(start: float, stop: float, step: float) -> list[float]:
 
 
 class Runner:
-    """An FMU that runs again and again.
+    """Runs a loaded FMU repeatedly.
 
     Parameters
     ----------
     folder : Path
-        Where it is unpacked.
+        The unpacked FMU.
     job : Job
-        What to do.
+        Settings of the runs.
+
+    Attributes
+    ----------
+    resets : bool or None
+        The FMU's reset works; None until the second run has shown it.
 
     Raises
     ------
     Exception
-        Whatever FMPy raises if the FMU cannot be loaded or instantiated.
+        Any exception of FMPy, if the FMU cannot be loaded or instantiated.
     """
 
     def __init__(self, folder: Path, job: Job) -> None:
@@ -263,7 +270,7 @@ class Runner:
         variables = self.description.modelVariables
         self.events = not self.two and any(v.type == "Clock" for v in variables)
         self.resets: bool | None = None if job.reuse else False
-        self.used, self.logging, self.heard = False, True, 0
+        self.used, self.logging, self.logged = False, True, 0
         self.points = communication_points(job.start, job.stop, job.step)
         self.fmu = instantiate_fmu(
             str(folder),
@@ -275,13 +282,13 @@ class Runner:
             require_functions=False,
         )
         named = {variable.name: variable for variable in variables}
-        along = {o.variable: named[o.variable] for o in job.outputs if o.reduction != "final"}
+        history = {o.variable: named[o.variable] for o in job.outputs if o.reduction != "final"}
         final = {o.variable: named[o.variable] for o in job.outputs if o.reduction == "final"}
-        self.along = _Recorder(self.fmu, along.values(), self.two)
+        self.history = _Recorder(self.fmu, history.values(), self.two)
         self.final = _Recorder(self.fmu, final.values(), self.two)
 
     def run(self, values: Mapping[str, float]) -> Outcome:
-        """Do a run with start values; return its outcome, whatever happens."""
+        """Run once with start values; errors are returned as outcomes, not raised."""
         if not (self.used and self.resets is None):
             return self._once(values)
         after_reset = self._once(values)
@@ -303,7 +310,7 @@ class Runner:
             return Outcome(FAILED, message, seconds, spent=not self._recovers(error))
 
     def _recovers(self, error: Exception) -> bool:
-        """Replace an instance in a state of error, which a reset need not leave, if that works."""
+        """Replace the instance after an error, since a reset may not clear it; return success."""
         if isinstance(error, FMICallException) and error.status == FATAL:
             return False
         try:
@@ -314,10 +321,10 @@ class Runner:
         return True
 
     def _reason(self, error: Exception) -> str:
-        """Return the FMU's own words about an error before FMPy's."""
+        """Return the FMU's messages about an error, or else FMPy's message."""
         worst = [text for status, text in self.messages if status >= DISCARD]
-        told = list(dict.fromkeys(worst or [text for _, text in self.messages]))[-PRESENT:]
-        return "; ".join(told) or str(error) or type(error).__name__
+        texts = list(dict.fromkeys(worst or [text for _, text in self.messages]))[-MESSAGES_MAX:]
+        return "; ".join(texts) or str(error) or type(error).__name__
 
     def _log2(self, _: object, __: bytes, status: int, ___: bytes, text: bytes) -> None:
         self._note(status, text)
@@ -326,25 +333,25 @@ class Runner:
         self._note(status, text)
 
     def _note(self, status: int, text: bytes) -> None:
-        self.heard += 1
+        self.logged += 1
         if status > 0:
             self.messages.append((status, (text or b"").decode(errors="replace").strip()))
-            del self.messages[: -10 * PRESENT]
+            del self.messages[: -10 * MESSAGES_MAX]
 
     def _prepare(self, renew: bool) -> None:
-        """Have an instance that nothing was done with yet."""
-        chatty = self.logging and self.heard > CHATTY
-        self.logging, self.heard = self.logging and not chatty, 0
+        """Reset or replace the instance if it was used before."""
+        verbose = self.logging and self.logged > LOGGED_MAX
+        self.logging, self.logged = self.logging and not verbose, 0
         self.messages.clear()
         if self.used or renew:
-            if self.resets is False or renew or chatty:
+            if self.resets is False or renew or verbose:
                 self._instantiate()
             else:
                 self.fmu.reset()
         self.used = True
 
     def _instantiate(self) -> None:
-        """Replace the instance, the library staying loaded."""
+        """Replace the instance; the library stays loaded."""
         prefix = "fmi2" if self.two else "fmi3"
         getattr(self.fmu, f"{prefix}FreeInstance")(self.fmu.component)
         self.fmu.component = None
@@ -357,26 +364,26 @@ class Runner:
 
     def _simulate(self, values: dict[str, float]) -> tuple[str, str, tuple[float, ...]]:
         self._initialize(values)
-        times, rows = [self.points[0]], [self.along.read()]
+        times, rows = [self.points[0]], [self.history.read()]
         status, message = OK, ""
         for begin, end in pairwise(self.points):
             ended = self._step(begin, end - begin)
             times.append(end if ended is None else ended)
-            rows.append(self.along.read())
+            rows.append(self.history.read())
             if ended is not None:
                 status, message = ENDED, f"the FMU ended the run at t = {ended:.9g} s"
                 break
         last = self.final.named(self.final.read())
         self.fmu.terminate()
         t, table = np.array(times), np.array(rows, dtype=np.float64).T
-        history = self.along.named(table)
+        history = self.history.named(table)
         return (
             status,
             message,
             tuple(
                 float(last[output.variable])
                 if output.reduction == "final"
-                else reduced(output, t, history[output.variable])
+                else reduce(output, t, history[output.variable])
                 for output in self.job.outputs
             ),
         )
@@ -393,16 +400,16 @@ class Runner:
         rest = self._set(rest, settable_in_initialization_mode)
         self.fmu.exitInitializationMode()
         if rest:
-            raise ValueError(f"the FMU lets nobody set {', '.join(rest)}")
+            raise ValueError(f"the FMU has no start values for {', '.join(rest)}")
         if self.events:
             self._update()
 
     def _set(self, values: dict[str, float], when: Callable[[Any], bool]) -> dict[str, float]:
-        """Set what can be set now; return the rest."""
+        """Set the values that can be set in the present mode; return the others."""
         return apply_start_values(self.fmu, self.description, values, settable=when)  # type: ignore[no-any-return]
 
     def _step(self, t: float, size: float) -> float | None:
-        """Make a step; return when the FMU ended the simulation [s], None if it did not."""
+        """Take a step; return the time at which the FMU ended the simulation [s], or None."""
         if not self.two:
             event, ended, _, last = self.fmu.doStep(t, size)
             if self.events and event and not ended:
@@ -418,7 +425,7 @@ class Runner:
         return None
 
     def _update(self) -> bool:
-        """Let happen what is due in event mode and leave it; return whether that is the end."""
+        """Update discrete states, leave event mode; return whether the FMU ended the simulation."""
         again, ended = True, False
         while again and not ended:
             again, ended = self.fmu.updateDiscreteStates()[:2]
@@ -428,10 +435,10 @@ class Runner:
 
 
 class _Recorder:
-    """Reads variables into memory that is kept, which FMPy's getters make each time."""
+    """Reads variables into memory allocated once; FMPy's getters allocate at each call."""
 
     def __init__(self, fmu: Any, variables: Iterable[Any], two: bool) -> None:
-        groups: dict[str, list[Any]] = {}  # a function of FMI reads variables of one type
+        groups: dict[str, list[Any]] = {}  # by type: one call of FMI per type
         for variable in variables:
             whole = "Integer" if two else "Int64"
             kind = whole if variable.type == "Enumeration" else variable.type
@@ -454,11 +461,12 @@ class _Recorder:
         return row
 
     def named(self, columns: Sequence[Any] | NDArray[np.float64]) -> dict[str, Any]:
-        """Return what was read by the names of the variables."""
+        """Return values in the order of :meth:`read` by the names of the variables."""
         return dict(zip(self.names, columns, strict=True))
 
 
 def _bits(outcome: Outcome) -> tuple[str, bytes]:
+    """Return status and bytes of the values, to compare two outcomes to the last bit."""
     return outcome.status, np.array(outcome.values).tobytes()
 
 
@@ -466,38 +474,39 @@ def _bits(outcome: Outcome) -> tuple[str, bytes]:
 
 
 def main() -> None:
-    """Run what comes through standard input until it closes; answer each run with its outcome."""
+    """Run the batches read from standard input until it closes; write one outcome per run."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what the FMU prints does not get between the answers
+    replies = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)  # Output of the FMU must not mix with the replies.
     batches: queue.Queue[Any] = queue.Queue()
     threading.Thread(target=_read, args=(sys.stdin.buffer, batches), daemon=True).start()
     folder, job = batches.get()
     try:
         runner = Runner(folder, job)
     except Exception as error:
-        _answer(answers, f"the FMU cannot be loaded: {error}")
+        _reply(replies, f"the FMU cannot be loaded: {error}")
         return
-    _answer(answers, "")
-    for values in _waiting(batches):
+    _reply(replies, "")
+    for values in _queued(batches):
         outcome = runner.run(values)
-        _answer(answers, outcome)
+        _reply(replies, outcome)
         if outcome.spent:
             break
-    answers.flush()
-    os._exit(0)  # an FMU in a state of error may hang when its library is unloaded
+    replies.flush()
+    os._exit(0)  # An FMU may hang after an error when its library is unloaded.
 
 
-def _waiting(batches: "queue.Queue[Any]") -> Iterator[Mapping[str, float]]:
+def _queued(batches: "queue.Queue[Any]") -> Iterator[Mapping[str, float]]:
+    """Yield start values of runs until none arrive for :data:`IDLE_MAX`."""
     while True:
         try:
-            yield from batches.get(timeout=IDLE)
+            yield from batches.get(timeout=IDLE_MAX)
         except queue.Empty:
             return
 
 
 def _read(stream: BinaryIO, batches: "queue.Queue[Any]") -> None:
-    """Pass on what is sent; end this process with the one that sends, if in the middle of a run."""
+    """Queue the batches; end this process at once when its parent ends, even during a run."""
     try:
         while True:
             batches.put(pickle.load(stream))
@@ -505,8 +514,8 @@ def _read(stream: BinaryIO, batches: "queue.Queue[Any]") -> None:
         os._exit(0)
 
 
-def _answer(stream: BinaryIO, answer: object) -> None:
-    pickle.dump(answer, stream)
+def _reply(stream: BinaryIO, reply: object) -> None:
+    pickle.dump(reply, stream)
     stream.flush()
 
 

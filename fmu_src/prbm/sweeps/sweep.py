@@ -30,7 +30,7 @@ import fmpy  # type: ignore[import-untyped]
 from ..base.errors import ParameterError, PrbmError
 from ..base.progress import Progress
 from ..runs.run import ROWS_MAX
-from .runs import CRASHED, GOOD, Job, Outcome, Output, SpecificationError, parsed
+from .runs import CRASHED, GOOD, Job, Outcome, Output, SpecificationError, parse_output
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -42,21 +42,21 @@ REMEDY = "install the packages for sweeps with: python -m pip install 'prbm-impa
 
 BATCH_MIN, BATCH_MAX = 1.0, 30.0  # Limits of the duration of a batch [s].
 BATCH_SHARE = 0.02  # Duration of a batch, as a share of the time so far.
-BATCHES_PER_THREAD = 2  # Batches under way per thread: no thread waits for work.
-RESET_RUNS_MIN = 20  # Least runs per process at which a check of the FMU's reset is worthwhile.
+BATCHES_PER_THREAD = 2  # Batches submitted per thread, so that no thread waits for work.
+RESET_RUNS_MIN = 20  # Runs per process from which on a check of the FMU's reset pays off.
 STEPS = 1000  # Communication steps for an FMU without a proposed step.
-CONNECTION_TIMEOUT = 10.0  # For the answer of a scheduler and its workers [s].
+CONNECTION_TIMEOUT = 10.0  # Longest wait for a scheduler and its workers [s].
 FILES = (".csv", ".feather", ".h5", ".json", ".mat", ".ods", ".tsv", ".txt", ".xls", ".xlsx")
-"""Suffixes that are rejected for the results, which are a folder."""
+"""Suffixes rejected for the results, which are a folder and not a file."""
 RECENT_RUNS = 50  # Runs whose median duration determines the size of the next batch.
 
-ABSENT = "No module named"  # Python's message for a package that is not installed.
+MISSING_MODULE = "No module named"  # Python's message for a package that is not installed.
 
 Outputs = Sequence[str] | Mapping[str, str]
 
 
 class SweepError(PrbmError, RuntimeError):
-    """A sweep is impossible, for all tables."""
+    """The sweep cannot run with any table."""
 
 
 def sweep(
@@ -87,8 +87,8 @@ def sweep(
         One column per variable, with its name, and one row per run; or a CSV or Parquet file of
         such a table.  The units are those of the FMU: SI for the FMUs of this project.
     out : str or Path
-        Folder of the results, a Parquet dataset.  If it has a part of the same sweep, only the rest
-        is computed.  Rows may have been added to the table.
+        Folder of the results, a Parquet dataset.  If it has runs of the same sweep, only the others
+        are computed.  Rows may have been added to the table.
     outputs : sequence of str, or mapping of str to str
         Recorded outputs of a run:
 
@@ -115,9 +115,9 @@ def sweep(
     timeout : float or None
         Longest duration of a run [s]; None: no limit.
     anew : bool
-        Whether to delete earlier results in ``out``.
+        Delete earlier results in ``out`` (default: False).
     failed : bool
-        Whether to repeat failed runs.
+        Repeat failed runs (default: False).
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
 
@@ -131,33 +131,35 @@ def sweep(
     Raises
     ------
     ParameterError
-        If the table, an output, a setting or ``out`` is invalid, or ``out`` has the results of
-        another sweep.
+        If the table, an output, a setting or ``out`` is invalid, ``out`` has the results of another
+        sweep, or another sweep is writing to it.
     SweepError
-        If the FMU cannot be read or loaded, the scheduler does not answer, or a package is not
+        If the FMU cannot be read or loaded, the scheduler does not respond, or a package is not
         installed.
     KeyboardInterrupt
         After Ctrl-C, with the number of completed runs, which are kept.
     """
-    _needed()
+    _check_packages()
     _check_name(Path(out))
-    plan = _planned(fmu, table, outputs, values, stop_time, step, tolerance)
+    plan = _make_plan(fmu, table, outputs, values, stop_time, step, tolerance)
     _check_counts(workers, retries, timeout)
     results = _results(plan, Path(out))
-    tell = progress or (lambda fraction: None)
-    with ExitStack() as stack:  # Keep earlier results until there is a client.
+    report = progress or (lambda fraction: None)
+    with ExitStack() as stack:
+        stack.enter_context(results.lock())
+        # Earlier results are deleted only after the scheduler has responded.
         client = stack.enter_context(_client(scheduler, workers)) if anew else None
         results.begin(anew)
         done = results.read()
         _same_rows(plan, done, results.folder)
         seen = set(done["row"][done["status"].isin(GOOD)] if failed else done["row"])
         rest = [row for row in range(len(plan.rows)) if row not in seen]
-        tell(1.0 - len(rest) / len(plan.rows))
+        report(1.0 - len(rest) / len(plan.rows))
         if rest:
             client = client or stack.enter_context(_client(scheduler, workers))
             if failed:
                 results.forget_failures()
-            _Sweep(client, plan, results, tell).run(rest, retries, timeout)
+            _Sweep(client, plan, results, report).run(rest, retries, timeout)
     return results.read()
 
 
@@ -165,7 +167,7 @@ def samples(
     distributions: Mapping[str, Any], n: int, seed: int = 0, method: str = "random"
 ) -> "pd.DataFrame":
     """Draw a table of parameters at random: see :func:`prbm.sweeps.table.samples`."""
-    _needed()
+    _check_packages()
     from . import table as sweep_table
 
     return sweep_table.samples(distributions, n, seed, method)
@@ -189,8 +191,8 @@ class Plan:
     rows: list[dict[str, float]]
 
 
-def _needed() -> None:
-    """Check for the packages of the extra.
+def _check_packages() -> None:
+    """Check that the packages of the extra ``sweep`` are installed.
 
     Raises
     ------
@@ -202,7 +204,7 @@ def _needed() -> None:
             raise SweepError(f"sweeps need the package {name}; {REMEDY}")
 
 
-def _planned(
+def _make_plan(
     fmu: str | Path,
     table: "pd.DataFrame | str | Path",
     outputs: Outputs | None,
@@ -235,7 +237,7 @@ def _planned(
 
 
 def read_fmu(path: Path) -> tuple[bytes, Any]:
-    """Return an FMU as bytes, with its description by FMPy.
+    """Return the bytes of an FMU and FMPy's model description.
 
     Raises
     ------
@@ -248,13 +250,13 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
         raise SweepError(f"{path} cannot be read ({error.strerror}); give an FMU") from None
     try:
         description = fmpy.read_model_description(io.BytesIO(data), validate=False)
-    except Exception as error:  # FMPy has no exceptions of its own.
+    except Exception as error:  # FMPy raises plain exceptions.
         reason = " ".join(str(error).split())
         raise SweepError(f"{path} is not a readable FMU: {reason}") from None
     if not description.fmiVersion.startswith(("2", "3")) or description.coSimulation is None:
         raise SweepError(
-            f"{path} is an FMU of FMI {description.fmiVersion} without co-simulation or older than "
-            "FMI 2.0; export it for co-simulation in FMI 2.0 or 3.0"
+            f"{path} (FMI {description.fmiVersion}): must have co-simulation of FMI 2.0 or 3.0; "
+            "export it so"
         )
     return data, description
 
@@ -269,11 +271,11 @@ def _outputs(outputs: Outputs | None, variables: Mapping[str, Any]) -> tuple[Out
         outputs = [outputs]
     pairs = outputs.items() if isinstance(outputs, Mapping) else ((text, text) for text in outputs)
     try:
-        kept = tuple(parsed(text, variables, column) for column, text in pairs)
+        kept = tuple(parse_output(text, variables, column) for column, text in pairs)
     except SpecificationError as error:
         raise ParameterError(f"output {error}") from None
     if not kept:
-        raise ParameterError("there is no output to keep; name one, as outputs=['shuttle.x']")
+        raise ParameterError("no output is selected; name one, as in outputs=['shuttle.x']")
     check_outputs(((output.column, output.variable) for output in kept), variables)
     return kept
 
@@ -321,8 +323,8 @@ def _times(
     odd = abs(steps - round(steps)) > 1e-9 * steps
     if odd and not co_simulation.canHandleVariableCommunicationStepSize:
         raise ParameterError(
-            f"stop_time = {stop:g} s is no multiple of step = {size:g} s, and the FMU takes steps "
-            "of one size only; choose one that divides it"
+            f"stop_time = {stop:g} s: must be a multiple of step = {size:g} s, since the FMU has a "
+            "fixed step; choose a step that divides it"
         )
     return {"start": start, "stop": stop, "step": size, "tolerance": tolerance}
 
@@ -330,8 +332,8 @@ def _times(
 def _check_name(out: Path) -> None:
     if out.suffix.lower() in FILES:
         raise ParameterError(
-            f"{out} is the name of a {out.suffix} file, but the results are a folder of Parquet "
-            f"files: choose a name such as {out.with_suffix('.parquet')}; "
+            f"out = {out}: the results are a folder of Parquet files, not a {out.suffix} file; "
+            f"choose a name such as {out.with_suffix('.parquet')}; "
             "pandas.read_parquet(name).to_csv(...) makes one file of them"
         )
 
@@ -369,9 +371,9 @@ def _same_rows(plan: Plan, done: "pd.DataFrame", folder: Path) -> None:
         now = [*plan.rows[k].values()] if k < len(plan.rows) else None
         if now != values:
             raise ParameterError(
-                f"{folder} holds a sweep over another table: row {k} is "
-                f"{'gone' if now is None else 'another one now'}; give another name for the "
-                "results, or begin anew (--anew)"
+                f"{folder} contains a sweep over another table: row {k} "
+                f"{'is missing now' if now is None else 'has changed'}; give another name for the "
+                "results, or delete the old ones with --anew"
             )
 
 
@@ -380,7 +382,7 @@ def _same_rows(plan: Plan, done: "pd.DataFrame", folder: Path) -> None:
 
 @contextmanager
 def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
-    """Yield a client of the scheduler at an address, or of one in this process.
+    """Yield a client of the scheduler at an address, or of a new scheduler in this process.
 
     In this process one worker with threads suffices: the FMU runs in separate processes.
     """
@@ -409,7 +411,7 @@ def _client(scheduler: str | None, workers: int | None) -> Iterator[Any]:
     except (TimeoutError, OSError, ValueError) as error:
         reason = (str(error).splitlines() or [type(error).__name__])[0]
         raise SweepError(
-            f"no scheduler answers at {scheduler} ({reason}); start one with: dask scheduler"
+            f"no scheduler responds at {scheduler} ({reason}); start one with: dask scheduler"
         ) from None
     with client:
         try:
@@ -441,15 +443,12 @@ class _Sweep:
         except KeyboardInterrupt:
             kept = len(self.results.read())
             raise KeyboardInterrupt(
-                f"the sweep was stopped: {kept} of {len(self.plan.rows)} runs are kept in "
-                f"{self.results.folder}, and the same call does the rest"
+                f"the sweep was stopped: {kept} of {len(self.plan.rows)} runs are stored in "
+                f"{self.results.folder}; repeat the call to compute the others"
             ) from None
         finally:
-            with suppress(
-                OSError,
-                KeyError,
-                # The scheduler may be gone, or a worker without the plugin.
-            ):
+            # Fails if the scheduler has ended, or a worker does not have the plugin.
+            with suppress(OSError, KeyError):
                 self.client.unregister_worker_plugin(self.plugin)
 
     def _install(self, rows: Sequence[int], retries: int, timeout: float | None) -> None:
@@ -466,10 +465,10 @@ class _Sweep:
                 FmuPlugin(self.plan.fmu, job, retries, timeout), name=self.plugin
             )
         except Exception as error:  # distributed wraps the errors of workers.
-            if ABSENT not in str(error):
+            if MISSING_MODULE not in str(error):
                 raise
             raise SweepError(
-                "a worker cannot import prbm; install there what is installed here: "
+                "a worker cannot import prbm; install it there: "
                 "python -m pip install 'prbm-impact[sweep]'"
             ) from None
 
@@ -481,7 +480,7 @@ class _Sweep:
         from distributed import as_completed
 
         running: dict[Any, list[int]] = {}
-        deaths: dict[int, int] = {}  # Crashed workers per row.
+        crashes: dict[int, int] = {}  # Crashed workers per row.
         suspects: deque[int] = deque()
         completed = as_completed(loop=self.client.loop)  # type: ignore[no-untyped-call]
         self._submit(rest, running, completed)
@@ -489,25 +488,25 @@ class _Sweep:
             rows = running.pop(future)
             outcomes = self._outcomes(future)
             if outcomes is None:
-                outcomes = self._after_death(rows, deaths, suspects, retries)
+                outcomes = self._after_crash(rows, crashes, suspects, retries)
             if outcomes:
                 self._keep(rows, outcomes)
             self._submit(rest, running, completed)
             if suspects and not running:
                 self._send([suspects.popleft()], running, completed)
 
-    def _after_death(
-        self, rows: list[int], deaths: dict[int, int], suspects: deque[int], retries: int
+    def _after_crash(
+        self, rows: list[int], crashes: dict[int, int], suspects: deque[int], retries: int
     ) -> list[Outcome]:
         """Return the outcome of a row whose workers crashed too often; otherwise repeat the rows.
 
         A crashed worker loses all of its rows, not only the row that caused the crash.  At the end
-        these rows are repeated one by one, with no other batch under way, to find the cause.
+        these rows are repeated one by one, with no other batch submitted, to find the cause.
         """
         for row in rows:
-            deaths[row] = deaths.get(row, -1) + 1
-        if deaths[rows[0]] > retries:
-            return [Outcome(CRASHED, "the workers that had it died, one after the other")]
+            crashes[row] = crashes.get(row, -1) + 1
+        if crashes[rows[0]] > retries:
+            return [Outcome(CRASHED, "every worker that ran it crashed")]
         suspects.extend(rows)
         return []
 
@@ -518,14 +517,14 @@ class _Sweep:
         self.progress(self.done / len(self.plan.rows))
 
     def _submit(self, rest: deque[int], running: dict[Any, list[int]], completed: Any) -> None:
-        """Submit batches until :data:`BATCHES_PER_THREAD` are under way."""
+        """Submit batches until there are :data:`BATCHES_PER_THREAD` per thread."""
         threads = self._threads()
         while rest and len(running) < BATCHES_PER_THREAD * threads:
             size = self._size(len(rest), threads)
             self._send([rest.popleft() for _ in range(size)], running, completed)
 
     def _size(self, rest: int, threads: int) -> int:
-        """Return the number of rows of the next batch: small at the start and at the end."""
+        """Return the number of rows of the next batch, small at the start and at the end."""
         if not self.recent:
             return 1
         seconds = min(max(BATCH_SHARE * (time.monotonic() - self.begin), BATCH_MIN), BATCH_MAX)
@@ -554,8 +553,8 @@ class _Sweep:
             raise SweepError(f"{self.plan.name}: {error}") from None
         except CancelledError:
             raise SweepError(
-                f"the scheduler is gone; {len(self.results.read())} of {len(self.plan.rows)} runs "
-                f"are kept in {self.results.folder}, and the same call does the rest"
+                f"the scheduler has ended: {len(self.results.read())} of {len(self.plan.rows)} "
+                f"runs are stored in {self.results.folder}; repeat the call to compute the others"
             ) from None
 
 
@@ -566,5 +565,5 @@ def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
     for row, status, message in results.loc[~good, ["row", "status", "message"]].head(3).values:
         lines.append(f"row {row} {status}: {message}")
     if (~good).sum() > 3:
-        lines.append("and more in the columns status and message")
+        lines.append("the others are in the columns status and message")
     return "\n".join(lines)

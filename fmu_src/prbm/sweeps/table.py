@@ -1,4 +1,4 @@
-"""Tables of parameters: given, read from files or drawn at random, and compared with an FMU."""
+"""Tables of parameters: read from files, drawn at random, compared with the variables of an FMU."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -19,12 +19,14 @@ from ..base.names import proposal
 
 Table = pd.DataFrame | str | Path
 METHODS = ("random", "latin", "sobol")
-SEPARATORS = {";": "semicolons", "\t": "tabs"}  # of tables that are none of ours
+SEPARATORS = {";": "semicolons", "\t": "tabs"}  # separators of CSV dialects that are rejected
 WORDS = {"true": 1.0, "false": 0.0}
-EDGE = 2.0**-53  # how near to 0 and 1 a probability may come, where distributions may have no end
+PROBABILITY_MIN = 2.0**-53  # Probabilities stay this far from 0 and 1: quantiles may be infinite.
+NAMES_LISTED_MAX = 10  # Longer lists of settable variables are left to "fmpy info".
+HINT_LENGTH_MAX = 200  # characters
 RANGES = {"Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31, "Int64": 53,
           "UInt8": 8, "UInt16": 16, "UInt32": 32, "UInt64": 53}  # fmt: skip
-"""Bits of the whole numbers of FMI, as far as a float holds them."""
+"""Bits of FMI's integer types; a float represents 53 bits exactly."""
 
 
 def samples(
@@ -32,20 +34,20 @@ def samples(
 ) -> pd.DataFrame:
     """Draw a table of parameters.
 
-    A column is x = F^-1(u), F the distribution and u a sequence in (0, 1): pseudo-random, a Latin
-    hypercube or Sobol's, scrambled. The columns are independent of each other.
+    A column is x = F^-1(u) with the distribution F and a sequence u in (0, 1): pseudo-random, a
+    Latin hypercube or the scrambled sequence of Sobol.  The columns are independent of each other.
 
     Parameters
     ----------
     distributions : mapping
-        For each parameter a frozen distribution of ``scipy.stats`` (anything with ``ppf``), or
-        (low, high), between which it is uniform; in SI units.
+        For each parameter a frozen distribution of ``scipy.stats`` (any object with ``ppf``), or
+        (low, high) for a uniform distribution; in SI units.
     n : int
-        Rows; a power of two for Sobol's sequence, which is out of balance otherwise.
+        Number of rows.  Sobol's sequence is balanced only for powers of two, and needs one.
     seed : int
-        The same seed gives the same table.
+        Seed (default: 0).  The same seed gives the same table.
     method : str
-        ``random``, ``latin`` or ``sobol``.
+        ``random`` (default), ``latin`` or ``sobol``.
 
     Returns
     -------
@@ -54,7 +56,7 @@ def samples(
     Raises
     ------
     ParameterError
-        If there is nothing to draw, a distribution is none, or it gives no finite numbers.
+        If n or the number of parameters is zero, or a distribution or a method is invalid.
 
     Examples
     --------
@@ -64,9 +66,11 @@ def samples(
     """
     if not distributions or n < 1:
         raise ParameterError(
-            f"{n} rows of {len(distributions)} parameters are no table; draw 1 x 1 or more"
+            f"n = {n} rows of {len(distributions)} parameters: draw at least one of each"
         )
-    unit = np.clip(_unit(n, len(distributions), seed, method), EDGE, 1.0 - EDGE)
+    unit = np.clip(
+        _unit(n, len(distributions), seed, method), PROBABILITY_MIN, 1.0 - PROBABILITY_MIN
+    )
     columns = {
         name: _quantiles(name, distribution, unit[:, k])
         for k, (name, distribution) in enumerate(distributions.items())
@@ -75,6 +79,7 @@ def samples(
 
 
 def _unit(n: int, d: int, seed: int, method: str) -> NDArray[np.float64]:
+    """Return probabilities, shape (n, d)."""
     if method == "random":
         return np.random.default_rng(seed).random((n, d))
     if method == "latin":
@@ -82,9 +87,9 @@ def _unit(n: int, d: int, seed: int, method: str) -> NDArray[np.float64]:
     if method == "sobol":
         if n & (n - 1):
             near = 2 ** round(math.log2(n))
-            raise ParameterError(f"n = {n} is no power of two, as Sobol's points are; try {near}")
+            raise ParameterError(f"n = {n}: Sobol's sequence needs a power of two, such as {near}")
         return qmc.Sobol(d, seed=seed).random(n)
-    raise ParameterError(f"there is no method {method!r}; methods are {', '.join(METHODS)}")
+    raise ParameterError(f"unknown method {method!r}; methods are {', '.join(METHODS)}")
 
 
 def _quantiles(name: str, distribution: Any, u: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -95,11 +100,11 @@ def _quantiles(name: str, distribution: Any, u: NDArray[np.float64]) -> NDArray[
         x = np.asarray(distribution.ppf(u), dtype=float)
     else:
         raise ParameterError(
-            f"{name}: {distribution!r} is no distribution; give one of scipy.stats, as "
-            "norm(0.0, 1e-3), or (low, high)"
+            f"{name}: {distribution!r} must be a distribution of scipy.stats, such as "
+            "norm(0.0, 1e-3), or a pair (low, high)"
         )
     if x.shape != u.shape or not np.isfinite(x).all():
-        raise ParameterError(f"{name}: the distribution gives what is no finite number")
+        raise ParameterError(f"{name}: the quantiles of the distribution must be finite numbers")
     return x
 
 
@@ -118,7 +123,7 @@ def read_table(table: Table) -> pd.DataFrame:
         rows, columns = table.shape
         raise ParameterError(
             f"{where} has {rows} rows and {columns} columns; give a column for each parameter, "
-            "under its name, and a row for each run"
+            "headed by its name, and a row for each run"
         )
     names = [str(name).strip() for name in table.columns]
     twice = sorted({name for name in names if names.count(name) > 1})
@@ -136,13 +141,13 @@ def _read_file(path: Path) -> pd.DataFrame:
         return pd.read_csv(path, dtype=str, keep_default_na=False, skipinitialspace=True)
     except pd.errors.EmptyDataError:
         return pd.DataFrame()
-    except (OSError, ValueError) as error:  # those of pandas and pyarrow among them
+    except (OSError, ValueError) as error:  # Errors of pandas and pyarrow are subclasses.
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise ParameterError(f"{path} is no table that can be read: {reason}") from None
+        raise ParameterError(f"{path} cannot be read as a table: {reason}") from None
 
 
 def checked(table: pd.DataFrame, variables: Mapping[str, Any]) -> pd.DataFrame:
-    """Return a table as float64 after comparing it with the variables of an FMU.
+    """Check a table against the variables of an FMU; return it as float64.
 
     Parameters
     ----------
@@ -154,7 +159,7 @@ def checked(table: pd.DataFrame, variables: Mapping[str, Any]) -> pd.DataFrame:
     Raises
     ------
     ParameterError
-        If a name is unknown or cannot be set, or a cell is no finite number of the right type.
+        If a name is unknown or cannot be set, or a cell is not a finite number of the right type.
     """
     columns = {}
     for name in table.columns:
@@ -174,28 +179,29 @@ def _check_separator(name: str, variables: Mapping[str, Any]) -> None:
 
 
 def check_settable(name: str, variables: Mapping[str, Any]) -> None:
-    """Refuse a variable that no start value can be given to.
+    """Reject a variable without a start value.
 
     Raises
     ------
     ParameterError
+        If the variable is unknown or cannot be set before a run.
     """
     settable = {key: v for key, v in variables.items() if _settable(v)}
     if name in settable:
         return
     hint = proposal(name, settable)
-    if len(settable) > 10 and hint.startswith("known"):
-        hint = "modelDescription.xml and fmpy info list what there is"
+    if len(settable) > NAMES_LISTED_MAX and hint.startswith("known"):
+        hint = "fmpy info lists the variables"
     if name not in variables:
         raise ParameterError(f"the FMU has no variable {name!r}; {hint}")
     variable = variables[name]
     kind = f"{variable.causality or 'local'} variable of type {variable.type}"
     shape = f" and shape {variable.shape}" if variable.shape else ""
-    raise ParameterError(f"{name} is a {kind}{shape}, which no table can set; {hint}")
+    raise ParameterError(f"{name} ({kind}{shape}) cannot be set by a table; {hint}")
 
 
 def _settable(variable: Any) -> bool:
-    """Whether FMPy sets it before or in initialization, from one number."""
+    """Return whether FMPy can set a variable to a number before or during initialization."""
     if variable.type in ("String", "Binary", "Clock") or variable.shape:
         return False
     if variable.causality in ("structuralParameter", "calculatedParameter", "independent"):
@@ -206,11 +212,11 @@ def _settable(variable: Any) -> bool:
 def _numbers(name: str, column: "pd.Series[Any]", kind: str) -> NDArray[np.float64]:
     x = np.array([_number(name, row, cell) for row, cell in enumerate(column)])
     if kind == "Boolean":
-        _refuse(name, x, (x != 0.0) & (x != 1.0), "a Boolean, write 0 or 1")
+        _reject(name, x, (x != 0.0) & (x != 1.0), "0 or 1 (Boolean)")
     elif kind in RANGES:
         high = 2.0 ** RANGES[kind]
         low = 0.0 if kind[0] == "U" else -high
-        _refuse(name, x, (x != np.round(x)) | (x < low) | (x >= high), f"a whole number ({kind})")
+        _reject(name, x, (x != np.round(x)) | (x < low) | (x >= high), f"a whole number ({kind})")
     return x
 
 
@@ -223,30 +229,32 @@ def _number(name: str, row: int, cell: Any) -> float:
         x = math.nan
     if not math.isfinite(x):
         raise ParameterError(
-            f"row {row} of the table has {name} = {cell!s}, which is no finite number; correct it "
+            f"row {row} of the table: {name} = {cell!s} must be a finite number; correct it "
             "or leave the row out"
         )
     return x
 
 
-def _refuse(name: str, x: NDArray[np.float64], wrong: NDArray[np.bool_], what: str) -> None:
+def _reject(name: str, x: NDArray[np.float64], wrong: NDArray[np.bool_], required: str) -> None:
+    """Raise an error for the first wrong value."""
     if wrong.any():
         row = int(wrong.argmax())
-        raise ParameterError(f"row {row} of the table has {name} = {x[row]:g}; it is {what}")
+        raise ParameterError(f"row {row} of the table: {name} = {x[row]:g} must be {required}")
 
 
 def check_outputs(names: Iterable[tuple[str, str]], variables: Mapping[str, Any]) -> None:
-    """Refuse outputs, given as (what was written, variable), that are no scalar numbers of an FMU.
+    """Reject outputs, given as (text, variable), whose variable is not a scalar number.
 
     Raises
     ------
     ParameterError
+        If a variable is unknown, an array, or not a number.
     """
     for text, name in names:
         variable = variables.get(name)
         if variable is None:
             hint = proposal(name, variables)
-            hint = "fmpy info lists what there is" if len(hint) > 200 else hint
+            hint = "fmpy info lists the variables" if len(hint) > HINT_LENGTH_MAX else hint
             raise ParameterError(f"output {text}: the FMU has no variable {name!r}; {hint}")
         if variable.type in ("String", "Binary", "Clock") or variable.shape:
             raise ParameterError(

@@ -1,8 +1,8 @@
-"""What a Dask worker does for a sweep: it keeps processes, one a thread, that run the FMU.
+"""The part of a sweep that runs on a Dask worker: processes, one per thread, that run the FMU.
 
-An FMU may crash or hang.  So it runs in processes of its own: one that dies costs the run that it
-was at, its signal is known, and the worker stays.  The FMU comes to every worker once, also to
-those that join late, as a plugin.
+An FMU may crash or hang, so it runs in separate processes.  A crash costs only its run, its signal
+can be reported, and the worker survives.  A plugin sends the FMU once to every worker, including
+workers that join later.
 """
 
 import contextlib
@@ -24,51 +24,58 @@ from distributed import WorkerPlugin, get_worker
 from ..fmu.unpack import unpacked
 from .runs import CRASHED, TIMEOUT, Job, Outcome
 
-PATIENCE = 5.0  # s for a process to end that has been told to
+EXIT_TIMEOUT = 5.0  # Longest wait for the exit of a process before it is killed [s].
 STOPPED = "the sweep was stopped"
 COMMAND = "from prbm.sweeps.runs import main; main()"
 
 
 class Unusable(Exception):
-    """The FMU cannot be run here, whatever its parameters; the message says why."""
+    """The FMU cannot run on this worker with any parameters; the message gives the reason."""
 
 
 class Child:
     """A process that runs the FMU.
 
+    Parameters
+    ----------
+    folder : Path
+        The unpacked FMU.
+    job : Job
+        Settings of the runs.
+
     Raises
     ------
     Unusable
-        If it does not get as far as an instance.
+        If the FMU cannot be loaded or instantiated.
     """
 
     def __init__(self, folder: Path, job: Job) -> None:
         paths = os.pathsep.join(path for path in sys.path if path)
-        self.said = (folder / f"said-{os.urandom(4).hex()}").open("ab+")
+        self.stderr = (folder / f"stderr-{os.urandom(4).hex()}").open("ab+")
         self.process = subprocess.Popen(
             [sys.executable, "-P", "-c", COMMAND],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            stderr=self.said,
+            stderr=self.stderr,
             env={**os.environ, "PYTHONPATH": paths},
-            start_new_session=True,  # Ctrl-C is for the one who asked for the sweep
+            start_new_session=True,  # Ctrl-C must reach only the process of the sweep.
         )
         self.late = False
         self.send((folder, job))
-        complaint = self.receive(None)
-        if complaint != "":
+        error = self.receive(None)
+        if error != "":
             end = self.close()
-            raise Unusable(complaint or f"the process of the FMU ended at once: {end}")
+            raise Unusable(error or f"the process of the FMU ended at its start: {end}")
 
-    def send(self, what: object) -> None:
-        """Tell it something."""
+    def send(self, message: object) -> None:
+        """Send a message to the process."""
         assert self.process.stdin is not None
-        with contextlib.suppress(OSError):  # a process that is no more is found out by receive
-            pickle.dump(what, self.process.stdin)
+        with contextlib.suppress(OSError):  # receive() reports that the process has ended.
+            pickle.dump(message, self.process.stdin)
             self.process.stdin.flush()
 
     def receive(self, timeout: float | None) -> Any:
-        """Return what it answers; None if it ended, or was ended after so many seconds."""
+        """Return a reply; None if the process ended or was killed after ``timeout`` [s]."""
         timer = threading.Timer(timeout, self._time_out) if timeout is not None else None
         if timer:
             timer.start()
@@ -86,27 +93,27 @@ class Child:
 
     @property
     def alive(self) -> bool:
-        """Whether it may be asked for more."""
+        """Whether the process is running."""
         return self.process.poll() is None
 
     def close(self) -> str:
-        """End it; return how it ended, with the last line that it wrote."""
+        """End the process; return its exit status and the last line of its standard error."""
         with contextlib.suppress(OSError):
             self.process.stdin.close()  # type: ignore[union-attr]
         try:
-            code = self.process.wait(PATIENCE)
+            code = self.process.wait(EXIT_TIMEOUT)
         except subprocess.TimeoutExpired:
             self.process.kill()
             code = self.process.wait()
         self.process.stdout.close()  # type: ignore[union-attr]
-        self.said.seek(0)
-        lines = self.said.read().decode(errors="replace").strip().splitlines()
-        self.said.close()
+        self.stderr.seek(0)
+        lines = self.stderr.read().decode(errors="replace").strip().splitlines()
+        self.stderr.close()
         return ending(code) + (f" ({lines[-1].strip()})" if lines else "")
 
 
 def ending(code: int) -> str:
-    """Return how a process ended, from its exit code.
+    """Return the text of an exit code.
 
     Examples
     --------
@@ -122,18 +129,18 @@ def ending(code: int) -> str:
 
 
 class Processes:
-    """The processes of a worker: as many as its threads ask for at a time.
+    """The processes of a worker, at most one per thread.
 
     Parameters
     ----------
     fmu : bytes
         The FMU.
     job : Job
-        What all runs have in common.
+        Settings of the runs.
     retries : int
-        How often a run whose process died is tried again.
+        Number of repetitions of a run whose process crashed.
     timeout : float or None
-        After how long a run is given up [s].
+        Longest duration of a run [s]; None: no limit.
     """
 
     def __init__(self, fmu: bytes, job: Job, retries: int, timeout: float | None) -> None:
@@ -143,12 +150,12 @@ class Processes:
         self.folder = self.stack.enter_context(unpacked(io.BytesIO(fmu)))
 
     def run(self, rows: Sequence[Mapping[str, float]]) -> list[Outcome]:
-        """Run the FMU with each of some sets of values.
+        """Run the FMU once for each mapping of start values.
 
         Raises
         ------
         Unusable
-            If the FMU cannot be loaded, or no more runs are wanted.
+            If the FMU cannot be loaded, or the sweep was stopped.
         """
         outcomes: list[Outcome] = []
         attempts = 0
@@ -157,11 +164,11 @@ class Processes:
             child.send(rows[len(outcomes) :])
             spent = False
             while not spent and len(outcomes) < len(rows):
-                answer = child.receive(self.timeout)
-                if answer is None:
+                outcome = child.receive(self.timeout)
+                if outcome is None:
                     break
-                outcomes.append(answer)
-                attempts, spent = 0, answer.spent
+                outcomes.append(outcome)
+                attempts, spent = 0, outcome.spent
             if len(outcomes) == len(rows) and not spent:
                 self._keep(child)
                 break
@@ -173,24 +180,24 @@ class Processes:
                 continue
             attempts += 1
             if late:
-                outcomes.append(Outcome(TIMEOUT, f"not done after {limit:g} s", limit))
+                outcomes.append(Outcome(TIMEOUT, f"not finished after {limit:g} s", limit))
                 attempts = 0
             elif attempts > self.retries:
-                times = f", {attempts} times out of {attempts}" if attempts > 1 else ""
-                outcomes.append(Outcome(CRASHED, f"the process of the FMU died: {end}{times}"))
+                times = f", in each of {attempts} attempts" if attempts > 1 else ""
+                outcomes.append(Outcome(CRASHED, f"the process of the FMU crashed: {end}{times}"))
                 attempts = 0
         return outcomes
 
     def _child(self) -> Child:
-        """Return a process that is idle, or a new one."""
+        """Return an idle process, or a new one."""
         with self.lock:
             if self.closed:
                 raise Unusable(STOPPED)
             child = self.idle.pop() if self.idle else None
         if child is not None and child.alive:
-            child.said.truncate(0)
+            child.stderr.truncate(0)
             return child
-        if child is not None:  # it waited too long for work
+        if child is not None:  # It ended itself after IDLE_MAX without work.
             self._drop(child)
         child = Child(self.folder, self.job)
         with self.lock:
@@ -201,6 +208,7 @@ class Processes:
         return child
 
     def _keep(self, child: Child) -> None:
+        """Keep a process for further runs, unless the sweep was stopped."""
         with self.lock:
             if not self.closed:
                 self.idle.append(child)
@@ -208,24 +216,25 @@ class Processes:
         self._drop(child)
 
     def _drop(self, child: Child) -> str:
+        """End a process; return the text of :meth:`Child.close`."""
         with self.lock:
             self.all.discard(child)
         return child.close()
 
     def close(self) -> None:
-        """End all processes, also in the middle of a run, and remove what was unpacked."""
+        """Kill all processes, even during a run, and delete the unpacked FMU."""
         with self.lock:
             self.closed, children = True, list(self.all)
             idle, self.idle = self.idle, []
         for child in children:
             child.process.kill()
-        for child in idle:  # the thread that waits for another one closes that
+        for child in idle:  # The other processes are closed by the threads that wait for them.
             child.close()
         self.stack.close()
 
 
 class FmuPlugin(WorkerPlugin):
-    """Brings the FMU to a worker, and takes it away."""
+    """Installs the FMU on a worker and removes it at the end."""
 
     def __init__(self, fmu: bytes, job: Job, retries: int, timeout: float | None) -> None:
         self.arguments = fmu, job, retries, timeout
@@ -240,6 +249,6 @@ class FmuPlugin(WorkerPlugin):
 
 
 def run_batch(plugin: str, rows: Sequence[Mapping[str, float]]) -> list[Outcome]:
-    """Run some rows on this worker."""
+    """Run the FMU on this worker once for each row."""
     installed: Any = get_worker().plugins[plugin]
     return installed.processes.run(rows)  # type: ignore[no-any-return]

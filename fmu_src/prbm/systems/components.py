@@ -1,4 +1,4 @@
-"""FMUs as components of a system, on FMPy's classes: variables by name, errors with remedies."""
+"""FMUs as components of a system: FMPy's classes with access by name and errors with remedies."""
 
 import math
 from collections import defaultdict
@@ -22,46 +22,53 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave  # type: ignore[import-untyped]
 from ..base.errors import PrbmError
 
 Value = float | int | bool
-INPUTS = ("input", "parameter", "structuralParameter")  # what may be given a start value
+INPUTS = (
+    "input",
+    "parameter",
+    "structuralParameter",
+)  # causalities with a start value
 CO_SIMULATION, MODEL_EXCHANGE = "co-simulation", "model exchange"
 CLASSES = {
     (CO_SIMULATION, 2): FMU2Slave, (CO_SIMULATION, 3): FMU3Slave,
     (MODEL_EXCHANGE, 2): FMU2Model, (MODEL_EXCHANGE, 3): FMU3Model,
 }  # fmt: skip
-TEXTS = {"String": str, "Binary": bytes}  # types that are no numbers
-ENUMERATED = {2: "Integer", 3: "Int64"}  # as which enumerations are read and given
+TEXTS = {
+    "String": str,
+    "Binary": bytes,
+}  # Python's types of FMI's non-numeric ones
+ENUMERATED = {2: "Integer", 3: "Int64"}  # type of an enumeration's values, by FMI version
 DESCRIBED = {CO_SIMULATION: "coSimulation", MODEL_EXCHANGE: "modelExchange"}
 
 
 class CouplingError(PrbmError, ValueError):
-    """FMUs cannot be coupled as they are asked to be, or one of them fails."""
+    """The FMUs cannot be coupled in the requested way, or one of them fails."""
 
 
 class Component:
-    """An FMU that is unpacked and loaded; what uses it instantiates and steps it.
+    """An unpacked and loaded FMU.  Subclasses instantiate and advance it.
 
     Parameters
     ----------
     name : str
-        Of the instance.
+        Name of the instance.
     fmu : str or Path
-        Of FMI 2.0 or 3.0.
+        An FMU of FMI 2.0 or 3.0.
     folder : str or Path
-        An empty folder, where it is unpacked.
+        An empty folder into which the FMU is unpacked.
     kind : str
         :data:`CO_SIMULATION` or :data:`MODEL_EXCHANGE`.
 
     Attributes
     ----------
     time : float
-        Where it is, for messages [s].
+        Current time, for messages [s].
     variables : dict
-        What FMPy knows of them, by name.
+        FMPy's descriptions of the variables, by name.
 
     Raises
     ------
     CouplingError
-        If there is no FMU that can do that.
+        If the FMU cannot be read or loaded, or does not have this interface.
     """
 
     def __init__(self, name: str, fmu: str | Path, folder: str | Path, kind: str) -> None:
@@ -72,14 +79,14 @@ class Component:
         if self.interface is None or self.version < 2:
             raise CouplingError(f"{name}: {fmu} has no {kind} of FMI 2.0 or 3.0")
         self.variables = {v.name: v for v in self.description.modelVariables}
-        self.said = ""  # the last message of the FMU about an error
+        self.last_error = ""  # last message of the FMU about an error
         self.callbacks = self._callbacks()
         self.fmu: Any = self._loaded(CLASSES[kind, self.version], fmu, folder)
 
-    def _loaded(self, of: Any, fmu: str | Path, folder: str | Path) -> Any:
+    def _loaded(self, fmpy_class: Any, fmu: str | Path, folder: str | Path) -> Any:
         try:
-            with chdir("."):  # back to it: FMPy stays in the folder of what it cannot load
-                return of(
+            with chdir("."):  # FMPy does not restore the working directory if loading fails.
+                return fmpy_class(
                     guid=self.description.guid,
                     unzipDirectory=str(extract(str(fmu), str(folder))),
                     modelIdentifier=self.interface.modelIdentifier,
@@ -89,11 +96,11 @@ class Component:
             raise CouplingError(f"{self.name}: {fmu} cannot be loaded here ({error})") from None
 
     def instantiate(self, **options: Any) -> None:
-        """Instantiate it and keep its messages about errors.
+        """Instantiate the FMU and store its messages about errors.
 
-        In FMI 2.0 the instance gets callbacks of its own.  FMPy's default callbacks share one
-        native logger with every simulation of the process, and end the process after another
-        simulation with a logger has been collected.
+        In FMI 2.0 each instance gets separate callbacks.  FMPy's default callbacks share one
+        native logger with every simulation of the process.  They crash the process after another
+        simulation with a logger has been garbage-collected.
         """
         if self.version > 2:
             options |= {"loggingOn": True, "logMessage": self._note}
@@ -102,7 +109,7 @@ class Component:
             self.call("instantiate", callbacks=self.callbacks, loggingOn=True)
 
     def _callbacks(self) -> Any:
-        """Return callbacks of FMI 2.0, which live as long as the component."""
+        """Return callbacks of FMI 2.0; the component keeps them alive."""
         callbacks = fmi2CallbackFunctions()
         callbacks.logger = fmi2CallbackLoggerTYPE(self._note_fmi2)
         callbacks.allocateMemory = defaultCallbacks.allocateMemory
@@ -110,15 +117,15 @@ class Component:
         return callbacks
 
     def _note_fmi2(self, _: Any, __: bytes, status: int, category: bytes, message: bytes) -> None:
-        """Keep a message of FMI 2.0, a format without arguments."""
+        """Store a message of FMI 2.0, which is a format string without arguments."""
         self._note(
             None, status, category, (message or b"").replace(b"%%", b"%").replace(b"##", b"#")
         )
 
     def _note(self, _: Any, status: int, category: bytes, message: bytes) -> None:
-        """Keep a message about an error, not one about an event."""
+        """Store a message about a warning or an error; ignore the others."""
         if status > 0:
-            self.said = message.decode(errors="replace")
+            self.last_error = message.decode(errors="replace")
 
     def call(self, function: str, *arguments: Any, **options: Any) -> Any:
         """Call a function of the FMU by FMPy's name.
@@ -126,12 +133,12 @@ class Component:
         Raises
         ------
         CouplingError
-            If it fails; with what the FMU said.
+            If it fails; the error contains the last message of the FMU.
         """
         try:
             return getattr(self.fmu, function)(*arguments, **options)
         except FMICallException as error:
-            why = self.said or "it gave no reason"
+            why = self.last_error or "the FMU logged no reason"
             raise CouplingError(
                 f"{self.name}: {error.function} at {self.time:g} s returned the status "
                 f"{error.status}: {why}"
@@ -140,21 +147,21 @@ class Component:
             raise CouplingError(f"{self.name}: {function} failed ({error})") from None
 
     def variable(self, name: str) -> Any:
-        """Return what FMPy knows of a variable.
+        """Return FMPy's description of a variable.
 
         Raises
         ------
         CouplingError
-            If there is none of that name; the message lists similar ones.
+            If no variable has that name; the message lists similar names.
         """
         if name not in self.variables:
             near = get_close_matches(name, self.variables)
-            hint = f"; near it are {', '.join(near)}" if near else ""
+            hint = f"; similar names are {', '.join(near)}" if near else ""
             raise CouplingError(f"{self.name} has no variable {name!r}{hint}")
         return self.variables[name]
 
     def get(self, names: Sequence[str]) -> dict[str, Value]:
-        """Return variables by name, those of a type with one call."""
+        """Return the values of variables by name, with one call of the FMU per type."""
         result: dict[str, Value] = {}
         for kind, some in self._kinds(names).items():
             references = [self.variables[name].valueReference for name in some]
@@ -162,12 +169,13 @@ class Component:
         return result
 
     def set(self, values: Mapping[str, Value]) -> None:
-        """Give values to variables."""
+        """Set variables by name, with one call of the FMU per type."""
         for kind, some in self._kinds(values).items():
             references = [self.variables[name].valueReference for name in some]
             self.call(f"set{kind}", references, [values[name] for name in some])
 
     def _kinds(self, names: Sequence[str] | Mapping[str, Value]) -> dict[str, list[str]]:
+        """Return the names by type of FMI."""
         kinds = defaultdict(list)
         for name in names:
             kind = self.variable(name).type
@@ -176,45 +184,45 @@ class Component:
 
 
 def described(name: str, fmu: str | Path) -> Any:
-    """Return what FMPy knows of an FMU, the name being that of its instance.
+    """Return FMPy's model description of an FMU; the name of the instance is for messages.
 
     Raises
     ------
     CouplingError
-        If there is no FMU that can be read.
+        If the file cannot be read as an FMU.
     """
     try:
         return read_model_description(str(fmu))
     except Exception as error:
-        raise CouplingError(f"{name}: {fmu} is no FMU that can be read ({error})") from None
+        raise CouplingError(f"{name}: {fmu} cannot be read as an FMU ({error})") from None
 
 
 def start_value(full: str, value: object, variable: Any) -> Any:
-    """Return a value as Python's own of the variable's type; numbers of NumPy are numbers, too.
+    """Convert a start value to Python's type for the variable; NumPy's numbers are accepted.
 
     Raises
     ------
     CouplingError
-        If the variable may not be given a start value, or not this one.
+        If the variable has no start value, or the value does not fit its type.
     """
     if variable.causality not in INPUTS:
-        raise CouplingError(f"{full} = {value} cannot be given: it is neither input nor parameter")
+        raise CouplingError(f"{full} = {value} cannot be set: it is neither input nor parameter")
     if variable.type in TEXTS:
         if not isinstance(value, TEXTS[variable.type]):
             kind = TEXTS[variable.type].__name__
             raise CouplingError(f"{full} = {value!r} must be of Python's type {kind}")
         return value
-    if isinstance(value, SupportsFloat):  # which a string is not
-        with suppress(TypeError, OverflowError):  # an array, a number beyond all floats
+    if isinstance(value, SupportsFloat):  # False for a string
+        with suppress(TypeError, OverflowError):  # an array, or an integer above the largest float
             return _of_type(full, value, variable.type)
     raise CouplingError(f"{full} = {value!r} must be a number, in the unit of the variable")
 
 
 def _of_type(full: str, value: Any, kind: str) -> Value:
-    """Return a number as one of a type of FMI."""
+    """Convert a number to Python's type for a type of FMI."""
     number = float(value)
     if math.isnan(number):
-        raise CouplingError(f"{full} = {value} is no number")
+        raise CouplingError(f"{full} = {value}: must be a number")
     if kind.startswith(("Real", "Float")):
         return number
     if kind == "Boolean":
@@ -227,12 +235,12 @@ def _of_type(full: str, value: Any, kind: str) -> Value:
 
 
 def check_wire(to: str, given: Any, source: str) -> None:
-    """Check that what a connection leads to is an input.
+    """Check that the end of a connection is an input.
 
     Raises
     ------
     CouplingError
-        If not.
+        If it has another causality.
     """
     if given.causality != "input":
-        raise CouplingError(f"{to} is no input: connect {source} to one")
+        raise CouplingError(f"{to} is not an input: connect {source} to an input")

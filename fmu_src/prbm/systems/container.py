@@ -1,4 +1,4 @@
-"""A system of FMUs inside one FMU, by FMPy's container: for a tool that takes a single one."""
+"""Containers: a system of FMUs inside one FMU, by FMPy's container, for tools that load one FMU."""
 
 import shutil
 import tempfile
@@ -20,7 +20,7 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
 
 from .components import CouplingError, Value, check_wire, described, start_value
 
-NAMES3 = {"Real": "Float64", "Integer": "Int32"}  # of types, which the container takes throughout
+NAMES3 = {"Real": "Float64", "Integer": "Int32"}  # names of types in FMI 3.0, by those in FMI 2.0
 KINDS = ("parameter", "input", "output")
 
 
@@ -34,30 +34,33 @@ def container(
     fmi: int = 3,
     stop_time: float = 1.0,
 ) -> None:
-    """Write an FMU for co-simulation that has others inside and couples them.
+    """Write an FMU for co-simulation that contains other FMUs and couples them.
 
     Parameters
     ----------
     path : str or Path
-        The FMU, ``.fmu``.
-    fmus, connections
-        FMUs by the names of their instances, and for inputs, ``name.variable``, the outputs that
-        they get their values from.
+        The FMU to write, ``.fmu``.
+    fmus : mapping
+        The inner FMUs by the names of their instances.
+    connections : mapping
+        Source output by connected input, both as ``name.variable``.
     step : float
-        Communication step of those inside [s]; that of the container is to be a multiple of it.
+        Communication step of the inner FMUs [s].  The communication step of the container must be
+        a multiple of it.
     values : mapping
-        Start values, ``name.variable``: these are parameters and inputs of the container.
+        Start values, ``name.variable``.  These variables become parameters and inputs of the
+        container.
     shown : sequence of str
         Further variables of the container, ``name.variable``.
     fmi : {2, 3}
-        Version of FMI of the container; those inside may have the other one.
+        FMI version of the container (default: 3); the inner FMUs may have the other one.
     stop_time : float
-        Of the default experiment [s].
+        Stop time of the default experiment [s] (default: 1).
 
     Notes
     -----
-    The scheme is Jacobi's.  No event mode, no state that can be saved, and the platforms that both
-    FMPy's library and the FMUs inside are made for.
+    The coupling scheme is Jacobi's.  The container has no event mode and cannot save its state.  It
+    runs on the platforms that both FMPy's library and the inner FMUs support.
 
     Raises
     ------
@@ -85,7 +88,7 @@ def container(
                 instantiationToken=f"{{{uuid5(NAMESPACE_URL, repr((connections, values)))}}}",
                 generationTool="prbm-impact, FMPy",
                 coSimulation=CoSimulation(modelIdentifier="", fixedInternalStepSize=step),
-                modelVariables=[time, *mapped],  # the container counts from the time, which is 0
+                modelVariables=[time, *mapped],  # value references count from 0, the time's
                 defaultExperiment=DefaultExperiment(
                     startTime="0", stopTime=repr(stop_time), stepSize=repr(step)
                 ),
@@ -101,32 +104,34 @@ def container(
 
 
 def _inside(name: str, fmu: str | Path, folder: Path) -> Any:
-    """Return an FMU under the name of its instance, after which its folder is called."""
+    """Copy an FMU to NAME.fmu, since the container names its folder after the file."""
     description, own = described(name, fmu), folder / f"{name}.fmu"
     shutil.copyfile(fmu, own)
     return config.Component(name, own, description)
 
 
 def _found(inside: Mapping[str, Any], full: str) -> tuple[Any, Any]:
+    """Return the inner FMU and the variable of ``name.variable``."""
     name, _, variable = full.partition(".")
     component = inside.get(name)
     for candidate in component.modelDescription.modelVariables if component else ():
         if candidate.name == variable:
             return component, candidate
-    raise CouplingError(f"{full}: there is no such variable; write name.variable")
+    raise CouplingError(f"{full}: unknown variable; write INSTANCE.VARIABLE")
 
 
 def _type(kind: str, fmi: int) -> str:
+    """Return the name of a type in a version of FMI."""
     three = NAMES3.get(kind, kind)
     two = {name: other for other, name in NAMES3.items()}
     return three if fmi == 3 else two.get(three, three)
 
 
 def _shown(full: str, value: Value | None, inside: Mapping[str, Any], fmi: int) -> Any:
-    """Return a variable of the container for one of those inside."""
+    """Return the variable of the container for a variable of an inner FMU."""
     _, variable = _found(inside, full)
     if variable.causality not in KINDS:
-        raise CouplingError(f"{full} is neither parameter nor input nor output")
+        raise CouplingError(f"{full}: must be a parameter, an input or an output")
     start = variable.start if value is None else start_value(full, value, variable)
     output = variable.causality == "output"
     return ModelVariable(
@@ -146,7 +151,7 @@ def _text(value: Any) -> str:
 
 
 def _wire(inside: Mapping[str, Any], to: str, source: str) -> Any:
-    """Return a connection; FMPy's library knows the names of types of FMI 3.0 alone."""
+    """Return a connection, with FMI 3.0 names of the types: FMPy's library requires them."""
     (giver, output), (taker, given) = _found(inside, source), _found(inside, to)
     check_wire(to, given, source)
     renamed = [copy(v) for v in (output, given)]

@@ -1,21 +1,24 @@
-"""FMUs side by side: a small master for co-simulation, on FMPy's classes.
+"""A small co-simulation master on FMPy's classes.
 
-A system is some FMUs with names, and connections from outputs to inputs, ``name.variable``:
+A system consists of named FMUs and of connections from outputs to inputs, ``name.variable``:
 
     guide --- shuttle.vx ---> coil          {"coil.velocity": "guide.shuttle.vx",
       ^--------- force --------'             "guide.force.x": "coil.force"}
 
-Between two communication points nothing is exchanged.  What an input gets is decided by a scheme:
+Values are exchanged at communication points only.  The scheme determines the inputs of a step:
 
-    jacobi          all inputs are the outputs at the beginning of the step
-    gauss-seidel    the FMUs go one after the other, in the order of their names, and each sees
-                    the outputs at the end of the step of those before it
+    jacobi          every FMU uses the outputs at the beginning of the step
+    gauss-seidel    the FMUs step one after the other, in the order of the mapping; each uses the
+                    outputs at the end of the step of the FMUs before it
 
-Both make an error of the first order in the step.  With events, FMUs of FMI 3.0 that know event
-mode end a step where something happens to them, and the others follow to that time: those with
-events go first, with the outputs at the beginning of the step; if one of them ends earlier than the
-others, these are put back and repeat the step to its time.  There the outputs are exchanged and
-event mode is repeated until no input changes any more.
+The error of both is of first order in the step.
+
+With ``events=True``, FMUs of FMI 3.0 that have event mode end a step early at their events:
+
+1. These FMUs step first, with the outputs at the beginning of the step.
+2. If one of them stops earlier than the others, the others are restored and step to its time.
+3. The FMUs without event mode follow to that time.
+4. Outputs are exchanged and event mode is repeated until no input changes.
 """
 
 import math
@@ -31,7 +34,7 @@ from ..runs.run import Source, communication_points
 from .components import CO_SIMULATION, Component, CouplingError, Value, check_wire, start_value
 
 GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
-MOST_UPDATES = 100  # of discrete states at one time; more than this is a loop without end
+UPDATES_MAX = 100  # event iterations at one time before the system is rejected as an endless loop
 
 
 class Instance(Component):
@@ -40,18 +43,18 @@ class Instance(Component):
     Parameters
     ----------
     name : str
-        Of the instance.
+        Name of the instance.
     fmu : str or Path
         An FMU for co-simulation, of FMI 2.0 or 3.0.
     folder : str or Path
-        An empty folder, where it is unpacked.
+        An empty folder into which the FMU is unpacked.
     events : bool
-        Whether event mode and early return are used, if the FMU has them.
+        Use event mode and early return if the FMU has them (default: False).
 
     Raises
     ------
     CouplingError
-        If there is no FMU that can do that.
+        If the FMU cannot be read, loaded or instantiated, or has no co-simulation.
     """
 
     def __init__(
@@ -60,12 +63,12 @@ class Instance(Component):
         super().__init__(name, fmu, folder, CO_SIMULATION)
         self.events = events and self.version > 2 and bool(self.interface.hasEventMode)
         self.restorable = bool(self.interface.canGetAndSetFMUstate)
-        self.updating = False
-        self.stepping = False  # in step mode, where events may be had: no discrete inputs then
-        self.given: dict[str, Value] = {}
+        self.updating = False  # in event mode
+        self.stepping = False  # in step mode of an instance with events: discrete inputs are locked
+        self.connected: dict[str, Value] = {}
         self.instantiate(eventModeUsed=self.events, earlyReturnAllowed=self.events)
 
-    # -- life --
+    # -- start and end --
 
     def initialize(self, time: float, stop_time: float | None, tolerance: float | None) -> None:
         """Enter initialization mode."""
@@ -78,93 +81,100 @@ class Instance(Component):
             self.call("enterInitializationMode", **experiment)
 
     def begin(self) -> None:
-        """Leave initialization mode; with events, one is in event mode then."""
+        """Leave initialization mode, into event mode if the instance has events."""
         self.call("exitInitializationMode")
         self.updating = self.events
 
     def close(self) -> None:
-        """End the simulation and give the instance back, whatever has happened to it."""
-        with suppress(Exception):  # it has failed before, or has not begun
+        """Terminate the simulation and free the instance, in any state."""
+        with suppress(Exception):  # Fails if the instance has failed before or was not initialized.
             self.fmu.terminate()
         self.fmu.freeInstance()
 
-    # -- motion --
+    # -- steps and events --
 
     def step(self, end: float) -> bool:
-        """Go to a time [s]; return whether something happens where it got to, ``time``."""
+        """Step towards a time [s]; return whether an event is due at the new ``time``."""
         result = self.call("doStep", self.time, end - self.time)
         if self.version == 2:
             self.time = end
             return False
-        happens, terminated, early, reached = result
+        event, terminated, early, reached = result
         self.time = reached if early else end
         if terminated:
-            raise CouplingError(f"{self.name} has ended the simulation at {self.time:g} s")
-        return bool(happens)
+            raise CouplingError(f"{self.name} terminated the simulation at {self.time:g} s")
+        return bool(event)
 
     def enter_events(self) -> None:
-        """Go into event mode, if there is one."""
+        """Enter event mode, if the instance uses it."""
         if self.events and not self.updating:
             self.call("enterEventMode")
             self.updating, self.stepping = True, False
 
     def update(self) -> bool:
-        """Let happen what is due; return whether there is more of it."""
+        """Update the discrete states once; return whether another update is needed."""
         return self.updating and bool(self.call("updateDiscreteStates")[0])
 
     def leave_events(self) -> None:
-        """Go back to steps."""
+        """Return to step mode."""
         if self.updating:
             self.call("enterStepMode")
             self.updating, self.stepping = False, True
 
     def at_events(self, name: str) -> bool:
-        """Return whether a variable may be set now only after :meth:`enter_events`."""
+        """Return whether :meth:`enter_events` must be called before this variable is set."""
         return self.stepping and self.variable(name).variability != "continuous"
 
     @contextmanager
-    def kept(self, needed: bool) -> Iterator[Callable[[], None]]:
-        """Keep the present state; what is yielded returns to it."""
+    def saved_state(self, needed: bool) -> Iterator[Callable[[], None]]:
+        """Save the present state; yield the function that restores it."""
         if not needed:
             yield lambda: None
             return
         if not self.restorable:
             raise CouplingError(
-                f"{self.name} cannot return to a state that it has left, which a system with "
-                "several FMUs with events takes: use one of them only, or events=False"
+                f"{self.name} cannot restore a saved state, which a system with several FMUs in "
+                "event mode needs: use only one FMU with event mode, or events=False"
             )
         state, time = self.call("getFMUState"), self.time
 
-        def back() -> None:
+        def restore() -> None:
             self.call("setFMUState", state)
             self.time = time
 
         try:
-            yield back
+            yield restore
         finally:
             self.call("freeFMUState", state)
 
 
 class System:
-    """FMUs that are connected: started, advanced, closed at the end of a ``with`` block.
+    """Connected FMUs; a context manager that frees the instances at its end.
 
     Parameters
     ----------
     fmus : mapping
-        The FMUs by the names of their instances, in the order in which they go.
+        The FMUs by the names of their instances, in the order of their steps.
     connections : mapping
-        For inputs, ``name.variable``, the outputs that they get their values from.
+        Source output by connected input, both as ``name.variable``.
     scheme : str
-        ``gauss-seidel`` or ``jacobi``.
+        ``gauss-seidel`` (default) or ``jacobi``.
     events : bool
-        Whether event mode is used, of those FMUs that have it.
+        Use event mode of the FMUs that have it (default: False).
     watched : sequence of str
-        Further variables that ``values`` has.
+        Further variables to read into ``values`` after each step, ``name.variable``.
+
+    Attributes
+    ----------
+    time : float
+        Current time [s].
+    values : dict
+        Current values of connected outputs and watched variables, by ``name.variable``.
 
     Raises
     ------
     CouplingError
-        If names do not fit.
+        If an FMU cannot be used, a name is unknown or a connection does not lead to an input.
     """
 
     def __init__(
@@ -179,7 +189,7 @@ class System:
             raise CouplingError(f"scheme = {scheme!r} must be {GAUSS_SEIDEL!r} or {JACOBI!r}")
         for name in fmus:
             if "." in name or not name:
-                raise CouplingError(f"{name!r} is no name for an instance: leave out dots")
+                raise CouplingError(f"instance name {name!r}: must be non-empty and without dots")
         self.scheme, self.connections = scheme, dict(connections)
         self.time = 0.0
         self.values: dict[str, Value] = {}
@@ -195,37 +205,38 @@ class System:
             raise
 
     def _wires(self) -> dict[str, dict[str, str]]:
-        """Return for each instance its inputs by their own names, with where they come from."""
+        """Return for each instance its connected inputs, with the full name of each source."""
         wires: dict[str, dict[str, str]] = {name: {} for name in self.instances}
         for to, source in self.connections.items():
-            instance, name = self.parted(to)
+            instance, name = self.resolve(to)
             check_wire(to, instance.variable(name), source)
-            giver, output = self.parted(source)
+            giver, output = self.resolve(source)
             giver.variable(output)
             wires[instance.name][name] = source
         return wires
 
     def _read(self, watched: Sequence[str]) -> dict[str, list[str]]:
-        """Return for each instance the variables that are read of it after a step."""
+        """Return for each instance the variables that are read after a step."""
         read: dict[str, list[str]] = {name: [] for name in self.instances}
         for full in dict.fromkeys([*self.connections.values(), *watched]):
-            instance, name = self.parted(full)
+            instance, name = self.resolve(full)
             instance.variable(name)
             read[instance.name].append(name)
         return read
 
-    def parted(self, full: str) -> tuple[Instance, str]:
+    def resolve(self, full: str) -> tuple[Instance, str]:
         """Return the instance and the variable of a name ``name.variable``.
 
         Raises
         ------
         CouplingError
-            If there is no such instance.
+            If no instance has that name.
         """
         name, _, variable = full.partition(".")
         if name not in self.instances:
             raise CouplingError(
-                f"{full!r} belongs to none of {', '.join(self.instances)}: write name.variable"
+                f"{full!r}: unknown instance; write INSTANCE.VARIABLE with one of "
+                f"{', '.join(self.instances)}"
             )
         return self.instances[name], variable
 
@@ -236,7 +247,7 @@ class System:
         self.close()
 
     def close(self) -> None:
-        """Give back the instances and remove what was unpacked."""
+        """Free the instances and delete the unpacked files."""
         while self.instances:
             self.instances.popitem()[1].close()
         self.folder.cleanup()
@@ -250,9 +261,19 @@ class System:
         stop_time: float = math.inf,
         tolerance: float | None = None,
     ) -> None:
-        """Initialize all instances with start values, ``name.variable``.
+        """Initialize all instances.
 
-        Outputs reach the inputs within initialization mode, along chains as long as the system.
+        Outputs are passed to the connected inputs in initialization mode, once per instance.
+        That suffices for a chain of connections through the whole system.
+
+        Parameters
+        ----------
+        values : mapping
+            Start values of parameters and inputs, ``name.variable``.
+        time, stop_time : float
+            Start time (default: 0) and stop time (default: none) [s].
+        tolerance : float or None
+            Tolerance of the integration in the FMUs; None: that of each FMU.
         """
         self.give(values or {})
         stop = None if math.isinf(stop_time) else stop_time
@@ -266,59 +287,60 @@ class System:
         self._update()
 
     def give(self, values: Mapping[str, Value]) -> None:
-        """Give values to inputs and parameters, ``name.variable``."""
+        """Set inputs and parameters, ``name.variable``; discrete inputs in event mode."""
         for full, value in values.items():
-            instance, name = self.parted(full)
+            instance, name = self.resolve(full)
             own = start_value(full, value, instance.variable(name))
             if instance.at_events(name):
                 instance.enter_events()
             instance.set({name: own})
         if any(instance.updating for instance in self.instances.values()):
-            self.happen()
+            self.handle_events()
 
     # -- exchange --
 
-    def look(self, instance: Instance) -> None:
-        """Read the outputs of an instance."""
+    def read_outputs(self, instance: Instance) -> None:
+        """Read the connected outputs and watched variables of an instance into ``values``."""
         found = instance.get(self.read[instance.name])
         self.values |= {f"{instance.name}.{name}": value for name, value in found.items()}
 
-    def wire(self, instance: Instance) -> bool:
+    def set_connected(self, instance: Instance) -> bool:
         """Set the connected inputs of an instance; return whether one of them has changed.
 
-        If a discrete one has, the instance is in event mode then.
+        The instance enters event mode if a discrete input has changed.
         """
         given = {to: self.values[source] for to, source in self.wires[instance.name].items()}
-        changed = {to: x for to, x in given.items() if x != instance.given.get(to)}
+        changed = {to: x for to, x in given.items() if x != instance.connected.get(to)}
         if any(instance.at_events(to) for to in changed):
             instance.enter_events()
         instance.set({to: x for to, x in given.items() if not instance.at_events(to)})
-        instance.given = given
+        instance.connected = given
         return bool(changed)
 
     def exchange(self) -> bool:
         """Read all outputs, set all connected inputs; return whether one of them has changed."""
         for instance in self.instances.values():
-            self.look(instance)
-        return any([self.wire(instance) for instance in self.instances.values()])
+            self.read_outputs(instance)
+        return any([self.set_connected(instance) for instance in self.instances.values()])
 
-    # -- motion --
+    # -- steps --
 
     def steps(self, end: float) -> Iterator[None]:
-        """Go to a communication point [s]; stop at each row of a result on the way."""
+        """Go to a communication point [s]; yield there and before and after each event."""
         stuck = 0
         while True:
-            begin, happens = self.time, self.advance(end)
+            begin, event = self.time, self.advance(end)
             yield
-            if happens:
-                self.happen()
+            if event:
+                self.handle_events()
                 yield
             if self.time >= end:
                 return
             stuck = 0 if self.time > begin else stuck + 1
-            if stuck > MOST_UPDATES:
+            if stuck > UPDATES_MAX:
                 raise CouplingError(
-                    f"at {self.time:g} s there is one event after the other, without an end"
+                    f"more than {UPDATES_MAX} events at {self.time:g} s without progress in time: "
+                    "use events=False"
                 )
 
     def row(self, names: Sequence[str]) -> dict[str, Value]:
@@ -326,64 +348,68 @@ class System:
         return {"time": self.time, **{name: self.values[name] for name in names}}
 
     def advance(self, end: float) -> bool:
-        """Take one step towards a time [s], which ends earlier where something happens.
+        """Take one step towards a time [s], which ends at the first event.
 
-        Returns whether something happens at the ``time`` that it got to: :meth:`happen`.
+        Returns whether an event is due at the new ``time``; :meth:`handle_events` handles it.
         """
         leaders = [x for x in self.instances.values() if x.events]
         others = [x for x in self.instances.values() if not x.events]
         first = leaders + others if self.scheme == JACOBI else leaders
         for instance in first:
-            self.wire(instance)
+            self.set_connected(instance)
         if any(instance.updating for instance in leaders):  # a discrete input has changed
-            self.happen()
-        end, happens = self._lead(leaders, end)
+            self.handle_events()
+        end, event = self._step_leaders(leaders, end)
         for instance in leaders:
-            self.look(instance)
+            self.read_outputs(instance)
         for instance in others:
             if self.scheme == GAUSS_SEIDEL:
-                self.wire(instance)
+                self.set_connected(instance)
             instance.step(end)
-            self.look(instance)
+            self.read_outputs(instance)
         self.time = end
-        return happens
+        return event
 
-    def _lead(self, leaders: list[Instance], end: float) -> tuple[float, bool]:
-        """Bring those with events to one time: the end, or the first event of all."""
+    def _step_leaders(self, leaders: list[Instance], end: float) -> tuple[float, bool]:
+        """Step the instances with events to ``end`` or to the first event of all of them.
+
+        Returns the time that they reached, and whether an event is due there.
+        """
         with ExitStack() as stack:
-            back = [stack.enter_context(x.kept(len(leaders) > 1)) for x in leaders]
-            happens = [x.step(end) for x in leaders]
+            restore = [stack.enter_context(x.saved_state(len(leaders) > 1)) for x in leaders]
+            events = [x.step(end) for x in leaders]
             while (first := min((x.time for x in leaders), default=end)) < end:
                 end = first
                 for k, instance in enumerate(leaders):
                     if instance.time > end:
-                        back[k]()
-                        happens[k] = instance.step(end)
-        return end, any(happens)
+                        restore[k]()
+                        events[k] = instance.step(end)
+        return end, any(events)
 
-    def happen(self) -> None:
-        """Let happen what is due at this time, in all instances with events.
+    def handle_events(self) -> None:
+        """Run the event iteration of the present time in all instances with events.
 
         Raises
         ------
         CouplingError
-            If it does not come to an end.
+            If the iteration does not end.
         """
         for instance in self.instances.values():
             instance.enter_events()
         self._update()
 
     def _update(self) -> None:
+        """Update discrete states and exchange outputs until nothing changes; leave event mode."""
         self.exchange()
-        for _ in range(MOST_UPDATES):
+        for _ in range(UPDATES_MAX):
             more = [instance.update() for instance in self.instances.values()]
             changed = self.exchange()
             if not (changed or any(more)):
                 break
         else:
             raise CouplingError(
-                f"at {self.time:g} s the instances have exchanged {MOST_UPDATES} times what "
-                "happens, without an end: break the loop of connections between their events"
+                f"the event iteration at {self.time:g} s does not end after {UPDATES_MAX} updates: "
+                "break the loop of connections between the events of the instances"
             )
         for instance in self.instances.values():
             instance.leave_events()
@@ -407,32 +433,32 @@ def simulate(
     Parameters
     ----------
     fmus, connections, scheme, events
-        As of :class:`System`.
+        As for :class:`System`.
     stop_time, step : float
         Duration and communication step [s]; the last step may be shorter.
     values : mapping
         Start values of parameters and inputs, ``name.variable``.
     record : sequence of str
-        Variables that the result has beside those that are connected, ``name.variable``.
+        Variables of the result beside the connected outputs, ``name.variable``.
     source : callable or None
-        Gives inputs, ``name.variable``, for the step that begins at a time [s].
+        ``source(t)`` returns inputs, ``name.variable``, for the step that begins at t [s].
     tolerance : float or None
-        Of the integration in the FMUs; None: their own.
+        Tolerance of the integration in the FMUs; None: that of each FMU.
     progress : callable or None
-        Told the fraction that is done, from 0 to 1.
+        Called with the completed fraction, from 0 to 1.
 
     Returns
     -------
     structured array
-        ``time`` and the outputs by name, a row each communication point, in the units of the
-        FMUs.  Where something happens with events there are two rows, before it and after it.
+        ``time`` and the variables by name in the units of the FMUs, one row per communication
+        point.  With events, each event has two rows: before it and after it.
 
     Raises
     ------
     CouplingError
-        If names do not fit, or an FMU fails.
+        If a name or a connection is invalid, or an FMU fails.
     ParameterError
-        If there is no step to take.
+        If ``stop_time`` or ``step`` is not positive and finite.
     """
     times = communication_points(stop_time, step)
     names = list(dict.fromkeys([*record, *connections.values()]))

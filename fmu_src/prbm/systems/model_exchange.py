@@ -1,8 +1,8 @@
-"""An FMU for model exchange and a partner in one solver, the partner being a Python function.
+"""An FMU for model exchange and a partner, a Python function, integrated by one solver.
 
-Model exchange provides the derivatives of the states, and indicators whose change of sign is an
-event, but no solver.  A coupled system can therefore be integrated at once, without communication
-steps, as a reference for its co-simulation.
+An FMU for model exchange returns the derivatives of its states, and indicators whose change of sign
+is an event.  The importer integrates them.  A coupled system can thus be integrated as a whole,
+without communication steps, as a reference for its co-simulation.
 """
 
 import tempfile
@@ -22,13 +22,13 @@ from .components import MODEL_EXCHANGE, Component, CouplingError, Value, start_v
 
 Real = NDArray[np.float64]
 Partner = Callable[[float, Mapping[str, Value], Real], tuple[Mapping[str, float], Sequence[float]]]
-LOCATED = 1e-14  # s, to which events are located
-ABSOLUTE = 1e-3  # of the relative tolerance times a nominal value: the absolute tolerance
+EVENT_TIME_ATOL = 1e-14  # s
+STATE_ATOL_FACTOR = 1e-3  # Absolute tolerance over (relative tolerance times nominal value).
 NAMES2 = {
     "updateDiscreteStates": "newDiscreteStates",
     "getContinuousStateDerivatives": "getDerivatives",
 }
-"""What FMPy calls differently in FMI 2.0."""
+"""FMPy's names of functions in FMI 2.0, by those in FMI 3.0."""
 
 
 class Model(Component):
@@ -37,14 +37,14 @@ class Model(Component):
     Parameters
     ----------
     fmu : str or Path
-        Of FMI 2.0 or 3.0.
+        An FMU of FMI 2.0 or 3.0.
     folder : str or Path
-        An empty folder, where it is unpacked.
+        An empty folder into which the FMU is unpacked.
 
     Raises
     ------
     CouplingError
-        If it has no model exchange, or one of its functions fails.
+        If the FMU cannot be read or loaded, has no model exchange, or one of its functions fails.
     """
 
     def __init__(self, fmu: str | Path, folder: str | Path) -> None:
@@ -59,12 +59,13 @@ class Model(Component):
         return super().call(own, *arguments, **options)
 
     def _filled(self, getter: str, count: int) -> Real:
+        """Return the array that a getter of the FMU fills."""
         values = (c_double * count)()
         self.call(getter, values, count)
         return np.array(values)
 
     def start(self, values: Mapping[str, Value], stop_time: float) -> None:
-        """Initialize with start values, at time 0."""
+        """Initialize at time 0, with start values by name."""
         self.set({name: start_value(name, x, self.variable(name)) for name, x in values.items()})
         if self.version == 2:
             self.call("setupExperiment", startTime=0.0, stopTime=stop_time)
@@ -74,7 +75,7 @@ class Model(Component):
         self.call("exitInitializationMode")
 
     def update(self) -> None:
-        """Let happen what is due in event mode, and leave it."""
+        """Update discrete states until no further update is needed; leave event mode."""
         while self.call("updateDiscreteStates")[0]:
             pass
         self.call("enterContinuousTimeMode")
@@ -92,7 +93,7 @@ class Model(Component):
 
     @property
     def rates(self) -> Real:
-        """Their derivatives."""
+        """Derivatives of the continuous states."""
         return self._filled("getContinuousStateDerivatives", self.states)
 
     @property
@@ -102,7 +103,7 @@ class Model(Component):
 
     @property
     def nominals(self) -> Real:
-        """Magnitudes of the states."""
+        """Nominal values of the continuous states."""
         return self._filled("getNominalsOfContinuousStates", self.states)
 
     def __enter__(self) -> Self:
@@ -118,16 +119,19 @@ class OneSolver:
     Parameters
     ----------
     model : Model
-        Initialized.
+        The initialized model.
     partner : callable
-        ``partner(t, outputs, z)`` returns the inputs that it gives to the model, by name, and
-        the derivatives of its own states z.  Its inputs must not act on these outputs at once.
+        ``partner(t, outputs, z)`` returns the inputs of the model by name, and the derivatives of
+        the partner's states z.  The outputs must not depend on these inputs at the same time (no
+        algebraic loop).
     z : sequence of float
-        Its states at the start.
+        The partner's states at the start.
     sees : sequence of str
-        The outputs that it is shown.
-    tolerance, largest : float
-        Relative tolerance, and largest step [s]: what begins and ends within a step is not seen.
+        Names of the outputs that the partner gets.
+    tolerance : float
+        Relative tolerance.
+    max_step : float
+        Largest step [s].  A contact that begins and ends within one step is not detected.
     """
 
     def __init__(
@@ -137,16 +141,16 @@ class OneSolver:
         z: Sequence[float],
         sees: Sequence[str],
         tolerance: float,
-        largest: float,
+        max_step: float,
     ) -> None:
         self.model, self.partner, self.sees = model, partner, tuple(sees)
-        self.tolerance, self.largest = tolerance, largest
-        self.time, self.happens = 0.0, False
+        self.tolerance, self.max_step = tolerance, max_step
+        self.time, self.event = 0.0, False
         self.z = np.array(z, float)
         model.update()
 
     def put(self, time: float, y: Real) -> Sequence[float]:
-        """Bring the model and its inputs to a time and all states; return the partner's rates."""
+        """Set time, states and inputs of the model; return the partner's derivatives."""
         n = self.model.states
         self.model.put(time, y[:n])
         inputs, rates = self.partner(time, self.model.get(self.sees), y[n:])
@@ -164,53 +168,53 @@ class OneSolver:
         return self.model.z
 
     def steps(self, end: float) -> Iterator[Callable[[float], Real] | None]:
-        """Go to a time [s], step by step; ``time`` is where one ends.
+        """Integrate to a time [s], step by step; ``time`` is the end of the latest step.
 
-        Yields the states within the step as a function of time; where it ends with an event,
-        which ``happens`` tells, None after the event.
+        Yields after each step a function that interpolates the states within it.  If the step
+        ended at an event, ``event`` is true, and None is yielded after the event was handled.
         """
         nominal = np.concatenate([self.model.nominals, np.ones(len(self.z))])
-        absolute: Any = ABSOLUTE * self.tolerance * nominal
+        absolute: Any = STATE_ATOL_FACTOR * self.tolerance * nominal
         while self.time < end:
             y = np.concatenate([self.model.x, self.z])
-            sign, self.happens = self.indicators(self.time, y) > 0.0, False
+            sign, self.event = self.indicators(self.time, y) > 0.0, False
             solver: Any = DOP853(
-                self.slope, self.time, y, end, self.largest, self.tolerance, absolute
+                self.slope, self.time, y, end, self.max_step, self.tolerance, absolute
             )
-            while solver.status == "running" and not self.happens:
+            while solver.status == "running" and not self.event:
                 message = solver.step()
                 if solver.status == "failed":
-                    raise CouplingError(f"the solver fails at {self.time:g} s: {message}")
+                    raise CouplingError(f"the solver failed at {self.time:g} s: {message}")
                 inside = solver.dense_output()
                 y = self._end(inside, sign)
                 yield inside
                 self.put(self.time, y)
-            if self.happens:
+            if self.event:
                 self.model.call("enterEventMode")
                 self.model.update()
                 yield None
 
     def _end(self, inside: Any, sign: NDArray[np.bool_]) -> Real:
-        """Go to the end of a step, or to the first event in it; return the states there."""
+        """Set the model to the end of a step or to its first event; return the states there."""
         crossed = (self.indicators(inside.t, inside(inside.t)) > 0.0) != sign
         self.time = self._root(inside, sign, crossed) if crossed.any() else inside.t
         y: Real = inside(self.time)
         self.put(self.time, y)
         self.z = y[self.model.states :]
-        asked, _ = self.model.call("completedIntegratorStep")
-        self.happens = bool(asked) or bool(crossed.any())
+        requested, _ = self.model.call("completedIntegratorStep")
+        self.event = bool(requested) or bool(crossed.any())
         return y
 
     def _root(self, inside: Any, sign: NDArray[np.bool_], crossed: NDArray[np.bool_]) -> float:
-        """Return the time of the first event of a step, on its far side."""
+        """Return the time of the first event of a step, just after its indicator has changed."""
         roots = []
         for k in map(int, np.flatnonzero(crossed)):
 
             def indicator(t: float, k: int = k) -> float:
                 return float(self.indicators(t, inside(t))[k])
 
-            root = brentq(indicator, inside.t_old, inside.t, xtol=LOCATED)
-            beyond = LOCATED
+            root = brentq(indicator, inside.t_old, inside.t, xtol=EVENT_TIME_ATOL)
+            beyond = EVENT_TIME_ATOL
             while (indicator(root) > 0.0) == sign[k]:
                 root, beyond = min(root + beyond, inside.t), 2 * beyond
             roots.append(root)
@@ -227,39 +231,40 @@ def simulate(
     sees: Sequence[str] = (),
     record: Sequence[str] = (),
     tolerance: float = 1e-10,
-    largest: float = 1e-3,
+    max_step: float = 1e-3,
 ) -> Columns:
-    """Simulate a model and a partner in one solver, Dormand and Prince's of order 8.
+    """Simulate a model and a partner with one solver, Dormand and Prince's method of order 8.
 
     Parameters
     ----------
-    fmu, partner, z, sees, tolerance, largest
-        As of :class:`Model` and :class:`OneSolver`.
+    fmu, partner, z, sees, tolerance, max_step
+        As for :class:`Model` and :class:`OneSolver`.
     stop_time, step : float
-        Duration and distance of the rows of the result [s]; they do not bound a step.
+        Duration, and interval between the rows of the result [s].  The solver's steps do not
+        depend on the interval.
     values : mapping
         Start values of parameters and inputs, by name.
     record : sequence of str
-        Variables that the result has.
+        Names of the variables in the result.
 
     Returns
     -------
     structured array
-        ``time``, the variables by name, and the partner's states ``z[0]``, ``z[1]``, ...; at an
-        event there are two rows, before it and after it.
+        ``time``, the variables by name, and the partner's states ``z[0]``, ``z[1]``, ...  An event
+        has two rows: before it and after it.
 
     Raises
     ------
     CouplingError
-        If a name does not fit, or the solver fails.
+        If a name is unknown, a function of the FMU fails or the solver fails.
     ParameterError
-        If there is no step to take.
+        If ``stop_time`` or ``step`` is not positive and finite.
     """
     times = communication_points(stop_time, step)
     rows: list[dict[str, Value]] = []
     with tempfile.TemporaryDirectory(prefix="prbm_model_") as folder, Model(fmu, folder) as model:
         model.start(values or {}, times[-1])
-        one = OneSolver(model, partner, z, sees, tolerance, largest)
+        one = OneSolver(model, partner, z, sees, tolerance, max_step)
 
         def note(time: float, own: Real) -> None:
             states = {f"z[{k}]": float(x) for k, x in enumerate(own)}
@@ -275,7 +280,7 @@ def simulate(
                 y = inside(due[0])
                 one.put(due[0], y)
                 note(due.pop(0), y[model.states :])
-            if one.happens:
+            if one.event:
                 one.put(one.time, inside(one.time))
                 note(one.time, one.z)
     return structured(rows)

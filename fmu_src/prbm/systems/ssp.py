@@ -1,7 +1,6 @@
-"""System structure packages (SSP 1.0): FMUs and how they are connected, in one file.
+"""System structure packages (SSP 1.0): FMUs, their connections and start values in one file.
 
-Masters of FMI read them: here FMPy's (:func:`simulate`) is given one.  The description is
-written for co-simulation; start values stand in it, and FMPy gets them from there.
+Co-simulation masters read such packages.  :func:`simulate` runs one with FMPy's master.
 """
 
 import io
@@ -22,7 +21,14 @@ SSD = "http://ssp-standard.org/SSP1/SystemStructureDescription"
 SSC = "http://ssp-standard.org/SSP1/SystemStructureCommon"
 SSV = "http://ssp-standard.org/SSP1/SystemStructureParameterValues"
 DESCRIPTION = "SystemStructure.ssd"
-EPOCH = (1980, 1, 1, 0, 0, 0)  # of all files in a package: equal systems are equal bytes
+EPOCH = (
+    1980,
+    1,
+    1,
+    0,
+    0,
+    0,
+)  # Date of all files: equal systems give equal bytes.
 KINDS = {"Real": "Real", "Float64": "Real", "Integer": "Integer", "Int32": "Integer",
          "Boolean": "Boolean"}  # fmt: skip
 """Types of SSP by those of FMI 2.0 and 3.0."""
@@ -41,23 +47,23 @@ def package(
     Parameters
     ----------
     path : str or Path
-        The package, ``.ssp``.
+        The package to write, ``.ssp``.
     fmus : mapping
-        FMUs for co-simulation by the names of their instances, in the order in which they go.
+        FMUs for co-simulation by the names of their instances, in the order of their steps.
     connections : mapping
-        For inputs, ``name.variable``, the outputs that they get their values from.
+        Source output by connected input, both as ``name.variable``.
     values : mapping
         Start values of parameters and inputs, ``name.variable``.
     stop_time : float
-        Of the default experiment [s].
+        Stop time of the default experiment [s] (default: 1).
     title : str
-        Name of the system; None: that of the file.
+        Name of the system (default: that of the file).
 
     Raises
     ------
     CouplingError
-        If an FMU cannot be read, a name or a causality does not fit, or a type has no counterpart
-        in SSP.
+        If an FMU cannot be read, a name is unknown, a causality does not fit, or a type has no
+        counterpart in SSP.
     """
     path, values = Path(path), dict(values or {})
     variables = {
@@ -77,7 +83,7 @@ def package(
         (start, output), (end, given) = _found(variables, source), _found(variables, to)
         check_wire(to, variables[end][given], source)
         if variables[start][output].causality != "output":
-            raise CouplingError(f"{source} is no output: {to} cannot be connected to it")
+            raise CouplingError(f"{source} is not an output: connect {to} to an output")
         _add(wires, SSD, "Connection", startElement=start, startConnector=output,
              endElement=end, endConnector=given)  # fmt: skip
     _add(root, SSD, "DefaultExperiment", startTime="0.0", stopTime=repr(float(stop_time)))
@@ -103,10 +109,10 @@ def _text(root: ET.Element) -> bytes:
 
 
 def _found(variables: Mapping[str, Mapping[str, Any]], full: str) -> tuple[str, str]:
-    """Return instance and variable of a name, if there are such."""
+    """Return instance and variable of ``name.variable``."""
     name, _, variable = full.partition(".")
     if variable not in variables.get(name, {}):
-        raise CouplingError(f"{full}: there is no such variable; write name.variable")
+        raise CouplingError(f"{full}: unknown variable; write INSTANCE.VARIABLE")
     return name, variable
 
 
@@ -117,7 +123,7 @@ def _component(
     connections: Mapping[str, str],
     values: Mapping[str, Value],
 ) -> None:
-    """Describe an instance: what is connected, what has a start value."""
+    """Add an instance with its connectors and start values to the description."""
     component = _add(
         elements, SSD, "Component", name=name, source=f"resources/{name}.fmu",
         type="application/x-fmu-sharedlibrary", implementation="CoSimulation",
@@ -146,7 +152,7 @@ def _component(
 
 def _kind(full: str, variable: Any) -> str:
     if variable.type not in KINDS:
-        raise CouplingError(f"{full} is of the type {variable.type}, which SSP 1.0 does not have")
+        raise CouplingError(f"{full}: SSP 1.0 has no counterpart of its type {variable.type}")
     return KINDS[variable.type]
 
 
@@ -157,44 +163,44 @@ def _number(kind: str, value: Value) -> str:
 
 
 def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
-    """Let FMPy simulate a package, from the start values that stand in it.
+    """Simulate a package with FMPy's master, from the start values in the package.
 
     Parameters
     ----------
     path : str or Path
-        A package of FMUs of FMI 2.0, which are all that FMPy's master knows.
+        A package of FMUs of FMI 2.0; FMPy's master does not support FMI 3.0.
     stop_time, step : float
-        Duration and communication step [s].
+        Duration, a multiple of the step, and communication step [s].
 
     Returns
     -------
     structured array
-        ``time`` and the connected variables, ``name.variable``, a row at the end of each step; an
-        input has the value that it gets for the next one.
+        ``time`` and the connected variables, ``name.variable``, one row at the end of each step.
+        An input has its value for the next step.
 
     Notes
     -----
-    The scheme is Jacobi's, and in the first step all connected inputs are zero.
+    The coupling scheme is Jacobi's.  In the first step all connected inputs are zero.
 
     Raises
     ------
     CouplingError
         If the package cannot be read or FMPy cannot simulate it.
     ParameterError
-        If there is no step to take.
+        If ``stop_time`` or ``step`` is not positive and finite.
     """
     from fmpy.ssp.simulation import simulate_ssp  # type: ignore[import-untyped]
     from fmpy.ssp.ssd import ParameterSet, find_components, read_ssd  # type: ignore[import-untyped]
 
     times = communication_points(stop_time, step)
-    if times[-1] - times[-2] < (1 - 1e-6) * step:  # more than rounding
+    if times[-1] - times[-2] < (1 - 1e-6) * step:  # shorter than a step by more than rounding
         raise CouplingError(
-            f"stop_time = {stop_time:g} s is no multiple of step = {step:g} s, as FMPy needs it"
+            f"stop_time = {stop_time:g} s: FMPy needs a multiple of step = {step:g} s"
         )
     try:
         description = read_ssd(str(path))
     except Exception as error:
-        _refuse(path, error)
+        _fail(path, error)
     components = find_components(description.system)
     _check_names(component.name for component in components)
     every = ParameterSet(name="start values")
@@ -203,31 +209,31 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
             for parameters in binding.parameterValues:
                 for parameter in parameters.parameters:
                     parameter.name = f"{component.name}.{parameter.name}"
-                    if parameter.type == "Boolean":  # FMPy takes the text, which is not 0, as true
+                    if parameter.type == "Boolean":  # FMPy reads any text as true, "false" too.
                         parameter.value = parameter.value in ("true", "1")
                     every.parameters.append(parameter)
-    # half a step less: FMPy adds up its steps, and may take one more by rounding
+    # Half a step less: FMPy sums its steps, and rounding could add one.
     end = times[-2] + step / 2
     try:
         result: Columns = simulate_ssp(
             str(path), stop_time=end, step_size=step, parameter_set=every
         )
     except Exception as error:
-        _refuse(path, error)
-    result["time"] = np.minimum(result["time"] + step, stop_time)  # FMPy writes the beginnings
+        _fail(path, error)
+    result["time"] = np.minimum(result["time"] + step, stop_time)  # FMPy records the begins.
     return result
 
 
 def _check_names(names: Iterable[str]) -> None:
-    """Refuse names that FMPy takes for each other when it hands out start values."""
+    """Reject names of which one begins with another: FMPy would mix up their start values."""
     for one, other in pairwise(sorted(names)):
         if other.startswith(one):
             raise CouplingError(
-                f"FMPy takes start values of {other} as those of {one}: let no instance have a "
-                "name with which another one begins"
+                f"instances {one} and {other}: FMPy would apply start values of {other} to {one}; "
+                "rename one so that no name begins with another"
             )
 
 
-def _refuse(path: str | Path, error: Exception) -> NoReturn:
-    """Say in a sentence what FMPy has found."""
+def _fail(path: str | Path, error: Exception) -> NoReturn:
+    """Raise the error of FMPy as a :class:`CouplingError`."""
     raise CouplingError(f"{path}: FMPy cannot simulate it ({error})") from None

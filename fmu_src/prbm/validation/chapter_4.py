@@ -1,4 +1,4 @@
-"""Results of the source's chapter 4: the PMMA guide and its 1R model."""
+"""Results of chapter 4 of the thesis: the PMMA guide and its 1R model."""
 
 import math
 from functools import cache
@@ -20,7 +20,7 @@ from .common import (
     GREEN,
     GREY,
     K_HOWELL,
-    K_SOURCE,
+    K_THESIS,
     PMMA,
     RED,
     K,
@@ -32,14 +32,14 @@ from .common import (
 )
 from .side_by_side import Drawing, Number, Result
 
-SPAN = 0.5  # s
+SPAN = 0.5  # duration of the free vibrations [s]
 
 
 @cache
 def swing_of_elements() -> tuple[Real, Real, float]:
-    """Return time, displacement of the PMMA guide by elements, and its small-motion frequency."""
+    """Return time, displacement and small-motion frequency of the PMMA guide by elements."""
     fe = FiniteElements(guide("PRBDM"), PMMA, elements=16)
-    run = fe.transient(SPAN, 1e-4, spectral_radius=0.9)  # nothing hits it
+    run = fe.transient(SPAN, 1e-4, spectral_radius=0.9)  # The motion is smooth.
     return run["time"], run["shuttle.x"], float(fe.modes(fe.equilibrium()).frequency[0])
 
 
@@ -49,60 +49,70 @@ def swing(K_theta: float) -> tuple[Real, Real]:
     return t, response(guide("PRBDM"), {**PMMA, K: K_theta}, t)
 
 
+def harmonic_amplitude(frequency: float) -> float:
+    """Return the amplitude of the 1R of the PMMA guide, released straight at 1 m/s [m].
+
+    The angle of a 1R guide without gravity is harmonic with the amplitude v/(r omega).
+    """
+    r = source_model.GAMMA_1R * source_model.PMMA.length
+    return r * math.sin(PMMA["release.velocity"] / (r * 2 * math.pi * frequency))
+
+
 @own_style()
 def table_4_1(_: Progress) -> Result:
-    """Return the swing of the PMMA guide with Howell's K_theta."""
+    """Return the free vibration of the PMMA guide with Howell's K_theta."""
     t, x, small = swing_of_elements()
     f_fe, a_fe = crossings(t, x)
     f, a = crossings(*swing(K_HOWELL))
     ansys_f, ansys_a = 5.6348, 25.4474
-    moving_along = 1e3 / (2 * math.pi * small)
+    f_thesis, a_thesis = crossings(*swing(K_THESIS))
+    in_mode = 1e3 * harmonic_amplitude(small)
     numbers = (
         Number(
-            "1R, frequency, Hz; printed 2.5296 % above ANSYS",
+            "1R, frequency, Hz; printed error: 2.5296 % above ANSYS",
             f,
             f"{ansys_f * 1.025296:.4f}",
             f_fe,
             within=0.01,
         ),
         Number(
-            "1R, amplitude, mm; printed 8.2516 % above",
+            "1R, amplitude, mm; printed error: 8.2516 % above ANSYS",
             1e3 * a,
             f"{ansys_a * 1.082516:.4f}",
             1e3 * a_fe,
             within=0.01,
         ),
-        Number("the same row as printed: frequency, Hz", f, "5.6348", f_fe, within=0.01),
+        Number("1R, frequency, Hz, as printed in the row", f, "5.6348", f_fe, within=0.01),
         Number(
-            "the same row as printed: amplitude, mm", 1e3 * a, "25.4474", 1e3 * a_fe, within=0.01
+            "1R, amplitude, mm, as printed in the row", 1e3 * a, "25.4474", 1e3 * a_fe, within=0.01
         ),
         Number("ANSYS, frequency, Hz", None, "5.6348", f_fe, within=0.001),
         Number("ANSYS, amplitude, mm", None, "25.4474", 1e3 * a_fe, within=0.01),
         Number(
-            "amplitude if the flexures move along, v/ω, mm",
-            1e3 * crossings(*swing(K_SOURCE))[1],
+            "1R with K_Θ = 2.5449, amplitude, mm",
+            1e3 * a_thesis,
             None,
-            moving_along,
+            1e3 * harmonic_amplitude(f_thesis),
             "exact",
-            0.01,
+            1e-4,
         ),
         Number("COMSOL 1R, frequency, Hz", f, "5.7940", f_fe, within=0.01),
         Number("COMSOL 1R, amplitude, mm", 1e3 * a, "26.0180", 1e3 * a_fe, within=0.01),
         Number(
-            "error of COMSOL 1R from its own row, %",
+            "COMSOL 1R, error recomputed from its row, %",
             100 * (5.7940 / ansys_f - 1),
             "3.3650",
             within=0.01,
         ),
         Number(
-            "error of COMSOL distributed from its own row, %",
+            "COMSOL distributed, error recomputed from its row, %",
             100 * (5.8244 / ansys_f - 1),
             "2.8260",
             within=0.01,
         ),
     )
     left, right = panels(1, 2, (8.0, 3.0))
-    for axes, K_theta in ((left, K_HOWELL), (right, K_SOURCE)):
+    for axes, K_theta in ((left, K_HOWELL), (right, K_THESIS)):
         axes.plot(t, 1e3 * x, color=GREY, linewidth=4, label="finite elements")
         time, ours = swing(K_theta)
         axes.plot(time, 1e3 * ours, color=BLUE, linewidth=1.2, label=f"1R, K_Θ = {K_theta}")
@@ -113,25 +123,29 @@ def table_4_1(_: Progress) -> Result:
     return Result(
         "table-4-1",
         "Figures 4.1 and 4.2, table 4.1",
-        "free swing of the PMMA guide, K_Θ = 2.65",
+        "free vibration of the PMMA guide, K_Θ = 2.65",
         numbers,
-        "The MATLAB row repeats the values of the ANSYS row; what its errors say instead is our "
-        "1R model to 0.6 %. The errors of the two COMSOL rows are swapped. The 1R is 1.9 % too "
-        "fast beside either finite-element program: K_Θ = 2.65 is for a force alone.",
-        f"""The amplitude is mostly a matter of how the guide is set going. With the shuttle
-alone at 1 m/s the finite elements swing {1e3 * a_fe:.2f} mm, with the flexures moving along as in
-the mode v/ω = {moving_along:.2f} mm, and a 1R has no choice but the latter. K_Θ does not
-explain the 8 %.""",
+        "The MATLAB row of the table repeats the values of the ANSYS row, but its printed errors "
+        "belong to other values, which our 1R model meets to 0.6 %. The errors of the two COMSOL "
+        "rows are swapped. The frequency of the 1R is 1.9 % above that of both finite-element "
+        "programs, since K_Θ = 2.65 holds for an end force without an end moment.",
+        f"""The amplitude depends mostly on the initial velocities. If only the shuttle starts at
+1 m/s, the finite elements reach {1e3 * a_fe:.2f} mm. The flexures of a 1R model always move with
+the shuttle. Its angle is then harmonic, and its amplitude is r sin(v/(r ω)) with the length r of
+its links (the exact value in the table). At the frequency of the elements this is {in_mode:.2f} mm.
+The initial velocities thus explain most of the printed 8 %, and K_Θ does not.""",
         (
             Drawing(
-                "swing", "Swing of the PMMA guide: 1R models over finite elements", figure_of(left)
+                "swing",
+                "Free vibration of the PMMA guide: 1R models and finite elements",
+                figure_of(left),
             ),
         ),
     )
 
 
 def k_theta(_: Progress) -> Result:
-    """Return the K_theta that brings the 1R to the finite elements, by every route."""
+    """Return K_theta fitted to several results of finite elements."""
     t, x, small = swing_of_elements()
     one = guide("PRBDM")
     free = crossings(t, x)[0]
@@ -141,7 +155,7 @@ def k_theta(_: Progress) -> Result:
 
     times = np.linspace(0.0, SPAN, 301)
     whole = fit_response(one, [K], times, np.interp(times, t, x), PMMA)
-    f_source = crossings(*swing(K_SOURCE))[0]
+    f_source = crossings(*swing(K_THESIS))[0]
     fe = FiniteElements(guide("PRBDM2R"), elements=32)
     steel = float(fe.modes(fe.equilibrium()).frequency[0])
 
@@ -149,10 +163,10 @@ def k_theta(_: Progress) -> Result:
         return Number(name, found, "2.5449", within=0.01, absolute=True, form=".4f")
 
     numbers = (
-        near(f"to FE's small-motion frequency, {small:.4f} Hz", fitted(small)),
-        near(f"to the frequency of FE's swing, {free:.4f} Hz", fitted(free)),
+        near(f"K_Θ fitted to FE's small-motion frequency, {small:.4f} Hz", fitted(small)),
+        near(f"to the frequency of FE's vibration at 1 m/s, {free:.4f} Hz", fitted(free)),
         near("to the printed ANSYS frequency, 5.6348 Hz", fitted(5.6348)),
-        near("to FE's swing over 0.5 s, least squares", whole.values[K]),
+        near("to FE's vibration over 0.5 s, least squares", whole.values[K]),
         Number("for comparison: small deflections, 3 γ", 3 * 0.8517, form=".4f"),
         Number("frequency with K_Θ = 2.5449, Hz", f_source, "5.6348", free, within=0.001),
         Number(
@@ -166,63 +180,61 @@ def k_theta(_: Progress) -> Result:
         "Figure 4.3",
         "K_Θ fitted to finite elements",
         numbers,
-        "2.545 ± 0.01 is met by the small-motion frequency, by the frequency of the swing at 1 "
-        "m/s and by its whole response: the 1R guide without gravity is an exact harmonic "
-        "oscillator in its angle, so that its frequency does not depend on the amplitude, and "
-        "that of the elements hardly does.",
-        """What remains between 2.545 and our 2.551 is the difference of the two finite-element
-programs (ANSYS' beams shear and have rotary inertia, the cables do not) and the amplitude, which
-the thesis' least squares
-trade against the frequency. A guide that gravity deflects by a quarter of its length is stiffer
-than the 1R
-knows: the steel guide at rest takes 2.586. One K_Θ does not serve both.""",
+        "The small-motion frequency, the frequency at 1 m/s and the whole response all give 2.545 "
+        "± 0.01. The angle of the 1R guide without gravity is exactly harmonic, so that its "
+        "frequency does not depend on the amplitude; that of the elements hardly does.",
+        """Two effects explain the remaining difference between 2.545 and our 2.551. The beams of
+ANSYS have shear and rotary inertia, the cables of our elements do not. And the least squares of the
+thesis compromise between amplitude and frequency. One K_Θ does not fit both guides: gravity
+deflects the steel guide by a quarter of its length, which stiffens it more than the 1R, so that the
+steel guide at rest needs 2.586.""",
     )
 
 
-CAST = {
+IMPACT = {
     **PMMA,
     "release.displacement": -0.12,
     "release.velocity": 0.0,
     "stop.position": 0.02,
     "stop.restitution": 0.7,
-    K: K_SOURCE,
+    K: K_THESIS,
 }
-"""The impact of figure 4.4 as listing B.1.4 has it: released at -120 mm, wall at 20 mm."""
+"""The impact of figure 4.4 with the values of listing B.1.4: release at -120 mm, wall at 20 mm."""
 
 
 @own_style()
 def figure_4_4(_: Progress) -> Result:
-    """Return the impacts of the PMMA guide beside finite elements."""
+    """Return the impacts of the PMMA guide by the 1R and by finite elements."""
     one, end = guide("PRBDM"), 0.28
-    ours = simulate(one, CAST, stop_time=end, step=1e-3)
-    bare = {name: x for name, x in CAST.items() if name != K}
+    ours = simulate(one, IMPACT, stop_time=end, step=1e-3)
+    bare = {name: x for name, x in IMPACT.items() if name != K}
     theirs = FiniteElements(one, bare, elements=8).transient(end, 5e-5, spectral_radius=0.5)
     model = with_flexures(guide("PRBDM2R"), "2R", axial=True)
-    wall = [CAST["stop.position"]]
+    wall = [IMPACT["stop.position"]]
     returned = [
-        route(of, wall, [0.0], bare).restitution.item()
-        for route, of in ((algebraic, model), (by_elements, model))
+        method(of, wall, [0.0], bare).restitution.item()
+        for method, of in ((algebraic, model), (by_elements, model))
     ]
     a, b = ours.impacts, theirs.impacts
     numbers = (
-        Number("time of the first impact, s", a[0].time, None, b[0].time, within=0.01),
+        Number("first impact: time, s", a[0].time, None, b[0].time, within=0.01),
         Number(
-            "its closing speed, m/s",
+            "first impact: closing speed, m/s",
             a[0].latched.approach_speed,
             None,
             b[0].latched.approach_speed,
             within=0.01,
         ),
         Number(
-            "closing speed of the second, m/s",
+            "second impact: closing speed, m/s",
             a[1].latched.approach_speed,
             None,
             b[1].latched.approach_speed,
             within=0.05,
         ),
-        Number("time of the second, s", a[1].time, None, b[1].time, within=0.01),
+        Number("second impact: time, s", a[1].time, None, b[1].time, within=0.01),
         Number(
-            "modal restitution of the first, 1R",
+            "modal restitution, 1R",
             0.7,
             None,
             returned[1],
@@ -231,7 +243,7 @@ def figure_4_4(_: Progress) -> Result:
             form=".3f",
         ),
         Number(
-            "modal restitution, 2R that stretches",
+            "modal restitution, 2R with stretching flexures",
             returned[0],
             None,
             returned[1],
@@ -245,7 +257,7 @@ def figure_4_4(_: Progress) -> Result:
         theirs["time"], 1e3 * theirs["shuttle.x"], color=GREY, linewidth=4, label="finite elements"
     )
     axes.plot(ours["time"], 1e3 * ours["shuttle.x"], color=BLUE, linewidth=1.2, label="1R")
-    axes.axhline(1e3 * CAST["stop.position"], color=RED, linewidth=0.8)
+    axes.axhline(1e3 * IMPACT["stop.position"], color=RED, linewidth=0.8)
     axes.set_xlabel("time [s]")
     axes.set_ylabel("x of the shuttle [mm]")
     legend(axes)
@@ -254,12 +266,14 @@ def figure_4_4(_: Progress) -> Result:
         "Figure 4.4",
         "impacts of the PMMA guide, restitution 0.7",
         numbers,
-        "A good match in the thesis; here the 1R arrives at the wall as the elements do and "
-        "leaves it too fast. Each PMMA flexure has a tenth of the shuttle's mass and does not "
-        "stop with it: Newton's law at the shuttle leaves them moving, and less than 0.7 is "
-        "left in the fundamental mode. The 2R has most of that, the 1R none.",
-        "What ANSYS' contact element does with its coefficient the thesis does not say; its "
-        "curve follows the 1R. Release and wall are those of listing B.1.4, -120 mm and 20 mm.",
+        "The thesis reports a good match of 1R and ANSYS. Here the 1R reaches the wall as the "
+        "elements do, but rebounds too fast. Each PMMA flexure has a tenth of the shuttle's mass. "
+        "Newton's law stops the shuttle and not the flexures, so that the modal restitution of "
+        "the elements is below 0.7. The 2R has about three quarters of this effect, the 1R none "
+        "of it.",
+        "The thesis does not state how the contact element of ANSYS uses its coefficient; the "
+        "curve of ANSYS follows the 1R. Release and wall are those of listing B.1.4, -120 mm and "
+        "20 mm.",
         (
             Drawing(
                 "impact",
@@ -271,12 +285,12 @@ def figure_4_4(_: Progress) -> Result:
 
 
 @own_style()
-def figure_4_5(tell: Progress) -> Result:
-    """Return the swing with Coulomb friction, and the work it takes."""
+def figure_4_5(progress: Progress) -> Result:
+    """Return the free vibration with Coulomb friction, and amplitudes by its work."""
     one, mu_N = guide("PRBDM"), 0.1  # N
     values = {
         **PMMA,
-        K: K_SOURCE,
+        K: K_THESIS,
         "release.displacement": -0.03,
         "release.velocity": 0.0,
         "friction.coefficient": 0.2,
@@ -289,7 +303,7 @@ def figure_4_5(tell: Progress) -> Result:
         x[[i for i in range(1, len(x) - 1) if (x[i] - x[i - 1]) * (x[i + 1] - x[i]) < 0]]
     )
     r, L = 0.8517 * 0.2, 0.2
-    k = 2 * 0.8517 * K_SOURCE * source_model.PMMA.EI / L
+    k = 2 * 0.8517 * K_THESIS * source_model.PMMA.EI / L
 
     def next_turn(before: float) -> float:
         a = math.asin(before / r)
@@ -297,13 +311,13 @@ def figure_4_5(tell: Progress) -> Result:
             lambda b: 2 * k * (a * a - b * b) - mu_N * r * (math.sin(a) + math.sin(b)), 0.0, a
         )
 
-    tell(0.5)
+    progress(0.5)
     expected = [0.03]
     for _ in range(4):
         expected.append(r * math.sin(next_turn(expected[-1])))
     numbers = tuple(
         Number(
-            f"amplitude after half swing {n}, mm",
+            f"amplitude after half cycle {n}, mm",
             1e3 * turns[n - 1],
             None,
             1e3 * expected[n],
@@ -319,7 +333,7 @@ def figure_4_5(tell: Progress) -> Result:
         1e3 * more["shuttle.x"],
         color=GREEN,
         linewidth=1.0,
-        label="less where the shuttle is high up the arc",
+        label="normal force decreasing with the deflection",
     )
     axes.set_xlabel("time [s]")
     axes.set_ylabel("x of the shuttle [mm]")
@@ -327,12 +341,12 @@ def figure_4_5(tell: Progress) -> Result:
     return Result(
         "figure-4-5",
         "Figure 4.5",
-        "a swing with Coulomb friction",
+        "free vibration with Coulomb friction",
         numbers,
         "The thesis gives no numbers for its simplified friction, a force against the motion "
-        "that grows where the guide passes its neutral position. Ours has the same law, with "
-        "stick and slip as states, and is held against the work of the force, 2 k (Θ₁² - Θ₂²) = "
-        "μ N (x₁ + x₂).",
+        "that is largest as the guide passes its neutral position. Our law is the same, with "
+        "stick and slip as discrete states. Its amplitudes are compared with the work of the "
+        "force, 2 k (Θ₁² - Θ₂²) = μ N (x₁ + x₂).",
         "",
-        (Drawing("friction", "Swings that friction ends", figure_of(axes)),),
+        (Drawing("friction", "Free vibrations stopped by friction", figure_of(axes)),),
     )

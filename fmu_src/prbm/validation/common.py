@@ -1,4 +1,4 @@
-"""What several results of the source need: its guides, figures, swings."""
+"""Guides, constants and functions shared by the reproduced results of the thesis."""
 
 import math
 from dataclasses import fields
@@ -19,11 +19,11 @@ from ..plots import figures
 from ..references import source_model
 
 K = "flexure.K_theta"
-K_HOWELL, K_SOURCE = 2.65, 2.5449
-REFITTED = np.array([8.7614, 4.0104])
-LASER, RATE, CELL = 4e-6, 750.0, 1e-3  # m, Hz; N: 0.2 % of the load cell's range
-DRAWS = 200
-COVERED = 3 * math.sqrt(0.683 * 0.317 / DRAWS)  # three standard deviations of the share covered
+K_HOWELL, K_THESIS = 2.65, 2.5449  # published; fitted in the thesis
+REFITTED = np.array([8.7614, 4.0104])  # K_theta1 and K_theta2 fitted in the thesis
+LASER, RATE, CELL = 4e-6, 750.0, 1e-3  # noise [m], rate [Hz]; noise [N], 0.2 % of the range
+DRAWS = 200  # number of synthetic records in a test of stated uncertainties
+COVERAGE_ATOL = 3 * math.sqrt(0.683 * 0.317 / DRAWS)  # three standard deviations of a coverage
 WEIGHTLESS = {"gravity.x": 0.0}
 BLUE, RED, GREEN, PINK, GREY = "#1f4e79", "#d55e00", "#009e73", "#cc79a7", "#b4bcc6"
 Crossings = tuple[float, float]
@@ -62,22 +62,22 @@ PMMA = {
     "release.velocity": 1.0,
     "stop.position": 0.15,
 }
-"""The PMMA guide of the source's chapter 4, set going at 1 m/s, its wall out of reach."""
+"""The PMMA guide of chapter 4, released straight at 1 m/s, with the wall out of reach."""
 
 
 def frequencies(
     mechanism: Mechanism, values: dict[str, float], displacement: float | None = None
 ) -> Real:
-    """Return the frequencies about a shape, at rest or held [Hz]."""
+    """Return the frequencies about the shape at rest, or held at a displacement [Hz]."""
     system = assemble(mechanism, mechanism.values(values))
     return modes(system, equilibrium(system, displacement)).frequency
 
 
 def crossings(t: Real, x: Real) -> Crossings:
-    """Return mean frequency between rising zeros [Hz], largest value, of a swing from zero."""
+    """Return the mean frequency between rising zeros [Hz] and the maximum of a free vibration."""
     rising, below = [0.0], False
     for i in range(len(x) - 1):
-        below = below or x[i] < -0.1 * x.max()  # a zero follows a whole swing, not noise
+        below = below or x[i] < -0.1 * x.max()  # Count a zero only after a swing, not in noise.
         if below and x[i + 1] >= 0.0:
             rising.append(float(t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i])))
             below = False
@@ -85,9 +85,9 @@ def crossings(t: Real, x: Real) -> Crossings:
 
 
 def repeated(t: Real, x: Real) -> float:
-    """Return the frequency between the first and the last maximum of a swing [Hz].
+    """Return the frequency between the first and the last maximum of a free vibration [Hz].
 
-    A maximum is that of the parabola through three samples.
+    Maxima are those of parabolas through three samples.
     """
     tops = []
     for i in np.flatnonzero((x[1:-1] > x[:-2]) & (x[1:-1] >= x[2:])) + 1:

@@ -1,9 +1,9 @@
-"""The results of the source, reproduced: a page with printed, computed and reference values.
+"""The results of the thesis, reproduced: a page with printed, computed and reference values.
 
 ``prbm validate --out docs`` computes all of :data:`prbm.validation.reproduced.RESULTS` and
 writes ``validation.md`` and the figures ``figures/validation-*.png`` into a folder.  With
-``--only`` some results are computed and the others stay as the existing page has them.  The random
-numbers of synthetic records are seeded: all runs give the same page.
+``--only`` the selected results are computed and the others copied from the existing page.  The
+random numbers of synthetic records are seeded, so that all runs give the same page.
 
 Source: S. Boersma, Modelling and Validation of the Impact Response in Compliant Mechanisms, MSc
 thesis, TU Delft, 2015.
@@ -28,25 +28,33 @@ class ValidationError(PrbmError, ValueError):
 
 # --- the page -----------------------------------------------------------------------------------
 
-HEAD = """# The source, reproduced
+HEAD = """# The results of the thesis, reproduced
 
-What S. Boersma's thesis (*Modelling and Validation of the Impact Response in Compliant Mechanisms*,
-TU Delft, 2015) prints, beside what this package computes and beside a reference that knows nothing
-of pseudo-rigid bodies: finite elements (**FE**, Exudyn's ANCF cables, from the same mechanism
-files), closed forms (**exact**), or what was **put in** to a synthetic record.
-`prbm validate --out docs` computes every number and figure of this page in a few
-minutes; the tests compute them again and compare.
+This page compares results of the thesis (S. Boersma, *Modelling and Validation of the Impact
+Response in Compliant Mechanisms*, MSc thesis, TU Delft, 2015) with those of this package. The
+columns are:
 
-The thesis' measured records are not public: where it measures, a synthetic record with its sensors'
-noise (laser 4 µm at 750 Hz, load cell 0 to 0.5 N) takes their place, and shows what an evaluation
-can know. Its curves exist as pictures only, so that for these its words are compared.
+- *printed*: the value in the thesis;
+- *computed*: the value of this package;
+- *reference*: an independent value. It comes from finite elements (**FE**: ANCF cables of Exudyn,
+  built from the same mechanism files), a closed form (**exact**), a conservation law or statistics
+  (**law**), or it is the known parameter of a synthetic record (**true**);
+- *difference*: computed less printed value, or less the reference if no value is printed;
+- *verdict*: the claimed limit of the difference, and whether the difference is within it. Numbers
+  without a limit are for information. The summary counts the claims that hold. Each section
+  explains those that do not, or says that the cause is unknown.
 
-*Difference* is ours less the printed value, or less the reference where nothing is printed. A limit
-stands beside a number only where agreement is claimed, and the verdict counts these claims; where
-one does not hold, the section says why, or that we do not know. What the source got wrong is shown
-on its own algorithm (`prbm.references.source_model`, derived again), with its errors as switches.
+`prbm validate --out docs` computes every number and figure of this page in a few minutes. The tests
+repeat the computation and compare the numbers.
+
+The measured records of the thesis are not public. Synthetic records with the noise of its sensors
+(laser 4 µm at 750 Hz, load cell 0 to 0.5 N) replace them, and show the accuracy of each evaluation.
+Its curves are available as pictures only; for these the statements of its text are compared. Two
+errors of the thesis are shown with its own algorithm, derived again in
+`prbm.references.source_model`: the extra factor γ of the 2R stiffness, and the missing right side
+of the acceleration constraint.
 """
-SUMMARY = "| in the source | | printed | ours | reference | difference | |"
+SUMMARY = "| in the thesis | quantity | printed | computed | reference | difference | verdict |"
 RULE = "|---|---|---:|---:|---:|---:|---|"
 SECTION = r"<!-- result: {} -->\n(.*?)<!-- end -->"
 
@@ -61,7 +69,7 @@ def page(results: Sequence[Result], known: str = "", keys: Sequence[str] = ()) -
     known : str
         An earlier page, or an empty text.
     keys : sequence of str
-        Order of all results; those of ``results`` if empty.
+        Keys of all results in the order of the page; empty: those of ``results``.
     """
     new = {result.key: result for result in results}
     rows, sections = [], []
@@ -79,14 +87,14 @@ def page(results: Sequence[Result], known: str = "", keys: Sequence[str] = ()) -
 
 
 def parts(text: str, key: str) -> tuple[str, str] | None:
-    """Return the row in the summary and the section of a result; None if it is not on the page."""
+    """Return the summary row and the section of a result; None if it is not on the page."""
     row = re.search(rf"^\| \[[^\]]*\]\(#{re.escape(key)}\) .*$", text, re.MULTILINE)
     section = re.search(SECTION.format(re.escape(key)), text, re.DOTALL)
     return (row[0], section[1]) if row and section else None
 
 
 def chosen(only: Sequence[str] = ()) -> tuple[Reproduction, ...]:
-    """Return the reproductions with these keys; without keys all of them.
+    """Return the reproductions with the given keys (default: all).
 
     Raises
     ------
@@ -96,21 +104,21 @@ def chosen(only: Sequence[str] = ()) -> tuple[Reproduction, ...]:
     known = [one.key for one in RESULTS]
     for key in only:
         if key not in known:
-            raise ValidationError(f"there is no result {key!r}; there are {', '.join(known)}")
+            raise ValidationError(f"unknown result {key!r}; results are {', '.join(known)}")
     return tuple(one for one in RESULTS if not only or one.key in only)
 
 
 def reproduce(
     folder: Path, only: Sequence[str] = (), progress: Progress | None = None
 ) -> Sequence[Result]:
-    """Compute results of the source and write them to a page with figures.
+    """Compute results of the thesis and write them to a page with figures.
 
     Parameters
     ----------
     folder : Path
         Folder of ``validation.md`` and ``figures/``, created if necessary.
     only : sequence of str
-        Keys of the results; empty: all.  The others stay as the existing page has them.
+        Keys of the results; empty: all.  The others are copied from the existing page.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
 
@@ -143,16 +151,16 @@ def reproduce(
     return results
 
 
-def _computed(wanted: Sequence[Reproduction], tell: Progress) -> list[Result]:
+def _computed(wanted: Sequence[Reproduction], progress: Progress) -> list[Result]:
     total = sum(one.seconds for one in wanted)
     done, results = 0.0, []
     for one in wanted:
         begin = done
 
         def part(fraction: float, begin: float = begin, share: float = one.seconds) -> None:
-            tell((begin + fraction * share) / total)
+            progress((begin + fraction * share) / total)
 
         results.append(one.run(part))
         done += one.seconds
-        tell(done / total)
+        progress(done / total)
     return results

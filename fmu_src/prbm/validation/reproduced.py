@@ -1,7 +1,7 @@
-"""The results of the source, one function each; :mod:`prbm.validation.page` writes the page.
+"""The reproduced results of the thesis, one function each, for :mod:`prbm.validation.page`.
 
-Every function computes its numbers and the values that they are compared with: printed values of
-the source, finite elements, closed forms, true values of synthetic records.
+Each function computes numbers and their references: values printed in the thesis, finite elements,
+closed forms, and the true parameters of synthetic records.
 """
 
 from . import chapter_4, chapter_5, chapter_6, chapter_7, restitution_map
@@ -27,4 +27,4 @@ RESULTS: tuple[Reproduction, ...] = (
     Reproduction("figure-6-5", chapter_6.figure_6_5, True, 5),
     Reproduction("chapter-7", chapter_7.chapter_7),
 )
-"""In the order of the page."""
+"""All results in the order of the page."""

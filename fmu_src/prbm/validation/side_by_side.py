@@ -1,4 +1,4 @@
-"""Printed values, ours and those of an independent route side by side, with their assessment."""
+"""Printed, computed and reference values side by side, with claims about their agreement."""
 
 import math
 from collections.abc import Callable
@@ -18,22 +18,22 @@ class Number:
     Parameters
     ----------
     name : str
-        What it is, with its unit.
+        Name of the quantity, with its unit.
     ours : float or None
-        By the model; None: only the reference has it.
+        Value of this package; None: only the reference is compared.
     printed : str or None
-        As the source prints it.
+        Value printed in the thesis.
     reference : float or None
-        By an independent route.
+        Value of an independent method.
     by : str
-        Which route: ``FE`` (finite elements), ``exact`` (closed form), ``put in`` (the truth of a
+        The method: ``FE`` (finite elements), ``exact`` (closed form), ``true`` (parameter of a
         synthetic record), ``law``.
     within : float or None
-        How near the number should be to what it is compared with; None: that is not claimed.
+        Claimed limit of the difference; None: no claim.
     absolute : bool
-        Whether differences are absolute; else they are relative.
+        Whether the difference is absolute (default: relative).
     form : str
-        How ours and the reference are written.
+        Format of the value of this package and of the reference.
     """
 
     name: str
@@ -47,20 +47,20 @@ class Number:
 
     @property
     def found(self) -> float:
-        """What is compared: ours, or the reference where it alone is there."""
+        """The compared value: that of this package, or else the reference."""
         found = self.ours if self.ours is not None else self.reference
         return math.nan if found is None else found
 
     @property
     def target(self) -> float:
-        """With what it is compared: the printed value, or else the reference."""
+        """The value to compare with: the printed one, or else the reference."""
         if self.printed is not None:
             return float(self.printed)
         return math.nan if self.reference is None or self.ours is None else self.reference
 
     @property
     def difference(self) -> float:
-        """Found less target, relative unless ``absolute``; NaN if there is nothing to compare."""
+        """Found less target, relative unless ``absolute``; NaN if one of them is missing."""
         off = self.found - self.target
         if self.absolute:
             return off
@@ -68,7 +68,7 @@ class Number:
 
     @property
     def agrees(self) -> bool | None:
-        """Whether the difference is within what is claimed; None if nothing is."""
+        """Whether the difference is within the claimed limit; None without a claim."""
         if self.within is None or math.isnan(self.difference):
             return None
         return abs(self.difference) <= self.within
@@ -97,7 +97,7 @@ class Number:
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure of a result: its name without the extension, what it shows."""
+    """A figure of a result: file name without extension, caption, figure."""
 
     name: str
     caption: str
@@ -106,56 +106,56 @@ class Drawing:
 
 @dataclass(frozen=True)
 class Result:
-    """A reproduced result of the source.
+    """A reproduced result of the thesis.
 
     Parameters
     ----------
     key : str
         Short name, for ``only`` and for links.
     where : str
-        Table, figure or section of the source.
-    what : str
-        What is reproduced.
+        Table, figure or section of the thesis.
+    title : str
+        Title of the section.
     numbers : tuple of Number
-        The first one heads the summary.
-    because : str
-        Why it agrees, or does not; a sentence or two.
+        Compared numbers; the first one is in the summary.
+    explanation : str
+        Explanation of the agreement or disagreement, two or three sentences.
     text : str
-        More, in Markdown.
+        Further text in Markdown, after the numbers and figures.
     drawings : tuple of Drawing
         Figures.
     """
 
     key: str
     where: str
-    what: str
+    title: str
     numbers: tuple[Number, ...]
-    because: str
+    explanation: str
     text: str = ""
     drawings: tuple[Drawing, ...] = field(default=(), compare=False)
 
     @property
     def verdict(self) -> str:
-        """Whether the claims of the numbers hold."""
+        """The number of claims that hold, in words."""
         claims = [number.agrees for number in self.numbers if number.agrees is not None]
         if not claims:
-            return "nothing to compare with"
+            return "no claims"
         if all(claims):
             return "agrees"
         return f"agrees in {sum(claims)} of {len(claims)}" if any(claims) else "does not agree"
 
     def row(self) -> str:
-        """Return the line of the summary."""
+        """Return the row of the summary."""
         head = self.numbers[0].cells()
         link = f"[{self.where}](#{self.key})"
         return f"| {link} | {head[0]} | {' | '.join(head[1:5])} | {self.verdict} |"
 
     def section(self) -> str:
         """Return the section of the page."""
-        lines = [f'<a id="{self.key}"></a>', f"## {self.where}: {self.what}", ""]
-        lines += [f"**{self.verdict[0].upper()}{self.verdict[1:]}.** {self.because}", ""]
+        lines = [f'<a id="{self.key}"></a>', f"## {self.where}: {self.title}", ""]
+        lines += [f"**{self.verdict[0].upper()}{self.verdict[1:]}.** {self.explanation}", ""]
         lines += [
-            "| | printed | ours | reference | difference | |",
+            "| quantity | printed | computed | reference | difference | verdict |",
             "|---|---:|---:|---:|---:|---|",
         ]
         lines += ["| " + " | ".join(number.cells()) + " |" for number in self.numbers]
@@ -180,18 +180,18 @@ def file_name(drawing: Drawing) -> str:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """How a result is reproduced.
+    """The computation of a result.
 
     Parameters
     ----------
     key : str
-        That of its result.
+        Key of the result.
     run : callable
-        Computes it, telling the fraction done.
+        Computes the result; its argument is a progress callback.
     elements : bool
-        Whether it needs the finite elements (Exudyn).
+        Whether the computation needs finite elements (Exudyn).
     seconds : float
-        It takes about; weights of the progress.
+        Approximate duration [s], the weight in the reported progress.
     """
 
     key: str

@@ -1,4 +1,4 @@
-"""Synthetic records: known motions with the noise of the sensors in the source."""
+"""Synthetic records: known motions with the noise of the sensors of the thesis."""
 
 import math
 
@@ -18,7 +18,19 @@ def bent(
     noise: float,
     loss: float = 0.0,
 ) -> tuple[Real, Real]:
-    """Return deflection [m] and force [N] of a beam bent and let back; loss of work on the way."""
+    """Return deflection [m] and force [N] of a beam in cyclic bending.
+
+    Parameters
+    ----------
+    rng : Generator
+        Random numbers of the noise.
+    samples, cycles : int
+        Number of samples and of cycles.
+    stiffness, largest, noise : float
+        Stiffness [N/m], largest deflection [m], standard deviation of the force [N].
+    loss : float
+        Share of the work of a cycle that is lost during unloading [-].
+    """
     phase = np.linspace(0.0, 2 * np.pi * cycles, samples)
     d = largest * (1 - np.cos(phase)) / 2
     fall = np.where(np.sin(phase) < 0.0, 1 - 3 * loss * (1 - d / largest), 1.0)

@@ -198,7 +198,7 @@ def stated_problem(
     for target in targets:
         if not hasattr(target, "model"):
             raise EvaluationError(
-                f"{target!r} is no target: give Frequency, Response, ForceDeflection, or an object "
+                f"{target!r} must be a target: Frequency, Response, ForceDeflection, or an object "
                 "with the attributes and methods of Target"
             )
     if len({target.uncertainty is None for target in targets}) > 1:
@@ -214,7 +214,7 @@ def stated_problem(
         if name not in defaults:
             raise ParameterError(unknown(name, defaults))
         if names.count(name) > 1:
-            raise EvaluationError(f"{name} is to be fitted twice")
+            raise EvaluationError(f"{name} is listed twice among the parameters to fit")
     limits = np.array([_bounds(mechanism, one, defaults[one.name]) for one in wanted])
     start = [defaults[one.name] if one.start is None else one.start for one in wanted]
     lower, upper = limits.T
@@ -243,7 +243,7 @@ def _bounds(mechanism: Mechanism, one: Free, default: float) -> tuple[float, flo
     upper = min(most, wide[1] if one.upper is None else one.upper)
     if not (math.isfinite(lower) and math.isfinite(upper) and lower < upper):
         raise EvaluationError(
-            f"{one.name}: the bounds {lower:g} to {upper:g} leave nothing to fit; give "
+            f"{one.name}: the bounds {lower:g} to {upper:g} are not an interval; give "
             f"Free({one.name!r}, lower, upper)"
         )
     return lower, upper

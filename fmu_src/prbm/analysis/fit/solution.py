@@ -45,15 +45,14 @@ class Direction:
     def __str__(self) -> str:
         part = {name: x for name, x in self.shares.items() if abs(x) >= SHARE_MIN}
         if len(part) == 1:
-            return f"{next(iter(part))} cannot be determined by these data"
+            return f"these data cannot determine {next(iter(part))}"
         lead = next(iter(part))
         moves = [f"{name} by {x / part[lead]:+.3g} %" for name, x in part.items()]
-        known = "nothing" if math.isinf(self.uncertainty) else (
-            f"less than the uncertainty of the data allows to see (relative {self.uncertainty:.2g})"
+        effect = "has no effect" if math.isinf(self.uncertainty) else (
+            f"has less effect than their uncertainty (relative {self.uncertainty:.2g})"
         )  # fmt: skip
         return (
-            f"{' and '.join(part)} cannot be told apart by these data: changing "
-            f"{', '.join(moves)} changes {known}"
+            f"these data cannot separate {' and '.join(part)}: changing {', '.join(moves)} {effect}"
         )
 
 
@@ -142,10 +141,10 @@ class Fit:
     @property
     def at_bounds(self) -> tuple[str, ...]:
         """Parameters that ended at a bound."""
-        return self._those(self.problem.at_bounds(self.p))
+        return self._selected(self.problem.at_bounds(self.p))
 
-    def _those(self, which: NDArray[np.bool_]) -> tuple[str, ...]:
-        return tuple(name for name, it in zip(self.problem.names, which, strict=True) if it)
+    def _selected(self, which: NDArray[np.bool_]) -> tuple[str, ...]:
+        return tuple(name for name, chosen in zip(self.problem.names, which, strict=True) if chosen)
 
     @property
     def correlation(self) -> Real:
@@ -161,10 +160,10 @@ class Fit:
         notes = [str(valley) for valley in self.valleys]
         if not self.converged:
             notes.append(
-                f"{STEPS_MAX} steps did not lead to a least misfit: the model cannot follow these "
-                "data, or starts too far away; give bounds near the values, or look at the figure"
+                f"no convergence in {STEPS_MAX} steps: the model does not fit these data, or starts"
+                " too far from the solution; give narrower bounds, or inspect the figure"
             )
-        ends = self._those(self.problem.at_ends(self.p))
+        ends = self._selected(self.problem.at_ends(self.p))
         for name in self.at_bounds:
             limit = self.problem.values(self.p)[name]
             if name in ends:
@@ -173,9 +172,9 @@ class Fit:
                 notes.append(f"{name} ended at its bound {limit:.6g}: widen the bounds")
         if self.problem.known and self.reduced > REDUCED_MAX:
             notes.append(
-                f"the residuals are {self.reduced:.3g} times the stated uncertainty: the model "
-                "errs more than the data; uncertainties were widened by that factor and hold "
-                "within this model only"
+                f"the residuals are {self.reduced:.3g} times the stated uncertainty: the error of "
+                "the model exceeds that of the data; uncertainties are multiplied by that factor "
+                "and are valid for this model only"
             )
         return tuple(notes)
 
@@ -267,7 +266,7 @@ def _assessed(problem: Problem, p: Real, evaluations: int, converged: bool) -> F
         noise = max(1.0, noise) if m > k else 1.0
     elif m <= k:
         raise EvaluationError(
-            f"{m} data cannot give {k} parameters and their own scatter: give their uncertainty"
+            f"{m} data cannot determine {k} parameters and their own scatter: give an uncertainty"
         )
     noise *= widening(serial_correlation(rest), m) if m > k else 1.0
     least = MODEL_RTOL * float(np.abs(problem.data / problem.uncertainty).max())
@@ -345,10 +344,10 @@ def fitted_restitution(
 ) -> Fit:
     """Fit the restitution of a stop to a bouncing response.
 
-    The 1R guide has no other mode: its restitution is the restitution in the fundamental mode as
-    the source defines it, for all measured mechanisms.  It is one number for all impacts of the
-    record.  If an impact leaves much energy in other modes, the following impacts depend on it, and
-    the number differs from that of the first one (:func:`prbm.mechanics.modal.modal_restitution`).
+    The 1R guide has only the fundamental mode, so that its fitted restitution estimates the modal
+    restitution, as in the thesis.  It is one number for all impacts of the record.  If an impact
+    leaves much energy in other modes, the following impacts depend on it, and the number differs
+    from that of the first one (:func:`prbm.mechanics.modal.modal_restitution`).
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ DISPLACEMENT = "displacement"  # Of the released body along the direction of its
 
 
 class Target(Protocol):
-    """Data with an uncertainty, and the values of a model at their place.
+    """Data with an uncertainty, and the corresponding values of a model.
 
     An ``uncertainty`` of None is estimated from the residuals.
     """
@@ -72,13 +72,13 @@ class Frequency:
     def __post_init__(self) -> None:
         if not isinstance(self.frequency, Estimate):
             raise EvaluationError(
-                f"frequency = {self.frequency!r} has no uncertainty, which weighs a target: give "
+                f"frequency = {self.frequency!r} has no uncertainty, the weight of a target: give "
                 "Frequency(Estimate(value, standard uncertainty)), both in Hz"
             )
         if not 0.0 < self.frequency.uncertainty < math.inf or self.frequency.value <= 0.0:
             raise EvaluationError(
                 f"frequency {self.frequency}: give a positive value and its standard uncertainty; "
-                "for a computed one half of its last digit"
+                "half of the last digit for a computed frequency"
             )
         if self.mode < 1:
             raise EvaluationError(f"mode = {self.mode}: the fundamental is 1")

@@ -3,13 +3,13 @@
 from .flexure_models import with_flexures
 from .free_body import closed_form
 from .impacts import first_impact
-from .maps import HEIGHTS, OFFSETS, Hit, ImpactMap, grouped
+from .maps import OFFSETS, WALLS, Hit, ImpactMap, grouped
 from .responses import fit_response, response
 from .routes import algebraic, by_elements, fitted, shares, simulated
 
 __all__ = [
-    "HEIGHTS",
     "OFFSETS",
+    "WALLS",
     "Hit",
     "ImpactMap",
     "algebraic",

@@ -23,19 +23,19 @@ from ...mechanics.system import System, unit
 from ...mechanism.description import Mechanism
 from ...mechanism.parts import GROUND, value
 from ..touching import impact_shape, lever
-from .maps import HEIGHTS, OFFSETS, ImpactMap, MovedStop, point_counter
+from .maps import OFFSETS, WALLS, ImpactMap, MovedStop, point_counter
 
 PATH_RTOL = 1e-9  # A path shorter than this fraction of the step is round-off.
 PATH_STEP = 1e-4  # Half of the step along the path of a body, as a share of the size.
 TURNING_MAX = 0.02  # Largest motion by turning at the hit point, as a share of the path.
 ENERGY_SHARE_MIN = 0.95  # Least share of the body in the kinetic energy of the fundamental mode.
 _UNFIT = "the closed form is that of"
-_OTHER_WAYS = "choose another way: algebraic, simulated or elements"
+_OTHER_METHODS = "choose another method: algebraic, simulated or elements"
 
 
 def closed_form(
     mechanism: Mechanism,
-    heights: Sequence[float] = HEIGHTS,
+    walls: Sequence[float] = WALLS,
     offsets: Sequence[float] = OFFSETS,
     values: Mapping[str, float] | None = None,
     *,
@@ -64,53 +64,54 @@ def closed_form(
     s = mechanism.stops[which.index]
     if s.on != GROUND:
         raise ParameterError(
-            f"{_UNFIT} a stop on the ground, but {s.name} is on {s.on}, which moves; {_OTHER_WAYS}"
+            f"{_UNFIT} a stop on the ground, but {s.name} is on {s.on}, which moves; "
+            f"{_OTHER_METHODS}"
         )
-    result = np.zeros((len(offsets), len(heights)))
+    result = np.zeros((len(offsets), len(walls)))
     system = assemble(mechanism, mechanism.values(which.at(values, 0.0, 0.0)))
     eps = value(s, "restitution", system.values)
     body = next(b for b in mechanism.bodies if b.name == s.body)
     m, J = (value(body, name, system.values) for name in ("mass", "inertia"))
     levers = lever(system, which.index) + np.array(offsets)
     reach = max(float(np.abs(levers).max()), math.sqrt(J / m))
-    count = point_counter(progress, len(heights))
-    for j, h in enumerate(heights):
+    count = point_counter(progress, len(walls))
+    for j, h in enumerate(walls):
         shape = impact_shape(system, which.index, h)
         path, turning = _path(system, s.body, shape)
         _check_alone(system, s.body, shape, path, turning * reach, h)
         slope = math.tan(np.angle(path * unit(s.direction).conjugate()))
         result[:, j] = (1 + eps) / ((1 + slope**2) * (1 + m * levers**2 / J)) - 1
         count()
-    return ImpactMap(label, np.array(heights), np.array(offsets), result)
+    return ImpactMap(label, np.array(walls), np.array(offsets), result)
 
 
 def _path(system: System, body: str, shape: Equilibrium) -> tuple[complex, float]:
-    """Return the direction of a body's path along the held shapes, and its rotation [rad/m]."""
+    """Return the unit direction of a body's path along held shapes, and its rotation [rad/m]."""
     frame, step = system.bodies[body], PATH_STEP * system.length
     held = float((system.release @ system.directions(shape.q)).real) + system.release_c
     behind, ahead = (equilibrium(system, held + k * step).q for k in (-1, 1))
     moved = complex(frame.A @ (system.directions(ahead) - system.directions(behind)))
     if abs(moved) <= PATH_RTOL * step:
         raise ParameterError(
-            f"{_UNFIT} a body that moves along a path, but {body} does not move, or turns on the "
-            f"spot; {_OTHER_WAYS}"
+            f"{_UNFIT} a body that moves along a path, but {body} does not move, or turns about "
+            f"its centre of mass; {_OTHER_METHODS}"
         )
     return moved / abs(moved), float(ahead[frame.j] - behind[frame.j]) / abs(moved)
 
 
 def _check_alone(
-    system: System, body: str, shape: Equilibrium, path: complex, turns: float, height: float
+    system: System, body: str, shape: Equilibrium, path: complex, turns: float, wall: float
 ) -> None:
     """Reject a body that turns on its path, or with too little of the fundamental's energy.
 
     ``turns`` is the motion by turning at the hit point, over the path [-].
     """
-    where = f"with the wall at {1e3 * height:g} mm"
+    where = f"with the wall at {1e3 * wall:g} mm"
     if abs(turns) > TURNING_MAX:
         raise ParameterError(
             f"{_UNFIT} a body that does not turn, but {where} {body} turns: where it is hit, or at "
             f"its radius of gyration, by {100 * abs(turns):.3g} % of its path (at most "
-            f"{100 * TURNING_MAX:g} %); {_OTHER_WAYS}"
+            f"{100 * TURNING_MAX:g} %); {_OTHER_METHODS}"
         )
     _, velocity = system.motion(
         system.bodies[body], system.directions(shape.q), modes(system, shape).shape[:, 0]
@@ -122,5 +123,5 @@ def _check_alone(
             f"{_UNFIT} a body that moves alone, but {where} the motion of {body} along its path is "
             f"{100 * share:.3g} % of the fundamental's kinetic energy (at least "
             f"{100 * ENERGY_SHARE_MIN:g} %): other bodies or the flexures move with it; "
-            f"{_OTHER_WAYS}"
+            f"{_OTHER_METHODS}"
         )

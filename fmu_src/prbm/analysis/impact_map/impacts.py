@@ -30,9 +30,9 @@ def first_impact(simulation: Simulation, stop: int) -> Impact:
             if impact.stop == name:
                 return impact
     raise EquilibriumError(
-        f"the wall {name} is not reached in {PERIODS_MAX:g} periods from "
+        f"the wall of {name} is not reached in {PERIODS_MAX:g} periods from "
         f"release.displacement = {simulation.values.get('release.displacement', 0.0):g} m: release "
-        "further away"
+        "further from it"
     )
 
 
@@ -57,11 +57,11 @@ def mode_energies(system: System, impact: Impact) -> Hit:
     before, after = (rate**2 / 2 for rate in rates)
     arriving = float(before.sum())
     values = system.values
-    height, offset = (
+    wall, offset = (
         value(next(s for s in system.mechanism.stops if s.name == impact.stop), name, values)
         for name in ("position", "offset")
     )
     return Hit(
-        height, offset, impact.latched.modal_restitution, found.frequency,
+        wall, offset, impact.latched.modal_restitution, found.frequency,
         before / arriving, after / arriving, impact.latched.energy_lost / arriving,
     )  # fmt: skip

@@ -1,8 +1,9 @@
 r"""Impact maps: the modal restitution over positions of the wall and offsets of the hit.
 
-The modal restitution is the velocity of the fundamental mode after an impact over that before,
-reversed.  The source of this package measures it at 5 x 5 walls and offsets.  The routes to a map
-are in :mod:`prbm.analysis.impact_map.routes` and :mod:`prbm.analysis.impact_map.free_body`.
+The modal restitution is the ratio of the fundamental mode's velocities after and before an impact,
+with the sign reversed.  Its default points are those measured in the thesis (S. Boersma, *Modelling
+and Validation of the Impact Response in Compliant Mechanisms*, TU Delft 2015).  The methods are in
+:mod:`prbm.analysis.impact_map.routes` and :mod:`prbm.analysis.impact_map.free_body`.
 """
 
 import csv
@@ -19,8 +20,8 @@ from ...mechanics.arrays import Real
 from ...mechanism.description import Mechanism
 from ..touching import stop_index
 
-HEIGHTS = (-10e-3, -5e-3, 0.0, 5e-3, 10e-3)  # Positions of the wall in the source [m].
-OFFSETS = (-4e-3, -2e-3, 0.0, 2e-3, 4e-3)  # Offsets of the hit in the source [m].
+WALLS = (-10e-3, -5e-3, 0.0, 5e-3, 10e-3)  # Positions of the wall in the thesis [m].
+OFFSETS = (-4e-3, -2e-3, 0.0, 2e-3, 4e-3)  # Offsets of the hit in the thesis [m].
 ENERGY_SHOWN_MIN = 5e-5  # Least share of the energy of a mode in a table.
 
 
@@ -30,7 +31,7 @@ class Hit:
 
     Parameters
     ----------
-    height, offset : float
+    wall, offset : float
         Position of the wall, distance of the hit point from the point of the stop [m].
     restitution : float
         Modal restitution [-].
@@ -42,7 +43,7 @@ class Hit:
         Energy lost in the contact, in the same units [-].
     """
 
-    height: float
+    wall: float
     offset: float
     restitution: float
     frequency: Real
@@ -68,17 +69,17 @@ class ImpactMap:
     Parameters
     ----------
     label : str
-        Name of the model and of the route.
-    heights, offsets : (k,), (l,)
+        Name of the model and of the method.
+    walls, offsets : (k,), (l,)
         Positions of the wall, offsets [m].
     restitution : (l, k)
         Modal restitution [-].
     hits : tuple of tuple of Hit
-        The points with their energies, in rows and columns; empty for a route without energies.
+        The points with their energies, in rows and columns; empty for a method without energies.
     """
 
     label: str
-    heights: Real
+    walls: Real
     offsets: Real
     restitution: Real
     hits: tuple[tuple[Hit, ...], ...] = ()
@@ -91,7 +92,7 @@ class ImpactMap:
         head = ["route", "wall position [m]", "offset [m]", "modal restitution [-]"]
         writer.writerow([*head, *energies, "lost in contact [-]"])
         for i, d in enumerate(self.offsets):
-            for j, h in enumerate(self.heights):
+            for j, h in enumerate(self.walls):
                 known: list[str] = [""] * 5
                 if self.hits:
                     hit = self.hits[i][j]
@@ -108,7 +109,7 @@ class ImpactMap:
         return path
 
     def __str__(self) -> str:
-        head = "".join(f"{1e3 * h:9.3g}" for h in self.heights)
+        head = "".join(f"{1e3 * h:9.3g}" for h in self.walls)
         lines = [self.label, f"d \\ h, mm{head}"]
         for d, row in zip(self.offsets, self.restitution, strict=True):
             lines.append(f"{1e3 * d:9.3g}" + "".join(f"{c:9.4f}" for c in row))
@@ -156,17 +157,17 @@ class MovedStop:
         return found
 
     def at(
-        self, values: Mapping[str, float] | None, height: float, offset: float
+        self, values: Mapping[str, float] | None, wall: float, offset: float
     ) -> dict[str, float]:
         """Return values with another position of the wall and another offset of the hit."""
-        return {**(values or {}), f"{self.name}.position": height, f"{self.name}.offset": offset}
+        return {**(values or {}), f"{self.name}.position": wall, f"{self.name}.offset": offset}
 
 
 def map_of(label: str, rows: Sequence[Sequence[Hit]]) -> ImpactMap:
     """Return the map of hits in rows (offsets) and columns (walls)."""
     return ImpactMap(
         label,
-        np.array([hit.height for hit in rows[0]]),
+        np.array([hit.wall for hit in rows[0]]),
         np.array([row[0].offset for row in rows]),
         np.array([[hit.restitution for hit in row] for row in rows]),
         tuple(tuple(row) for row in rows),

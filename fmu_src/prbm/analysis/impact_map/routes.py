@@ -1,4 +1,4 @@
-r"""Routes to an impact map, for any mechanism with a stop.
+r"""Methods for an impact map, for any mechanism with a stop.
 
 * **algebraic**: a pure fundamental mode arrives at the shape that a force holds at the wall,
 
@@ -6,15 +6,15 @@ r"""Routes to an impact map, for any mechanism with a stop.
 
   by a pseudo-rigid-body model (:func:`algebraic`) or by finite elements (:func:`by_elements`);
 * **simulated**: the first impact after a release (:func:`simulated`).  The arriving motion is never
-  the pure mode, and the phase of the small ringing in the other modes changes C.  A model with few
-  pivots has its second frequency 10 % too low, and a wrong phase: C of the steel guide at -10 mm is
-  0.43 (2R), 0.47 and 0.478 (chains of 16 and 32 links), 0.479 (finite elements);
+  the pure mode, and the phase of the small vibration in the other modes changes C.  The second
+  frequency of the 2R model is 10 % too low, which changes this phase.  C of the steel guide at
+  -10 mm is 0.43 (2R), 0.47 and 0.478 (chains of 16 and 32 links), 0.479 (finite elements);
 * **fitted**: the restitution of the 1R model whose motion is nearest to the simulated one
   (:func:`fitted`);
 * **closed form**: a free body on a path, :func:`prbm.analysis.impact_map.free_body.closed_form`.
 
-The energy goes to the modes that were at rest, and into the contact.  For a pure arriving mode, in
-units of its energy,
+The fundamental mode loses energy to the other modes and to the contact.  For a pure arriving mode,
+in units of its energy,
 
     after_1 = C^2,    after_i = (1 + eps)^2 mu_1 mu_i,    lost = (1 - eps^2) mu_1.
 """
@@ -34,7 +34,7 @@ from ...references.finite_elements import FiniteElements, Shape
 from ..touching import impact_shape, touching
 from .flexure_models import with_flexures
 from .impacts import first_impact, mode_energies
-from .maps import HEIGHTS, OFFSETS, Hit, ImpactMap, MovedStop, map_of, point_counter
+from .maps import OFFSETS, WALLS, Hit, ImpactMap, MovedStop, map_of, point_counter
 from .responses import fit_response, response
 
 SAMPLES = 200  # Samples of a fitted response.
@@ -72,16 +72,16 @@ def shares(G: Real, restitution: float) -> tuple[float, Real, float]:
     return C, after, (1.0 - restitution**2) * float(mu[0])
 
 
-def _hit(height: float, offset: float, found: Modes, G: Real, restitution: float) -> Hit:
+def _hit(wall: float, offset: float, found: Modes, G: Real, restitution: float) -> Hit:
     C, after, lost = shares(G @ found.shape, restitution)
     before = np.zeros(len(after))
     before[0] = 1.0
-    return Hit(height, offset, C, found.frequency, before, after, lost)
+    return Hit(wall, offset, C, found.frequency, before, after, lost)
 
 
 def algebraic(
     mechanism: Mechanism,
-    heights: Sequence[float] = HEIGHTS,
+    walls: Sequence[float] = WALLS,
     offsets: Sequence[float] = OFFSETS,
     values: Mapping[str, float] | None = None,
     *,
@@ -95,7 +95,7 @@ def algebraic(
     ----------
     mechanism : Mechanism
         A mechanism with any model of its flexures.
-    heights, offsets : sequences of float
+    walls, offsets : sequences of float
         Positions of the wall, offsets of the hit point [m].
     values : mapping
         Parameters that differ from their defaults, ``stop.restitution`` among them.
@@ -114,12 +114,12 @@ def algebraic(
         If a wall cannot be reached by a force on the released body.
     """
     which = MovedStop.of(mechanism, stop)
-    count = point_counter(progress, len(heights) * len(offsets))
+    count = point_counter(progress, len(walls) * len(offsets))
 
     def hits(offset: float) -> Iterator[Hit]:
         system = assemble(mechanism, mechanism.values(which.at(values, 0.0, offset)))
         eps = value(mechanism.stops[which.index], "restitution", system.values)
-        for h in heights:
+        for h in walls:
             shape = impact_shape(system, which.index, h)
             G = system.gap_rows.jacobian(system.directions(shape.q))[which.index]
             yield _hit(h, offset, modes(system, shape), G, eps)
@@ -130,7 +130,7 @@ def algebraic(
 
 def by_elements(
     mechanism: Mechanism,
-    heights: Sequence[float] = HEIGHTS,
+    walls: Sequence[float] = WALLS,
     offsets: Sequence[float] = OFFSETS,
     values: Mapping[str, float] | None = None,
     *,
@@ -152,14 +152,14 @@ def by_elements(
         If Exudyn is not installed.
     """
     which = MovedStop.of(mechanism, stop)
-    count = point_counter(progress, len(heights) * len(offsets))
+    count = point_counter(progress, len(walls) * len(offsets))
 
     def hits(offset: float) -> Iterator[Hit]:
         fe = FiniteElements(mechanism, which.at(values, 0.0, offset), elements=elements)
         eps = value(mechanism.stops[which.index], "restitution", fe.values)
         size = fe.model.size
         shape: Shape | None = None
-        for h in heights:
+        for h in walls:
 
             def gap(shape: Shape, h: float = h) -> float:
                 return fe.gap(which.index, shape.q) + h
@@ -173,7 +173,7 @@ def by_elements(
 
 def simulated(
     mechanism: Mechanism,
-    heights: Sequence[float] = HEIGHTS,
+    walls: Sequence[float] = WALLS,
     offsets: Sequence[float] = OFFSETS,
     values: Mapping[str, float] | None = None,
     *,
@@ -197,10 +197,10 @@ def simulated(
         If a wall is not reached after the release.
     """
     which = MovedStop.of(mechanism, stop)
-    count = point_counter(progress, len(heights) * len(offsets))
+    count = point_counter(progress, len(walls) * len(offsets))
 
     def hits(offset: float) -> Iterator[Hit]:
-        for h in heights:
+        for h in walls:
             simulation = Simulation(mechanism, which.at(values, h, offset), tolerance=tolerance)
             impact = first_impact(simulation, which.index)
             yield mode_energies(simulation.system, impact)
@@ -211,7 +211,7 @@ def simulated(
 
 def fitted(
     mechanism: Mechanism,
-    heights: Sequence[float] = HEIGHTS,
+    walls: Sequence[float] = WALLS,
     offsets: Sequence[float] = OFFSETS,
     values: Mapping[str, float] | None = None,
     *,
@@ -221,11 +221,11 @@ def fitted(
 ) -> ImpactMap:
     """Return the restitution of an inextensible 1R model fitted to simulated responses.
 
-    The source evaluates its measurements in the same way.  The 1R model has the same wall and
-    release, a centred hit, and one restitution in place of the modal one.  Its stiffness is fitted
-    too, because its period differs.  The response is the motion of the released body from the
-    release to :data:`REBOUND_PERIODS` periods after the first impact, with further impacts.  A 1R
-    model cannot move through the wall: a negative modal restitution is fitted by 0.
+    The thesis evaluates its measurements in this way.  The 1R model has the same wall and release,
+    a centred hit, and one restitution in place of the modal one.  Its stiffness is fitted too,
+    because its period differs.  The response is the motion of the released body from the release to
+    :data:`REBOUND_PERIODS` periods after the first impact, with further impacts.  A 1R model cannot
+    move through the wall, so that the fit of a negative modal restitution is 0.
 
     The fit depends on the whole rebound, not on the impact alone.  Where the frequencies of the
     excited modes change during the rebound, their energies change too.  A guide that rebounds
@@ -237,14 +237,14 @@ def fitted(
     which = MovedStop.of(mechanism, stop)
     model = with_flexures(mechanism, "1R")
     eps = f"{which.name}.restitution"
-    result = np.zeros((len(offsets), len(heights)))
+    result = np.zeros((len(offsets), len(walls)))
     count = point_counter(progress, result.size)
     known = model.values()
     shared = {name: x for name, x in (values or {}).items() if name in known}
     kinds = (f"{kind.name}.K_theta" for kind in model.flexure_types)
     stiffness = [name for name in kinds if name in known]
     for i, d in enumerate(offsets):
-        for j, h in enumerate(heights):
+        for j, h in enumerate(walls):
             simulation = Simulation(mechanism, which.at(values, h, d), tolerance=RELEASE_RTOL)
             hit = first_impact(simulation, which.index).time
             end = hit + REBOUND_PERIODS / simulation.frequency
@@ -253,4 +253,4 @@ def fitted(
             found = fit_response(model, [eps, *stiffness], times, wanted, which.at(shared, h, 0.0))
             result[i, j] = found.values[eps]
             count()
-    return ImpactMap(label, np.array(heights), np.array(offsets), result)
+    return ImpactMap(label, np.array(walls), np.array(offsets), result)

@@ -145,7 +145,7 @@ class ElementModel:
             self._joint(joint)
         for force in self.mechanism.forces:
             at = self.rigid[force.body].centre if force.point is None else self._at(force.point)
-            x, y, moment = (self.given[f"{force.name}.{what}"] for what in ("x", "y", "moment"))
+            x, y, moment = (self.given[f"{force.name}.{axis}"] for axis in ("x", "y", "moment"))
             marker = self._marker(force.body, at)
             self._add_load(item.Force, marker, [x, y, 0.0])
             self._add_load(item.Torque, marker, [0.0, 0.0, moment])
