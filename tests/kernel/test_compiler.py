@@ -187,9 +187,9 @@ def planted(cache: Path, folder: Path, monkeypatch) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / entry.name).write_bytes(valid)
     (folder / entry.name).chmod(0o644)
-    monkeypatch.setattr(compiler, "_made", {})
+    monkeypatch.setattr(compiler, "_loaded", {})
     assert only(libraries([HOST])) == content  # It is valid as long as it is private.
-    monkeypatch.setattr(compiler, "_made", {})
+    monkeypatch.setattr(compiler, "_loaded", {})
     return folder / entry.name
 
 

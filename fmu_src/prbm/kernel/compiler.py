@@ -429,19 +429,19 @@ def _cached(
     if name not in _loaded:
         folder = private_cache()
         if folder is None:
-            content = _compiled(wanted, compiler, files, progress)
+            content = _compile(wanted, compiler, files, progress)
             progress(
                 f"cannot write to {cache_folder()}: no folder that only this user can write to; "
                 "the next export compiles again"
             )
         else:
             entry = folder / name
-            content = _read(entry) or _compile(entry, wanted, compiler, files, progress)
+            content = _read(entry) or _store(entry, wanted, compiler, files, progress)
         _loaded[name] = content
     return _loaded[name]
 
 
-def _compiled(
+def _compile(
     wanted: Platform,
     compiler: Compiler,
     files: Mapping[str, bytes],
@@ -452,7 +452,7 @@ def _compiled(
     return compiled(wanted, compiler, files)
 
 
-def _compile(
+def _store(
     entry: Path,
     wanted: Platform,
     compiler: Compiler,
@@ -463,7 +463,7 @@ def _compile(
     with _locked(entry.parent):
         content = _read(entry)
         if content is None:
-            content = _compiled(wanted, compiler, files, progress)
+            content = _compile(wanted, compiler, files, progress)
             try:
                 write(entry, MAGIC + hashlib.sha256(content).digest() + content)
             except OSError:
