@@ -108,7 +108,9 @@ def test_any_number_of_stops_can_rest_at_once():
 
 def test_the_step_size_changes_within_its_limits():
     controller = StepSizeController(h=1e-3)
-    assert controller.next(0.0).h == pytest.approx(1e-3 * min(STEP_GROWTH_MAX, 0.9 * 1e-4**-0.13))
+    assert controller.next(0.0).h == pytest.approx(
+        1e-3 * min(STEP_GROWTH_MAX, 0.85 * 1e-4 ** -(1 / 6 - 0.07))
+    )
     for error in (1e12, math.inf, math.nan):
         rejected = controller.next(error)
         assert rejected.h == pytest.approx(1e-3 * STEP_SHRINK_MIN)

@@ -9,7 +9,7 @@ import pytest
 
 from kernel_library import KERNEL, compiled, constants
 from prbm.base import tolerances
-from prbm.hybrid.runge_kutta import BOGACKI_SHAMPINE, powers
+from prbm.hybrid.runge_kutta import TSITOURAS_PAPAKOSTAS, powers
 from prbm.interface import tables
 from prbm.kernel import header
 
@@ -128,10 +128,10 @@ def exported():
     macros = re.findall(r"#define (\w+) [\d.]", header.header())
     lines = [f"const double value_{name} = {name};" for name in macros]
     arrays = {
-        "STAGE_WEIGHTS": BOGACKI_SHAMPINE.a,
-        "ERROR_WEIGHTS": BOGACKI_SHAMPINE.error,
-        "DENSE_WEIGHTS": BOGACKI_SHAMPINE.dense,
-        "LARGEST_WEIGHTS": header.largest_weights(BOGACKI_SHAMPINE),
+        "STAGE_WEIGHTS": TSITOURAS_PAPAKOSTAS.a,
+        "ERROR_WEIGHTS": TSITOURAS_PAPAKOSTAS.error,
+        "DENSE_WEIGHTS": TSITOURAS_PAPAKOSTAS.dense,
+        "LARGEST_WEIGHTS": header.largest_weights(TSITOURAS_PAPAKOSTAS),
     }
     for name, expected in arrays.items():
         shape = "".join(f"[{count}]" for count in expected.shape)
@@ -155,7 +155,7 @@ def test_c_reads_the_bits_of_the_tableau(exported):
 
 
 def test_the_bounds_of_the_dense_weights_hold_and_are_close():
-    found = np.abs(powers(BOGACKI_SHAMPINE, np.linspace(0.0, 1.0, 7001))).max(axis=0)
-    bounds = header.largest_weights(BOGACKI_SHAMPINE)
+    found = np.abs(powers(TSITOURAS_PAPAKOSTAS, np.linspace(0.0, 1.0, 7001))).max(axis=0)
+    bounds = header.largest_weights(TSITOURAS_PAPAKOSTAS)
     assert (found <= bounds).all()
     assert (bounds <= found + 1.1e-3).all()

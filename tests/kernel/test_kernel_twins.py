@@ -1226,7 +1226,7 @@ def test_reactions_on_the_base_are_the_same(name):
         assert_same(moment[0], expected[1], scale=abs(expected[0]) * theirs.system.length)
 
 
-PAIR = runge_kutta.BOGACKI_SHAMPINE
+PAIR = runge_kutta.TSITOURAS_PAPAKOSTAS
 
 
 @twin(stages=runge_kutta.stages, weights=runge_kutta.powers, interpolate=runge_kutta.interpolate)

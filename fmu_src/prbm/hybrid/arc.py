@@ -6,10 +6,10 @@ import numpy as np
 
 from ..base.tolerances import GUARD_INTERVALS
 from ..mechanics.arrays import Real
-from .runge_kutta import BOGACKI_SHAMPINE, interpolate, powers
+from .runge_kutta import TSITOURAS_PAPAKOSTAS, interpolate, powers
 
 FRACTIONS = np.linspace(0.0, 1.0, GUARD_INTERVALS + 1)
-GRID = powers(BOGACKI_SHAMPINE, FRACTIONS)
+GRID = powers(TSITOURAS_PAPAKOSTAS, FRACTIONS)
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Arc:
 
     def at(self, t: float) -> Real:
         """Return the state at time t, not projected."""
-        return interpolate(BOGACKI_SHAMPINE, self.y, self.k, self.h, (t - self.start) / self.h)
+        return interpolate(TSITOURAS_PAPAKOSTAS, self.y, self.k, self.h, (t - self.start) / self.h)
 
     def samples(self) -> tuple[Real, Real]:
         """Return the ends of the intervals in which the guards are evaluated.

@@ -29,11 +29,11 @@ from ..mechanics.constraints import Factors
 from ..mechanics.dynamics import Equations, Evaluation
 from .configuration import Configuration, Scales
 from .front import Front
-from .runge_kutta import BOGACKI_SHAMPINE as PAIR
+from .runge_kutta import TSITOURAS_PAPAKOSTAS as PAIR
 from .runge_kutta import stages
 from .walls import step_limit
 
-REJECTED_EXPONENT = 1.0 / PAIR.order
+REJECTED_EXPONENT = 1.0 / (PAIR.error_order + 1)
 ACCEPTED_EXPONENT = REJECTED_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT
 
 

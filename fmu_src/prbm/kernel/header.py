@@ -19,7 +19,7 @@ import numpy as np
 
 from ..base import tolerances
 from ..hybrid.events import EventKind
-from ..hybrid.runge_kutta import BOGACKI_SHAMPINE, Tableau, powers
+from ..hybrid.runge_kutta import TSITOURAS_PAPAKOSTAS, Tableau, powers
 from ..interface import tables
 from ..interface.variables import (
     BASE_OUTPUTS,
@@ -68,7 +68,7 @@ def header() -> str:
         _section(tables, _tables()),
         _section("prbm.interface.variables", _groups()),
         _section("prbm.mechanics.inputs", _inputs()),
-        _section("prbm.hybrid.runge_kutta", _tableau(BOGACKI_SHAMPINE)),
+        _section("prbm.hybrid.runge_kutta", _tableau(TSITOURAS_PAPAKOSTAS)),
     )
     return "\n".join((HEAD, *parts, "#endif\n"))
 
@@ -151,7 +151,7 @@ def _inputs() -> Iterator[str]:
 def _tableau(tableau: Tableau) -> Iterator[str]:
     stages, dense = tableau.dense.shape
     yield _constant("STAGES", stages)
-    yield _constant("ORDER", tableau.order)
+    yield _constant("ERROR_ORDER", tableau.error_order)
     yield _constant("DENSE", dense)
     yield _array("STAGE_TIMES", tableau.c)
     yield _array("STAGE_WEIGHTS", tableau.a)

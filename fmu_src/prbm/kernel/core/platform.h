@@ -38,7 +38,7 @@
 #define RARE static
 #endif
 #if defined(__GNUC__) && !defined(__clang__) /* Clang unrolls without a pragma. */
-#define UNROLLED _Pragma("GCC unroll 8")
+#define UNROLLED _Pragma("GCC unroll 10")
 #define UNROLLED_BY_LANES _Pragma("GCC unroll 4")
 #else
 #define UNROLLED

@@ -1,4 +1,4 @@
-/* The pair 5(4) of Bogacki and Shampine with a quartic: the data of hybrid/runge_kutta.py. */
+/* The Runge-Kutta pair and its interpolant: the data of hybrid/runge_kutta.py. */
 #include <math.h>
 
 #include "core/dynamics.h"
@@ -41,6 +41,8 @@ SIZED void combine_length(int n, int stride, int count, double h, const double *
     case 5: combine_of(5, n, stride, h, a, k, y, result); break;
     case 6: combine_of(6, n, stride, h, a, k, y, result); break;
     case 7: combine_of(7, n, stride, h, a, k, y, result); break;
+    case 8: combine_of(8, n, stride, h, a, k, y, result); break;
+    case 9: combine_of(9, n, stride, h, a, k, y, result); break;
     default: combine_of(STAGES, n, stride, h, a, k, y, result);
     }
 }
@@ -100,7 +102,7 @@ static void furthest(int n, int ny, const double *k, double h, double *distance)
 PRBM void weights(double theta, double *b) {
     for (int i = 0; i < STAGES; i++) {
         const double *d = DENSE_WEIGHT[i];
-        b[i] = theta * (d[0] + theta * (d[1] + theta * (d[2] + theta * d[3])));
+        b[i] = theta * (d[0] + theta * (d[1] + theta * (d[2] + theta * (d[3] + theta * d[4]))));
     }
 }
 

@@ -1,4 +1,4 @@
-/* The Runge-Kutta pair 5(4) of Bogacki and Shampine with a quartic dense output. */
+/* Steps of the Runge-Kutta pair, their errors and their dense output. */
 #ifndef PRBM_RUNGE_KUTTA_H
 #define PRBM_RUNGE_KUTTA_H
 

@@ -3,7 +3,7 @@
 
 #include "hybrid/hybrid.h"
 
-#define STEP_ERROR_EXPONENT (1.0 / (double)ORDER)
+#define STEP_ERROR_EXPONENT (1.0 / (ERROR_ORDER + 1.0))
 #define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT)
 
 /* --- errors ----------------------------------------------------------------------------------- */
