@@ -19,7 +19,7 @@ from prbm.__main__ import main as started
 from prbm.base import atomic as files
 from prbm.commands import command_line as cli
 from prbm.commands import systems
-from prbm.files.mechanism_file import find, shipped
+from prbm.files.mechanism_file import load, shipped
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import free_displacement
 from support import ROOT
@@ -102,7 +102,7 @@ def test_the_list_is_that_of_the_shipped_mechanisms(capsys):
 
 def test_the_mode_of_a_1r_guide_moves_along_its_circle(capsys):
     """Kinetic energy along x and y as cos^2 and sin^2 of the link's angle."""
-    guide = find("PRBDM")
+    guide = load("PRBDM")
     system = assemble(guide, guide.values())
     radius = system.values["flexure.gamma"] * system.values["flexure.length"]
     sine = free_displacement(system) / radius
@@ -116,7 +116,7 @@ def test_the_mode_of_a_1r_guide_moves_along_its_circle(capsys):
 def test_a_held_1r_guide_is_a_crank_on_torsion_springs(capsys):
     """F = 4 k Theta/(gamma l cos Theta), x = gamma l sin Theta, y = gamma l (cos Theta - 1)."""
     assert run("equilibrium PRBDM --set gravity.x=0 --from -20mm --to 20mm --out .") == cli.OK
-    p = find("PRBDM").values()
+    p = load("PRBDM").values()
     radius = p["flexure.gamma"] * p["flexure.length"]
     I = p["flexure.width"] * p["flexure.thickness"] ** 3 / 12
     k = 2 * p["flexure.gamma"] * p["flexure.K_theta"] * p["flexure.youngs_modulus"] * I
@@ -138,7 +138,7 @@ def test_a_bistable_mechanism_rests_and_snaps_symmetrically(capsys):
     rows = table("Bistable-rests.csv")
     assert rows["kind"] == ["stable rest", "unstable rest", "stable rest", "snap", "snap"]
     places = np.array(rows["displacement [m]"], float)
-    rise = find("Bistable").values()["strut.rise"]
+    rise = load("Bistable").values()["strut.rise"]
     np.testing.assert_allclose(places[:3], [0.0, rise, 2 * rise], atol=1e-9)
     assert places[3] + places[4] == pytest.approx(2 * rise, abs=1e-7)
     forces = np.array(rows["force [N]"], float)

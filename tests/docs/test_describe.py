@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from prbm.analysis.stretching import notes, restitution, stretching
-from prbm.files.mechanism_file import load
+from prbm.files.mechanism_file import read_mechanism
 from support import ROOT
 
 PAGE = (ROOT / "docs" / "describe-your-mechanism.md").read_text()
@@ -30,7 +30,7 @@ def write_file(folder: Path) -> Path:
 
 
 def test_the_pieces_are_a_mechanism_file(tmp_path: Path) -> None:
-    lever = load(write_file(tmp_path))
+    lever = read_mechanism(write_file(tmp_path))
     assert lever.name == "Lever"
     assert lever.drawing.splitlines()[-1].split() == ["left", "right"]
     # all variables that the text names are there, but for those of an FMU's outputs
@@ -41,7 +41,7 @@ def test_the_pieces_are_a_mechanism_file(tmp_path: Path) -> None:
 
 
 def test_stretching_matters_to_the_impact_of_the_lever_as_the_page_says(tmp_path: Path) -> None:
-    lever = load(write_file(tmp_path))
+    lever = read_mechanism(write_file(tmp_path))
     said = re.search(r"lever of this page goes from ([\d.]+) to ([\d.]+):", PAGE)
     assert said is not None
     as_it_is, stretched = map(float, said.groups())

@@ -19,7 +19,7 @@ from mechanism_mistakes import CHANGES, CONTENTS, EXAMPLE
 from prbm.base.errors import MechanismError, PrbmError
 from prbm.commands import building as cli
 from prbm.files import units
-from prbm.files.mechanism_file import load, schema, shipped
+from prbm.files.mechanism_file import read_mechanism, schema, shipped
 from prbm.files.schema import MechanismTable
 from prbm.files.toml_lines import line_of, lines
 from prbm.interface.units import UNITS
@@ -41,7 +41,7 @@ from support import ROOT, mechanism
 def read(folder: Path, content: str | bytes) -> Mechanism:
     path = folder / "mine.toml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return load(path)
+    return read_mechanism(path)
 
 
 @pytest.fixture(scope="module")
@@ -320,7 +320,7 @@ def test_what_is_no_file_is_a_sentence_and_status_2(tmp_path, capsys):
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no such device")
 def test_a_file_without_an_end_is_read_no_further_than_a_mechanism_goes():
     with pytest.raises(MechanismError, match="larger than"):
-        load("/dev/zero")
+        read_mechanism("/dev/zero")
 
 
 def test_there_are_many_mistakes():

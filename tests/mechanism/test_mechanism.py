@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, PrbmError
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
@@ -305,11 +305,11 @@ def test_files_that_are_no_mechanism_get_one_clear_message(tmp_path):
         path = tmp_path / f"{name}.toml"
         path.write_text(content)
         with pytest.raises(MechanismError) as caught:
-            load(path)
+            read_mechanism(path)
         assert str(path) in str(caught.value)
         assert words in str(caught.value)
     with pytest.raises(MechanismError, match="cannot be read"):
-        load(tmp_path / "none.toml")
+        read_mechanism(tmp_path / "none.toml")
 
 
 def test_a_mechanism_is_data_to_the_last_digit():

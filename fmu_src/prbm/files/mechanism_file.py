@@ -49,7 +49,7 @@ NAMES = {  # by what the pattern of a name admits
 # --- reading ----------------------------------------------------------------------------------
 
 
-def load(path: str | Path) -> Mechanism:
+def read_mechanism(path: str | Path) -> Mechanism:
     """Read a mechanism from a TOML file.
 
     Raises
@@ -114,7 +114,7 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def find(name: str | Path) -> Mechanism:
+def load(name: str | Path) -> Mechanism:
     """Return a shipped mechanism, or read one from a file.
 
     Parameters
@@ -131,19 +131,19 @@ def find(name: str | Path) -> Mechanism:
 
     Examples
     --------
-    >>> find("Bistable").name
+    >>> load("Bistable").name
     'Bistable'
     """
     name, files = str(name), shipped()
     if name in files:
-        return load(files[name])
+        return read_mechanism(files[name])
     if Path(name).is_dir():
         raise ParameterError(f"{name!r} is a folder; name a mechanism file in it")
     if not Path(name).suffix and not Path(name).is_file():
         raise ParameterError(
             f"there is no model {name!r}; {proposal(name, files)}; a file of your own ends in .toml"
         )
-    return load(name)
+    return read_mechanism(name)
 
 
 # --- what is wrong ----------------------------------------------------------------------------

@@ -114,8 +114,8 @@ def units_of(mechanism: Mechanism) -> dict[str, str]:
 
     Examples
     --------
-    >>> from prbm.files.mechanism_file import find
-    >>> units = units_of(find("PRBDM"))
+    >>> from prbm.files.mechanism_file import load
+    >>> units = units_of(load("PRBDM"))
     >>> units["flexure.length"], units["force.moment"], units["base.acceleration.x"]
     ('m', 'N.m', 'm/s2')
     """
@@ -134,8 +134,8 @@ def settings(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, float]:
 
     Examples
     --------
-    >>> from prbm.files.mechanism_file import find
-    >>> settings(find("PRBDM"), ["stop.restitution=0.5", "release.displacement = -10 mm"])
+    >>> from prbm.files.mechanism_file import load
+    >>> settings(load("PRBDM"), ["stop.restitution=0.5", "release.displacement = -10 mm"])
     {'stop.restitution': 0.5, 'release.displacement': -0.01}
     """
     return assigned(units_of(mechanism), texts)
