@@ -250,7 +250,7 @@ def test_walls_out_of_reach_and_unknown_stops_are_told():
         )
     with pytest.raises(ParameterError, match="no stop bumper"):
         impact_map.algebraic(guide(), stop="bumper")
-    with pytest.raises(ParameterError, match="no variable"):
+    with pytest.raises(ParameterError, match="unknown variable"):
         impact_map.fit_response(guide(), ["stop.bounce"], TIMES, TIMES)
     with pytest.raises(RecordError, match="too few"):
         impact_map.fit_response(guide(), ["stop.restitution"], TIMES[:9], TIMES[:9])
