@@ -514,17 +514,17 @@ def test_a_package_that_is_missing_is_named(monkeypatch, capsys):
 
 
 FILES = {
-    ("title =", "titel ="): "titel is no key that is known there; did you mean title?",
+    ("title =", "titel ="): "unknown key titel; did you mean title?",
     ("mass = 0.053187", "mass = [1]"): "bodies.0.mass (of shuttle) = [1]: write a number, or an",
     ("mass = 0.053187", ""): "bodies.0.mass (of shuttle) is missing: add the key",
     (
         'point = ["shuttle.width"',
         'bounce = 1\npoint = ["shuttle.width"',
-    ): "stops.0.bounce (of stop) is no key",
+    ): "unknown key stops.0.bounce (of stop)",
     ("gravity = [9.81, 0.0]", "gravity = [9.81]"): "gravity = [9.81]: a number is missing; add it",
     ("centre = [", "centre = [[1], "): "bodies.0.centre",
     ("left = [0.0, 0.0]", "left = [0.0]"): "ground.left = [0.0]: a number is missing; add it",
-    ("[[stops]]", "[stops]"): "write a list, [...], or a table [[...]]",
+    ("[[stops]]", "[stops]"): "write a list, [...], or one table [[...]]",
     ("value = 0.04", "value = -1.0"): "flexure.length = -1 m must be at least",
 }
 

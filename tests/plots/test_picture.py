@@ -259,7 +259,10 @@ def test_a_file_is_found_as_well_as_a_name() -> None:
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["Bistabel"], "there is no model 'Bistabel'; did you mean Bistable?"),
+        (
+            ["Bistabel"],
+            "unknown mechanism 'Bistabel' (mechanism files end in .toml); did you mean Bistable?",
+        ),
         (["none.toml"], "none.toml: cannot be read"),
         (["PRBDM", "--set", "shuttle.mas=1"], "did you mean shuttle.mass"),
         (["PRBDM", "--set", "shuttle.mass"], "write NAME=VALUE"),

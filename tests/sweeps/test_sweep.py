@@ -549,8 +549,8 @@ def test_the_command_sums_up(native, capsys):
 WORDS = {
     "no number": ("--set gravity.x=down", "--set gravity.x= down: "),
     "no variable": ("--set gravity.X=1", "--set gravity.X=1: "),
-    "another unit": ("--set 'gravity.x=1 kg'", "'kg' is the unit of something else"),
-    "no time": ("--stop-time 3mm", "--stop-time 3mm: 'mm' is the unit of something else"),
+    "another unit": ("--set 'gravity.x=1 kg'", "the unit 'kg' has another dimension"),
+    "no time": ("--stop-time 3mm", "--stop-time 3mm: the unit 'mm' has another dimension"),
     "no count": ("--workers two", "argument --workers: invalid int value: 'two'"),
 }
 

@@ -1,4 +1,4 @@
-"""Units as they stand in the heads of measured data: ``mm``, ``Volts``, ``°C``, ``m/s²``."""
+"""Units in the heads of measured data: ``mm``, ``Volts``, ``°C``, ``m/s²``."""
 
 import math
 import re
@@ -25,7 +25,7 @@ percent = 0.01 = pct
 COHERENT = ("1", "s", "m", "N", "V", "kg", "A", "Hz", "K", "rad", "Pa", "J", "W", "m/s", "m/s2",
             "N/m", "N.m", "rad/s", "kg.m2", "kg/m3", "V/m", "m/V", "ohm")  # fmt: skip
 KNOWN = "m, in, g, s, min, hr, N, gf, lbf, Nm, Pa, bar, J, W, Hz, V, A, K, degC, rad, deg, % with "
-KNOWN += "SI prefixes, joined as in m/s2 or N.m, and - for none"
+KNOWN += "SI prefixes, joined as in m/s2 or N.m, and - for dimensionless numbers"
 PLAIN = {"%": "pct", "°C": "degC", "-": "1", "": "1", "1": "1", "none": "1", "S": "s"}
 
 _SUPERSCRIPTS = str.maketrans("¹²³⁴⁻", "1234-")
@@ -33,8 +33,8 @@ _SUPERSCRIPTS = str.maketrans("¹²³⁴⁻", "1234-")
 
 @cache
 def _registry() -> Any:
-    """Return the units, made when the first one is met."""
-    import pint  # here, because it takes a third of a second
+    """Return pint's registry of these units, created at the first call."""
+    import pint  # imported here because the import takes 0.3 s
 
     registry: Any = pint.UnitRegistry(
         None, non_int_type=Decimal, autoconvert_offset_to_baseunit=True
@@ -45,8 +45,8 @@ def _registry() -> Any:
 
 @cache
 def _unit(text: str) -> Any:
-    """Return pint's unit for what is written; None if it is none."""
-    import pint  # here, because it takes a third of a second
+    """Return pint's unit for a written unit, None if it is unknown."""
+    import pint  # imported here because the import takes 0.3 s
 
     written = text.strip().translate(_SUPERSCRIPTS)
     written = PLAIN.get(written, written)
@@ -67,7 +67,7 @@ def _unit(text: str) -> Any:
 
 
 def is_unit(text: str) -> bool:
-    """Tell whether a text is a unit that is known, ``-`` for none among them.
+    """Return whether a text is a known unit; ``-`` stands for a dimensionless number.
 
     Examples
     --------
@@ -78,7 +78,7 @@ def is_unit(text: str) -> bool:
 
 
 def si_unit(text: str) -> str:
-    """Return the name of the SI unit of what a unit measures.
+    """Return the name of the SI unit with the dimension of a known unit.
 
     Examples
     --------
@@ -93,7 +93,12 @@ def si_unit(text: str) -> str:
 
 
 def in_si(text: str) -> tuple[float, float]:
-    """Return factor and offset that take a number in a unit to SI: factor x + offset.
+    """Return factor and offset of the conversion to SI: a number x is factor x + offset.
+
+    Raises
+    ------
+    ValueError
+        If one of them is not a finite number.
 
     Examples
     --------
@@ -112,7 +117,7 @@ def in_si(text: str) -> tuple[float, float]:
 
 
 def same_dimension(unit: str, other: str) -> bool:
-    """Tell whether two known units measure the same.
+    """Return whether two known units have the same dimension.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Line numbers of the tables and keys of a TOML text, which tomllib does not report."""
+"""Line numbers of tables and keys of a TOML text, which :mod:`tomllib` does not report."""
 
 import re
 import tomllib
@@ -20,8 +20,8 @@ _KEY = re.compile(rf"\s*((?:{_STRING}|[^=\"'#])+?)\s*=", re.DOTALL)
 def lines(text: str) -> dict[Path, int]:
     r"""Return the lines, counted from 1, of all tables and keys of a valid TOML text.
 
-    Tables of an array are counted from 0; the array is where its first table is.  What stands
-    inside a value has no line of its own.
+    Tables of an array are counted from 0; the line of the array is that of its first table.
+    Values, elements of lists and keys of inline tables are not listed.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def lines(text: str) -> dict[Path, int]:
 
 
 def line_of(path: Sequence[str | int], known: Mapping[Path, int]) -> int | None:
-    """Return the line of a key, or of the nearest table around it that has one."""
+    """Return the line of a key, or of the innermost enclosing table that is listed, or None."""
     for length in range(len(path), 0, -1):
         if tuple(path[:length]) in known:
             return known[tuple(path[:length])]
@@ -53,7 +53,7 @@ def line_of(path: Sequence[str | int], known: Mapping[Path, int]) -> int | None:
 
 
 def _statements(text: str) -> Iterator[tuple[int, str]]:
-    """Yield every key with its value, and every header, with the line where it begins."""
+    """Yield the line and the text of each header and of each key with its value."""
     line, first, begin, depth = 1, 1, 0, 0
     for piece in _PIECE.finditer(text + "\n"):
         token = piece[0]
@@ -65,7 +65,7 @@ def _statements(text: str) -> Iterator[tuple[int, str]]:
 
 
 def _keys(statement: str) -> list[str]:
-    """Return the keys of a header, or of a key with a value that is no table."""
+    """Return the parts of the dotted key in a header, or in ``key = 0``."""
     keys = []
     data = tomllib.loads(statement)
     while isinstance(data, dict) and data:
@@ -87,4 +87,5 @@ def _opened(keys: Sequence[str], counts: dict[Path, int], array: bool) -> Path:
 
 
 def _last(path: Path, counts: Mapping[Path, int]) -> Path:
+    """Return the path of the last table of an array, or the path itself if it is no array."""
     return (*path, counts[path] - 1) if path in counts else path

@@ -1,9 +1,9 @@
-"""Quantities as people write them: ``0.1 mm``, ``7.8 g/cm3``, ``shuttle.width/2 + 3 mm``.
+"""Read quantities with units: ``0.1 mm``, ``7.8 g/cm3``, ``shuttle.width/2 + 3 mm``.
 
-A number without a unit is in SI.  A unit is a product of powers, ``kg.m2``, ``g mm2``, ``N.m``,
-over others, ``N/m``, ``m/s2``, ``1/s``; a power is the digits after the symbol.  Angles have a
-dimension of their own here, so that an angle is not taken for a plain number.  Numbers are
-converted as decimals: ``0.1 mm`` is the double that 1e-4 is.
+Numbers without a unit are in SI.  Units are products of powers, ``kg.m2``, ``g mm2``, ``N.m``,
+and quotients, ``N/m``, ``m/s2``, ``1/s``.  Powers are written as digits after the symbol.  Angles
+have a dimension, so that an angle is not accepted as a dimensionless number.  Numbers are
+converted as decimals: ``0.1 mm`` and ``1e-4`` give the same double.
 """
 
 import math
@@ -15,7 +15,7 @@ from typing import Any
 from ..base.errors import MechanismError
 from ..mechanism.expressions import Quantity, affine
 
-LONGEST_TEXT = 1000  # characters of an expression
+EXPRESSION_LENGTH_MAX = 1000  # characters
 COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
 )  # fmt: skip
@@ -44,10 +44,10 @@ watt = joule / second = W
 hertz = 1 / second = Hz
 """
 DEFINITIONS = f"""{MECHANICAL}tera- = 1e12 = T-
-"""  # an engineer's mechanism needs no more, and pint's own list makes a metre of a misprint
+"""  # Pint's own list of units has names that are likely misprints of these.
 KNOWN = "m, g, s, N, Nm, Pa, J, W, Hz, rad, deg, with SI prefixes, joined as in kg/m3 or N.m"
 
-_NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # atomic: 1e3 is not 1 of the unit e3
+_NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # Atomic: 1e3 is not 1 with the unit e3.
 _POWER = r"[A-Za-zµμ°]+(?:\^?-?\d+)?"
 _PRODUCT = rf"{_POWER}(?:(?:\s*[.*·⋅]\s*|\s+){_POWER})*"
 _UNIT = rf"{_PRODUCT}(?:\s*/\s*{_POWER})*"
@@ -62,14 +62,14 @@ def quantity(written: object, unit: str) -> Quantity:
     Parameters
     ----------
     written : float or str
-        What is in the file.
+        Value in the file.
     unit : str
         Unit of the result, for instance ``kg.m2``; empty if dimensionless.
 
     Raises
     ------
     MechanismError
-        If it is none of them, or measures something else.
+        If it is none of the three, or has another dimension.
 
     Examples
     --------
@@ -80,7 +80,7 @@ def quantity(written: object, unit: str) -> Quantity:
     """
     if not isinstance(written, str):
         if isinstance(written, bool) or not isinstance(written, int | float):
-            raise MechanismError("write a number, or an expression in parameters as a text")
+            raise MechanismError("write a number, or an expression in parameters in quotes")
         return _finite(written)
     text = _short(written)
     plain = _PLAIN.fullmatch(text)
@@ -93,7 +93,7 @@ def number(written: object, unit: str) -> float:
     Raises
     ------
     MechanismError
-        If it is anything else, or measures something else.
+        If it is neither, or has another dimension.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def converted(value: str, unit: str, wanted: str) -> float:
     Raises
     ------
     MechanismError
-        If a unit is unknown, the two measure different things or the number is too large.
+        If a unit is unknown, the two have different dimensions, or the result is too large.
 
     Examples
     --------
@@ -124,7 +124,7 @@ def converted(value: str, unit: str, wanted: str) -> float:
     """
     written = _unit(unit)
     if written.dimensionality != _unit(wanted).dimensionality:
-        raise MechanismError(f"{unit!r} is the unit of something else; {_advice(wanted)}")
+        raise MechanismError(f"the unit {unit!r} has another dimension; {_advice(wanted)}")
     try:
         result = _registry().Quantity(Decimal(value), written).to(_unit(wanted)).magnitude
     except ArithmeticError:
@@ -133,7 +133,7 @@ def converted(value: str, unit: str, wanted: str) -> float:
 
 
 def same_dimension(unit: str, other: str) -> bool:
-    """Return whether two units measure the same.
+    """Return whether two units have the same dimension.
 
     Raises
     ------
@@ -144,7 +144,12 @@ def same_dimension(unit: str, other: str) -> bool:
 
 
 def si_unit(written: str) -> str:
-    """Return the SI unit of what is written, empty if there is none.
+    """Return the SI unit of a number with a unit, an empty text for other texts.
+
+    Raises
+    ------
+    MechanismError
+        If the unit is unknown.
 
     Examples
     --------
@@ -157,7 +162,7 @@ def si_unit(written: str) -> str:
 
 
 def check_coherent(unit: str) -> None:
-    """Refuse a unit that is not the one that its kind of quantity has in SI.
+    """Reject a unit other than the SI unit of its dimension.
 
     Raises
     ------
@@ -168,14 +173,14 @@ def check_coherent(unit: str) -> None:
         return
     factor = _registry().Quantity(Decimal(1), _unit(unit)).to_root_units().magnitude
     mass = _unit(unit).dimensionality.get("[mass]", 0)
-    if factor != Decimal(1000) ** mass:  # the root unit is the gram
+    if factor != Decimal(1000) ** mass:  # Pint's root unit is the gram.
         raise MechanismError(
-            'parameters are in SI; write the unit after the number instead, value = "40 mm"'
+            'not an SI unit; write the unit after the number instead, as in value = "40 mm"'
         )
 
 
 def _expression(text: str, unit: str) -> str:
-    """Return an expression with its numbers with units as numbers in the wanted unit."""
+    """Return an expression in which numbers with units are numbers in the given unit."""
     plain = _LITERAL.sub(lambda m: _written(converted(m[1], m[2], unit)), text)
     affine(plain)
     if plain != text:
@@ -184,27 +189,30 @@ def _expression(text: str, unit: str) -> str:
 
 
 def _check_terms(text: str) -> None:
-    """Refuse products of a unit with a parameter or a unit: their dimension is another one."""
+    """Reject products of a number with a unit and a parameter, which change the dimension."""
     try:
         affine(_LITERAL.sub(lambda m: f"({m[1]} * written.unit)", text))
     except MechanismError:
         raise MechanismError(
-            f"cannot read the expression {text[:80]!r}: a number with a unit is a term of a sum; "
-            "write a factor in SI, without its unit"
+            f"cannot read the expression {text[:80]!r}: a number with a unit must be a term of a "
+            "sum; write factors without units, in SI"
         ) from None
 
 
 def _written(value: float) -> str:
+    """Return a number as it is written in an expression, negative ones in parentheses."""
     return repr(value) if value >= 0 else f"({value!r})"
 
 
 def _short(text: str) -> str:
-    if len(text) > LONGEST_TEXT:
-        raise MechanismError(f"write an expression of at most {LONGEST_TEXT} characters")
+    """Return a text without outer blanks and superscripts; reject a long one."""
+    if len(text) > EXPRESSION_LENGTH_MAX:
+        raise MechanismError(f"write an expression of at most {EXPRESSION_LENGTH_MAX} characters")
     return text.strip().translate(_SUPERSCRIPTS)
 
 
 def _finite(value: float | Decimal) -> float:
+    """Return a number as a finite float; reject other numbers."""
     try:
         result = float(value)
     except OverflowError:
@@ -215,13 +223,14 @@ def _finite(value: float | Decimal) -> float:
 
 
 def _advice(unit: str) -> str:
+    """Return the remedy for a wrong dimension."""
     return f"write a quantity in {unit}" if unit else "write a number without a unit"
 
 
 @cache
 def _registry() -> Any:
-    """Return the units, made when the first one is met."""
-    import pint  # here, because it takes a third of a second
+    """Return pint's registry of these units, created at the first call."""
+    import pint  # imported here because the import takes 0.3 s
 
     registry: Any = pint.UnitRegistry(None, non_int_type=Decimal)
     registry.load_definitions(DEFINITIONS.strip().splitlines())
@@ -230,8 +239,8 @@ def _registry() -> Any:
 
 @cache
 def _unit(text: str) -> Any:
-    """Return pint's unit for a unit as it is written here."""
-    import pint  # here, because it takes a third of a second
+    """Return pint's unit for a written unit."""
+    import pint  # imported here because the import takes 0.3 s
 
     powers = re.sub(r"(?<=[A-Za-zµμ°])\^?(-?\d+)", r"**\1", text)
     product = re.sub(r"\s*[·⋅.]\s*|(?<=[\wµμ°])\s+(?=[A-Za-zµμ°])", "*", powers.strip())
@@ -239,4 +248,4 @@ def _unit(text: str) -> Any:
     try:
         return _registry().parse_units(product)
     except (pint.PintError, ValueError, ArithmeticError, TypeError, AttributeError):
-        raise MechanismError(f"the unit {text!r} is unknown; known are {KNOWN}") from None
+        raise MechanismError(f"the unit {text!r} is unknown; known units are {KNOWN}") from None
