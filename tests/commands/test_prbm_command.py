@@ -522,10 +522,10 @@ def without(start: int, end: int):
 GOOD = ("t [s],x [m]", TIME, SWING)
 MALFORMED = {
     "no file": (None, FREQUENCY, "data.csv: cannot be read"),
-    "empty": ("", FREQUENCY, "is empty: export the record again"),
-    "a picture": ("\x89PNG\x00\x01", FREQUENCY, "is no text but binary data"),
-    "prose": ("what we\nmeasured\nyesterday\n", FREQUENCY, "is no table"),
-    "no such column": (text(*GOOD), f"{FREQUENCY} --column y", "there is no column 'y'; columns"),
+    "empty": ("", FREQUENCY, "empty file: export the record again"),
+    "a picture": ("\x89PNG\x00\x01", FREQUENCY, "data.csv: binary data"),
+    "prose": ("what we\nmeasured\nyesterday\n", FREQUENCY, "not a table"),
+    "no such column": (text(*GOOD), f"{FREQUENCY} --column y", "unknown column 'y'; columns"),
     "a misprinted column": (
         text("t [s],laser [m]", TIME, SWING), f"{FREQUENCY} --column lasr", "mean 'laser'?"
     ),
@@ -537,9 +537,9 @@ MALFORMED = {
     "a gap": (text(*GOOD, change=without(50, 80)), FREQUENCY, "line 51: a gap of 0.155 s follows"),
     "not a number": (text(*GOOD, change=replaced(9, "0.04,nan")), FREQUENCY, "line 10, column 'x'"),
     "an empty cell": (text(*GOOD, change=replaced(9, "0.04,")), FREQUENCY, "line 10: 1 values for"),
-    "a word": (text(*GOOD, change=replaced(9, "0.04,late")), FREQUENCY, "'late' is no number"),
+    "a word": (text(*GOOD, change=replaced(9, "0.04,late")), FREQUENCY, "'late' is not a number"),
     "a unit in a cell": (
-        text(*GOOD, change=replaced(9, "0.04,1.2 mm")), FREQUENCY, "has a unit of its own"
+        text(*GOOD, change=replaced(9, "0.04,1.2 mm")), FREQUENCY, "has a unit: write"
     ),
     "time that stands still": (
         text(*GOOD, change=replaced(9, "0.035,0.1")), FREQUENCY, "equals that of the row above"
@@ -551,17 +551,17 @@ MALFORMED = {
     "cut too short": (text(*GOOD), f"{FREQUENCY} --to 20ms", "are too few to evaluate"),
     "cut away": (
         text(*GOOD), f"{FREQUENCY} --from 20",
-        "nothing of x is left from 20 s on: the record is from 0 s to 1.995 s; choose a start",
+        "x has no samples from 20 s on: choose a start and a later end between 0 s and 1.995 s",
     ),
-    "cut away before": (text(*GOOD), f"{FREQUENCY} --to -1", "nothing of x is left up to -1 s: "),
+    "cut away before": (text(*GOOD), f"{FREQUENCY} --to -1", "x has no samples up to -1 s: "),
     "cut the wrong way": (
-        text(*GOOD), f"{FREQUENCY} --from 1.5 --to 1", "is left from 1.5 s to 1 s: the record is"
+        text(*GOOD), f"{FREQUENCY} --from 1.5 --to 1", "no samples from 1.5 s to 1 s: choose"
     ),
     "nothing is bent": (
         text("d [mm],F [N]", 0 * TIME + 0.5, SWING), MODULUS,
-        "the deflection does not change, it is 0.0005 m throughout: take the column",
+        "the deflection does not change, it is 0.0005 m throughout: choose the col",
     ),
-    "nothing moves": (text("t [s],x [m]", TIME, 0 * TIME + 1), FREQUENCY, "nothing vibrates"),
+    "nothing moves": (text("t [s],x [m]", TIME, 0 * TIME + 1), FREQUENCY, "x does not change: "),
     "one swing": (text("t [s],x [m]", TIME / 40, SWING), f"{FREQUENCY} --to 8ms", "or less in"),
     "another unit": (
         text("t [s],x [N]", TIME, SWING), RESTITUTION, "no column in m or a multiple of it can be"
@@ -570,13 +570,13 @@ MALFORMED = {
         text("t [s],x [N]", TIME, SWING), f"{RESTITUTION} --column x", "is in N, but m was expected"
     ),
     "no unit": (
-        text("t [s],x", TIME, SWING), f"{RESTITUTION} --column x", 'no unit: give it, --unit "x=m"'
+        text("t [s],x", TIME, SWING), f"{RESTITUTION} --column x", 'give its unit, --unit "x=m"'
     ),
     "an unknown unit": (
-        text("t [s],x [furlong]", TIME, SWING), f"{RESTITUTION} --column x", "which is unknown"
+        text("t [s],x [furlong]", TIME, SWING), f"{RESTITUTION} --column x", "the unknown unit"
     ),
-    "an unknown unit, given": (text(*GOOD), f"{FREQUENCY} --unit x=ell", "'ell' given for 'x' is"),
-    "a unit of no column": (text(*GOOD), f"{FREQUENCY} --unit y=m", "'y', which is no column"),
+    "an unknown unit, given": (text(*GOOD), f"{FREQUENCY} --unit x=ell", "'ell' of 'x' is"),
+    "a unit of no column": (text(*GOOD), f"{FREQUENCY} --unit y=m", "the unknown column 'y'"),
     "no unit after the sign": (text(*GOOD), f"{FREQUENCY} --unit x", "--unit x: write NAME=TEXT"),
     "millimetres as metres": (
         text("t [s],x [m]", TIME, 1e3 * SWING), RESTITUTION, "check the unit of the column"
@@ -590,9 +590,9 @@ MALFORMED = {
     ),
     "no impact": (text(*GOOD), RESTITUTION, "no impact in the record"),
     "no head": (
-        text(*GOOD, change=without(0, 1)), FREQUENCY, 'give --columns "t [s]" "x [mm]" and the like'
+        text(*GOOD, change=without(0, 1)), FREQUENCY, 'for instance --columns "t [s]" "x [mm]"'
     ),
-    "too many names": (text(*GOOD), f"{FREQUENCY} --columns 't [s]'", "1 names were given for 2"),
+    "too many names": (text(*GOOD), f"{FREQUENCY} --columns 't [s]'", "1 names for 2"),
     "no force": (text("d [mm],x [mm]", TIME, SWING), MODULUS, "can all be the deflection"),
     "volts for a force": (text("d [mm],F [V]", TIME, SWING), MODULUS, "no column in N or a multip"),
     "longer than the beam": (text("d [m],F [N]", TIME, SWING), MODULUS, "is longer than the beam"),

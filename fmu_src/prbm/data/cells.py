@@ -1,4 +1,4 @@
-"""Cells of a table of measured data, and the table before units are applied."""
+"""Cells of a table of measured data, and the table as text."""
 
 import csv
 import re
@@ -17,20 +17,20 @@ SUFFIX = re.compile(r"(.*\S)\s*(?:/\s*|,\s+|\s+in\s+)(\S+)")
 
 @dataclass(frozen=True)
 class Table:
-    """A table as text: its cells, before they become numbers and units are applied.
+    """A table as text, before its cells are converted to numbers and units are applied.
 
     Parameters
     ----------
     heads : list of (str, str)
-        Name and unit of each column; empty if the caller gives them.
+        Name and unit of each column; empty if the names are given by the caller.
     lines : list of int
-        The line of the file that each row comes from.
+        Line of each row in the file, from 1.
     rows : list of list of str
-        The cells.
+        Cells of each row.
     decimal : str
-        The decimal sign.
+        Decimal sign.
     comments : tuple of str
-        The lines above the table, without marks of comments.
+        Lines above the table, without marks of comments.
     """
 
     heads: list[tuple[str, str]]
@@ -41,7 +41,7 @@ class Table:
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
-    """Return the cells of a line, without empty ones at its end."""
+    """Return the cells of a line, without empty cells at its end."""
     if delimiter == " ":
         cells = line.split()
     elif '"' in line:
@@ -55,7 +55,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
 
 
 def is_number(cell: str, decimal: str) -> bool:
-    """Return whether a cell is a number with a decimal sign, or with none.
+    """Return whether a cell is a number with the decimal sign, or without one.
 
     Examples
     --------
@@ -70,7 +70,7 @@ def is_number(cell: str, decimal: str) -> bool:
 
 
 def is_data(cells: list[str], decimal: str) -> bool:
-    """Return whether cells are a row of the table: numbers, or marks of missing ones."""
+    """Return whether cells are a row of the table: numbers, or marks of missing numbers."""
     numbers = sum(is_number(cell, decimal) for cell in cells)
     return numbers > 0 and all(
         is_number(cell, decimal) or cell.lower() in MISSING for cell in cells
@@ -78,7 +78,7 @@ def is_data(cells: list[str], decimal: str) -> bool:
 
 
 def name_and_unit(head: str) -> tuple[str, str]:
-    """Return name and unit of the head of a column.
+    """Return the name and the unit in the head of a column.
 
     Examples
     --------

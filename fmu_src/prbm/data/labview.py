@@ -1,4 +1,4 @@
-"""LabVIEW measurement files (``.lvm``), versions 0.9 to 2, one segment."""
+"""LabVIEW measurement files (``.lvm``), versions 0.9 to 2, with one segment."""
 
 from collections.abc import Mapping
 
@@ -9,12 +9,18 @@ LVM, LVM_END = "LabVIEW Measurement", "***End_of_Header***"
 
 
 def labview_table(source: str, lines: list[str]) -> Table:
-    """Return the table of a LabVIEW measurement file of one segment."""
+    """Return the table of a LabVIEW measurement file with one segment.
+
+    Raises
+    ------
+    RecordError
+        If the header is incomplete, or the file has several segments or several X columns.
+    """
     ends = [i for i, line in enumerate(lines) if line.startswith(LVM_END)]
     if len(ends) != 2 or ends[1] + 2 >= len(lines):
         raise RecordError(
-            f"{source}: a LabVIEW measurement file of one segment has two lines {LVM_END} above "
-            f"its numbers, this one has {len(ends)}: export one segment a file, with a header"
+            f"{source}: a LabVIEW measurement file of one segment has two lines {LVM_END}, this "
+            f"one has {len(ends)}: export one segment per file, with its header"
         )
     between = "\t" if "Tab" in " ".join(lines[: ends[0]]) else ","
     tags = {
@@ -24,13 +30,13 @@ def labview_table(source: str, lines: list[str]) -> Table:
     axes = tags.get("X_Columns", ["One"])[0]
     if axes not in ("No", "One"):
         raise RecordError(
-            f"{source}: X_Columns is {axes}, a time for every channel: export with one X column"
+            f"{source}: X_Columns is {axes}, one for each channel: export with one X column"
         )
     try:
         channels = int(tags["Channels"][0])
     except (KeyError, IndexError, ValueError):
         raise RecordError(
-            f"{source}: the header does not say how many Channels there are"
+            f"{source}: the header has no number of Channels: export the file again"
         ) from None
     names = [cell.strip() for cell in lines[ends[1] + 1].split(between)][1 : channels + 1]
     if len(names) < channels:
@@ -57,12 +63,12 @@ def labview_table(source: str, lines: list[str]) -> Table:
 def _count_times(
     source: str, rows: list[list[str]], tags: Mapping[str, list[str]], decimal: str
 ) -> None:
-    """Write X0 + i Delta_X into the first, empty cells."""
+    """Write the times X0 + i Delta_X into the first cell of each row, which is empty."""
     try:
         start, step = (float(tags[key][0].replace(",", ".")) for key in ("X0", "Delta_X"))
     except (KeyError, IndexError, ValueError):
         raise RecordError(
-            f"{source}: there is no X column, nor X0 and Delta_X to count it: export with X column"
+            f"{source}: neither an X column nor X0 and Delta_X: export with an X column"
         ) from None
     for i, row in enumerate(rows):
         row[0] = repr(start + i * step).replace(".", decimal)
