@@ -42,7 +42,7 @@ def test_the_pieces_are_a_mechanism_file(tmp_path: Path) -> None:
 
 def test_stretching_matters_to_the_impact_of_the_lever_as_the_page_says(tmp_path: Path) -> None:
     lever = read_mechanism(write_file(tmp_path))
-    said = re.search(r"lever of this page goes from ([\d.]+) to ([\d.]+):", PAGE)
+    said = re.search(r"lever of this page goes from (\d\.\d+) to (\d\.\d+)", PAGE)
     assert said is not None
     as_it_is, stretched = map(float, said.groups())
     (told,) = notes(lever, {})

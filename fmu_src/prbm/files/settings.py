@@ -71,7 +71,7 @@ def quantities(texts: Sequence[str], unit: str, option: str) -> list[float]:
     Raises
     ------
     UserMistake
-        If a quantity is invalid, or some have a unit and others, other than 0, have none.
+        If a quantity is invalid, or only some of the numbers other than 0 have a unit.
 
     Examples
     --------

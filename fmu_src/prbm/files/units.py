@@ -69,7 +69,7 @@ def quantity(written: object, unit: str) -> Quantity:
     Raises
     ------
     MechanismError
-        If it is none of the three, or has another dimension.
+        If it is not one of these, or has another dimension.
 
     Examples
     --------
