@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import os.path
 import re
 import reprlib
 import tomllib
@@ -15,17 +16,17 @@ from pydantic import ValidationError
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import DictSchema, NullableSchema, TupleSchema, WithDefaultSchema
 
+from ..base import reading
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
 from ..mechanism.description import Mechanism
 from .schema import NAME_LENGTH_MAX, TAGS, MechanismTable, Table, mechanism
-from .toml_lines import line_of, lines
+from .toml_lines import key_length, line_of, lines
 
 Item = TypeVar("Item")
 FILE_SIZE_MAX = 1 << 20  # bytes; a mechanism of a hundred flexures has 20 kB.
 PROBLEMS_MAX = 5  # Problems of one file in a message.
-# Keys of 100 parts and more; the time that tomllib needs for a key grows faster than its length.
-DEEP_KEY = re.compile(r"(?<![\w'\"-])(?:[\w'\"-]+\s*\.\s*){100}")
+KEY_LENGTH_MAX = 100  # Parts of a dotted key; tomllib needs more than linear time for longer ones.
 DIALECT = "http://json-schema.org/draft-07/schema#"  # The latest that TOML editors support.
 REMEDIES = {  # Remedy for each of pydantic's error types.
     "int_type": "write a whole number",
@@ -60,19 +61,19 @@ def read_mechanism(path: str | Path) -> Mechanism:
         names the file, the line if there is one, and the key.
     """
     path = Path(path)
+    content = reading.content(path, FILE_SIZE_MAX, MechanismError)
     try:
-        text = _text(path)
-        data = tomllib.loads(text)
-    except MechanismError:
-        raise
-    except OSError as error:
-        raise MechanismError(f"{path}: cannot be read ({error.strerror})") from None
+        text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+        deep = key_length(text, KEY_LENGTH_MAX + 1) > KEY_LENGTH_MAX
+        data = None if deep else tomllib.loads(text)
     except RecursionError:
-        raise MechanismError(f"{path}: its tables, lists or keys are nested too deeply") from None
+        data = None
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise MechanismError(f"{path}: not a TOML file ({error})") from None
     except ValueError:
         raise MechanismError(f"{path}: a number has thousands of digits; round it") from None
+    if data is None:
+        raise MechanismError(f"{path}: its tables, lists or keys are nested too deeply")
     try:
         return mechanism(MechanismTable.model_validate(data), drawing(text))
     except ValidationError as error:
@@ -82,20 +83,6 @@ def read_mechanism(path: str | Path) -> Mechanism:
         problems = _first_by_line([(_place(str(error), data), str(error))], text)
     messages = (f"line {line}: {message}" if line else message for line, message in problems)
     raise MechanismError("\n".join(f"{path}: {message}" for message in messages))
-
-
-def _text(path: Path) -> str:
-    """Return the text of a file with Unix line ends; reject large files and deep keys."""
-    with path.open("rb") as file:
-        content = file.read(FILE_SIZE_MAX + 1)
-    if len(content) > FILE_SIZE_MAX:
-        raise MechanismError(
-            f"{path}: larger than {FILE_SIZE_MAX} bytes; check that it is a mechanism file"
-        )
-    text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    if DEEP_KEY.search(text):
-        raise MechanismError(f"{path}: its tables, lists or keys are nested too deeply")
-    return text
 
 
 def drawing(text: str) -> str:
@@ -141,9 +128,9 @@ def load(name: str | Path) -> Mechanism:
     name, files = str(name), shipped()
     if name in files:
         return read_mechanism(files[name])
-    if Path(name).is_dir():
+    if os.path.isdir(name):
         raise ParameterError(f"{name!r} is a folder; give a mechanism file in it")
-    if not Path(name).suffix and not Path(name).is_file():
+    if not Path(name).suffix and not os.path.isfile(name):
         raise ParameterError(
             f"unknown mechanism {name!r} (mechanism files end in .toml); {proposal(name, files)}"
         )
