@@ -1,5 +1,6 @@
 """Mechanism files: values with units, defaults, messages for mistakes, schema and page."""
 
+import contextlib
 import copy
 import json
 import math
@@ -18,7 +19,7 @@ import pytest
 from mechanism_mistakes import CHANGES, CONTENTS, EXAMPLE
 from prbm.base.errors import MechanismError, PrbmError
 from prbm.commands import building as cli
-from prbm.files import units
+from prbm.files import record_units, units
 from prbm.files.mechanism_file import read_mechanism, schema, shipped
 from prbm.files.schema import MechanismTable
 from prbm.files.toml_lines import line_of, lines
@@ -108,7 +109,6 @@ def test_a_number_with_a_unit_is_read_as_a_quantity(written, unit, expected):
 @pytest.mark.parametrize(
     ("written", "expected"),
     [
-        ("1e3", "1e3"),
         ("a.b/2", "a.b/2"),
         ("2*(a + 3 mm)", "2*(a + 0.003)"),
         ("a-3mm", "a-0.003"),
@@ -138,7 +138,7 @@ def test_only_numbers_with_units_are_replaced_in_an_expression(written, expected
         ("1e999999999999 m", "finite"),
         ("a + 1e999 m", "finite"),
         ("3 m2", "another dimension"),
-        ("3 m999999999", "another dimension"),
+        ("3 m999999999", "is unknown"),
         ("3 if", "unknown"),
         ("3 deg", "another dimension"),
         ("a" * 2000, "at most 1000 characters"),
@@ -152,6 +152,51 @@ def test_only_numbers_with_units_are_replaced_in_an_expression(written, expected
 def test_invalid_lengths_are_rejected(written, words):
     with pytest.raises(MechanismError, match=words):
         units.quantity(written, "m")
+
+
+@pytest.mark.parametrize(
+    "text", ["12", " 1e-3 ", "+12", "-(3)", "24/2", "2*6", "3 mm + 1", "2*(a + 3 mm) - 0.5"]
+)
+def test_numbers_in_quotes_without_a_unit_are_rejected(text):
+    """They may be meant in another unit than SI."""
+    with pytest.raises(MechanismError, match="has no unit: write a unit after each number"):
+        units.quantity(text, "m")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("0.6", ""), ("1/3", ""), ("0", "m"), ("a + 12", "m"), ("3 mm/2 - a", "m")]
+)
+def test_dimensionless_numbers_zero_and_terms_beside_parameters_need_no_unit(text, unit):
+    units.quantity(text, unit)
+
+
+HOSTILE_UNITS = (
+    "m)", "( m", "m**-", "m^", "()", "m()", "1/", "/", "m\u0663", "\U0001f600", "m^0.5", "m0",
+    "km999999999", "g999999999", "m" * 3000, "m*" * 3000 + "m", "m*" + "-" * 5000 + "s",
+    "(" * 90 + "m", "m**9**9**9", "__import__('os')", "if", "m#", "m\n", "m\0", "degC2", "degC.m",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", HOSTILE_UNITS)
+def test_invalid_units_raise_errors_of_the_package(unit, tmp_path):
+    """In all functions that read units, in a mechanism file, and in the head of a record."""
+    for read_unit in (
+        units.check_coherent,
+        lambda text: units.converted("1", text, "m"),
+        lambda text: units.quantity(f"3 {text}", "m"),
+        lambda text: units.si_unit(f"3 {text}"),
+    ):
+        with contextlib.suppress(MechanismError):
+            read_unit(unit)
+    if record_units.is_unit(unit):
+        assert math.isfinite(math.hypot(*record_units.in_si(unit)))
+        assert record_units.si_unit(unit)
+    for old, new in (
+        ("= 0.5", f"= 5\nunit = {json.dumps(unit)}"),
+        ('"40 mm"', json.dumps(f"4 {unit}")),
+    ):
+        with contextlib.suppress(MechanismError):
+            read(tmp_path, EXAMPLE.replace(old, new))
 
 
 def test_an_angle_is_not_dimensionless():

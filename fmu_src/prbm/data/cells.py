@@ -2,17 +2,18 @@
 
 import csv
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from ..files.record_units import is_unit
+from ..files.units import UNIT_LENGTH_MAX
 
 MISSING = frozenset(
     ("", "nan", "inf", "+inf", "-inf", "-", "--", "na", "n/a", "#n/a", "null", "none", "ol",
      "over", "overflow", "∞", "-∞", "1.#qnan", "#div/0!", "#wert!", "#value!")
 )  # fmt: skip
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
-BRACKETS = re.compile(r"(.*?)\s*/?\s*(?:\[([^\[\]]*)\]|\(([^()]*)\))\s*")
-SUFFIX = re.compile(r"(.*\S)\s*(?:/\s*|,\s+|\s+in\s+)(\S+)")
+OPENING = {"]": "[", ")": "("}
 
 
 @dataclass(frozen=True)
@@ -44,14 +45,20 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     """Return the cells of a line, without empty cells at its end."""
     if delimiter == " ":
         cells = line.split()
-    elif '"' in line:
-        cells = next(csv.reader([line.strip("\r\n")], delimiter=delimiter, skipinitialspace=True))
     else:
-        cells = line.split(delimiter)
+        cells = _quoted(line, delimiter) if '"' in line else line.split(delimiter)
     cells = [cell.strip() for cell in cells]
     while cells and not cells[-1]:
         cells.pop()
     return cells
+
+
+def _quoted(line: str, delimiter: str) -> list[str]:
+    """Return the cells of a line with quoted cells."""
+    try:
+        return next(csv.reader([line.strip("\r\n")], delimiter=delimiter, skipinitialspace=True))
+    except csv.Error:  # a cell longer than the limit of the csv module
+        return line.split(delimiter)
 
 
 def is_number(cell: str, decimal: str) -> bool:
@@ -84,16 +91,31 @@ def name_and_unit(head: str) -> tuple[str, str]:
     --------
     >>> [name_and_unit(head) for head in ("t [s]", "time (ms)", "Force/N", "v / (m/s)")]
     [('t', 's'), ('time', 'ms'), ('Force', 'N'), ('v', 'm/s')]
-    >>> [name_and_unit(head) for head in ("Load, N", "x in mm")]
-    [('Load', 'N'), ('x', 'mm')]
+    >>> [name_and_unit(head) for head in ("Load, N", "x in mm", "v in m/s", "v/m/s")]
+    [('Load', 'N'), ('x', 'mm'), ('v', 'm/s'), ('v', 'm/s')]
     >>> name_and_unit("force (filtered) / mN"), name_and_unit("ratio/total"), name_and_unit("Ch1")
     (('force (filtered)', 'mN'), ('ratio/total', ''), ('Ch1', ''))
     """
-    found = BRACKETS.fullmatch(head)
-    if found and found[1]:
-        unit = found[2] if found[2] is not None else found[3]
-        return found[1].strip(), unit.strip() or "-"
-    found = SUFFIX.fullmatch(head)
-    if found and is_unit(found[2]):
-        return found[1].strip(), found[2]
-    return head, ""
+    text = head.strip()
+    closing = text[-1:]
+    if closing in OPENING:
+        name, bracket, unit = text[:-1].rpartition(OPENING[closing])
+        name = name.rstrip().removesuffix("/").rstrip()
+        if bracket and name and closing not in unit:
+            return name, unit.strip() or "-"
+    splits = ((name, unit) for name, unit in _splits(text) if name and is_unit(unit))
+    return next(splits, (head, ""))
+
+
+def _splits(head: str) -> Iterator[tuple[str, str]]:
+    """Yield the possible names and units in a head without brackets, the longest unit first."""
+    *before, last = head.rsplit(maxsplit=1) or [""]
+    if len(last) > UNIT_LENGTH_MAX:
+        return
+    name = before[0] if before else ""
+    if name.endswith((",", "/")):
+        yield name[:-1].rstrip(), last
+    elif name.endswith("in") and name[-3:-2].isspace():
+        yield name[:-2].rstrip(), last
+    for slash in (i for i, c in enumerate(last) if c == "/"):
+        yield f"{name} {last[:slash]}".strip(), last[slash + 1 :]

@@ -26,18 +26,22 @@ def labview_table(source: str, lines: list[str]) -> Table:
     tags = {
         cells[0]: cells[1:] for cells in (cells_of(x, between) for x in lines[: ends[1]]) if cells
     }
-    decimal = tags.get("Decimal_Separator", ["."])[0]
-    axes = tags.get("X_Columns", ["One"])[0]
+    decimal = _value(tags, "Decimal_Separator", ".")
+    if decimal not in (".", ","):
+        raise RecordError(
+            f"{source}: Decimal_Separator is {decimal!r}: export with a decimal point or comma"
+        )
+    axes = _value(tags, "X_Columns", "One")
     if axes not in ("No", "One"):
         raise RecordError(
             f"{source}: X_Columns is {axes}, one for each channel: export with one X column"
         )
     try:
-        channels = int(tags["Channels"][0])
-    except (KeyError, IndexError, ValueError):
-        raise RecordError(
-            f"{source}: the header has no number of Channels: export the file again"
-        ) from None
+        channels = int(_value(tags, "Channels", ""))
+    except ValueError:
+        channels = 0
+    if channels < 1:
+        raise RecordError(f"{source}: the header has no number of Channels: export the file again")
     names = [cell.strip() for cell in lines[ends[1] + 1].split(between)][1 : channels + 1]
     if len(names) < channels:
         raise RecordError(
@@ -46,7 +50,7 @@ def labview_table(source: str, lines: list[str]) -> Table:
         )
     units = tags.get("Y_Unit_Label", [])
     units = units + [""] * (channels - len(units))
-    is_time = tags.get("X_Dimension", ["Time"])[0] == "Time"
+    is_time = _value(tags, "X_Dimension", "Time") == "Time"
     heads = [("time" if is_time else "X_Value", "s" if is_time else "")]
     heads += list(zip(names, units[:channels], strict=True))
     numbers, rows = [], []
@@ -58,6 +62,11 @@ def labview_table(source: str, lines: list[str]) -> Table:
         _count_times(source, rows, tags, decimal)
     comments = tuple(line.strip() for line in lines[: ends[1]] if line.strip())
     return Table(heads, numbers, rows, decimal, comments)
+
+
+def _value(tags: Mapping[str, list[str]], key: str, default: str) -> str:
+    """Return the first value of a key in the header, or a default if it is missing."""
+    return (tags.get(key) or [default])[0]
 
 
 def _count_times(

@@ -23,6 +23,7 @@ invalid record names the file, the line, the column, the value and a remedy.
 """
 
 import difflib
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -31,6 +32,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import reading
 from ..files.record_units import KNOWN, in_si, is_unit, same_dimension, si_unit
 from ..mechanics.arrays import Real
 from .cells import MISSING, Table, is_number, name_and_unit
@@ -239,15 +241,7 @@ def read_record(
 
 def _text(path: Path) -> str:
     """Return the text of a file; reject large, empty and binary files."""
-    try:
-        size = path.stat().st_size
-        if size > FILE_SIZE_MAX:
-            raise RecordError(
-                f"{path.name}: {size} bytes exceed the limit of {FILE_SIZE_MAX}: split it"
-            )
-        data = path.read_bytes()
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read ({error.strerror})") from None
+    data = reading.content(path, FILE_SIZE_MAX, RecordError)
     if not data.strip():
         raise RecordError(f"{path.name}: empty file: export the record again")
     if data.startswith(b"PK\x03\x04") or data.startswith(b"\xd0\xcf\x11\xe0"):
@@ -326,10 +320,10 @@ def _quickly(table: Table, width: int) -> Real | None:
     if PLAIN_NUMBERS[table.decimal].fullmatch(text) is None:
         return None
     try:
-        numbers = list(map(float, text.replace(",", ".").split("\n")))
+        numbers = np.array(list(map(float, text.replace(",", ".").split("\n"))))
     except ValueError:
         return None
-    return np.array(numbers).reshape(-1, width)
+    return numbers.reshape(-1, width) if np.isfinite(numbers).all() else None
 
 
 def _parsed(source: str, heads: list[tuple[str, str]], table: Table) -> Iterator[list[float]]:
@@ -351,6 +345,11 @@ def _parsed(source: str, heads: list[tuple[str, str]], table: Table) -> Iterator
                 )
             text = cell.replace(table.decimal, ".").lower().replace("d", "e")
             row.append(float(text))
+            if math.isinf(row[-1]):
+                raise RecordError(
+                    f"{source}, line {number}, column {name!r}: {cell[:30]!r} is too large: "
+                    "correct or remove the line"
+                )
         yield row
 
 
@@ -371,4 +370,6 @@ def _channel(name: str, unit: str, values: Real) -> Channel:
     if not unit or not is_unit(unit):
         return Channel(name, unit, None, values)
     factor, offset = in_si(unit)
-    return Channel(name, unit, si_unit(unit), factor * values + offset)
+    with np.errstate(over="ignore"):
+        converted: Real = factor * values + offset
+    return Channel(name, unit, si_unit(unit), converted)

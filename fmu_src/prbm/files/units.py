@@ -8,6 +8,7 @@ converted as decimals: ``0.1 mm`` and ``1e-4`` give the same double.
 
 import math
 import re
+import reprlib
 from decimal import Decimal
 from functools import cache
 from typing import Any
@@ -16,6 +17,8 @@ from ..base.errors import MechanismError
 from ..mechanism.expressions import Quantity, affine
 
 EXPRESSION_LENGTH_MAX = 1000  # characters
+UNIT_LENGTH_MAX = 100  # characters
+EXPONENT_MAX = 20  # Exponent of a base unit; no quantity of mechanics has a larger one.
 COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
 )  # fmt: skip
@@ -48,7 +51,7 @@ DEFINITIONS = f"""{MECHANICAL}tera- = 1e12 = T-
 KNOWN = "m, g, s, N, Nm, Pa, J, W, Hz, rad, deg, with SI prefixes, joined as in kg/m3 or N.m"
 
 _NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # Atomic: 1e3 is not 1 with the unit e3.
-_POWER = r"[A-Za-zµμ°]+(?:\^?-?\d+)?"
+_POWER = r"[A-Za-zµμ°]+(?:\^?-?[0-9]+)?"
 _PRODUCT = rf"{_POWER}(?:(?:\s*[.*·⋅]\s*|\s+){_POWER})*"
 _UNIT = rf"{_PRODUCT}(?:\s*/\s*{_POWER})*"
 _PLAIN = re.compile(rf"([+-]?{_NUMBER})\s*((?:1?\s*/\s*)?{_UNIT})")
@@ -69,7 +72,8 @@ def quantity(written: object, unit: str) -> Quantity:
     Raises
     ------
     MechanismError
-        If it is not one of these, or has another dimension.
+        If it is not one of these, has another dimension, or has no unit although it is in quotes
+        and not dimensionless.
 
     Examples
     --------
@@ -182,9 +186,16 @@ def check_coherent(unit: str) -> None:
 def _expression(text: str, unit: str) -> str:
     """Return an expression in which numbers with units are numbers in the given unit."""
     plain = _LITERAL.sub(lambda m: _written(converted(m[1], m[2], unit)), text)
-    affine(plain)
+    expression = affine(plain)
     if plain != text:
         _check_terms(text)
+    if unit and (plain != text or not expression.terms):
+        without = affine(_LITERAL.sub("0", text)).constant
+        if without:
+            raise MechanismError(
+                f"{without:g} has no unit: write a unit after each number, as in "
+                f'"{without:g} {unit}", or a number in {unit} without quotes'
+            )
     return plain
 
 
@@ -239,13 +250,26 @@ def _registry() -> Any:
 
 @cache
 def _unit(text: str) -> Any:
-    """Return pint's unit for a written unit."""
-    import pint  # imported here because the import takes 0.3 s
-
-    powers = re.sub(r"(?<=[A-Za-zµμ°])\^?(-?\d+)", r"**\1", text)
+    """Return pint's unit for a written unit; reject an unknown one."""
+    powers = re.sub(r"(?<=[A-Za-zµμ°])\^?(-?[0-9]+)", r"**\1", text[: UNIT_LENGTH_MAX + 1])
     product = re.sub(r"\s*[·⋅.]\s*|(?<=[\wµμ°])\s+(?=[A-Za-zµμ°])", "*", powers.strip())
-    product = re.sub(r"^1?\s*/", "1/", product)
+    unit = parsed_unit(_registry(), re.sub(r"^1?\s*/", "1/", product))
+    if unit is None or len(text) > UNIT_LENGTH_MAX:
+        name = reprlib.repr(text)
+        raise MechanismError(f"the unit {name} is unknown; known units are {KNOWN}")
+    return unit
+
+
+def parsed_unit(registry: Any, text: str) -> Any:
+    """Return the unit of a registry of pint, None if it is unknown or not convertible to SI.
+
+    For invalid texts pint raises errors of many types, among them AssertionError, KeyError and
+    TokenError.
+    """
     try:
-        return _registry().parse_units(product)
-    except (pint.PintError, ValueError, ArithmeticError, TypeError, AttributeError):
-        raise MechanismError(f"the unit {text!r} is unknown; known units are {KNOWN}") from None
+        unit = registry.parse_units(text)
+        zero, one = (registry.Quantity(Decimal(x), unit).to_root_units().magnitude for x in (0, 1))
+        exponent = max(map(abs, unit.dimensionality.values()), default=0)
+        return unit if exponent <= EXPONENT_MAX and 0.0 < float(one - zero) < math.inf else None
+    except Exception:
+        return None
