@@ -386,6 +386,7 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     _check_names(file)
     materials = _materials(file)
     own = (flexure for flexure in file.flexures if flexure.type is None)
+    points = {body.name: body.points for body in file.bodies}
     same = ("name", "title", "description", "ground", "gravity", "damping_zeta", "damping_beta")
     result = Mechanism(
         **{key: getattr(file, key) for key in same},
@@ -393,9 +394,9 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
         flexure_types=tuple(_type(t, materials) for t in (*file.flexure_types, *own)),
         flexures=tuple(map(_flexure, file.flexures)),
         joints=tuple(parts.Joint(**dict(joint)) for joint in file.joints),
-        stops=tuple(parts.Stop(**_attached(stop, file)) for stop in file.stops),
-        frictions=tuple(parts.Friction(**_attached(part, file)) for part in file.frictions),
-        forces=tuple(parts.Force(**_attached(force, file)) for force in file.forces),
+        stops=tuple(parts.Stop(**_attached(stop, points)) for stop in file.stops),
+        frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
+        forces=tuple(parts.Force(**_attached(force, points)) for force in file.forces),
         probes=tuple(parts.Probe(**dict(probe)) for probe in file.probes),
         release=parts.Release(**dict(file.release)),
         geometry=tuple(_parameters(file)),
@@ -495,13 +496,13 @@ def _flexure(table: FlexureTable) -> parts.Flexure:
 
 
 def _attached(
-    table: StopTable | FrictionTable | ForceTable, file: MechanismTable
+    table: StopTable | FrictionTable | ForceTable, bodies: Mapping[str, Mapping[str, parts.Point]]
 ) -> dict[str, Any]:
     """Return the fields of a part; a point given by name is replaced by its coordinates."""
     given = dict(table)
     if isinstance(table.point, str):
         body, _, name = table.point.rpartition(".")
-        points = next((b.points for b in file.bodies if b.name == table.body), {})
+        points = bodies.get(table.body, {})
         if body != table.body or name not in points:
             raise MechanismError(
                 f"{table.name}.point = {table.point!r} is not a point of the body {table.body}; "
@@ -521,8 +522,9 @@ def _check_drawn(mechanism: Mechanism) -> None:
                 f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within "
                 f"{LENGTH_MAX:g} m of the origin"
             )
+    types = {kind.name: kind for kind in mechanism.flexure_types}
     for flexure in mechanism.flexures:
-        _check_slender(mechanism, flexure, values)
+        _check_slender(mechanism, flexure, types[flexure.type], values)
     for joint in mechanism.joints:
         apart = _distance(mechanism, joint, values)
         if apart > LENGTH_MIN:
@@ -533,7 +535,10 @@ def _check_drawn(mechanism: Mechanism) -> None:
 
 
 def _check_slender(
-    mechanism: Mechanism, flexure: parts.Flexure, values: Mapping[str, float]
+    mechanism: Mechanism,
+    flexure: parts.Flexure,
+    kind: parts.FlexureType,
+    values: Mapping[str, float],
 ) -> None:
     """Reject a flexure without length, or as thick as long, which is mostly a mistake of units."""
     length = _distance(mechanism, flexure, values)
@@ -542,7 +547,6 @@ def _check_slender(
             f"flexure {flexure.name} from {flexure.start} to {flexure.end} has zero length: move "
             "its ends apart"
         )
-    kind = next(kind for kind in mechanism.flexure_types if kind.name == flexure.type)
     thickness = parts.value(kind, "thickness", values)
     if thickness >= length:
         raise MechanismError(

@@ -11,8 +11,9 @@ and of FMI.
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from keyword import iskeyword
 
 from ..base.errors import MechanismError, ParameterError
@@ -208,10 +209,13 @@ class Mechanism:
                     f"the name {name!r} is used twice or reserved: give each part its own name"
                 )
             seen.add(name)
-        names = [p.name for p in self.parameters]
-        for name in names:
-            if names.count(name) > 1:
-                raise MechanismError(f"the parameter {name!r} is defined twice: rename one")
+        defined: set[str] = set()
+        for parameter in self.parameters:
+            if parameter.name in defined:
+                raise MechanismError(
+                    f"the parameter {parameter.name!r} is defined twice: rename one"
+                )
+            defined.add(parameter.name)
 
     def _check_references(self) -> None:
         """Reject undefined references and inconsistent parts."""
@@ -219,26 +223,27 @@ class Mechanism:
             raise MechanismError(f"{self.name} needs at least one body and one flexure")
         for kind in self.flexure_types:
             self._check_type(kind)
+        types = {kind.name: kind for kind in self.flexure_types}
         for flexure in self.flexures:
-            self._check_flexure(flexure)
+            self._check_flexure(flexure, types)
         for joint in self.joints:
             self._check_connection("joint", joint)
         for probe in self.probes:
             self.point(probe.point, probe.name)
-        self._check_attached([body.name for body in self.bodies])
+        self._check_attached({body.name: body for body in self.bodies})
         directed: tuple[Stop | Friction | Release, ...] = (*self.stops, *self.frictions)
         for one in (*directed, self.release):
             if not math.isfinite(one.direction):
                 raise MechanismError(f"{one.name}.direction = {one.direction} must be finite")
 
-    def _check_attached(self, bodies: Sequence[str]) -> None:
+    def _check_attached(self, bodies: Mapping[str, Body]) -> None:
         """Reject stops, friction, forces and a release at undefined bodies."""
         attached: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
         for part in attached:
             if part.body not in bodies:
                 raise MechanismError(_undefined(f"{part.name}.body", part.body, bodies))
         for stop in self.stops:
-            if stop.on not in (GROUND, *bodies):
+            if stop.on != GROUND and stop.on not in bodies:
                 raise MechanismError(_undefined(f"{stop.name}.on", stop.on, (GROUND, *bodies)))
             if stop.on == stop.body:
                 raise MechanismError(
@@ -273,15 +278,11 @@ class Mechanism:
                     f"coefficients are {', '.join(sorted(known)) or 'none'}"
                 )
 
-    def _check_flexure(self, flexure: Flexure) -> None:
+    def _check_flexure(self, flexure: Flexure, types: Mapping[str, FlexureType]) -> None:
         """Reject a flexure with an undefined type or point, or with inconsistent ends."""
-        kind = next((k for k in self.flexure_types if k.name == flexure.type), None)
+        kind = types.get(flexure.type)
         if kind is None:
-            raise MechanismError(
-                _undefined(
-                    f"{flexure.name}.type", flexure.type, [k.name for k in self.flexure_types]
-                )
-            )
+            raise MechanismError(_undefined(f"{flexure.name}.type", flexure.type, types))
         self._check_connection("flexure", flexure)
         ends = flexure.ends
         if len(ends) != 2 or any(end not in ENDS for end in ends):
@@ -317,7 +318,7 @@ class Mechanism:
             If the point is not defined.
         """
         owner, _, name = reference.rpartition(".")
-        points = {GROUND: self.ground} | {b.name: b.points for b in self.bodies}
+        points = self._points
         if owner not in points or name not in points[owner]:
             every = [f"{o}.{p}" for o, named in points.items() for p in named]
             raise MechanismError(
@@ -325,6 +326,11 @@ class Mechanism:
                 f"{', '.join(every)}"
             )
         return points[owner][name]
+
+    @cached_property
+    def _points(self) -> dict[str, Mapping[str, Point]]:
+        """Points of the ground and of the bodies, by owner."""
+        return {GROUND: self.ground} | {body.name: body.points for body in self.bodies}
 
     def _quantities(self) -> Iterator[tuple[str, Quantity]]:
         """Yield the names and values of all coordinates, coefficients and fields of parts."""
@@ -343,7 +349,7 @@ class Mechanism:
             yield from ((f"{one.name}.{f}", getattr(one, f)) for f in FIELDS[type(one)])
 
 
-def _undefined(key: str, name: str, known: Sequence[str]) -> str:
+def _undefined(key: str, name: str, known: Iterable[str]) -> str:
     """Return the message for a key whose value is not the name of a known part."""
     return f"{key} = {name!r} is not defined; choose one of {', '.join(known) or 'none'}"
 
