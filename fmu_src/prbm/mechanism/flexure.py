@@ -191,8 +191,8 @@ def stub(gamma: Sequence[float]) -> float:
     if gamma0 < -STUB_RTOL:
         raise ParameterError(
             f"the links of a flexure are longer than the flexure: the sum of its gammas is "
-            f"{sum(gamma):.6g}, so that gamma0 = {gamma0:.6g} < 0; choose gammas with a sum of "
-            "at most 1"
+            f"{sum(gamma):.6g}, so that gamma0 = {gamma0:.6g} < 0; choose gammas that add up "
+            "to at most 1"
         )
     return max(gamma0, 0.0)
 
