@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .base.version import __version__ as __version__
-    from .files.mechanism_file import find as load
+    from .files.mechanism_file import load as load
     from .hybrid.simulation import Simulation
     from .mechanism.description import Mechanism
     from .runs.result import Result
@@ -28,7 +28,7 @@ _HOMES = {
     "Result": ("runs.result", "Result"),
     "Simulation": ("hybrid.simulation", "Simulation"),
     "__version__": ("base.version", "__version__"),
-    "load": ("files.mechanism_file", "find"),
+    "load": ("files.mechanism_file", "load"),
     "simulate": ("runs.run", "simulate"),
 }
 

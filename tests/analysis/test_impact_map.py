@@ -246,7 +246,7 @@ def test_walls_out_of_reach_and_unknown_stops_are_rejected():
         )
     with pytest.raises(ParameterError, match="no stop bumper"):
         impact_map.algebraic(guide(), stop="bumper")
-    with pytest.raises(ParameterError, match=r"variable 'stop\.bounce'"):
+    with pytest.raises(ParameterError, match="unknown variable"):
         impact_map.fit_response(guide(), ["stop.bounce"], TIMES, TIMES)
     with pytest.raises(RecordError, match="too few"):
         impact_map.fit_response(guide(), ["stop.restitution"], TIMES[:9], TIMES[:9])

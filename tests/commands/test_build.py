@@ -23,7 +23,7 @@ from prbm.commands import build_fmu as command
 from prbm.commands import building as cli
 from prbm.commands import fmu_report as report
 from prbm.drawing import icon as picture
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu import python_fmu
 from prbm.fmu.description import Heading, model_description
 from prbm.kernel import compiler
@@ -463,7 +463,7 @@ def test_what_no_fmu_can_have_is_a_sentence(tmp_path, old, new, sentence):
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(old, new, 1), "utf-8")
     with pytest.raises(MechanismError, match=sentence):
-        python_fmu.build(load(path))
+        python_fmu.build(read_mechanism(path))
 
 
 def test_a_name_of_pythons_own_is_one_like_others(tmp_path):
@@ -472,7 +472,7 @@ def test_a_name_of_pythons_own_is_one_like_others(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(text.replace('name = "PRBDM"', 'name = "globals"'), "utf-8")
     fmu = tmp_path / "globals.fmu"
-    atomic.write(fmu, python_fmu.build(load(path)))
+    atomic.write(fmu, python_fmu.build(read_mechanism(path)))
     assert len(simulate_fmu(str(fmu), stop_time=0.01)) > 1
 
 
@@ -483,7 +483,7 @@ def test_odd_texts_do_no_harm(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(re.sub(r"^title = .*$", lambda _: odd, text, flags=re.MULTILINE), "utf-8")
     fmu = tmp_path / "PRBDM.fmu"
-    atomic.write(fmu, python_fmu.build(load(path)))
+    atomic.write(fmu, python_fmu.build(read_mechanism(path)))
     assert validate_fmu(str(fmu)) == []
     assert read_model_description(str(fmu)).description == '{a} """ \\   <b> %s é'
 
@@ -514,17 +514,17 @@ def test_a_package_that_is_missing_is_named(monkeypatch, capsys):
 
 
 FILES = {
-    ("title =", "titel ="): "titel is no key that is known there; did you mean title?",
+    ("title =", "titel ="): "unknown key titel; did you mean title?",
     ("mass = 0.053187", "mass = [1]"): "bodies.0.mass (of shuttle) = [1]: write a number, or an",
     ("mass = 0.053187", ""): "bodies.0.mass (of shuttle) is missing: add the key",
     (
         'point = ["shuttle.width"',
         'bounce = 1\npoint = ["shuttle.width"',
-    ): "stops.0.bounce (of stop) is no key",
+    ): "unknown key stops.0.bounce (of stop)",
     ("gravity = [9.81, 0.0]", "gravity = [9.81]"): "gravity = [9.81]: a number is missing; add it",
     ("centre = [", "centre = [[1], "): "bodies.0.centre",
     ("left = [0.0, 0.0]", "left = [0.0]"): "ground.left = [0.0]: a number is missing; add it",
-    ("[[stops]]", "[stops]"): "write a list, [...], or a table [[...]]",
+    ("[[stops]]", "[stops]"): "write a list, [...], or one table [[...]]",
     ("value = 0.04", "value = -1.0"): "flexure.length = -1 m must be at least",
 }
 
@@ -536,7 +536,7 @@ def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, chang
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(*change, 1))
     with pytest.raises(MechanismError) as error:
-        load(path)
+        read_mechanism(path)
     assert FILES[change] in str(error.value)
     for line in str(error.value).splitlines():
         assert line.startswith(f"{path}: ")
@@ -549,4 +549,4 @@ def test_a_byte_order_mark_is_no_part_of_a_mechanism_file(mechanisms, tmp_path):
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8-sig")
-    assert load(path) == mechanisms["PRBDM"]
+    assert read_mechanism(path) == mechanisms["PRBDM"]

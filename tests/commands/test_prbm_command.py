@@ -19,7 +19,7 @@ from prbm.__main__ import main as started
 from prbm.base import atomic as files
 from prbm.commands import command_line as cli
 from prbm.commands import systems
-from prbm.files.mechanism_file import find, shipped
+from prbm.files.mechanism_file import load, shipped
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import free_displacement
 from support import ROOT
@@ -102,7 +102,7 @@ def test_the_list_is_that_of_the_shipped_mechanisms(capsys):
 
 def test_the_mode_of_a_1r_guide_moves_along_its_circle(capsys):
     """Kinetic energy along x and y as cos^2 and sin^2 of the link's angle."""
-    guide = find("PRBDM")
+    guide = load("PRBDM")
     system = assemble(guide, guide.values())
     radius = system.values["flexure.gamma"] * system.values["flexure.length"]
     sine = free_displacement(system) / radius
@@ -116,7 +116,7 @@ def test_the_mode_of_a_1r_guide_moves_along_its_circle(capsys):
 def test_a_held_1r_guide_is_a_crank_on_torsion_springs(capsys):
     """F = 4 k Theta/(gamma l cos Theta), x = gamma l sin Theta, y = gamma l (cos Theta - 1)."""
     assert run("equilibrium PRBDM --set gravity.x=0 --from -20mm --to 20mm --out .") == cli.OK
-    p = find("PRBDM").values()
+    p = load("PRBDM").values()
     radius = p["flexure.gamma"] * p["flexure.length"]
     I = p["flexure.width"] * p["flexure.thickness"] ** 3 / 12
     k = 2 * p["flexure.gamma"] * p["flexure.K_theta"] * p["flexure.youngs_modulus"] * I
@@ -138,7 +138,7 @@ def test_a_bistable_mechanism_rests_and_snaps_symmetrically(capsys):
     rows = table("Bistable-rests.csv")
     assert rows["kind"] == ["stable rest", "unstable rest", "stable rest", "snap", "snap"]
     places = np.array(rows["displacement [m]"], float)
-    rise = find("Bistable").values()["strut.rise"]
+    rise = load("Bistable").values()["strut.rise"]
     np.testing.assert_allclose(places[:3], [0.0, rise, 2 * rise], atol=1e-9)
     assert places[3] + places[4] == pytest.approx(2 * rise, abs=1e-7)
     forces = np.array(rows["force [N]"], float)
@@ -329,15 +329,15 @@ def test_a_mechanism_of_ones_own_is_named_by_its_file(capsys):
 
 
 MISTAKES = [
-    ("modes Bistabel", "no model 'Bistabel'; did you mean Bistable?"),
+    ("modes Bistabel", "unknown mechanism 'Bistabel' (mechanism files end in .toml); did you"),
     ("modes none.toml", "none.toml: cannot be read"),
-    ("modes PRBDM --held 10kg", "--held 10kg: 'kg' is the unit of something else; write a quant"),
+    ("modes PRBDM --held 10kg", "--held 10kg: the unit 'kg' has another dimension; write a qu"),
     ("modes PRBDM --held much", "--held much: write a number in m, or a number and a unit"),
     ("modes PRBDM --held nan", "--held nan: write a finite number in m"),
     ("modes PRBDM --count 0", "--count 0: ask for one mode or more"),
     ("modes PRBDM --set shuttle.mas=1", "did you mean shuttle.mass"),
     ("modes PRBDM --set shuttle.mass", "--set shuttle.mass: write NAME=VALUE"),
-    ("modes PRBDM --set shuttle.mass=1m", "'m' is the unit of something else; write a quantity i"),
+    ("modes PRBDM --set shuttle.mass=1m", "the unit 'm' has another dimension; write a quant"),
     ("modes PRBDM --set shuttle.mass=-1kg", "shuttle.mass = -1 kg"),
     ("modes PRBDM --set force.x=1", "force.x: it is an input"),
     ("modes PRBDM --out taken", "taken is a file; choose a folder with --out"),
@@ -355,7 +355,7 @@ MISTAKES = [
     ("impact-map PRBDM --heights -10 5", "check the unit, as in --heights -10mm"),
     ("impact-map PRBDM --offsets 4", "check the unit, as in --offsets 4mm"),
     ("simulate PRBDM --stop-time 0", "stop_time = 0 s must be positive"),
-    ("simulate PRBDM --stop-time 1m", "--stop-time 1m: 'm' is the unit of something else"),
+    ("simulate PRBDM --stop-time 1m", "--stop-time 1m: the unit 'm' has another dimension"),
     ("simulate PRBDM --step 1ns", "choose a larger one"),
     ("simulate PRBDM --tolerance 2", "choose a number between 0 and 1"),
     ("simulate PRBDM --stop-time 10ms --spectrum", "there is no impact in 0.01 s"),
@@ -365,7 +365,7 @@ MISTAKES = [
     ("fit PRBDM --free flexure.K_theta=1 --frequency '5 +- 1'", "flexure.K_theta=LOW:HIGH"),
     ("fit PRBDM --free flexure.K_theta=2:1 --frequency '5 +- 1'", "lower bound is not below"),
     ("fit PRBDM --free flexure.K_theta --frequency 5Hz", "give its standard uncertainty"),
-    ("fit PRBDM --free flexure.K_theta --frequency '5 Hz +- 1 mm'", "unit of something else"),
+    ("fit PRBDM --free flexure.K_theta --frequency '5 Hz +- 1 mm'", "has another dimension"),
     ("fit PRBDM --free flexure.K_theta --frequency '5 +- -1'", "must not be negative"),
     ("fit PRBDM --free flexure.K_theta --frequency '5 +- 1 mode 3'", "PRBDM has 1 modes"),
     ("impact-map PRBDM --stop bumper", "no stop bumper; it has stop"),
@@ -522,10 +522,10 @@ def without(start: int, end: int):
 GOOD = ("t [s],x [m]", TIME, SWING)
 MALFORMED = {
     "no file": (None, FREQUENCY, "data.csv: cannot be read"),
-    "empty": ("", FREQUENCY, "is empty: export the record again"),
-    "a picture": ("\x89PNG\x00\x01", FREQUENCY, "is no text but binary data"),
-    "prose": ("what we\nmeasured\nyesterday\n", FREQUENCY, "is no table"),
-    "no such column": (text(*GOOD), f"{FREQUENCY} --column y", "there is no column 'y'; columns"),
+    "empty": ("", FREQUENCY, "empty file: export the record again"),
+    "a picture": ("\x89PNG\x00\x01", FREQUENCY, "data.csv: binary data"),
+    "prose": ("what we\nmeasured\nyesterday\n", FREQUENCY, "not a table"),
+    "no such column": (text(*GOOD), f"{FREQUENCY} --column y", "unknown column 'y'; columns"),
     "a misprinted column": (
         text("t [s],laser [m]", TIME, SWING), f"{FREQUENCY} --column lasr", "mean 'laser'?"
     ),
@@ -537,9 +537,9 @@ MALFORMED = {
     "a gap": (text(*GOOD, change=without(50, 80)), FREQUENCY, "line 51: a gap of 0.155 s follows"),
     "not a number": (text(*GOOD, change=replaced(9, "0.04,nan")), FREQUENCY, "line 10, column 'x'"),
     "an empty cell": (text(*GOOD, change=replaced(9, "0.04,")), FREQUENCY, "line 10: 1 values for"),
-    "a word": (text(*GOOD, change=replaced(9, "0.04,late")), FREQUENCY, "'late' is no number"),
+    "a word": (text(*GOOD, change=replaced(9, "0.04,late")), FREQUENCY, "'late' is not a number"),
     "a unit in a cell": (
-        text(*GOOD, change=replaced(9, "0.04,1.2 mm")), FREQUENCY, "has a unit of its own"
+        text(*GOOD, change=replaced(9, "0.04,1.2 mm")), FREQUENCY, "has a unit: write"
     ),
     "time that stands still": (
         text(*GOOD, change=replaced(9, "0.035,0.1")), FREQUENCY, "equals that of the row above"
@@ -551,17 +551,17 @@ MALFORMED = {
     "cut too short": (text(*GOOD), f"{FREQUENCY} --to 20ms", "are too few to evaluate"),
     "cut away": (
         text(*GOOD), f"{FREQUENCY} --from 20",
-        "nothing of x is left from 20 s on: the record is from 0 s to 1.995 s; choose a start",
+        "x has no samples from 20 s on: choose a start and a later end between 0 s and 1.995 s",
     ),
-    "cut away before": (text(*GOOD), f"{FREQUENCY} --to -1", "nothing of x is left up to -1 s: "),
+    "cut away before": (text(*GOOD), f"{FREQUENCY} --to -1", "x has no samples up to -1 s: "),
     "cut the wrong way": (
-        text(*GOOD), f"{FREQUENCY} --from 1.5 --to 1", "is left from 1.5 s to 1 s: the record is"
+        text(*GOOD), f"{FREQUENCY} --from 1.5 --to 1", "no samples from 1.5 s to 1 s: choose"
     ),
     "nothing is bent": (
         text("d [mm],F [N]", 0 * TIME + 0.5, SWING), MODULUS,
-        "the deflection does not change, it is 0.0005 m throughout: take the column",
+        "the deflection does not change, it is 0.0005 m throughout: choose the col",
     ),
-    "nothing moves": (text("t [s],x [m]", TIME, 0 * TIME + 1), FREQUENCY, "nothing vibrates"),
+    "nothing moves": (text("t [s],x [m]", TIME, 0 * TIME + 1), FREQUENCY, "x does not change: "),
     "one swing": (text("t [s],x [m]", TIME / 40, SWING), f"{FREQUENCY} --to 8ms", "or less in"),
     "another unit": (
         text("t [s],x [N]", TIME, SWING), RESTITUTION, "no column in m or a multiple of it can be"
@@ -570,13 +570,13 @@ MALFORMED = {
         text("t [s],x [N]", TIME, SWING), f"{RESTITUTION} --column x", "is in N, but m was expected"
     ),
     "no unit": (
-        text("t [s],x", TIME, SWING), f"{RESTITUTION} --column x", 'no unit: give it, --unit "x=m"'
+        text("t [s],x", TIME, SWING), f"{RESTITUTION} --column x", 'give its unit, --unit "x=m"'
     ),
     "an unknown unit": (
-        text("t [s],x [furlong]", TIME, SWING), f"{RESTITUTION} --column x", "which is unknown"
+        text("t [s],x [furlong]", TIME, SWING), f"{RESTITUTION} --column x", "the unknown unit"
     ),
-    "an unknown unit, given": (text(*GOOD), f"{FREQUENCY} --unit x=ell", "'ell' given for 'x' is"),
-    "a unit of no column": (text(*GOOD), f"{FREQUENCY} --unit y=m", "'y', which is no column"),
+    "an unknown unit, given": (text(*GOOD), f"{FREQUENCY} --unit x=ell", "'ell' of 'x' is"),
+    "a unit of no column": (text(*GOOD), f"{FREQUENCY} --unit y=m", "the unknown column 'y'"),
     "no unit after the sign": (text(*GOOD), f"{FREQUENCY} --unit x", "--unit x: write NAME=TEXT"),
     "millimetres as metres": (
         text("t [s],x [m]", TIME, 1e3 * SWING), RESTITUTION, "check the unit of the column"
@@ -590,9 +590,9 @@ MALFORMED = {
     ),
     "no impact": (text(*GOOD), RESTITUTION, "no impact in the record"),
     "no head": (
-        text(*GOOD, change=without(0, 1)), FREQUENCY, 'give --columns "t [s]" "x [mm]" and the like'
+        text(*GOOD, change=without(0, 1)), FREQUENCY, 'for instance --columns "t [s]" "x [mm]"'
     ),
-    "too many names": (text(*GOOD), f"{FREQUENCY} --columns 't [s]'", "1 names were given for 2"),
+    "too many names": (text(*GOOD), f"{FREQUENCY} --columns 't [s]'", "1 names for 2"),
     "no force": (text("d [mm],x [mm]", TIME, SWING), MODULUS, "can all be the deflection"),
     "volts for a force": (text("d [mm],F [V]", TIME, SWING), MODULUS, "no column in N or a multip"),
     "longer than the beam": (text("d [m],F [N]", TIME, SWING), MODULUS, "is longer than the beam"),

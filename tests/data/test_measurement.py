@@ -1,4 +1,4 @@
-"""Young's modulus, hysteresis and calibration: round trips with the noise of real sensors."""
+"""Young's modulus, hysteresis and calibration from records with the noise of real sensors."""
 
 import math
 
@@ -20,8 +20,8 @@ from prbm.data.series import Series
 from prbm.data.uncertainty import Estimate, EvaluationError, line, power_law
 from prbm.plots.measurement import bending_figure
 
-E, LENGTH, WIDTH, THICKNESS = 181.5e9, 40e-3, 8e-3, 0.1e-3  # the steel flexures of the source
-CELL = 1e-3  # N of noise of the load cell for 0 to 0.5 N, 0.2 % of its range
+E, LENGTH, WIDTH, THICKNESS = 181.5e9, 40e-3, 8e-3, 0.1e-3  # Steel flexures of the thesis.
+CELL_NOISE = 1e-3  # N, 0.2 % of the range of a load cell for 0 to 0.5 N.
 STIFFNESS = E * WIDTH * THICKNESS**3 / (4 * LENGTH**3)
 
 
@@ -31,8 +31,8 @@ def beam(u_length=0.0, u_width=0.0, u_thickness=0.0, name="1"):
     )
 
 
-def bent(rng, samples=600, cycles=1, noise=CELL, loss=0.0, largest=3e-3):
-    """Return the record of a beam bent and let back, force against the sensor's sign, offset."""
+def bent(rng, samples=600, cycles=1, noise=CELL_NOISE, loss=0.0, largest=3e-3):
+    """Return deflection and force of loading cycles, with offsets and negative force."""
     phase = np.linspace(0.0, 2 * np.pi * cycles, samples)
     d = largest * (1 - np.cos(phase)) / 2
     back = np.sin(phase) < 0.0
@@ -40,21 +40,21 @@ def bent(rng, samples=600, cycles=1, noise=CELL, loss=0.0, largest=3e-3):
     return d + 1e-3, -(F + 0.02) + noise * rng.standard_normal(samples)
 
 
-def test_youngs_modulus_comes_back_within_a_percent():
-    """A cell of 0.2 % of 0.5 N on a flexure of 5.7 N/m bent by 3 mm, 17 mN."""
+def test_youngs_modulus_is_recovered_within_a_percent():
+    """Noise of 1 mN on forces up to 17 mN, at a deflection of 3 mm of a flexure of 5.7 N/m."""
     d, F = bent(np.random.default_rng(0), 12000, 10)
     found = youngs_modulus(d, F, beam(), window=10)
     assert found.modulus.value == pytest.approx(E, rel=0.01)
     assert found.modulus.relative < 0.005
     assert found.stiffness.value == pytest.approx(STIFFNESS, rel=0.01)
     (note,) = found.notes
-    assert "so that the ± is of the scatter of the fit only" in note, "the beam's sizes are exact"
+    assert "so that the ± includes the scatter of the fit only" in note
     assert "E = (18" in str(found)
     assert len(bending_figure(found).axes) == 1
 
 
 def test_youngs_modulus_is_exact_without_noise():
-    """The sorting, the window, the sensor's sign, zero and angle change nothing: rounding only."""
+    """Order, window, sign, zero and angle of the sensor change the result by round-off only."""
     d, F = bent(np.random.default_rng(0), noise=0.0)
     for options in (
         {}, {"window": 7}, {"fit_range": (0.0, 1.0)}, {"force_gain": Estimate(1.0, 0.01)},
@@ -68,8 +68,8 @@ def test_youngs_modulus_is_exact_without_noise():
     )
 
 
-def test_sizes_in_mm_that_pass_for_metres_are_noticed():
-    """E goes with l^3/(b h^3): a thousandth of the true one, which may be that of a rubber."""
+def test_dimensions_in_mm_taken_as_metres_are_noted():
+    """E is proportional to l^3/(b h^3): a thousandth of the true value."""
     d, F = bent(np.random.default_rng(0))
     sizes = (Estimate(1e3 * x, 0.0) for x in (LENGTH, WIDTH, THICKNESS))
     found = youngs_modulus(d, F, Beam("1", *sizes))
@@ -78,13 +78,13 @@ def test_sizes_in_mm_that_pass_for_metres_are_noticed():
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-9])
-def test_a_modulus_that_no_solid_has_is_noticed(factor):
-    """As with forces in mN that pass for N."""
+def test_a_modulus_outside_the_range_of_solids_is_noted(factor):
+    """The cause may be a force in mN taken as N."""
     d, F = bent(np.random.default_rng(0))
     assert any("no solid" in note for note in youngs_modulus(d, factor * F, beam()).notes)
 
 
-def test_stated_uncertainty_of_the_fit_covers_the_truth():
+def test_the_uncertainty_of_the_fit_covers_the_true_modulus():
     """68.3 % of 200 draws, -+ 3 standard deviations of a count of them: 0.585 to 0.781."""
     rng = np.random.default_rng(2)
     hits = 0
@@ -95,8 +95,8 @@ def test_stated_uncertainty_of_the_fit_covers_the_truth():
     assert 0.585 < hits / 200 < 0.781
 
 
-def test_stated_uncertainty_holds_the_dimensions():
-    """Each draw measures another l, b and h about the true ones (GUM, type B, normal)."""
+def test_the_uncertainty_includes_the_dimensions():
+    """Each draw has other measured dimensions, normally distributed about the true ones."""
     rng = np.random.default_rng(3)
     u = (0.05e-3, 0.02e-3, 0.5e-6)
     hits = 0
@@ -115,31 +115,31 @@ def test_stated_uncertainty_holds_the_dimensions():
     assert found.budget["length"] == pytest.approx(3 * 0.05 / 40, rel=0.01)
 
 
-def test_points_at_one_place_have_no_line():
-    """The mean of equal numbers may be another number, by rounding: their spread is no measure."""
+def test_points_of_one_x_are_rejected():
+    """Round-off can make the spread of equal numbers about their mean positive."""
     x = 0.5e-3 + np.array([0.0, 1.0, 0.0, 1.0]) * np.spacing(0.5e-3)
     for n in (3, 4, 7, 10):
-        with pytest.raises(EvaluationError, match=r"points are at x = 0\.0003: a line needs diff"):
+        with pytest.raises(EvaluationError, match=r"points are at x = 0\.0003: give points"):
             line(np.full(n, 0.3e-3), np.arange(float(n)))
     with pytest.raises(EvaluationError, match=r"does not change, it is 0\.0005 m"):
         youngs_modulus(x, np.arange(4.0), beam())
 
 
-def test_sizes_without_uncertainty_are_noted():
-    """Whatever the ± holds is said, where a reader would take it for all there is."""
+def test_dimensions_without_uncertainty_are_noted():
+    """The note lists the contributions that the ± includes."""
     d, F = bent(np.random.default_rng(0), 12000, 10)
     sizes = dict(zip(("u_length", "u_width", "u_thickness"), (5e-5, 2e-5, 5e-7), strict=True))
     assert youngs_modulus(d, F, beam(**sizes), window=10).notes == ()
     (note,) = youngs_modulus(d, F, beam(), window=10).notes
-    assert note.startswith("length, width and thickness were given without uncertainty")
+    assert note.startswith("length, width and thickness have no uncertainty")
     (note,) = youngs_modulus(
         d, F, beam(**sizes | {"u_width": 0.0}), window=10, force_gain=Estimate(1.0, 0.01)
     ).notes
-    assert note.startswith("width was given without uncertainty, so that the ± is of the scatter")
-    assert "the fit, length, thickness and force gain only; give it of each" in note
+    assert note.startswith("width has no uncertainty, so that the ± includes the scatter")
+    assert "the fit, length, thickness and force gain only; give an uncertainty" in note
 
 
-def test_uncertainty_of_the_sensors_angle_is_its_tangent():
+def test_the_uncertainty_of_the_sensor_angle_contributes_by_its_tangent():
     """d(1/cos a)/(1/cos a) = tan a da."""
     d, F = bent(np.random.default_rng(0), noise=0.0)
     found = youngs_modulus(d, F, beam(), sensor_angle=Estimate(30.0, 1.0))
@@ -148,7 +148,7 @@ def test_uncertainty_of_the_sensors_angle_is_its_tangent():
 
 
 def elastica(alpha):
-    """Return the tip deflection over the length under P l^2/EI = alpha, by shooting."""
+    """Return the ratio of tip deflection to length under P l^2/EI = alpha, by shooting."""
 
     def end(curvature):
         run = solve_ivp(
@@ -160,15 +160,15 @@ def elastica(alpha):
     return end(brentq(lambda c: end(c)[1], 0, 2 * alpha, xtol=1e-14))[2]
 
 
-def test_the_elastica_stiffens_as_stated():
-    """F l^2/EI = 3 r (1 + 36/35 r^2 + ...), r = d/l; the next term is 1.2 r^2 more."""
+def test_the_stiffening_coefficient_is_that_of_the_elastica():
+    """F l^2/EI = 3 r (1 + 36/35 r^2 + ...), r = d/l; the next term is about 1.2 r^4."""
     for alpha in (0.03, 0.1, 0.3):
         r = elastica(alpha)
         assert (alpha / 3 / r - 1) / r**2 == pytest.approx(STIFFENING, abs=1.3 * r**2)
 
 
-def test_large_deflections_are_said_with_their_error():
-    """E from the elastica's forces errs by what is stated; beyond 1 % a note says so."""
+def test_large_deflections_are_noted_with_their_error():
+    """The stated stiffening is the error of E from forces of the elastica."""
     alphas = np.linspace(0.0, 0.9, 30)[1:]
     d = np.array([elastica(alpha) for alpha in alphas]) * LENGTH
     F = alphas * E * WIDTH * THICKNESS**3 / 12 / LENGTH**2
@@ -177,14 +177,14 @@ def test_large_deflections_are_said_with_their_error():
     assert found.modulus.value / E - 1 == pytest.approx(found.stiffening, rel=0.15)
     assert found.stiffening > 0.05
     assert any("of the length" in note for note in found.notes)
-    assert any("bend away" in note for note in found.notes)
+    assert any("deviate from a line" in note for note in found.notes)
     small = youngs_modulus(d[:6], F[:6], beam(), fit_range=(0.0, 1.0))
     assert abs(small.modulus.value / E - 1) < 0.01
     assert not any("of the length" in note for note in small.notes)
 
 
-def test_hysteresis_loses_the_area_of_the_loop():
-    """Unloading falls short by c (1 - r): the loss is c/3 of the work k d^2/2, at r = d/d_max.
+def test_the_loss_of_a_cycle_is_the_area_of_the_loop():
+    """Unloading forces are lower by c (1 - r), r = d/d_max: the loss is c/3 of the work k d^2/2.
 
     int r c (1 - r) dr over int r dr = (1/6)/(1/2) c.
     """
@@ -193,15 +193,15 @@ def test_hysteresis_loses_the_area_of_the_loop():
         loops = hysteresis(d, F)
         assert len(loops) == cycles
         for loop in loops:
-            assert loop.fraction == pytest.approx(0.1, abs=1e-3)  # 1000 points a cycle
+            assert loop.fraction == pytest.approx(0.1, abs=1e-3)  # 1000 points per cycle
             assert loop.work == pytest.approx(STIFFNESS * 3e-3**2 / 2, rel=1e-3)
     noisy = hysteresis(*bent(np.random.default_rng(4), 4000, 4, noise=3e-4, loss=0.3))
     assert [loop.fraction for loop in noisy] == pytest.approx([0.1] * 4, abs=0.02)
     assert hysteresis(*bent(np.random.default_rng(4), 600, 0.5)) == ()
 
 
-def test_branches_that_differ_are_said():
-    """A loss of 10 % of the work; E lies between those of the branches, each alone."""
+def test_different_branches_of_a_cycle_are_noted():
+    """With a loss of 10 % of the work, E is between the moduli of the two branches."""
     d, F = bent(np.random.default_rng(4), 4000, 1, noise=1e-5, loss=0.3)
     both, up, down = (
         youngs_modulus(d[part], F[part], beam())
@@ -223,8 +223,8 @@ def test_turning_points_ignore_noise():
     assert len(turns) == 7
 
 
-def test_a_table_of_beams_has_their_mean_and_scatter():
-    """The mean of n values that scatter by s is uncertain by s/sqrt(n), with n - 1 freedom."""
+def test_a_table_of_beams_has_mean_and_scatter():
+    """The mean of n values of deviation s has the uncertainty s/sqrt(n), with n - 1 freedom."""
     rng = np.random.default_rng(6)
     found = [youngs_modulus(*bent(rng, cycles=2, loss=0.3), beam(name=str(i))) for i in range(5)]
     table = beam_table(found)
@@ -233,12 +233,12 @@ def test_a_table_of_beams_has_their_mean_and_scatter():
     assert table.mean.uncertainty == pytest.approx(np.std(values, ddof=1) / math.sqrt(5), rel=1e-12)
     assert table.mean.freedom == 4
     assert str(table).count("\n") == 6
-    assert 0.3 < table.excess < 3.0, "noise alone: the stated uncertainty explains the scatter"
+    assert 0.3 < table.excess < 3.0, "the stated uncertainty explains the scatter of noise"
     with pytest.raises(EvaluationError, match="two beams"):
         beam_table(found[:1])
 
 
-REFUSED = {
+INVALID = {
     "pairs": ({"force": np.zeros(3)}, "pairs"),
     "not a number": ({"force": np.array([1.0, np.nan] * 30)}, r"force\[1\] = nan"),
     "units": ({"deflection": np.linspace(0, 4, 60)}, "longer than the beam"),
@@ -252,15 +252,15 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_data_that_hold_no_modulus_are_refused(name):
-    options, says = REFUSED[name]
+@pytest.mark.parametrize("name", INVALID)
+def test_data_without_a_modulus_are_rejected(name):
+    options, message = INVALID[name]
     data = {"deflection": np.linspace(0, 4e-3, 60), "force": np.linspace(0, 0.02, 60)} | options
-    with pytest.raises(EvaluationError, match=says):
+    with pytest.raises(EvaluationError, match=message):
         youngs_modulus(beam=beam(), **data)
 
 
-def test_beams_have_dimensions():
+def test_dimensions_of_a_beam_must_be_positive():
     with pytest.raises(EvaluationError, match="width = 0 m must be positive"):
         Beam("x", Estimate(1.0, 0.0), Estimate(0.0, 0.0), Estimate(1.0, 0.0))
 
@@ -274,26 +274,26 @@ def stage(rng, n=60, noise=4e-6):
     return x, 1.3 + 200.0 * (x + noise * rng.standard_normal(n))
 
 
-def test_calibration_comes_back_and_covers():
+def test_the_uncertainties_of_a_calibration_cover_the_true_values():
     """The gain and a calibrated position lie within one standard uncertainty in 68 % of draws."""
     rng = np.random.default_rng(7)
-    gains = places = 0
+    gains = positions = 0
     at = 1.3 + 200.0 * 2e-3
     for _ in range(200):
         sensor = calibrate(*stage(rng))
         gains += abs(sensor.gain.value - 1 / 200.0) < sensor.gain.uncertainty
         reading = np.array([at])
         error = abs(sensor(reading)[0] - 2e-3)
-        places += error < sensor.uncertainty(reading)[0]
+        positions += error < sensor.uncertainty(reading)[0]
     assert 0.585 < gains / 200 < 0.781
-    assert 0.585 < places / 200 < 0.781
+    assert 0.585 < positions / 200 < 0.781
     assert sensor.residual == pytest.approx(4e-6, rel=0.3)
     assert sensor.gain.unit == "m/V"
     assert sensor.sensitivity.value == pytest.approx(200.0, rel=0.01)
     assert "gain" in str(sensor)
 
 
-def test_a_record_in_volts_becomes_one_in_metres():
+def test_a_calibration_converts_a_record_from_volts_to_metres():
     x, volts = stage(np.random.default_rng(8), noise=0.0)
     sensor = calibrate(x, volts)
     series = Series(np.arange(60) / 750, volts, "laser", "V", "record.csv")
@@ -301,12 +301,12 @@ def test_a_record_in_volts_becomes_one_in_metres():
     np.testing.assert_allclose(length.values, x, atol=1e-15)
     assert (length.unit, length.name) == ("m", "laser")
     with pytest.raises(
-        EvaluationError, match="laser is in m, the calibration is of a reading in V"
+        EvaluationError, match="laser is in m, but the calibration is for readings in V"
     ):
         sensor.applied(length)
 
 
-def test_a_bent_characteristic_is_said():
+def test_a_nonlinear_characteristic_is_reported():
     x, volts = stage(np.random.default_rng(8))
     sensor = calibrate(x, volts + 2e3 * (x - 1.25e-3) ** 2)
     assert "not linear" in str(sensor)
@@ -314,7 +314,7 @@ def test_a_bent_characteristic_is_said():
     assert sensor.nonlinearity > 1e-6
 
 
-def test_a_dead_sensor_is_refused():
+def test_a_reading_independent_of_the_quantity_is_rejected():
     rng = np.random.default_rng(9)
     with pytest.raises(EvaluationError, match="does not change with the quantity"):
         calibrate(np.linspace(0, 1, 50), rng.standard_normal(50))
@@ -327,8 +327,8 @@ def test_a_dead_sensor_is_refused():
 # --- lines and estimates ------------------------------------------------------------------------
 
 
-def test_correlated_residuals_widen_the_uncertainty():
-    """An autoregressive error of r = 0.8: without the widening 200 draws cover a third only."""
+def test_correlated_residuals_increase_the_uncertainty():
+    """With autoregressive errors of r = 0.8, plain uncertainties cover a third of 200 draws."""
     rng = np.random.default_rng(10)
     x = np.linspace(0, 1, 300)
     hits = plain = 0
@@ -344,7 +344,7 @@ def test_correlated_residuals_widen_the_uncertainty():
     assert plain / 200 < 0.4
 
 
-def test_uncertainties_of_a_power_law_are_those_of_samples():
+def test_the_uncertainty_of_a_power_law_is_that_of_random_samples():
     """Monte Carlo of y = 3 x^2/z with 1e5 draws: standard deviation within 1 %."""
     rng = np.random.default_rng(11)
     x, z = Estimate(2.0, 0.02), Estimate(5.0, 0.05)
@@ -354,16 +354,16 @@ def test_uncertainties_of_a_power_law_are_those_of_samples():
     assert y.value == pytest.approx(2.4, rel=1e-12)
 
 
-def test_freedom_of_a_combined_uncertainty_is_welch_and_satterthwaite():
-    """GUM H.1 in small: u^4/sum(u_i^4/v_i); equal parts of 4 and 4 make 8."""
+def test_degrees_of_freedom_follow_welch_and_satterthwaite():
+    """u^4/sum(u_i^4/v_i): two equal contributions of 4 degrees of freedom give 8."""
     part = Estimate(1.0, 0.01, freedom=4)
     y, _ = power_law({"a": (part, 1.0), "b": (part, 1.0)})
     assert y.freedom == pytest.approx(8.0, rel=1e-12)
 
 
 @pytest.mark.parametrize("wrong", [(math.nan, 1.0), (1.0, -1.0), (1.0, math.nan), (math.inf, 0.0)])
-def test_estimates_are_finite(wrong):
-    with pytest.raises(EvaluationError, match="is no estimate"):
+def test_invalid_estimates_are_rejected(wrong):
+    with pytest.raises(EvaluationError, match="invalid estimate"):
         Estimate(*wrong)
 
 
@@ -378,12 +378,12 @@ def test_estimates_are_finite(wrong):
         (Estimate(-3e-4, 2e-5, "m"), "(-300 ± 20)e-6 m"),
     ],
 )
-def test_estimates_print_with_two_digits_of_uncertainty(estimate, text):
+def test_estimates_are_printed_with_two_digits_of_uncertainty(estimate, text):
     assert str(estimate) == text
 
 
-def test_a_beam_as_thick_as_long_is_a_mistake_of_units():
-    """0.1 meant in mm, beside a length in mm: E would be a billion times too small."""
+def test_a_beam_as_thick_as_long_is_rejected():
+    """0.1 mm taken as 0.1 m would make E a billion times too small."""
     with pytest.raises(
         EvaluationError, match=r"thickness = 0\.1 m is not less than length = 0\.04 m"
     ):
@@ -391,7 +391,7 @@ def test_a_beam_as_thick_as_long_is_a_mistake_of_units():
 
 
 @pytest.mark.parametrize("gain", [0.0, -1.0])
-def test_a_force_gain_that_is_not_positive_is_refused(gain):
+def test_a_force_gain_must_be_positive(gain):
     d, F = bent(np.random.default_rng(0))
     with pytest.raises(EvaluationError, match=r"force_gain = .* must be positive"):
         youngs_modulus(d, F, beam(), force_gain=Estimate(gain, 0.0))

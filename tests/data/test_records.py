@@ -1,108 +1,19 @@
-"""Measured data as people and instruments write them, and the sentences about what is wrong."""
+"""Records of people and instruments: layouts, units, and messages for invalid records."""
 
 import contextlib
 
 import numpy as np
 import pytest
 
+from measurement_layouts import LAYOUTS, SIGNAL, TIME, lvm, table
 from prbm.base.errors import PrbmError
 from prbm.data.records import read_record
 from prbm.data.series import RecordError, Series
 
-TIME = np.arange(40) * 1e-3
-SIGNAL = 5e-3 * np.cos(30.0 * TIME)
-
-
-def table(delimiter=",", decimal=".", factors=(1.0, 1e3), columns=(TIME, SIGNAL), end="\n"):
-    """Return rows of numbers as text."""
-    rows = zip(*(f * x for f, x in zip(factors, columns, strict=True)), strict=True)
-    text = end.join(delimiter.join(f"{x:.9g}" for x in row) for row in rows)
-    return text.replace(".", decimal) + end
-
-
-LVM = """LabVIEW Measurement\t
-Writer_Version\t2
-Reader_Version\t2
-Separator\tTab
-Decimal_Separator\t{decimal}
-Multi_Headings\tNo
-X_Columns\t{columns}
-Time_Pref\tRelative
-Operator\tlab
-Date\t2015/03/04
-Time\t12:00:00,5
-***End_of_Header***\t
-\t
-Channels\t2\t\t
-Samples\t40\t40\t
-Date\t2015/03/04\t2015/03/04\t
-Time\t12:00:00,5\t12:00:00,5\t
-Y_Unit_Label\tmm\tVolts\t
-X_Dimension\tTime\tTime\t
-X0\t0{decimal}0000000000000000E+0\t0{decimal}0000000000000000E+0\t
-Delta_X\t0{decimal}001000\t0{decimal}001000\t
-***End_of_Header***\t\t\t
-X_Value\tLaser\tLoad cell\tComment
-"""
-
-
-def lvm(decimal=".", columns="One"):
-    """Return a LabVIEW measurement file of two channels, the first row with a comment."""
-    rows = table("\t", decimal, (1.0, 1e3, 1.0), (TIME, SIGNAL, SIGNAL)).splitlines()
-    if columns == "No":
-        rows = ["\t" + row.split("\t", 1)[1] for row in rows]
-    rows[0] += "\tStandby"
-    return LVM.format(decimal=decimal, columns=columns) + "\n".join(rows) + "\n"
-
-
-LAYOUTS = {  # name: (text, names of time and signal)
-    "brackets": ("t [s],x [mm]\n" + table(), ("t", "x")),
-    "parentheses": ("time (ms),x (mm)\n" + table(factors=(1e3, 1e3)), ("time", "x")),
-    "slash": ("t/ms;x/um\n" + table(";", factors=(1e3, 1e6)), ("t", "x")),
-    "words": ('"Time, s","x in mm"\n' + table(), ("Time", "x")),
-    "decimal comma": ("t [s];x [mm]\n" + table(";", ","), ("t", "x")),
-    "decimal comma, tabs": ("t [s]\tx [mm]\n" + table("\t", ","), ("t", "x")),
-    "decimal comma, quoted": (
-        "t [s],x [mm]\n"
-        + "".join(f'"{t:.3f}","{1e3 * x:.9f}"\n' for t, x in zip(TIME, SIGNAL, strict=True))
-        .replace('","', "|").replace(".", ",").replace("|", '","'),
-        ("t", "x"),
-    ),
-    "byte order mark, CRLF": ("\ufefft [s],x [mm]\r\n" + table(end="\r\n"), ("t", "x")),
-    "row of units": ("t,x\ns,mm\n" + table(), ("t", "x")),
-    "row of units in brackets": ("t;x\n[s];[mm]\n\n" + table(";"), ("t", "x")),
-    "PicoScope": ("Time,Channel A\n(ms),(mm)\n\n" + table(factors=(1e3, 1e3)), ("Time",
-        "Channel A")),
-    "PicoScope, German": (
-        "Zeit;Kanal A\n(ms);(mm)\n\n" + table(";", ",", (1e3, 1e3)), ("Zeit", "Kanal A"),
-    ),
-    "Keysight": ("x-axis,1\nsecond,Millimeter\n" + table(), ("x-axis", "1")),
-    "Tektronix": (
-        "Model,MSO4034\nHorizontal Units,S\nRecord Length,40\nVertical Units,mm\n,\nTIME,CH1\n"
-        + table(),
-        ("TIME", "CH1"),
-    ),
-    "Instron": (
-        '"Specimen","3"\n"Rate 1","0.5","mm/min"\n\n"Time","Extension"\n"(s)","(mm)"\n'
-        + "".join(f'"{t}","{1e3 * x}"\n' for t, x in zip(TIME, SIGNAL, strict=True)),
-        ("Time", "Extension"),
-    ),
-    "LabVIEW": (lvm(), ("time", "Laser")),
-    "LabVIEW, decimal comma": (lvm(","), ("time", "Laser")),
-    "LabVIEW, no X column": (lvm(columns="No"), ("time", "Laser")),
-    "comments": ("# laser, 750 Hz\n% zeroed\nt [s],x [mm]\n# go\n" + table() + "# end\n", ("t",
-        "x")),
-    "head in a comment": ("# t [s] x [mm]\n" + table(" "), ("t", "x")),
-    "aligned with blanks": ("   t[s]     x[mm]\n" + table("     "), ("t", "x")),
-    "delimiter at the end": (
-        "t [s];x [mm];\n" + table(";").replace("\n", ";\n"), ("t", "x"),
-    ),
-}  # fmt: skip
-
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_layouts_give_the_same_channels_in_si(name, tmp_path):
-    """What was written is read back, to the nine digits that were written."""
+def test_all_layouts_are_read_as_the_same_channels_in_si(name, tmp_path):
+    """The values agree to the nine digits of the file."""
     text, (time, signal) = LAYOUTS[name]
     path = tmp_path / "record.csv"
     path.write_bytes(text.encode())
@@ -118,14 +29,14 @@ def test_layouts_give_the_same_channels_in_si(name, tmp_path):
 @pytest.mark.parametrize(
     ("encoding", "unit"), [("utf-16", "µm"), ("cp1252", "µm"), ("utf-8", "µm"), ("utf-8", "μm")]
 )
-def test_encodings(encoding, unit, tmp_path):
+def test_encodings_are_detected(encoding, unit, tmp_path):
     path = tmp_path / "record.txt"
     path.write_bytes(f"t [s]\tx [{unit}]\n{table(chr(9), factors=(1.0, 1e6))}".encode(encoding))
     np.testing.assert_allclose(read_record(path).column("x", "m"), SIGNAL, rtol=1e-8)
 
 
-def test_a_table_without_a_head_is_given_one(tmp_path):
-    """The layout of the source's carbon-nanotube records: three columns and no head."""
+def test_names_of_columns_can_be_given_for_a_table_without_a_head(tmp_path):
+    """The carbon-nanotube records of the thesis have three columns and no head."""
     path = tmp_path / "TS02E01CNT009_1_data.txt"
     path.write_text(table("\t", factors=(1.0, 1e3, 1.0), columns=(TIME, SIGNAL, SIGNAL)))
     record = read_record(path, columns=["t [s]", "d [mm]", "F"], units={"F": "mN"})
@@ -133,7 +44,7 @@ def test_a_table_without_a_head_is_given_one(tmp_path):
     np.testing.assert_allclose(record.column("f", "N"), 1e-3 * SIGNAL, rtol=1e-8)
 
 
-def test_temperatures_and_ratios_have_offsets_and_factors(tmp_path):
+def test_temperatures_and_percentages_are_converted_to_si(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("t [min];T [°C];u [%];n [-]\n0;20;50;1\n1;21,5;51;2\n2;22;52;3\n")
     record = read_record(path)
@@ -155,59 +66,62 @@ def rows(*changed, keep=ROWS):
     return "\n".join(line for line in lines if line is not None) + "\n"
 
 
-MALFORMED = {  # name: (bytes, what the sentence must say, column asked for)
-    "empty": (b"", "is empty"),
-    "blank": (b" \r\n \n", "is empty"),
+MALFORMED = {  # name: (content of the file, part of the message)
+    "empty": (b"", "empty file"),
+    "blank": (b" \r\n \n", "empty file"),
     "binary": (bytes(range(256)) * 20, "binary"),
     "zeros": (b"t [s],x [mm]\n\0\0\0\0", "binary"),
     "spreadsheet": (b"PK\x03\x04" + b"x" * 100, "spreadsheet"),
-    "prose": (b"Dear all,\nthe data follow tomorrow.\n", "no table"),
-    "one column": (("x [mm]\n" + "\n".join("12345")).encode(), "no table"),
+    "prose": (b"Dear all,\nthe data follow tomorrow.\n", "not a table"),
+    "one column": (("x [mm]\n" + "\n".join("12345")).encode(), "not a table"),
     "no head": (table().encode(), "no names above 2 columns"),
     "too few names": (("x\n" + table(factors=(1, 1, 1), columns=(TIME,) * 3)).encode(),
                       "1 names above 3 columns"),
     "empty name": ((",x [mm]\n" + table()).encode(), "column 1 has no name"),
-    "name twice": (("x [s],x [mm]\n" + table()).encode(), "'x' stands above columns 1 and 2"),
+    "name twice": (("x [s],x [mm]\n" + table()).encode(),
+        "the name 'x' is that of columns 1 and 2"),
     "too short": ((HEAD + rows(keep=ROWS[:2])).encode(), "2 rows of numbers are too few"),
     "too few samples": ((HEAD + rows(keep=ROWS[:9])).encode(), "9 samples of x are too few"),
     "a value missing": ((HEAD + rows((6, "0.006"))).encode(),
-        "line 8: 1 values for 2 columns: mend"),
+        "line 8: 1 values for 2 columns: correct"),
     "a value too many": ((HEAD + rows((6, "0.006,1,2"))).encode(), "line 8: 3 values for 2"),
     "cut off": ((HEAD + rows((39, "0.039"))).encode(),
         "line 41: 1 values for 2 columns: the file was"),
-    "NaN": ((HEAD + rows((4, "0.004,NaN"))).encode(), "line 6, column 'x': 'NaN' is no value"),
+    "NaN": ((HEAD + rows((4, "0.004,NaN"))).encode(), "line 6, column 'x': 'NaN' is not a value"),
     "NaN in the first row": ((HEAD + rows((0, "0,nan"))).encode(), "line 2, column 'x': 'nan'"),
     "infinite": ((HEAD + rows((4, "0.004,-inf"))).encode(),
-        "line 6, column 'x': '-inf' is no value"),
-    "overload": ((HEAD + rows((4, "0.004,OL"))).encode(), "line 6, column 'x': 'OL' is no value"),
-    "empty cell": ((HEAD + rows((4, ",3"))).encode(), "line 6, column 't': '' is no value"),
+        "line 6, column 'x': '-inf' is not a value"),
+    "overload": ((HEAD + rows((4, "0.004,OL"))).encode(),
+        "line 6, column 'x': 'OL' is not a value"),
+    "empty cell": ((HEAD + rows((4, ",3"))).encode(), "line 6, column 't': '' is not a value"),
     "word": ((HEAD + rows((4, "0.004,trigger"))).encode(),
-        "line 6, column 'x': 'trigger' is no number"),
+        "line 6, column 'x': 'trigger' is not a number"),
     "unit in a cell": ((HEAD + rows((4, "0.004,4.9 mm"))).encode(),
-        "'4.9 mm' has a unit of its own"),
+        "'4.9 mm' has a unit: write"),
     "two tables": ((HEAD + table() + HEAD + table()).encode(), "line 42, column 't': 't [s]'"),
     "mixed decimal signs": (("t [s];x [mm]\n" + table(";").replace("0.004;", "0,004;")).encode(),
                             "line 6, column 't': '0,004' has another decimal sign than the rest"),
     "thousands": (("t [s];x [mm]\n" + table(";", ",").replace("0,004;", "1.000,4;")).encode(),
-                  "line 6, column 't': '1.000,4' is no number"),
-    "underscore": ((HEAD + rows((4, "0.004,1_0"))).encode(), "'1_0' is no number"),
-    "hexadecimal": ((HEAD + rows((4, "0.004,0x1F"))).encode(), "'0x1F' is no number"),
+                  "line 6, column 't': '1.000,4' is not a number"),
+    "underscore": ((HEAD + rows((4, "0.004,1_0"))).encode(), "'1_0' is not a number"),
+    "hexadecimal": ((HEAD + rows((4, "0.004,0x1F"))).encode(), "'0x1F' is not a number"),
     "unit missing": (("t [s],x\n" + table()).encode(),
-        "the column 'x' has no unit: give it, units="),
+        "the column 'x' has no unit: give its unit, units="),
     "unit unknown": (("t [s],x [furlong]\n" + table()).encode(),
-        "has the unit 'furlong', which is unkn"),
-    "unit of something else": (("t [s],x [mN]\n" + table()).encode(),
+        "has the unknown unit 'furlong' (known"),
+    "unit of another dimension": (("t [s],x [mN]\n" + table()).encode(),
         "'x' is in mN, but m was expected"),
     "mass for force": (("t [s],x [g]\n" + table()).encode(), "'x' is in g, but m was expected"),
     "time in mm": (("t [mm],x [mm]\n" + table()).encode(),
-        "no column is a time; columns are t [mm]"),
+        "no column has a unit of time; columns are t [mm]"),
     "time without unit": (("t,x [mm]\n" + table()).encode(),
-        "no column is a time; columns are t [?]"),
+        "no column has a unit of time; columns are t [?]"),
 
     "several times": (
         ("a [s],b [s],x [mm]\n" + table(factors=(1, 1, 1), columns=(TIME,) * 3)).encode(),
-        "the columns a, b are all in s"),
-    "another column": (("t [s],y [mm]\n" + table()).encode(), "no column 'x'; columns are t, y"),
+        "the columns a, b all have units of time"),
+    "another column": (("t [s],y [mm]\n" + table()).encode(),
+        "unknown column 'x'; columns are t, y"),
     "time backwards": ((HEAD + rows((7, "0.0035,1"))).encode(),
         "line 9: the time 0.0035 s is before"),
     "time twice": ((HEAD + rows((7, "0.006,1"))).encode(), "line 9: the time 0.006 s equals"),
@@ -223,30 +137,30 @@ MALFORMED = {  # name: (bytes, what the sentence must say, column asked for)
 
 
 @pytest.mark.parametrize("name", MALFORMED)
-def test_malformed_records_get_one_clear_sentence(name, tmp_path):
-    """It names the file, says what is wrong where, and what to do; it is no other exception."""
-    data, says = MALFORMED[name]
+def test_malformed_records_are_rejected_with_one_message(name, tmp_path):
+    """The message begins with the name of the file and has one line."""
+    data, expected = MALFORMED[name]
     path = tmp_path / "bad record.csv"
     path.write_bytes(data)
     with pytest.raises(RecordError) as caught:
         read_record(path).series("x", "m")
-    sentence = str(caught.value)
-    assert says in sentence
-    assert sentence.startswith("bad record.csv")
-    assert "\n" not in sentence
+    message = str(caught.value)
+    assert expected in message
+    assert message.startswith("bad record.csv")
+    assert "\n" not in message
     assert isinstance(caught.value, PrbmError)
 
 
-def test_arguments_that_do_not_fit_the_file_are_refused(tmp_path):
+def test_arguments_that_disagree_with_the_file_are_rejected(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text(HEAD + table())
-    with pytest.raises(RecordError, match="a unit was given for 'y', which is no column"):
+    with pytest.raises(RecordError, match="a unit is given for the unknown column 'y'"):
         read_record(path, units={"y": "mm"})
-    with pytest.raises(RecordError, match="the unit 'ell' given for 'x' is unknown"):
+    with pytest.raises(RecordError, match="the unit 'ell' of 'x' is unknown"):
         read_record(path, units={"x": "ell"})
-    with pytest.raises(RecordError, match="3 names were given for 2 columns"):
+    with pytest.raises(RecordError, match="3 names for 2 columns"):
         read_record(path, columns=["t [s]", "x [mm]", "F [N]"])
-    with pytest.raises(RecordError, match="is no table"):
+    with pytest.raises(RecordError, match="not a table"):
         read_record(path, delimiter=";")
     with pytest.raises(RecordError, match="cannot be read"):
         read_record(tmp_path / "missing.csv")
@@ -254,7 +168,7 @@ def test_arguments_that_do_not_fit_the_file_are_refused(tmp_path):
         read_record(tmp_path)
 
 
-def test_units_that_were_given_replace_those_of_the_file(tmp_path):
+def test_given_units_replace_those_of_the_file(tmp_path):
     path = tmp_path / "record.csv"
     path.write_text("t [s],x [mm]\n" + table())
     record = read_record(path, units={"t": "ms", "x": "V"})
@@ -262,8 +176,8 @@ def test_units_that_were_given_replace_those_of_the_file(tmp_path):
     np.testing.assert_allclose(record.column("x", "mV"), 1e3 * SIGNAL, rtol=1e-8)
 
 
-def test_times_that_were_rounded_are_no_gaps():
-    """750 Hz written to the millisecond: steps of 1 and 2 ms; a lost sample is a gap."""
+def test_rounded_times_are_accepted_and_gaps_rejected():
+    """Times at 750 Hz, rounded to the millisecond, have steps of 1 and 2 ms."""
     time = np.round(np.arange(400) / 750, 3)
     assert set(np.round(np.diff(time), 6)) == {0.001, 0.002}
     series = Series(time, time)
@@ -274,7 +188,7 @@ def test_times_that_were_rounded_are_no_gaps():
         Series(lost, lost)
 
 
-def test_parts_of_a_series_keep_their_times():
+def test_a_part_of_a_series_keeps_its_times():
     series = Series(TIME, SIGNAL)
     part = series.between(0.01, 0.03)
     assert (part.time[0], part.time[-1]) == (0.01, 0.03)
@@ -285,8 +199,8 @@ def test_parts_of_a_series_keep_their_times():
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_no_damage_ends_in_another_exception(seed, tmp_path):
-    """Bytes changed, cut or repeated at random: a record or a RecordError."""
+def test_damaged_files_give_a_record_or_a_record_error(seed, tmp_path):
+    """Bytes are changed, removed or repeated at random."""
     rng = np.random.default_rng(seed)
     layouts = [text.encode() for text, _ in LAYOUTS.values()]
     path = tmp_path / "record.csv"

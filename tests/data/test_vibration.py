@@ -1,4 +1,4 @@
-"""Frequency and damping come back from noisy records: 4 um at 750 Hz, as the source's laser."""
+"""Frequency and damping from records with the noise of the laser of the thesis."""
 
 import dataclasses
 import math
@@ -24,8 +24,8 @@ def vibration(zeta, rng, duration=10.0, amplitude=10e-3, noise=NOISE, frequency=
 
 
 @pytest.mark.parametrize("zeta", [1e-4, 1e-3, 1e-2, 0.1, 0.3])
-def test_frequency_and_damping_come_back(zeta):
-    """Frequency within 0.01 Hz and zeta within 10 %, both ways."""
+def test_frequency_and_damping_are_recovered(zeta):
+    """Frequency within 0.01 Hz; zeta within 10 %, from the fit and from the decrement."""
     found = free_vibration(vibration(zeta, np.random.default_rng(0)))
     assert found.frequency.value == pytest.approx(FREQUENCY, abs=0.01)
     assert found.zeta.value == pytest.approx(zeta, rel=0.1)
@@ -39,16 +39,16 @@ def test_frequency_and_damping_come_back(zeta):
     assert "damping ratio, fit" in str(found)
 
 
-@pytest.mark.parametrize(("unit", "said"), [("m", " m"), ("m/s2", " m/s2"), ("1", "")])
-def test_an_amplitude_has_the_unit_of_its_record(unit, said):
+@pytest.mark.parametrize(("unit", "text"), [("m", " m"), ("m/s2", " m/s2"), ("1", "")])
+def test_an_amplitude_has_the_unit_of_its_record(unit, text):
     series = dataclasses.replace(vibration(1e-2, np.random.default_rng(0)), unit=unit)
     found = free_vibration(series)
-    assert f"amplitude {found.amplitude:.4g}{said}, residual" in str(found)
-    assert f"residual {found.residual:.3g}{said}, correlation" in str(found)
+    assert f"amplitude {found.amplitude:.4g}{text}, residual" in str(found)
+    assert f"residual {found.residual:.3g}{text}, correlation" in str(found)
 
 
-def test_a_motion_that_dies_at_once_has_no_decrement_but_a_fit():
-    """At zeta = 0.6 a tenth is left after each half period: three peaks above the noise."""
+def test_a_strongly_damped_motion_has_a_fit_but_no_decrement():
+    """At zeta = 0.6, three peaks are above the noise: a half period reduces them to a tenth."""
     found = free_vibration(vibration(0.6, np.random.default_rng(0)))
     assert found.decrement is None
     assert found.decrement_zeta is None
@@ -56,25 +56,25 @@ def test_a_motion_that_dies_at_once_has_no_decrement_but_a_fit():
 
 
 @pytest.mark.parametrize("zeta", [6.88e-9, 0.0])
-def test_damping_that_the_record_does_not_hold_is_too_small_to_measure(zeta):
-    """The source's 6.88e-9 is a tenth of what 10 s of its laser resolve: u about 8e-8.
+def test_damping_below_its_uncertainty_is_too_small_to_measure(zeta):
+    """The 6.88e-9 of the thesis is a tenth of the uncertainty of 10 s of its laser, 8e-8.
 
     The Cramer-Rao bound of the decay of a sine is u = (noise/amplitude) sqrt(2/n) sqrt(12)/T.
     """
-    said = 0
+    count = 0
     for seed in range(20):
         series = vibration(zeta, np.random.default_rng(seed))
         found = free_vibration(series)
         bound = NOISE / 10e-3 * math.sqrt(2 / 7500) * math.sqrt(12) / 10 / (2 * np.pi * FREQUENCY)
         assert found.zeta.uncertainty == pytest.approx(bound, rel=0.1)
-        said += found.damping.startswith("too small to measure") or "negative" in found.damping
+        count += found.damping.startswith("too small to measure") or "negative" in found.damping
         if found.damping.startswith("too small"):
             assert found.zeta.interval()[1] > zeta
             assert not found.damping_measurable
-    assert said >= 17, "at 95 % one in forty errs to the one side"
+    assert count >= 17, "at 95 %, one interval in forty is above zero"
 
 
-def test_uncertainties_cover_the_truth():
+def test_uncertainties_cover_the_true_values():
     """68.3 % of 200 draws, -+ 3 standard deviations of a count of them: 0.585 to 0.781."""
     rng = np.random.default_rng(1)
     hits = dict.fromkeys(("frequency", "zeta", "decrement", "its zeta"), 0)
@@ -90,8 +90,8 @@ def test_uncertainties_cover_the_truth():
         assert 0.585 < count / 200 < 0.781, name
 
 
-def test_confidence_intervals_of_the_damping_hold_zero_as_often_as_stated():
-    """Without damping 95 % of the intervals include zero: 190 of 200, -+ 3 x 3.1."""
+def test_confidence_intervals_of_no_damping_include_zero_at_the_stated_level():
+    """Of 200 intervals 190 include zero, -+ 3 standard deviations of 3.1."""
     rng = np.random.default_rng(2)
     zeros = sum(
         free_vibration(vibration(0.0, rng, 2.0, 1e-3)).zeta.includes_zero() for _ in range(200)
@@ -100,8 +100,8 @@ def test_confidence_intervals_of_the_damping_hold_zero_as_often_as_stated():
 
 
 @pytest.mark.parametrize("duration", [2.0, 5.3, 16.7])
-def test_the_spectrum_is_as_sharp_as_it_says(duration):
-    """The highest line is within half a line; the parabola within 2 % of one."""
+def test_the_spectral_peak_is_within_its_resolution(duration):
+    """The highest line is within half a line distance, the parabola within 2 % of it."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         frequency = FREQUENCY + rng.uniform(-0.5, 0.5)
@@ -113,14 +113,14 @@ def test_the_spectrum_is_as_sharp_as_it_says(duration):
         assert abs(found.interpolated - frequency) <= 0.02 * found.resolution
 
 
-def test_the_source_reads_its_spectrum_to_006_hz():
-    """4.82 Hz -+ 0.06 Hz is a record of 17 s: lines 1/T apart."""
+def test_a_record_of_17_s_has_spectral_lines_006_hz_apart():
+    """The thesis states 4.82 Hz -+ 0.06 Hz."""
     found = fourier_peak(vibration(1e-4, np.random.default_rng(4), 1 / 0.06))
     assert found.resolution == pytest.approx(0.06, rel=1e-3)
 
 
-def test_uneven_sampling_is_no_obstacle():
-    """Times rounded to the millisecond: a jitter of 0.3 ms of 207 ms, known to the fit."""
+def test_rounded_sampling_times_give_the_exact_frequency():
+    """The fit uses the rounded times, which are consistent with the values."""
     rng = np.random.default_rng(5)
     t = np.round(np.arange(3000) / RATE, 3)
     x = 1e-2 * np.exp(-0.03 * t) * np.cos(2 * np.pi * FREQUENCY * t)
@@ -128,8 +128,8 @@ def test_uneven_sampling_is_no_obstacle():
     assert found.damped_frequency.value == pytest.approx(FREQUENCY, abs=1e-4)
 
 
-def test_quantised_readings_widen_nothing_beyond_reason():
-    """Steps of 4 um, the sensor's resolution, are noise of 4 um/sqrt(12)."""
+def test_quantised_readings_have_the_uncertainty_of_rounding():
+    """Steps of 4 um are noise of 4 um/sqrt(12)."""
     t = np.arange(7500) / RATE
     x = 1e-2 * np.exp(-0.1 * t) * np.cos(2 * np.pi * FREQUENCY * t)
     found = free_vibration(Series(t, np.round(x / 4e-6) * 4e-6))
@@ -137,8 +137,8 @@ def test_quantised_readings_widen_nothing_beyond_reason():
     assert found.damped_frequency.value == pytest.approx(FREQUENCY, abs=1e-5)
 
 
-def test_a_second_mode_widens_the_uncertainty():
-    """What the model leaves out is correlated from sample to sample, not noise."""
+def test_a_second_mode_increases_the_uncertainty():
+    """The residuals of the omitted mode are correlated from sample to sample."""
     rng = np.random.default_rng(6)
     series = vibration(1e-3, rng)
     second = 2e-4 * np.cos(2 * np.pi * 20.0 * series.time)
@@ -149,7 +149,7 @@ def test_a_second_mode_widens_the_uncertainty():
     assert abs(found.frequency.value - FREQUENCY) < 3 * found.frequency.uncertainty
 
 
-REFUSED = {
+INVALID = {
     "still": (np.full(200, 3e-3), "does not change"),
     "drift": (np.linspace(0, 1, 200), "periods or less"),
     "one period": (np.cos(np.linspace(0, 2 * np.pi, 200)), "periods or less"),
@@ -157,15 +157,15 @@ REFUSED = {
 }
 
 
-@pytest.mark.parametrize("name", REFUSED)
-def test_records_without_a_vibration_are_refused(name):
-    x, says = REFUSED[name]
-    with pytest.raises(EvaluationError, match=says) as caught:
+@pytest.mark.parametrize("name", INVALID)
+def test_records_without_a_vibration_are_rejected(name):
+    x, message = INVALID[name]
+    with pytest.raises(EvaluationError, match=message) as caught:
         free_vibration(Series(np.arange(len(x)) / RATE, x, source="record.csv"))
     assert str(caught.value).startswith("record.csv: ")
 
 
-def test_a_growing_motion_is_no_damping():
+def test_the_damping_of_a_growing_motion_is_reported_as_negative():
     found = free_vibration(vibration(-1e-3, np.random.default_rng(8)))
     assert "negative" in found.damping
     assert not found.damping_measurable
@@ -176,7 +176,7 @@ def test_a_growing_motion_is_no_damping():
 
 
 def bouncing(restitution=0.6, noise=NOISE, height=15e-3, count=5):
-    """Return times of a ball's impacts, and its record: closed form."""
+    """Return the impact times and the record of a bouncing ball, in closed form."""
     g = 9.81
     fall = math.sqrt(2 * height / g)
     when = [fall]
@@ -194,13 +194,13 @@ def bouncing(restitution=0.6, noise=NOISE, height=15e-3, count=5):
     return np.array(when), Series(t, x + noise * rng.standard_normal(len(t)))
 
 
-def test_impacts_are_kinks():
-    """Every bounce of a ball, down to 0.07 m/s, to a sample."""
+def test_impact_times_of_a_bouncing_ball_are_found_to_a_sample():
+    """All bounces, down to a speed of 0.07 m/s."""
     when, series = bouncing()
     assert impacts(series) == pytest.approx(when, abs=1.01 / RATE)
 
 
-def test_a_record_without_impact_says_so():
+def test_a_record_without_impact_is_rejected():
     with pytest.raises(EvaluationError, match="no impact in the record"):
         impacts(vibration(1e-3, np.random.default_rng(10)))
     with pytest.raises(EvaluationError, match="no impact in the record"):

@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from prbm.analysis.stretching import notes, restitution, stretching
-from prbm.files.mechanism_file import load
+from prbm.files.mechanism_file import read_mechanism
 from support import ROOT
 
 PAGE = (ROOT / "docs" / "describe-your-mechanism.md").read_text()
@@ -30,7 +30,7 @@ def write_file(folder: Path) -> Path:
 
 
 def test_the_pieces_of_the_page_are_a_mechanism_file(tmp_path: Path) -> None:
-    lever = load(write_file(tmp_path))
+    lever = read_mechanism(write_file(tmp_path))
     assert lever.name == "Lever"
     assert lever.drawing.splitlines()[-1].split() == ["left", "right"]
     # All parameters that the text names exist; outputs of an FMU are not among the values.
@@ -41,7 +41,7 @@ def test_the_pieces_of_the_page_are_a_mechanism_file(tmp_path: Path) -> None:
 
 
 def test_the_page_gives_the_modal_restitution_with_and_without_stretch(tmp_path: Path) -> None:
-    lever = load(write_file(tmp_path))
+    lever = read_mechanism(write_file(tmp_path))
     match = re.search(r"lever of this page goes from ([\d.]+) to ([\d.]+):", PAGE)
     assert match is not None
     inextensible, stretched = map(float, match.groups())

@@ -1,5 +1,6 @@
-"""Mechanism files: what may be written, what it means, and a sentence for everything else."""
+"""Mechanism files: values with units, defaults, messages for mistakes, schema and page."""
 
+import contextlib
 import copy
 import json
 import math
@@ -18,8 +19,8 @@ import pytest
 from mechanism_mistakes import CHANGES, CONTENTS, EXAMPLE
 from prbm.base.errors import MechanismError, PrbmError
 from prbm.commands import building as cli
-from prbm.files import units
-from prbm.files.mechanism_file import load, schema, shipped
+from prbm.files import record_units, units
+from prbm.files.mechanism_file import read_mechanism, schema, shipped
 from prbm.files.schema import MechanismTable
 from prbm.files.toml_lines import line_of, lines
 from prbm.interface.units import UNITS
@@ -41,7 +42,7 @@ from support import ROOT, mechanism
 def read(folder: Path, content: str | bytes) -> Mechanism:
     path = folder / "mine.toml"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    return load(path)
+    return read_mechanism(path)
 
 
 @pytest.fixture(scope="module")
@@ -49,11 +50,11 @@ def striker(tmp_path_factory) -> Mechanism:
     return read(tmp_path_factory.mktemp("striker"), EXAMPLE)
 
 
-# --- what is written --------------------------------------------------------------------------
+# --- values -----------------------------------------------------------------------------------
 
 
-def test_units_become_si_to_the_last_digit(striker):
-    """A decimal with a unit is the double that the same decimal in SI is."""
+def test_numbers_with_units_are_converted_to_si_to_the_last_digit(striker):
+    """The decimal is scaled before it is rounded to a double."""
     body, anvil = striker.bodies
     assert (body.mass, body.inertia, anvil.mass) == (0.053187, 2.83664e-5, 2e-3)
     assert striker.gravity == (0.0, -9.81)
@@ -69,8 +70,8 @@ def test_units_become_si_to_the_last_digit(striker):
     assert striker.release.displacement == -3e-3
 
 
-def test_units_stand_in_expressions(striker):
-    """They are terms of sums; what is stored is the same expression in SI."""
+def test_terms_of_expressions_may_have_units(striker):
+    """The mechanism has the same expression in SI."""
     assert striker.bodies[0].centre == ("arm.length/2 + 0.003", 0.0)
     assert striker.ground["far"] == ("arm.length + 0.02", 0.05)
 
@@ -101,14 +102,13 @@ def test_units_stand_in_expressions(striker):
         (7, "m", 7.0),
     ],
 )
-def test_a_quantity_is_a_number_and_a_unit(written, unit, expected):
+def test_a_number_with_a_unit_is_read_as_a_quantity(written, unit, expected):
     assert units.quantity(written, unit) == expected
 
 
 @pytest.mark.parametrize(
     ("written", "expected"),
     [
-        ("1e3", "1e3"),
         ("a.b/2", "a.b/2"),
         ("2*(a + 3 mm)", "2*(a + 0.003)"),
         ("a-3mm", "a-0.003"),
@@ -116,31 +116,31 @@ def test_a_quantity_is_a_number_and_a_unit(written, unit, expected):
         ("link[2].m + 1e-1 cm", "link[2].m + 0.001"),
     ],
 )
-def test_an_expression_is_kept_but_for_its_units(written, expected):
+def test_only_numbers_with_units_are_replaced_in_an_expression(written, expected):
     assert units.quantity(written, "m") == expected
 
 
 @pytest.mark.parametrize(
     ("written", "words"),
     [
-        ("3 kg", "'kg' is the unit of something else; write a quantity in m"),
-        ("3 furlong", "the unit 'furlong' is unknown; known are m, g, s"),
-        ("3 m/kg.s", "something else"),
-        ("a + 3 kg", "'kg' is the unit of something else"),
+        ("3 kg", "the unit 'kg' has another dimension; write a quantity in m"),
+        ("3 furlong", "the unit 'furlong' is unknown; known units are m, g, s"),
+        ("3 m/kg.s", "another dimension"),
+        ("a + 3 kg", "the unit 'kg' has another dimension"),
         ("a + 3 furlong", "'furlong' is unknown"),
-        ("a * 3 mm", "'mm' is the unit|is a term of a sum"),
-        ("3 mm*4 mm", "is a term of a sum"),
-        ("1/(3 mm)", "is a term of a sum"),
+        ("a * 3 mm", "must be a term of a sum"),
+        ("3 mm*4 mm", "must be a term of a sum"),
+        ("1/(3 mm)", "must be a term of a sum"),
         ("3 mm * a", "unknown"),
         ("3 12", "cannot read"),
         ("", "cannot read"),
         ("1e999 m", "finite"),
         ("1e999999999999 m", "finite"),
         ("a + 1e999 m", "finite"),
-        ("3 m2", "something else"),
-        ("3 m999999999", "something else"),
+        ("3 m2", "another dimension"),
+        ("3 m999999999", "is unknown"),
         ("3 if", "unknown"),
-        ("3 deg", "something else"),
+        ("3 deg", "another dimension"),
         ("a" * 2000, "at most 1000 characters"),
         (True, "write a number"),
         (math.inf, "finite"),
@@ -149,18 +149,63 @@ def test_an_expression_is_kept_but_for_its_units(written, expected):
         (None, "write a number"),
     ],
 )
-def test_what_is_no_length_is_a_sentence(written, words):
+def test_invalid_lengths_are_rejected(written, words):
     with pytest.raises(MechanismError, match=words):
         units.quantity(written, "m")
 
 
-def test_an_angle_is_no_plain_number():
+@pytest.mark.parametrize(
+    "text", ["12", " 1e-3 ", "+12", "-(3)", "24/2", "2*6", "3 mm + 1", "2*(a + 3 mm) - 0.5"]
+)
+def test_numbers_in_quotes_without_a_unit_are_rejected(text):
+    """They may be meant in another unit than SI."""
+    with pytest.raises(MechanismError, match="has no unit: write a unit after each number"):
+        units.quantity(text, "m")
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"), [("0.6", ""), ("1/3", ""), ("0", "m"), ("a + 12", "m"), ("3 mm/2 - a", "m")]
+)
+def test_dimensionless_numbers_zero_and_terms_beside_parameters_need_no_unit(text, unit):
+    units.quantity(text, unit)
+
+
+HOSTILE_UNITS = (
+    "m)", "( m", "m**-", "m^", "()", "m()", "1/", "/", "m\u0663", "\U0001f600", "m^0.5", "m0",
+    "km999999999", "g999999999", "m" * 3000, "m*" * 3000 + "m", "m*" + "-" * 5000 + "s",
+    "(" * 90 + "m", "m**9**9**9", "__import__('os')", "if", "m#", "m\n", "m\0", "degC2", "degC.m",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("unit", HOSTILE_UNITS)
+def test_invalid_units_raise_errors_of_the_package(unit, tmp_path):
+    """In all functions that read units, in a mechanism file, and in the head of a record."""
+    for read_unit in (
+        units.check_coherent,
+        lambda text: units.converted("1", text, "m"),
+        lambda text: units.quantity(f"3 {text}", "m"),
+        lambda text: units.si_unit(f"3 {text}"),
+    ):
+        with contextlib.suppress(MechanismError):
+            read_unit(unit)
+    if record_units.is_unit(unit):
+        assert math.isfinite(math.hypot(*record_units.in_si(unit)))
+        assert record_units.si_unit(unit)
+    for old, new in (
+        ("= 0.5", f"= 5\nunit = {json.dumps(unit)}"),
+        ('"40 mm"', json.dumps(f"4 {unit}")),
+    ):
+        with contextlib.suppress(MechanismError):
+            read(tmp_path, EXAMPLE.replace(old, new))
+
+
+def test_an_angle_is_not_dimensionless():
     with pytest.raises(MechanismError, match="write a number without a unit"):
         units.quantity("12 deg", "")
 
 
-def test_units_are_those_that_an_fmu_can_have():
-    """A parameter whose value has a unit gets one that the FMU knows; all are coherent."""
+def test_units_of_parameters_are_coherent_and_known_to_the_fmu():
+    """Other units are rejected."""
     assert set(units.COHERENT) <= set(UNITS)
     known = {unit for part in FIELDS.values() for unit, *_ in part.values()}
     assert known <= {"", *units.COHERENT}
@@ -169,17 +214,17 @@ def test_units_are_those_that_an_fmu_can_have():
         small = f"m{unit.removeprefix('k')}"
         assert units.converted("1", small, unit) == (1e-6 if unit.startswith("k") else 1e-3)
     for unit in ("mm", "deg", "g", "kN", "g/cm3", "1/ms"):
-        with pytest.raises(MechanismError, match="parameters are in SI"):
+        with pytest.raises(MechanismError, match="not an SI unit"):
             units.check_coherent(unit)
 
 
-def test_a_parameter_has_the_unit_of_its_value(striker):
+def test_a_parameter_has_the_si_unit_of_its_value(striker):
     length, ratio, *_ = striker.geometry
     assert (length.unit, ratio.unit) == ("m", "")
 
 
-def test_a_material_is_two_parameters_that_types_refer_to(striker):
-    """What a user sees of it: steel.youngs_modulus [Pa], steel.density [kg/m3], in bounds."""
+def test_a_material_has_two_parameters_that_flexure_types_refer_to(striker):
+    """steel.youngs_modulus [Pa] and steel.density [kg/m3], with the bounds of the type's fields."""
     known = {p.name: p for p in striker.parameters}
     for name, value in (("youngs_modulus", 181.5e9), ("density", 7800.0)):
         unit, _, minimum, maximum, nominal, _ = FIELDS[FlexureType][name]
@@ -194,13 +239,13 @@ def test_a_material_is_two_parameters_that_types_refer_to(striker):
     assert (leaf.youngs_modulus, leaf.density) == ("steel.youngs_modulus", "steel.density")
 
 
-def test_a_material_may_be_an_expression(tmp_path):
+def test_a_quantity_of_a_material_may_be_an_expression(tmp_path):
     old, new = 'youngs_modulus = "181.5 GPa"', 'youngs_modulus = "1 GPa + 1e9*ratio"'
     leaf = read(tmp_path, EXAMPLE.replace(old, new)).flexure_types[0]
     assert leaf.youngs_modulus == "1000000000.0 + 1e9*ratio"
 
 
-def test_a_flexure_with_a_section_of_its_own_has_a_type_of_its_name(striker):
+def test_a_flexure_with_its_own_section_has_a_type_of_its_name(striker):
     leaf, right, hanger = striker.flexure_types
     assert [f.type for f in striker.flexures] == ["leaf", "right", "hanger"]
     assert (right.model, right.n, right.axial, right.thickness) == ("nR", 8, True, 5e-5)
@@ -210,7 +255,7 @@ def test_a_flexure_with_a_section_of_its_own_has_a_type_of_its_name(striker):
     assert {"right.thickness", "hanger.youngs_modulus", "hanger.gamma"} <= names
 
 
-def test_ends_are_two_or_the_same_twice(striker):
+def test_one_type_of_end_applies_to_both_ends(striker):
     ends = [flexure.ends for flexure in striker.flexures]
     assert ends == [("clamp", "clamp"), ("clamp", "clamp"), ("clamp", "pin")]
 
@@ -225,12 +270,12 @@ def test_a_point_may_be_given_by_its_name(striker):
     assert striker.probes[0] == Probe("watch", "arm.tip")
 
 
-def test_a_directive_to_the_editor_is_no_part_of_the_drawing(striker):
+def test_directives_to_editors_are_not_part_of_the_drawing(striker):
     assert striker.drawing == " ground --- arm --- tip"
 
 
-def test_what_is_left_out_has_the_default_of_the_engine(tmp_path):
-    """The default of every key is that of the data, and there is no key less."""
+def test_keys_have_the_defaults_of_the_fields_of_the_parts(tmp_path):
+    """Each part has the same keys in a file as fields in the engine."""
     models = {Body: "bodies", Stop: "stops", Friction: "frictions", Force: "forces",
               Joint: "joints", Probe: "probes", Release: "release"}  # fmt: skip
     for part, key in models.items():
@@ -247,8 +292,7 @@ def test_what_is_left_out_has_the_default_of_the_engine(tmp_path):
     }
 
 
-def test_the_guides_are_what_they_were():
-    """Values of the experimental structure, however they are written."""
+def test_the_shipped_guides_have_the_values_of_the_experimental_structure():
     for name in ("PRBDM", "PRBDM2R", "PRBDM2RAxial", "PRBDM3R"):
         guide = mechanism(name)
         values = guide.values()
@@ -266,14 +310,14 @@ def test_the_guides_are_what_they_were():
 # --- mistakes ---------------------------------------------------------------------------------
 
 
-def refused(path: Path, capsys) -> str:
-    """Return what the command says about a file, which is status 2 and lines of a kind."""
+def rejection(path: Path, capsys) -> str:
+    """Return the message of the build command about an invalid file; check status and format."""
     folder = next(folder for folder in path.parents if folder.is_dir())
     before = [*folder.iterdir()]
     assert cli.main(["--mechanism", str(path), "--out", str(folder / "dist")]) == cli.MISTAKE
-    told = capsys.readouterr()
-    assert told.out == ""
-    first, *others = told.err.splitlines()
+    output = capsys.readouterr()
+    assert output.out == ""
+    first, *others = output.err.splitlines()
     command, _, first = first.partition(": ")
     assert command == "build_fmu.py"
     for line in (first, *others):
@@ -282,97 +326,99 @@ def refused(path: Path, capsys) -> str:
         for word in ("Traceback", "Value error", "Input should", "String should", "<text>", "None"):
             assert word not in line
     assert len(others) < 5
-    if "missing: add" not in told.err and "is no key" not in told.err:
+    if "missing: add" not in output.err and "unknown key" not in output.err:
         assert not others
     assert [*folder.iterdir()] == before
-    return told.err
+    return output.err
 
 
 @pytest.fixture(autouse=True)
-def _as_the_command(monkeypatch):
+def _program_name(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["build_fmu.py"])
 
 
 @pytest.mark.parametrize("mistake", CHANGES)
-def test_a_mistake_is_a_sentence_and_status_2(mistake, tmp_path, capsys):
+def test_a_mistake_is_rejected_with_a_message_and_status_2(mistake, tmp_path, capsys):
     old, new, words = CHANGES[mistake]
     assert EXAMPLE.count(old) >= 1
     path = tmp_path / "mine.toml"
     path.write_text(EXAMPLE.replace(old, new, 1), "utf-8")
-    assert words in refused(path, capsys)
+    assert words in rejection(path, capsys)
 
 
 @pytest.mark.parametrize("content", CONTENTS)
-def test_a_file_of_anything_is_a_sentence_and_status_2(content, tmp_path, capsys):
+def test_a_file_with_other_content_is_rejected_with_a_message_and_status_2(
+    content, tmp_path, capsys
+):
     path = tmp_path / "mine.toml"
     path.write_bytes(CONTENTS[content][0])
-    assert CONTENTS[content][1] in refused(path, capsys)
+    assert CONTENTS[content][1] in rejection(path, capsys)
 
 
-def test_what_is_no_file_is_a_sentence_and_status_2(tmp_path, capsys):
-    assert "cannot be read (Is a directory)" in refused(tmp_path, capsys)
-    assert "cannot be read (No such file or directory)" in refused(tmp_path / "a.toml", capsys)
-    assert "cannot be read (File name too long)" in refused(tmp_path / ("a" * 300), capsys)
+def test_an_unreadable_path_is_rejected_with_a_message_and_status_2(tmp_path, capsys):
+    assert "cannot be read (Is a directory)" in rejection(tmp_path, capsys)
+    assert "cannot be read (No such file or directory)" in rejection(tmp_path / "a.toml", capsys)
+    assert "cannot be read (File name too long)" in rejection(tmp_path / ("a" * 300), capsys)
     (tmp_path / "file").write_text(EXAMPLE)
-    assert "cannot be read (Not a directory)" in refused(tmp_path / "file" / "a.toml", capsys)
+    assert "cannot be read (Not a directory)" in rejection(tmp_path / "file" / "a.toml", capsys)
 
 
 @pytest.mark.skipif(not Path("/dev/zero").exists(), reason="no such device")
-def test_a_file_without_an_end_is_read_no_further_than_a_mechanism_goes():
+def test_reading_of_an_endless_file_stops_at_the_size_limit():
     with pytest.raises(MechanismError, match="larger than"):
-        load("/dev/zero")
+        read_mechanism("/dev/zero")
 
 
-def test_there_are_many_mistakes():
+def test_there_are_at_least_45_mistakes():
     assert len(CHANGES) + len(CONTENTS) >= 45
 
 
-TWO_PLACES = (
-    "name of a material and a body",
+TWO_LINES = (  # Mistakes of two lines that do not agree.
+    "material and body of one name",
     "zero-length flexure",
     "joint of points drawn apart",
 )
 
 
 @pytest.mark.parametrize("mistake", sorted({*CHANGES} - {"thousands of digits"}))
-def test_a_mistake_has_the_line_of_its_key_or_part(mistake, tmp_path, capsys):
-    """Between the header of the table and the key where it was made, or at what does not fit it."""
+def test_the_message_gives_a_line_of_the_wrong_part(mistake, tmp_path, capsys):
+    """Between the header of the table and the changed key, or in the other part of a conflict."""
     old, new, _ = CHANGES[mistake]
     path = tmp_path / "mine.toml"
     path.write_text(EXAMPLE.replace(old, new, 1), "utf-8")
-    line = re.search(r"line (\d+)", refused(path, capsys))
+    line = re.search(r"line (\d+)", rejection(path, capsys))
     assert line
     before = EXAMPLE[: EXAMPLE.index(old)].split("\n")
     last = len(before) + max(old.count("\n"), new.count("\n"))
     headers = [i for i, text in enumerate(before, 1) if text.startswith("[[")]
     first = max(headers, default=1)
     assert first <= int(line[1])
-    assert int(line[1]) <= last or mistake in TWO_PLACES
+    assert int(line[1]) <= last or mistake in TWO_LINES
 
 
-SCRAPS = (
+FRAGMENTS = (
     "", "=", "[", "]", "[[", "{", "}", '"', "'", '"""', "#", ".", ",", "\n", "nan", "-", "1e999",
     "true", "\\", "\0", "é", "mm", "3 mm", "/", "*", "(", "arm.length", "x" * 200, "[[bodies]]\n",
     "[release]\n", "name = 3\n", "1979-05-27",
 )  # fmt: skip
 
 
-def test_no_scrap_at_any_place_is_a_traceback(tmp_path):
-    """What a slip of the keyboard makes of a file is a mechanism, or a sentence."""
+def test_random_edits_give_a_mechanism_or_a_message(tmp_path):
+    """Only errors of the package are raised, with messages that begin with the path."""
     rng = random.Random(0)
     for _ in range(400):
         begin = rng.randrange(len(EXAMPLE))
         end = min(len(EXAMPLE), begin + rng.choice((0, 0, 1, 3, 30)))
-        text = EXAMPLE[:begin] + rng.choice(SCRAPS) + EXAMPLE[end:]
-        told = ""
+        text = EXAMPLE[:begin] + rng.choice(FRAGMENTS) + EXAMPLE[end:]
+        message = ""
         try:
             read(tmp_path, text)
         except PrbmError as error:
-            told = str(error)
-        assert not told or told.startswith(f"{tmp_path / 'mine.toml'}: ")
+            message = str(error)
+        assert not message or message.startswith(f"{tmp_path / 'mine.toml'}: ")
 
 
-def test_lines_are_those_of_an_editor():
+def test_lines_of_tables_and_keys_are_counted_from_1():
     text = '''\
 # a = 1
 title = """
@@ -411,7 +457,7 @@ a.b = 7
     assert line_of(("stops", 0), known) is None
 
 
-def test_line_ends_of_other_systems_are_line_ends(tmp_path, striker):
+def test_line_ends_of_windows_and_old_macs_are_accepted(tmp_path, striker):
     for end in ("\r\n", "\r"):
         assert read(tmp_path, EXAMPLE.replace("\n", end)) == striker
         with pytest.raises(MechanismError, match="line 3: name = 3: write a text"):
@@ -421,60 +467,60 @@ def test_line_ends_of_other_systems_are_line_ends(tmp_path, striker):
 # --- schema and reference ---------------------------------------------------------------------
 
 
-def problems(data: object) -> list[str]:
-    """Return what a validator of JSON schemas says."""
+def schema_errors(data: object) -> list[str]:
+    """Return the messages of a validator of JSON schemas."""
     validator = jsonschema.validators.validator_for(schema())
     return [error.message for error in validator(schema()).iter_errors(data)]
 
 
-def test_the_schema_is_one():
+def test_the_schema_is_a_valid_draft_7_schema_without_null():
     assert schema()["$schema"] == "http://json-schema.org/draft-07/schema#"
     jsonschema.Draft7Validator.check_schema(schema())
     assert "null" not in json.dumps(schema())
 
 
 @pytest.mark.parametrize("name", [*shipped(), "example"])
-def test_what_is_a_mechanism_satisfies_the_schema(name):
+def test_mechanisms_satisfy_the_schema(name):
     text = EXAMPLE if name == "example" else shipped()[name].read_text("utf-8")
-    assert problems(tomllib.loads(text)) == []
+    assert schema_errors(tomllib.loads(text)) == []
 
 
-SEEN = (
-    "text as a truth", "list as a number", "list as a value", "truth as a number",
-    "number as a name", "number as a title", "part of a link", "gravity with three numbers",
-    "gravity with one number", "point with one number", "point that is a number",
+SCHEMA_MISTAKES = (
+    "text as a boolean", "list as a number", "list as a value", "boolean as a number",
+    "number as a name", "number as a title", "fractional number of links",
+    "gravity with three numbers", "gravity with one number", "point with one number",
+    "point that is a number",
     "point without a body", "array instead of table", "table instead of array",
     "ground as an array",
     "value instead of an array", "unknown key", "unknown key of the file", "unknown table",
     "key of another part", "missing key", "body without mass", "missing release",
-    "name with a path", "name that is empty", "name too long",
-    "part with a path", "part with a name too long", "point with spaces",
-    "both material and density", "neither material nor density", "half a material",
+    "mechanism named by a path", "name that is empty", "name too long",
+    "part named by a path", "part with a name too long", "point with spaces",
+    "both material and density", "neither material nor density", "density missing",
     "type and section", "no type and no section", "section without width", "too dense",
-    "unknown model", "n too large", "n of nothing", "ends wrong", "three ends", "one end", "huge",
+    "unknown model", "n too large", "n of zero", "ends wrong", "three ends", "only one end", "huge",
     "damping out of bounds", "text as a number",
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("mistake", SEEN)
-def test_what_is_none_does_not_satisfy_the_schema(mistake):
+@pytest.mark.parametrize("mistake", SCHEMA_MISTAKES)
+def test_mistakes_do_not_satisfy_the_schema(mistake):
     old, new, _ = CHANGES[mistake]
-    assert problems(tomllib.loads(EXAMPLE.replace(old, new, 1)))
+    assert schema_errors(tomllib.loads(EXAMPLE.replace(old, new, 1)))
 
 
-def test_the_schema_tells_what_the_code_knows():
-    """Unit, bounds and default of every quantity, and a description of every key."""
+def test_the_schema_has_unit_bounds_and_description_of_every_key():
     definitions = schema()["definitions"]
     for part, table in ((Body, "BodyTable"), (Stop, "StopTable"), (FlexureType, "FlexureTable"),
                         (Friction, "FrictionTable"), (Release, "ReleaseTable")):  # fmt: skip
         for name, (unit, description, minimum, maximum, *_) in FIELDS[part].items():
-            told = definitions[table]["properties"][name]
-            assert told["description"] == f"{description} [{unit or '-'}]"
-            assert told["anyOf"][0]["minimum"] == minimum
-            assert told["anyOf"][0]["maximum"] == maximum
+            entry = definitions[table]["properties"][name]
+            assert entry["description"] == f"{description} [{unit or '-'}]"
+            assert entry["anyOf"][0]["minimum"] == minimum
+            assert entry["anyOf"][0]["maximum"] == maximum
     for table in (schema(), *definitions.values()):
         assert table["description"]
-        assert all(told["description"] for told in table["properties"].values())
+        assert all(entry["description"] for entry in table["properties"].values())
 
 
 def test_the_command_prints_the_schema(capsys):
@@ -482,8 +528,8 @@ def test_the_command_prints_the_schema(capsys):
     assert json.loads(capsys.readouterr().out) == schema()
 
 
-def test_a_mechanism_without_units_needs_no_library_of_units(tmp_path):
-    """It takes a third of a second to import."""
+def test_pint_is_not_imported_for_a_file_without_units(tmp_path):
+    """The import takes 0.3 s."""
     text = (ROOT / "tests" / "interface" / "test_tables.py").read_text().split('"""')[3]
     (tmp_path / "plain.toml").write_text(text)
     code = (
@@ -500,37 +546,38 @@ REFERENCE = ROOT / "docs" / "mechanism-files.md"
 def keys_of(table: dict) -> str:
     """Return the keys of a table of the schema as a table of Markdown."""
     rows = ["| key | unit | default | range | meaning |", "|---|---|---|---|---|"]
-    for key, told in table["properties"].items():
-        meaning, _, unit = told["description"].partition(" [")
-        cells = (f"`{key}`", unit.rstrip("]"), default(table, key), span(told), meaning)
+    for key, entry in table["properties"].items():
+        meaning, _, unit = entry["description"].partition(" [")
+        cells = (f"`{key}`", unit.rstrip("]"), default(table, key), span(entry), meaning)
         rows.append("| " + " | ".join(cells).replace("|  |", "| |") + " |")
     return "\n".join(row.replace("|  |", "| |").replace("|  |", "| |") for row in rows)
 
 
 def default(table: dict, key: str) -> str:
+    """Return the default of a key as the page shows it."""
     if key in table.get("required", ()):
         return "required"
     value = table["properties"][key].get("default", "")
     return "" if value in ("", [], {}) else f"`{json.dumps(value)}`"
 
 
-def span(told: dict) -> str:
+def span(entry: dict) -> str:
     """Return the bounds or the choices of a key."""
-    choices = [told, *told.get("anyOf", ()), *told.get("oneOf", ())]
+    choices = [entry, *entry.get("anyOf", ()), *entry.get("oneOf", ())]
     for choice in choices:
         if "enum" in choice:
             return ", ".join(f"`{value}`" for value in choice["enum"])
         if "minimum" in choice:
             return f"{choice['minimum']:g} to {choice['maximum']:g}"
-    items = told.get("items", {})
+    items = entry.get("items", {})
     return span(items) if items else ""
 
 
-def test_the_reference_page_has_every_key_with_unit_default_and_range():
+def test_the_page_has_every_key_with_unit_default_and_range():
     page = REFERENCE.read_text("utf-8")
-    told = schema()
-    tables = {key: _definition(told, key) for key in told["properties"]}
-    for key, table in {"mechanism": told, **tables}.items():
+    root = schema()
+    tables = {key: _definition(root, key) for key in root["properties"]}
+    for key, table in {"mechanism": root, **tables}.items():
         if table is not None:
             block = re.search(rf"<!-- keys of {key} -->\n(.*?)\n<!-- end -->", page, re.DOTALL)
             assert block, f"docs/mechanism-files.md needs the keys of {key}:\n{keys_of(table)}"
@@ -538,15 +585,15 @@ def test_the_reference_page_has_every_key_with_unit_default_and_range():
     assert all(f"`{symbol}`" in page for symbol in re.findall(r"(\w+)(?:,| *$)", units.KNOWN)[:9])
 
 
-def _definition(told: dict, key: str) -> dict | None:
-    """Return the table, or the table of the array, that a key of the file holds."""
-    reference = re.search(r"#/definitions/(\w+)", json.dumps(told["properties"][key]))
-    return copy.copy(told["definitions"][reference[1]]) if reference else None
+def _definition(root: dict, key: str) -> dict | None:
+    """Return the schema of the table, or of the tables in the array, at a key of the file."""
+    reference = re.search(r"#/definitions/(\w+)", json.dumps(root["properties"][key]))
+    return copy.copy(root["definitions"][reference[1]]) if reference else None
 
 
-def test_the_example_of_the_reference_page_is_a_mechanism(tmp_path):
+def test_the_example_of_the_page_is_a_mechanism(tmp_path):
     page = REFERENCE.read_text("utf-8")
     for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL):
         if "title" in text:
-            assert problems(tomllib.loads(text)) == []
+            assert schema_errors(tomllib.loads(text)) == []
             assert read(tmp_path, text).bodies

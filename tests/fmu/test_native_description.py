@@ -21,7 +21,7 @@ import native_host
 from prbm.base.atomic import write
 from prbm.base.errors import MechanismError, SimulationError
 from prbm.commands import fmu_report as report
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu import native_fmu
 from prbm.fmu import reference_results as reference
 from prbm.fmu.native_fmu import described
@@ -94,7 +94,7 @@ def test_reference_results_equal_the_python_engine(native):
     text = member(native["PRBDM", 2], "extra/org.fmi-standard.fmi-ls-ref/PRBDM_out.csv").decode()
     rows = list(csv.DictReader(io.StringIO(text)))
     assert [float(row["time"]) for row in rows] == pytest.approx(np.arange(1001) * 1e-3)
-    simulation = Simulation(load(shipped()["PRBDM"]))
+    simulation = Simulation(read_mechanism(shipped()["PRBDM"]))
     simulation.advance(0.1)
     for name, x in simulation.outputs().items():
         if name in rows[0]:
@@ -108,7 +108,7 @@ def test_a_failing_default_experiment_has_no_reference_results(monkeypatch):
 
     monkeypatch.setattr(reference, "simulate", fails)
     reported: list[str] = []
-    built = native_fmu.build(load(shipped()["PRBDM"]), fmi=3, progress=reported.append)
+    built = native_fmu.build(read_mechanism(shipped()["PRBDM"]), fmi=3, progress=reported.append)
     with zipfile.ZipFile(io.BytesIO(built)) as archive:
         assert not [name for name in archive.namelist() if name.startswith("extra/")]
     assert "no reference results: the simulation of the default experiment fails" in reported
@@ -277,7 +277,7 @@ def test_the_compiled_source_needs_no_resources(native, tmp_path, fmi):
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_two_builds_of_one_source_are_identical(native, mechanisms, fmi):
-    again = native_fmu.build(load(shipped()["PRBDM2R"]), fmi=fmi)
+    again = native_fmu.build(read_mechanism(shipped()["PRBDM2R"]), fmi=fmi)
     assert native["PRBDM2R", fmi].read_bytes() == again
 
 
@@ -337,7 +337,7 @@ def test_clocks_without_a_stop_are_rejected(tmp_path):
     text = re.sub(r"\[\[stops\]\].*?\n\n", "", text, flags=re.DOTALL)
     path = tmp_path / "mine.toml"
     path.write_text(text)
-    free = load(path)
+    free = read_mechanism(path)
     assert free.stops == ()
     with pytest.raises(MechanismError, match="PRBDM has no stop"):
         native_fmu.build(free, fmi=3, clock=True)

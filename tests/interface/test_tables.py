@@ -9,7 +9,7 @@ import pytest
 from kernel_library import KernelError, kernel
 from many_parts import anvil, elastic
 from prbm.base.errors import MechanismError
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu.native_fmu import described
 from prbm.hybrid.simulation import Simulation
 from prbm.interface.tables import HEAD, slots, tables
@@ -122,8 +122,8 @@ def mechanism(request, tmp_path_factory) -> Mechanism:
     if request.param == "Lever":
         path = tmp_path_factory.mktemp("lever") / "lever.toml"
         path.write_text(EXPRESSIONS)
-        return load(path)
-    return load(shipped()[request.param])
+        return read_mechanism(path)
+    return read_mechanism(shipped()[request.param])
 
 
 @pytest.fixture(scope="module")
@@ -369,7 +369,7 @@ def test_the_length_of_a_name_is_in_bytes(tmp_path):
     path = tmp_path / "mine.toml"
     text = shipped()["PRBDM"].read_text()
     path.write_text(text.replace('"left_flexure"', '"linke_Fläche"'), "utf-8")
-    mechanism = load(path)
+    mechanism = read_mechanism(path)
     native = described(mechanism, {}, 2)
     written = tables(mechanism, native.variables, TOKEN, native.independent)
     name = "linke_Fläche".encode()

@@ -1,4 +1,4 @@
-"""The flexure models against beam theory and finite elements, and the page that tells of it."""
+"""Flexure models against beam theory and finite elements, and the page of the results."""
 
 import importlib.util
 import math
@@ -36,11 +36,11 @@ def script():
     return module
 
 
-# --- beam theory by another route ---------------------------------------------------------------
+# --- beam theory --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("load", [0.01, 1.0, -3.0, 8.0])
-def test_elliptic_integrals_solve_the_elastica(load):
+def test_elliptic_integrals_agree_with_a_boundary_value_problem_of_the_elastica(load):
     """Slopes: theta'' = -alpha cos theta, theta(0) = theta'(1) = 0; shape: z' = exp(i theta)."""
 
     def rate(s, y):
@@ -58,8 +58,8 @@ def test_elliptic_integrals_solve_the_elastica(load):
     assert tip.z == pytest.approx(complex(found.y[2, -1], found.y[3, -1]), abs=1e-8)
 
 
-def test_a_heavy_tip_is_a_mass_on_a_spring():
-    """omega^2 -> 3 EI/(m_tip L^3); with an inertia too, two by two (Rayleigh, both exact)."""
+def test_a_beam_with_a_heavy_tip_has_the_frequencies_of_a_massless_beam():
+    """omega^2 -> 3 EI/(m_tip L^3); with inertia, the eigenvalues of a 2 x 2 stiffness matrix."""
     assert wavenumber(1, 1e6) ** 4 == pytest.approx(3e-6, rel=1e-6)
     stiffness = np.array([[12.0, -6.0], [-6.0, 4.0]])
     omega2 = np.linalg.eigvals(stiffness / np.array([[1e6], [3e5]]))
@@ -73,8 +73,8 @@ FORCE_ERRORS = {"1R": 3.8, "2R": 1.0, "3R": 2.3, "10R": 0.51, "40R": 0.033}  # %
 
 
 @pytest.mark.parametrize("model", FORCE_ERRORS)
-def test_an_end_force_bends_a_cantilever_as_the_elastica_says(model):
-    """Up to P L^2/EI = 8, to the error of the model; and to either side the same."""
+def test_tip_displacements_under_an_end_force_are_those_of_the_elastica(model):
+    """Within the error of the model up to P L^2/EI = 8, and mirrored for the opposite force."""
     models = script()
     system = models.cantilever(model)
     for load in (1e-3, 0.1, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0):
@@ -89,7 +89,7 @@ SLOPES = {"1R": 1 / (0.8517 * 2.65), "2R": 1 / 3.4710 + 1 / 2.0682,
 
 
 @pytest.mark.parametrize("model", SLOPES)
-def test_an_end_moment_turns_the_tip_by_the_sum_of_the_compliances(model):
+def test_the_tip_slope_under_an_end_moment_is_the_sum_of_the_compliances(model):
     """Every spring carries the whole moment: exact for chains, 0.443, 0.772, 1.007 for 1R to 3R."""
     models = script()
     system = models.cantilever(model)
@@ -104,25 +104,25 @@ def test_an_end_moment_turns_the_tip_by_the_sum_of_the_compliances(model):
 
 
 def test_a_chain_converges_to_the_elastica_at_second_order():
-    """Force and moment together have no closed form; each alone has: slopes of 2.00 +- 0.05."""
+    """Slopes of 2.00 +- 0.05, under a force and under a moment."""
     models = script()
-    for what, load, exact in (("force", 8.0, end_force), ("moment", math.pi, end_moment)):
+    for kind, load, exact in (("force", 8.0, end_force), ("moment", math.pi, end_moment)):
         errors = [
-            models.displacement_error(models.tip_of(models.cantilever(f"{n}R"), **{what: load}),
+            models.displacement_error(models.tip_of(models.cantilever(f"{n}R"), **{kind: load}),
                                       exact(load))
             for n in (5, 10, 20, 40)
         ]  # fmt: skip
         assert models.order((5, 10, 20, 40), errors) == pytest.approx(2.0, abs=0.05)
 
 
-FREQUENCY_ERRORS = {  # largest of f1, of f2 [%], over bodies without inertia
+FREQUENCY_ERRORS = {  # Largest errors of f1 and f2 [%], over tip bodies without inertia.
     "1R": (5.9, None), "2R": (1.3, 14.0), "3R": (3.1, 2.1), "10R": (0.5, 1.6), "40R": (0.03, 0.11),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("model", FREQUENCY_ERRORS)
 def test_frequencies_with_a_body_at_the_tip_are_those_of_the_beam(model):
-    """To the error of the model."""
+    """Within the error of the model."""
     models = script()
     for tip in ((0.0, 0.0), (0.3, 0.0), (1.0, 0.0), (10.0, 0.0)):
         system = models.cantilever(model, tip)
@@ -141,11 +141,11 @@ def test_frequencies_of_a_chain_converge_to_those_of_the_beam_at_second_order(ti
     assert models.order((10, 20, 40, 80), errors) == pytest.approx(2.0, abs=0.1)
 
 
-def test_a_chain_stretches_as_a_bar():
-    """P L/EA under a small pull along it; the 2R and the 3R, too, have one link that does."""
+def test_an_axial_force_stretches_a_flexure_by_the_elongation_of_a_bar():
+    """P L/EA under a small force: by one link of the 2R and 3R, by all links of a chain."""
     models = script()
     EA = models.MODULUS * models.WIDTH * models.THICKNESS
-    pull = 1e-4 * EA  # the logarithm of the stretch is linear: second order in P/EA
+    pull = 1e-4 * EA  # The logarithmic strain is linear in the force: the error is of second order.
     for model in ("2R", "3R", "10R"):
         system = models.cantilever(model, axial=True)
         q = equilibrium(system, loads={"force.x": pull}).q
@@ -157,8 +157,8 @@ def test_a_chain_stretches_as_a_bar():
 # --- statics under loads ------------------------------------------------------------------------
 
 
-def test_a_load_does_the_work_that_the_springs_store():
-    """dV/dP = P dz/dP (Castigliano), force and moment at once, at a large deflection."""
+def test_the_work_of_loads_is_the_change_of_elastic_energy():
+    """dV/dP = P dz/dP (Castigliano), for force and moment together at a large deflection."""
     models = script()
     system = models.cantilever("3R")
     forces = np.array([3.0, -2.0, 0.7]) * models.EI / models.L**2 * np.array([1, 1, models.L])
@@ -174,20 +174,22 @@ def test_a_load_does_the_work_that_the_springs_store():
     assert V_high - V_low == pytest.approx(forces @ (high - low), rel=1e-6)
 
 
-def test_weight_is_a_load_like_others():
-    """Gravity on a body and the same force at its centre of mass bend alike; modes, too, agree."""
+def test_gravity_and_an_equal_force_at_the_centre_of_mass_give_one_shape():
+    """Their frequencies agree as well."""
     heavy = script().cantilever("3R", (1e4, 1e3))
     m = heavy.values["tip.mass"]
     g = 8.0 * script().EI / script().L ** 2 / m
     weighed = replace(heavy, values={**heavy.values, "gravity.y": g})
     shapes = equilibrium(weighed), equilibrium(heavy, loads={"force.y": m * g})
-    np.testing.assert_allclose(shapes[0].q, shapes[1].q, atol=1e-3)  # the flexure weighs, too
+    np.testing.assert_allclose(
+        shapes[0].q, shapes[1].q, atol=1e-3
+    )  # Gravity acts on the flexure as well.
     f = modes(weighed, shapes[0]).frequency, modes(heavy, shapes[1]).frequency
     np.testing.assert_allclose(f[0][:2], f[1][:2], rtol=1e-3)
 
 
-def test_what_holds_and_what_loads_are_one():
-    """The holding force, applied as a load, keeps the shape without being held."""
+def test_the_holding_force_applied_as_a_load_gives_the_held_shape():
+    """The frequencies about both shapes agree."""
     system = script().cantilever("2R")
     held = equilibrium(system, 0.6 * script().L)
     loaded = equilibrium(system, loads={"force.y": held.force})
@@ -196,7 +198,7 @@ def test_what_holds_and_what_loads_are_one():
     np.testing.assert_allclose(f[0], f[1], rtol=1e-7)
 
 
-def test_loads_that_are_none_are_refused():
+def test_invalid_loads_are_rejected():
     system = script().cantilever("2R")
     with pytest.raises(ParameterError, match=r"'force.z'; did you mean force"):
         equilibrium(system, loads={"force.z": 1.0})
@@ -209,7 +211,7 @@ def test_loads_that_are_none_are_refused():
 
 # --- the guide ----------------------------------------------------------------------------------
 
-GUIDES = {  # rest [mm], f1, f2, f3 at rest, f1 straight [Hz], as our design notes give them
+GUIDES = {  # Rest position [mm], f1, f2, f3 there and f1 straight [Hz], computed independently.
     "1R": (10.42, 4.957, None, None, 4.726),
     "2R": (10.78, 4.889, 115.9, 182.9, 4.624),
     "3R": (10.95, 4.854, 147.7, 233.2, 4.590),
@@ -219,8 +221,8 @@ HALF_DIGITS = (5e-3, 5e-4, 0.05, 0.05, 5e-4)
 
 
 @pytest.mark.parametrize("model", GUIDES)
-def test_the_steel_guide_has_its_figures(model):
-    """Computed before by other programs, to the digits given."""
+def test_rest_position_and_frequencies_of_the_steel_guide(model):
+    """Equal to the results of other programs in all digits given."""
     found = script().guide_figures(model)[[0, 1, 2, 3, 6]]
     for x, expected, half in zip(found, GUIDES[model], HALF_DIGITS, strict=True):
         assert math.isnan(x) if expected is None else abs(x - expected) <= 1.01 * half
@@ -228,23 +230,23 @@ def test_the_steel_guide_has_its_figures(model):
 
 @pytest.mark.parametrize(("axial", "ns"), [(False, (5, 10, 20, 40)), (True, (5, 10, 20, 40, 80))])
 def test_a_chain_guide_converges_at_second_order(axial, ns):
-    """In 1/n, to its own Richardson limit.
+    """The errors are relative to the Richardson limit of the chains.
 
-    Bounce and pitch come later into the range of the order: their slope is 1.2 from 5 to 10 links.
+    Bounce and pitch need more links to reach this order: their slope is 1.2 from 5 to 10 links.
     """
     models = script()
     figures = np.array([models.guide_figures(f"{n}R", axial=axial) for n in ns])
     errors = np.abs(figures / models.richardson(list(figures)) - 1)
-    for i in (0, 1, 4, 5, 6):  # rest, f1, the flexures' own, f1 straight
+    for i in (0, 1, 4, 5, 6):  # rest position, f1, modes of the flexures, f1 straight
         assert models.order(ns, errors[:, i]) == pytest.approx(2.0, abs=0.1)
     for i in (2, 3):  # bounce, pitch
         assert models.order(ns[-2:], errors[-2:, i]) == pytest.approx(2.0, abs=0.1)
 
 
-def test_the_limit_of_chains_that_stretch_is_that_of_finite_elements():
-    """To the elements' last digit; bounce and pitch to 1.5e-4.
+def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
+    """To the last digit of the finite elements; bounce and pitch to 1.5e-4.
 
-    The limit of these is known to 5e-5 from chains of up to 80 links.
+    Chains of up to 80 links give the limit of bounce and pitch to 5e-5.
     """
     models = script()
     figures = [models.guide_figures(f"{n}R", axial=True) for n in (20, 40, 80)]
@@ -260,8 +262,8 @@ def test_the_limit_of_chains_that_stretch_is_that_of_finite_elements():
     assert rigid / axial - 1 == pytest.approx([0.0025, 0.0021], abs=1e-4)
 
 
-def test_finite_elements_say_so_themselves():
-    """The figures that the page calls FE, built anew: to 1e-4 (its Jacobians are differences)."""
+def test_the_finite_element_figures_of_the_page_are_reproduced():
+    """To 1e-4, because the Jacobians of the finite elements are finite differences."""
     models = script()
     values = mechanism("PRBDM2R").values()
     found = finite_elements.guide(values, 64)
@@ -281,12 +283,12 @@ def test_finite_elements_say_so_themselves():
     ("2R", False, 0.0485),
 ])  # fmt: skip
 def test_modal_restitution_is_that_of_finite_elements(model, axial, error):
-    """To the error of the model, at nine places; without tuning."""
+    """Within the error of the model at nine hit points, without tuning."""
     assert script().restitution_error(model, axial=axial) < error
 
 
-def test_straight_rigid_links_let_an_off_centre_hit_cost_nothing():
-    """What axial compliance mends: 0.596 instead of 0.548 at an offset of 4 mm, eps = 0.6."""
+def test_an_off_centre_hit_lowers_modal_restitution_only_with_axial_compliance():
+    """Modal restitution 0.596 of rigid links against 0.548, at an offset of 4 mm and eps = 0.6."""
     rigid, axial = (script().guide("2R", axial=axial) for axial in (False, True))
     found = []
     for guide in (rigid, axial):
@@ -296,8 +298,8 @@ def test_straight_rigid_links_let_an_off_centre_hit_cost_nothing():
     assert found[1] == pytest.approx(script().FE_RESTITUTION[4][1], abs=0.004)
 
 
-def test_axial_compliance_leaves_bounce_and_pitch_to_the_model():
-    """11.4 and 13.0 % below finite elements with it, 11.3 and 12.8 % without."""
+def test_axial_compliance_hardly_changes_bounce_and_pitch():
+    """11.4 and 13.0 % below finite elements with axial compliance, 11.3 and 12.8 % without."""
     models = script()
     for axial, errors in ((True, (-0.1144, -0.1299)), (False, (-0.1127, -0.1285))):
         found = models.guide_figures("2R", axial=axial)
@@ -311,8 +313,8 @@ def test_axial_compliance_leaves_bounce_and_pitch_to_the_model():
 
 
 @pytest.mark.parametrize("name", ["1R", "2R", "3R", "nR"])
-def test_what_a_flexure_weighs(name):
-    """All of itself, but for the 1R: 0.73, half of it at each pivot, as the page tells."""
+def test_the_mass_of_the_segments_is_that_of_the_flexure_except_for_the_1R(name):
+    """The 1R has 0.73 of the mass, half of it at each pivot."""
     model = replace(MODELS[name], links=4 if name == "nR" else 0)
     gamma, K_theta = ([c.value for c in part] for part in (model.gamma, model.K_theta))
     found = segments(model, gamma, K_theta, ("clamp", "clamp"), 0.2, 1.0, 1.0)
@@ -326,6 +328,7 @@ def test_what_a_flexure_weighs(name):
 
 
 def cells(table):
+    """Return the rows of cells of a Markdown table."""
     return [[c.strip() for c in line.strip("|").split("|")] for line in table.splitlines()]
 
 
@@ -334,8 +337,8 @@ def unit_of_last_digit(number):
 
 
 @pytest.mark.parametrize("name", ["end force", "end moment", "frequencies", "guide", "restitution"])
-def test_the_page_shows_what_is_computed(name):
-    """Every cell, numbers to one unit of their last digit."""
+def test_the_tables_of_the_page_are_reproduced(name):
+    """Numbers to one unit of their last digit."""
     models = script()
     now, page = (cells(t) for t in (models.TABLES[name](), models.shown(PAGE, name)))
     assert [len(row) for row in now] == [len(row) for row in page]
@@ -348,7 +351,7 @@ def test_the_page_shows_what_is_computed(name):
             assert abs(float(new) - expected) <= 1.01 * unit_of_last_digit(old)
 
 
-def test_the_page_has_all_tables_and_its_figure():
+def test_the_page_has_all_tables_and_the_figure():
     models = script()
     assert set(models.TABLES) == {"end force", "end moment", "frequencies", "guide", "restitution"}
     assert PAGE.count("<!-- table:") == len(models.TABLES)

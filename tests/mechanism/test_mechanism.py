@@ -1,4 +1,4 @@
-"""Mechanisms as data: expressions, parameters, and everything that is refused."""
+"""Mechanisms as data: expressions, parameters, and rejected descriptions."""
 
 import dataclasses
 import math
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from prbm.base.errors import EquilibriumError, MechanismError, ParameterError, PrbmError
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
@@ -52,14 +52,14 @@ def test_parameters_are_those_of_the_public_interface(model, own):
     ("text", "expected"),
     [("2*a - b/4 + 1", 2.5), ("-(a - 3)", 2.0), ("+a*2", 2.0), (7, 7.0), ("1e-3", 1e-3)],
 )
-def test_expressions_are_linear_in_parameters(text, expected):
+def test_expressions_are_affine_in_parameters(text, expected):
     assert affine(text)({"a": 1.0, "b": 2.0}) == expected
 
 
 @pytest.mark.parametrize(
     "text", ["a*b", "1/a", "sin(a)", "a**2", "a +", "__import__('os')", "a/0", "(" * 500, "'x'"]
 )
-def test_anything_else_is_no_expression(text):
+def test_other_expressions_are_rejected(text):
     with pytest.raises(MechanismError, match="cannot read the expression"):
         affine(text)
 
@@ -77,17 +77,20 @@ LEAF = GUIDE.flexure_types[0]
     ("parts", "words"),
     [
         ({"name": "2R"}, "use letters a to z"),
-        ({"name": "class"}, "no word of Python"),
+        ({"name": "class"}, "no keyword of Python"),
         ({"name": "Führung"}, "use letters a to z"),
         ({"gravity": (9.81,)}, "an x and a y"),
         ({"stops": (Stop("energy", "shuttle", (0, 0)),)}, "used twice or reserved"),
-        ({"stops": (Stop("s", "shuttle", (0, 0), direction=math.nan),)}, "must be an angle"),
+        ({"stops": (Stop("s", "shuttle", (0, 0), direction=math.nan),)}, "must be finite"),
         ({"ground": {"left": (math.nan, 0), "right": (0.1, 0)}}, "not finite"),
         ({"ground": {"left": ("1e400", 0), "right": (0.1, 0)}}, "not finite"),
         ({"bodies": ()}, "at least one body"),
         ({"bodies": (BODY, BODY)}, "'shuttle' is used twice"),
-        ({"stops": (Stop("stop", "shutle", (0, 0)),)}, "'shutle' is not described"),
-        ({"release": Release("nobody")}, "'nobody' is not described"),
+        (
+            {"stops": (Stop("stop", "shutle", (0, 0)),)},
+            "'shutle' is not defined; choose one of shuttle",
+        ),
+        ({"release": Release("shutle")}, "'shutle' is not defined; choose one of shuttle"),
         ({"flexures": (dataclasses.replace(LEFT, end="shuttle.top"), RIGHT)}, "'shuttle.top'"),
         ({"flexures": (dataclasses.replace(LEFT, type="leaf"), RIGHT)}, "'leaf' is not"),
         ({"flexures": (dataclasses.replace(LEFT, ends=("free", "pin")), RIGHT)}, "needs a clamp"),
@@ -95,13 +98,13 @@ LEAF = GUIDE.flexure_types[0]
         ({"flexure_types": (dataclasses.replace(LEAF, model="4R"),)}, "choose one of 1R, 2R, 3R"),
         (
             {"flexure_types": (dataclasses.replace(LEAF, coefficients={"gamma": 0.8}),)},
-            "no coefficient of the 2R model",
+            "not a coefficient of the 2R model",
         ),
-        ({"geometry": ()}, "no parameter of PRBDM2R"),
+        ({"geometry": ()}, "not a parameter of PRBDM2R"),
         ({"geometry": (*GUIDE.geometry, GUIDE.geometry[0])}, "defined twice"),
     ],
 )
-def test_an_inconsistent_description_is_refused(parts, words):
+def test_inconsistent_descriptions_are_rejected(parts, words):
     with pytest.raises(MechanismError, match=words):
         changed(**parts)
 
@@ -120,12 +123,12 @@ def test_an_inconsistent_description_is_refused(parts, words):
         ),
     ],
 )
-def test_bounds_hold_for_expressions_too(parts, words):
+def test_expressions_out_of_bounds_are_rejected(parts, words):
     with pytest.raises(ParameterError, match=re.escape(words)):
         changed(**parts).values()
 
 
-def test_what_moves_must_have_mass():
+def test_moving_parts_without_mass_are_rejected():
     massless = changed(flexure_types=(dataclasses.replace(LEAF, density="1e-30*flexure.length"),))
     values = GUIDE.values() | {"flexure.density": 0.0}
     with pytest.raises(ParameterError, match="at least 1 kg/m3"):
@@ -134,8 +137,8 @@ def test_what_moves_must_have_mass():
         assemble(GUIDE, values)
 
 
-def test_values_that_are_not_all_are_refused():
-    """With the names of those that are missing, and where all of them are to be had."""
+def test_incomplete_values_are_rejected():
+    """The message names missing parameters and the call that returns all values."""
     values = GUIDE.values()
     del values["gravity.x"]
     with pytest.raises(
@@ -147,31 +150,31 @@ def test_values_that_are_not_all_are_refused():
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_every_bound_of_every_parameter_works_or_says_why_not(model):
-    """At each end of its range a value runs a moment or is refused with a sentence."""
+def test_a_parameter_at_its_bounds_is_simulated_or_rejected_with_a_reason(model):
+    """At each bound, the simulation starts or a message gives the reason."""
     guide = mechanism(model)
     for p in guide.parameters:
         for bound in (p.minimum, p.maximum):
             try:
                 Simulation(guide, {p.name: bound})
                 continue
-            except PrbmError as refused:
-                words = str(refused)
-            assert len(words) > 20, p.name
+            except PrbmError as error:
+                message = str(error)
+            assert len(message) > 20, p.name
 
 
-def test_a_name_that_is_none_is_refused():
-    with pytest.raises(MechanismError, match="is no name"):
+def test_an_invalid_parameter_name_is_rejected():
+    with pytest.raises(MechanismError, match="is invalid: use letters"):
         Parameter("two words", 1.0)
 
 
 @pytest.mark.parametrize("bad", [True, "1", None, float("nan"), 1j])
-def test_a_value_that_is_no_number_is_refused(bad):
+def test_a_value_that_is_not_a_number_is_rejected(bad):
     with pytest.raises(ParameterError, match=r"flexure.length = "):
         GUIDE.values({"flexure.length": bad})
 
 
-def test_a_mechanism_that_falls_apart_is_refused():
+def test_a_mechanism_with_unconnected_bodies_is_rejected():
     loose = Body("loose", 1.0, 1.0, (1.0, 1.0), {"a": (1.0, 1.0)})
     other = Body("other", 1.0, 1.0, (2.0, 1.0), {"a": (2.0, 1.0)})
     between = Flexure("between", "flexure", "loose.a", "other.a")
@@ -183,17 +186,17 @@ def test_a_mechanism_that_falls_apart_is_refused():
         assemble(alone, alone.values())
 
 
-def test_a_flexure_without_length_is_refused():
+def test_a_flexure_without_length_is_rejected():
     short = changed(flexures=(LEFT, RIGHT), ground={"left": (0, "flexure.length"), "right": (0, 0)})
     with pytest.raises(ParameterError, match=r"left_flexure from ground\.left to shuttle\.left"):
         assemble(short, short.values())
 
 
-def around(n: int = 8) -> Mechanism:
-    """Return a wheel on two chains that meet where it is fixed, under its centre of mass."""
+def wheel_on_two_leaves(n: int = 8) -> Mechanism:
+    """Return a wheel on two chains that are both clamped to the ground at its centre of mass."""
     return Mechanism(
         name="Wheel",
-        title="A wheel about the one point that holds it",
+        title="A wheel on two leaves from one point",
         ground={"hub": (0.0, 0.0)},
         bodies=(Body("rim", 0.02, 1e-5, (0.0, 0.0), {"right": (0.04, 0.0), "top": (0.0, 0.04)}),),
         flexure_types=(FlexureType("leaf", "nR", 1e-4, 8e-3, 2e11, 7800.0, n=n),),
@@ -206,9 +209,9 @@ def around(n: int = 8) -> Mechanism:
     )
 
 
-def test_a_mechanism_has_a_size_even_if_all_its_centres_are_at_one_place():
-    """Each leaf resists a turn about its root with 4 EI/L; tolerances go with the size."""
-    wheel = around(60)
+def test_the_size_is_positive_if_all_centres_of_mass_coincide():
+    """The stiffness of each leaf against a turn about its root is 4 EI/L."""
+    wheel = wheel_on_two_leaves(60)
     system = assemble(wheel, wheel.values())
     assert system.length == pytest.approx(0.04)
     shape = equilibrium(system, loads={"push.moment": 1e-6})
@@ -217,7 +220,7 @@ def test_a_mechanism_has_a_size_even_if_all_its_centres_are_at_one_place():
 
 
 def truss() -> Mechanism:
-    """Return a body on three bars that do not meet in a point."""
+    """Return a body on three bars whose lines have no common point."""
     pins = ("pin", "pin")
     return Mechanism(
         name="Truss",
@@ -234,7 +237,7 @@ def truss() -> Mechanism:
     )
 
 
-def test_a_mechanism_that_cannot_move_is_refused_by_the_names_of_its_loops():
+def test_a_mechanism_without_mobility_is_rejected_with_the_names_of_its_loops():
     held = truss()
     with pytest.raises(MechanismError, match="closed by second, third leave the mechanism no mot"):
         assemble(held, held.values())
@@ -243,7 +246,7 @@ def test_a_mechanism_that_cannot_move_is_refused_by_the_names_of_its_loops():
 def pinned() -> Mechanism:
     """Return a wheel on a pin at its centre of mass, with a leaf to the ground."""
     return dataclasses.replace(
-        around(),
+        wheel_on_two_leaves(),
         ground={"hub": (0.0, 0.0), "side": (0.06, 0.01)},
         bodies=(Body("rim", 0.02, 1e-5, (0, 0), {"hub": (0.0, 0.0), "right": (0.02, 0.0)}),),
         flexures=(Flexure("leaf_1", "leaf", "ground.side", "rim.right"),),
@@ -252,24 +255,26 @@ def pinned() -> Mechanism:
     )
 
 
-def test_a_release_of_a_body_that_turns_about_its_centre_of_mass_is_refused_for_that():
-    """The leaf stretches, and so lets the wheel turn."""
+def test_a_release_of_a_body_whose_centre_of_mass_is_fixed_is_rejected():
+    """The leaf stretches, so that the wheel can turn."""
     leaf = dataclasses.replace(pinned().flexure_types[0], axial=True)
     wheel = dataclasses.replace(pinned(), flexure_types=(leaf,))
     with pytest.raises(EquilibriumError, match=r"= 0 m: the centre of mass of the body rim stays"):
         Simulation(wheel)
 
 
-def test_a_release_along_which_a_body_cannot_move_is_refused_for_that():
-    """The leaf, as drawn, does not let the pinned wheel turn."""
+def test_a_release_along_an_immobile_direction_is_rejected():
+    """The inextensible leaf, as drawn, prevents a rotation of the pinned wheel."""
     with pytest.raises(EquilibriumError, match=r"= 0 m: the body rim cannot move along the direc"):
         Simulation(pinned())
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 @pytest.mark.parametrize("reverse", [False, True])
-def test_the_order_and_direction_of_the_flexures_do_not_matter(order, reverse):
-    """The same physics whichever flexure is the tree and from whichever end it is drawn."""
+def test_frequencies_and_rest_position_do_not_depend_on_order_and_direction_of_flexures(
+    order, reverse
+):
+    """The choice of the spanning tree and of the start of a flexure has no influence."""
     flexures = [GUIDE.flexures[i] for i in order]
     if reverse:
         flexures[0] = dataclasses.replace(flexures[0], start=flexures[0].end, end=flexures[0].start)
@@ -282,17 +287,17 @@ def test_the_order_and_direction_of_the_flexures_do_not_matter(order, reverse):
     assert results[1][1] == pytest.approx(results[0][1], rel=1e-9)
 
 
-def test_mass_is_kept():
-    """Rods on links and stubs: the 2R guide moves all of its mass but the stubs at the ground."""
+def test_the_moving_mass_is_that_of_the_parts_less_the_stubs_at_the_ground():
+    """Each stub at the ground has a twentieth of the mass of a 2R flexure."""
     system = assemble(GUIDE, GUIDE.values())
     flexure = 7800 * 8e-3 * 1e-4 * 0.04
     assert system.m.sum() == pytest.approx(0.053187 + 2 * flexure * (1 - 0.05), rel=1e-12)
 
 
-def test_files_that_are_no_mechanism_get_one_clear_message(tmp_path):
+def test_invalid_files_are_rejected_with_path_and_reason(tmp_path):
     text = shipped()["PRBDM"].read_text()
     cases = {
-        "no toml": ("= 3", "is no TOML file"),
+        "no toml": ("= 3", "not a TOML file"),
         "unknown key": (text + "\n[extra]\nx = 1\n", "extra"),
         "wrong type": (
             text.replace("mass = 0.053187", "mass = [1, 2]"),
@@ -305,15 +310,15 @@ def test_files_that_are_no_mechanism_get_one_clear_message(tmp_path):
         path = tmp_path / f"{name}.toml"
         path.write_text(content)
         with pytest.raises(MechanismError) as caught:
-            load(path)
+            read_mechanism(path)
         assert str(path) in str(caught.value)
         assert words in str(caught.value)
     with pytest.raises(MechanismError, match="cannot be read"):
-        load(tmp_path / "none.toml")
+        read_mechanism(tmp_path / "none.toml")
 
 
-def test_a_mechanism_is_data_to_the_last_digit():
-    """Its representation is Python that makes it again: what an FMU carries."""
+def test_the_representation_of_a_mechanism_evaluates_to_an_equal_mechanism():
+    """The Python FMU contains this representation."""
     import prbm.mechanism.description
 
     for name in shipped():
@@ -321,7 +326,7 @@ def test_a_mechanism_is_data_to_the_last_digit():
         assert same == mechanism(name)
 
 
-def test_types_that_share_a_name_are_refused():
+def test_two_types_of_one_name_are_rejected():
     twice = (LEAF, FlexureType("flexure", "1R", 1e-3, 1e-3, 1e9, 1e3))
     with pytest.raises(MechanismError, match="twice"):
         changed(flexure_types=twice)

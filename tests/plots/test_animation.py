@@ -470,7 +470,10 @@ def test_a_result_without_the_links_leads_to_a_command_that_records_them(
     ("arguments", "sentence"),
     [
         (["out.gif"], "name the source of the film: RESULT.csv, --model or --mechanism"),
-        (["--model", "PRBDN", "out.gif"], "there is no model 'PRBDN'; did you mean PRBDM"),
+        (
+            ["--model", "PRBDN", "out.gif"],
+            "unknown mechanism 'PRBDN' (mechanism files end in .toml); did you mean PRBDM",
+        ),
         (["--model", "PRBDM", "out.bmp"], "end the name in .gif or .mp4"),
         (["--model", "PRBDM", "--set", "stop.restitution", "out.gif"], "write NAME=VALUE"),
         (["--model", "PRBDM", "--set", "stop.restitution=2", "out.gif"], "must be at most 1"),

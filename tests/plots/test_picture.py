@@ -13,7 +13,7 @@ from prbm.commands.command_line import main
 from prbm.drawing.icon import icon, shape
 from prbm.drawing.shapes import Shapes, box, corners, hull
 from prbm.drawing.style import png
-from prbm.files.mechanism_file import find, shipped
+from prbm.files.mechanism_file import load, shipped
 from prbm.fmu.start import start_sample
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
@@ -253,13 +253,16 @@ def test_the_command_draws_a_shipped_mechanism(
 
 def test_a_file_is_found_as_well_as_a_name() -> None:
     path = shipped()["Bistable"]
-    assert find(str(path)) == find("Bistable")
+    assert load(str(path)) == load("Bistable")
 
 
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["Bistabel"], "there is no model 'Bistabel'; did you mean Bistable?"),
+        (
+            ["Bistabel"],
+            "unknown mechanism 'Bistabel' (mechanism files end in .toml); did you mean Bistable?",
+        ),
         (["none.toml"], "none.toml: cannot be read"),
         (["PRBDM", "--set", "shuttle.mas=1"], "did you mean shuttle.mass"),
         (["PRBDM", "--set", "shuttle.mass"], "write NAME=VALUE"),

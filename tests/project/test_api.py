@@ -61,7 +61,7 @@ def test_load_takes_a_shipped_name_or_a_path():
 
 
 def test_load_proposes_the_nearest_names():
-    with pytest.raises(ValueError, match="no model 'Bistabel'; did you mean Bistable"):
+    with pytest.raises(ValueError, match=r"unknown mechanism 'Bistabel'.*; did you mean Bistable"):
         prbm.load("Bistabel")
 
 

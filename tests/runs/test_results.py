@@ -13,7 +13,7 @@ from PIL import Image
 from prbm.base.errors import ParameterError
 from prbm.base.progress import reporter
 from prbm.drawing.style import png
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.description import Mechanism
 from prbm.plots.figures import response
@@ -195,7 +195,7 @@ def test_the_response_shows_all_impacts_and_a_constant_balance(
 
 def test_legends_lie_beside_what_the_response_shows() -> None:
     """Of a leaf that falls from the upper left to the lower right, with curves everywhere."""
-    figure = response(simulate(load(shipped()["Cantilever"]), stop_time=0.06, step=1e-4))
+    figure = response(simulate(read_mechanism(shipped()["Cantilever"]), stop_time=0.06, step=1e-4))
     figure.draw_without_rendering()
     displacement, _, speeds, energies = figure.axes
     for axes in (displacement, speeds, energies):

@@ -1,6 +1,10 @@
-"""A mechanism file that uses everything there is, and what can be wrong with one."""
+"""A mechanism file with every table and key, and mistakes in it with their messages.
 
-from prbm.files.mechanism_file import LARGEST_FILE
+``CHANGES`` maps the name of a mistake to a text, its replacement and a part of the message.
+``CONTENTS`` maps the name of a mistake to the content of a file and a part of the message.
+"""
+
+from prbm.files.mechanism_file import FILE_SIZE_MAX
 from prbm.mechanism.flexure import LINKS_MAX
 
 EXAMPLE = """\
@@ -130,22 +134,30 @@ RIGHT = 'thickness = "50 um"\nwidth = 8e-3\nmaterial = "steel"\n'
 CHANGES = {
     # units
     "unknown unit": ('"53.187 g"', '"3 furlong"', "bodies.0.mass (of arm) = '3 furlong': the unit"),
-    "wrong dimension": ('"0.1 mm"', '"3 kg"', "flexure_types.0.thickness (of leaf) = '3 kg': 'kg'"),
-    "unit of another dimension in an expression": ("/2 + 3 mm", "/2 + 3 s", "'s' is the unit of"),
+    "wrong dimension": (
+        '"0.1 mm"',
+        '"3 kg"',
+        "flexure_types.0.thickness (of leaf) = '3 kg': the unit",
+    ),
+    "unit of another dimension in an expression": (
+        "/2 + 3 mm",
+        "/2 + 3 s",
+        "the unit 's' has another",
+    ),
     "unknown unit in an expression": ("/2 + 3 mm", "/2 + 3 ell", "the unit 'ell' is unknown"),
-    "product of units": ("/2 + 3 mm", "* 3 mm", "is a term of a sum"),
-    "unit of gravity": ('"-981 cm/s2"', '"-981 cm"', "gravity.1 = '-981 cm': 'cm' is the unit"),
+    "product of units": ("/2 + 3 mm", "* 3 mm", "must be a term of a sum"),
+    "unit of gravity": ('"-981 cm/s2"', '"-981 cm"', "gravity.1 = '-981 cm': the unit 'cm'"),
     "direction in metres": ('"-90 deg"', '"-90 m"', "stops.0.direction (of wall)"),
     "value in another unit": (
         "value = 0.5",
         'value = "5 mm"\nunit = "kg"',
-        "geometry.1.value (of ratio) = '5 mm': 'mm' is the unit of something else",
+        "geometry.1.value (of ratio) = '5 mm': the unit 'mm' has another dimension",
     ),
     "minimum in another unit": ('"1 nm"', '"1 ng"', "geometry.0.minimum (of arm.length)"),
     "unit that is not SI": (
         '"40 mm"',
         '40\nunit = "mm"',
-        "arm.length has the unit 'mm': parameters",
+        "arm.length has the unit 'mm': not an SI unit",
     ),
     "unit of a parameter unknown": (
         "= 0.5",
@@ -170,7 +182,7 @@ CHANGES = {
         "value = [1]",
         "geometry.1.value (of ratio) = [1]: write a number",
     ),
-    "truth as a number": (
+    "boolean as a number": (
         'mass = "53.187 g"',
         "mass = true",
         "(of arm) = True: write a number, or",
@@ -182,9 +194,17 @@ CHANGES = {
     ),
     "number as a name": ('name = "leaf"', "name = 7", "flexure_types.0.name = 7: write a text"),
     "number as a title": ("title = ", "title = 3 # ", "title = 3: write a text in quotes"),
-    "text as a truth": ("axial = true", 'axial = "yes"', "axial (of right) = 'yes': write true or"),
-    "part of a link": ("n = 8", "n = 8.5", "flexures.1.n (of right) = 8.5: write a whole number"),
-    "gravity with three numbers": ('"0 m/s2", ', "0, 0, ", "take out what is too much"),
+    "text as a boolean": (
+        "axial = true",
+        'axial = "yes"',
+        "axial (of right) = 'yes': write true or",
+    ),
+    "fractional number of links": (
+        "n = 8",
+        "n = 8.5",
+        "flexures.1.n (of right) = 8.5: write a whole number",
+    ),
+    "gravity with three numbers": ('"0 m/s2", ', "0, 0, ", "remove the surplus values"),
     "gravity with one number": ('"0 m/s2", ', "", "a number is missing; add it"),
     "point with one number": (
         "side = [0, ",
@@ -211,16 +231,20 @@ CHANGES = {
     ),
     # keys
     "unknown key": ("inertia = 1e-6", "inertai = 1e-6", "did you mean inertia?"),
-    "unknown key of the file": ("title = ", "titel = ", "titel is no key that is known there; did"),
+    "unknown key of the file": ("title = ", "titel = ", "unknown key titel; did you mean title?"),
     "unknown table": (
         "[[probes]]",
         "[[prones]]",
-        "prones is no key that is known there; did you mean",
+        "unknown key prones; did you mean probes?",
     ),
-    "key of another part": ("n = 8", "stroke = 8", "known are name, model, n, thickness, width"),
+    "key of another part": (
+        "n = 8",
+        "stroke = 8",
+        "allowed keys are name, model, n, thickness, width",
+    ),
     "missing key": ("inertia = 1e-6\n", "", "bodies.1.inertia (of anvil) is missing: add the key"),
     "body without mass": ('mass = "2e-3 kg"\n', "", "bodies.1.mass (of anvil) is missing: add the"),
-    "missing release": ("[release]", "[relaese]", "relaese is no key that is known there; did you"),
+    "missing release": ("[release]", "[relaese]", "unknown key relaese; did you mean release?"),
     "key defined twice": ("damping_zeta = 0.01", "name = 'x'", "(at line 6, column "),
     "table defined twice": ("[release]", "[ground]", "line 116"),
     # names
@@ -231,7 +255,7 @@ CHANGES = {
         "[[materials]]\nname = 'steel'\ndensity = 1\nyoungs_modulus = 1\n[[flexure_types]]",
         "'steel' is used twice",
     ),
-    "name of a material and a body": (
+    "material and body of one name": (
         'name = "steel"',
         'name = "arm"',
         "'arm' is used twice or reserved",
@@ -246,15 +270,23 @@ CHANGES = {
         '"arm.mass"',
         "the parameter 'arm.mass' is defined twice",
     ),
-    "name of Python": ('name = "Striker"', 'name = "class"', "mechanism name 'class'"),
-    "name with a path": ('"Striker"', '"../../etc/x"', "mechanism name '../../etc/x': use letters"),
+    "mechanism named by a keyword": (
+        'name = "Striker"',
+        'name = "class"',
+        "mechanism name 'class'",
+    ),
+    "mechanism named by a path": (
+        '"Striker"',
+        '"../../etc/x"',
+        "mechanism name '../../etc/x': use letters",
+    ),
     "name that is empty": ('"Striker"', '""', "mechanism name ''"),
     "name too long": ('"Striker"', f'"{"x" * 300}"', "write a shorter name, of at most 100"),
-    "part with a path": ('name = "anvil"', 'name = "../anvil"', "bodies.1.name (of ../anvil)"),
-    "part with a name of Python": ('name = "anvil"', 'name = "lambda"', "a word of Python"),
+    "part named by a path": ('name = "anvil"', 'name = "../anvil"', "bodies.1.name (of ../anvil)"),
+    "part named by a keyword": ('name = "anvil"', 'name = "lambda"', "a keyword of Python"),
     "part with a name too long": ('name = "rub"', f'name = "{"x" * 300}"', "write a shorter name"),
     "point with spaces": ("side = [0", '"my side" = [0', "ground.my side = 'my side': use letters"),
-    "place far away": (
+    "ground point far away": (
         '"50 mm"]',
         '"5e12 m"]',
         "ground.far is drawn at (0.06 m, 5e+12 m): draw the mechanism within 1000 m",
@@ -270,12 +302,12 @@ CHANGES = {
         'end = "anvil.nose"',
         "hook refers to the point 'anvil.nose",
     ),
-    "body of a point not described": (
+    "body of a point undefined": (
         '"anvil.top"',
         '"hammer.top"',
         "the point 'hammer.top', which",
     ),
-    "probe of nothing": (
+    "probe of an undefined point": (
         'name = "watch"\npoint = "arm.tip"',
         'name = "watch"\npoint = "arm.x"',
         "watch refers to the point 'arm.x'",
@@ -283,22 +315,26 @@ CHANGES = {
     "stop at a point of another body": (
         'point = "arm.tip"\ndir',
         'point = "anvil.top"\ndir',
-        "wall.point = 'anvil.top' is no point of the body arm",
+        "wall.point = 'anvil.top' is not a point of the body arm",
     ),
     "stop of an unknown body": (
         'body = "arm"\npoint = "arm.tip"\ndir',
         'body = "harm"\npoint = [0, 0]\ndir',
-        "wall.body = 'harm' is not",
+        "wall.body = 'harm' is not defined",
     ),
     "stop on itself": ('on = "anvil"', 'on = "arm"', "wall is fixed to the body that it stops"),
-    "stop on nothing": ('on = "anvil"', 'on = "air"', "wall.on = 'air' is not described"),
-    "force on nothing": ('name = "pull"\nbody = "anvil"', 'name = "pull"\nbody = "x"', "pull.body"),
+    "stop on an undefined body": ('on = "anvil"', 'on = "air"', "wall.on = 'air' is not defined"),
+    "force on an undefined body": (
+        'name = "pull"\nbody = "anvil"',
+        'name = "pull"\nbody = "x"',
+        "pull.body",
+    ),
     "release of an unknown body": (
         'body = "arm"\ndirection = "1.57',
         'body = "a"\ndirection = "1.57',
-        "release.body = 'a' is not described",
+        "release.body = 'a' is not defined",
     ),
-    "unknown type": ('type = "leaf"', 'type = "leave"', "left.type = 'leave' is not described"),
+    "unknown type": ('type = "leaf"', 'type = "leave"', "left.type = 'leave' is not defined"),
     "unknown parameter": (
         '"arm.length + 2 cm", "50',
         '"arm.lenght + 2 cm", "50',
@@ -307,12 +343,12 @@ CHANGES = {
     "cycle of references": (
         'mass = "53.187 g"\ninertia = "28366.4 g.mm2"',
         'mass = "arm.inertia"\ninertia = "arm.mass"',
-        "arm.mass refers to 'arm.inertia', which is an expression itself",
+        "arm.mass refers to 'arm.inertia', which is an expression, not a parameter",
     ),
     "reference to itself": (
         'mass = "53.187 g"',
         'mass = "2*arm.mass"',
-        "arm.mass refers to 'arm.mass', which is an expression itself",
+        "arm.mass refers to 'arm.mass', which is an expression, not a parameter",
     ),
     "parameter that is an expression": (
         "value = 0.5",
@@ -323,32 +359,32 @@ CHANGES = {
     "material unknown": (
         'material = "steel"\naxial',
         'material = "stel"\naxial',
-        "right.material = 'stel' is not described; materials are steel",
+        "right.material = 'stel' is not defined; materials are steel",
     ),
     "both material and density": (
         'material = "steel"\naxial',
         'material = "steel"\ndensity = 1\naxial',
-        "right has a material and density of its own: leave one out",
+        "right has material as well as density: remove either",
     ),
     "neither material nor density": (
         HANGER,
         "",
-        "hanger has no material: write material = and its",
+        "hanger has no material: add material with the name of one",
     ),
-    "half a material": (
+    "density missing": (
         "density = 2700\n",
         "",
-        "hanger has no material: write material = and its name, or density",
+        "hanger has no material: add material with the name of one, or density",
     ),
     "type and section": (
         'type = "leaf"',
         'type = "leaf"\nwidth = 1',
-        "left has a type and width of",
+        "left has type as well as width: remove either",
     ),
     "no type and no section": (
         'type = "leaf"\n',
         "",
-        "left.model is missing: add the key, or a type",
+        "left.model is missing: add the key, or the type",
     ),
     "section without width": (RIGHT, RIGHT.replace("width = 8e-3\n", ""), "right.width is missing"),
     "negative thickness": ('"0.1 mm"', '"-0.1 mm"', "leaf.thickness = -0.0001 m must be at least"),
@@ -365,7 +401,7 @@ CHANGES = {
     "coefficient of another model": (
         "gamma = 0.85",
         "gamma1 = 0.85",
-        "hanger.gamma1 is no coefficient",
+        "hanger.gamma1 is not a coefficient",
     ),
     "unknown model": (
         'model = "2R"',
@@ -374,20 +410,24 @@ CHANGES = {
     ),
     "n missing": ("n = 8\n", "", "right.n = 0 must be the number of links of the chain"),
     "n too large": ("n = 8\n", "n = 100000\n", f"from 1 to {LINKS_MAX}"),
-    "n of nothing": ("n = 8\n", "n = 0\n", "flexures.1.n (of right) = 0: write a larger number"),
-    "n with 2R": (
+    "n of zero": (
+        "n = 8\n",
+        "n = 0\n",
+        "flexures.1.n (of right) = 0: write a number of at least 1",
+    ),
+    "n of a 2R model": (
         'model = "2R"',
         'model = "2R"\nn = 3',
-        "leaf.n = 3: the 2R model has its own number",
+        "leaf.n = 3: the 2R model has a fixed number",
     ),
     # geometry of the drawing
     "ends wrong": (
         'ends = "clamp"',
         'ends = "glue"',
-        "right.ends = ('glue', 'glue'): each of the two",
+        "right.ends = ('glue', 'glue'): choose each end among",
     ),
     "three ends": ('ends = ["clamp", "pin"]', 'ends = ["clamp", "pin", "pin"]', "flexures.2.ends"),
-    "one end": ('ends = ["clamp", "pin"]', 'ends = ["clamp"]', "flexures.2.ends (of hanger)"),
+    "only one end": ('ends = ["clamp", "pin"]', 'ends = ["clamp"]', "flexures.2.ends (of hanger)"),
     "free at both ends": (
         'ends = "clamp"',
         'ends = "free"',
@@ -446,7 +486,7 @@ CHANGES = {
     "thousands of digits": (
         'mass = "53.187 g"',
         f"mass = {'9' * 9999}",
-        "has a number of thousands of digits",
+        "a number has thousands of digits",
     ),
     "damping out of bounds": (
         "damping_zeta = 0.01",
@@ -458,7 +498,7 @@ CHANGES = {
         '"0.1 nm"',
         "arm.length = 1e-10 m must be at least 1e",
     ),
-    "bound that is none": (
+    "bound that is not a number": (
         '"1 nm"',
         "nan",
         "geometry.0.minimum (of arm.length) = nan: write a finite",
@@ -486,26 +526,26 @@ BOMB = 100_000
 CONTENTS = {
     "empty": (b"", "name is missing: add the key"),
     "blank": (b"\n\n# nothing\n", "name is missing: add the key"),
-    "garbage": (b"\x00\xff garbage" * 1_000_000, f"larger than {LARGEST_FILE} bytes"),
-    "binary": (bytes(range(256)), "is no TOML file ('utf-8' codec"),
+    "garbage": (b"\x00\xff garbage" * 1_000_000, f"larger than {FILE_SIZE_MAX} bytes"),
+    "binary": (bytes(range(256)), "not a TOML file ('utf-8' codec"),
     "not UTF-8": (
         EXAMPLE.replace("strikes", "schlägt").encode("latin-1"),
-        "is no TOML file ('utf-8",
+        "not a TOML file ('utf-8",
     ),
-    "UTF-16": (EXAMPLE.encode("utf-16"), "is no TOML file ('utf-8' codec"),
-    "zip": (b"PK\x03\x04\x14\x00", "is no TOML file ("),
-    "JSON": (b'{"name": "x"}', "is no TOML file (Invalid statement (at line 1, column 1))"),
+    "UTF-16": (EXAMPLE.encode("utf-16"), "not a TOML file ('utf-8' codec"),
+    "zip": (b"PK\x03\x04\x14\x00", "not a TOML file ("),
+    "JSON": (b'{"name": "x"}', "not a TOML file (Invalid statement (at line 1, column 1))"),
     "value instead of a table": (b"release = 3", "line 1: release = 3: write a table, [...]"),
     "half a line": (
         b'name = "x"\ntitle = \n',
-        "is no TOML file (Invalid value (at line 2, column 9))",
+        "not a TOML file (Invalid value (at line 2, column 9))",
     ),
-    "bomb of lists": (b"x = " + b"[" * BOMB + b"]" * BOMB, "is nested too deeply"),
-    "bomb of tables": (b"x = " + b"{a=" * BOMB + b"1" + b"}" * BOMB, "is nested too deeply"),
-    "bomb of keys": (b"a." * BOMB + b"a = 1", "is nested too deeply"),
-    "bomb of a header": (b"[" + b"a." * BOMB + b"a]", "is nested too deeply"),
-    "deep key": (b"a." * 90 + b"a = 1", "line 1: a is no key that is known there"),
-    "bomb in its place": (
+    "bomb of lists": (b"x = " + b"[" * BOMB + b"]" * BOMB, "are nested too deeply"),
+    "bomb of tables": (b"x = " + b"{a=" * BOMB + b"1" + b"}" * BOMB, "are nested too deeply"),
+    "bomb of keys": (b"a." * BOMB + b"a = 1", "are nested too deeply"),
+    "bomb of a header": (b"[" + b"a." * BOMB + b"a]", "are nested too deeply"),
+    "deep key": (b"a." * 90 + b"a = 1", "line 1: unknown key a; allowed keys"),
+    "bomb as a value": (
         b"release = " + b"[" * 300 + b"]" * 300,
         "release = [[[[[[[...]]]]]]]: write",
     ),

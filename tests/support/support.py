@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu import native_fmu
 from prbm.hybrid.impacts import Impact
 from prbm.hybrid.simulation import Simulation
@@ -30,7 +30,7 @@ SUPPORT = Path(__file__).resolve().parent
 
 @cache
 def mechanism(name: str) -> Mechanism:
-    return load(shipped()[name])
+    return read_mechanism(shipped()[name])
 
 
 GUIDES = ("PRBDM", "PRBDM2R")

@@ -588,8 +588,11 @@ def test_the_command_prints_a_summary(native, capsys):
 ARGUMENTS = {
     "text for a number": ("--set gravity.x=down", "--set gravity.x= down: "),
     "unknown variable": ("--set gravity.X=1", "--set gravity.X=1: "),
-    "wrong unit": ("--set 'gravity.x=1 kg'", "'kg' is the unit of something else"),
-    "length for a time": ("--stop-time 3mm", "--stop-time 3mm: 'mm' is the unit of something else"),
+    "wrong unit": ("--set 'gravity.x=1 kg'", "the unit 'kg' has another dimension"),
+    "length for a time": (
+        "--stop-time 3mm",
+        "--stop-time 3mm: the unit 'mm' has another dimension",
+    ),
     "text for a count": ("--workers two", "argument --workers: invalid int value: 'two'"),
 }
 

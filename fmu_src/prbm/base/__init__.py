@@ -1,1 +1,1 @@
-"""Errors, file writing, units and names in text, version: used by every other package."""
+"""Errors, file writing, display units, messages and version, for every other package."""

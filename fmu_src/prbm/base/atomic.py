@@ -1,4 +1,4 @@
-"""Atomic writing of files: a reader sees the old content or the new one, never a part of it."""
+"""Atomic writing of files: readers see the old content or the new one, never a part of it."""
 
 import os
 import tempfile
@@ -7,15 +7,15 @@ from pathlib import Path
 
 from .errors import PrbmError
 
-FILE_MODE = 0o644  # temporary files are private
+FILE_MODE = 0o644  # Temporary files are created with 0o600.
 
 
 class FileError(PrbmError, OSError):
-    """A file cannot be written to its place."""
+    """A file cannot be written at its path."""
 
 
 def write(path: str | Path, content: bytes) -> None:
-    """Write a file completely or not at all, and create its folder.
+    """Write a file completely or not at all; create its folder if needed.
 
     Raises
     ------
@@ -26,10 +26,16 @@ def write(path: str | Path, content: bytes) -> None:
 
 
 def write_all(files: Mapping[Path, bytes]) -> None:
-    """Write files, and create their folders.
+    """Write files; create their folders if needed.
 
-    First all contents are written under temporary names, then all files are renamed: if one of them
-    cannot be written, no file is changed, unless a renaming fails after others have succeeded.
+    All contents are written to temporary files first.  Then the temporary files are renamed.  If
+    a content cannot be written, no file is changed.  If a renaming fails, the files renamed before
+    it remain changed.
+
+    Parameters
+    ----------
+    files : mapping
+        Path and content of each file.
 
     Raises
     ------
@@ -62,10 +68,17 @@ def check_writable(folder: Path, remedy: str = "choose a folder with --out") -> 
 
     The folder need not exist.
 
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    remedy : str
+        End of the error message.
+
     Raises
     ------
     FileError
-        If it is a file, or there is no permission.
+        If the path is a file, or there is no permission to write.
     """
     existing = folder
     while not existing.exists() and existing != existing.parent:
@@ -84,7 +97,7 @@ def check_file(path: Path) -> None:
     Raises
     ------
     FileError
-        If it is a folder, its folder is a file, or there is no permission.
+        If the path is a folder, its parent is a file, or there is no permission to write.
     """
     if path.is_dir():
         raise FileError(f"cannot write {path}: it is a folder; choose another name")
@@ -97,9 +110,9 @@ def check_no_folder(path: Path) -> None:
     Raises
     ------
     FileError
-        If it is a folder.
+        If the path is a folder.
     """
     if path.is_dir():
         raise FileError(
-            f"cannot write {path}: it is a folder; remove it, or choose another place with --out"
+            f"cannot write {path}: it is a folder; remove it, or choose another path with --out"
         )

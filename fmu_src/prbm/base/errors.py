@@ -1,20 +1,20 @@
-"""Errors of the package: of a description, of values, of an equilibrium, of a simulation.
+"""Errors that the package raises: in descriptions, values, equilibria and simulations.
 
-Every message names the variable, its value, its unit and a remedy; it is meant to be shown to
-the user as it is.
+Every message names the variable, its value, its unit and a remedy.  It can be shown to the user
+without changes.
 """
 
 
 class PrbmError(Exception):
-    """Base of all errors that this package raises on purpose."""
+    """Base class of all errors that this package raises."""
 
 
 class MechanismError(PrbmError, ValueError):
-    """The description of a mechanism contradicts itself or is incomplete."""
+    """The description of a mechanism is incomplete or inconsistent."""
 
 
 class ParameterError(PrbmError, ValueError):
-    """A parameter or an input is unknown, or its value is out of bounds."""
+    """A parameter or an input is unknown, or its value is outside its bounds."""
 
 
 class EquilibriumError(PrbmError, ValueError):

@@ -1,4 +1,4 @@
-"""Progress of a computation, reported on a stream."""
+"""Progress of a computation, written to a stream."""
 
 import math
 import sys
@@ -8,13 +8,13 @@ from typing import TextIO
 
 Progress = Callable[[float], object]
 
-DELAY = 1.0  # s; a shorter computation reports nothing
-LINE_INTERVAL = 2.0  # s between the lines in a file
-TERMINAL_INTERVAL = 0.1  # s between the updates of a line on a terminal
+DELAY = 1.0  # s; shorter computations write nothing.
+LINE_INTERVAL = 2.0  # s between lines in a file.
+TERMINAL_INTERVAL = 0.1  # s between updates of the line on a terminal.
 
 
 def reporter(stream: TextIO | None = None) -> Progress:
-    """Return a progress callback, to be called with the fraction of the work that is done.
+    """Return a progress callback; its argument is the completed fraction of the work.
 
     It writes nothing in the first second.  After that it updates one line on a terminal; to any
     other stream it adds a line every two seconds.
@@ -22,7 +22,7 @@ def reporter(stream: TextIO | None = None) -> Progress:
     Parameters
     ----------
     stream : text stream or None
-        Where to write (default: standard error).
+        Destination (default: standard error).
     """
     out = sys.stderr if stream is None else stream
     terminal = out.isatty()

@@ -2,7 +2,7 @@
 
 
 def printable(text: str) -> str:
-    r"""Return a text with blanks for the characters that XML and HTML cannot hold.
+    r"""Return a text with blanks in place of the characters that XML and HTML cannot contain.
 
     Examples
     --------

@@ -1,8 +1,8 @@
-"""Display units: those in which a quantity has few digits before the point."""
+"""Display units, chosen so that a value has few digits before the decimal point."""
 
 
 def length_unit(size: float) -> tuple[float, str]:
-    """Return the display unit of a length of this size [m], as its factor and name.
+    """Return factor and name of the display unit of a length [m].
 
     Examples
     --------
@@ -16,7 +16,7 @@ def length_unit(size: float) -> tuple[float, str]:
 
 
 def frequency_unit(frequency: float) -> tuple[float, str]:
-    """Return the display unit of a frequency [Hz], as its factor and name.
+    """Return factor and name of the display unit of a frequency [Hz].
 
     Examples
     --------
@@ -30,7 +30,7 @@ def frequency_unit(frequency: float) -> tuple[float, str]:
 
 
 def time_unit(span: float) -> tuple[float, str]:
-    """Return the display unit of a duration [s], as its factor and name.
+    """Return factor and name of the display unit of a duration [s].
 
     Examples
     --------

@@ -1,4 +1,4 @@
 """The version of the package."""
 
 __version__ = "0.2.0"
-GENERATION_TOOL = f"prbm-impact {__version__}"  # as FMUs and their documentation name it
+GENERATION_TOOL = f"prbm-impact {__version__}"  # Written to FMUs and their documentation.

@@ -15,7 +15,7 @@ from typing import NoReturn
 from ..base.atomic import check_no_folder, check_writable, write
 from ..base.errors import PrbmError
 from ..base.version import __version__
-from ..files.mechanism_file import load, schema, shipped
+from ..files.mechanism_file import read_mechanism, schema, shipped
 from ..files.settings import UserMistake
 from ..fmu import native_fmu, python_fmu
 from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
@@ -132,7 +132,7 @@ def _list() -> None:
     files = shipped()
     width = max(map(len, files))
     for name, path in files.items():
-        print(f"{name:{width}}  {load(path).title}")
+        print(f"{name:{width}}  {read_mechanism(path).title}")
 
 
 def asked_flavours(options: argparse.Namespace) -> tuple[Flavour, ...]:
@@ -239,7 +239,7 @@ def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
         If a file cannot be read or does not describe a mechanism.
     """
     if options.mechanism is not None:
-        return [load(options.mechanism)]
+        return [read_mechanism(options.mechanism)]
     files = shipped()
     names = list(dict.fromkeys(options.model or files))
     for name in names:
@@ -248,7 +248,7 @@ def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
                 f"there is no mechanism {name!r}; shipped are {', '.join(files)}, and "
                 "--mechanism FILE.toml takes your own"
             )
-    return [load(files[name]) for name in names]
+    return [read_mechanism(files[name]) for name in names]
 
 
 def start_values(texts: Sequence[str]) -> dict[str, float]:

@@ -36,8 +36,8 @@ def span(
 
     Examples
     --------
-    >>> from prbm.files.mechanism_file import find
-    >>> span(find("PRBDM"), {}, None), span(find("PRBDM"), {}, "200 ms", "1e-4")
+    >>> from prbm.files.mechanism_file import load
+    >>> span(load("PRBDM"), {}, None), span(load("PRBDM"), {}, "200 ms", "1e-4")
     ((1.0, 0.001), (0.2, 0.0001))
     """
     duration = None if stop_time is None else quantity(stop_time, "s", "--stop-time")

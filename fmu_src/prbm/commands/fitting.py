@@ -4,7 +4,7 @@ import argparse
 
 from ..analysis.fit import DISPLACEMENT, Fit, ForceDeflection, Response, Target, fit, valley
 from ..base.progress import reporter
-from ..files.mechanism_file import find
+from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantity, settings
 from ..mechanism.description import Mechanism
 from ..plots import fit as figures
@@ -15,7 +15,7 @@ from .words import free, frequency
 
 def fitted(options: argparse.Namespace) -> None:
     """Print the parameters that fit best, and what the data cannot tell."""
-    mechanism = find(options.mechanism)
+    mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     wanted = [free(mechanism, text) for text in options.free]
     output = Output(options.out)

@@ -12,7 +12,7 @@ from ..analysis.impact_map import ImpactMap
 from ..analysis.stretching import note
 from ..analysis.touching import lever, stop_index
 from ..base.progress import Progress, reporter
-from ..files.mechanism_file import find
+from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
@@ -38,7 +38,7 @@ WAYS: Mapping[str, Way] = {
 
 def mapped(options: argparse.Namespace) -> None:
     """Print the maps of all ways and models that were asked for."""
-    mechanism = find(options.mechanism)
+    mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
     heights, offsets = _points(options, mechanism, values)

@@ -9,7 +9,7 @@ from ..base.progress import reporter
 from ..data.measurement import Beam, YoungsModulus, beam_table, youngs_modulus
 from ..data.uncertainty import Estimate
 from ..data.vibration import free_vibration
-from ..files.mechanism_file import find
+from ..files.mechanism_file import load
 from ..files.settings import UserMistake, settings
 from ..plots import measurement as figures
 from . import data, fitting
@@ -133,7 +133,7 @@ def frequency(options: argparse.Namespace) -> None:
 
 def restitution(options: argparse.Namespace) -> None:
     """Print the restitution of a stop that fits a bouncing response."""
-    mechanism = find(options.mechanism)
+    mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     more = [free(mechanism, text) for text in options.free]
     output = Output(options.out)

@@ -8,7 +8,7 @@ from ..base.atomic import FileError, check_file
 from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..base.progress import reporter
-from ..files.mechanism_file import find, load, shipped
+from ..files.mechanism_file import load, read_mechanism, shipped
 from ..files.settings import quantity, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
@@ -24,7 +24,7 @@ from .duration import span
 
 def drawn(options: argparse.Namespace) -> None:
     """Draw a mechanism to a PNG file."""
-    mechanism = find(options.mechanism)
+    mechanism = load(options.mechanism)
     path = options.out or Path(f"{mechanism.name}.png")
     check_file(path)
     figure = picture(mechanism, settings(mechanism, options.set), options.modes)
@@ -79,12 +79,12 @@ def _result(options: argparse.Namespace) -> Result:
 def _named(options: argparse.Namespace) -> tuple[Mechanism | None, list[str]]:
     """Return the mechanism that the command line names, if any, and the remaining files."""
     if options.mechanism is not None:
-        return load(options.mechanism), options.files
+        return read_mechanism(options.mechanism), options.files
     if options.model is not None:
-        return find(options.model), options.files
+        return load(options.model), options.files
     first = options.files[0]
     if len(options.files) == 2 and (first in shipped() or first.endswith(".toml")):
-        return find(first), options.files[1:]
+        return load(first), options.files[1:]
     return None, options.files
 
 
@@ -95,7 +95,7 @@ def _owner(columns: Columns) -> Mechanism:
     flexures.  Then it is the one with the fewest coordinates whose loops are closed.
     """
     recorded = {name for name in names(columns) if name.endswith(".angle")}
-    every = [load(path) for path in shipped().values()]
+    every = [read_mechanism(path) for path in shipped().values()]
     alike = sorted((m for m in every if _angle_names(m) == recorded), key=_size)
     for mechanism in alike:
         if _closes_loops(columns, mechanism):

@@ -2,7 +2,7 @@
 
 import argparse
 
-from ..files.mechanism_file import load, shipped
+from ..files.mechanism_file import read_mechanism, shipped
 
 
 def listed(options: argparse.Namespace) -> None:
@@ -10,4 +10,4 @@ def listed(options: argparse.Namespace) -> None:
     files = shipped()
     width = max(map(len, files))
     for name, path in files.items():
-        print(f"{name:{width}}  {load(path).title}")
+        print(f"{name:{width}}  {read_mechanism(path).title}")

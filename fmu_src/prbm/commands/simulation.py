@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analysis.stretching import notes
 from ..base.progress import reporter
-from ..files.mechanism_file import find
+from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantity, settings
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
@@ -34,7 +34,7 @@ SHOWN = 1.5  # times the highest mode that is marked: as far as a spectrum is dr
 
 def simulated(options: argparse.Namespace) -> None:
     """Print what happens after the release."""
-    mechanism = find(options.mechanism)
+    mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
     stop_time, step = span(mechanism, values, options.stop_time, options.step)

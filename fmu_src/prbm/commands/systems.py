@@ -2,7 +2,7 @@
 
 import argparse
 
-from ..files.mechanism_file import find
+from ..files.mechanism_file import load
 from ..files.settings import UserMistake, settings
 from ..mechanics.assembly import assemble
 from ..mechanics.system import System
@@ -13,7 +13,7 @@ ROUNDING = 1e-9  # of its scale: what a computation leaves of zero
 
 def assembled(options: argparse.Namespace) -> tuple[Mechanism, dict[str, float], System]:
     """Return the mechanism, what --set changes, and the system that they make."""
-    mechanism = find(options.mechanism)
+    mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     own = {p.name for p in mechanism.parameters}
     for name in values:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..base.atomic import check_writable
 from ..base.progress import reporter
-from ..files.mechanism_file import find
+from ..files.mechanism_file import load
 from ..files.settings import UserMistake, settings
 from .output import Output
 from .words import measured
@@ -47,7 +47,7 @@ def _mechanism(options: argparse.Namespace) -> None:
     """Compare a mechanism with finite elements and measurements."""
     if options.only or options.list:
         raise UserMistake("--only and --list concern the source's results: leave MECHANISM out")
-    mechanism = find(options.mechanism)
+    mechanism = load(options.mechanism)
     values, output = settings(mechanism, options.set), Output(options.out)
     known = dict(map(measured, options.measured))
     from ..analysis.comparison import compare  # here for the start-up time

@@ -65,8 +65,8 @@ def free(mechanism: Mechanism, text: str) -> Free:
 
     Examples
     --------
-    >>> from prbm.files.mechanism_file import find
-    >>> free(find("PRBDM"), "stop.position=-1 mm : 1 mm")
+    >>> from prbm.files.mechanism_file import load
+    >>> free(load("PRBDM"), "stop.position=-1 mm : 1 mm")
     Free(name='stop.position', lower=-0.001, upper=0.001, start=None)
     """
     name, equals, limits = (part.strip() for part in text.partition("="))

@@ -1,1 +1,1 @@
-"""Measured data: records, uncertainties, evaluation of measurements."""
+"""Measured data: reading of records, uncertainties, and evaluation of measurements."""

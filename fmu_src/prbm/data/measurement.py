@@ -1,15 +1,15 @@
-r"""Sensors calibrated, and Young's modulus from bending a cantilever.
+r"""Calibration of sensors, and Young's modulus from bending a cantilever.
 
-A force F at the free end of a cantilever of length l moves it by d = F l^3/(3 E I), so that the
-slope s of the force over the deflection gives
+A force F at the free end of a cantilever of length l deflects it by d = F l^3/(3 E I).  The slope s
+of the force over the deflection gives
 
     E = s l^3/(3 I) = 4 s l^3/(b h^3),      I = b h^3/12                                 [1, eq. 9]
 
-for small deflections.  A force that keeps its direction follows
+for small deflections.  For large deflections and a force of constant direction
 
     F = 3 E I d/l^3 (1 + k (d/l)^2 + ...),      k = :data:`STIFFENING`,
 
-so that a line fitted up to a tenth of the length is about 1 % too steep.
+so that a line fitted up to d = l/10 is about 1 % too steep.
 
 Sources
 -------
@@ -26,30 +26,30 @@ import numpy as np
 
 from ..mechanics.arrays import Real
 from .series import Series
-from .uncertainty import CORRELATED, Estimate, EvaluationError, Line, line, power_law
+from .uncertainty import CORRELATION_FACTOR, Estimate, EvaluationError, Line, line, power_law
 
-STIFFENING = 36 / 35  # of the elastica under a force that keeps its direction, times (d/l)^2
-LINEAR = 0.01  # the share by which the theory of small deflections may be wrong unannounced
-LOSSY = 0.03  # of the work of a cycle: more makes the branches different springs
-LONGEST = 1.0  # of the length of a beam: a larger deflection is a mistake of units
-LARGE = 1.0  # m: a longer beam is more likely one whose sizes are in mm
-SOLID = (1e5, 2e12)  # Pa: from gels to diamond and carbon nanotubes
-TURNS = 0.2  # of the range of the deflection: less is noise, not a change of direction
-SIZES = ("length", "width", "thickness")  # of a beam
-SAME = 1e-12  # of a deflection: rounding, not a change
-LARGEST_ANGLE = 85.0  # deg between the sensor and the direction of the force
+STIFFENING = 36 / 35  # Coefficient of (d/l)^2 for a force of constant direction (elastica).
+STIFFENING_MAX = 0.01  # Relative error of the theory of small deflections without a note.
+CYCLE_LOSS_MAX = 0.03  # Share of the work of a cycle that may be lost without a note.
+DEFLECTION_MAX = 1.0  # Of the length of a beam: a larger deflection is a mistake of units.
+BEAM_LENGTH_MAX = 1.0  # m: the dimensions of a longer beam are likely in mm.
+MODULUS_RANGE = (1e5, 2e12)  # Pa, from gels to diamond and carbon nanotubes.
+TURN_RTOL = 0.2  # Of the range of the deflection: a smaller change of direction is noise.
+DIMENSIONS = ("length", "width", "thickness")  # Of a beam.
+DEFLECTION_RTOL = 1e-12  # Of the deflection: a smaller change is round-off.
+SENSOR_ANGLE_MAX = 85.0  # deg, between the axis of the sensor and the force.
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """A linear sensor, reading = offset + sensitivity quantity.
+    """Calibration of a linear sensor, reading = offset + sensitivity * quantity.
 
     Parameters
     ----------
     fit : Line
-        Reading over quantity.
+        Line of the reading over the quantity.
     reading_unit, unit : str
-        Of the sensor's output and of the quantity.
+        Units of the reading and of the quantity.
     """
 
     fit: Line
@@ -58,35 +58,35 @@ class Calibration:
 
     @property
     def sensitivity(self) -> Estimate:
-        """Change of the reading with the quantity."""
+        """Slope of the reading over the quantity."""
         slope, per = self.fit.slope, f"{self.reading_unit}/{self.unit}"
         return Estimate(slope.value, slope.uncertainty, per, slope.freedom)
 
     @property
     def gain(self) -> Estimate:
-        """Change of the quantity with the reading, 1/sensitivity."""
+        """Slope of the quantity over the reading, 1/sensitivity."""
         return power_law(
             {"sensitivity": (self.sensitivity, -1.0)}, unit=f"{self.unit}/{self.reading_unit}"
         )[0]
 
     @property
     def residual(self) -> float:
-        """Standard deviation of a single reading, as a quantity."""
+        """Standard deviation of a single reading, in the unit of the quantity."""
         return self.fit.residual / abs(self.fit.slope.value)
 
     @property
     def nonlinearity(self) -> float:
-        """Largest distance of a reading from the line, as a quantity."""
+        """Largest residual of a reading, in the unit of the quantity."""
         return self.fit.largest / abs(self.fit.slope.value)
 
     def __call__(self, reading: Real) -> Real:
-        """Return the quantity for readings."""
+        """Return the quantities of readings."""
         fit = self.fit
         result: Real = fit.centre_x + (reading - fit.centre_y) / fit.slope.value
         return result
 
     def applied(self, series: Series) -> Series:
-        """Return a recorded reading as the quantity.
+        """Return the quantity of a recorded reading.
 
         Raises
         ------
@@ -95,15 +95,15 @@ class Calibration:
         """
         if series.unit != self.reading_unit:
             raise EvaluationError(
-                f"{series.source}: {series.name} is in {series.unit}, the calibration is of a "
-                f"reading in {self.reading_unit}: take another column"
+                f"{series.source}: {series.name} is in {series.unit}, but the calibration is for "
+                f"readings in {self.reading_unit}: choose another column"
             )
         return replace(series, values=self(series.values), unit=self.unit)
 
     def uncertainty(self, reading: Real) -> Real:
-        """Return the standard uncertainty of the calibration at readings, as a quantity.
+        """Return the standard uncertainty of the calibration at readings, in the quantity's unit.
 
-        The noise of the reading itself, :attr:`residual`, comes on top.
+        The noise of a single reading, :attr:`residual`, is not included.
         """
         fit = self.fit
         along = (reading - fit.centre_y) / fit.slope.value * fit.slope.relative
@@ -111,7 +111,7 @@ class Calibration:
         return result
 
     def __str__(self) -> str:
-        bent = "" if self.fit.serial * math.sqrt(self.fit.n) <= CORRELATED else (
+        bent = "" if self.fit.serial * math.sqrt(self.fit.n) <= CORRELATION_FACTOR else (
             "; neighbouring residuals are correlated: the sensor is not linear, or drifts"
         )  # fmt: skip
         return (
@@ -123,16 +123,16 @@ class Calibration:
 def calibrate(
     quantity: Real, reading: Real, unit: str = "m", reading_unit: str = "V"
 ) -> Calibration:
-    """Return the calibration of a sensor against a reference that is much better.
+    """Return the calibration of a sensor against a much more accurate reference.
 
     Parameters
     ----------
     quantity : (n,)
-        What the reference says, in order of time or size.
+        Values of the reference, ordered by time or size.
     reading : (n,)
-        What the sensor says; the noise is in it.
+        Readings of the sensor, with noise.
     unit, reading_unit : str
-        Their units.
+        Units of the quantity and of the reading.
 
     Raises
     ------
@@ -153,18 +153,19 @@ def calibrate(
         raise EvaluationError(
             f"the reading does not change with the quantity: the sensitivity is "
             f"{fit.slope.value:.3g} ± {fit.slope.uncertainty:.3g} {reading_unit}/{unit}; check the "
-            "wiring, or move further"
+            "wiring, or increase the range"
         )
     return Calibration(fit, reading_unit, unit)
 
 
 def _check_pairs(x: Real, y: Real, x_name: str, y_name: str) -> None:
+    """Reject arrays of different shapes, and numbers that are not finite."""
     if x.shape != y.shape or x.ndim != 1:
         raise EvaluationError(f"{len(x)} values of {x_name} for {len(y)} of {y_name}: give pairs")
     for name, values in ((x_name, x), (y_name, y)):
         if not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise EvaluationError(f"{name}[{row}] = {values[row]} is no number: take the row out")
+            raise EvaluationError(f"{name}[{row}] = {values[row]} must be finite: remove the row")
 
 
 # --- Young's modulus ----------------------------------------------------------------------------
@@ -172,7 +173,7 @@ def _check_pairs(x: Real, y: Real, x_name: str, y_name: str) -> None:
 
 @dataclass(frozen=True)
 class Beam:
-    """A cantilever: length l to the point of the force, width b, thickness h in the bending [m]."""
+    """A cantilever: length l up to the force, width b, thickness h in the plane of bending [m]."""
 
     name: str
     length: Estimate
@@ -180,27 +181,27 @@ class Beam:
     thickness: Estimate
 
     def __post_init__(self) -> None:
-        for what in SIZES:
-            x = getattr(self, what)
-            if x.value <= 0.0:
-                raise EvaluationError(f"beam {self.name}: {what} = {x.value:g} m must be positive")
+        for dimension in DIMENSIONS:
+            x = getattr(self, dimension).value
+            if x <= 0.0:
+                raise EvaluationError(f"beam {self.name}: {dimension} = {x:g} m must be positive")
         if self.thickness.value >= self.length.value:
             raise EvaluationError(
                 f"beam {self.name}: thickness = {self.thickness.value:g} m is not less than "
-                f"length = {self.length.value:g} m, which no beam is: check the units of both"
+                f"length = {self.length.value:g} m: check the units of both"
             )
 
 
 @dataclass(frozen=True)
 class Loop:
-    """A cycle of loading and unloading.
+    """Cycle of loading and unloading.
 
     Parameters
     ----------
     work : float
         Work of loading [J].
     loss : float
-        What is not given back [J].
+        Work of loading that unloading does not return [J].
     """
 
     work: float
@@ -208,36 +209,36 @@ class Loop:
 
     @property
     def fraction(self) -> float:
-        """Loss over work of loading [-]."""
+        """Ratio of the loss to the work of loading [-]."""
         return self.loss / self.work
 
 
 @dataclass(frozen=True)
 class YoungsModulus:
-    """Young's modulus of a beam.
+    """Young's modulus of a beam, with the fit.
 
     Parameters
     ----------
     beam : Beam
-        The beam.
+        Beam.
     modulus : Estimate
-        E [Pa].
+        Young's modulus E [Pa].
     stiffness : Estimate
         Slope of the force over the deflection [N/m].
     fit : Line
-        The line, through the averaged data within the fit range.
+        Line through the averaged data within the fit range.
     fit_range : pair of float
-        Deflections between which was fitted [m].
+        Smallest and largest deflection of the fit [m].
     deflection : float
-        Largest deflection within the fit range, from where the force is zero [m].
+        Largest deflection within the fit range, measured from zero force [m].
     stiffening : float
-        By how much the theory of small deflections overestimates E, to leading order [-].
+        Relative overestimate of E by the theory of small deflections, to leading order [-].
     loops : tuple of Loop
         Complete cycles in the record.
     budget : dict
-        Shares of the relative standard uncertainty, by name [-].
+        Contributions to the relative standard uncertainty, by name [-].
     points : pair of (n,)
-        Sorted, averaged deflection [m] and force [N], for a figure.
+        Sorted and averaged deflection [m] and force [N], for a figure.
     """
 
     beam: Beam
@@ -253,49 +254,50 @@ class YoungsModulus:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What a reader of the number must know."""
+        """Remarks on the reliability of the modulus."""
         notes = []
         length, E = self.beam.length.value, self.modulus.value
-        if length > LARGE:
+        if length > BEAM_LENGTH_MAX:
             notes.append(
-                f"the beam is {length:g} m long: if its sizes are in mm, this E is a thousandth of "
-                f"the true one; give {length:g} mm, and the others alike"
+                f"the beam is {length:g} m long: if its dimensions are in mm, this E is a "
+                f"thousandth of the true value; give {length:g} mm, and the others in mm"
             )
-        elif not SOLID[0] < E < SOLID[1]:
+        elif not MODULUS_RANGE[0] < E < MODULUS_RANGE[1]:
             notes.append(
                 f"no solid has E = {E:.2g} Pa: check the units of the beam, the deflection and "
                 "the force"
             )
-        if self.stiffening > LINEAR:
+        if self.stiffening > STIFFENING_MAX:
             notes.append(
                 f"the deflection reaches {self.deflection / self.beam.length.value:.2f} of the "
                 f"length, where small-deflection theory is off by {100 * self.stiffening:.1f} %: "
-                "bend it less"
+                "reduce the deflection"
             )
-        if self.fit.serial * math.sqrt(self.fit.n) > CORRELATED:
+        if self.fit.serial * math.sqrt(self.fit.n) > CORRELATION_FACTOR:
             notes.append(
-                "the data bend away from the line (neighbouring residuals are correlated): the "
-                "uncertainty was widened; narrow the fit range"
+                "the data deviate from a line (neighbouring residuals are correlated), which "
+                "increases the uncertainty; narrow the fit range"
             )
         loss = self.loss
-        if loss is not None and loss > LOSSY:
+        if loss is not None and loss > CYCLE_LOSS_MAX:
             notes.append(
-                f"{100 * loss:.0f} % of the work is lost in a cycle: E is of both branches, "
-                "and their difference is not in its uncertainty; evaluate one alone to see it"
+                f"{100 * loss:.0f} % of the work is lost in a cycle: E is fitted to loading and "
+                "unloading together, and its uncertainty does not include their difference; "
+                "evaluate each branch alone"
             )
-        exact = [what for what in SIZES if getattr(self.beam, what).uncertainty == 0.0]
+        exact = [name for name in DIMENSIONS if getattr(self.beam, name).uncertainty == 0.0]
         if exact:
-            more = [what for what, share in self.budget.items() if share > 0.0 and what != "fit"]
+            more = [name for name, share in self.budget.items() if share > 0.0 and name != "fit"]
             notes.append(
-                f"{_listed(exact)} {'were' if exact[1:] else 'was'} given without uncertainty, so "
-                f"that the ± is of {_listed(['the scatter of the fit', *more])} only; give it of "
-                "each, as 40 mm +- 0.05 mm"
+                f"{_listed(exact)} {'have' if exact[1:] else 'has'} no uncertainty, so that the ± "
+                f"includes {_listed(['the scatter of the fit', *more])} only; give an uncertainty, "
+                "as in 40 mm +- 0.05 mm"
             )
         return tuple(notes)
 
     @property
     def loss(self) -> float | None:
-        """Mean loss of the cycles over their work of loading [-]; None without a cycle."""
+        """Mean ratio of loss to work of the cycles [-]; None without a cycle."""
         return float(np.mean([loop.fraction for loop in self.loops])) if self.loops else None
 
     def __str__(self) -> str:
@@ -314,7 +316,7 @@ class YoungsModulus:
 
 
 def _listed(words: Sequence[str]) -> str:
-    """Return words as a list in a sentence.
+    """Return words joined by commas and "and".
 
     Examples
     --------
@@ -334,44 +336,44 @@ def youngs_modulus(
     sensor_angle: Estimate | float = 0.0,
     force_gain: Estimate | None = None,
 ) -> YoungsModulus:
-    """Return Young's modulus from the record of a bent cantilever.
+    """Return Young's modulus from a record of bending a cantilever.
 
-    The pairs are sorted by their deflection and averaged over windows that do not overlap, so
-    that their errors stay independent; the sign of the force does not matter.
+    The pairs are sorted by deflection and averaged over windows.  The windows do not overlap, so
+    that the errors are independent.  The sign of the force is arbitrary.
 
     Parameters
     ----------
     deflection, force : (n,)
-        In the order of time [m], [N]; any zero.
+        Deflection [m] and force [N] in the order of time, with arbitrary zeros.
     beam : Beam
-        Its dimensions with their standard uncertainties.
+        Dimensions with their standard uncertainties.
     fit_range : pair of float
-        Fractions of the range of the deflection between which the line is fitted.
+        Limits of the fit, as fractions of the range of the deflection.
     window : int
-        Number of samples that are averaged.
+        Number of samples in a window.
     sensor_angle : Estimate or float
-        Between the axis of the force sensor and the force [deg]: the force is the sensor's over
-        the cosine.
+        Angle between the axis of the force sensor and the force [deg].  The force is the reading
+        divided by the cosine of this angle.
     force_gain : Estimate or None
-        Factor on the force, with the uncertainty of the sensor's calibration; None: 1, exact.
+        Factor on the force, with the uncertainty of the sensor's calibration (default: exactly 1).
 
     Raises
     ------
     EvaluationError
-        If the data are no pairs of numbers, too few, longer than the beam, or hold no stiffness.
+        If the data are not pairs of finite numbers, are too few, exceed the length of the beam, or
+        have no significant stiffness.
     """
     _check_pairs(deflection, force, "deflection", "force")
     _check_options(beam, deflection, fit_range, window)
     angle = sensor_angle if isinstance(sensor_angle, Estimate) else Estimate(sensor_angle, 0.0)
-    if not abs(angle.value) <= LARGEST_ANGLE:
+    if not abs(angle.value) <= SENSOR_ANGLE_MAX:
         raise EvaluationError(
-            f"sensor_angle = {angle.value:g} deg: a sensor feels nothing of a force across it; "
-            f"give an angle of at most {LARGEST_ANGLE:g} deg"
+            f"sensor_angle = {angle.value:g} deg: a sensor does not measure a transverse force; "
+            f"give an angle of at most {SENSOR_ANGLE_MAX:g} deg"
         )
     if force_gain is not None and force_gain.value <= 0.0:
         raise EvaluationError(
-            f"force_gain = {force_gain.value:g} must be positive: the sign of the force is "
-            "found without it"
+            f"force_gain = {force_gain.value:g} must be positive: the sign of the force is detected"
         )
     turned = math.radians(angle.value)
     force = force / math.cos(turned)
@@ -407,7 +409,7 @@ def youngs_modulus(
 
 
 def _touched(x: Real, fit: Line) -> bool:
-    """Tell whether the force is zero within the record, and not an offset of the sensor's."""
+    """Return whether the fitted force is zero at a deflection within the record."""
     zero = fit.centre_x - fit.centre_y / fit.slope.value
     return float(x[0]) <= zero <= float(x[-1])
 
@@ -415,6 +417,7 @@ def _touched(x: Real, fit: Line) -> bool:
 def _check_options(
     beam: Beam, deflection: Real, fit_range: tuple[float, float], window: int
 ) -> None:
+    """Reject an invalid fit range, window or deflection."""
     low, high = fit_range
     if not 0.0 <= low < high <= 1.0:
         raise EvaluationError(
@@ -422,15 +425,15 @@ def _check_options(
         )
     if window < 1 or 3 * window > len(deflection):
         raise EvaluationError(
-            f"window = {window} samples: give 1 to a third of the {len(deflection)} that there are"
+            f"window = {window} samples: give a number from 1 to {len(deflection) // 3}"
         )
     reach = float(np.ptp(deflection))
-    if reach <= SAME * float(np.abs(deflection).max()):
+    if reach <= DEFLECTION_RTOL * float(np.abs(deflection).max()):
         raise EvaluationError(
             f"beam {beam.name}: the deflection does not change, it is {deflection[0]:.4g} m "
-            "throughout: take the column of the deflection, or bend the beam"
+            "throughout: choose the column of the deflection, or bend the beam"
         )
-    if reach > LONGEST * beam.length.value:
+    if reach > DEFLECTION_MAX * beam.length.value:
         raise EvaluationError(
             f"beam {beam.name}: a deflection of {reach:.4g} m is longer than the beam, "
             f"{beam.length.value:.4g} m: check the units of both"
@@ -438,7 +441,7 @@ def _check_options(
 
 
 def averaged(x: Real, y: Real, window: int) -> tuple[Real, Real]:
-    """Return pairs sorted by x, averaged over windows that do not overlap; a rest is dropped.
+    """Return pairs sorted by x and averaged over windows; an incomplete window is dropped.
 
     Examples
     --------
@@ -451,9 +454,10 @@ def averaged(x: Real, y: Real, window: int) -> tuple[Real, Real]:
 
 
 def turning_points(x: Real, least: float) -> list[int]:
-    """Return the indices between which x rises or falls by more than ``least``.
+    """Return the indices of turning points, between which x changes by more than ``least``.
 
-    The first is the extreme from which it first does, the last the end of the record.
+    The first index is the extreme before the first such change.  The last one is the end of the
+    record.
 
     Examples
     --------
@@ -479,17 +483,17 @@ def turning_points(x: Real, least: float) -> list[int]:
 def hysteresis(deflection: Real, force: Real) -> tuple[Loop, ...]:
     """Return the complete cycles of loading and unloading in a record.
 
-    The loss is the area between the branches over their common deflections, the work the area
-    under the loading branch, from the force at its start.
+    The loss is the area between the branches over their common deflections.  The work is the area
+    under the loading branch above the force at its start.
 
     Parameters
     ----------
     deflection, force : (n,)
-        In the order of time [m], [N].
+        Deflection [m] and force [N] in the order of time.
 
     Examples
     --------
-    Half-way back the force is 0.4 where it was 0.5: a tenth of the work 1/2 stays.
+    At half the deflection the force is 0.5 in loading and 0.4 in unloading: a loss of a tenth.
 
     >>> d, F = np.array([0.0, 1.0, 0.5, 0.0]), np.array([0.0, 1.0, 0.4, 0.0])
     >>> [round(loop.fraction, 2) for loop in hysteresis(d, F)]
@@ -497,7 +501,7 @@ def hysteresis(deflection: Real, force: Real) -> tuple[Loop, ...]:
     """
     if np.mean((deflection - deflection.mean()) * (force - force.mean())) < 0.0:
         force = -force
-    turns = turning_points(deflection, TURNS * float(np.ptp(deflection)))
+    turns = turning_points(deflection, TURN_RTOL * float(np.ptp(deflection)))
     loops = []
     for start, top, end in zip(turns, turns[1:], turns[2:], strict=False):
         if deflection[top] <= deflection[start]:
@@ -509,7 +513,7 @@ def hysteresis(deflection: Real, force: Real) -> tuple[Loop, ...]:
 
 
 def _loop(deflection: Real, force: Real, start: int, top: int, end: int) -> Loop | None:
-    """Return a cycle; None if its branches have little in common."""
+    """Return a cycle; None if its branches have few deflections in common."""
     low = max(deflection[start], deflection[end])
     high = deflection[top]
     if high - low < 0.5 * (high - deflection[start]):
@@ -534,11 +538,11 @@ class BeamTable:
     Parameters
     ----------
     beams : tuple of YoungsModulus
-        One a beam, or one a repeat.
+        Moduli of the beams, or of repeated measurements.
     mean : Estimate
-        Mean; its uncertainty is that of the mean of values that scatter [Pa].
+        Mean, with the uncertainty scatter/sqrt(n) [Pa].
     scatter : float
-        Standard deviation of the values [Pa].
+        Standard deviation of the moduli [Pa].
     """
 
     beams: tuple[YoungsModulus, ...]
@@ -547,7 +551,7 @@ class BeamTable:
 
     @property
     def excess(self) -> float:
-        """Scatter over the mean of the stated uncertainties [-]: 1 if they explain it."""
+        """Ratio of the scatter to the mean stated uncertainty [-]: 1 if that explains it."""
         stated = np.mean([beam.modulus.uncertainty for beam in self.beams])
         return self.scatter / float(stated) if stated > 0.0 else math.inf
 
@@ -561,7 +565,7 @@ class BeamTable:
             )
         rows.append(
             f"{'mean':<16}{1e-9 * self.mean.value:>10.4g}{1e-9 * self.mean.uncertainty:>10.2g}  "
-            f"scatter {1e-9 * self.scatter:.2g} GPa, {self.excess:.1f} times the stated"
+            f"scatter {1e-9 * self.scatter:.2g} GPa, {self.excess:.1f} times the stated uncertainty"
         )
         return "\n".join(rows)
 
@@ -572,10 +576,12 @@ def beam_table(beams: Sequence[YoungsModulus]) -> BeamTable:
     Raises
     ------
     EvaluationError
-        If there are fewer than two.
+        If there are fewer than two beams.
     """
     if len(beams) < 2:
-        raise EvaluationError(f"a mean with its scatter needs two beams or more, not {len(beams)}")
+        raise EvaluationError(
+            f"a mean with a scatter needs two beams or more, but there are {len(beams)}"
+        )
     values = np.array([beam.modulus.value for beam in beams])
     scatter = float(values.std(ddof=1))
     n = len(values)

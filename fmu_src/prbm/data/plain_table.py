@@ -1,4 +1,4 @@
-"""Tables of measured data without a layout of their own: separator, decimal sign and head."""
+"""Tables of measured data in plain text: detection of separator, decimal sign and head."""
 
 import re
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ from ..files.record_units import is_unit
 from .cells import Table, cells_of, is_data, name_and_unit
 from .series import RecordError
 
-SAMPLE = 400  # lines by which the separator is recognized
+SAMPLE_LINES = 400  # Number of lines from which the separator is detected.
 COMMENT = re.compile(r"\s*(#|%|!|//)\s*")
 CHARACTERS = {"\t": "tabs", ";": "semicolons", ",": "commas", " ": "blanks"}
 FORMATS = [("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), (",", ","), (" ", "."),
@@ -17,9 +17,9 @@ FORMATS = [("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), (",", "
 def recognized(
     source: str, lines: list[str], delimiter: str | None, decimal: str | None
 ) -> tuple[str, str]:
-    """Return delimiter and decimal sign that make most lines a row of two numbers or more."""
+    """Return the delimiter and decimal sign for which most lines have two numbers or more."""
     kept = [line for line in lines if line.strip() and not COMMENT.match(line)]
-    sample = kept[:: max(1, len(kept) // SAMPLE)][-SAMPLE:]
+    sample = kept[:: max(1, len(kept) // SAMPLE_LINES)][-SAMPLE_LINES:]
     best, found = 0, None
     for option in FORMATS:
         if delimiter not in (None, option[0]) or decimal not in (None, option[1]):
@@ -31,8 +31,8 @@ def recognized(
     if found is None:
         known = ", ".join(CHARACTERS.values())
         raise RecordError(
-            f"{source}: is no table: no line holds two numbers or more separated by {known}; "
-            "export a time and a signal as columns"
+            f"{source}: not a table: no line has two numbers or more separated by {known}; export "
+            "a time and a signal as columns"
         )
     return found
 
@@ -44,7 +44,7 @@ def plain_table(
     delimiter: str | None,
     decimal: str | None,
 ) -> Table:
-    """Return the table of a file without a layout of its own."""
+    """Return the table in a file of plain text."""
     between, sign = recognized(source, lines, delimiter, decimal)
     first = _first_row(lines, between, sign)
     numbers, rows = [], []
@@ -60,7 +60,7 @@ def plain_table(
 
 
 def _first_row(lines: list[str], delimiter: str, decimal: str) -> int:
-    """Return the index of the first line of two numbers or more that another one follows."""
+    """Return the index of the first line with two numbers or more before another such line."""
     kept = [i for i, line in enumerate(lines) if line.strip() and not COMMENT.match(line)]
     data = []
     for i in kept:
@@ -77,15 +77,15 @@ def _heads(source: str, above: list[str], delimiter: str, width: int) -> list[tu
     plain = [line for line in above if not COMMENT.match(line)]
     if not plain:
         plain = [COMMENT.sub("", line, count=1) for line in above]
-    if delimiter == " ":  # a unit belongs to the name before it
+    if delimiter == " ":  # "x [mm]" is one cell
         plain = [re.sub(r"(?<=[^\])\s])\s+(?=[\[(])", "", line) for line in plain]
     rows = [_padded(cells_of(line, delimiter), width) for line in plain]
     if not rows or len(rows[-1]) != width:
         seen = f"{len(cells_of(plain[-1], delimiter))} names" if rows else "no names"
         raise RecordError(
             f"{source}: there are {seen} above {width} columns of numbers separated by "
-            f"{CHARACTERS[delimiter]}: write a head, or give "
-            f'columns=["t [s]", "x [mm]"] and the like'
+            f"{CHARACTERS[delimiter]}: write a head, or give its names, for instance "
+            f'columns=["t [s]", "x [mm]"]'
         )
     last = [_bare(cell) for cell in rows[-1]]
     has_units = (
@@ -100,7 +100,7 @@ def _heads(source: str, above: list[str], delimiter: str, width: int) -> list[tu
 
 
 def _padded(cells: list[str], width: int) -> list[str]:
-    """Return cells with one empty unit or name added where a row ends with it."""
+    """Return cells, with an empty one added if the last one is missing."""
     return [*cells, ""] if len(cells) == width - 1 else cells
 
 
@@ -112,7 +112,7 @@ def _bare(cell: str) -> str:
 def _axes_units(
     heads: list[tuple[str, str]], above: list[str], delimiter: str
 ) -> list[tuple[str, str]]:
-    """Add the units of lines ``Horizontal Units`` and ``Vertical Units`` where none are known."""
+    """Add units from the lines ``Horizontal Units`` and ``Vertical Units`` to heads without one."""
     rows = (cells_of(line, delimiter) for line in above)
     tags = {cells[0].lower(): cells[1:] for cells in rows if cells}
     across, up = tags.get("horizontal units", []), tags.get("vertical units", [])

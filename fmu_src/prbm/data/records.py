@@ -1,29 +1,29 @@
-"""Measured data from text files: channels by name, in SI, checked.
+"""Read measured data from text files: checked channels by name, in SI.
 
-Recognized without further arguments:
+Detected without further arguments:
 
 * columns separated by tabs, semicolons, commas or blanks; decimal point, or decimal comma where
   commas do not separate; quoted cells; UTF-8 with or without a byte order mark, UTF-16 with one,
   Windows-1252;
 * units in the head of a column, ``t [s]``, ``time (ms)``, ``Force/N``, ``Load, N``,
-  ``x in mm``, or in a row of their own below the names, ``s;mm`` or ``(ms),(V)``;
-* lines above the head, comments that start with ``#``, ``%``, ``!`` or ``//``, and a head that
-  is itself a comment, as ``numpy.savetxt`` writes it.
+  ``x in mm``, or in a row below the names, ``s;mm`` or ``(ms),(V)``;
+* lines above the head, comments that start with ``#``, ``%``, ``!`` or ``//``, and a head in a
+  comment, as ``numpy.savetxt`` writes it.
 
-That covers plain tables and spreadsheets' CSV, and these layouts of vendors:
+These layouts of vendors are read as well:
 
 * LabVIEW measurement files (``.lvm``, versions 0.9 to 2, one segment, ``X_Columns`` No or One):
-  separator, decimal sign and units are taken from the header, the column of comments is dropped;
+  separator, decimal sign and units are read from the header, the column of comments is skipped;
 * PicoScope and Instron: a row of units in parentheses;
 * Keysight oscilloscopes: ``x-axis,1`` above ``second,Volt``;
 * Tektronix oscilloscopes: lines ``Horizontal Units`` and ``Vertical Units`` above the table.
 
-A column without a unit can be given one (``units``), and a table without a head its names
-(``columns``).  An invalid record is rejected with a sentence that names the file, the line, the
-column, the value and a remedy.
+Missing units and heads are given by the arguments ``units`` and ``columns``.  The message for an
+invalid record names the file, the line, the column, the value and a remedy.
 """
 
 import difflib
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -32,6 +32,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base import reading
 from ..files.record_units import KNOWN, in_si, is_unit, same_dimension, si_unit
 from ..mechanics.arrays import Real
 from .cells import MISSING, Table, is_number, name_and_unit
@@ -39,10 +40,10 @@ from .labview import LVM, labview_table
 from .plain_table import plain_table
 from .series import RecordError, Series
 
-LARGEST_FILE = 1 << 26  # bytes; three channels at 750 Hz for half an hour have 40 MB
-FEWEST_ROWS = 3  # of a table of numbers
-TIMES = ("t", "time", "zeit", "temps", "x_value", "x-axis", "timestamp")
-PLAIN = {sign: re.compile(rf"[0-9+\-eE\n{sign}]*") for sign in ".,"}
+FILE_SIZE_MAX = 1 << 26  # bytes; three channels at 750 Hz for half an hour have 40 MB.
+ROWS_MIN = 3  # Rows of a table of numbers.
+TIME_NAMES = ("t", "time", "zeit", "temps", "x_value", "x-axis", "timestamp")
+PLAIN_NUMBERS = {sign: re.compile(rf"[0-9+\-eE\n{sign}]*") for sign in ".,"}
 
 
 @dataclass(frozen=True)
@@ -52,13 +53,13 @@ class Channel:
     Parameters
     ----------
     name : str
-        As in the file, without the unit.
+        Name in the file, without the unit.
     written : str
-        The unit as in the file, or an empty text.
+        Unit in the file; empty if it is missing.
     unit : str or None
         SI unit of the values; None if the unit is missing or unknown.
     values : (m,)
-        In SI, or as in the file if the unit is not known.
+        Values in SI, or as in the file if the unit is missing or unknown.
     """
 
     name: str
@@ -69,18 +70,18 @@ class Channel:
 
 @dataclass(frozen=True)
 class Record:
-    """The table in a file of measured data.
+    """Table in a file of measured data.
 
     Parameters
     ----------
     source : str
         Name of the file.
     channels : tuple of Channel
-        Its columns, in order.
+        Columns, in the order of the file.
     lines : (m,) int
-        The line of the file that each row comes from.
+        Line of each row in the file, from 1.
     comments : tuple of str
-        The lines above the table, without marks of comments.
+        Lines above the table, without marks of comments.
     """
 
     source: str
@@ -94,7 +95,7 @@ class Record:
         return tuple(channel.name for channel in self.channels)
 
     def channel(self, name: str) -> Channel:
-        """Return a channel by its name, upper or lower case.
+        """Return a channel by its name; upper and lower case are equal if no name matches exactly.
 
         Raises
         ------
@@ -107,82 +108,81 @@ class Record:
             return found[0]
         if found:
             raise RecordError(
-                f"{self.source}: the name {name!r} stands above {len(found)} columns; give the "
-                "columns names of their own, columns=[...]"
+                f"{self.source}: the name {name!r} is that of {len(found)} columns; give different "
+                "names, columns=[...]"
             )
         near = difflib.get_close_matches(name, self.names, n=1, cutoff=0.6)
         hint = f"did you mean {near[0]!r}?" if near else f"columns are {', '.join(self.names)}"
-        raise RecordError(f"{self.source}: there is no column {name!r}; {hint}")
+        raise RecordError(f"{self.source}: unknown column {name!r}; {hint}")
 
     def column(self, name: str, unit: str) -> Real:
-        """Return a column in SI, of the dimension of a unit.
+        """Return the values of a column in SI.
 
         Parameters
         ----------
         name : str
-            Of the column.
+            Name of the column.
         unit : str
-            For instance ``m`` or ``mm`` for a length; the values are in SI in either case.
+            Unit with the expected dimension, for instance ``m`` or ``mm`` for a length.
 
         Raises
         ------
         RecordError
-            If there is no such column, its unit is missing or unknown, or it has another
-            dimension.
+            If the column does not exist, or its unit is missing, unknown or of another dimension.
         """
         channel = self.channel(name)
         if channel.unit is None:
-            what = "has no unit"
+            state = "has no unit"
             if channel.written:
-                what = f"has the unit {channel.written!r}, which is unknown (known are {KNOWN})"
+                state = f"has the unknown unit {channel.written!r} (known units are {KNOWN})"
             raise RecordError(
-                f"{self.source}: the column {channel.name!r} {what}: give it, "
+                f"{self.source}: the column {channel.name!r} {state}: give its unit, "
                 f"units={{{channel.name!r}: {unit!r}}}"
             )
         if not same_dimension(channel.written, unit):
             raise RecordError(
                 f"{self.source}: the column {channel.name!r} is in {channel.written or '1'}, but "
-                f"{unit} was expected: take another column, or correct its unit, "
+                f"{unit} was expected: choose another column, or correct its unit, "
                 f"units={{{channel.name!r}: {unit!r}}}"
             )
         return channel.values
 
     @property
     def time(self) -> Channel:
-        """The column of times.
+        """Column of the time.
 
         Raises
         ------
         RecordError
-            If none is measured in s, or several are and none has a name of the time.
+            If no column has a unit of time, or several have one and none is named as the time.
         """
         found = [c for c in self.channels if c.unit == "s"]
-        named = [c for c in found if c.name.lower() in TIMES]
+        named = [c for c in found if c.name.lower() in TIME_NAMES]
         if len(found) == 1 or named:
             return (named or found)[0]
         if found:
             raise RecordError(
-                f"{self.source}: the columns {', '.join(c.name for c in found)} are all in s: call "
-                "the one that is the time t"
+                f"{self.source}: the columns {', '.join(c.name for c in found)} all have units of "
+                "time: rename the column of the time to t"
             )
         heads = ", ".join(f"{c.name} [{c.written or '?'}]" for c in self.channels)
         raise RecordError(
-            f"{self.source}: no column is a time; columns are {heads}: give the unit of the time, "
+            f"{self.source}: no column has a unit of time; columns are {heads}: give the unit, "
             f"units={{{self.names[0]!r}: 's'}}"
         )
 
     def series(self, name: str, unit: str) -> Series:
-        """Return a column over time.
+        """Return a column as a signal over time.
 
         Parameters
         ----------
         name, unit : str
-            As for :meth:`column`.
+            Name of the column, and unit with the expected dimension.
 
         Raises
         ------
         RecordError
-            As :meth:`column`, :attr:`time` and :class:`Series` do.
+            As raised by :meth:`column`, :attr:`time` and :class:`Series`.
         """
         values = self.column(name, unit)
         return Series(self.time.values, values, name, si_unit(unit), self.source, self.lines)
@@ -204,25 +204,25 @@ def read_record(
     delimiter: str | None = None,
     decimal: str | None = None,
 ) -> Record:
-    r"""Read a table of measured data; see the module for the layouts.
+    r"""Read a table of measured data; the module lists the layouts.
 
     Parameters
     ----------
     path : str or Path
-        The file.
+        Path of the file.
     columns : sequence of str or None
-        Names, with units as in ``"t [s]"``, in place of the head or where there is none.
+        Names, with units as in ``"t [s]"``, in place of the head in the file.
     units : mapping
-        Units of columns by name, where they are missing or wrong in the file.
+        Units by names of columns, in place of those in the file.
     delimiter : {"\t", ";", ",", " "} or None
-        Separator of the cells (default: recognized).
+        Separator of the cells (default: detected).
     decimal : {".", ","} or None
-        The decimal sign (default: recognized).
+        Decimal sign (default: detected).
 
     Raises
     ------
     RecordError
-        If the file cannot be read or does not hold a table of numbers.
+        If the file cannot be read or does not contain a table of numbers.
     """
     path = Path(path)
     source = path.name
@@ -240,18 +240,12 @@ def read_record(
 
 
 def _text(path: Path) -> str:
-    """Return the text of a file."""
-    try:
-        size = path.stat().st_size
-        if size > LARGEST_FILE:
-            raise RecordError(f"{path.name}: {size} bytes are too many for a record: split it")
-        data = path.read_bytes()
-    except OSError as error:
-        raise RecordError(f"{path}: cannot be read ({error.strerror})") from None
+    """Return the text of a file; reject large, empty and binary files."""
+    data = reading.content(path, FILE_SIZE_MAX, RecordError)
     if not data.strip():
-        raise RecordError(f"{path.name}: is empty: export the record again")
+        raise RecordError(f"{path.name}: empty file: export the record again")
     if data.startswith(b"PK\x03\x04") or data.startswith(b"\xd0\xcf\x11\xe0"):
-        raise RecordError(f"{path.name}: is a spreadsheet or an archive: save the table as CSV")
+        raise RecordError(f"{path.name}: a spreadsheet or an archive: save the table as CSV")
     encoding = "utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig"
     for attempt in (encoding, "cp1252"):
         try:
@@ -262,14 +256,15 @@ def _text(path: Path) -> str:
         if bad is None:
             return text.rstrip("\x1a")
         break
-    raise RecordError(f"{path.name}: is no text but binary data: export the record as CSV")
+    raise RecordError(f"{path.name}: binary data: export the record as CSV")
 
 
 def _renamed(source: str, table: Table, columns: Sequence[str]) -> Table:
+    """Return a table with given names and units of all columns."""
     width = len(table.rows[0]) if table.rows else 0
     if len(columns) != width:
         raise RecordError(
-            f"{source}: {len(columns)} names were given for {width} columns: name every column"
+            f"{source}: {len(columns)} names for {width} columns: give one name for each column"
         )
     heads = [name_and_unit(head) for head in columns]
     return Table(heads, table.lines, table.rows, table.decimal, table.comments)
@@ -278,23 +273,25 @@ def _renamed(source: str, table: Table, columns: Sequence[str]) -> Table:
 def _with_units(
     source: str, heads: list[tuple[str, str]], units: Mapping[str, str]
 ) -> list[tuple[str, str]]:
-    """Return the heads with the units that were given."""
+    """Return the heads with given units; reject unknown units and repeated names."""
     names = [name for name, _ in heads]
     for name, unit in units.items():
         if name not in names:
             raise RecordError(
-                f"{source}: a unit was given for {name!r}, which is no column; columns are "
+                f"{source}: a unit is given for the unknown column {name!r}; columns are "
                 f"{', '.join(names)}"
             )
         if not is_unit(unit):
-            raise RecordError(f"the unit {unit!r} given for {name!r} is unknown; known are {KNOWN}")
+            raise RecordError(
+                f"{source}: the unit {unit!r} of {name!r} is unknown; known units are {KNOWN}"
+            )
     for i, name in enumerate(names, start=1):
         if not name:
-            raise RecordError(f"{source}: column {i} has no name: give columns=[...]")
+            raise RecordError(f"{source}: column {i} has no name: give names, columns=[...]")
         if name in names[: i - 1]:
             raise RecordError(
-                f"{source}: the name {name!r} stands above columns {names.index(name) + 1} and "
-                f"{i}: give the columns names of their own, columns=[...]"
+                f"{source}: the name {name!r} is that of columns {names.index(name) + 1} and {i}: "
+                "give different names, columns=[...]"
             )
     return [(name, units.get(name, unit)) for name, unit in heads]
 
@@ -305,39 +302,39 @@ def _numbers(source: str, heads: list[tuple[str, str]], table: Table) -> Real:
     Raises
     ------
     RecordError
-        At the first row that has not a number for every column.
+        If a row does not have a number for each column, or there are too few rows.
     """
-    if len(table.rows) < FEWEST_ROWS:
+    if len(table.rows) < ROWS_MIN:
         raise RecordError(
-            f"{source}: {len(table.rows)} rows of numbers are too few to evaluate: record "
-            f"{FEWEST_ROWS} or more"
+            f"{source}: {len(table.rows)} rows of numbers are too few: record {ROWS_MIN} or more"
         )
     quick = _quickly(table, len(heads))
     return np.array(list(_parsed(source, heads, table))) if quick is None else quick
 
 
 def _quickly(table: Table, width: int) -> Real | None:
-    """Return the rows as numbers; None if a cell needs the slower parser, which names errors."""
+    """Return the rows as numbers; None if a cell needs the slower parser, which reports errors."""
     if any(len(row) != width for row in table.rows):
         return None
     text = "\n".join("\n".join(row) for row in table.rows)
-    if PLAIN[table.decimal].fullmatch(text) is None:
+    if PLAIN_NUMBERS[table.decimal].fullmatch(text) is None:
         return None
     try:
-        numbers = list(map(float, text.replace(",", ".").split("\n")))
+        numbers = np.array(list(map(float, text.replace(",", ".").split("\n"))))
     except ValueError:
         return None
-    return np.array(numbers).reshape(-1, width)
+    return numbers.reshape(-1, width) if np.isfinite(numbers).all() else None
 
 
 def _parsed(source: str, heads: list[tuple[str, str]], table: Table) -> Iterator[list[float]]:
+    """Yield the rows as numbers; reject the first wrong cell."""
     last = table.lines[-1]
     for number, cells in zip(table.lines, table.rows, strict=True):
         if len(cells) != len(heads):
             cut = number == last and len(cells) < len(heads)
             raise RecordError(
                 f"{source}, line {number}: {len(cells)} values for {len(heads)} columns: "
-                + ("the file was cut off; take the last line out" if cut else "mend the line")
+                + ("the file was cut off; remove the last line" if cut else "correct the line")
             )
         row = []
         for (name, _), cell in zip(heads, cells, strict=True):
@@ -348,23 +345,31 @@ def _parsed(source: str, heads: list[tuple[str, str]], table: Table) -> Iterator
                 )
             text = cell.replace(table.decimal, ".").lower().replace("d", "e")
             row.append(float(text))
+            if math.isinf(row[-1]):
+                raise RecordError(
+                    f"{source}, line {number}, column {name!r}: {cell[:30]!r} is too large: "
+                    "correct or remove the line"
+                )
         yield row
 
 
 def _advice(cell: str, decimal: str) -> str:
-    """Return the error in a cell that is not a number, and a remedy."""
+    """Return the message for a cell that is not a number, with a remedy."""
     if cell.lower() in MISSING:
-        return "is no value: take the row out, or interpolate over it"
+        return "is not a value: remove the row, or interpolate over it"
     if any(is_number(cell, other) for other in ".,"):
-        return f"has another decimal sign than the rest, {decimal!r}: write all numbers alike"
+        return f"has another decimal sign than the rest, {decimal!r}: use one decimal sign"
     number = re.match(r"[+-]?[\d.,]+\s*([^\d\s.,].*)", cell)
     if number and is_unit(number[1]):
-        return "has a unit of its own: write the unit once, in the head of the column"
-    return "is no number: take the line out or mend it"
+        return "has a unit: write the unit in the head of the column only"
+    return "is not a number: correct or remove the line"
 
 
 def _channel(name: str, unit: str, values: Real) -> Channel:
+    """Return a channel with its values converted to SI if the unit is known."""
     if not unit or not is_unit(unit):
         return Channel(name, unit, None, values)
     factor, offset = in_si(unit)
-    return Channel(name, unit, si_unit(unit), factor * values + offset)
+    with np.errstate(over="ignore"):
+        converted: Real = factor * values + offset
+    return Channel(name, unit, si_unit(unit), converted)

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from ..base.errors import PrbmError
 from ..mechanics.arrays import Real
 
-FEWEST_SAMPLES = 16  # of a signal over time
-GAP = 1.8  # times the usual step; a sample that is missing makes 2, rounded times up to 1.5
-LONG = 3.0  # times the median step; longer steps do not count for the usual one
+SAMPLES_MIN = 16  # Samples of a signal over time.
+GAP_FACTOR = 1.8  # Times the usual step: a missing sample gives 2, rounding up to 1.5.
+LONG_STEP_FACTOR = 3.0  # Times the median step: longer steps are left out of the usual step.
 
 
 class RecordError(PrbmError, ValueError):
@@ -25,18 +25,20 @@ class Series:
     Parameters
     ----------
     time : (m,)
-        Increasing [s].
+        Increasing times [s].
     values : (m,)
-        In ``unit``.
+        Values in ``unit``.
     name, unit : str
-        What it is; SI.
+        Name of the signal, and SI unit.
     source : str
-        Where it comes from, for messages.
+        Name of the file, for messages.
+    lines : (m,) int
+        Line of each sample in the file, for messages; empty if there is no file.
 
     Raises
     ------
     RecordError
-        If it is too short, holds what is no number, its times do not increase or have a gap.
+        If the signal is too short or not finite, or its times do not increase or have a gap.
     """
 
     time: Real
@@ -53,27 +55,29 @@ class Series:
                 f"{self.source}: {len(time)} times for {len(values)} values of {self.name}: give "
                 "one time for each value"
             )
-        if len(time) < FEWEST_SAMPLES:
+        if len(time) < SAMPLES_MIN:
             raise RecordError(
                 f"{self.source}: {len(time)} samples of {self.name} are too few to evaluate: "
-                f"record {FEWEST_SAMPLES} or more"
+                f"record {SAMPLES_MIN} or more"
             )
-        for what, x in (("the time", time), (self.name, values)):
+        for name, x in (("the time", time), (self.name, values)):
             bad = np.flatnonzero(~np.isfinite(x))
             if len(bad):
                 raise RecordError(
-                    f"{self._where(int(bad[0]))}: {what} is {x[bad[0]]}: take the row out, or "
+                    f"{self._where(int(bad[0]))}: {name} is {x[bad[0]]}: remove the row, or "
                     "interpolate over it"
                 )
         self._check_order()
         self._check_gaps()
 
     def _where(self, row: int) -> str:
+        """Return the position of a sample for messages: its line, or its number from 1."""
         if row < len(self.lines):
             return f"{self.source}, line {self.lines[row]}"
         return f"{self.source}, sample {row + 1}"
 
     def _check_order(self) -> None:
+        """Reject times that do not increase."""
         steps = np.diff(self.time)
         bad = np.flatnonzero(steps <= 0.0)
         if len(bad):
@@ -87,13 +91,14 @@ class Series:
             )
 
     def _check_gaps(self) -> None:
+        """Reject a step that is longer than the usual step by a missing sample."""
         steps = np.diff(self.time)
-        usual = float(steps[steps <= LONG * np.median(steps)].mean())
+        usual = float(steps[steps <= LONG_STEP_FACTOR * np.median(steps)].mean())
         i = int(np.argmax(steps))
-        if steps[i] > GAP * usual:
+        if steps[i] > GAP_FACTOR * usual:
             raise RecordError(
                 f"{self._where(i + 1)}: a gap of {steps[i]:.6g} s follows t = {self.time[i]:.9g} "
-                f"s, where steps are {usual:.6g} s: evaluate the part before or after it "
+                f"s, but the usual step is {usual:.6g} s: evaluate the part before or after it "
                 "(Series.between)"
             )
 
@@ -104,36 +109,36 @@ class Series:
 
     @property
     def step(self) -> float:
-        """Mean distance of the samples [s]."""
+        """Mean sampling interval [s]."""
         return float(self.time[-1] - self.time[0]) / (len(self.time) - 1)
 
     def between(self, start: float = -math.inf, end: float = math.inf) -> "Series":
-        """Return the part with start <= t <= end [s]; its times stay as they are.
+        """Return the part with start <= t <= end [s]; its times do not change.
 
         Raises
         ------
         RecordError
-            If there is nothing of the record in it, or too little.
+            If the part has no samples, or too few.
         """
         kept = (self.time >= start) & (self.time <= end)
         if not kept.any():
             low, high = (f"{t:.6g} s" for t in (self.time[0], self.time[-1]))
             raise RecordError(
-                f"{self.source}: nothing of {self.name} is left {_span(start, end)}: the record is "
-                f"from {low} to {high}; choose a start and a later end within"
+                f"{self.source}: {self.name} has no samples {_span(start, end)}: choose a start "
+                f"and a later end between {low} and {high}"
             )
         lines = self.lines[kept] if len(self.lines) else self.lines
         return Series(self.time[kept], self.values[kept], self.name, self.unit, self.source, lines)
 
     def from_zero(self) -> "Series":
-        """Return the same signal with the time counted from its first sample."""
+        """Return the signal with times relative to its first sample."""
         return Series(
             self.time - self.time[0], self.values, self.name, self.unit, self.source, self.lines
         )
 
 
 def _span(start: float, end: float) -> str:
-    """Return a span of time in words.
+    """Return an interval of time in words.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Values with standard uncertainties, after the GUM, and the straight line through data.
+"""Values with standard uncertainties according to the GUM, and straight lines through data.
 
 Source
 ------
@@ -15,13 +15,13 @@ from scipy import stats
 from ..base.errors import PrbmError
 from ..mechanics.arrays import Real
 
-CORRELATED = 3.0  # times 1/sqrt(n), the scatter of the correlation of independent residuals
-LEVEL = 0.95  # of confidence, wherever none is given
-FEWEST_POINTS = 3  # of a line whose scatter is to be known
+CORRELATION_FACTOR = 3.0  # Times 1/sqrt(n), the deviation of uncorrelated residuals: correlated.
+CONFIDENCE_LEVEL = 0.95  # Default level of confidence.
+POINTS_MIN = 3  # Points of a line with an uncertainty.
 
 
 class EvaluationError(PrbmError, ValueError):
-    """The data do not hold what is to be evaluated."""
+    """The quantity cannot be evaluated from the data."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Estimate:
     value : float
         Best estimate.
     uncertainty : float
-        Standard uncertainty, in the same unit; infinite: not determined.
+        Standard uncertainty, in the same unit; infinite if the value is not determined.
     unit : str
         SI unit; empty if dimensionless.
     freedom : float
@@ -42,7 +42,7 @@ class Estimate:
     Raises
     ------
     EvaluationError
-        If the value is not finite or the uncertainty negative or no number.
+        If the value is not finite, or the uncertainty negative or not a number.
 
     Examples
     --------
@@ -60,8 +60,8 @@ class Estimate:
     def __post_init__(self) -> None:
         if not math.isfinite(self.value) or math.isnan(self.uncertainty) or self.uncertainty < 0.0:
             raise EvaluationError(
-                f"{self.value:g} with the standard uncertainty {self.uncertainty:g} is no "
-                "estimate: give a finite value and an uncertainty that is not negative"
+                f"invalid estimate {self.value:g} with the standard uncertainty "
+                f"{self.uncertainty:g}: give a finite value and an uncertainty of at least 0"
             )
 
     @property
@@ -69,8 +69,8 @@ class Estimate:
         """Relative standard uncertainty, u/|value| [-]."""
         return self.uncertainty / abs(self.value) if self.value else math.inf
 
-    def interval(self, level: float = LEVEL) -> tuple[float, float]:
-        """Return the confidence interval value -+ t u, t of Student's distribution.
+    def interval(self, level: float = CONFIDENCE_LEVEL) -> tuple[float, float]:
+        """Return the confidence interval value -+ t u, with t of Student's distribution.
 
         Examples
         --------
@@ -81,8 +81,8 @@ class Estimate:
         reach = _student(level, self.freedom) * self.uncertainty
         return self.value - reach, self.value + reach
 
-    def includes_zero(self, level: float = LEVEL) -> bool:
-        """Tell whether the confidence interval includes zero."""
+    def includes_zero(self, level: float = CONFIDENCE_LEVEL) -> bool:
+        """Return whether the confidence interval includes zero."""
         low, high = self.interval(level)
         return low <= 0.0 <= high
 
@@ -100,7 +100,7 @@ class Estimate:
 
 
 def _student(level: float, freedom: float) -> float:
-    """Return the factor of a two-sided confidence interval."""
+    """Return the coverage factor t of a two-sided confidence interval."""
     p = 0.5 + level / 2.0
     return float(stats.norm.ppf(p) if math.isinf(freedom) else stats.t.ppf(p, freedom))
 
@@ -108,7 +108,7 @@ def _student(level: float, freedom: float) -> float:
 def power_law(
     powers: Mapping[str, tuple[Estimate, float]], factor: float = 1.0, unit: str = ""
 ) -> tuple[Estimate, dict[str, float]]:
-    """Return y = factor prod x_i^p_i with its uncertainty, and the budget.
+    """Return y = factor prod x_i^p_i with its uncertainty, and the uncertainty budget.
 
         (u(y)/y)^2 = sum (p_i u(x_i)/x_i)^2                              (GUM, eq. 12)
 
@@ -117,9 +117,9 @@ def power_law(
     Parameters
     ----------
     powers : mapping
-        Names to quantities and their powers; they are independent.
+        Independent quantities and their powers, by name.
     factor : float
-        Exact.
+        Exact factor.
     unit : str
         Unit of the result.
 
@@ -127,7 +127,7 @@ def power_law(
     -------
     Estimate
     budget : dict
-        Names to |p_i| u(x_i)/|x_i| [-].
+        Contributions |p_i| u(x_i)/|x_i|, by name [-].
 
     Examples
     --------
@@ -146,14 +146,14 @@ def power_law(
 
 @dataclass(frozen=True)
 class Line:
-    """The straight line y = centre_y + slope (x - centre_x) of least squares.
+    """Straight line y = centre_y + slope (x - centre_x) of least squares.
 
     Parameters
     ----------
     slope : Estimate
-        Its uncertainty holds the scatter of the data about the line.
+        Slope, with the uncertainty from the scatter of the data about the line.
     centre_x, centre_y : float
-        Mean of the data; the error there and that of the slope are independent.
+        Mean of the data.  The errors of the line there and of the slope are independent.
     centre_u : float
         Standard uncertainty of the line at the centre.
     residual : float
@@ -161,8 +161,8 @@ class Line:
     largest : float
         Largest distance of the data from the line.
     serial : float
-        Correlation of neighbouring residuals [-]; independent ones have none, data that bend
-        away from the line have nearly 1.
+        Correlation of neighbouring residuals [-]: about 0 if they are independent, nearly 1 if
+        the data follow a curve.
     n : int
         Number of points.
     """
@@ -177,30 +177,30 @@ class Line:
     n: int
 
     def at(self, x: float) -> float:
-        """Return the line at x."""
+        """Return the value of the line at x."""
         return self.centre_y + self.slope.value * (x - self.centre_x)
 
     @property
     def intercept(self) -> float:
-        """The line at x = 0."""
+        """Value of the line at x = 0."""
         return self.at(0.0)
 
 
 def line(x: Real, y: Real) -> Line:
-    """Return the straight line of least squares through points in order.
+    """Return the straight line of least squares through ordered points.
 
-    If neighbouring residuals are correlated (r beyond 3/sqrt(n)) the points hold less than they
-    seem to, and the uncertainties are taken sqrt((1 + r)/(1 - r)) times as large.
+    If the correlation r of neighbouring residuals exceeds 3/sqrt(n), the uncertainties are
+    multiplied by sqrt((1 + r)/(1 - r)).
 
     Parameters
     ----------
     x, y : (n,)
-        Points, ordered along x or in time; the error is in y.
+        Points, ordered along x or in time, with errors in y.
 
     Raises
     ------
     EvaluationError
-        If there are fewer than three points, or all at one place.
+        If there are fewer than three points, or all have one x.
 
     Examples
     --------
@@ -209,15 +209,17 @@ def line(x: Real, y: Real) -> Line:
     (2.0, 1.0, 0.0)
     """
     n = len(x)
-    if n < FEWEST_POINTS:
+    if n < POINTS_MIN:
         raise EvaluationError(
-            f"a line with its uncertainty needs {FEWEST_POINTS} points or more, there are {n}: "
+            f"a line with an uncertainty needs {POINTS_MIN} points or more, but there are {n}: "
             "record more, or widen the fit range"
         )
     centre_x, centre_y = float(x.mean()), float(y.mean())
     spread = float(((x - centre_x) ** 2).sum())
-    if float(np.ptp(x)) == 0.0:  # the mean of equal numbers may be another one, by rounding
-        raise EvaluationError(f"all {n} points are at x = {centre_x:.6g}: a line needs different x")
+    if float(np.ptp(x)) == 0.0:  # round-off can make the spread of equal numbers positive
+        raise EvaluationError(
+            f"all {n} points are at x = {centre_x:.6g}: give points of different x"
+        )
     slope = float((x - centre_x) @ (y - centre_y)) / spread
     rest = y - centre_y - slope * (x - centre_x)
     residual = math.sqrt(float(rest @ rest) / (n - 2))
@@ -243,15 +245,16 @@ def serial_correlation(residuals: Real) -> float:
 
 
 def widening(serial: float, n: int) -> float:
-    """Return by how much correlated residuals widen an uncertainty, 1 or more [-].
+    """Return the factor of an uncertainty due to correlated residuals, 1 or more [-].
 
-    sqrt((1 + r)/(1 - r)) of an autoregressive process of first order, if r is beyond chance.
+    It is sqrt((1 + r)/(1 - r)), as for an autoregressive process of first order, if the
+    correlation r exceeds 3/sqrt(n), and 1 otherwise.
 
     Examples
     --------
     >>> widening(0.01, 100), round(widening(0.6, 100), 12)
     (1.0, 2.0)
     """
-    if serial * math.sqrt(n) <= CORRELATED:
+    if serial * math.sqrt(n) <= CORRELATION_FACTOR:
         return 1.0
     return math.sqrt((1.0 + serial) / max(1.0 - serial, 1.0 / n))

@@ -5,8 +5,8 @@ The model is x(t) = c + exp(-lambda t) (a cos omega_d t + b sin omega_d t), with
     lambda = zeta omega_n,      omega_d = omega_n sqrt(1 - zeta^2),
     delta = ln(x_k/x_k+1) = 2 pi zeta/sqrt(1 - zeta^2)          (logarithmic decrement).
 
-Large motion of a mechanism is neither harmonic nor of one frequency; the residuals then are
-correlated, which is said and which widens the uncertainties.
+Large motion of a mechanism is neither harmonic nor of one frequency.  The residuals are then
+correlated; the result states their correlation, and its uncertainties are larger.
 """
 
 import math
@@ -18,30 +18,31 @@ from scipy.signal import find_peaks
 
 from ..mechanics.arrays import Real
 from .series import Series
-from .uncertainty import LEVEL, Estimate, EvaluationError, serial_correlation, widening
+from .uncertainty import CONFIDENCE_LEVEL, Estimate, EvaluationError, serial_correlation, widening
 
-FEWEST_PERIODS = 3.0  # in a record, for a frequency
-PROMINENT = 0.25  # share of the signal's power that the fit must explain
-FEWEST_PEAKS = 4  # of a decrement
-LOWEST_PEAK = 5.0  # times the noise: lower peaks are biased and left out
-KINK = 6.0  # times the usual second difference: an impact
-MADS = 1.4826  # standard deviations in a median absolute deviation, of Gaussian noise
-DECAYS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # over the record, from which the fit starts
+PERIODS_MIN = 3.0  # Periods in a record from which a frequency is evaluated.
+EXPLAINED_POWER_MIN = 0.25  # Share of the signal's power that the fit explains.
+PEAKS_MIN = 4  # Peaks from which a decrement is evaluated.
+PEAK_NOISE_MIN = 5.0  # Ratio of a peak to the noise: lower peaks are biased, and skipped.
+KINK_FACTOR = 6.0  # Times the usual second difference: larger ones are impacts.
+DEVIATION_PER_MAD = 1.4826  # Standard over median absolute deviation of Gaussian noise.
+START_DECAYS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # lambda T of the start values of the fit.
 
 
 @dataclass(frozen=True)
 class FourierPeak:
-    """The highest peak of the spectrum.
+    """Highest peak of a spectrum.
 
     Parameters
     ----------
     frequency : Estimate
-        Of the highest line [Hz]; the true one is anywhere within half a line, u = 1/(T sqrt 12).
+        Frequency of the highest line [Hz].  The true frequency is uniformly distributed within half
+        a line distance, so that u = 1/(T sqrt 12).
     resolution : float
         Distance of the lines, 1/T [Hz].
     interpolated : float
-        Top of the parabola through the logarithms of three lines, of the signal in a Hann
-        window [Hz].
+        Frequency at the vertex of a parabola through the logarithms of three lines, of the signal
+        with a Hann window [Hz].
     """
 
     frequency: Estimate
@@ -55,20 +56,22 @@ def fourier_peak(series: Series) -> FourierPeak:
     Raises
     ------
     EvaluationError
-        If the signal does not change, or holds less than three periods.
+        If the signal does not change, or has fewer than three periods.
     """
     T, n = series.duration, len(series.values)
     x = series.values - series.values.mean()
     if float(np.abs(x).max()) <= 1e-12 * float(np.abs(series.values).max()):
-        raise EvaluationError(f"{series.source}: {series.name} does not change: nothing vibrates")
+        raise EvaluationError(
+            f"{series.source}: {series.name} does not change: choose another column"
+        )
     grid = series.time[0] + series.step * np.arange(n)
-    x = np.interp(grid, series.time, x)  # where the sampling is not quite even
+    x = np.interp(grid, series.time, x)  # for uneven sampling
     lines = np.abs(np.fft.rfft(x))
     peak = int(np.argmax(lines[1:])) + 1
-    if peak < FEWEST_PERIODS:
+    if peak < PERIODS_MIN:
         raise EvaluationError(
-            f"{series.source}: {series.name} holds {peak} periods or less in {T:.4g} s: record "
-            f"{FEWEST_PERIODS:g} or more, or take a drift out"
+            f"{series.source}: {series.name} has {peak} periods or less in {T:.4g} s: record "
+            f"{PERIODS_MIN:g} or more, or remove the drift"
         )
     smooth = np.abs(np.fft.rfft(x * np.hanning(n)))
     top = peak - 1 + int(np.argmax(smooth[peak - 1 : peak + 2]))
@@ -83,7 +86,7 @@ def fourier_peak(series: Series) -> FourierPeak:
 
 @dataclass(frozen=True)
 class FreeVibration:
-    """A damped sine in a record, by least squares, and the logarithmic decrement.
+    """Damped sine fitted to a record by least squares, and the logarithmic decrement.
 
     Parameters
     ----------
@@ -94,21 +97,21 @@ class FreeVibration:
     zeta : Estimate
         Damping ratio of the fit [-].
     decrement : Estimate or None
-        Logarithmic decrement per period, from the peaks [-]; None if there are too few.
+        Logarithmic decrement per period, from the peaks [-]; None if there are too few peaks.
     decrement_zeta : Estimate or None
-        Damping ratio from it [-].
+        Damping ratio from the decrement [-].
     amplitude : float
-        At the start of the record, in its unit.
+        Amplitude at the start of the record, in the unit of the record.
     rest : float
-        Where it comes to rest, in the unit of the record.
+        Position of rest, in the unit of the record.
     residual : float
         Standard deviation about the fit, in the unit of the record.
     serial : float
-        Correlation of neighbouring residuals [-]; noise has none.
+        Correlation of neighbouring residuals [-]; about 0 for noise.
     peak : FourierPeak
-        The spectrum's view.
+        Highest peak of the spectrum.
     unit : str
-        Of the record; 1 if it is dimensionless.
+        Unit of the record; 1 if it is dimensionless.
     """
 
     frequency: Estimate
@@ -125,12 +128,12 @@ class FreeVibration:
 
     @property
     def damping_measurable(self) -> bool:
-        """Whether the 95 % confidence interval of the damping ratio lies above zero."""
-        return self.zeta.interval(LEVEL)[0] > 0.0
+        """Whether the 95 % confidence interval of the damping ratio is above zero."""
+        return self.zeta.interval(CONFIDENCE_LEVEL)[0] > 0.0
 
     @property
     def damping(self) -> str:
-        """The damping ratio in words, as far as the record knows it."""
+        """Damping ratio in words, or its upper bound if it is too small to measure."""
         return damping_verdict(self.zeta)
 
     def __str__(self) -> str:
@@ -151,7 +154,7 @@ class FreeVibration:
 
 
 def damping_verdict(zeta: Estimate) -> str:
-    """Return a damping ratio in words: the value, or that it is too small to measure.
+    """Return a damping ratio in words, or its upper bound if it is too small to measure.
 
     Examples
     --------
@@ -160,11 +163,11 @@ def damping_verdict(zeta: Estimate) -> str:
     >>> damping_verdict(Estimate(0.0123, 0.0002))
     '0.01230 ± 0.00020'
     """
-    low, high = zeta.interval(LEVEL)
+    low, high = zeta.interval(CONFIDENCE_LEVEL)
     if low > 0.0:
         return str(zeta)
     if high <= 0.0:
-        return f"{zeta} is negative: the motion grows, or the model of a free vibration is wrong"
+        return f"{zeta} is negative: the motion grows, or is not a free vibration"
     return f"too small to measure: {zeta} includes zero; below {high:.2g} at 95 %"
 
 
@@ -174,12 +177,12 @@ def free_vibration(series: Series) -> FreeVibration:
     Parameters
     ----------
     series : Series
-        From the release, or later; at least three periods.
+        Signal from the release on, or later, of at least three periods.
 
     Raises
     ------
     EvaluationError
-        If the signal holds less, or a damped sine does not explain it.
+        If the signal has fewer periods, or is not a damped sine.
     """
     peak = fourier_peak(series)
     t, x = series.time - series.time[0], series.values
@@ -188,10 +191,10 @@ def free_vibration(series: Series) -> FreeVibration:
     rest = x - model
     n = len(x)
     explained = 1.0 - float(rest @ rest) / float(((x - x.mean()) ** 2).sum())
-    if explained < PROMINENT:
+    if explained < EXPLAINED_POWER_MIN:
         raise EvaluationError(
             f"{series.source}: a damped sine explains {100 * max(explained, 0.0):.0f} % of "
-            f"{series.name}: choose the part of the record that vibrates freely (Series.between)"
+            f"{series.name}: choose a part of free vibration (Series.between)"
         )
     residual = math.sqrt(float(rest @ rest) / (n - len(y)))
     serial = serial_correlation(rest)
@@ -228,7 +231,7 @@ def _damped_sine(t: Real, y: Real) -> Real:
 
 
 def _jacobian(t: Real, y: Real) -> Real:
-    """Return its derivatives, (m, 5)."""
+    """Return the derivatives of the damped sine with respect to y, (m, 5)."""
     _, a, b, decay, omega = y
     envelope = np.exp(-decay * t)
     cos, sin = envelope * np.cos(omega * t), envelope * np.sin(omega * t)
@@ -237,7 +240,7 @@ def _jacobian(t: Real, y: Real) -> Real:
 
 
 def _linear_part(t: Real, x: Real, decay: float, omega: float) -> tuple[Real, float]:
-    """Return the best (c, a, b) for a decay and a frequency, and the sum of squares left."""
+    """Return the best (c, a, b) for a decay and a frequency, and the sum of squared residuals."""
     J = _jacobian(t, np.array([0.0, 0.0, 0.0, decay, omega]))[:, :3]
     best = np.asarray(np.linalg.lstsq(J, x, rcond=None)[0], np.float64)
     rest = x - J @ best
@@ -246,7 +249,7 @@ def _linear_part(t: Real, x: Real, decay: float, omega: float) -> tuple[Real, fl
 
 def _fitted(t: Real, x: Real, omega: float) -> Real:
     """Return (c, a, b, decay, omega) of the damped sine of least squares."""
-    starts = [decay / t[-1] for decay in DECAYS]
+    starts = [decay / t[-1] for decay in START_DECAYS]
     decay = min(starts, key=lambda one: _linear_part(t, x, one, omega)[1])
     start = np.array([*_linear_part(t, x, decay, omega)[0], decay, omega])
     size = max(math.hypot(start[1], start[2]), 1e-300)
@@ -277,8 +280,9 @@ def _fitted(t: Real, x: Real, omega: float) -> Real:
 def _decrement(t: Real, x: Real, period: float, noise: float) -> Estimate | None:
     """Return the logarithmic decrement per period from the peaks on both sides.
 
-    A parabola through the samples within a twelfth of a period of each peak gives its height.
-    The line through the logarithms over the number of half periods is twice as steep per period.
+    A parabola through the samples within a twelfth of a period of each peak gives its time and
+    height.  The decrement is the negative slope of the line through the logarithms of the heights
+    over time in periods.
     """
     step = t[-1] / (len(t) - 1)
     half = max(1, round(period / 12.0 / step))
@@ -291,19 +295,19 @@ def _decrement(t: Real, x: Real, period: float, noise: float) -> Estimate | None
         s = (t[part] - t[i]) / period
         c2, c1, c0 = np.polyfit(s, x[part], 2)
         height = abs(c0 - c1**2 / (4.0 * c2)) if c2 else abs(c0)
-        if height < LOWEST_PEAK * noise:
+        if height < PEAK_NOISE_MIN * noise:
             break
         places.append((t[i] - c1 / (2.0 * c2) * period if c2 else t[i]) / period)
         heights.append(math.log(height))
         sizes.append(height)
-    if len(places) < FEWEST_PEAKS:
+    if len(places) < PEAKS_MIN:
         return None
     fit = _weighted_line(np.array(places), np.array(heights), np.array(sizes))
     return Estimate(-fit.value, fit.uncertainty, freedom=fit.freedom)
 
 
 def _weighted_line(x: Real, y: Real, weight: Real) -> Estimate:
-    """Return the slope of the line of least squares with weights 1/u, u known up to a factor."""
+    """Return the slope of the line of least squares with weights proportional to 1/u(y)."""
     w = weight**2
     centre, mean = float(w @ x / w.sum()), float(w @ y / w.sum())
     spread = float(w @ (x - centre) ** 2)
@@ -327,26 +331,29 @@ def _decrement_zeta(decrement: Estimate | None) -> Estimate | None:
 
 
 def impacts(series: Series) -> Real:
-    """Return the times of impacts: kinks of the signal, at which its velocity jumps [s].
+    """Return the times of impacts: kinks of the signal, where its velocity jumps [s].
 
-    A kink is a second difference that differs from their median by more than six times the
-    usual (median absolute) deviation; it is located to a sample.
+    At a kink, the deviation of the second difference from the median is more than six times the
+    usual deviation, which follows from the median absolute deviation.  Times are accurate to one
+    sample.
 
     Raises
     ------
     EvaluationError
-        If there is none.
+        If there is no impact.
     """
     x = series.values
     second = x[2:] - 2.0 * x[1:-1] + x[:-2]
     second = np.abs(second - np.median(second))
-    usual = MADS * float(np.median(second))
-    found, _ = find_peaks(np.concatenate([[0.0], second, [0.0]]), height=KINK * usual, distance=3)
+    usual = DEVIATION_PER_MAD * float(np.median(second))
+    found, _ = find_peaks(
+        np.concatenate([[0.0], second, [0.0]]), height=KINK_FACTOR * usual, distance=3
+    )
     if not len(found) or usual == 0.0:
         raise EvaluationError(
             f"{series.source}: no impact in the record: the sharpest kink of {series.name} is "
-            f"{float(second.max()) / max(usual, 1e-300):.2g} times the usual second difference, an "
-            f"impact makes {KINK:g} or more; check that the stop was reached, or sample faster"
+            f"{float(second.max()) / max(usual, 1e-300):.2g} times the usual second difference, "
+            f"less than {KINK_FACTOR:g}; check that the stop was reached, or sample faster"
         )
     times: Real = series.time[found]
     return times

@@ -1,1 +1,1 @@
-"""Mechanism files, units and settings as users write them."""
+"""Readers of mechanism files, of units and of the NAME=VALUE settings of a command."""

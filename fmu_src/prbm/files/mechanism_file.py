@@ -1,7 +1,8 @@
-"""Mechanism files: TOML in, checked :class:`prbm.Mechanism` out; and the schema of such files."""
+"""Read mechanism files (TOML) as :class:`prbm.Mechanism`, and describe them by a JSON schema."""
 
 import difflib
 import math
+import os.path
 import re
 import reprlib
 import tomllib
@@ -15,29 +16,30 @@ from pydantic import ValidationError
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core.core_schema import DictSchema, NullableSchema, TupleSchema, WithDefaultSchema
 
+from ..base import reading
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
 from ..mechanism.description import Mechanism
-from .schema import LONGEST_NAME, TAGS, MechanismTable, Table, mechanism
-from .toml_lines import line_of, lines
+from .schema import NAME_LENGTH_MAX, TAGS, MechanismTable, Table, mechanism
+from .toml_lines import key_length, line_of, lines
 
-Said = TypeVar("Said")
-LARGEST_FILE = 1 << 20  # bytes; a mechanism of a hundred flexures has 20 kB
-MOST_PROBLEMS = 5  # told at a time
-DEEP_KEY = re.compile(r"(?<![\w'\"-])(?:[\w'\"-]+\s*\.\s*){100}")  # tomllib takes hours for more
-DIALECT = "http://json-schema.org/draft-07/schema#"  # the latest that TOML editors know
-REMEDIES = {  # by pydantic's types of errors
+Item = TypeVar("Item")
+FILE_SIZE_MAX = 1 << 20  # bytes; a mechanism of a hundred flexures has 20 kB.
+PROBLEMS_MAX = 5  # Problems of one file in a message.
+KEY_LENGTH_MAX = 100  # Parts of a dotted key; tomllib needs more than linear time for longer ones.
+DIALECT = "http://json-schema.org/draft-07/schema#"  # The latest that TOML editors support.
+REMEDIES = {  # Remedy for each of pydantic's error types.
     "int_type": "write a whole number",
-    "greater_than_equal": "write a larger number, at least 1",
+    "greater_than_equal": "write a number of at least 1",
     "string_type": "write a text in quotes",
-    "string_too_long": f"write a shorter name, of at most {LONGEST_NAME} characters",
+    "string_too_long": f"write a shorter name, of at most {NAME_LENGTH_MAX} characters",
     "bool_type": "write true or false",
-    "tuple_type": "write a list, [...], or a table [[...]] for every part of a kind",
-    "too_long": "take out what is too much",
+    "tuple_type": "write a list, [...], or one table [[...]] for each part",
+    "too_long": "remove the surplus values",
     "dict_type": "write a table, [...]",
     "model_type": "write a table, [...]",
 }
-NAMES = {  # by what the pattern of a name admits
+NAME_REMEDIES = {  # Remedy for a name that does not match the pattern of this key.
     "start": "write the name of a point, body.point or ground.point",
     "end": "write the name of a point, body.point or ground.point",
     "point": "write the name of a point, body.point",
@@ -49,55 +51,44 @@ NAMES = {  # by what the pattern of a name admits
 # --- reading ----------------------------------------------------------------------------------
 
 
-def load(path: str | Path) -> Mechanism:
+def read_mechanism(path: str | Path) -> Mechanism:
     """Read a mechanism from a TOML file.
 
     Raises
     ------
     MechanismError
-        If the file cannot be read, is no TOML, or does not describe a mechanism; the message
-        names the file, the line if it has one, and the key.
+        If the file cannot be read, is not TOML, or does not describe a mechanism.  The message
+        names the file, the line if there is one, and the key.
     """
     path = Path(path)
+    content = reading.content(path, FILE_SIZE_MAX, MechanismError)
     try:
-        text = _text(path)
-        data = tomllib.loads(text)
-    except MechanismError:
-        raise
-    except OSError as error:
-        raise MechanismError(f"{path}: cannot be read ({error.strerror})") from None
+        text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+        deep = key_length(text, KEY_LENGTH_MAX + 1) > KEY_LENGTH_MAX
+        data = None if deep else tomllib.loads(text)
     except RecursionError:
-        raise MechanismError(f"{path}: is nested too deeply for a mechanism file") from None
+        data = None
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise MechanismError(f"{path}: is no TOML file ({error})") from None
+        raise MechanismError(f"{path}: not a TOML file ({error})") from None
     except ValueError:
-        raise MechanismError(f"{path}: has a number of thousands of digits") from None
+        raise MechanismError(f"{path}: a number has thousands of digits; round it") from None
+    if data is None:
+        raise MechanismError(f"{path}: its tables, lists or keys are nested too deeply")
     try:
         return mechanism(MechanismTable.model_validate(data), drawing(text))
     except ValidationError as error:
         places = [(e["loc"], e) for e in error.errors(include_url=False)]
-        told = [(line, _problem(dict(e), data)) for line, e in _in_order(places, text)]
+        problems = [(line, _problem(dict(e), data)) for line, e in _first_by_line(places, text)]
     except PrbmError as error:
-        told = _in_order([(_place(str(error), data), str(error))], text)
-    sentences = (f"line {line}: {sentence}" if line else sentence for line, sentence in told)
-    raise MechanismError("\n".join(f"{path}: {sentence}" for sentence in sentences))
-
-
-def _text(path: Path) -> str:
-    with path.open("rb") as file:
-        content = file.read(LARGEST_FILE + 1)
-    if len(content) > LARGEST_FILE:
-        raise MechanismError(f"{path}: larger than {LARGEST_FILE} bytes, no mechanism file")
-    text = content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
-    if DEEP_KEY.search(text):
-        raise MechanismError(f"{path}: is nested too deeply for a mechanism file")
-    return text
+        problems = _first_by_line([(_place(str(error), data), str(error))], text)
+    messages = (f"line {line}: {message}" if line else message for line, message in problems)
+    raise MechanismError("\n".join(f"{path}: {message}" for message in messages))
 
 
 def drawing(text: str) -> str:
-    """Return the comment with which a mechanism file opens, without its marks.
+    """Return the comment at the top of a mechanism file, without its marks.
 
-    Directives to editors, ``#:schema``, are no part of it.
+    Directives to editors, ``#:schema``, are skipped.
     """
     comments = []
     for line in text.splitlines():
@@ -109,12 +100,12 @@ def drawing(text: str) -> str:
 
 
 def shipped() -> dict[str, Path]:
-    """Return the files of the mechanisms that come with the package, by name."""
+    """Return the mechanism files of the package by name."""
     folder = Path(str(resources.files(__package__.rpartition(".")[0] + ".shipped")))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 
-def find(name: str | Path) -> Mechanism:
+def load(name: str | Path) -> Mechanism:
     """Return a shipped mechanism, or read one from a file.
 
     Parameters
@@ -125,32 +116,32 @@ def find(name: str | Path) -> Mechanism:
     Raises
     ------
     ParameterError
-        If there is neither a shipped mechanism of that name nor a file.
+        If there is neither a shipped mechanism of that name nor such a file, or it is a folder.
     MechanismError
         If the file cannot be read or does not describe a mechanism.
 
     Examples
     --------
-    >>> find("Bistable").name
+    >>> load("Bistable").name
     'Bistable'
     """
     name, files = str(name), shipped()
     if name in files:
-        return load(files[name])
-    if Path(name).is_dir():
-        raise ParameterError(f"{name!r} is a folder; name a mechanism file in it")
-    if not Path(name).suffix and not Path(name).is_file():
+        return read_mechanism(files[name])
+    if os.path.isdir(name):
+        raise ParameterError(f"{name!r} is a folder; give a mechanism file in it")
+    if not Path(name).suffix and not os.path.isfile(name):
         raise ParameterError(
-            f"there is no model {name!r}; {proposal(name, files)}; a file of your own ends in .toml"
+            f"unknown mechanism {name!r} (mechanism files end in .toml); {proposal(name, files)}"
         )
-    return load(name)
+    return read_mechanism(name)
 
 
-# --- what is wrong ----------------------------------------------------------------------------
+# --- error messages ---------------------------------------------------------------------------
 
 
 def _problem(error: dict[str, Any], data: Any) -> str:
-    """Return a sentence about one error that pydantic found: the key, and what to do."""
+    """Return the message for one error that pydantic found: key, value and remedy."""
     kind = error["type"]
     loc = tuple(key for key in error["loc"] if key not in TAGS)
     where = ".".join(str(key) for key in loc if key != "[key]") + _owner(loc, data)
@@ -162,35 +153,35 @@ def _problem(error: dict[str, Any], data: Any) -> str:
     if kind == "extra_forbidden":
         known = _keys(loc)
         near = difflib.get_close_matches(str(loc[-1]), known, n=1, cutoff=0.6)
-        hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
-        return f"{where} is no key that is known there; {hint}"
+        hint = f"did you mean {near[0]}?" if near else f"allowed keys are {', '.join(known)}"
+        return f"unknown key {where}; {hint}"
     if kind == "value_error":
         remedy = str(error["ctx"]["error"])
     elif kind == "string_pattern_mismatch":
-        remedy = NAMES[str(loc[-1])]
+        remedy = NAME_REMEDIES[str(loc[-1])]
     elif kind == "tuple_type" and len(loc) > 1:
         remedy = "write a pair, [..., ...]"
     else:
         remedy = REMEDIES.get(kind, error["msg"])
     if remedy.startswith("cannot read the expression"):
-        return f"{where}: {remedy}"  # which it quotes
+        return f"{where}: {remedy}"  # The remedy quotes the value already.
     return f"{where} = {reprlib.repr(error['input'])}: {remedy}"
 
 
 def _keys(loc: Sequence[str | int]) -> list[str]:
-    """Return the keys that are known beside one that is not."""
+    """Return the allowed keys of the table that has an unknown key."""
     return [*_table(str(loc[0]) if loc[1:] else "").model_fields]
 
 
 def _table(key: str) -> type[Table]:
-    """Return the table that a key of the file holds, or an array of which it holds."""
+    """Return the class of the table, or of the array of tables, at a key of the file."""
     field = MechanismTable.model_fields.get(key)
     kinds = (field.annotation, *get_args(field.annotation)) if field else ()
     return next((k for k in kinds if isinstance(k, type) and issubclass(k, Table)), MechanismTable)
 
 
 def _owner(loc: Sequence[str | int], data: Any) -> str:
-    """Return the name of the part that a key belongs to, because parts are counted from 0."""
+    """Return the name of the part that a key belongs to, as `` (of NAME)``, or an empty text."""
     if len(loc) < 3 or not isinstance(loc[1], int):
         return ""
     part = data[loc[0]][loc[1]]
@@ -198,48 +189,49 @@ def _owner(loc: Sequence[str | int], data: Any) -> str:
     return f" (of {reprlib.repr(name)[1:-1]})" if isinstance(name, str) else ""
 
 
-def _in_order(
-    places: Sequence[tuple[Sequence[str | int], Said]], text: str
-) -> list[tuple[int | None, Said]]:
-    """Return the first of what is said of some keys, each with the line of its key."""
+def _first_by_line(
+    places: Sequence[tuple[Sequence[str | int], Item]], text: str
+) -> list[tuple[int | None, Item]]:
+    """Return the first items in the order of their lines, each with the line of its key."""
     known = lines(text)
-    found = [(line_of(loc, known), said) for loc, said in places]
-    return sorted(found, key=lambda one: one[0] or math.inf)[:MOST_PROBLEMS]
+    found = [(line_of(loc, known), item) for loc, item in places]
+    return sorted(found, key=lambda numbered: numbered[0] or math.inf)[:PROBLEMS_MAX]
 
 
+# The name at the beginning of a message, after the kind of the part, or a quoted name.
 _SUBJECT = re.compile(
     r"(?:^(?:mechanism |(?:the )?(?:flexure|joint|stop) )?|')([\w\[\]]+(?:\.[\w\[\]]+)*)"
 )
 
 
-def _place(sentence: str, data: Mapping[str, Any]) -> tuple[str | int, ...]:
-    """Return the part or the key of it that a sentence of the engine begins with or quotes."""
+def _place(message: str, data: Mapping[str, Any]) -> tuple[str | int, ...]:
+    """Return the path of the part or key that a message of the engine names first."""
     parts = dict(_parts(data))
-    for word in _SUBJECT.findall(sentence):
+    for word in _SUBJECT.findall(message):
         if word in parts:
-            return _quoted(sentence, parts[word], data)
+            return _quoted(message, parts[word], data)
         name, _, key = word.rpartition(".")
         if name in parts:
             return (*parts[name], key)
-        if f"{name}_{key}" in parts:  # the parameter damping.zeta is the key damping_zeta
+        if f"{name}_{key}" in parts:  # The parameter damping.zeta is the key damping_zeta.
             return parts[f"{name}_{key}"]
     return ()
 
 
 def _quoted(
-    sentence: str, path: tuple[str | int, ...], data: Mapping[str, Any]
+    message: str, path: tuple[str | int, ...], data: Mapping[str, Any]
 ) -> tuple[str | int, ...]:
-    """Return the key of a part whose value a sentence quotes, or the part."""
+    """Return the path of the key of a part whose value a message quotes, or of the part."""
     part: Any = data
     for key in path:
         part = part[key]
     values = part.items() if isinstance(part, dict) else ()
-    keys = (k for text in re.findall("'(.*?)'", sentence) for k, v in values if v == text)
+    keys = (k for text in re.findall("'(.*?)'", message) for k, v in values if v == text)
     return (*path, *islice(keys, 1))
 
 
 def _parts(data: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str | int, ...]]]:
-    """Yield the names of what a file describes, and where."""
+    """Yield the names of the tables and parts of a file with their paths."""
     for key, value in data.items():
         yield key, (key,)
         for i, part in enumerate(value if isinstance(value, list) else ()):
@@ -251,7 +243,7 @@ def _parts(data: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str | int, ...]
 
 
 class _Schema(GenerateJsonSchema):
-    """What editors of TOML need: no null, which TOML does not have, and no titles."""
+    """Generator of a schema for TOML editors: without null, which TOML lacks, and titles."""
 
     def nullable_schema(self, schema: NullableSchema) -> JsonSchemaValue:
         return self.generate_inner(schema["schema"])
@@ -263,14 +255,14 @@ class _Schema(GenerateJsonSchema):
 
     def tuple_schema(self, schema: TupleSchema) -> JsonSchemaValue:
         result = super().tuple_schema(schema)
-        if "prefixItems" in result:  # of one kind here, and no word of the dialect
+        if "prefixItems" in result:  # not in draft 7; all items have one type here
             result["items"] = result.pop("prefixItems")[0]
         return result
 
     def dict_schema(self, schema: DictSchema) -> JsonSchemaValue:
         result = super().dict_schema(schema)
         if "patternProperties" in result:
-            result["additionalProperties"] = False  # a name of another form is a mistake
+            result["additionalProperties"] = False  # reject names of another form
         return result
 
     def field_title_should_be_set(self, schema: Any) -> bool:
@@ -278,7 +270,7 @@ class _Schema(GenerateJsonSchema):
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON schema of mechanism files, with which editors complete and check them.
+    """Return the JSON schema of mechanism files; editors complete and check the files with it.
 
     Examples
     --------

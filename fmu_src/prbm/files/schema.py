@@ -1,8 +1,8 @@
-"""The tables and keys of a mechanism file, and the mechanism that they describe.
+"""Tables and keys of a mechanism file, and their conversion to a mechanism.
 
-A file allows more forms than the data of the engine: a section and a material may stand with their
-flexure, several types may share a material, points may be given by name, and quantities have units.
-This module converts them to the parts of :mod:`prbm.mechanism.description`.
+A file allows more forms than :mod:`prbm.mechanism.description`: a flexure may have a section and a
+material instead of a type, several types may share a material, points may be given by name, and
+quantities may have units.
 """
 
 import math
@@ -38,19 +38,31 @@ from ..mechanism.parameters import NAME
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .units import check_coherent, number, quantity, si_unit
 
-LONGEST_NAME = 100  # characters; a name becomes part of the names of files
+NAME_LENGTH_MAX = 100  # characters; names become parts of file names.
 MATERIAL = ("youngs_modulus", "density")
 SECTION = ("thickness", "width")
-TEXT, LIST = TAGS = ("<text>", "<list>")  # the ways to write a point, or the ends
+TEXT, LIST = TAGS = ("<text>", "<list>")  # Tags of the two forms of a point, or of the ends.
 IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 
 
-# --- what a key holds -------------------------------------------------------------------------
+# --- values of keys ---------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Measured:
-    """What a key holds: a number in a unit, a number with a unit or, mostly, an expression."""
+    """Type of a quantity: a number in a unit, a number with a unit, or an expression.
+
+    Parameters
+    ----------
+    description : str
+        Meaning, for the schema.
+    unit : str
+        Unit of plain numbers and of the result; empty if dimensionless.
+    minimum, maximum : float
+        Bounds, for the schema.
+    expression : bool
+        Whether expressions in parameters are allowed.
+    """
 
     description: str
     unit: str
@@ -59,7 +71,7 @@ class Measured:
     expression: bool = True
 
     def read(self, written: object) -> Quantity:
-        """Return the quantity in the unit of the key, or an expression."""
+        """Return the number in the unit of the key, or the expression."""
         return (quantity if self.expression else number)(written, self.unit)
 
     def __get_pydantic_core_schema__(self, _: Any, __: GetCoreSchemaHandler) -> CoreSchema:
@@ -76,7 +88,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class InUnit:
-    """What a key of a parameter holds: a number, in the unit beside it; a bound may be infinite."""
+    """Type of a number in the unit of its parameter; a bound may be infinite."""
 
     bound: bool = False
 
@@ -94,21 +106,24 @@ class InUnit:
 
 
 def measured(part: type, key: str) -> Measured:
-    """Return what a field holds that is a parameter of the mechanism."""
+    """Return the type of a field that is a parameter of the mechanism."""
     unit, description, minimum, maximum, *_ = FIELDS[part][key]
     return Measured(description, unit, minimum, maximum)
 
 
 def _allowed(name: str) -> str:
+    """Return a name; reject keywords of Python, because expressions are parsed as Python."""
     if any(iskeyword(word) for word in re.split(r"[.\[]", name)):
-        raise MechanismError("a word of Python, which expressions cannot hold; choose another name")
+        raise MechanismError("a keyword of Python; choose another name")
     return name
 
 
 Name = Annotated[
-    StrictStr, Field(max_length=LONGEST_NAME, pattern=f"^{NAME.pattern}$"), AfterValidator(_allowed)
+    StrictStr,
+    Field(max_length=NAME_LENGTH_MAX, pattern=f"^{NAME.pattern}$"),
+    AfterValidator(_allowed),
 ]
-PointName = Annotated[StrictStr, Field(max_length=LONGEST_NAME, pattern=r"^[^\W\d]\w*$")]
+PointName = Annotated[StrictStr, Field(max_length=NAME_LENGTH_MAX, pattern=r"^[^\W\d]\w*$")]
 Coordinate = Annotated[Quantity, Measured("Coordinate", "m")]
 Point = tuple[Coordinate, Coordinate]
 Reference = Annotated[StrictStr, Field(pattern=r"^\S+\.[^.\s]+$")]
@@ -121,6 +136,7 @@ Model = Annotated[StrictStr, Field(json_schema_extra={"enum": list(MODELS)})]
 
 
 def _written_as(value: object) -> str:
+    """Return the tag of the form of a point, or of the ends."""
     return TEXT if isinstance(value, str) else LIST
 
 
@@ -137,28 +153,28 @@ EndOrEnds = Annotated[
 
 
 class Table(BaseModel):
-    """A table whose keys are all known."""
+    """A table that rejects unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 class Named(Table):
-    """A table with a name of its own."""
+    """A table with a name."""
 
-    name: Name = Field(description="Its name")
+    name: Name = Field(description="Name")
 
 
 class ParameterTable(Named):
     """A parameter that points and other quantities refer to."""
 
-    unit: StrictStr = Field("", description="SI unit; that of the value if it is written with one")
+    unit: StrictStr = Field("", description="SI unit (default: that of the value)")
     value: Annotated[float, InUnit()] = Field(description="Default, in the unit")
-    description: StrictStr = Field("", description="One sentence for the reader of the FMU")
+    description: StrictStr = Field("", description="Description of the FMU parameter")
     minimum: Annotated[float, InUnit(bound=True)] | None = Field(
-        None, description="Least value, in the unit"
+        None, description="Smallest value, in the unit"
     )
     maximum: Annotated[float, InUnit(bound=True)] | None = Field(
-        None, description="Greatest value, in the unit"
+        None, description="Largest value, in the unit"
     )
     nominal: Annotated[float, InUnit(bound=True)] | None = Field(
         None, description="Typical magnitude, in the unit"
@@ -172,12 +188,12 @@ class ParameterTable(Named):
             try:
                 return {"unit": si_unit(data["value"]), **data}
             except MechanismError:
-                pass  # told where the value is read
+                pass  # The value is read later, and rejected there.
         return data
 
 
 class MaterialTable(Named):
-    """A material: parameters name.youngs_modulus and name.density."""
+    """A material, with the parameters name.youngs_modulus and name.density."""
 
     youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")]
     density: Annotated[Quantity, measured(parts.FlexureType, "density")]
@@ -188,16 +204,16 @@ class Section(Named):
 
     model: Model | None = Field(None, description="Pseudo-rigid-body model")
     n: Annotated[StrictInt, Field(ge=1, json_schema_extra={"maximum": LINKS_MAX})] | None = Field(
-        None, description="Number of links, of the chain nR alone"
+        None, description="Number of links, for the model nR only"
     )
     thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")] | None = None
     width: Annotated[Quantity, measured(parts.FlexureType, "width")] | None = None
     material: StrictStr | None = Field(
-        None, description="Name of a material, instead of youngs_modulus and density"
+        None, description="Name of a material, in place of youngs_modulus and density"
     )
     youngs_modulus: Annotated[Quantity, measured(parts.FlexureType, "youngs_modulus")] | None = None
     density: Annotated[Quantity, measured(parts.FlexureType, "density")] | None = None
-    axial: StrictBool = Field(False, description="Whether the flexures stretch, too")
+    axial: StrictBool = Field(False, description="Whether the flexures can stretch")
     coefficients: dict[StrictStr, Annotated[Quantity, Measured("Coefficient", "")]] = Field(
         {}, description="Values that replace the published coefficients of the model"
     )
@@ -222,7 +238,7 @@ class FlexureTypeTable(Section):
 
 
 class FlexureTable(Section):
-    """A straight flexure between two points; of a type, or with a section of its own."""
+    """A straight flexure between two points, with a type or with its own section."""
 
     model_config = ConfigDict(
         json_schema_extra={
@@ -231,12 +247,12 @@ class FlexureTable(Section):
     )
 
     type: StrictStr | None = Field(
-        None, description="Name of a flexure type, instead of a model, section and material here"
+        None, description="Name of a flexure type, in place of model, section and material"
     )
-    start: Reference = Field(description="Point at its start, body.point or ground.point")
-    end: Reference = Field(description="Point at its end, body.point or ground.point")
+    start: Reference = Field(description="Start point, body.point or ground.point")
+    end: Reference = Field(description="End point, body.point or ground.point")
     ends: EndOrEnds = Field(
-        (CLAMP, CLAMP), description="How it is held: at both ends, or a pair for start and end"
+        (CLAMP, CLAMP), description="Type of both ends, or a pair for start and end"
     )
 
 
@@ -250,18 +266,18 @@ class BodyTable(Named):
 
 
 class JointTable(Named):
-    """A pin that joins two points, drawn at the same place."""
+    """A pin between two points that are drawn at the same position."""
 
-    start: Reference = Field(description="One point, body.point or ground.point")
-    end: Reference = Field(description="The other point")
+    start: Reference = Field(description="First point, body.point or ground.point")
+    end: Reference = Field(description="Second point, body.point or ground.point")
 
 
 class StopTable(Named):
-    """A point of a body against a wall, fixed to the ground or to another body."""
+    """A contact of a point of a body with a wall, which is fixed to the ground or another body."""
 
     body: StrictStr = Field(description="Body that hits the wall")
-    point: PointOrName = Field(description="Point that hits, coordinates as drawn or body.point")
-    on: StrictStr = Field(GROUND, description="What the wall is fixed to, ground or a body")
+    point: PointOrName = Field(description="Hit point, coordinates as drawn or body.point")
+    on: StrictStr = Field(GROUND, description="Body that carries the wall, or ground")
     direction: Angle = parts.Stop.direction
     position: Annotated[Quantity, measured(parts.Stop, "position")] = parts.Stop.position
     offset: Annotated[Quantity, measured(parts.Stop, "offset")] = parts.Stop.offset
@@ -273,9 +289,9 @@ class StopTable(Named):
 class FrictionTable(Named):
     """Coulomb friction against the motion of a body along a direction."""
 
-    body: StrictStr = Field(description="Body that is rubbed")
+    body: StrictStr = Field(description="Body on which the friction acts")
     point: PointOrName | None = Field(
-        None, description="Where, coordinates as drawn or body.point; else the centre of mass"
+        None, description="Point, coordinates as drawn or body.point (default: centre of mass)"
     )
     direction: Angle = parts.Friction.direction
     coefficient: Annotated[Quantity, measured(parts.Friction, "coefficient")] = (
@@ -292,22 +308,22 @@ class FrictionTable(Named):
 class ForceTable(Named):
     """Inputs name.x, name.y and name.moment: a force and a moment on a body."""
 
-    body: StrictStr = Field(description="Body that is pushed")
+    body: StrictStr = Field(description="Body on which the force acts")
     point: PointOrName | None = Field(
-        None, description="Where, coordinates as drawn or body.point; else the centre of mass"
+        None, description="Point, coordinates as drawn or body.point (default: centre of mass)"
     )
 
 
 class ProbeTable(Named):
-    """Outputs name.x, name.y, name.vx and name.vy: displacement and velocity of a point."""
+    """A point whose displacement name.x, name.y and velocity name.vx, name.vy are outputs."""
 
-    point: Reference = Field(description="Point that is watched, body.point")
+    point: Reference = Field(description="Point, body.point")
 
 
 class ReleaseTable(Table):
-    """How the motion starts: from a shape held by a force on a body along a direction."""
+    """Start of the motion: from a shape that is held by a force on a body along a direction."""
 
-    body: StrictStr = Field(description="Body that is held and let go")
+    body: StrictStr = Field(description="Body that is held and released")
     direction: Angle = parts.Release.direction
     displacement: Annotated[Quantity, measured(parts.Release, "displacement")] = (
         parts.Release.displacement
@@ -319,10 +335,10 @@ class MechanismTable(Table):
     """A planar compliant mechanism."""
 
     name: Annotated[
-        StrictStr, Field(max_length=LONGEST_NAME, json_schema_extra={"pattern": IDENTIFIER})
-    ] = Field(description="Name of the FMU: letters a to z, digits and _")
-    title: StrictStr = Field(description="One line that says what it is")
-    description: StrictStr = Field("", description="A paragraph")
+        StrictStr, Field(max_length=NAME_LENGTH_MAX, json_schema_extra={"pattern": IDENTIFIER})
+    ] = Field(description="Name of the FMU, of letters a to z, digits and _")
+    title: StrictStr = Field(description="Title of one line")
+    description: StrictStr = Field("", description="Description of one paragraph")
     gravity: tuple[Acceleration, Acceleration] = Field(
         (0.0, 0.0), description="Acceleration of gravity along x and y [m/s2]"
     )
@@ -331,12 +347,12 @@ class MechanismTable(Table):
     ] = 0.0
     damping_beta: Annotated[
         float,
-        Measured("Damping in proportion to stiffness, as a time constant", "s", 0.0, 1e-2,
+        Measured("Time constant of stiffness-proportional damping", "s", 0.0, 1e-2,
                  expression=False),
     ] = 0.0  # fmt: skip
     ground: dict[PointName, Point] = Field(description="Fixed points, by name [m]")
     geometry: tuple[ParameterTable, ...] = Field(
-        (), description="Parameters that points and other quantities refer to"
+        (), description="Parameters for points and other quantities"
     )
     materials: tuple[MaterialTable, ...] = Field((), description="Materials")
     bodies: tuple[BodyTable, ...] = Field(description="Rigid bodies")
@@ -347,12 +363,14 @@ class MechanismTable(Table):
     joints: tuple[JointTable, ...] = Field((), description="Pins")
     stops: tuple[StopTable, ...] = Field((), description="Walls")
     frictions: tuple[FrictionTable, ...] = Field((), description="Coulomb friction")
-    forces: tuple[ForceTable, ...] = Field((), description="Forces that an FMU has as inputs")
-    probes: tuple[ProbeTable, ...] = Field((), description="Points that an FMU has as outputs")
-    release: ReleaseTable = Field(description="How the motion starts")
+    forces: tuple[ForceTable, ...] = Field((), description="Forces that are inputs of the FMU")
+    probes: tuple[ProbeTable, ...] = Field(
+        (), description="Points whose motion is an output of the FMU"
+    )
+    release: ReleaseTable = Field(description="Start of the motion")
 
 
-# --- the mechanism that they describe ---------------------------------------------------------
+# --- conversion to a mechanism ----------------------------------------------------------------
 
 
 def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
@@ -361,13 +379,14 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
     Raises
     ------
     MechanismError
-        If it contradicts itself or refers to what is not described.
+        If the file is inconsistent or has an undefined reference.
     ParameterError
-        If a default is out of its bounds.
+        If a default is outside its bounds.
     """
     _check_names(file)
     materials = _materials(file)
     own = (flexure for flexure in file.flexures if flexure.type is None)
+    points = {body.name: body.points for body in file.bodies}
     same = ("name", "title", "description", "ground", "gravity", "damping_zeta", "damping_beta")
     result = Mechanism(
         **{key: getattr(file, key) for key in same},
@@ -375,9 +394,9 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
         flexure_types=tuple(_type(t, materials) for t in (*file.flexure_types, *own)),
         flexures=tuple(map(_flexure, file.flexures)),
         joints=tuple(parts.Joint(**dict(joint)) for joint in file.joints),
-        stops=tuple(parts.Stop(**_attached(stop, file)) for stop in file.stops),
-        frictions=tuple(parts.Friction(**_attached(part, file)) for part in file.frictions),
-        forces=tuple(parts.Force(**_attached(force, file)) for force in file.forces),
+        stops=tuple(parts.Stop(**_attached(stop, points)) for stop in file.stops),
+        frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
+        forces=tuple(parts.Force(**_attached(force, points)) for force in file.forces),
         probes=tuple(parts.Probe(**dict(probe)) for probe in file.probes),
         release=parts.Release(**dict(file.release)),
         geometry=tuple(_parameters(file)),
@@ -388,7 +407,7 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
 
 
 def _parameters(file: MechanismTable) -> Iterator[parameters.Parameter]:
-    """Yield the parameters of the file, and those that its materials are."""
+    """Yield the parameters of the file and of its materials."""
     for table in file.geometry:
         try:
             check_coherent(table.unit)
@@ -406,12 +425,12 @@ def _parameters(file: MechanismTable) -> Iterator[parameters.Parameter]:
 
 
 def _materials(file: MechanismTable) -> dict[str, dict[str, Quantity]]:
-    """Return what Young's modulus and density of a flexure type of each material are."""
+    """Return Young's modulus and density of each material, as a flexure type refers to them."""
     return {m.name: {key: _referred(m, key) for key in MATERIAL} for m in file.materials}
 
 
 def _check_names(file: MechanismTable) -> None:
-    """Refuse a name that two parts of a kind have, or a material and anything else."""
+    """Reject a name of two parts of one kind, or of a material and any other part."""
     parts: tuple[tuple[Named, ...], ...] = (file.bodies, file.flexure_types, file.flexures)
     parts = (*parts, file.joints, file.stops, file.frictions, file.forces, file.probes)
     reserved = {*RESERVED}
@@ -420,23 +439,24 @@ def _check_names(file: MechanismTable) -> None:
         for name in (part.name for part in kind):
             if name in seen:
                 raise MechanismError(
-                    f"the name {name!r} is used twice or reserved: give each part its own"
+                    f"the name {name!r} is used twice or reserved: give each part its own name"
                 )
             seen.add(name)
         reserved |= {material.name for material in file.materials}
 
 
 def _referred(material: MaterialTable, key: str) -> Quantity:
+    """Return the expression of a material's quantity, or the name of its parameter."""
     given: Quantity = getattr(material, key)
     return given if isinstance(given, str) else f"{material.name}.{key}"
 
 
 def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts.FlexureType:
-    """Return the type that a table describes; a flexure's own has the name of the flexure."""
+    """Return the flexure type of a table; the name of a flexure is that of its own type."""
     for key in ("model", *SECTION):
         if getattr(table, key) is None:
             raise MechanismError(
-                f"{table.name}.{key} is missing: add the key, or a type that has it"
+                f"{table.name}.{key} is missing: add the key, or the type of the flexure"
             )
     keys = ("name", "model", *SECTION, "axial", "coefficients")
     given: dict[str, Any] = {key: getattr(table, key) for key in keys}
@@ -444,57 +464,56 @@ def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts
 
 
 def _material(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> dict[str, Quantity]:
-    """Return Young's modulus and density of what a table describes."""
+    """Return Young's modulus and density of a type or flexure."""
     own = {key: getattr(table, key) for key in MATERIAL if key in table.model_fields_set}
     if table.material is None:
         if len(own) < len(MATERIAL):
             raise MechanismError(
-                f"{table.name} has no material: write material = and its name, or "
+                f"{table.name} has no material: add material with the name of one, or "
                 f"{' and '.join(key for key in MATERIAL if key not in own)}"
             )
         return own
     if own:
         raise MechanismError(
-            f"{table.name} has a material and {' and '.join(own)} of its own: leave one out"
+            f"{table.name} has material as well as {' and '.join(own)}: remove either"
         )
     if table.material not in materials:
         raise MechanismError(
-            f"{table.name}.material = {table.material!r} is not described; materials are "
+            f"{table.name}.material = {table.material!r} is not defined; materials are "
             f"{', '.join(materials) or 'none'}"
         )
     return materials[table.material]
 
 
 def _flexure(table: FlexureTable) -> parts.Flexure:
+    """Return the flexure of a table; without a type, its type has the name of the flexure."""
     own = [key for key in _OWN if key in table.model_fields_set]
     if table.type is not None and own:
-        raise MechanismError(
-            f"{table.name} has a type and {' and '.join(own)} of its own: leave one out"
-        )
+        raise MechanismError(f"{table.name} has type as well as {' and '.join(own)}: remove either")
     ends = (table.ends, table.ends) if isinstance(table.ends, str) else table.ends
     kind = table.name if table.type is None else table.type
     return parts.Flexure(table.name, kind, table.start, table.end, ends)
 
 
 def _attached(
-    table: StopTable | FrictionTable | ForceTable, file: MechanismTable
+    table: StopTable | FrictionTable | ForceTable, bodies: Mapping[str, Mapping[str, parts.Point]]
 ) -> dict[str, Any]:
-    """Return the fields of a part whose point may be given by its name."""
+    """Return the fields of a part; a point given by name is replaced by its coordinates."""
     given = dict(table)
     if isinstance(table.point, str):
         body, _, name = table.point.rpartition(".")
-        points = next((b.points for b in file.bodies if b.name == table.body), {})
+        points = bodies.get(table.body, {})
         if body != table.body or name not in points:
             raise MechanismError(
-                f"{table.name}.point = {table.point!r} is no point of the body {table.body}, "
-                f"whose points are {', '.join(f'{table.body}.{p}' for p in points) or 'none'}"
+                f"{table.name}.point = {table.point!r} is not a point of the body {table.body}; "
+                f"its points are {', '.join(f'{table.body}.{p}' for p in points) or 'none'}"
             )
         given["point"] = points[name]
     return given
 
 
 def _check_drawn(mechanism: Mechanism) -> None:
-    """Refuse, for the defaults, what cannot be drawn, and expressions out of bounds."""
+    """Reject a mechanism that cannot be drawn, or has expressions out of bounds, by default."""
     values = mechanism.values()
     for name, point in _places(mechanism):
         x, y = (affine(coordinate)(values) for coordinate in point)
@@ -503,28 +522,31 @@ def _check_drawn(mechanism: Mechanism) -> None:
                 f"{name} is drawn at ({x:g} m, {y:g} m): draw the mechanism within "
                 f"{LENGTH_MAX:g} m of the origin"
             )
+    types = {kind.name: kind for kind in mechanism.flexure_types}
     for flexure in mechanism.flexures:
-        _check_slender(mechanism, flexure, values)
+        _check_slender(mechanism, flexure, types[flexure.type], values)
     for joint in mechanism.joints:
         apart = _distance(mechanism, joint, values)
         if apart > LENGTH_MIN:
             raise MechanismError(
                 f"joint {joint.name}: {joint.start} and {joint.end} are drawn {apart:g} m apart; "
-                "draw them at the same place"
+                "draw them at the same position"
             )
 
 
 def _check_slender(
-    mechanism: Mechanism, flexure: parts.Flexure, values: Mapping[str, float]
+    mechanism: Mechanism,
+    flexure: parts.Flexure,
+    kind: parts.FlexureType,
+    values: Mapping[str, float],
 ) -> None:
-    """Refuse a flexure without length, or as thick as long: millimetres written as metres."""
+    """Reject a flexure without length, or as thick as long, which is mostly a mistake of units."""
     length = _distance(mechanism, flexure, values)
     if length < LENGTH_MIN:
         raise MechanismError(
-            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has no length: move "
+            f"flexure {flexure.name} from {flexure.start} to {flexure.end} has zero length: move "
             "its ends apart"
         )
-    kind = next(kind for kind in mechanism.flexure_types if kind.name == flexure.type)
     thickness = parts.value(kind, "thickness", values)
     if thickness >= length:
         raise MechanismError(
@@ -534,7 +556,7 @@ def _check_slender(
 
 
 def _places(mechanism: Mechanism) -> Iterator[tuple[str, parts.Point]]:
-    """Yield all drawn points with their names."""
+    """Yield the names and coordinates of all drawn points."""
     yield from ((f"{GROUND}.{name}", point) for name, point in mechanism.ground.items())
     for body in mechanism.bodies:
         yield f"{body.name}.centre", body.centre

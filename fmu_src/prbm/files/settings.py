@@ -1,4 +1,4 @@
-"""Quantities with units, written by users, and the parameters and inputs that they set."""
+"""Read quantities with units, and NAME=VALUE settings, from the options of a command."""
 
 import math
 import re
@@ -15,25 +15,27 @@ UNIT_ALONE = re.compile(r"[A-Za-zµμ°][^=]*|1/.*")
 
 
 class UserMistake(PrbmError, ValueError):
-    """A request of the user cannot be fulfilled; the message says why and names a remedy."""
+    """An option or an argument is invalid; the message gives the reason and a remedy."""
 
 
-def quantity(text: str, unit: str, what: str) -> float:
-    """Read a number, which is in SI, or a number with a unit.
+def quantity(text: str, unit: str, option: str) -> float:
+    """Read a number, in SI if it has no unit.
+
+    A dimensionless quantity may be given in per cent.
 
     Parameters
     ----------
     text : str
-        As it was given.
+        Value of the option.
     unit : str
-        Of the result.
-    what : str
-        The option, for messages.
+        Unit of the result, empty if dimensionless.
+    option : str
+        Name of the option, for messages.
 
     Raises
     ------
     UserMistake
-        If it is none, or measures something else.
+        If the text is not a finite number, or its unit is unknown or has another dimension.
 
     Examples
     --------
@@ -48,19 +50,28 @@ def quantity(text: str, unit: str, what: str) -> float:
         try:
             value = 0.01 * float(percent[1]) if percent else number(text, unit)
         except (MechanismError, ValueError) as error:
-            raise UserMistake(f"{what} {text}: {error}") from None
+            raise UserMistake(f"{option} {text}: {error}") from None
     if not math.isfinite(value):
-        raise UserMistake(f"{what} {text}: write a finite number{f' in {unit}' if unit else ''}")
+        raise UserMistake(f"{option} {text}: write a finite number{f' in {unit}' if unit else ''}")
     return value
 
 
-def quantities(texts: Sequence[str], unit: str, what: str) -> list[float]:
-    """Read quantities; a unit that stands alone at the end is that of all numbers before it.
+def quantities(texts: Sequence[str], unit: str, option: str) -> list[float]:
+    """Read quantities; a unit alone at the end applies to all numbers before it.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Values of the option.
+    unit : str
+        Unit of the results, empty if dimensionless.
+    option : str
+        Name of the option, for messages.
 
     Raises
     ------
     UserMistake
-        If one is none, or some have a unit and others have none.
+        If a quantity is invalid, or only some of the numbers other than 0 have a unit.
 
     Examples
     --------
@@ -76,14 +87,14 @@ def quantities(texts: Sequence[str], unit: str, what: str) -> list[float]:
     bare = [x for x in given if not has_unit(x) and _nonzero(x)]
     if bare and len(bare) < sum(map(_nonzero, given)):
         raise UserMistake(
-            f"{what} {' '.join(texts)}: {bare[0]} has no unit and others have one: write a unit "
+            f"{option} {' '.join(texts)}: {bare[0]} has no unit and others have one; write a unit "
             f"after every number, or one at the end for all"
         )
-    return [quantity(text, unit, what) for text in given]
+    return [quantity(text, unit, option) for text in given]
 
 
 def without_exponent(text: str) -> str:
-    """Return a number without its power of ten, whose e is no unit.
+    """Return a quantity without the power of ten of its number, whose e is not a unit.
 
     Examples
     --------
@@ -94,7 +105,7 @@ def without_exponent(text: str) -> str:
 
 
 def has_unit(text: str) -> bool:
-    """Tell whether a unit stands in a quantity.
+    """Return whether a quantity has a unit.
 
     Examples
     --------
@@ -105,17 +116,17 @@ def has_unit(text: str) -> bool:
 
 
 def _nonzero(text: str) -> bool:
-    """Tell whether a quantity needs a unit: nothing is nothing in every unit."""
+    """Return whether a text is other than a zero without a unit."""
     return re.fullmatch(r"[+-]?0*\.?0*", text) is None
 
 
 def units_of(mechanism: Mechanism) -> dict[str, str]:
-    """Return the units of the parameters and inputs by their names.
+    """Return the units of the parameters and inputs of a mechanism by name.
 
     Examples
     --------
-    >>> from prbm.files.mechanism_file import find
-    >>> units = units_of(find("PRBDM"))
+    >>> from prbm.files.mechanism_file import load
+    >>> units = units_of(load("PRBDM"))
     >>> units["flexure.length"], units["force.moment"], units["base.acceleration.x"]
     ('m', 'N.m', 'm/s2')
     """
@@ -128,28 +139,28 @@ def settings(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, float]:
     Raises
     ------
     UserMistake
-        If a text is no such pair.
+        If a text is not such a pair, or its value is invalid.
     ParameterError
-        If there is no such parameter or input.
+        If a parameter or input is unknown.
 
     Examples
     --------
-    >>> from prbm.files.mechanism_file import find
-    >>> settings(find("PRBDM"), ["stop.restitution=0.5", "release.displacement = -10 mm"])
+    >>> from prbm.files.mechanism_file import load
+    >>> settings(load("PRBDM"), ["stop.restitution=0.5", "release.displacement = -10 mm"])
     {'stop.restitution': 0.5, 'release.displacement': -0.01}
     """
     return assigned(units_of(mechanism), texts)
 
 
 def assigned(units: Mapping[str, str], texts: Sequence[str]) -> dict[str, float]:
-    """Read NAME=VALUE pairs of variables with these units.
+    """Read NAME=VALUE pairs of variables with given units.
 
     Raises
     ------
     UserMistake
-        If a text is no such pair.
+        If a text is not such a pair, or its value is invalid.
     ParameterError
-        If there is no such variable.
+        If a variable is unknown.
 
     Examples
     --------

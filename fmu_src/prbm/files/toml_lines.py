@@ -1,4 +1,8 @@
-"""Line numbers of the tables and keys of a TOML text, which tomllib does not report."""
+"""Line numbers of tables and keys of a TOML text, which :mod:`tomllib` does not report.
+
+The pieces of a text are found without backtracking, in linear time.  An unterminated string in an
+invalid text is one piece.
+"""
 
 import re
 import tomllib
@@ -7,21 +11,23 @@ from collections.abc import Iterator, Mapping, Sequence
 Path = tuple[str | int, ...]
 
 _STRING = (
-    r'"""(?:\\.|[^\\])*?"""(?:"{0,2})'
-    r"|'''.*?'''(?:'{0,2})"
-    r'|"(?:\\.|[^"\\\n])*"'
-    r"|'[^'\n]*'"
+    r'"""(?:[^"\\]|\\.?|"(?!""))*+"{0,5}+'
+    r"|'''(?:[^']|'(?!''))*+'{0,5}+"
+    r'|"(?:[^"\\\n]|\\.?)*+"?+'
+    r"|'[^'\n]*+'?+"
 )
-_PIECE = re.compile(rf"{_STRING}|\#[^\n]*|[\[\]{{}}\n]|[^\[\]{{}}\n\"'#]+", re.DOTALL)
-_HEADER = re.compile(r"\s*(\[\[?)(.*)", re.DOTALL)
-_KEY = re.compile(rf"\s*((?:{_STRING}|[^=\"'#])+?)\s*=", re.DOTALL)
+_PIECE = re.compile(
+    rf"{_STRING}|\#[^\n]*+|[\w \t-]++|.",  # a string, a comment, words, or another character
+    re.DOTALL,
+)
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def lines(text: str) -> dict[Path, int]:
     r"""Return the lines, counted from 1, of all tables and keys of a valid TOML text.
 
-    Tables of an array are counted from 0; the array is where its first table is.  What stands
-    inside a value has no line of its own.
+    Tables of an array are counted from 0; the line of the array is that of its first table.
+    Values, elements of lists and keys of inline tables are not listed.
 
     Examples
     --------
@@ -32,40 +38,74 @@ def lines(text: str) -> dict[Path, int]:
     counts: dict[Path, int] = {}
     table: Path = ()
     for line, statement in _statements(text):
-        header = _HEADER.match(statement)
-        if header:
-            table = _opened(_keys(statement), counts, array=header[1] == "[[")
+        if statement.startswith("["):
+            table = _opened(_keys(statement), counts, array=statement.startswith("[["))
             result.setdefault(table[:1], line)
             result[table] = line
-        elif key := _KEY.match(statement):
-            path = (*table, *_keys(f"{key[1]} = 0"))
+        else:
+            path = (*table, *_keys(f"{statement} = 0"))
             result.setdefault(path[: len(table) + 1], line)
             result[path] = line
     return result
 
 
+def key_length(text: str, limit: int) -> int:
+    """Return the number of parts of the longest dotted key, counted up to a limit.
+
+    It is an upper bound: words and strings joined by dots count wherever they are.
+
+    Examples
+    --------
+    >>> key_length("a.'b.c'.d = 1.5", 100)
+    3
+    """
+    longest = parts = 1
+    for piece in _PIECE.finditer(text):
+        token = piece[0]
+        if token == ".":
+            parts += 1
+            longest = max(longest, parts)
+            if longest >= limit:
+                break
+        elif token[0] not in "\"'" and not _is_words(token):
+            parts = 1
+    return longest
+
+
 def line_of(path: Sequence[str | int], known: Mapping[Path, int]) -> int | None:
-    """Return the line of a key, or of the nearest table around it that has one."""
+    """Return the line of a key, or of the innermost enclosing table that is listed, or None."""
     for length in range(len(path), 0, -1):
         if tuple(path[:length]) in known:
             return known[tuple(path[:length])]
     return None
 
 
+def _is_words(token: str) -> bool:
+    """Return whether a piece of a text consists of the characters of bare keys and blanks."""
+    return token[0] in " \t-" or token[0].isalnum() or token[0] == "_"
+
+
 def _statements(text: str) -> Iterator[tuple[int, str]]:
-    """Yield every key with its value, and every header, with the line where it begins."""
-    line, first, begin, depth = 1, 1, 0, 0
+    """Yield the line and the text of each header, and of each key without its value."""
+    line, first, begin, depth, key = 1, 1, 0, 0, ""
     for piece in _PIECE.finditer(text + "\n"):
         token = piece[0]
         line += token.count("\n")
+        if token == "=" and not depth and not key:
+            key = text[begin : piece.start()].strip()
         depth += (token in "[{") - (token in "]}")
         if token == "\n" and not depth:
-            yield first, text[begin : piece.start()]
-            first, begin = line, piece.end()
+            statement = key or text[begin : piece.start()].strip()
+            if key or statement.startswith("["):
+                yield first, statement
+            first, begin, key = line, piece.end(), ""
 
 
 def _keys(statement: str) -> list[str]:
-    """Return the keys of a header, or of a key with a value that is no table."""
+    """Return the parts of the dotted key in a header, or in ``key = 0``."""
+    bare = statement.removesuffix(" = 0")
+    if _BARE.fullmatch(bare):
+        return [bare]
     keys = []
     data = tomllib.loads(statement)
     while isinstance(data, dict) and data:
@@ -87,4 +127,5 @@ def _opened(keys: Sequence[str], counts: dict[Path, int], array: bool) -> Path:
 
 
 def _last(path: Path, counts: Mapping[Path, int]) -> Path:
+    """Return the path of the last table of an array, or the path itself if it is no array."""
     return (*path, counts[path] - 1) if path in counts else path

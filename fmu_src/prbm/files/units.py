@@ -1,13 +1,14 @@
-"""Quantities as people write them: ``0.1 mm``, ``7.8 g/cm3``, ``shuttle.width/2 + 3 mm``.
+"""Read quantities with units: ``0.1 mm``, ``7.8 g/cm3``, ``shuttle.width/2 + 3 mm``.
 
-A number without a unit is in SI.  A unit is a product of powers, ``kg.m2``, ``g mm2``, ``N.m``,
-over others, ``N/m``, ``m/s2``, ``1/s``; a power is the digits after the symbol.  Angles have a
-dimension of their own here, so that an angle is not taken for a plain number.  Numbers are
-converted as decimals: ``0.1 mm`` is the double that 1e-4 is.
+Numbers without a unit are in SI.  Units are products of powers, ``kg.m2``, ``g mm2``, ``N.m``,
+and quotients, ``N/m``, ``m/s2``, ``1/s``.  Powers are written as digits after the symbol.  Angles
+have a dimension, so that an angle is not accepted as a dimensionless number.  Numbers are
+converted as decimals: ``0.1 mm`` and ``1e-4`` give the same double.
 """
 
 import math
 import re
+import reprlib
 from decimal import Decimal
 from functools import cache
 from typing import Any
@@ -15,7 +16,9 @@ from typing import Any
 from ..base.errors import MechanismError
 from ..mechanism.expressions import Quantity, affine
 
-LONGEST_TEXT = 1000  # characters of an expression
+EXPRESSION_LENGTH_MAX = 1000  # characters
+UNIT_LENGTH_MAX = 100  # characters
+EXPONENT_MAX = 20  # Exponent of a base unit; no quantity of mechanics has a larger one.
 COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
 )  # fmt: skip
@@ -44,11 +47,11 @@ watt = joule / second = W
 hertz = 1 / second = Hz
 """
 DEFINITIONS = f"""{MECHANICAL}tera- = 1e12 = T-
-"""  # an engineer's mechanism needs no more, and pint's own list makes a metre of a misprint
+"""  # Pint's own list of units has names that are likely misprints of these.
 KNOWN = "m, g, s, N, Nm, Pa, J, W, Hz, rad, deg, with SI prefixes, joined as in kg/m3 or N.m"
 
-_NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # atomic: 1e3 is not 1 of the unit e3
-_POWER = r"[A-Za-zµμ°]+(?:\^?-?\d+)?"
+_NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # Atomic: 1e3 is not 1 with the unit e3.
+_POWER = r"[A-Za-zµμ°]+(?:\^?-?[0-9]+)?"
 _PRODUCT = rf"{_POWER}(?:(?:\s*[.*·⋅]\s*|\s+){_POWER})*"
 _UNIT = rf"{_PRODUCT}(?:\s*/\s*{_POWER})*"
 _PLAIN = re.compile(rf"([+-]?{_NUMBER})\s*((?:1?\s*/\s*)?{_UNIT})")
@@ -62,14 +65,15 @@ def quantity(written: object, unit: str) -> Quantity:
     Parameters
     ----------
     written : float or str
-        What is in the file.
+        Value in the file.
     unit : str
         Unit of the result, for instance ``kg.m2``; empty if dimensionless.
 
     Raises
     ------
     MechanismError
-        If it is none of them, or measures something else.
+        If it is not one of these, has another dimension, or has no unit although it is in quotes
+        and not dimensionless.
 
     Examples
     --------
@@ -80,7 +84,7 @@ def quantity(written: object, unit: str) -> Quantity:
     """
     if not isinstance(written, str):
         if isinstance(written, bool) or not isinstance(written, int | float):
-            raise MechanismError("write a number, or an expression in parameters as a text")
+            raise MechanismError("write a number, or an expression in parameters in quotes")
         return _finite(written)
     text = _short(written)
     plain = _PLAIN.fullmatch(text)
@@ -93,7 +97,7 @@ def number(written: object, unit: str) -> float:
     Raises
     ------
     MechanismError
-        If it is anything else, or measures something else.
+        If it is neither, or has another dimension.
 
     Examples
     --------
@@ -115,7 +119,7 @@ def converted(value: str, unit: str, wanted: str) -> float:
     Raises
     ------
     MechanismError
-        If a unit is unknown, the two measure different things or the number is too large.
+        If a unit is unknown, the two have different dimensions, or the result is too large.
 
     Examples
     --------
@@ -124,7 +128,7 @@ def converted(value: str, unit: str, wanted: str) -> float:
     """
     written = _unit(unit)
     if written.dimensionality != _unit(wanted).dimensionality:
-        raise MechanismError(f"{unit!r} is the unit of something else; {_advice(wanted)}")
+        raise MechanismError(f"the unit {unit!r} has another dimension; {_advice(wanted)}")
     try:
         result = _registry().Quantity(Decimal(value), written).to(_unit(wanted)).magnitude
     except ArithmeticError:
@@ -133,7 +137,7 @@ def converted(value: str, unit: str, wanted: str) -> float:
 
 
 def same_dimension(unit: str, other: str) -> bool:
-    """Return whether two units measure the same.
+    """Return whether two units have the same dimension.
 
     Raises
     ------
@@ -144,7 +148,12 @@ def same_dimension(unit: str, other: str) -> bool:
 
 
 def si_unit(written: str) -> str:
-    """Return the SI unit of what is written, empty if there is none.
+    """Return the SI unit of a number with a unit, an empty text for other texts.
+
+    Raises
+    ------
+    MechanismError
+        If the unit is unknown.
 
     Examples
     --------
@@ -157,7 +166,7 @@ def si_unit(written: str) -> str:
 
 
 def check_coherent(unit: str) -> None:
-    """Refuse a unit that is not the one that its kind of quantity has in SI.
+    """Reject a unit other than the SI unit of its dimension.
 
     Raises
     ------
@@ -168,43 +177,53 @@ def check_coherent(unit: str) -> None:
         return
     factor = _registry().Quantity(Decimal(1), _unit(unit)).to_root_units().magnitude
     mass = _unit(unit).dimensionality.get("[mass]", 0)
-    if factor != Decimal(1000) ** mass:  # the root unit is the gram
+    if factor != Decimal(1000) ** mass:  # Pint's root unit is the gram.
         raise MechanismError(
-            'parameters are in SI; write the unit after the number instead, value = "40 mm"'
+            'not an SI unit; write the unit after the number instead, as in value = "40 mm"'
         )
 
 
 def _expression(text: str, unit: str) -> str:
-    """Return an expression with its numbers with units as numbers in the wanted unit."""
+    """Return an expression in which numbers with units are numbers in the given unit."""
     plain = _LITERAL.sub(lambda m: _written(converted(m[1], m[2], unit)), text)
-    affine(plain)
+    expression = affine(plain)
     if plain != text:
         _check_terms(text)
+    if unit and (plain != text or not expression.terms):
+        without = affine(_LITERAL.sub("0", text)).constant
+        if without:
+            raise MechanismError(
+                f"{without:g} has no unit: write a unit after each number, as in "
+                f'"{without:g} {unit}", or a number in {unit} without quotes'
+            )
     return plain
 
 
 def _check_terms(text: str) -> None:
-    """Refuse products of a unit with a parameter or a unit: their dimension is another one."""
+    """Reject products of a number with a unit and a parameter, which change the dimension."""
     try:
         affine(_LITERAL.sub(lambda m: f"({m[1]} * written.unit)", text))
     except MechanismError:
         raise MechanismError(
-            f"cannot read the expression {text[:80]!r}: a number with a unit is a term of a sum; "
-            "write a factor in SI, without its unit"
+            f"cannot read the expression {text[:80]!r}: a number with a unit must be a term of a "
+            "sum; write factors without units, in SI"
         ) from None
 
 
 def _written(value: float) -> str:
+    """Return a number as it is written in an expression, negative ones in parentheses."""
     return repr(value) if value >= 0 else f"({value!r})"
 
 
 def _short(text: str) -> str:
-    if len(text) > LONGEST_TEXT:
-        raise MechanismError(f"write an expression of at most {LONGEST_TEXT} characters")
+    """Return a text without outer blanks and superscripts; reject a long one."""
+    if len(text) > EXPRESSION_LENGTH_MAX:
+        raise MechanismError(f"write an expression of at most {EXPRESSION_LENGTH_MAX} characters")
     return text.strip().translate(_SUPERSCRIPTS)
 
 
 def _finite(value: float | Decimal) -> float:
+    """Return a number as a finite float; reject other numbers."""
     try:
         result = float(value)
     except OverflowError:
@@ -215,13 +234,14 @@ def _finite(value: float | Decimal) -> float:
 
 
 def _advice(unit: str) -> str:
+    """Return the remedy for a wrong dimension."""
     return f"write a quantity in {unit}" if unit else "write a number without a unit"
 
 
 @cache
 def _registry() -> Any:
-    """Return the units, made when the first one is met."""
-    import pint  # here, because it takes a third of a second
+    """Return pint's registry of these units, created at the first call."""
+    import pint  # imported here because the import takes 0.3 s
 
     registry: Any = pint.UnitRegistry(None, non_int_type=Decimal)
     registry.load_definitions(DEFINITIONS.strip().splitlines())
@@ -230,13 +250,26 @@ def _registry() -> Any:
 
 @cache
 def _unit(text: str) -> Any:
-    """Return pint's unit for a unit as it is written here."""
-    import pint  # here, because it takes a third of a second
-
-    powers = re.sub(r"(?<=[A-Za-zµμ°])\^?(-?\d+)", r"**\1", text)
+    """Return pint's unit for a written unit; reject an unknown one."""
+    powers = re.sub(r"(?<=[A-Za-zµμ°])\^?(-?[0-9]+)", r"**\1", text[: UNIT_LENGTH_MAX + 1])
     product = re.sub(r"\s*[·⋅.]\s*|(?<=[\wµμ°])\s+(?=[A-Za-zµμ°])", "*", powers.strip())
-    product = re.sub(r"^1?\s*/", "1/", product)
+    unit = parsed_unit(_registry(), re.sub(r"^1?\s*/", "1/", product))
+    if unit is None or len(text) > UNIT_LENGTH_MAX:
+        name = reprlib.repr(text)
+        raise MechanismError(f"the unit {name} is unknown; known units are {KNOWN}")
+    return unit
+
+
+def parsed_unit(registry: Any, text: str) -> Any:
+    """Return the unit of a registry of pint, None if it is unknown or not convertible to SI.
+
+    For invalid texts pint raises errors of many types, among them AssertionError, KeyError and
+    TokenError.
+    """
     try:
-        return _registry().parse_units(product)
-    except (pint.PintError, ValueError, ArithmeticError, TypeError, AttributeError):
-        raise MechanismError(f"the unit {text!r} is unknown; known are {KNOWN}") from None
+        unit = registry.parse_units(text)
+        zero, one = (registry.Quantity(Decimal(x), unit).to_root_units().magnitude for x in (0, 1))
+        exponent = max(map(abs, unit.dimensionality.values()), default=0)
+        return unit if exponent <= EXPONENT_MAX and 0.0 < float(one - zero) < math.inf else None
+    except Exception:
+        return None

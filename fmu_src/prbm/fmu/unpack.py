@@ -9,6 +9,8 @@ from urllib.parse import unquote
 
 import fmpy  # type: ignore[import-untyped]
 
+from ..base.archives import check_unpacked_size
+
 
 @contextmanager
 def unpacked(fmu: Path | BinaryIO) -> Iterator[Path]:
@@ -16,9 +18,12 @@ def unpacked(fmu: Path | BinaryIO) -> Iterator[Path]:
 
     Raises
     ------
+    ArchiveError
+        If the FMU is too large to be unpacked.
     RuntimeError
         If the path of every candidate has characters that a URI encodes.
     """
+    check_unpacked_size(fmu)
     candidates = (tempfile.gettempdir(), "/tmp", "/var/tmp", r"C:\Users\Public", ".")
     for candidate in map(Path, candidates):
         if candidate.is_dir() and plain(candidate.resolve()):

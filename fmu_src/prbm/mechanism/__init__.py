@@ -1,1 +1,1 @@
-"""The description of a mechanism: frozen data, expressions, parameters, flexure models."""
+"""Description of mechanisms: frozen data, expressions, parameters and flexure models."""

@@ -1,19 +1,19 @@
 """A planar compliant mechanism as frozen data, checked for consistency.
 
-Bodies, flexures, stops, friction, forces and the release are described as they are drawn: all
-points are global coordinates of the straight, unloaded shape.  A number in the description of a
-part becomes a parameter ``part.field``; a text is an expression in parameters, linear in them::
+All points are given in global coordinates of the straight, unloaded shape, as drawn.  A number in a
+part becomes a parameter ``part.field``.  A text is an expression that is affine in parameters::
 
     Body("shuttle", mass=0.05, ..., points={"right": ("shuttle.width", "flexure.length")})
 
-so that the same data serve one simulation, an FMU whose parameters are set by an importer, and a
-picture.  This package is independent of files and of FMI.
+Simulations, FMUs and pictures are made from the same data.  This package is independent of files
+and of FMI.
 """
 
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from keyword import iskeyword
 
 from ..base.errors import MechanismError, ParameterError
@@ -44,34 +44,34 @@ RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "rel
 
 @dataclass(frozen=True)
 class Mechanism:
-    """The description of a mechanism: its parts, its parameters and their defaults.
+    """Description of a mechanism: parts, parameters and their defaults.
 
     Parameters
     ----------
     name, title, description : str
-        Identifier of its FMU, one line, a paragraph.
+        Identifier of the FMU, title of one line, description of a paragraph.
     ground : mapping
-        Fixed points by name [m].
+        Fixed points, by name [m].
     bodies, flexure_types, flexures, joints, stops, frictions, forces, probes : tuples of parts
-        The parts.
+        Parts of each kind.
     release : Release
-        How the motion starts.
+        Start of the motion.
     geometry : tuple of Parameter
-        Parameters that the points refer to.
+        Parameters that points and other quantities refer to.
     gravity : pair of float
         Default acceleration of gravity along x and y [m/s^2].
     damping_zeta, damping_beta : float
-        Default damping ratio of the fundamental mode [-] and time constant of the damping in
-        proportion to every spring's rate [s].
+        Default damping ratio of the fundamental mode [-], and time constant of damping in
+        proportion to stiffness [s].
     drawing : str
-        The mechanism in characters.
+        Drawing of the mechanism in characters.
 
     Raises
     ------
     MechanismError
         If a name is used twice, a reference is undefined, or a part is inconsistent.
     ParameterError
-        If a default is out of its own bounds.
+        If a default is outside its bounds.
     """
 
     name: str
@@ -97,7 +97,7 @@ class Mechanism:
         if not re.fullmatch(r"[A-Za-z_]\w*", self.name, re.ASCII) or iskeyword(self.name):
             raise MechanismError(
                 f"mechanism name {self.name!r}: use letters a to z, digits and _, not starting "
-                "with a digit, and no word of Python (it becomes a file name and an identifier)"
+                "with a digit, and no keyword of Python (it becomes a file name and an identifier)"
             )
         if len(self.gravity) != 2:
             raise MechanismError(f"gravity = {self.gravity!r} must have an x and a y component")
@@ -109,11 +109,12 @@ class Mechanism:
             for name in affine(quantity).terms:
                 if name not in known and name in given:
                     raise MechanismError(
-                        f"{where} refers to {name!r}, which is an expression itself: write it out"
+                        f"{where} refers to {name!r}, which is an expression, not a parameter: "
+                        "write out the expression"
                     )
                 if name not in known:
                     raise MechanismError(
-                        f"{where} refers to {name!r}, which is no parameter of {self.name}; "
+                        f"{where} refers to {name!r}, which is not a parameter of {self.name}; "
                         f"{proposal(name, known)}"
                     )
 
@@ -121,10 +122,11 @@ class Mechanism:
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters, in the order of the interface."""
+        """All parameters, in the order of the FMU interface."""
         return tuple(self._parameters())
 
     def _parameters(self) -> Iterator[Parameter]:
+        """Yield all parameters."""
         yield from self.geometry
         for kind in self.flexure_types:
             yield from _fields(kind)
@@ -150,12 +152,12 @@ class Mechanism:
         )  # fmt: skip
         yield Parameter(
             "damping.zeta", self.damping_zeta, "",
-            "Damping ratio of the fundamental mode, by damping in proportion to mass", 0.0, 10.0,
+            "Damping ratio of the fundamental mode, from mass-proportional damping", 0.0, 10.0,
             tunable=True,
         )  # fmt: skip
         yield Parameter(
             "damping.beta", self.damping_beta, "s",
-            "Damping in proportion to the rate of every spring, as a time constant", 0.0, 1e-2,
+            "Time constant of damping in proportion to the rate of every spring", 0.0, 1e-2,
             1e-5, tunable=True,
         )  # fmt: skip
         tuned: tuple[Part, ...] = (*self.frictions, *self.stops)
@@ -167,12 +169,12 @@ class Mechanism:
         return replace(MODELS[kind.model], links=kind.n)
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Return all parameter values, defaults replaced by the given changes.
+        """Return the values of all parameters: the defaults, or the given changes.
 
         Raises
         ------
         ParameterError
-            If a name is unknown or a value out of bounds.
+            If a name is unknown, or a value or an expression is out of bounds.
         """
         parameters = {p.name: p for p in self.parameters}
         result = {p.name: p.value for p in parameters.values()}
@@ -183,7 +185,7 @@ class Mechanism:
         for part in self._parts():
             for name, meta in FIELDS[type(part)].items():
                 quantity = getattr(part, name)
-                if isinstance(quantity, str):  # bounds hold for expressions too
+                if isinstance(quantity, str):  # reject expressions out of bounds
                     Parameter(f"{part.name}.{name}", affine(quantity)(result), *meta)
         return result
 
@@ -195,53 +197,64 @@ class Mechanism:
     # -- checks --
 
     def _check_names(self) -> None:
+        """Reject names that are used twice or reserved."""
         seen = set(RESERVED)
-        own = [f.name for f in self.flexures if f.type != f.name]  # else both have one section
+        # A flexure may share its name with its type.
+        own = [f.name for f in self.flexures if f.type != f.name]
         parts: tuple[Part, ...] = (*self.bodies, *self.flexure_types, *self.joints, *self.stops)
         parts = (*parts, *self.frictions, *self.forces, *self.probes)
         for name in (*(part.name for part in parts), *own):
             if name in seen:
                 raise MechanismError(
-                    f"the name {name!r} is used twice or reserved: give each part its own"
+                    f"the name {name!r} is used twice or reserved: give each part its own name"
                 )
             seen.add(name)
-        names = [p.name for p in self.parameters]
-        for name in names:
-            if names.count(name) > 1:
-                raise MechanismError(f"the parameter {name!r} is defined twice")
+        defined: set[str] = set()
+        for parameter in self.parameters:
+            if parameter.name in defined:
+                raise MechanismError(
+                    f"the parameter {parameter.name!r} is defined twice: rename one"
+                )
+            defined.add(parameter.name)
 
     def _check_references(self) -> None:
+        """Reject undefined references and inconsistent parts."""
         if not self.bodies or not self.flexures:
             raise MechanismError(f"{self.name} needs at least one body and one flexure")
         for kind in self.flexure_types:
             self._check_type(kind)
+        types = {kind.name: kind for kind in self.flexure_types}
         for flexure in self.flexures:
-            self._check_flexure(flexure)
+            self._check_flexure(flexure, types)
         for joint in self.joints:
             self._check_connection("joint", joint)
         for probe in self.probes:
             self.point(probe.point, probe.name)
-        self._check_attached([body.name for body in self.bodies])
+        self._check_attached({body.name: body for body in self.bodies})
         directed: tuple[Stop | Friction | Release, ...] = (*self.stops, *self.frictions)
         for one in (*directed, self.release):
             if not math.isfinite(one.direction):
-                raise MechanismError(f"{one.name}.direction = {one.direction} must be an angle")
+                raise MechanismError(f"{one.name}.direction = {one.direction} must be finite")
 
-    def _check_attached(self, bodies: Sequence[str]) -> None:
-        """Reject stops, friction, forces and a release at bodies that are not described."""
+    def _check_attached(self, bodies: Mapping[str, Body]) -> None:
+        """Reject stops, friction, forces and a release at undefined bodies."""
         attached: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
         for part in attached:
             if part.body not in bodies:
-                raise MechanismError(f"{part.name}.body = {part.body!r} is not described")
+                raise MechanismError(_undefined(f"{part.name}.body", part.body, bodies))
         for stop in self.stops:
-            if stop.on not in (GROUND, *bodies):
-                raise MechanismError(f"{stop.name}.on = {stop.on!r} is not described")
+            if stop.on != GROUND and stop.on not in bodies:
+                raise MechanismError(_undefined(f"{stop.name}.on", stop.on, (GROUND, *bodies)))
             if stop.on == stop.body:
-                raise MechanismError(f"the stop {stop.name} is fixed to the body that it stops")
+                raise MechanismError(
+                    f"the stop {stop.name} is fixed to the body that it stops: choose another "
+                    f"body for {stop.name}.on"
+                )
         if self.release.body not in bodies:
-            raise MechanismError(f"release.body = {self.release.body!r} is not described")
+            raise MechanismError(_undefined("release.body", self.release.body, bodies))
 
     def _check_type(self, kind: FlexureType) -> None:
+        """Reject a flexure type with an unknown model, or with options of another model."""
         if kind.model not in MODELS:
             raise MechanismError(
                 f"{kind.name}.model = {kind.model!r} is unknown: choose one of {', '.join(MODELS)}"
@@ -254,62 +267,73 @@ class Mechanism:
             )
         if kind.n and not chain:
             raise MechanismError(
-                f"{kind.name}.n = {kind.n}: the {kind.model} model has its own number of links; "
-                'leave n out, or choose model = "nR"'
+                f"{kind.name}.n = {kind.n}: the {kind.model} model has a fixed number of links; "
+                'remove n, or choose model = "nR"'
             )
         known = {c.name for c in self.model(kind).coefficients}
         for name in kind.coefficients:
             if name not in known:
                 raise MechanismError(
-                    f"{kind.name}.{name} is no coefficient of the {kind.model} model, which has "
-                    f"{', '.join(sorted(known)) or 'none'}"
+                    f"{kind.name}.{name} is not a coefficient of the {kind.model} model; its "
+                    f"coefficients are {', '.join(sorted(known)) or 'none'}"
                 )
 
-    def _check_flexure(self, flexure: Flexure) -> None:
-        kind = next((k for k in self.flexure_types if k.name == flexure.type), None)
+    def _check_flexure(self, flexure: Flexure, types: Mapping[str, FlexureType]) -> None:
+        """Reject a flexure with an undefined type or point, or with inconsistent ends."""
+        kind = types.get(flexure.type)
         if kind is None:
-            raise MechanismError(f"{flexure.name}.type = {flexure.type!r} is not described")
+            raise MechanismError(_undefined(f"{flexure.name}.type", flexure.type, types))
         self._check_connection("flexure", flexure)
         ends = flexure.ends
         if len(ends) != 2 or any(end not in ENDS for end in ends):
             raise MechanismError(
-                f"{flexure.name}.ends = {ends!r}: each of the two ends is one of {', '.join(ENDS)}"
+                f"{flexure.name}.ends = {ends!r}: choose each end among {', '.join(ENDS)}"
             )
         if FREE in ends and CLAMP not in ends:
             raise MechanismError(
-                f"{flexure.name}.ends = {ends!r}: a free end needs a clamp at the other"
+                f"{flexure.name}.ends = {ends!r}: a free end needs a clamp at the other end"
             )
         if kind.axial and FREE in ends and len(MODELS[kind.model].gamma) == 1:
             raise MechanismError(
-                f"{flexure.name} has one link, which its free end fixes to the body: it cannot "
-                f"stretch; choose another model than {kind.model}, or axial = false"
+                f"{flexure.name} has one link, which its free end fixes to the body, so that it "
+                f"cannot stretch; choose another model than {kind.model}, or axial = false"
             )
 
-    def _check_connection(self, what: str, part: Flexure | Joint) -> None:
+    def _check_connection(self, kind: str, part: Flexure | Joint) -> None:
+        """Reject a flexure or joint between undefined points, or points of one body."""
         for end in (part.start, part.end):
             self.point(end, part.name)
         if body_of(part.start) == body_of(part.end):
-            raise MechanismError(f"{what} {part.name} joins {body_of(part.start)} to itself")
+            raise MechanismError(
+                f"{kind} {part.name} joins {body_of(part.start)} to itself: choose points of two "
+                "bodies"
+            )
 
     def point(self, reference: str, user: str) -> Point:
-        """Return the drawn point that ``body.point`` names.
+        """Return the coordinates of the point ``body.point`` as drawn [m].
 
         Raises
         ------
         MechanismError
-            If it is not described.
+            If the point is not defined.
         """
         owner, _, name = reference.rpartition(".")
-        points = {GROUND: self.ground} | {b.name: b.points for b in self.bodies}
+        points = self._points
         if owner not in points or name not in points[owner]:
             every = [f"{o}.{p}" for o, named in points.items() for p in named]
             raise MechanismError(
-                f"{user} refers to the point {reference!r}, which is not described; points are "
+                f"{user} refers to the point {reference!r}, which is not defined; points are "
                 f"{', '.join(every)}"
             )
         return points[owner][name]
 
+    @cached_property
+    def _points(self) -> dict[str, Mapping[str, Point]]:
+        """Points of the ground and of the bodies, by owner."""
+        return {GROUND: self.ground} | {body.name: body.points for body in self.bodies}
+
     def _quantities(self) -> Iterator[tuple[str, Quantity]]:
+        """Yield the names and values of all coordinates, coefficients and fields of parts."""
         for name, point in self.ground.items():
             yield from ((f"{GROUND}.{name}", c) for c in point)
         for body in self.bodies:
@@ -325,8 +349,13 @@ class Mechanism:
             yield from ((f"{one.name}.{f}", getattr(one, f)) for f in FIELDS[type(one)])
 
 
+def _undefined(key: str, name: str, known: Iterable[str]) -> str:
+    """Return the message for a key whose value is not the name of a known part."""
+    return f"{key} = {name!r} is not defined; choose one of {', '.join(known) or 'none'}"
+
+
 def _fields(part: Part) -> Iterator[Parameter]:
-    """Yield the parameters that a part's numbers are."""
+    """Yield the parameters of a part: its fields that are numbers."""
     for name, meta in FIELDS[type(part)].items():
         quantity = getattr(part, name)
         if not isinstance(quantity, str):

@@ -15,22 +15,22 @@ Quantity = float | str
 
 @dataclass(frozen=True)
 class Affine:
-    """A linear expression in parameters, constant + sum(factor * parameter)."""
+    """An affine expression in parameters: constant + sum(factor * parameter)."""
 
     constant: float = 0.0
     terms: Mapping[str, float] = field(default_factory=dict)
 
     def __call__(self, values: Mapping[str, float]) -> float:
-        """Evaluate the expression for the given parameters."""
+        """Return the value of the expression for given parameter values."""
         return self.constant + sum(c * values[name] for name, c in self.terms.items())
 
     def scaled(self, factor: float) -> "Affine":
-        """Return the expression times a number."""
+        """Return the product of the expression and a number."""
         terms = {name: factor * c for name, c in self.terms.items()}
         return Affine(factor * self.constant, terms)
 
     def plus(self, other: "Affine") -> "Affine":
-        """Return the sum of two expressions."""
+        """Return the sum of this and another expression."""
         terms = dict(self.terms)
         for name, c in other.terms.items():
             terms[name] = terms.get(name, 0.0) + c
@@ -38,17 +38,17 @@ class Affine:
 
 
 def affine(quantity: Quantity) -> Affine:
-    """Read a number or an expression that is linear in parameters.
+    """Read a number, or an expression that is affine in parameters.
 
     Parameters
     ----------
     quantity : float or str
-        Numbers, names of parameters, ``+ - * /`` and parentheses.
+        A number, or a text of numbers, names of parameters, ``+ - * /`` and parentheses.
 
     Raises
     ------
     MechanismError
-        If the text is anything else, or not linear in the parameters.
+        If the text is not such an expression, or has a number that is not finite.
 
     Examples
     --------
@@ -71,7 +71,7 @@ def affine(quantity: Quantity) -> Affine:
         reason = why.msg if isinstance(why, SyntaxError) else why
         raise MechanismError(
             f"cannot read the expression {str(quantity)[:80]!r}: write numbers and parameter names "
-            f"joined by + - * /, linear in the parameters ({reason})"
+            f"joined by + - * /, without products of parameters ({reason})"
         ) from None
     if not all(map(math.isfinite, (result.constant, *result.terms.values()))):
         raise MechanismError(f"cannot read the expression {quantity!r}: its numbers are not finite")

@@ -1,24 +1,24 @@
-"""Flexures as rigid segments and torsion springs: the pseudo-rigid-body models as data.
+"""Pseudo-rigid-body models as data: flexures of rigid segments and torsion springs.
 
-A model is a set of published coefficients for a cantilever of length h.  Everything else follows
-from the rules that all of them share:
+A model is a set of published coefficients for a cantilever of length h.  Common rules give the
+segments of a flexure of length L:
 
-* clamped at one end: the set once, h = L; the other end is a pin, or free: then it carries its
-  body along, which is fixed to the last link;
-* clamped at both ends: two mirrored cantilevers of half the length, h = L/2, whose middle
-  segments join into one link::
+* Clamped at one end: one cantilever, h = L.  The other end is a pin, or free; the body at a free
+  end is fixed to the last link.
+* Clamped at both ends: two mirrored cantilevers, h = L/2, whose last links form one link in the
+  middle::
 
       clamp                                            clamp
       ##|--g0--o--g1--o----2 g2----o--g1--o--g0--|##          (2R, in units of h)
               K1     K2           K2     K1
 
-* pinned at both ends: one link, which does not bend.
+* Pinned at both ends: one rigid link.
 
-The chain of n equal links (nR, Hencky) needs no coefficients: springs n EI/L between the links and
-2 n EI/L at every rigid attachment, a free end's body included.
+The chain of n equal links (nR, Hencky) has no coefficients.  Its springs are n EI/L between links
+and 2 n EI/L at each end that is clamped or free.
 
-With axial compliance links stretch, too.  The stiffness EA/L of a flexure is that of its middle
-link, which stands for all; in a chain every link has its own, n EA/L.
+With axial compliance, the middle link of a flexure stretches with the stiffness EA/L.  In a chain
+all links stretch, each with the stiffness n EA/L.
 
 Sources
 -------
@@ -38,7 +38,7 @@ from ..base.tolerances import STUB_RTOL
 
 @dataclass(frozen=True)
 class Coefficient:
-    """A dimensionless number of a flexure model and the bounds within which it has a meaning."""
+    """A dimensionless coefficient of a flexure model, with its bounds."""
 
     name: str
     value: float
@@ -49,7 +49,7 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class FlexureModel:
-    """The coefficients of a pseudo-rigid-body model of a cantilever.
+    """Coefficients of a pseudo-rigid-body model of a cantilever.
 
     Parameters
     ----------
@@ -60,15 +60,14 @@ class FlexureModel:
     K_theta : tuple of Coefficient
         Stiffness coefficients of the pivots, from the clamp to the tip [-].
     rate_with_gamma : bool
-        Whether the published stiffness coefficient goes with a factor gamma: the rate is
-        gamma_i K_theta_i EI/h if it does, K_theta_i EI/h if not.
+        Whether the spring rates are gamma_i K_theta_i EI/h; otherwise they are K_theta_i EI/h.
     lumped : bool
-        Whether the mass is lumped at the pivots (kinetic energy equivalence, [4]); else each
-        segment is a slender rod with its share of the mass.
+        Whether the mass is lumped at the pivots (equivalent kinetic energy, [4]); otherwise each
+        segment is a slender rod, with a mass in proportion to its length.
     source : str
-        Where the coefficients come from.
+        Source of the coefficients.
     links : int
-        Number of equal links of a chain; 0: a set of coefficients.
+        Number of equal links of a chain; 0 for the other models.
     """
 
     name: str
@@ -86,11 +85,13 @@ class FlexureModel:
 
 
 def _gamma(name: str, value: float, which: str) -> Coefficient:
+    """Return the length coefficient of a link."""
     text = f"Length of {which} in units of the length of the cantilever"
     return Coefficient(name, value, text, maximum=1.0)
 
 
 def _K_theta(name: str, value: float, which: str) -> Coefficient:
+    """Return the stiffness coefficient of a pivot."""
     return Coefficient(name, value, f"Stiffness coefficient of {which}")
 
 
@@ -141,25 +142,25 @@ MODELS = {
 
 CLAMP, PIN, FREE = "clamp", "pin", "free"
 ENDS = (CLAMP, PIN, FREE)
-LINKS_MAX = 200  # Of a chain.
+LINKS_MAX = 200  # Links of a chain.
 
 
 @dataclass(frozen=True)
 class Segments:
-    """A flexure cut into rigid segments, from its start to its end.
+    """Rigid segments of a flexure, from its start to its end.
 
     Parameters
     ----------
     lengths : tuple of float, n + 2
-        The stub that is part of the body at the start, n links, the stub at the end [m].
+        Lengths of the stub fixed to the body at the start, n links, and the stub at the end [m].
     rates : tuple of float, n + 1
-        Torsion springs between consecutive segments [N m/rad].
+        Rates of the torsion springs between consecutive segments [N m/rad].
     rods : tuple of float, n + 2
         Masses of the segments as slender rods [kg].
     lumps : tuple of float, n + 1
         Masses at the pivots [kg].
     axial : tuple of float, n
-        Axial stiffness of the links [N/m]; 0: rigid.
+        Axial stiffness of the links [N/m]; 0 for rigid links.
     """
 
     lengths: tuple[float, ...]
@@ -169,12 +170,12 @@ class Segments:
     axial: tuple[float, ...]
 
     def reversed(self) -> "Segments":
-        """Return the same flexure from its end to its start."""
+        """Return the segments from the end to the start."""
         return Segments(*(tuple(reversed(part)) for part in vars(self).values()))
 
 
 def stub(gamma: Sequence[float]) -> float:
-    """Length of the stub at the clamp, gamma0 = 1 - sum(gamma), in units of h [-].
+    """Return the length of the stub at the clamp, gamma0 = 1 - sum(gamma), in units of h [-].
 
     Raises
     ------
@@ -206,30 +207,30 @@ def segments(
     mass: float,
     EA: float = 0.0,
 ) -> Segments:
-    """Cut a flexure into rigid segments, springs and masses.
+    """Return the rigid segments, springs and masses of a flexure.
 
-    The rates are K_i = K_theta_i EI/h (times gamma_i if ``rate_with_gamma``).
-    The masses at the pivots of the 1R are m/4 + (m L^2/12)/(gamma L)^2: the kinetic energy of
-    a uniform rod about a fixed end, at the radius gamma L (eq. 3.3 of the thesis); with an end
-    that is free or two that are pinned, the 1R is made of rods as the others are.
+    The spring rates are K_i = K_theta_i EI/h, or gamma_i K_theta_i EI/h with ``rate_with_gamma``.
+    The 1R has the masses m/4 + (m L^2/12)/(gamma L)^2 at its pivots.  At the radius gamma L they
+    have the kinetic energy of a uniform rod that rotates about its end (eq. 3.3 of the thesis).
+    With a free end, or two pinned ends, the 1R consists of rods like the other models.
 
     Parameters
     ----------
     model : FlexureModel
-        The meaning of the coefficients.
+        Model that the coefficients belong to.
     gamma, K_theta : sequences of float
-        Their values, from the clamp to the tip [-].
+        Values of the coefficients, from the clamp to the tip [-].
     ends : pair of {"clamp", "pin", "free"}
-        How the flexure is held at its start and end; a free end needs a clamp at the other.
+        Types of the start and the end; a free end needs a clamp at the other end.
     L, EI, mass : float
         Length [m], bending stiffness [N m^2] and mass [kg] of the flexure.
     EA : float
-        Axial stiffness [N]; 0: inextensible.
+        Axial stiffness [N]; 0 for an inextensible flexure.
 
     Returns
     -------
     Segments
-        From the start to the end of the flexure.
+        Segments from the start to the end of the flexure.
 
     Raises
     ------
@@ -286,7 +287,7 @@ def _cantilevers(
     ]
     if ends == (CLAMP, CLAMP):
         return [*half[:-1], 2 * half[-1], *reversed(half[:-1])], [*stiffness, *stiffness[::-1]]
-    if FREE in ends:  # the last link is part of the body
+    if FREE in ends:  # The last link is fixed to the body.
         lengths, rates = half, stiffness
     else:
         lengths, rates = [*half, 0.0], [*stiffness, 0.0]

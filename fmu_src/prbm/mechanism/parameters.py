@@ -1,4 +1,4 @@
-"""Parameters: a value with its unit, its bounds and whether it is tunable."""
+"""Parameters: values with units and bounds."""
 
 import math
 import re
@@ -11,7 +11,7 @@ NAME = re.compile(r"[A-Za-z_]\w*(\[\d+\])?(\.[A-Za-z_]\w*(\[\d+\])?)*")
 
 @dataclass(frozen=True)
 class Parameter:
-    """A named value with its unit, its meaning and the bounds within which it makes sense.
+    """A named value with its unit, description and bounds.
 
     Parameters
     ----------
@@ -22,13 +22,13 @@ class Parameter:
     unit : str
         SI unit, products with dots and powers as in ``kg.m2``; empty if dimensionless.
     description : str
-        One sentence for a person who knows the mechanism but not the model.
+        One phrase for a user who knows the mechanism but not the model.
     minimum, maximum : float
         Inclusive bounds.
     nominal : float or None
-        Typical magnitude, where it differs much from 1.
+        Typical magnitude; None if it is about 1.
     tunable : bool
-        Whether it may change while the simulation runs.
+        Whether it may change during a simulation.
     """
 
     name: str
@@ -43,17 +43,17 @@ class Parameter:
     def __post_init__(self) -> None:
         if not NAME.fullmatch(self.name):
             raise MechanismError(
-                f"{self.name!r} is no name: use letters, digits and _, joined by dots"
+                f"the name {self.name!r} is invalid: use letters, digits and _, joined by dots"
             )
         self.check(self.value)
 
     def check(self, value: float) -> float:
-        """Return the value as a float if it is allowed.
+        """Return the value as a float.
 
         Raises
         ------
         ParameterError
-            If it is not a finite number within the bounds.
+            If the value is not a finite number within the bounds.
         """
         number = finite(self.name, value, self.unit)
         unit = f" {self.unit}" if self.unit else ""
@@ -74,7 +74,7 @@ def finite(name: str, value: float, unit: str = "") -> float:
     Raises
     ------
     ParameterError
-        If it is anything else.
+        If the value is not a finite number.
     """
     unit = f" {unit}" if unit else ""
     if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):

@@ -1,4 +1,4 @@
-"""The parts of a mechanism as frozen data, and the fields that become parameters."""
+"""Parts of a mechanism as frozen data, and the fields of parts that become parameters."""
 
 import math
 from collections.abc import Mapping
@@ -15,7 +15,21 @@ GROUND = "ground"
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body: mass [kg], inertia about its centre of mass [kg m^2], points as drawn [m]."""
+    """A rigid body.
+
+    Parameters
+    ----------
+    name : str
+        Prefix of its parameters, for instance ``shuttle``.
+    mass : Quantity
+        Mass [kg].
+    inertia : Quantity
+        Moment of inertia about the centre of mass [kg m^2].
+    centre : Point
+        Centre of mass as drawn [m].
+    points : mapping
+        Points as drawn, by name [m].
+    """
 
     name: str
     mass: Quantity
@@ -26,7 +40,7 @@ class Body:
 
 @dataclass(frozen=True)
 class FlexureType:
-    """Section and material that several flexures share, and their pseudo-rigid-body model.
+    """Section, material and pseudo-rigid-body model of flexures.
 
     Parameters
     ----------
@@ -35,17 +49,17 @@ class FlexureType:
     model : {"1R", "2R", "3R", "nR"}
         Pseudo-rigid-body model.
     thickness, width : Quantity
-        Section: in the plane of motion, across it [m].
+        Dimensions of the section in the plane of motion and across it [m].
     youngs_modulus : Quantity
-        Of the material [Pa].
+        Young's modulus [Pa].
     density : Quantity
-        Of the material [kg/m^3].
+        Density [kg/m^3].
     coefficients : mapping
         Values that replace the published coefficients of the model, by name [-].
     n : int
-        Number of links, of the chain nR alone.
+        Number of links of the model nR; 0 for other models.
     axial : bool
-        Whether the flexures stretch, too.
+        Whether the flexures can stretch.
     """
 
     name: str
@@ -61,10 +75,13 @@ class FlexureType:
 
 @dataclass(frozen=True)
 class Flexure:
-    """A straight flexure between two points, each ``body.point``, and how it is held there.
+    """A straight flexure between two points, each ``body.point``.
 
-    An end is a ``clamp`` (a spring), a ``pin`` (none), or ``free``: then the body at that end
-    is carried by the last link, as the mass at the tip of a cantilever.
+    Each of the ``ends`` has one of these types:
+
+    * ``clamp``: fixed to the body;
+    * ``pin``: free to rotate about the point;
+    * ``free``: the tip of a cantilever; the body at this end is fixed to the last link.
     """
 
     name: str
@@ -76,7 +93,7 @@ class Flexure:
 
 @dataclass(frozen=True)
 class Joint:
-    """A pin that joins two points, each ``body.point``, which are drawn at the same place."""
+    """A pin between two points, each ``body.point``, that are drawn at the same position."""
 
     name: str
     start: str
@@ -85,12 +102,32 @@ class Joint:
 
 @dataclass(frozen=True)
 class Stop:
-    """A point of a body against a wall fixed to the ground, or to another body.
+    """A contact of a point of a body with a wall, fixed to the ground or to another body.
 
-    The wall is a line across ``direction`` [deg], the direction in which the body travels
-    towards it; it is touched when the point has moved by ``position`` [m] from the straight
-    shape along that direction, as seen from the body or ground that the wall is fixed to.
-    ``offset`` [m] shifts the point along the wall, positive to the left of the direction.
+    Parameters
+    ----------
+    name : str
+        Prefix of its parameters and outputs, for instance ``stop``.
+    body : str
+        Body that hits the wall.
+    point : Point
+        Hit point as drawn [m].
+    direction : float
+        Direction in which the body approaches the wall, counter-clockwise from +x [deg].  The wall
+        is a line across this direction.
+    position : Quantity
+        Displacement of the hit point from the straight shape along the direction at which it
+        touches the wall [m], measured in the frame of the body or ground that carries the wall.
+    offset : Quantity
+        Shift of the hit point along the wall, positive to the left of the direction [m].
+    restitution : Quantity
+        Coefficient of restitution, energetic if there is friction [-].
+    friction : Quantity
+        Coefficient of friction [-].
+    rest_speed : Quantity
+        Closing speed below which an impact ends in rest under a pressing force [m/s].
+    on : str
+        Body that carries the wall, or ``ground``.
     """
 
     name: str
@@ -109,9 +146,9 @@ class Stop:
 class Friction:
     """Coulomb friction against the motion of a body along a direction [deg].
 
-    It acts at a point as drawn, the centre of mass unless given.  The normal force is
-    max(0, normal_force + normal_stiffness * s), s the displacement of the point to the left of
-    the direction (thesis 3.4.2).
+    It acts at a point as drawn [m] (default: the centre of mass).  The normal force [N] is
+    max(0, normal_force + normal_stiffness * s), where s [m] is the displacement of the point to
+    the left of the direction (section 3.4.2 of the thesis).
     """
 
     name: str
@@ -125,9 +162,9 @@ class Friction:
 
 @dataclass(frozen=True)
 class Force:
-    """Inputs ``name.x``, ``name.y`` [N], ``name.moment`` [N m] on a body.
+    """A force and a moment on a body: inputs ``name.x``, ``name.y`` [N], ``name.moment`` [N m].
 
-    The force acts at a point as drawn, the centre of mass unless given.
+    The force acts at a point as drawn [m] (default: the centre of mass).
     """
 
     name: str
@@ -137,9 +174,10 @@ class Force:
 
 @dataclass(frozen=True)
 class Probe:
-    """Outputs ``name.x``, ``name.y``, ``name.vx``, ``name.vy`` of a point ``body.point``.
+    """A point, ``body.point``, whose motion is an output.
 
-    The displacement from the straight shape [m] and the velocity [m/s].
+    The outputs are the displacement from the straight shape, ``name.x`` and ``name.y`` [m], and the
+    velocity, ``name.vx`` and ``name.vy`` [m/s].
     """
 
     name: str
@@ -148,10 +186,11 @@ class Probe:
 
 @dataclass(frozen=True)
 class Release:
-    """How the motion starts: from a shape held by a force on a body along a direction [deg].
+    """Start of the motion: from a shape that a force on a body along a direction [deg] holds.
 
-    ``displacement`` [m] of the centre of mass along the direction from the straight shape, and
-    ``velocity`` [m/s] along it, with the least kinetic energy.
+    ``displacement`` [m] is that of the body's centre of mass from the straight shape along the
+    direction.  ``velocity`` [m/s] is that of the centre of mass along the direction; the velocities
+    of the other coordinates are those of least kinetic energy.
     """
 
     name: ClassVar[str] = "release"
@@ -163,9 +202,9 @@ class Release:
 
 Part = Body | FlexureType | Flexure | Joint | Stop | Friction | Force | Probe | Release
 
-LENGTH_MIN = 1e-9  # m; a smaller dimension of a mechanism is a mistake.
-MASS_MIN = 1e-15  # kg; a cubic micrometre of silicon has 2e-15 kg.
-LENGTH_MAX = 1e3  # m; no mechanism of this kind is larger.
+LENGTH_MIN = 1e-9  # m; smallest dimension of a mechanism.
+MASS_MIN = 1e-15  # kg; half the mass of a cubic micrometre of silicon.
+LENGTH_MAX = 1e3  # m; largest dimension of a mechanism.
 
 
 def _meta(
@@ -177,6 +216,7 @@ def _meta(
     *,
     tunable: bool = False,
 ) -> tuple[str, str, float, float, float | None, bool]:
+    """Return the arguments of :class:`Parameter` after its name and value."""
     return unit, description, minimum, maximum, nominal, tunable
 
 
@@ -199,7 +239,7 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
             -LENGTH_MAX, LENGTH_MAX, 1e-2, tunable=True,
         ),
         "offset": _meta(
-            "m", "Distance of the hit point from the centre of mass along the wall",
+            "m", "Shift of the hit point along the wall",
             -LENGTH_MAX, LENGTH_MAX, 1e-2, tunable=True,
         ),
         "restitution": _meta(
@@ -208,7 +248,7 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
         ),
         "friction": _meta("", "Coefficient of friction at the stop", 0.0, 100.0, tunable=True),
         "rest_speed": _meta(
-            "m/s", "Closing speed below which an impact ends in rest if the stop is pressed",
+            "m/s", "Closing speed below which an impact ends in rest under a pressing force",
             0.0, 1e3, 1e-3, tunable=True,
         ),
     },
@@ -224,7 +264,7 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
     },
     Release: {
         "displacement": _meta(
-            "m", "Displacement from straight at which the body is held and let go",
+            "m", "Displacement from the straight shape at which the body is released",
             -LENGTH_MAX, LENGTH_MAX, 1e-2,
         ),
         "velocity": _meta("m/s", "Velocity at release", -1e4, 1e4),
@@ -233,7 +273,7 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
 
 
 def value(part: Part, name: str, values: Mapping[str, float]) -> float:
-    """Return a field of a part: the parameter ``part.field``, or the expression that it is."""
+    """Return the value of a field: of the parameter ``part.field``, or of its expression."""
     quantity = getattr(part, name)
     if isinstance(quantity, str):
         return affine(quantity)(values)
@@ -241,5 +281,5 @@ def value(part: Part, name: str, values: Mapping[str, float]) -> float:
 
 
 def body_of(reference: str) -> str:
-    """Return the body that ``body.point`` belongs to."""
+    """Return the name of the body in ``body.point``."""
     return reference.rpartition(".")[0]

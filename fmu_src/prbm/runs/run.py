@@ -59,8 +59,8 @@ def simulate(
 
     Examples
     --------
-    >>> from prbm.files.mechanism_file import find
-    >>> result = simulate(find("PRBDM"), {"stop.restitution": 0.5}, stop_time=0.05)
+    >>> from prbm.files.mechanism_file import load
+    >>> result = simulate(load("PRBDM"), {"stop.restitution": 0.5}, stop_time=0.05)
     >>> len(result["time"]), int(result["stop.impact_count"][-1])
     (51, 1)
     """

@@ -99,7 +99,7 @@ RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
     ">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.less_equal,
 }  # fmt: skip
 _REDUCTION = re.compile(r"(final|max|min|mean|first|since)\((.*)\)", re.DOTALL)
-_CONDITION = re.compile(r"(.*?)\s*(<=|>=|<|>)\s*([^<>=]+)", re.DOTALL)
+_CONDITION = re.compile(r"(.*)(<=|>=|<|>)([^<>=]+)", re.DOTALL)
 
 
 def parse_output(text: str, known: Container[str], column: str | None = None) -> Output:
@@ -125,13 +125,14 @@ def parse_output(text: str, known: Container[str], column: str | None = None) ->
     condition = _CONDITION.fullmatch(inner)
     if reduction not in ("first", "since") or inner in known or condition is None:
         return Output(name, inner, reduction)
+    limit = condition[3].strip()
     try:
-        bound = float(condition[3])
+        bound = float(limit)
     except ValueError:
         raise SpecificationError(
-            f"{text}: bound {condition[3]!r} must be a number, as in first(shuttle.x > 0.001)"
+            f"{text}: bound {limit!r} must be a number, as in first(shuttle.x > 0.001)"
         ) from None
-    return Output(name, condition[1], reduction, condition[2], bound)
+    return Output(name, condition[1].rstrip(), reduction, condition[2], bound)
 
 
 def reduce(output: Output, t: Real, x: Real) -> float:

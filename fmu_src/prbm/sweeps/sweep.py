@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Any
 
 import fmpy  # type: ignore[import-untyped]
 
+from ..base.archives import check_unpacked_size
 from ..base.errors import ParameterError, PrbmError
 from ..base.progress import Progress
 from ..runs.run import ROWS_MAX
@@ -249,6 +250,7 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
     except OSError as error:
         raise SweepError(f"{path} cannot be read ({error.strerror}); give an FMU") from None
     try:
+        check_unpacked_size(io.BytesIO(data))
         description = fmpy.read_model_description(io.BytesIO(data), validate=False)
     except Exception as error:  # FMPy raises plain exceptions.
         reason = " ".join(str(error).split())

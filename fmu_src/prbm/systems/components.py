@@ -19,6 +19,7 @@ from fmpy.fmi2 import (  # type: ignore[import-untyped]
 )
 from fmpy.fmi3 import FMU3Model, FMU3Slave  # type: ignore[import-untyped]
 
+from ..base.archives import check_unpacked_size
 from ..base.errors import PrbmError
 
 Value = float | int | bool
@@ -192,6 +193,7 @@ def described(name: str, fmu: str | Path) -> Any:
         If the file cannot be read as an FMU.
     """
     try:
+        check_unpacked_size(fmu)
         return read_model_description(str(fmu))
     except Exception as error:
         raise CouplingError(f"{name}: {fmu} cannot be read as an FMU ({error})") from None

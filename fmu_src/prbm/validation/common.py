@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..files.mechanism_file import load, shipped
+from ..files.mechanism_file import read_mechanism, shipped
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes
@@ -32,7 +32,7 @@ Crossings = tuple[float, float]
 @cache
 def guide(name: str) -> Mechanism:
     """Return a shipped mechanism."""
-    return load(shipped()[name])
+    return read_mechanism(shipped()[name])
 
 
 def parameters(of: source_model.Structure) -> dict[str, float]:

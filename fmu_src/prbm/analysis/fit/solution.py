@@ -229,8 +229,8 @@ def fit(
     Examples
     --------
     >>> from prbm.analysis.fit import Frequency
-    >>> from prbm.files.mechanism_file import load, shipped
-    >>> guide = load(shipped()["PRBDM"])
+    >>> from prbm.files.mechanism_file import load
+    >>> guide = load("PRBDM")
     >>> found = fit(guide, ["flexure.K_theta"], Frequency(Estimate(4.82, 0.06)))
     >>> print(found["flexure.K_theta"])
     2.475 ± 0.076

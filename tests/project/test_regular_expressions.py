@@ -1,0 +1,139 @@
+"""The time of every regular expression of the package is at most quadratic in its text."""
+
+import ast
+import builtins
+import importlib
+import itertools
+import re
+import signal
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from support import ROOT
+
+PACKAGE = ROOT / "fmu_src"
+FUNCTIONS = {
+    "compile",
+    "match",
+    "fullmatch",
+    "search",
+    "sub",
+    "subn",
+    "findall",
+    "finditer",
+    "split",
+}
+CLASSES = {r"\s": " ", r"\d": "1", r"\w": "a", r"\S": "a", r"\D": "a", r"\W": " ", ".": "a"}
+LENGTH = 200  # Repetitions in the shorter text.
+QUICK = 3e-3  # s; cubic time takes longer for the shorter text.
+RATIO_MAX = 6.0  # Of the times at twice the length: 4 if quadratic, 8 if cubic.
+TIMEOUT = 2.0  # s of processor time for one text.
+
+
+class _Names(dict):
+    """Names of a module, with "x" for the local names of a function."""
+
+    def __missing__(self, name: str) -> object:
+        return getattr(builtins, name, "x")
+
+
+def expressions() -> Iterator[tuple[str, re.Pattern]]:
+    """Yield the file and line of each call of :mod:`re` with its compiled pattern."""
+    for path in sorted((PACKAGE / "prbm").rglob("*.py")):
+        source = path.read_text("utf-8")
+        if "re." not in source:
+            continue
+        for node in ast.walk(ast.parse(source)):
+            if not (
+                isinstance(node, ast.Call)
+                and isinstance(node.func, ast.Attribute)
+                and isinstance(node.func.value, ast.Name)
+                and node.func.value.id == "re"
+                and node.func.attr in FUNCTIONS
+            ):
+                continue
+            names = _Names(vars(_module(path)))
+            values = [node.args[0], *(node.args[1:] if node.func.attr == "compile" else ())]
+            if node.func.attr != "compile":
+                values += [key.value for key in node.keywords if key.arg == "flags"]
+            evaluated = [
+                eval(compile(ast.Expression(value), str(path), "eval"), {}, names)
+                for value in values
+            ]
+            yield f"{path.relative_to(PACKAGE)}:{node.lineno}", re.compile(*evaluated)
+
+
+def _module(path: Path) -> object:
+    parts = path.relative_to(PACKAGE).with_suffix("").parts
+    return importlib.import_module(".".join(p for p in parts if p != "__init__"))
+
+
+EXPRESSIONS = dict(expressions())
+
+
+def test_all_calls_are_found():
+    calls = sum(
+        len(re.findall(rf"\bre\.(?:{'|'.join(FUNCTIONS)})\(", path.read_text("utf-8")))
+        for path in (PACKAGE / "prbm").rglob("*.py")
+    )
+    assert len(list(expressions())) == calls > 30
+
+
+def texts(pattern: str, n: int) -> Iterator[str]:
+    """Yield texts that repeat one or two characters of a pattern, and do not match at the end."""
+    letters = {c for c in re.sub(r"\\.", "", pattern, flags=re.DOTALL) if c.isprintable()}
+    letters |= {letter for name, letter in CLASSES.items() if name in pattern}
+    letters = sorted(letters - set("?*+^|{}") | set(re.findall(r"\\([^\w\s])", pattern)))[:10]
+    pumps = [*letters, *("".join(pair) for pair in itertools.permutations(letters, 2))]
+    for prefix, pump in itertools.product(("", *letters), pumps):
+        yield prefix + pump * n + "\0"
+
+
+def cpu_time(call: Callable[[str], object], text: str) -> float:
+    """Return the smallest of three processor times of a call [s]."""
+    durations = []
+    for _ in range(3):
+        begin = time.process_time()
+        call(text)
+        durations.append(time.process_time() - begin)
+        if durations[0] < QUICK:
+            break
+    return min(durations)
+
+
+def _timeout(*_: object) -> None:
+    raise AssertionError(f"a text of {LENGTH} repetitions takes more than {TIMEOUT:g} s")
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer on this platform")
+@pytest.mark.parametrize("place", EXPRESSIONS)
+def test_no_regular_expression_takes_more_than_quadratic_time(place):
+    expression = EXPRESSIONS[place]
+    previous = signal.signal(signal.SIGVTALRM, _timeout)
+    try:
+        for short, long in zip(
+            texts(expression.pattern, LENGTH), texts(expression.pattern, 2 * LENGTH), strict=True
+        ):
+            for call in (expression.search, expression.fullmatch):
+                signal.setitimer(signal.ITIMER_VIRTUAL, TIMEOUT)
+                duration = cpu_time(call, short)
+                if duration > QUICK:
+                    assert cpu_time(call, long) < RATIO_MAX * duration, (short[:12], duration)
+    finally:
+        signal.setitimer(signal.ITIMER_VIRTUAL, 0.0)
+        signal.signal(signal.SIGVTALRM, previous)
+
+
+def test_the_test_recognizes_cubic_and_exponential_time():
+    """The expressions that this test was made for."""
+    EXPRESSIONS["cubic"] = re.compile(r"\s*((?:'[^']*'|[^='#])+?)\s*=")
+    EXPRESSIONS["exponential"] = re.compile(r"(a+)+b")
+    try:
+        for place in ("cubic", "exponential"):
+            with pytest.raises(AssertionError):
+                test_no_regular_expression_takes_more_than_quadratic_time(place)
+    finally:
+        del EXPRESSIONS["cubic"], EXPRESSIONS["exponential"]
