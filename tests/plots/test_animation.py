@@ -469,7 +469,7 @@ def test_a_result_without_the_links_leads_to_a_command_that_records_them(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["out.gif"], "name the source of the film: RESULT.csv, --model or --mechanism"),
+        (["out.gif"], "nothing to show: give RESULT.csv, MECHANISM, --model or --mechanism"),
         (["--model", "PRBDN", "out.gif"], "there is no model 'PRBDN'; did you mean PRBDM"),
         (["--model", "PRBDM", "out.bmp"], "end the name in .gif or .mp4"),
         (["--model", "PRBDM", "--set", "stop.restitution", "out.gif"], "write NAME=VALUE"),
