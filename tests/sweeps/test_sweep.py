@@ -216,7 +216,7 @@ def test_what_failed_is_done_again_when_asked_for(mishap, log):
     assert (out["status"] == "ok").tolist() == [row != 4 for row in range(12)]
     assert len(list(Path("results.parquet").glob("part*"))) < 12
     assert sweep(mishap, table, step=0.5).equals(out)
-    out = sweep(mishap, table, step=0.5, workers=1, failed=True)
+    out = sweep(mishap, table, step=0.5, workers=1, retry_failed=True)
     assert out["y"].tolist() == table["x"].tolist()
     assert len(pd.read_parquet("results.parquet")) == 12
     assert runs(log) == Counter([*table["x"], 4.0])
@@ -302,7 +302,7 @@ def test_rows_that_are_added_are_the_rest(mishap, log):
     assert runs(log) == {1.0: 1, 2.0: 1, 3.0: 1}
 
 
-def test_another_sweep_is_refused_or_begins_anew(mishap, log, native):
+def test_results_of_another_sweep_are_kept_unless_overwritten(mishap, log, native):
     """Another step, output, value, table, FMU; a refusal leaves everything as it was."""
     table = pd.DataFrame({"x": [1.0, 2.0]})
     sweep(mishap, table, step=0.5, workers=1)
@@ -314,21 +314,21 @@ def test_another_sweep_is_refused_or_begins_anew(mishap, log, native):
         ({"table": table[:1]}, "another table: row 1 is gone"),
         ({"table": table.assign(pause=0.0)}, "another parameters"),
     ):
-        with pytest.raises(ParameterError, match=rf"{what}.*begin anew"):
+        with pytest.raises(ParameterError, match=rf"{what}.*overwrite them"):
             sweep(**({"fmu": mishap, "table": table, "step": 0.5, "workers": 1} | change))
     with pytest.raises(ParameterError, match="another FMU"):
         sweep(native["PRBDM", 2], GRID)
     assert runs(log).total() == 2
-    assert sweep(mishap, table, step=0.25, workers=1, anew=True)["y"].tolist() == [1.0, 2.0]
+    assert sweep(mishap, table, step=0.25, workers=1, overwrite=True)["y"].tolist() == [1.0, 2.0]
     assert runs(log).total() == 4
 
 
 def test_a_folder_of_something_else_is_left_alone(mishap):
     Path("results.parquet").mkdir()
     Path("results.parquet/letter.txt").write_text("keep me")
-    for anew in (False, True):
+    for overwrite in (False, True):
         with pytest.raises(ParameterError, match=r"results\.parquet exists and holds no sweep"):
-            sweep(mishap, pd.DataFrame({"x": [1.0]}), anew=anew)
+            sweep(mishap, pd.DataFrame({"x": [1.0]}), overwrite=overwrite)
     assert Path("results.parquet/letter.txt").read_text() == "keep me"
 
 

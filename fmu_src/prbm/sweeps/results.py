@@ -53,13 +53,13 @@ class Results:
         self.schema = pa.schema([(ROW, pa.int64()), *numbers, *own])
         self.count = 0
 
-    def begin(self, anew: bool = False) -> None:
+    def begin(self, overwrite: bool = False) -> None:
         """Make the folder, or go on in one of a sweep with the same settings.
 
         Raises
         ------
         ParameterError
-            If there is something else, or the settings differ and it is not to begin anew.
+            If the folder holds other files, or results of other settings without ``overwrite``.
         """
         file = self.folder / SETTINGS
         try:
@@ -69,7 +69,7 @@ class Results:
                 )
             for draft in self.folder.glob("_*.draft"):
                 draft.unlink()
-            if file.exists() and anew:
+            if file.exists() and overwrite:
                 self._clear()
             if file.exists():
                 self._compare(json.loads(file.read_text(encoding="utf-8")))
@@ -83,7 +83,7 @@ class Results:
                 f"{self.folder} cannot be written ({error.strerror}); give another name"
             ) from None
         except json.JSONDecodeError:
-            raise ParameterError(f"{file} is broken; remove {self.folder}, or begin anew") from None
+            raise ParameterError(f"{file} is damaged; delete {self.folder}") from None
 
     def _compare(self, before: Mapping[str, Any]) -> None:
         for name in {**before, **self.settings}:
@@ -91,7 +91,8 @@ class Results:
             if old != new:
                 raise ParameterError(
                     f"{self.folder} holds a sweep with another {name} ({_short(old)}, now "
-                    f"{_short(new)}); give another name for the results, or begin anew (--anew)"
+                    f"{_short(new)}); give another name for the results, or overwrite them "
+                    "(--overwrite)"
                 )
 
     def _clear(self) -> None:
@@ -128,7 +129,7 @@ class Results:
                 ) from None
 
     def forget_failures(self) -> None:
-        """Remove the rows of runs that failed, so that they are done again."""
+        """Remove the rows of failed runs, so that they are repeated."""
         for part, table in list(self._tables()):
             good = table.filter(pa.compute.is_in(table[STATUS], pa.array(GOOD)))
             if good.num_rows == 0:

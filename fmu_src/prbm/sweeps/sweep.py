@@ -73,8 +73,8 @@ def sweep(
     workers: int | None = None,
     retries: int = 1,
     timeout: float | None = None,
-    anew: bool = False,
-    failed: bool = False,
+    overwrite: bool = False,
+    retry_failed: bool = False,
     progress: Progress | None = None,
 ) -> "pd.DataFrame":
     """Run an FMU once for each row of a table.
@@ -114,9 +114,9 @@ def sweep(
         Number of repetitions of a run whose process crashed.
     timeout : float or None
         Longest duration of a run [s]; None: no limit.
-    anew : bool
+    overwrite : bool
         Whether to delete earlier results in ``out``.
-    failed : bool
+    retry_failed : bool
         Whether to repeat failed runs.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
@@ -146,16 +146,16 @@ def sweep(
     results = _results(plan, Path(out))
     tell = progress or (lambda fraction: None)
     with ExitStack() as stack:  # Keep earlier results until there is a client.
-        client = stack.enter_context(_client(scheduler, workers)) if anew else None
-        results.begin(anew)
+        client = stack.enter_context(_client(scheduler, workers)) if overwrite else None
+        results.begin(overwrite)
         done = results.read()
         _same_rows(plan, done, results.folder)
-        seen = set(done["row"][done["status"].isin(GOOD)] if failed else done["row"])
+        seen = set(done["row"][done["status"].isin(GOOD)] if retry_failed else done["row"])
         rest = [row for row in range(len(plan.rows)) if row not in seen]
         tell(1.0 - len(rest) / len(plan.rows))
         if rest:
             client = client or stack.enter_context(_client(scheduler, workers))
-            if failed:
+            if retry_failed:
                 results.forget_failures()
             _Sweep(client, plan, results, tell).run(rest, retries, timeout)
     return results.read()
@@ -371,7 +371,7 @@ def _same_rows(plan: Plan, done: "pd.DataFrame", folder: Path) -> None:
             raise ParameterError(
                 f"{folder} holds a sweep over another table: row {k} is "
                 f"{'gone' if now is None else 'another one now'}; give another name for the "
-                "results, or begin anew (--anew)"
+                "results, or overwrite them (--overwrite)"
             )
 
 
