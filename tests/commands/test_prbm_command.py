@@ -357,7 +357,7 @@ MISTAKES = [
     ("impact-map PRBDM --offsets 4", "check the unit, for instance --offsets 4mm"),
     ("simulate PRBDM --stop-time 0", "stop_time = 0 s must be positive"),
     ("simulate PRBDM --stop-time 1m", "--stop-time 1m: 'm' is the unit of something else"),
-    ("simulate PRBDM --step 1ns", "choose a larger one"),
+    ("simulate PRBDM --step 1ns", "choose a larger step"),
     ("simulate PRBDM --tolerance 2", "must lie between 0 and 1"),
     ("simulate PRBDM --stop-time 10ms --spectrum", "no impact in 0.01 s"),
     ("fit PRBDM --free flexure.K_theta", "no measured data: give"),

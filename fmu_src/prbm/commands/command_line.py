@@ -378,9 +378,9 @@ def _sweep(commands: Commands) -> None:
     )  # fmt: skip
     add(
         "--output", action="append", metavar="OUTPUT",
-        help="recorded output: a variable, for its final value; 'max(shuttle.x)', also with min and "
-        "mean; 'first(shuttle.x > 0)', the first time of a condition; 'since(stop.contact)', the "
-        "time from which it holds to the end; repeatable (default: all outputs)",
+        help="recorded output: a variable, for its final value; 'max(shuttle.x)', or min, mean; "
+        "'first(shuttle.x > 0)', the first time of a condition; 'since(stop.contact)', the time "
+        "from which it holds to the end; repeatable (default: all outputs)",
     )  # fmt: skip
     set_argument(parser, "start value of all runs")
     add("--stop-time", metavar="T", help="end of the runs [s] (default: that of the FMU)")

@@ -32,30 +32,30 @@ def simulate(
     mechanism : Mechanism
         The mechanism.
     changes : mapping or None
-        Parameters and inputs that differ from their defaults.
+        Parameters and inputs that differ from their defaults, in SI units.
     stop_time, step : float or None
-        Duration and communication step [s] (default: those of the default experiment, for most
-        mechanisms 1 s and 1 ms).  The last step may be shorter.
+        Duration and communication step [s]; None: those of the default experiment, for most
+        mechanisms 1 s and 1 ms.  The last step may be shorter.
     tolerance : float or None
-        Relative tolerance of the integration (default: ``solver.tolerance``).
+        Relative tolerance of the integration; None: ``solver.tolerance``.
     source : callable or None
         Function of time that returns inputs and tunable parameters by name, for the step that
         begins at that time [s].
     progress : callable or None
-        Called with the fraction of the steps that are done, from 0 to 1.
+        Called with the completed fraction, from 0 to 1.
 
     Returns
     -------
     Result
-        The columns have one row per communication point.  An input is in the row at which it
-        begins to act.
+        The columns have one row per communication point.  The row of an input is the time from
+        which it acts.
 
     Raises
     ------
     ParameterError
-        If a name is unknown, a value out of bounds or a time not positive.
+        If a name is unknown, a value is out of bounds, or a time is not positive.
     EquilibriumError, SimulationError
-        As :class:`prbm.Simulation` does.
+        As :class:`prbm.Simulation`.
 
     Examples
     --------
@@ -90,7 +90,7 @@ def communication_points(stop_time: float, step: float) -> list[float]:
     Raises
     ------
     ParameterError
-        If that is not a finite number of steps forwards.
+        If a time is not positive and finite, or there are more than :data:`ROWS_MAX` steps.
 
     Examples
     --------
@@ -103,6 +103,6 @@ def communication_points(stop_time: float, step: float) -> list[float]:
     steps = math.ceil(stop_time / step - LAST_STEP_RTOL)
     if steps > ROWS_MAX:
         raise ParameterError(
-            f"step = {step:g} s makes {steps} steps in {stop_time:g} s: choose a larger one"
+            f"step = {step:g} s makes {steps} steps in {stop_time:g} s; choose a larger step"
         )
     return [*(k * step for k in range(max(steps, 1))), stop_time]
