@@ -130,9 +130,7 @@ def test_without_a_compiler_only_the_python_fmus_are_built(tmp_path, monkeypatch
 
 @pytest.mark.usefixtures("_no_compiler")
 @pytest.mark.parametrize("options", ["--flavour native", "--fmi 2", "--clock", "--platform host"])
-def test_selecting_native_fmus_without_a_compiler_fails(
-    options, tmp_path, monkeypatch, capsys
-):
+def test_selecting_native_fmus_without_a_compiler_fails(options, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(options.split()) == cli.MISTAKE
     assert "pip install ziglang" in capsys.readouterr().err
@@ -283,9 +281,7 @@ EPOCHS = {"999999999999999999": None, "soon": None, "86400": "1970-01-02T00:00:0
 
 
 @pytest.mark.parametrize("command", MISTAKES)
-def test_mistakes_are_one_sentence_and_status_2(
-    command, tmp_path, monkeypatch, capsys
-):
+def test_mistakes_are_one_sentence_and_status_2(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "file").write_text("a file where a folder is needed")
     assert cli.main(command.split()) == cli.MISTAKE

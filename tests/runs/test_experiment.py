@@ -1,4 +1,4 @@
-"""The default experiment shows the motion of a mechanism, be it of micrometres or of metres."""
+"""The default experiment of mechanisms of any size, and its reference results."""
 
 import dataclasses
 
@@ -19,7 +19,7 @@ from support import COSTLY, mechanism
 
 
 def guide(size, model="2R", **section):
-    """Return a steel guide of a size [m], similar to those of other sizes."""
+    """Return a steel guide of a size [m]; guides of all sizes are geometrically similar."""
     leaf = FlexureType("leaf", model, 0.01 * size, 0.1 * size, 2e11, 7800.0, **section)
     return Mechanism(
         name="Scaled",
@@ -42,14 +42,14 @@ def guide(size, model="2R", **section):
 
 
 @pytest.mark.parametrize("name", shipped())
-def test_of_the_shipped_mechanisms_it_is_a_second(name):
+def test_default_experiments_of_shipped_mechanisms_take_one_second(name):
     assert experiment(mechanism(name)) == Experiment(1.0)
     assert Experiment().step == 1e-3
 
 
 @pytest.mark.parametrize("size", [2e-5, 2e-4, 0.2, 20.0])
-def test_it_shows_some_periods_at_any_size(size):
-    """Between one and a thousand, and not one in a few communication steps."""
+def test_default_experiments_have_1_to_1000_periods_at_any_size(size):
+    """About ten periods, if one second has fewer than one or more than a thousand."""
     scaled = guide(size)
     chosen = experiment(scaled)
     frequency = Simulation(scaled).outputs()["mode.frequency"]
@@ -59,8 +59,8 @@ def test_it_shows_some_periods_at_any_size(size):
     assert chosen.step == pytest.approx(chosen.stop_time / 1000, rel=1e-15)
 
 
-def test_similar_mechanisms_move_alike():
-    """Without gravity lengths, times go with the size: displacements, impacts, energies scale."""
+def test_motion_scales_with_the_size_of_the_mechanism():
+    """Without gravity, lengths and times are proportional to the size, energies to its cube."""
     small, large = 1e-4, 1.0
     found = []
     for size in (small, large):
@@ -78,17 +78,19 @@ def test_similar_mechanisms_move_alike():
     np.testing.assert_allclose(energy_a / small**3, energy_b / large**3, rtol=1e-6)
 
 
-def test_reference_results_are_left_out_where_they_would_take_minutes():
-    told: list[str] = []
+def test_reference_results_are_omitted_if_they_take_minutes():
+    messages: list[str] = []
     stiff = guide(0.1, "nR", n=40, axial=True)
-    assert reference.reference(stiff, {}, (), experiment(stiff), told.append) == {}
-    assert told == ["no reference results: the default experiment takes the Python engine minutes"]
+    assert reference.reference(stiff, {}, (), experiment(stiff), messages.append) == {}
+    assert messages == [
+        "no reference results: the default experiment takes the Python engine minutes"
+    ]
     for name in ("PRBDM2R", *COSTLY):
         assert reference.steps(mechanism(name), {}, Experiment()) < reference.MOST_STEPS
 
 
-def test_damping_shortens_the_steps_that_are_expected():
-    """By 1/(beta omega^2), of the fastest mode."""
+def test_damping_increases_the_estimated_number_of_steps():
+    """The step is limited to 1/(beta omega^2) of the fastest mode."""
     quiet = dataclasses.replace(guide(0.1), damping_beta=0.0)
     plain = reference.steps(quiet, {}, Experiment())
     omega = plain * reference.STABLE
@@ -97,7 +99,7 @@ def test_damping_shortens_the_steps_that_are_expected():
 
 
 @pytest.mark.parametrize("inside", [True, False])
-def test_the_page_shows_the_experiment_and_tells_of_results_that_are_inside(inside):
+def test_the_documentation_shows_the_experiment_and_included_results(inside):
     small = guide(1e-5)
     chosen = experiment(small)
     native = described(small, {}, 3)

@@ -1,4 +1,4 @@
-"""Results: the columns that FMPy would give, and their figures."""
+"""Results with the columns of FMPy, their files and figures."""
 
 import io
 import time
@@ -55,8 +55,8 @@ def test_the_last_step_ends_at_the_stop_time(mechanisms: dict[str, Mechanism]) -
     np.testing.assert_allclose(short["time"], [0.0, 0.002, 0.004, 0.005], rtol=1e-15)
 
 
-def test_a_source_acts_from_its_row_on(mechanisms: dict[str, Mechanism]) -> None:
-    """Force times displacement is the work of a force that is constant within each step."""
+def test_inputs_act_from_their_row_on(mechanisms: dict[str, Mechanism]) -> None:
+    """The work of a force that is constant within each step is force times displacement."""
     driven = simulate(
         mechanisms["PRBDM"], stop_time=0.03, source=lambda t: {"force.x": 0.2 if t < 0.01 else -0.1}
     )
@@ -66,7 +66,7 @@ def test_a_source_acts_from_its_row_on(mechanisms: dict[str, Mechanism]) -> None
     np.testing.assert_allclose(driven["energy.work"][1:], work, atol=1e-9)
 
 
-def test_the_values_are_those_of_the_start(mechanisms: dict[str, Mechanism]) -> None:
+def test_values_are_those_at_the_start(mechanisms: dict[str, Mechanism]) -> None:
     driven = simulate(
         mechanisms["PRBDM"],
         {"stop.offset": 1e-3, "force.y": 0.1},
@@ -79,9 +79,9 @@ def test_the_values_are_those_of_the_start(mechanisms: dict[str, Mechanism]) -> 
 
 
 def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
-    told: list[float] = []
-    simulate(mechanisms["PRBDM"], stop_time=0.004, progress=told.append)
-    np.testing.assert_allclose(told, [0.0, 0.25, 0.5, 0.75, 1.0])
+    fractions: list[float] = []
+    simulate(mechanisms["PRBDM"], stop_time=0.004, progress=fractions.append)
+    np.testing.assert_allclose(fractions, [0.0, 0.25, 0.5, 0.75, 1.0])
 
 
 @pytest.mark.parametrize(
@@ -95,14 +95,14 @@ def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
         ({"tolerance": 1.0}, "tolerance = 1 must lie between"),
     ],
 )
-def test_what_cannot_be_simulated_is_refused(
+def test_invalid_arguments_are_rejected(
     mechanisms: dict[str, Mechanism], settings: dict[str, float], sentence: str
 ) -> None:
     with pytest.raises(ParameterError, match=sentence):
         simulate(mechanisms["PRBDM"], **settings)
 
 
-def test_a_column_that_is_missing_is_named(result: Result) -> None:
+def test_a_missing_column_is_named(result: Result) -> None:
     with pytest.raises(ResultError, match=r"no column 'stop\.gapp'"):
         result["stop.gapp"]
 
@@ -127,35 +127,37 @@ def test_a_file_of_fmpy_is_read_back_exactly(tmp_path: Path, result: Result) -> 
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "is no result"),
-        ("shuttle.x,time\n0,0\n0,1\n", "is no result"),
-        ("time,a\n0,0\n", "two rows or more"),
-        ("time,a,a\n0,0,0\n1,0,0\n", "a column stands there twice"),
+        ("", "not a result"),
+        ("shuttle.x,time\n0,0\n0,1\n", "not a result"),
+        ("time,a\n0,0\n", "at least two rows must follow"),
+        ("time,a,a\n0,0,0\n1,0,0\n", "two columns are named 'a'"),
         ("time,a\n0,0\n1\n", "row 3 has 1 values for 2 columns"),
-        ("time,a\n0,0\n1,x\n", "row 3 holds what is no number"),
+        ("time,a\n0,0\n1,x\n", "row 3 has a cell that is not a number"),
     ],
 )
-def test_a_file_that_is_no_result_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+def test_files_of_another_layout_are_rejected(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "result.csv"
     path.write_text(text)
     with pytest.raises(ResultError, match=sentence):
         read_csv(path)
 
 
-def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+def test_binary_files_are_rejected(tmp_path: Path) -> None:
     (tmp_path / "result.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ResultError, match="is no CSV file"):
+    with pytest.raises(ResultError, match="not a CSV file"):
         read_csv(tmp_path / "result.csv")
 
 
-def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "result.csv").write_text("time,a\n0,0\n1,2\n", encoding="utf-8-sig")
     assert read_csv(tmp_path / "result.csv").dtype.names == ("time", "a")
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_progress_is_told_after_a_second(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In one line on a terminal; elsewhere in a line every other second."""
+def test_progress_is_reported_after_a_second(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A terminal shows one updated line; another stream gets a line every other second."""
     clock = iter([0.0, *np.arange(0.25, 5.25, 0.25)])
     monkeypatch.setattr(time, "monotonic", lambda: next(clock))
     stream = io.StringIO()
@@ -163,18 +165,18 @@ def test_progress_is_told_after_a_second(terminal: bool, monkeypatch: pytest.Mon
     report = reporter(stream)
     for k in range(1, 21):
         report(k / 20)
-    told = stream.getvalue()
+    written = stream.getvalue()
     if terminal:
-        assert told.startswith("\r 20%\r 25%")
-        assert told.endswith("\r100%\n")
+        assert written.startswith("\r 20%\r 25%")
+        assert written.endswith("\r100%\n")
     else:
-        assert told.split() == ["20%", "done", "60%", "done"]
+        assert written.split() == ["20%", "done", "60%", "done"]
 
 
-def test_a_figure_does_not_depend_on_the_users_taste(result: Result) -> None:
+def test_figures_do_not_depend_on_matplotlibrc(result: Result) -> None:
     plain = png(response(result))
-    taste = {"lines.linewidth": 5.0, "savefig.transparent": True, "xtick.direction": "in"}
-    with matplotlib.rc_context(taste):
+    settings = {"lines.linewidth": 5.0, "savefig.transparent": True, "xtick.direction": "in"}
+    with matplotlib.rc_context(settings):
         assert png(response(result)) == plain
 
 
@@ -187,14 +189,14 @@ def test_the_response_shows_all_impacts_and_a_constant_balance(
     closing, opening = (line.get_ydata() for line in speeds.lines)
     np.testing.assert_allclose(np.divide(opening, closing), 0.6, rtol=1e-6)
     balance = energies.lines[-1].get_ydata()
-    assert np.ptp(balance) < 1e-5  # of 17 mJ, at the default tolerance
+    assert np.ptp(balance) < 1e-5  # [mJ], of 17 mJ, at the default tolerance
     figure.savefig(tmp_path / "response.png")
     with Image.open(tmp_path / "response.png") as image:
         assert image.format == "PNG"
 
 
-def test_legends_lie_beside_what_the_response_shows() -> None:
-    """Of a leaf that falls from the upper left to the lower right, with curves everywhere."""
+def test_legends_of_the_response_do_not_cover_the_curves() -> None:
+    """The curves of the cantilever leave little room."""
     figure = response(simulate(load(shipped()["Cantilever"]), stop_time=0.06, step=1e-4))
     figure.draw_without_rendering()
     displacement, _, speeds, energies = figure.axes
@@ -205,7 +207,7 @@ def test_legends_lie_beside_what_the_response_shows() -> None:
             assert legend.count_contains(points) == 0, line.get_label()
 
 
-def test_the_response_has_a_panel_for_what_was_recorded(result: Result) -> None:
+def test_the_response_has_a_panel_per_recorded_quantity(result: Result) -> None:
     few = result.columns[["time", "shuttle.x", "shuttle.y"]]
     assert len(response(few, result.mechanism).axes) == 1
     with pytest.raises(ResultError, match=r"nothing to plot: record shuttle\.x"):
