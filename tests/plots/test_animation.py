@@ -346,7 +346,7 @@ def test_missing_angles_are_named_with_the_variables_to_record(short: Result) ->
 def test_angles_of_another_mechanism_are_rejected(short: Result) -> None:
     columns = short.columns.copy()
     columns["link[1].angle"] += 0.1
-    with pytest.raises(ResultError, match="loops of PRBDM stand open"):
+    with pytest.raises(ResultError, match="loops of PRBDM are open"):
         motion(columns, short.mechanism)
     columns["link[1].angle"] = np.nan
     with pytest.raises(ResultError, match="not finite numbers"):

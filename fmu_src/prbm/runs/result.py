@@ -131,7 +131,7 @@ def _number(cell: str) -> float:
 def rest_time(columns: Columns, stop: str = "stop") -> float | None:
     """Return the first recorded time of the last hold at a stop [s].
 
-    The result is None if the stop does not hold at the end.
+    Without a hold at the end, it returns None.
 
     Examples
     --------
