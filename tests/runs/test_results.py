@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from prbm.base.errors import ParameterError
+from prbm.base.errors import PrbmError
 from prbm.base.progress import reporter
 from prbm.drawing.style import png
 from prbm.files.mechanism_file import load, shipped
@@ -92,14 +92,28 @@ def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
         ({"step": -1e-3}, "step = -0.001 s must be positive"),
         ({"step": 1e-9}, "step = 1e-09 s makes 1000000000 steps"),
         ({"changes": {"stop.restitutoin": 0.5}}, "did you mean stop.restitution"),
+        ({"changes": {"stop.restitutoin": "0.5"}}, "did you mean stop.restitution"),
+        ({"changes": {"stop.position": "1 kg"}}, "stop.position = 1 kg: 'kg' is the unit of"),
+        ({"stop_time": "a"}, "stop_time = a: write a number in s, or a number and a unit"),
+        ({"stop_time": [1.0]}, r"stop_time = \[1\.0\]: must be a number, in s, or a text"),
+        ({"step": "5 mm"}, "step = 5 mm: 'mm' is the unit of something else"),
+        ({"tolerance": "fine"}, "tolerance = fine: write a number"),
         ({"tolerance": 1.0}, "tolerance = 1 must lie between"),
     ],
 )
 def test_invalid_arguments_are_rejected(
     mechanisms: dict[str, Mechanism], settings: dict[str, float], sentence: str
 ) -> None:
-    with pytest.raises(ParameterError, match=sentence):
+    with pytest.raises(PrbmError, match=sentence):
         simulate(mechanisms["PRBDM"], **settings)
+
+
+def test_texts_with_units_equal_numbers_in_si(mechanisms: dict[str, Mechanism]) -> None:
+    guide = mechanisms["PRBDM"]
+    texts = simulate(guide, {"release.displacement": "-10 mm"}, stop_time="20 ms", step="2 ms")
+    numbers = simulate(guide, {"release.displacement": -0.01}, stop_time=0.02, step=0.002)
+    np.testing.assert_array_equal(texts.columns, numbers.columns)
+    assert texts.values == numbers.values
 
 
 def test_a_missing_column_is_named(result: Result) -> None:

@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
 from ..base.errors import ParameterError
+from ..base.names import unknown
 from ..base.progress import Progress
 from ..hybrid.simulation import Simulation
 from ..mechanism.description import Mechanism
@@ -17,10 +19,10 @@ LAST_STEP_RTOL = 1e-9  # A last step below this fraction of a communication step
 
 def simulate(
     mechanism: Mechanism,
-    changes: Mapping[str, float] | None = None,
+    changes: Mapping[str, float | str] | None = None,
     *,
-    stop_time: float | None = None,
-    step: float | None = None,
+    stop_time: float | str | None = None,
+    step: float | str | None = None,
     tolerance: float | None = None,
     source: Source | None = None,
     progress: Progress | None = None,
@@ -32,10 +34,11 @@ def simulate(
     mechanism : Mechanism
         The mechanism.
     changes : mapping or None
-        Parameters and inputs that differ from their defaults, in SI units.
-    stop_time, step : float or None
-        Duration and communication step [s]; None: those of the default experiment, for most
-        mechanisms 1 s and 1 ms.  The last step may be shorter.
+        Parameters and inputs that differ from their defaults: numbers in SI units, or texts with
+        a unit, ``"-10 mm"``.
+    stop_time, step : float, str or None
+        Duration and communication step, numbers [s] or texts, ``"20 ms"``; None: those
+        of the default experiment, for most mechanisms 1 s and 1 ms.  The last step may be shorter.
     tolerance : float or None
         Relative tolerance of the integration; None: ``solver.tolerance``.
     source : callable or None
@@ -53,7 +56,9 @@ def simulate(
     Raises
     ------
     ParameterError
-        If a name is unknown, a value is out of bounds, or a time is not positive.
+        If a name is unknown, a value is not a number or out of bounds, or a time is not positive.
+    UserMistake
+        If a text is not a quantity of the right dimension.
     EquilibriumError, SimulationError
         As :class:`prbm.Simulation`.
 
@@ -63,13 +68,23 @@ def simulate(
     >>> result = simulate(find("PRBDM"), {"stop.restitution": 0.5}, stop_time=0.05)
     >>> len(result["time"]), int(result["stop.impact_count"][-1])
     (51, 1)
+    >>> result = simulate(find("PRBDM"), {"release.displacement": "-10 mm"}, stop_time="20 ms")
+    >>> result.values["release.displacement"], float(result["time"][-1])
+    (-0.01, 0.02)
     """
-    if stop_time is None or step is None:
-        default = experiment(mechanism, changes)
-        stop_time = default.stop_time if stop_time is None else stop_time
-        step = default.step if step is None else step
-    times = communication_points(stop_time, step)
-    simulation = Simulation(mechanism, changes, tolerance=tolerance)
+    values = _values(mechanism, changes)
+    duration, spacing = (
+        None if x is None else _number(name, x, "s")
+        for name, x in (("stop_time", stop_time), ("step", step))
+    )
+    if duration is None or spacing is None:
+        default = experiment(mechanism, values)
+        duration = default.stop_time if duration is None else duration
+        spacing = default.step if spacing is None else spacing
+    times = communication_points(duration, spacing)
+    if tolerance is not None:
+        tolerance = _number("tolerance", tolerance, "")
+    simulation = Simulation(mechanism, values, tolerance=tolerance)
     simulation.record = []
     start = {**simulation.values, **simulation.given}
     rows = []
@@ -82,6 +97,35 @@ def simulate(
         if progress is not None:
             progress(k / (len(times) - 1))
     return Result(mechanism, start, structured(rows), tuple(simulation.record))
+
+
+def _values(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Mapping[str, float]:
+    """Return changes with texts converted to numbers in SI."""
+    texts = {name: x for name, x in (changes or {}).items() if isinstance(x, str)}
+    if not texts:
+        return changes or {}  # type: ignore[return-value]
+    from ..files.settings import units_of  # imported here: pint takes half a second
+
+    units = units_of(mechanism)
+    for name in texts:
+        if name not in units:
+            raise ParameterError(unknown(name, units))
+    return {
+        name: _number(name, x, units[name]) if isinstance(x, str) else x
+        for name, x in (changes or {}).items()
+    }
+
+
+def _number(name: str, value: Any, unit: str) -> float:
+    """Return a number in a unit, from a number or a text with a unit."""
+    if isinstance(value, str):
+        from ..files.settings import quantity  # imported here: pint takes half a second
+
+        return quantity(value, unit, f"{name} =")
+    if isinstance(value, bool | bytes) or not hasattr(value, "__float__"):
+        remedy = f', in {unit}, or a text, "1 {unit}"' if unit else ""
+        raise ParameterError(f"{name} = {value!r}: must be a number{remedy}")
+    return float(value)
 
 
 def communication_points(stop_time: float, step: float) -> list[float]:
