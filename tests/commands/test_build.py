@@ -257,10 +257,11 @@ def test_ctrl_c_during_the_build_leaves_no_file(tmp_path, monkeypatch, capsys):
 MISTAKES = {
     "--model PRBDM --set stop.restitutoin=0.5": "did you mean stop.restitution",
     "--model PRBDM --set stop.restitution=nan": "a finite number",
-    "--model PRBDM --set stop.restitution=high": "a finite number",
+    "--model PRBDM --set stop.restitution=high": "write a number",
     "--model PRBDM --set stop.restitution": "write NAME=VALUE",
     "--model PRBDM --set stop.restitution=1.5": "stop.restitution = 1.5 must be at most 1",
-    "--model PRBDM --set shuttle.x=0.1": "shuttle.x is computed by the model",
+    "--model PRBDM --set shuttle.x=0.1": "there is no variable 'shuttle.x'",
+    "--model PRBDM --set stop.position=1kg": "'kg' is the unit of something else",
     "--model PRBDM --set release.displacement=0.02": "penetrated",
     "--model PRBDM --set release.displacement=-0.2": "cannot be reached",
     "--model PRBDM3": "the shipped ones are Bistable, Cantilever",
@@ -276,6 +277,8 @@ MISTAKES = {
     "--fmi 1": "invalid choice",
     "--flavour wood": "invalid choice",
     "--nonsense": "unrecognized arguments: --nonsense",
+    "--flavor python": "did you mean --flavour?",
+    "--flavour pyton": "did you mean python?",
 }
 EPOCHS = {"999999999999999999": None, "soon": None, "86400": "1970-01-02T00:00:00Z"}
 
@@ -290,6 +293,11 @@ def test_mistakes_are_one_sentence_and_status_2(command, tmp_path, monkeypatch, 
     assert error.startswith("build_fmu.py: ")
     assert error.count("\n") == 1
     assert [*tmp_path.iterdir()] == [tmp_path / "file"]
+
+
+def test_start_values_may_have_units():
+    options = cli.parser().parse_args(["--model", "PRBDM", "--set", "stop.position=-2 mm"])
+    assert cli.start_values(cli.mechanisms(options), options.changes) == {"stop.position": -0.002}
 
 
 def test_list_prints_the_shipped_mechanisms(capsys):

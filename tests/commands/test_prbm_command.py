@@ -491,6 +491,37 @@ def test_commands_that_need_a_stop_report_a_missing_one(capsys):
         assert f"CrossPivot {sentence}: describe one, [[stops]]" in capsys.readouterr().err
 
 
+PROPOSALS = {
+    "modes PRBDM --cont 3": "unrecognized arguments: --cont; did you mean --count?",
+    "simulate PRBDM --stoptime=1": "--stoptime; did you mean --stop-time?",
+    "fit PRBDM --frequncy 5": "--frequncy; did you mean --frequency?",
+    "modes PRBDM --colour red": "unrecognized arguments: --colour; see prbm modes --help",
+    "mods PRBDM": "did you mean modes?",
+    "measure frequncy a.csv": "did you mean frequency?",
+    "impact-map PRBDM --method algebric": "did you mean algebraic?",
+    "--verson": "did you mean --version?",
+}
+
+
+@pytest.mark.parametrize("line", PROPOSALS)
+def test_similar_words_are_proposed_for_misspelt_options_and_commands(line, capsys):
+    assert run(line) == cli.MISTAKE
+    assert PROPOSALS[line] in capsys.readouterr().err
+
+
+def test_version_is_printed(capsys):
+    assert run("--version") == cli.OK
+    assert re.fullmatch(r"prbm-impact \d+\.\d+\.\d+\n", capsys.readouterr().out)
+
+
+def test_the_range_in_the_help_of_equilibrium_contains_all_equilibria(capsys):
+    assert run("equilibrium --help") == cli.OK
+    line = re.search(r"prbm (equilibrium Bistable --from \S+ --to \S+)", capsys.readouterr().out)[1]
+    assert run(line) == cli.OK
+    found = re.findall(r"equilibrium at (\S+) mm: (\w+)", capsys.readouterr().out)
+    assert found == [("0", "stable"), ("12", "unstable"), ("24", "stable")]
+
+
 def test_without_a_command_the_help_is_printed(capsys):
     assert run("") == cli.MISTAKE
     assert "examples:" in capsys.readouterr().err

@@ -1,12 +1,57 @@
-"""Arguments shared by several commands.
+"""Arguments shared by several commands, and a parser that proposes similar words.
 
 This module imports no slow packages, so that help appears at once.
 """
 
+import re
 from argparse import ArgumentParser
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 ANIMATION_USAGE = "[options] (RESULT.csv | MECHANISM | --model NAME | --mechanism FILE) OUT.gif"
+
+INVALID_CHOICE = re.compile(r"invalid choice: '(?P<word>.*?)' \(choose from (?P<choices>.*)\)")
+SIMILARITY_MIN = 0.6  # Of difflib, from 0 to 1, for a word to be proposed.
+
+
+class ProposingParser(ArgumentParser):
+    """A parser whose messages about unknown options and commands propose similar ones."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse arguments; report unknown options before missing arguments."""
+        if args is not None and not self.allow_abbrev and self._subparsers is None:
+            self._check_options(args)
+        return super().parse_known_args(args, namespace)
+
+    def _check_options(self, words: Sequence[str]) -> None:
+        """Report the first unknown option."""
+        for word in words:
+            if word == "--":
+                return
+            option = word.partition("=")[0]
+            if option.startswith("--") and option not in self._option_string_actions:
+                self.error(f"unrecognized arguments: {option}")
+
+    def proposed(self, message: str) -> str:
+        """Return a message of argparse with similar options or choices."""
+        invalid = INVALID_CHOICE.search(message)
+        if invalid:
+            choices = re.findall(r"[\w.-]+", invalid["choices"])
+            return f"{message}{_proposal(invalid['word'], choices)}"
+        prefix, _, words = message.partition("unrecognized arguments: ")
+        if not prefix and words.startswith("--"):
+            options = [x for x in self._option_string_actions if x.startswith("--")]
+            return f"{message}{_proposal(words.split()[0], options)}"
+        return message
+
+
+def _proposal(word: str, known: Iterable[str]) -> str:
+    from difflib import get_close_matches  # imported here: needed for mistakes only
+
+    names = {name.lstrip("-"): name for name in known}
+    near = get_close_matches(word.lstrip("-"), names, n=1, cutoff=SIMILARITY_MIN)
+    return f"; did you mean {names[near[0]]}?" if near else ""
 
 
 def picture_arguments(parser: ArgumentParser) -> None:

@@ -2,13 +2,14 @@
 
 import argparse
 import json
-import math
 import os
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import NoReturn
 
@@ -16,11 +17,11 @@ from ..base.atomic import check_no_folder, check_writable, write
 from ..base.errors import PrbmError
 from ..base.version import __version__
 from ..files.mechanism_file import load, schema, shipped
-from ..files.settings import UserMistake
+from ..files.settings import UserMistake, assigned, units_of
 from ..fmu import native_fmu, python_fmu
 from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
-from ..mechanics.inputs import input_names
 from ..mechanism.description import Mechanism
+from .arguments import ProposingParser
 from .program import FAILED, INTERRUPTED, MISTAKE, OK, command_name
 
 TERMINATION_TIMEOUT = 2.0  # Time for the process of a simulation to end after Ctrl-C [s].
@@ -47,11 +48,11 @@ NATIVE = {"2": Flavour("fmi2", 2), "3": Flavour("fmi3", 3)}
 CLOCKED = Flavour("fmi3-clock", 3, clock=True)
 
 
-class _Parser(argparse.ArgumentParser):
+class _Parser(ProposingParser):
     """A parser that raises a mistake as :class:`UserMistake`."""
 
     def error(self, message: str) -> NoReturn:
-        raise UserMistake(f"{message}; see {self.prog} --help")
+        raise UserMistake(f"{self.proposed(message)}; see {self.prog} --help")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -92,7 +93,8 @@ def parser() -> argparse.ArgumentParser:
     )  # fmt: skip
     p.add_argument(
         "--set", action="append", default=[], dest="changes", metavar="NAME=VALUE",
-        help="start value of a parameter or input, in SI units; repeatable",
+        help='start value of a parameter or input, in SI or with a unit: "stop.position=1 mm"; '
+        "repeatable",
     )  # fmt: skip
     p.add_argument(
         "--simulate", action="store_true",
@@ -230,15 +232,15 @@ class BuildPlan:
 
 def _plan(options: argparse.Namespace) -> BuildPlan:
     """Return the plan of a command line, after all checks that take no time."""
+    chosen = mechanisms(options)
     plan = BuildPlan(
-        tuple(mechanisms(options)),
-        start_values(options.changes),
+        tuple(chosen),
+        start_values(chosen, options.changes),
         selected_flavours(options),
         selected_platforms(options),
         bool(options.flavour or options.fmi or options.platform or options.clock),
         options.out,
     )
-    _check_names(plan.mechanisms, plan.changes)
     for flavour in plan.flavours:
         check_writable(plan.out / flavour.folder)
         for mechanism in plan.mechanisms:
@@ -272,32 +274,32 @@ def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
     return [load(files[name]) for name in names]
 
 
-def start_values(texts: Sequence[str]) -> dict[str, float]:
-    """Read NAME=VALUE pairs.
+def start_values(chosen: Sequence[Mechanism], texts: Sequence[str]) -> dict[str, float]:
+    """Read NAME=VALUE pairs of parameters and inputs of mechanisms, in SI or with a unit.
 
     Raises
     ------
     UserMistake
-        If a text is not such a pair.
+        If a text is not such a pair, or only some of the mechanisms have the variable.
+    ParameterError
+        If no mechanism has the variable.
 
     Examples
     --------
-    >>> start_values(["stop.restitution=0.5", "stop.position = 1e-3"])
+    >>> start_values([load(shipped()["PRBDM"])], ["stop.restitution=0.5", "stop.position = 1 mm"])
     {'stop.restitution': 0.5, 'stop.position': 0.001}
     """
-    changes = {}
-    for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not (name and equals and math.isfinite(number)):
+    units = {mechanism.name: units_of(mechanism) for mechanism in chosen}
+    changes = assigned(reduce(or_, units.values()), texts)
+    for name in changes:
+        having = [model for model in units if name in units[model]]
+        lacking = [model for model in units if name not in units[model]]
+        if lacking:
+            options = " ".join(f"--model {model}" for model in having)
             raise UserMistake(
-                f"--set {text}: write NAME=VALUE with a finite number in SI units, for instance "
-                "--set stop.restitution=0.5"
+                f"--set {name}: no such parameter or input in {', '.join(lacking)}; add {options} "
+                "to build only mechanisms that have it"
             )
-        changes[name] = number
     return changes
 
 
@@ -340,20 +342,6 @@ def _fmu(plan: BuildPlan, flavour: Flavour, mechanism: Mechanism) -> bytes:
         raise  # It does not depend on the mechanism.
     except PrbmError as error:
         raise UserMistake(f"{mechanism.name}: {error}") from None
-
-
-def _check_names(chosen: Sequence[Mechanism], changes: Mapping[str, float]) -> None:
-    """Reject start values of variables that only some of the mechanisms have."""
-    known = {m.name: {*m.values(), *input_names(m)} for m in chosen}
-    for name in changes:
-        having = [model for model in known if name in known[model]]
-        lacking = [model for model in known if name not in known[model]]
-        if having and lacking:
-            options = " ".join(f"--model {model}" for model in having)
-            raise UserMistake(
-                f"--set {name}: no such parameter or input in {', '.join(lacking)}; add {options} "
-                "to build only mechanisms that have it"
-            )
 
 
 def _progress(name: str) -> Callable[[str], None]:

@@ -16,9 +16,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..base.errors import EquilibriumError, PrbmError, SimulationError
+from ..base.version import __version__
 from ..mechanism.flexure import MODELS
 from .arguments import (
     ANIMATION_USAGE,
+    ProposingParser,
     animation_arguments,
     picture_arguments,
     set_argument,
@@ -38,11 +40,11 @@ class _ArgumentError(Exception):
     """Invalid command line."""
 
 
-class _Parser(argparse.ArgumentParser):
+class _Parser(ProposingParser):
     """A parser that reports a mistake in one sentence."""
 
     def error(self, message: str) -> NoReturn:
-        raise _ArgumentError(f"{self.prog}: {message}; see {self.prog} --help")
+        raise _ArgumentError(f"{self.prog}: {self.proposed(message)}; see {self.prog} --help")
 
 
 Commands = Any  # argparse does not name the type of add_subparsers()
@@ -109,6 +111,10 @@ def parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
+    p.add_argument(
+        "--version", action="version", version=f"prbm-impact {__version__}",
+        help="print the version and exit",
+    )  # fmt: skip
     commands = p.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
     _list(commands)
     _modes(commands)
@@ -170,7 +176,7 @@ def _equilibrium(commands: Commands) -> None:
         _examples(
             "prbm equilibrium PRBDM2R",
             "prbm equilibrium PRBDM2R --held -10 -5 5 10 mm",
-            "prbm equilibrium Bistable --from -14mm --to 14mm --out curve",
+            "prbm equilibrium Bistable --from -2mm --to 26mm --out curve",
         ),
     )  # fmt: skip
     _mechanism(parser)
@@ -596,7 +602,7 @@ def _run(words: Sequence[str]) -> int:
         name = options.prog
         _function(options.run)(options)
         return OK
-    except SystemExit:  # argparse has printed the help
+    except SystemExit:  # argparse has printed the help or the version
         return OK
     except _ArgumentError as error:
         return _reported(str(error), MISTAKE)
