@@ -128,6 +128,21 @@ class Results:
                     f"{part} cannot be read ({reason}); remove it, and its runs are done again"
                 ) from None
 
+    def sort(self) -> None:
+        """Replace all parts by one part with the rows in order, so that any reader gets them so.
+
+        A kill leaves the new part beside old ones; :meth:`read` drops the duplicate rows.
+        """
+        parts = self._parts()
+        rows = [row for _, table in self._tables() for row in table[ROW].to_pylist()]
+        if rows == sorted(rows):
+            return
+        table = pa.Table.from_pandas(self.read(), schema=self.schema, preserve_index=False)
+        self._write(table, self.folder / f"part-{0:06d}-{os.urandom(3).hex()}.parquet")
+        for part in parts:
+            part.unlink()
+        self.count = 1
+
     def forget_failures(self) -> None:
         """Remove the rows of failed runs, so that they are repeated."""
         for part, table in list(self._tables()):
@@ -157,7 +172,7 @@ class Results:
         self.count += 1
 
     def _write(self, table: Any, part: Path) -> None:
-        """Write a part under another name first: a kill leaves a draft, which nobody reads."""
+        """Write a part under another name and rename it; drafts left by a kill are ignored."""
         draft = part.with_name(f"_{part.name}.draft")
         try:
             with draft.open("wb") as file:

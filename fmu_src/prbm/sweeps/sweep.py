@@ -158,6 +158,7 @@ def sweep(
             if retry_failed:
                 results.forget_failures()
             _Sweep(client, plan, results, tell).run(rest, retries, timeout)
+    results.sort()
     return results.read()
 
 
