@@ -61,7 +61,7 @@ def test_commands_of_the_page_run_in_an_empty_folder(tmp_path, capsys):
             assert program == "prbm"
             assert run(words) == cli.OK, line
     printed = capsys.readouterr()
-    assert printed.err == "" or re.fullmatch(r"( *\d+% done\n)+", printed.err)
+    assert printed.err == "" or re.fullmatch(r"( *\d+% done(, \d+ (s|min) left)?\n)+", printed.err)
     for block in re.findall(r"```text\n(.*?)```", PAGE, re.DOTALL):
         assert block in printed.out
     for path in Path("results").glob("*.png"):

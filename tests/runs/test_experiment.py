@@ -1,6 +1,8 @@
 """The default experiment of mechanisms of any size, and its reference results."""
 
 import dataclasses
+import itertools
+import time
 
 import numpy as np
 import pytest
@@ -78,15 +80,36 @@ def test_motion_scales_with_the_size_of_the_mechanism():
     np.testing.assert_allclose(energy_a / small**3, energy_b / large**3, rtol=1e-6)
 
 
-def test_reference_results_are_omitted_if_they_take_minutes():
+@pytest.mark.parametrize(("links", "axial"), [(40, True), (12, False)])
+def test_reference_results_are_omitted_if_they_take_minutes(links, axial, monkeypatch):
+    """The first chain is excluded by its frequencies, the second one after 10,000 steps."""
+    monkeypatch.setattr(reference, "STEPS_MAX", 5e4)
     messages: list[str] = []
-    stiff = guide(0.1, "nR", n=40, axial=True)
-    assert reference.reference(stiff, {}, (), experiment(stiff), messages.append) == {}
-    assert messages == [
-        "no reference results: the default experiment takes the Python engine minutes"
-    ]
+    chain = guide(0.1, "nR", n=links, axial=axial)
+    begin = time.process_time()
+    assert reference.reference(chain, {}, (), experiment(chain), messages.append) == {}
+    assert time.process_time() - begin < 30.0
+    assert messages[-1] == f"no reference results: {reference.SLOW}"
+
+
+def test_reference_results_of_shipped_mechanisms_are_not_excluded_by_their_frequencies():
     for name in ("PRBDM2R", *COSTLY):
-        assert reference.steps(mechanism(name), {}, Experiment()) < reference.MOST_STEPS
+        assert reference.steps(mechanism(name), {}, Experiment()) < reference.STEPS_MAX
+
+
+def test_the_computation_of_reference_results_reports_its_progress(monkeypatch):
+    """The clock advances by a second at each of the 1001 communication points."""
+    clock = itertools.count()
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(clock)))
+    messages: list[str] = []
+    small = mechanism("PRBDM")
+    variables = interface(small, {})
+    assert reference.reference(
+        small, {"stop.offset": 1e-3}, variables, Experiment(), messages.append
+    )
+    assert messages[0] == "reference results   0% done"
+    assert "reference results  50% done, 8 min left" in messages
+    assert len(messages) == 200
 
 
 def test_damping_increases_the_estimated_number_of_steps():

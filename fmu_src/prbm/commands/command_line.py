@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..base.errors import EquilibriumError, PrbmError, SimulationError
+from ..base.progress import CLEAR
 from ..base.version import __version__
 from ..mechanism.flexure import MODELS
 from .arguments import (
@@ -647,6 +648,6 @@ def _status(error: Exception) -> int | None:
 def _reported(sentence: str, status: int) -> int:
     """Print a sentence on standard error; return the status."""
     if sys.stderr.isatty():
-        print("\r", end="", file=sys.stderr)  # Overwrite the line of the progress.
+        print(CLEAR, end="", file=sys.stderr)
     print(sentence, file=sys.stderr)
     return status

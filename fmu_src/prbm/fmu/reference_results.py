@@ -15,13 +15,15 @@ from xml.etree.ElementTree import Element, SubElement
 from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
+from ..base.progress import messages
 from ..hybrid.simulation import Simulation
 from ..interface.variables import Variable
+from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at
 from ..mechanism.description import Mechanism
 from ..runs.experiment import Experiment
 from ..runs.result import names
-from ..runs.run import simulate
+from ..runs.run import SlowSimulationError, simulate
 from .description import serialized
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -32,9 +34,11 @@ ATTRIBUTES = {
     "fmi-ls-description": "Layered Standard providing information on related files included in "
     "an FMU.",
 }
-DIGITS = 9  # significant; the engine's own error is larger
-MOST_STEPS = 1e5  # of the Python engine, which takes a minute or two for them
-STABLE = 3.0  # the step in units of what the fastest motion lets an explicit method take, 1/omega
+SLOW = "the default experiment takes the Python engine more than about half a minute"
+DIGITS = 9  # Significant digits; the error of the engine is larger.
+STEPS_MAX = 1e5  # Integration steps that the Python engine takes in about half a minute.
+LARGE = 40  # Mechanisms with more coordinates take fewer steps in that time.
+STABLE = 3.0  # Largest stable step of an explicit method, in units of 1/omega.
 
 
 def reference(
@@ -44,16 +48,18 @@ def reference(
     experiment: Experiment,
     progress: Callable[[str], None] = lambda step: None,
 ) -> dict[str, bytes]:
-    """Return the files by their paths in the FMU; none if the experiment cannot be finished.
+    """Return the files by their paths in the FMU.
 
-    Nor are there any if the Python engine would take minutes for it; ``progress`` is told why.
+    They are omitted if the default experiment fails, or takes the Python engine more than about
+    half a minute; ``progress`` is called with the reason.  The time is limited by a number of
+    integration steps, so that every machine builds the same FMU.
     """
-    if steps(mechanism, changes, experiment) > MOST_STEPS:
-        progress("no reference results: the default experiment takes the Python engine minutes")
-        return {}
-    columns = _columns(_Hashed(mechanism), tuple(changes.items()), experiment)
-    if columns is None:
-        progress("no reference results: the default experiment does not come to its end")
+    columns: NDArray[Any] | str = SLOW
+    if steps(mechanism, changes, experiment) <= STEPS_MAX:
+        cached = _Cached(mechanism, progress)
+        columns = _columns(cached, tuple(changes.items()), experiment)
+    if isinstance(columns, str):
+        progress(f"no reference results: {columns}")
         return {}
     outputs = [v.name for v in variables if v.causality == "output" and v.name in names(columns)]
     file = f"{mechanism.name}_out.csv"
@@ -77,14 +83,14 @@ def steps(mechanism: Mechanism, changes: Mapping[str, float], experiment: Experi
     return experiment.stop_time * fastest / STABLE
 
 
-class _Hashed:
-    """A mechanism that is looked up by its identity: it holds mappings, which have no hash."""
+class _Cached:
+    """A mechanism that is hashed by its identity, with a callback that is no part of the hash."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
+    def __init__(self, mechanism: Mechanism, progress: Callable[[str], None]) -> None:
+        self.mechanism, self.progress = mechanism, progress
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Hashed) and self.mechanism is other.mechanism
+        return isinstance(other, _Cached) and self.mechanism is other.mechanism
 
     def __hash__(self) -> int:
         return id(self.mechanism)
@@ -92,15 +98,24 @@ class _Hashed:
 
 @lru_cache(maxsize=2)
 def _columns(
-    hashed: _Hashed, changes: tuple[tuple[str, float], ...], experiment: Experiment
-) -> NDArray[Any] | None:
-    """Return the result of the default experiment; the FMUs of one export share it."""
+    cached: _Cached, changes: tuple[tuple[str, float], ...], experiment: Experiment
+) -> NDArray[Any] | str:
+    """Return the result of the default experiment, or the reason why there is none.
+
+    The FMUs of one export share it.
+    """
+    mechanism = cached.mechanism
+    size = assemble(mechanism, mechanism.values()).n
     try:
         result = simulate(
-            hashed.mechanism, dict(changes), stop_time=experiment.stop_time, step=experiment.step
-        )
+            mechanism, dict(changes), stop_time=experiment.stop_time, step=experiment.step,
+            steps_max=STEPS_MAX / max(1.0, size / LARGE) ** 2,
+            progress=messages(lambda text: cached.progress(f"reference results {text}")),
+        )  # fmt: skip
+    except SlowSimulationError:
+        return SLOW
     except PrbmError:
-        return None
+        return "the default experiment does not come to its end"
     return result.columns
 
 

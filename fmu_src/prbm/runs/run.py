@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ..base.errors import ParameterError
+from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.progress import Progress
 from ..hybrid.simulation import Simulation
@@ -15,6 +15,11 @@ from .result import Result, structured
 Source = Callable[[float], Mapping[str, float]]
 ROWS_MAX = 10_000_000  # More communication points are a mistake in the unit of the step.
 LAST_STEP_RTOL = 1e-9  # A last step below this fraction of a communication step is round-off.
+EARLY_SHARE = 0.2  # Share of the steps that may be taken early, where most impacts are.
+
+
+class SlowSimulationError(SimulationError):
+    """A simulation takes more integration steps than permitted."""
 
 
 def simulate(
@@ -26,6 +31,7 @@ def simulate(
     tolerance: float | None = None,
     source: Source | None = None,
     progress: Progress | None = None,
+    steps_max: float | None = None,
 ) -> Result:
     """Simulate a mechanism from its release.
 
@@ -46,6 +52,9 @@ def simulate(
         begins at that time [s].
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
+    steps_max : float or None
+        Most integration steps of the simulation; it is already abandoned if it takes more than a
+        proportional part of them.  None: no limit.
 
     Returns
     -------
@@ -61,6 +70,8 @@ def simulate(
         If a text is not a quantity of the right dimension.
     EquilibriumError, SimulationError
         As :class:`prbm.Simulation`.
+    SlowSimulationError
+        If the simulation takes more than ``steps_max`` steps.
 
     Examples
     --------
@@ -90,6 +101,8 @@ def simulate(
     rows = []
     for k, t in enumerate(times):
         simulation.advance(t)
+        if steps_max is not None:
+            _check_steps(simulation, steps_max, k / (len(times) - 1))
         outputs = simulation.outputs()
         if source is not None:
             simulation.set(source(t))
@@ -97,6 +110,15 @@ def simulate(
         if progress is not None:
             progress(k / (len(times) - 1))
     return Result(mechanism, start, structured(rows), tuple(simulation.record))
+
+
+def _check_steps(simulation: Simulation, steps_max: float, fraction: float) -> None:
+    """Reject a simulation that takes more than a proportional part of the steps."""
+    if simulation.step_count > steps_max * max(fraction, EARLY_SHARE):
+        raise SlowSimulationError(
+            f"the simulation takes {simulation.step_count} integration steps until t = "
+            f"{simulation.time:.6g} s; at most {steps_max:g} are permitted in total"
+        )
 
 
 def _values(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Mapping[str, float]:
