@@ -29,6 +29,18 @@ def frequency_unit(frequency: float) -> tuple[float, str]:
     return 1e-9, "GHz"
 
 
+def frequency_text(frequency: float, digits: int = 4) -> str:
+    """Return a frequency [Hz] with its display unit.
+
+    Examples
+    --------
+    >>> frequency_text(4.957), frequency_text(92086.3), frequency_text(12345.0, 5)
+    ('4.957 Hz', '92.09 kHz', '12.345 kHz')
+    """
+    factor, name = frequency_unit(frequency)
+    return f"{factor * frequency:.{digits}g} {name}"
+
+
 def time_unit(span: float) -> tuple[float, str]:
     """Return the display unit of a duration [s], as its factor and name.
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.unit_text import frequency_unit
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.modal import modes
@@ -77,7 +78,10 @@ def _shares(system: System, e: Complex, phi: Real) -> list[float]:
 
 
 def _hertz(frequency: float) -> str:
-    return f"{frequency:#.5g} Hz" if frequency > 0.0 else "unstable"
+    if frequency <= 0.0:
+        return "unstable"
+    factor, unit = frequency_unit(frequency)
+    return f"{factor * frequency:#.5g} {unit}"
 
 
 def _where(system: System, shape: Equilibrium, at: float | None) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..analysis.stretching import notes
 from ..base.progress import reporter
+from ..base.unit_text import frequency_text
 from ..files.mechanism_file import find
 from ..files.settings import UserMistake, quantity, settings
 from ..mechanics.arrays import Real
@@ -120,7 +121,7 @@ def _spectrum(
         + (" without the wall" if options.spectrum == "first" else "")
         + f", resolution {grid[1]:.3g} Hz"
     )
-    print("modes at that shape  " + ", ".join(f"{i}: {f:.4g} Hz" for i, f in modes))
+    print("modes at that shape  " + ", ".join(f"{i}: {frequency_text(f)}" for i, f in modes))
     _print_peaks(lines, assemble(mechanism, mechanism.values()).length)
     output.table(
         f"{mechanism.name}-spectrum.csv",
@@ -143,4 +144,4 @@ def _print_peaks(lines: Mapping[str, tuple[Real, Real]], size: float) -> None:
         speed = float(amplitude.max()) * (size if name == "turning" else 1.0)
         significant = speed > ZERO_RTOL * largest
         found = peaks(frequency, amplitude)[:PEAKS_MAX].tolist() if significant else []
-        print(f"peaks {name:14} {', '.join(f'{f:.4g} Hz' for f in found) or 'none'}")
+        print(f"peaks {name:14} {', '.join(map(frequency_text, found)) or 'none'}")
