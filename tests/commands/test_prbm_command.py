@@ -248,7 +248,7 @@ def test_validate_compares_a_mechanism_with_elements_and_measurements(capsys):
     assert Path("Cantilever-comparison.png").exists()
 
 
-def test_a_map_of_one_point_has_no_surface(capsys):
+def test_maps_of_several_methods_share_a_table_and_a_figure(capsys):
     line = "impact-map PRBDM2R --wall-positions -5mm --offsets 2mm --method algebraic closed-form "
     line += "--out ."
     assert run(line) == cli.OK
@@ -274,6 +274,18 @@ def test_a_map_of_one_point_has_no_surface(capsys):
 def test_inextensible_flexures_cause_a_note_for_hits_off_the_centre(line, notes, capsys):
     assert run(line) == cli.OK
     assert capsys.readouterr().out.count("hits 3 mm off the centre of mass of shuttle") == notes
+
+
+@pytest.mark.parametrize(("release", "expected"), [("-18 mm", 0.01), ("-1 mm", 4e-4)])
+def test_default_wall_positions_are_round_numbers(release, expected):
+    assert run(f'impact-map PRBDM --set "release.displacement={release}" --offsets 0 --out .') == 0
+    found = [float(x) for x in table("PRBDM-impact-map.csv")["wall position [m]"]]
+    np.testing.assert_allclose(found, np.array([-1, -0.5, 0, 0.5, 1]) * expected, rtol=1e-12)
+
+
+def test_frequencies_above_ten_kilohertz_are_printed_in_khz(capsys):
+    assert run("modes PRBDM2RAxial --set flexure.length=4mm") == cli.OK
+    assert re.search(r"\d+\.\d+ kHz", capsys.readouterr().out)
 
 
 WEIGHTLESS = "--set gravity.x=0"

@@ -1,11 +1,10 @@
 """``prbm impact-map``: modal restitution over positions of the wall and offsets of the hit."""
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-
-import numpy as np
 
 from ..analysis import impact_map
 from ..analysis.impact_map import ImpactMap
@@ -20,9 +19,10 @@ from ..plots import impact_map as figures
 from .output import Output
 from .systems import check_length
 
-# The proportions of the grid in the thesis, for mechanisms of any size.
+# The default grid has about the proportions of that in the thesis, in round numbers.
 WALL_SHARE = 5 / 9  # Largest default wall position, as a share of the displacement at release.
 OFFSET_SHARE = 1 / 20  # Largest default offset, as a share of the size of the mechanism.
+ROUND_RTOL = 1e-9  # Smaller excesses over a round number are round-off.
 GRID = (-1.0, -0.5, 0.0, 0.5, 1.0)  # Default positions and offsets, relative to the largest.
 POINTS_MAX = 400  # Points of a map.
 FLEXURE_METHODS = {"algebraic", "simulated", "fitted"}  # Methods that depend on flexure models.
@@ -47,12 +47,13 @@ def mapped(options: argparse.Namespace) -> None:
     jobs = list(_jobs(options, mechanism, values, positions, offsets))
     report = reporter()
     maps = [job(_part(report, k, len(jobs))) for k, job in enumerate(jobs)]
-    print("modal restitution over wall positions h and offsets d of the hit point")
+    name = mechanism.name
+    print(f"{name}: modal restitution over wall positions h and offsets d of the hit point")
     for one in maps:
         print(one)
     for sentence in _notes(options, mechanism, values, positions, offsets):
         print(sentence)
-    _add_files(maps, output, mechanism.name)
+    _add_files(maps, output, name, mechanism.title)
     output.write()
 
 
@@ -76,7 +77,7 @@ def _points(
         texts = getattr(options, name.replace("-", "_"))
         chosen = (
             quantities(texts, "m", f"--{name}") if texts
-            else [float(f"{scale * share:.3g}") for share in GRID]
+            else [rounded_down(scale) * share for share in GRID]
         )  # fmt: skip
         if scale == 0.0 and not texts:
             raise UserMistake(
@@ -92,6 +93,21 @@ def _points(
             f"{len(positions) * len(offsets)} points; choose at most {POINTS_MAX}"
         )
     return positions, offsets
+
+
+def rounded_down(x: float) -> float:
+    """Return the largest number 1, 2, 4, 6 or 8 times a power of ten up to x; 0 for 0.
+
+    Examples
+    --------
+    >>> [rounded_down(x) for x in (0.01, 0.004, 5.56e-7, 0.0)]
+    [0.01, 0.004, 4e-07, 0.0]
+    """
+    if x == 0.0:
+        return 0.0
+    power = math.floor(math.log10(x * (1.0 + ROUND_RTOL)))
+    limit = x * (1.0 + ROUND_RTOL)
+    return max(y for digit in (1, 2, 4, 6, 8) if (y := float(f"{digit}e{power}")) <= limit)
 
 
 def _jobs(
@@ -161,15 +177,13 @@ def _label(model: str, n: int, axial: bool) -> str:
     return (f"{n}R" if n else model) + (" axial" if axial else "")
 
 
-def _add_files(maps: Sequence[ImpactMap], output: Output, name: str) -> None:
+def _add_files(maps: Sequence[ImpactMap], output: Output, name: str, title: str) -> None:
     """Add tables and figures of maps to the output."""
     head, rows = maps[0].csv().split("\n", 1)
     rest = [one.csv().split("\n", 1)[1] for one in maps[1:]]
     output.text(f"{name}-impact-map.csv", head + "\n" + rows + "".join(rest))
-    output.figure(f"{name}-impact-map.png", lambda: figures.heat_map(maps))
-    if np.all(np.array(maps[0].restitution.shape) > 1):
-        output.figure(f"{name}-impact-map-3d.png", lambda: figures.surface(maps))
+    output.figure(f"{name}-impact-map.png", lambda: figures.heat_map(maps, title=title))
     for one in maps:
         if one.hits:
             slug = re.sub(r"[^\w.]+", "-", one.label)
-            output.figure(f"{name}-energies-{slug}.png", partial(figures.energies, one))
+            output.figure(f"{name}-energies-{slug}.png", partial(figures.energies, one, title))
