@@ -49,14 +49,15 @@ def test_default_experiments_of_shipped_mechanisms_take_one_second(name):
     assert Experiment().step == 1e-3
 
 
-@pytest.mark.parametrize("size", [2e-5, 2e-4, 0.2, 20.0])
-def test_default_experiments_have_1_to_1000_periods_at_any_size(size):
-    """About ten periods, if one second has fewer than one or more than a thousand."""
+@pytest.mark.parametrize("size", [2e-5, 2e-4, 0.02, 0.2, 20.0])
+def test_default_experiments_have_1_to_25_periods_at_any_size(size):
+    """About ten periods, if one second has fewer than 1 or more than 25: 40 rows in each period."""
     scaled = guide(size)
     chosen = experiment(scaled)
     frequency = Simulation(scaled).outputs()["mode.frequency"]
-    assert 1.0 <= chosen.stop_time * frequency <= 1000.0
-    if not 1.0 <= frequency <= 1000.0:
+    assert 1.0 <= chosen.stop_time * frequency <= 25.0
+    assert chosen.step * frequency <= 1.0 / 40.0
+    if not 1.0 <= frequency <= 25.0:
         assert 5.0 <= chosen.stop_time * frequency <= 20.0
     assert chosen.step == pytest.approx(chosen.stop_time / 1000, rel=1e-15)
 

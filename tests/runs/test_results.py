@@ -2,12 +2,15 @@
 
 import io
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy.util
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from PIL import Image
 
 from prbm.base.errors import PrbmError
@@ -17,6 +20,7 @@ from prbm.files.mechanism_file import load, shipped
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.description import Mechanism
 from prbm.plots.figures import response
+from prbm.runs.headline import headline
 from prbm.runs.result import Result, ResultError, read_csv, rest_time
 from prbm.runs.run import simulate
 
@@ -232,3 +236,79 @@ def test_the_response_has_a_panel_per_recorded_quantity(result: Result) -> None:
         response(result.columns[["time"]], result.mechanism)
     with pytest.raises(ResultError, match="give the mechanism"):
         response(few)
+
+
+STIFF = {"flexure.thickness": 1e-3, "release.displacement": -3e-3}  # 150 Hz
+
+
+def test_the_time_axis_ends_shortly_after_the_motion_has_settled(
+    mechanisms: dict[str, Mechanism],
+) -> None:
+    """The stiff guide comes to rest at 36 ms; the free guide moves to the end of the result."""
+    stiff = response(simulate(mechanisms["PRBDM"], STIFF, stop_time=0.2, step=1e-3))
+    assert 36.0 < stiff.axes[-1].get_xlim()[1] < 45.0
+    assert stiff.axes[-1].get_xlabel() == "time [ms]"
+    free = simulate(mechanisms["PRBDM"], {"stop.position": 0.03}, stop_time=0.2)
+    assert response(free).axes[-1].get_xlim()[1] == pytest.approx(200.0)
+
+
+def test_a_result_without_motion_is_reported_and_not_plotted(
+    mechanisms: dict[str, Mechanism],
+) -> None:
+    """Released in the straight equilibrium without gravity, with round-off in the columns."""
+    at_rest = {"gravity.x": 0.0, "release.displacement": 0.0, "stop.position": 5e-3}
+    still = simulate(mechanisms["PRBDM2R"], at_rest, stop_time=0.05)
+    still.columns["shuttle.x"][::2] += 1e-16
+    (axes,) = response(still).axes
+    assert not axes.lines
+    assert [text.get_text() for text in axes.texts] == ["nothing moves in 0.05 s"]
+    lines = headline(still.columns, still.mechanism, still.values)
+    assert any("nothing moves" in line for line in lines)
+    moving = simulate(mechanisms["PRBDM2R"], at_rest | {"force.x": 1e-6}, stop_time=0.05)
+    lines = headline(moving.columns, moving.mechanism, moving.values)
+    assert not any("nothing moves" in line for line in lines)
+
+
+def wall_of(figure: Figure) -> Line2D:
+    """Return the line of the wall in the panel of the displacement."""
+    (line,) = [line for line in figure.axes[0].lines if line.get_label() == "wall"]
+    return line
+
+
+def test_the_panel_of_the_displacement_shows_the_wall(mechanisms: dict[str, Mechanism]) -> None:
+    """A fixed wall off the centre of mass, a moving wall, and a wall on another body."""
+    guide = mechanisms["PRBDM2R"]
+    fixed = simulate(guide, {"stop.position": -2e-3, "stop.offset": 4e-3}, stop_time=0.1)
+    np.testing.assert_allclose(wall_of(response(fixed)).get_ydata(), -2.0, atol=0.05)
+    moving = simulate(
+        mechanisms["PRBDM"],
+        stop_time=0.1,
+        source=lambda t: {"stop.displacement": 1e-3 * t / 0.1, "stop.velocity": 1e-2},
+    )
+    assert wall_of(response(moving)).get_ydata()[-1] == pytest.approx(1.0, rel=0.02)
+    pair = simulate(load(shipped()["ImpactOscillator"]), stop_time=0.2)
+    expected = 1e3 * pair["oscillator.x"] + 2.0
+    np.testing.assert_allclose(wall_of(response(pair)).get_ydata(), expected, atol=1e-6)
+    far = simulate(mechanisms["PRBDM"], {"stop.position": 0.079}, stop_time=0.01)
+    assert "wall" not in [line.get_label() for line in response(far).axes[0].lines]
+
+
+@pytest.mark.parametrize("speeds", [[0.5], [0.9, 0.3], [0.3, 0.04], [0.9, 0.2, 0.03], [2.0, 1e-4]])
+def test_axes_of_impact_speeds_have_several_labels(result: Result, speeds: list[float]) -> None:
+    impacts = tuple(
+        replace(impact, latched=replace(impact.latched, approach_speed=v, rebound_speed=0.6 * v))
+        for impact, v in zip(result.impacts, speeds, strict=False)
+    )
+    figure = response(replace(result, impacts=impacts))
+    figure.draw_without_rendering()
+    axes = figure.axes[2]
+    low, high = axes.get_ylim()
+    labels = zip(axes.get_yticks(), axes.get_yticklabels(), strict=True)
+    assert len([text for y, text in labels if low <= y <= high and text.get_text()]) >= 2
+
+
+def test_units_of_the_panels_follow_the_magnitudes(mechanisms: dict[str, Mechanism]) -> None:
+    small = {"release.displacement": -1e-5, "gravity.x": 0.0, "stop.rest_speed": 1e-6}
+    figure = response(simulate(mechanisms["PRBDM"], small, stop_time=0.1))
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == ["displacement [µm]", "velocity [mm/s]", "impact speed [mm/s]", "energy [nJ]"]

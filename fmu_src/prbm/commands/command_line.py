@@ -207,7 +207,8 @@ def _simulate(commands: Commands) -> None:
     stop_time_argument(parser)
     add(
         "--step", metavar="T",
-        help="time between rows of the table [s] (default: a thousandth of the duration)",
+        help="time between rows of the table [s] (default: at most a thousandth of the duration, "
+        "and at least 40 rows per fundamental period)",
     )  # fmt: skip
     add(
         "--tolerance", metavar="X",

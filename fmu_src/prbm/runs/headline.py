@@ -8,7 +8,7 @@ from ..mechanics.statics import free_displacement
 from ..mechanics.system import System, unit
 from ..mechanism.description import Mechanism
 from .marks import marks
-from .result import Columns, column, rest_time
+from .result import Columns, column, moves, rest_time
 
 FREQUENCY = "mode.frequency"
 SECONDS_MIN = 0.1  # Times of shorter runs are printed in ms or µs [s].
@@ -76,6 +76,11 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
     time = column(columns, "time")
     span = float(time[-1] - time[0])
     lines = _free(columns, system)
+    if not moves(columns, mechanism, system.length):
+        lines.append(
+            "motion               nothing moves: release the mechanism away from its equilibrium, "
+            "or apply an input"
+        )
     impacts = marks(columns, mechanism)
     for i, stop in enumerate(s.name for s in mechanism.stops):
         count = int(column(columns, f"{stop}.impact_count")[-1])

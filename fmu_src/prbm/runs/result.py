@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
 from ..hybrid.impacts import Impact
+from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 
 Columns = NDArray[Any]
+ZERO_MOTION_RTOL = 1e-9  # Smaller motions, relative to the size of the mechanism, are round-off.
 BOOLEANS = {"true": 1.0, "false": 0.0}  # Texts that some tools write for Booleans.
 
 
@@ -126,6 +128,36 @@ def read_csv(path: str | Path) -> Columns:
 def _number(cell: str) -> float:
     """Return the number in a cell; 1 or 0 for a Boolean."""
     return BOOLEANS[cell.lower()] if cell.lower() in BOOLEANS else float(cell)
+
+
+def body_motions(columns: Columns, mechanism: Mechanism, size: float) -> list[Real]:
+    """Return the recorded displacements and rotations of the bodies, rotations times the size [m].
+
+    Parameters
+    ----------
+    columns : structured array
+        The result.
+    mechanism : Mechanism
+        The mechanism that was simulated.
+    size : float
+        Size of the mechanism [m].
+    """
+    scales = {"x": 1.0, "y": 1.0, "angle": size}
+    return [
+        scale * columns[f"{body.name}.{name}"]
+        for body in mechanism.bodies
+        for name, scale in scales.items()
+        if f"{body.name}.{name}" in names(columns)
+    ]
+
+
+def moves(columns: Columns, mechanism: Mechanism, size: float) -> bool:
+    """Return whether a body moves by more than round-off; true if no motion was recorded.
+
+    Parameters as for :func:`body_motions`.
+    """
+    motions = body_motions(columns, mechanism, size)
+    return not motions or any(float(np.ptp(x)) > ZERO_MOTION_RTOL * size for x in motions)
 
 
 def rest_time(columns: Columns, stop: str = "stop") -> float | None:
