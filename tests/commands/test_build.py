@@ -515,9 +515,9 @@ def test_ctrl_c_during_the_imports_has_no_traceback(monkeypatch, capsys):
 def test_a_missing_package_is_named(monkeypatch, capsys):
     monkeypatch.delitem(sys.modules, "prbm.commands.building")
     monkeypatch.delattr(sys.modules["prbm.commands"], "building")
-    monkeypatch.setitem(sys.modules, "prbm.mechanics.inputs", None)
+    monkeypatch.setitem(sys.modules, "prbm.base.atomic", None)
     assert command.main() == cli.MISTAKE
-    assert "the Python package prbm.mechanics.inputs is missing" in capsys.readouterr().err
+    assert "the Python package prbm.base.atomic is missing" in capsys.readouterr().err
 
 
 FILES = {
