@@ -98,6 +98,24 @@ def test_reference_results_of_shipped_mechanisms_are_not_excluded_by_their_frequ
         assert reference.steps(mechanism(name), {}, Experiment()) < reference.STEPS_MAX
 
 
+def test_versions_of_fmi_share_the_reference_results_of_many_mechanisms(monkeypatch):
+    """All FMUs of one version are built before those of the next."""
+    computed: list[str] = []
+    simulate = reference.simulate
+
+    def counted(one, *arguments, **options):
+        computed.append(one.name)
+        return simulate(one, *arguments, **options)
+
+    monkeypatch.setattr(reference, "simulate", counted)
+    short = Experiment(0.003)
+    chosen = [dataclasses.replace(mechanism("PRBDM"), name=f"Guide{k}") for k in range(8)]
+    for _ in ("FMI 2.0", "FMI 3.0"):
+        for one in chosen:
+            assert reference.reference(one, {}, interface(one, {}), short)
+    assert computed == [one.name for one in chosen]
+
+
 def test_the_computation_of_reference_results_reports_its_progress(monkeypatch):
     """The clock advances by a second at each of the 1001 communication points."""
     clock = itertools.count()

@@ -37,6 +37,7 @@ ATTRIBUTES = {
 SLOW = "the default experiment takes the Python engine more than about half a minute"
 DIGITS = 9  # Significant digits; the error of the engine is larger.
 STEPS_MAX = 1e5  # Integration steps that the Python engine takes in about half a minute.
+CACHED_MAX = 32  # Results in memory: FMI 2.0 and 3.0 share them, mechanism by mechanism.
 LARGE = 40  # Mechanisms with more coordinates take fewer steps in that time.
 STABLE = 3.0  # Largest stable step of an explicit method, in units of 1/omega.
 
@@ -96,7 +97,7 @@ class _Cached:
         return id(self.mechanism)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=CACHED_MAX)
 def _columns(
     cached: _Cached, changes: tuple[tuple[str, float], ...], experiment: Experiment
 ) -> NDArray[Any] | str:
