@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..analysis.holding import Curve
-from ..base.unit_text import length_unit
+from ..base.unit_text import frequency_unit, length_unit
 from ..drawing.style import IMPACT, PAST, REST, own_style
 from ..mechanics.arrays import Real
 from .scene import plain
@@ -80,14 +80,16 @@ def _draw_frequency(axes: Axes, curve: Curve, factor: float) -> None:
     """Draw the fundamental frequency where the free mechanism is stable."""
     x = np.array([point.displacement for point in curve.points])
     hertz = _frequencies(curve)
-    axes.plot(factor * x, np.where(hertz > 0.0, hertz, np.nan), color=PAST, linewidth=1.2)
+    scale, unit = frequency_unit(float(hertz.max()))
+    shown = np.where(hertz > 0.0, scale * hertz, np.nan)
+    axes.plot(factor * x, shown, color=PAST, linewidth=1.2)
     if (hertz <= 0.0).any():
         axes.annotate(
             "shaded: unstable when released", (0.5, 0.06), xycoords="axes fraction", ha="center",
             fontsize=9, color=IMPACT,
         )  # fmt: skip
-    axes.set_ylim(0.0, 1.15 * max(float(hertz.max()), 0.0) or 1.0)
-    axes.set_ylabel("fundamental [Hz]")
+    axes.set_ylim(0.0, 1.15 * scale * max(float(hertz.max()), 0.0) or 1.0)
+    axes.set_ylabel(f"fundamental [{unit}]")
 
 
 def _shade_unstable(every: list[Axes], x: Real, hertz: Real) -> None:
