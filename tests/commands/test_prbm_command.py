@@ -276,6 +276,17 @@ def test_inextensible_flexures_cause_a_note_for_hits_off_the_centre(line, notes,
     assert capsys.readouterr().out.count("hits 3 mm off the centre of mass of shuttle") == notes
 
 
+def test_former_names_of_the_options_of_impact_maps_are_accepted_but_not_listed(capsys):
+    """Scripts outside this project use them."""
+    former = "impact-map PRBDM --heights 0 --offsets 0 --way closed-form"
+    present = "impact-map PRBDM --wall-positions 0 --offsets 0 --method closed-form"
+    assert run(former) == run(present) == cli.OK
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[: len(lines) // 2] == lines[len(lines) // 2 :]
+    assert run("impact-map --help") == cli.OK
+    assert not re.search("--heights|--way", capsys.readouterr().out)
+
+
 @pytest.mark.parametrize(("release", "expected"), [("-18 mm", 0.01), ("-1 mm", 4e-4)])
 def test_default_wall_positions_are_round_numbers(release, expected):
     assert run(f'impact-map PRBDM --set "release.displacement={release}" --offsets 0 --out .') == 0
