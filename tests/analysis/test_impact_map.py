@@ -105,7 +105,7 @@ def test_the_closed_form_is_refused_where_the_body_turns_or_others_move(name, he
     m = mechanism(name)
     with pytest.raises(ParameterError, match=said) as error:
         impact_map.closed_form(m, [height], [offset])
-    assert "choose another way" in str(error.value)
+    assert "choose another method" in str(error.value)
 
 
 def test_the_closed_form_is_refused_where_a_lever_makes_a_little_turning_much():

@@ -396,7 +396,7 @@ MISTAKES = [
     ("impact-map ImpactOscillator", "position of impact is an expression"),
     ("impact-map PRBDM --wall-positions 1 1 mm", "a value is given twice"),
     ("impact-map PRBDM --set release.displacement=0", "no default wall positions; give"),
-    ("impact-map Cantilever --wall-positions 3mm --method closed-form", "choose another"),
+    ("impact-map Cantilever --wall-positions 3mm --method closed-form", "choose another method"),
     ("impact-map PRBDM --method magic", "invalid choice: 'magic'"),
     ("impact-map PRBDM --axial", "--axial needs --model"),
     ("impact-map PRBDM --model nR --links 0", "--links 0: must be at least 1"),

@@ -3,7 +3,7 @@
 :func:`compare` evaluates the same quantities by the pseudo-rigid-body model and by finite elements
 of the same file, and compares them with measured values and their uncertainties:
 
-* the place of rest of the released body, and the lowest frequencies about that shape;
+* the equilibrium of the released body under gravity, and the lowest frequencies about that shape;
 * the holding force in the drawn shape, the stiffness and the frequencies there;
 * the modal restitution of an arriving fundamental mode, for every wall that a force on the released
   body reaches.

@@ -346,7 +346,7 @@ def fitted_restitution(
     """Fit the restitution of a stop to a bouncing response.
 
     The 1R guide has no other mode: its restitution is the restitution in the fundamental mode as
-    the source defines it, for all measured mechanisms.  It is one number for all impacts of the
+    the thesis defines it, for all measured mechanisms.  It is one number for all impacts of the
     record.  If an impact leaves much energy in other modes, the following impacts depend on it, and
     the number differs from that of the first one (:func:`prbm.mechanics.modal.modal_restitution`).
 

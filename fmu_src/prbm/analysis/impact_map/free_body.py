@@ -30,7 +30,7 @@ PATH_STEP = 1e-4  # Half of the step along the path of a body, as a share of the
 TURNING_MAX = 0.02  # Largest motion by turning at the hit point, as a share of the path.
 ENERGY_SHARE_MIN = 0.95  # Least share of the body in the kinetic energy of the fundamental mode.
 _UNFIT = "the closed form is that of"
-_OTHER_WAYS = "choose another way: algebraic, simulated or elements"
+_OTHERS = "choose another method: algebraic, simulated or elements"
 
 
 def closed_form(
@@ -64,7 +64,7 @@ def closed_form(
     s = mechanism.stops[which.index]
     if s.on != GROUND:
         raise ParameterError(
-            f"{_UNFIT} a stop on the ground, but {s.name} is on {s.on}, which moves; {_OTHER_WAYS}"
+            f"{_UNFIT} a stop on the ground, but {s.name} is on {s.on}, which moves; {_OTHERS}"
         )
     result = np.zeros((len(offsets), len(heights)))
     system = assemble(mechanism, mechanism.values(which.at(values, 0.0, 0.0)))
@@ -93,7 +93,7 @@ def _path(system: System, body: str, shape: Equilibrium) -> tuple[complex, float
     if abs(moved) <= PATH_RTOL * step:
         raise ParameterError(
             f"{_UNFIT} a body that moves along a path, but {body} does not move, or turns on the "
-            f"spot; {_OTHER_WAYS}"
+            f"spot; {_OTHERS}"
         )
     return moved / abs(moved), float(ahead[frame.j] - behind[frame.j]) / abs(moved)
 
@@ -110,7 +110,7 @@ def _check_alone(
         raise ParameterError(
             f"{_UNFIT} a body that does not turn, but {where} {body} turns: where it is hit, or at "
             f"its radius of gyration, by {100 * abs(turns):.3g} % of its path (at most "
-            f"{100 * TURNING_MAX:g} %); {_OTHER_WAYS}"
+            f"{100 * TURNING_MAX:g} %); {_OTHERS}"
         )
     _, velocity = system.motion(
         system.bodies[body], system.directions(shape.q), modes(system, shape).shape[:, 0]
@@ -122,5 +122,5 @@ def _check_alone(
             f"{_UNFIT} a body that moves alone, but {where} the motion of {body} along its path is "
             f"{100 * share:.3g} % of the fundamental's kinetic energy (at least "
             f"{100 * ENERGY_SHARE_MIN:g} %): other bodies or the flexures move with it; "
-            f"{_OTHER_WAYS}"
+            f"{_OTHERS}"
         )

@@ -1,8 +1,9 @@
 r"""Impact maps: the modal restitution over positions of the wall and offsets of the hit.
 
 The modal restitution is the velocity of the fundamental mode after an impact over that before,
-reversed.  The source of this package measures it at 5 x 5 walls and offsets.  The routes to a map
-are in :mod:`prbm.analysis.impact_map.routes` and :mod:`prbm.analysis.impact_map.free_body`.
+reversed.  The thesis behind this package measures it at 5 x 5 walls and offsets.  The methods that
+compute a map are in :mod:`prbm.analysis.impact_map.routes` and
+:mod:`prbm.analysis.impact_map.free_body`.
 """
 
 import csv
@@ -20,8 +21,8 @@ from ...mechanics.arrays import Real
 from ...mechanism.description import Mechanism
 from ..touching import stop_index
 
-HEIGHTS = (-10e-3, -5e-3, 0.0, 5e-3, 10e-3)  # Positions of the wall in the source [m].
-OFFSETS = (-4e-3, -2e-3, 0.0, 2e-3, 4e-3)  # Offsets of the hit in the source [m].
+HEIGHTS = (-10e-3, -5e-3, 0.0, 5e-3, 10e-3)  # Positions of the wall in the thesis [m].
+OFFSETS = (-4e-3, -2e-3, 0.0, 2e-3, 4e-3)  # Offsets of the hit point in the thesis [m].
 ENERGY_SHOWN_MIN = 5e-5  # Least share of the energy of a mode in a table.
 
 
