@@ -269,6 +269,21 @@ def test_a_result_without_motion_is_reported_and_not_plotted(
     assert not any("nothing moves" in line for line in lines)
 
 
+def test_round_off_of_a_resting_body_is_not_drawn() -> None:
+    """The oscillator moves; the hammer, which is the released body, stays at rest."""
+    pair = load(shipped()["ImpactOscillator"])
+    start = {"release.displacement": 0.0}
+    result = simulate(pair, start, stop_time=0.05)
+    result.columns["oscillator.x"] += 1e-4 * np.sin(100.0 * result["time"])
+    result.columns["hammer.x"] += 1e-17 * np.sin(300.0 * result["time"])
+    result.columns["hammer.vx"] += 1e-15
+    axes, velocity, *_ = response(result).axes
+    for panel in (axes, velocity):
+        np.testing.assert_array_equal(panel.lines[0].get_ydata(), 0.0)
+    low, high = axes.get_ylim()
+    assert low < -1.0 < 1.0 < high  # [mm]
+
+
 def wall_of(figure: Figure) -> Line2D:
     """Return the line of the wall in the panel of the displacement."""
     (line,) = [line for line in figure.axes[0].lines if line.get_label() == "wall"]

@@ -17,7 +17,16 @@ from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import GROUND
 from ..runs.marks import Mark, marks
-from ..runs.result import Columns, Result, ResultError, body_motions, column, moves, names
+from ..runs.result import (
+    ZERO_MOTION_RTOL,
+    Columns,
+    Result,
+    ResultError,
+    body_motions,
+    column,
+    moves,
+    names,
+)
 from .scene import plain
 
 ENERGIES = {  # Colours that colour-blind readers can distinguish.
@@ -85,6 +94,13 @@ class _Plot:
         body, u = self.mechanism.release.body, unit(self.mechanism.release.direction)
         result: Real = u.real * self.columns[f"{body}.{x}"] + u.imag * self.columns[f"{body}.{y}"]
         return result
+
+    def at_rest(self) -> bool:
+        """Return whether the recorded displacement of the released body is round-off."""
+        body = self.mechanism.release.body
+        if not self.has(f"{body}.x", f"{body}.y"):
+            return False
+        return float(np.ptp(self.along("x", "y"))) <= ZERO_MOTION_RTOL * self.size
 
 
 @own_style()
@@ -184,7 +200,9 @@ def _shade_rest(axes: Axes, plot: _Plot) -> None:
 
 def _displacement(axes: Axes, plot: _Plot) -> None:
     x = plot.along("x", "y")
-    factor, unit_name = length_unit(float(np.abs(x).max()) or 1.0)
+    if plot.at_rest():
+        x = np.full(len(x), round(float(x[0]) / plot.size, 9) * plot.size)
+    factor, unit_name = length_unit(float(np.abs(x).max()) or plot.size)
     body = plot.mechanism.release.body
     axes.plot(plot.time, factor * x, color=PAST, linewidth=1.4, label=body)
     if plot.marks:
@@ -217,12 +235,12 @@ def _walls(axes: Axes, plot: _Plot, x: Real, factor: float) -> None:
             name = stop.name if len(plot.mechanism.stops) > 1 else "wall"
             axes.plot(plot.time, factor * wall, color=WALL, linewidth=1.6, zorder=1.5, label=name)
             shown += np.clip(wall, low - room, high + room).tolist()
-    margin = Y_MARGIN * (max(shown) - min(shown))
+    margin = Y_MARGIN * ((max(shown) - min(shown)) or plot.size)
     axes.set_ylim(factor * (min(shown) - margin), factor * (max(shown) + margin))
 
 
 def _velocity(axes: Axes, plot: _Plot) -> None:
-    v = plot.along("vx", "vy")
+    v = np.zeros(len(plot.time)) if plot.at_rest() else plot.along("vx", "vy")
     factor, unit_name = prefixed_unit(float(np.abs(v).max()), "m/s")
     axes.plot(plot.time, factor * v, color=PAST, linewidth=1.2)
     axes.set_ylabel(f"velocity [{unit_name}]")
