@@ -143,7 +143,7 @@ def test_stated_uncertainties_of_a_fit_cover_the_truth():
     assert 0.585 < hits / 200 < 0.781
 
 
-# --- what cannot be told apart ------------------------------------------------------------------
+# --- parameters that cannot be determined separately ---------------------------------------------
 
 BOTH = ["flexure.K_theta1", "flexure.K_theta2"]
 
@@ -161,7 +161,7 @@ def test_one_frequency_does_not_tell_two_coefficients_apart(ambiguous):
     assert ambiguous.singular[1] == 0.0
     assert all(math.isinf(ambiguous[name].uncertainty) for name in BOTH)
     (note,) = ambiguous.notes
-    assert "flexure.K_theta1 and flexure.K_theta2 cannot be told apart" in note
+    assert "flexure.K_theta1 and flexure.K_theta2 cannot be determined separately" in note
     assert "changes nothing" in note
     assert "not determined" in str(ambiguous)
 

@@ -191,13 +191,13 @@ def test_a_fit_recovers_the_modulus_of_a_computed_force_curve(capsys):
     assert float(found["value"][0]) == pytest.approx(363e9, rel=1e-8)
     assert float(found["standard uncertainty"][0]) < 1e-6 * 363e9
     assert Path("PRBDM2R-force.png").exists()
-    assert "cannot be told apart" not in capsys.readouterr().out
+    assert "cannot be determined separately" not in capsys.readouterr().out
 
 
 def test_two_coefficients_fitted_to_one_frequency_form_a_valley(capsys):
     line = "fit PRBDM2R --free flexure.K_theta1 --free flexure.K_theta2 --out . --frequency"
     assert run(f"{line} '4.82 Hz +- 0.06'") == cli.OK
-    assert "cannot be told apart" in capsys.readouterr().out
+    assert "cannot be determined separately" in capsys.readouterr().out
     along = np.array(table("PRBDM2R-valley.csv")["misfit"], float)
     assert len(along) >= 11
     assert along.max() < 1e-6  # All points of the valley have the frequency.
@@ -596,10 +596,10 @@ MALFORMED = {
     "a unit in a cell": (
         text(*GOOD, change=replaced(9, "0.04,1.2 mm")), FREQUENCY, "has a unit of its own"
     ),
-    "time that stands still": (
+    "constant time": (
         text(*GOOD, change=replaced(9, "0.035,0.1")), FREQUENCY, "equals that of the row above"
     ),
-    "time that goes back": (
+    "decreasing time": (
         text(*GOOD, change=replaced(9, "0.01,0.1")), FREQUENCY, "is before that of the row above"
     ),
     "too short": (text("t [s],x [m]", TIME[:9], SWING[:9]), FREQUENCY, "are too few to evaluate"),

@@ -52,7 +52,7 @@ class Direction:
             f"less than the uncertainty of the data allows to see (relative {self.uncertainty:.2g})"
         )  # fmt: skip
         return (
-            f"{' and '.join(part)} cannot be told apart by these data: changing "
+            f"{' and '.join(part)} cannot be determined separately from these data: changing "
             f"{', '.join(moves)} changes {known}"
         )
 
