@@ -6,8 +6,8 @@
 >>> int(result["stop.impact_count"][-1])
 1
 
-The public names are imported on first use, so that ``import prbm`` takes no time.
-``docs/architecture.md`` describes the packages below.
+The public names are imported on first use (PEP 562), so that ``import prbm`` is fast.
+``docs/architecture.md`` describes the subpackages.
 """
 
 from importlib import import_module
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate"]
 
-_HOMES = {
+_MODULES = {
     "Mechanism": ("mechanism.description", "Mechanism"),
     "Result": ("runs.result", "Result"),
     "Simulation": ("hybrid.simulation", "Simulation"),
@@ -34,15 +34,15 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name from its module (PEP 562)."""
-    if name not in _HOMES:
+    """Import a public name from its module."""
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, attribute = _HOMES[name]
+    module, attribute = _MODULES[name]
     value = getattr(import_module(f".{module}", __name__), attribute)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    """Return the public names, whether or not they have been imported."""
+    """Return the public names, imported or not."""
     return sorted({*(name for name in globals() if name.startswith("__")), *__all__})

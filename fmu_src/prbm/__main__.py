@@ -1,23 +1,23 @@
-"""The entry point of the command ``prbm``: reports a missing package in a sentence."""
+"""Entry point of the command ``prbm``; it reports a missing package in one sentence."""
 
 import sys
 
-NOT_STARTED, INTERRUPTED = 2, 130
+MISTAKE, INTERRUPTED = 2, 130
 
 
 def main() -> int:
     """Run the command; return its exit status."""
     try:
-        from .commands.command_line import main as command  # here, so that Ctrl-C is caught
+        from .commands.command_line import main as command  # imported here, to catch Ctrl-C
 
         return command()
     except ModuleNotFoundError as error:
         print(
-            f"prbm needs the Python package {error.name}; install what it needs with "
+            f"prbm: the Python package {error.name} is missing; install all required packages with "
             "'python -m pip install prbm-impact'",
             file=sys.stderr,
         )
-        return NOT_STARTED
+        return MISTAKE
     except KeyboardInterrupt:
         print("prbm: interrupted", file=sys.stderr)
         return INTERRUPTED

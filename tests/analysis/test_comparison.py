@@ -141,13 +141,20 @@ def test_without_exudyn_the_error_names_the_installation(monkeypatch):
     ("row", "last"),
     [
         (Row("frequency 1 at rest", "Hz", 5.05, 5.0), "+1.00 %"),
-        (Row("modal restitution, stop", "", 0.5, -0.05), "+0.55"),  # not -1100 %
+        (Row("modal restitution, stop", "", 0.5, -0.05), "+0.55"),  # A ratio: not -1100 %.
         (Row("modal restitution, stop", "", 0.6, 0.5), "+0.1"),
-        (Row("rest position", "m", 3e-6, 1e-6), "+2e-06"),  # nor +200 %
+        (Row("rest position", "m", 3e-6, 1e-6), "+200.00 %"),
+        (Row("stiffness, straight", "N/m", 3310.0, 100.0), "+3210 %"),
+        (Row("rest position", "m", 2e-6, 0.0), "+2e-06 m"),
         (Row("rest position", "m", 0.0, 0.0), " 0"),
     ],
 )
-def test_differences_above_100_percent_and_of_ratios_are_absolute(row, last):
-    line = str(Comparison("some", 8, (row,)))
-    assert line.endswith(last)
+def test_differences_have_a_percent_sign_or_a_unit_except_for_ratios(row, last):
+    assert str(Comparison("some", 8, (row,))).endswith(last)
     assert png(comparison_figure(Comparison("some", 8, (row,)))).startswith(b"\x89PNG")
+
+
+def test_high_frequencies_are_printed_in_khz():
+    row = Row("frequency 3 at rest", "Hz", 12400.0, 12300.0)
+    line = str(Comparison("some", 8, (row,))).splitlines()[-1]
+    assert line.split() == ["frequency", "3", "at", "rest", "[kHz]", "12.4", "12.3", "+0.81", "%"]

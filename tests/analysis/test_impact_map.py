@@ -2,6 +2,7 @@
 
 import csv
 import io
+import itertools
 import re
 from dataclasses import replace
 
@@ -224,12 +225,58 @@ def test_a_map_is_written_and_drawn(tmp_path):
     assert all(len(row) == len(rows[0]) for row in rows)
     assert sum(map(float, rows[1][4:])) == pytest.approx(1.0, abs=5e-6)
     assert str(one).splitlines()[0] == "2R"
-    for figure in (
-        figures.heat_map([one, one]), figures.surface([one, one]), figures.energies(one),
-    ):  # fmt: skip
+    for figure in (figures.heat_map([one, one]), figures.energies(one)):
         assert png(figure).startswith(b"\x89PNG")
     point = impact_map.algebraic(guide(), [-5e-3], [0.0], WEIGHTLESS)
     assert png(figures.heat_map([point])).startswith(b"\x89PNG")
+
+
+def map_of(walls, offsets, restitution=0.5):
+    shape = (len(offsets), len(walls))
+    return impact_map.ImpactMap(
+        "2R", np.array(walls), np.array(offsets), np.full(shape, restitution)
+    )
+
+
+@pytest.mark.parametrize(
+    "walls",
+    [np.linspace(-5.56e-7, 5.56e-7, 5), np.linspace(-9e-3, 5e-3, 15), [0.0, 1e-5, 2e-5, 0.01]],
+)
+def test_labels_of_the_axes_do_not_overlap(walls):
+    """Small, many and unequally spaced positions of the wall."""
+    figure = figures.heat_map([map_of(walls, [-1e-3, 0.0, 1e-3])])
+    figure.draw_without_rendering()
+    boxes = [label.get_window_extent() for label in figure.axes[0].get_xticklabels()]
+    assert len(boxes) >= 2
+    for left, right in itertools.pairwise(sorted(boxes, key=lambda box: box.x0)):
+        assert left.x1 < right.x0
+    cells = [text.get_window_extent() for text in figure.axes[0].texts]
+    rows = [[box for box in cells if abs(box.y0 - cells[0].y0) < 1.0] if cells else []]
+    for left, right in itertools.pairwise(rows[0]):
+        assert left.x1 < right.x0
+
+
+def test_the_figure_names_the_mechanism_in_lines_that_fit():
+    title = "Parallel guide with a stop, one-rotation pseudo-rigid-body dynamic model (1R PRBDM)"
+    figure = figures.heat_map([map_of([-1e-3, 0.0], [0.0])], title=title)
+    figure.draw_without_rendering()
+    (written,) = [text for text in figure.texts if "Parallel" in text.get_text()]
+    assert written.get_text().split() == title.split()
+    box = written.get_window_extent()
+    assert 0.0 <= box.x0 < box.x1 <= figure.bbox.width
+
+
+def test_round_off_of_a_constant_map_is_not_coloured():
+    one = map_of([-1e-3, 0.0], [0.0])
+    one.restitution[0, 0] += 1e-5
+    low, high = figures.heat_map([one]).axes[0].collections[0].get_clim()
+    assert high - low == pytest.approx(0.02)
+
+
+def test_a_map_of_a_small_mechanism_is_printed_in_micrometres():
+    head, row = str(map_of([-4e-7, 4e-7], [1e-5])).splitlines()[1:]
+    assert head.split() == ["d", "\\", "h,", "µm", "-0.4", "0.4"]
+    assert row.split() == ["10", "0.5000", "0.5000"]
 
 
 def test_every_method_reports_its_progress():

@@ -1,4 +1,4 @@
-"""The command that builds FMUs: the same bytes, whole files, one sentence for a mistake."""
+"""The command that builds FMUs: selection, identical bytes, complete files, error messages."""
 
 import io
 import itertools
@@ -44,14 +44,14 @@ def build(folder: Path, *options: str, **environment: str) -> subprocess.Complet
 
 
 @pytest.fixture(autouse=True)
-def _typed(monkeypatch: pytest.MonkeyPatch) -> None:
+def _program_name(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["build_fmu.py"])
 
 
 @pytest.mark.native
 @pytest.mark.slow
-def test_from_an_empty_folder_it_builds_simulates_tells_and_plots(tmp_path):
-    """Free rest 10.42 and 10.78 mm, 4.957 and 4.889 Hz: the table of the design document."""
+def test_fmus_are_built_simulated_and_plotted_in_an_empty_folder(tmp_path):
+    """The equilibria are at 10.42 and 10.78 mm, the fundamentals at 4.957 and 4.889 Hz."""
     done = build(tmp_path, *GUIDES, "--simulate")
     assert done.returncode == 0, done.stderr
     frequencies = {"PRBDM": ("10.42", "4.957"), "PRBDM2R": ("10.78", "4.889")}
@@ -60,11 +60,12 @@ def test_from_an_empty_folder_it_builds_simulates_tells_and_plots(tmp_path):
         fmu = tmp_path / "dist" / folder / f"{model}.fmu"
         assert validate_fmu(str(fmu)) == []
         assert fmu.with_suffix(".png").read_bytes().startswith(b"\x89PNG")
-        told = done.stdout.partition(f"{folder}/{model}: simulating")[2].partition("figure ")[0]
-        assert re.search(rf"free rest position +shuttle {rest} mm from straight", told)
-        assert re.search(rf"fundamental +{frequency} Hz", told)
-        assert re.search(r"impacts at stop +14, the first at t = 0\.04", told)
-        assert re.search(r"came to rest +at t = 0\.24", told)
+        printed = done.stdout.partition(f"{folder}/{model}: simulating")[2]
+        summary = printed.partition("figure ")[0]
+        assert re.search(rf"free rest position +shuttle {rest} mm from straight", summary)
+        assert re.search(rf"fundamental +{frequency} Hz", summary)
+        assert re.search(r"impacts at stop +14, the first at t = 0\.04", summary)
+        assert re.search(r"came to rest +at t = 0\.24", summary)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["dist"]
     assert {p.name for p in (tmp_path / "dist").iterdir()} == {"python", "fmi2", "fmi3"}
 
@@ -80,7 +81,7 @@ def test_the_same_input_gives_the_same_bytes_in_every_process(tmp_path):
         assert first.read_bytes() == second.read_bytes()
 
 
-NATIVE = {
+SELECTED = {
     "--flavour native": {"fmi2", "fmi3"},
     "--flavour native --fmi 2": {"fmi2"},
     "--fmi 3": {"fmi3"},
@@ -93,11 +94,11 @@ NATIVE = {
 
 
 @pytest.mark.native
-@pytest.mark.parametrize("options", NATIVE)
-def test_what_is_asked_for_is_built_and_nothing_else(options, tmp_path, monkeypatch):
+@pytest.mark.parametrize("options", SELECTED)
+def test_options_select_the_kinds_of_fmus(options, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert cli.main([*options.split(), "--model", "PRBDM"]) == cli.OK
-    assert {p.name for p in (tmp_path / "dist").iterdir()} == NATIVE[options]
+    assert {p.name for p in (tmp_path / "dist").iterdir()} == SELECTED[options]
 
 
 @pytest.mark.native
@@ -117,39 +118,37 @@ def _no_compiler(monkeypatch) -> None:
 
 
 @pytest.mark.usefixtures("_no_compiler")
-def test_without_a_compiler_the_python_fmus_are_built_and_the_others_missed(
-    tmp_path, monkeypatch, capsys
-):
+def test_without_a_compiler_only_the_python_fmus_are_built(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main(["--model", "PRBDM"]) == cli.FAILED
-    told = capsys.readouterr()
+    printed = capsys.readouterr()
     assert [p.name for p in (tmp_path / "dist").rglob("*.fmu")] == ["PRBDM.fmu"]
-    assert told.err.startswith("build_fmu.py: only the Python FMUs were built: native FMUs need")
-    assert "pip install ziglang" in told.err
-    assert told.err.count("\n") == 1
+    assert printed.err.startswith("build_fmu.py: only the Python FMUs were built: native FMUs need")
+    assert "pip install ziglang" in printed.err
+    assert printed.err.count("\n") == 1
 
 
 @pytest.mark.usefixtures("_no_compiler")
-@pytest.mark.parametrize("asked", ["--flavour native", "--fmi 2", "--clock", "--platform host"])
-def test_who_asks_for_native_fmus_gets_them_or_an_error(asked, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("options", ["--flavour native", "--fmi 2", "--clock", "--platform host"])
+def test_selecting_native_fmus_without_a_compiler_fails(options, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert cli.main(asked.split()) == cli.MISTAKE
+    assert cli.main(options.split()) == cli.MISTAKE
     assert "pip install ziglang" in capsys.readouterr().err
     assert [*tmp_path.iterdir()] == []
 
 
-def test_what_does_not_run_here_is_not_simulated_here(tmp_path, monkeypatch, capsys):
+def test_fmus_for_another_platform_cannot_be_simulated(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     here = compiler.this_platform().name
     other = next(name for name in compiler.PLATFORMS if name != here)
     assert cli.main(["--platform", other, "--simulate"]) == cli.MISTAKE
-    assert f"{other} does not run on this machine" in capsys.readouterr().err
+    assert f"FMUs for {other} do not run on this machine" in capsys.readouterr().err
     assert [*tmp_path.iterdir()] == []
 
 
 @pytest.mark.native
-def test_what_is_installed_has_the_kernel_too(tmp_path):
-    """From a wheel, without the clone: in a process that sees nothing but what is installed."""
+def test_an_installed_wheel_has_the_kernel(tmp_path):
+    """FMUs are built in an isolated process, which imports installed packages only."""
     try:
         installed = metadata.distribution("prbm-impact").files or []
     except metadata.PackageNotFoundError:
@@ -180,10 +179,10 @@ def test_what_is_installed_has_the_kernel_too(tmp_path):
         assert validate_fmu(str(tmp_path / "dist" / folder / "PRBDM.fmu")) == []
 
 
-def test_platforms_go_by_the_names_of_both_standards():
+def test_platforms_have_the_names_of_fmi_2_and_3():
     def named(*texts: str) -> tuple[str, ...]:
         arguments = [part for text in texts for part in ("--platform", text)]
-        return cli.asked_platforms(cli.parser().parse_args(arguments))
+        return cli.selected_platforms(cli.parser().parse_args(arguments))
 
     assert named() == ("host",)
     assert named("win64,x86_64-windows", "aarch64-darwin", "darwin64") == (
@@ -191,7 +190,7 @@ def test_platforms_go_by_the_names_of_both_standards():
     )  # fmt: skip
 
 
-def test_another_content_has_another_guid_and_other_module_names(mechanisms, tmp_path):
+def test_guid_and_module_names_depend_on_the_content(mechanisms, tmp_path):
     names = []
     for changes in ({}, {"stop.restitution": 0.5}):
         path = tmp_path / "fmu"
@@ -203,7 +202,7 @@ def test_another_content_has_another_guid_and_other_module_names(mechanisms, tmp
     assert names[0].isdisjoint(names[1])
 
 
-def test_an_archive_has_sorted_names_and_the_date_of_no_build(fmus):
+def test_archives_have_sorted_names_and_a_fixed_date(fmus):
     with zipfile.ZipFile(fmus["PRBDM"]) as fmu:
         entries = fmu.infolist()
     assert [e.filename for e in entries] == sorted(e.filename for e in entries)
@@ -211,7 +210,7 @@ def test_an_archive_has_sorted_names_and_the_date_of_no_build(fmus):
 
 
 @pytest.mark.parametrize("failure", [OSError("disk full"), KeyboardInterrupt()])
-def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch, failure):
+def test_files_are_written_completely_or_not_at_all(tmp_path, monkeypatch, failure):
     path = tmp_path / "model.fmu"
     atomic.write(path, b"old")
 
@@ -225,26 +224,26 @@ def test_a_file_is_written_whole_or_not_at_all(tmp_path, monkeypatch, failure):
     assert [*tmp_path.iterdir()] == [path]
 
 
-def test_nothing_is_written_if_one_of_the_models_fails(tmp_path, monkeypatch, capsys):
-    """The 2R guide, which comes second, finds no shape under a weight that buckles it."""
+def test_no_file_is_written_if_one_mechanism_fails(tmp_path, monkeypatch, capsys):
+    """The 2R guide, the second mechanism, has no equilibrium under a weight that buckles it."""
     monkeypatch.chdir(tmp_path)
     options = ["--set", "gravity.x=0", "--set", "gravity.y=-100"]
     assert cli.main([*GUIDES, *options]) == cli.MISTAKE
-    told = capsys.readouterr()
-    assert "python/PRBDM: packing" in told.out
-    assert "PRBDM2R: release.displacement = -0.018 m cannot be reached" in told.err
+    printed = capsys.readouterr()
+    assert "python/PRBDM: packing" in printed.out
+    assert "PRBDM2R: release.displacement = -0.018 m cannot be reached" in printed.err
     assert [*tmp_path.iterdir()] == []
 
 
-def test_a_parameter_of_one_model_is_refused_before_any_is_built(tmp_path, monkeypatch, capsys):
+def test_a_parameter_of_one_mechanism_is_rejected_before_the_build(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert cli.main([*GUIDES, "--set", "flexure.gamma=0.8"]) == cli.MISTAKE
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert "PRBDM2R has no such parameter or input; add --model PRBDM " in told.err
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert "no such parameter or input in PRBDM2R; add --model PRBDM " in printed.err
 
 
-def test_ctrl_c_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
+def test_ctrl_c_during_the_build_leaves_no_file(tmp_path, monkeypatch, capsys):
     def interrupted(*_: object) -> bytes:
         raise KeyboardInterrupt
 
@@ -258,13 +257,14 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
 MISTAKES = {
     "--model PRBDM --set stop.restitutoin=0.5": "did you mean stop.restitution",
     "--model PRBDM --set stop.restitution=nan": "a finite number",
-    "--model PRBDM --set stop.restitution=high": "a finite number",
+    "--model PRBDM --set stop.restitution=high": "write a number",
     "--model PRBDM --set stop.restitution": "write NAME=VALUE",
     "--model PRBDM --set stop.restitution=1.5": "stop.restitution = 1.5 must be at most 1",
-    "--model PRBDM --set shuttle.x=0.1": "shuttle.x is computed by the model",
+    "--model PRBDM --set shuttle.x=0.1": "there is no variable 'shuttle.x'",
+    "--model PRBDM --set stop.position=1kg": "'kg' is the unit of something else",
     "--model PRBDM --set release.displacement=0.02": "penetrated",
     "--model PRBDM --set release.displacement=-0.2": "cannot be reached",
-    "--model PRBDM3": "shipped are Bistable, Cantilever",
+    "--model PRBDM3": "the shipped ones are Bistable, Cantilever",
     "--mechanism nowhere.toml": "nowhere.toml: cannot be read",
     "--model PRBDM --mechanism x.toml": "not allowed with",
     "--out file/deeper": "file is a file",
@@ -272,19 +272,21 @@ MISTAKES = {
     "--flavour python --clock": "only native FMUs of FMI 3.0 have clocks",
     "--fmi 2 --clock": "only native FMUs of FMI 3.0 have clocks",
     "--flavour python --platform all": "Python FMUs run on Linux and Windows",
-    "--platform amiga": "there is no such platform; choose host, all or some of x86_64-linux",
-    "--platform x86_64-linux,": "there is no such platform",
+    "--platform amiga": "unknown platform; choose host, all or some of x86_64-linux",
+    "--platform x86_64-linux,": "unknown platform",
     "--fmi 1": "invalid choice",
     "--flavour wood": "invalid choice",
     "--nonsense": "unrecognized arguments: --nonsense",
+    "--flavor python": "did you mean --flavour?",
+    "--flavour pyton": "did you mean python?",
 }
-FROM_1970 = {"999999999999999999": None, "soon": None, "86400": "1970-01-02T00:00:00Z"}
+EPOCHS = {"999999999999999999": None, "soon": None, "86400": "1970-01-02T00:00:00Z"}
 
 
 @pytest.mark.parametrize("command", MISTAKES)
-def test_a_mistake_is_answered_with_a_sentence_and_status_2(command, tmp_path, monkeypatch, capsys):
+def test_mistakes_are_one_sentence_and_status_2(command, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "file").write_text("in the way")
+    (tmp_path / "file").write_text("a file where a folder is needed")
     assert cli.main(command.split()) == cli.MISTAKE
     error = capsys.readouterr().err
     assert MISTAKES[command] in error
@@ -293,14 +295,19 @@ def test_a_mistake_is_answered_with_a_sentence_and_status_2(command, tmp_path, m
     assert [*tmp_path.iterdir()] == [tmp_path / "file"]
 
 
-def test_the_list_names_what_is_shipped(capsys):
+def test_start_values_may_have_units():
+    options = cli.parser().parse_args(["--model", "PRBDM", "--set", "stop.position=-2 mm"])
+    assert cli.start_values(cli.mechanisms(options), options.changes) == {"stop.position": -0.002}
+
+
+def test_list_prints_the_shipped_mechanisms(capsys):
     assert cli.main(["--list"]) == cli.OK
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == [*shipped()]
-    assert all(len(line) < 120 for line in lines)  # one each
+    assert all(len(line) < 120 for line in lines)
 
 
-def test_a_mechanism_of_ones_own_is_built_under_its_own_name(tmp_path):
+def test_fmus_of_a_mechanism_file_have_the_name_of_the_mechanism(tmp_path):
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     (tmp_path / "mine.toml").write_text(text.replace('name = "PRBDM"', 'name = "Mine"'))
     done = build(tmp_path, "--mechanism", "mine.toml", "--set", "stop.position=1e-3")
@@ -311,8 +318,8 @@ def test_a_mechanism_of_ones_own_is_built_under_its_own_name(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_path_that_pythonfmu_cannot_read_is_no_obstacle_to_our_own_simulation(tmp_path):
-    """It crashes on percent-encoded paths; the temporary folder is chosen around them."""
+def test_simulation_works_in_folders_that_pythonfmu_cannot_read(tmp_path):
+    """The FMU is unpacked elsewhere: pythonfmu crashes on percent-encoded paths."""
     awkward = tmp_path / "modèle 100%"
     awkward.mkdir()
     done = build(awkward, "--model", "PRBDM", "--simulate", TMPDIR=str(awkward))
@@ -321,31 +328,31 @@ def test_a_path_that_pythonfmu_cannot_read_is_no_obstacle_to_our_own_simulation(
     assert (awkward / "dist" / "fmi3" / "PRBDM.png").exists()
 
 
-@pytest.mark.parametrize("epoch", FROM_1970)
-def test_the_date_is_that_of_source_date_epoch(epoch, mechanisms, tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("epoch", EPOCHS)
+def test_source_date_epoch_sets_the_date(epoch, mechanisms, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SOURCE_DATE_EPOCH", epoch)
-    if FROM_1970[epoch] is None:
+    if EPOCHS[epoch] is None:
         assert command.main() == cli.MISTAKE
         assert f"SOURCE_DATE_EPOCH = {epoch!r} must be a number" in capsys.readouterr().err
         assert [*tmp_path.iterdir()] == []
     else:
         listed = python_fmu.interface(mechanisms["PRBDM"], {})
         xml = model_description(Heading("X", "", "", {}), listed).decode()
-        assert f'generationDateAndTime="{FROM_1970[epoch]}"' in xml
+        assert f'generationDateAndTime="{EPOCHS[epoch]}"' in xml
 
 
-def test_the_icon_does_not_depend_on_the_users_taste(mechanisms):
+def test_the_icon_does_not_depend_on_matplotlibrc(mechanisms):
     mechanism = mechanisms["PRBDM"]
     sample = python_fmu.start_sample(mechanism, {})
     plain = picture.icon(mechanism, sample)
-    taste = {"lines.linewidth": 5.0, "savefig.transparent": True, "lines.markersize": 20.0}
-    with matplotlib.rc_context(taste):
+    settings = {"lines.linewidth": 5.0, "savefig.transparent": True, "lines.markersize": 20.0}
+    with matplotlib.rc_context(settings):
         assert picture.icon(mechanism, sample) == plain
 
 
-def test_another_script_is_another_module(mechanisms, monkeypatch):
-    """FMUs in one process share modules, of which pythonfmu loads the script by its name."""
+def test_the_module_name_depends_on_the_script(mechanisms, monkeypatch):
+    """FMUs in one process share all modules, and pythonfmu loads the script by its name."""
 
     def name() -> bytes:
         with zipfile.ZipFile(io.BytesIO(python_fmu.build(mechanisms["PRBDM"]))) as fmu:
@@ -357,20 +364,20 @@ def test_another_script_is_another_module(mechanisms, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["PRBDM.fmu", "PRBDM.png"])
-def test_a_folder_where_a_file_is_to_be_is_named(name, tmp_path, monkeypatch, capsys):
+def test_a_folder_with_the_name_of_an_output_file_is_reported(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dist" / "python" / name).mkdir(parents=True)
     assert cli.main(["--model", "PRBDM", "--simulate"]) == cli.MISTAKE
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert f"{name}: it is a folder" in told.err
+    printed = capsys.readouterr()
+    assert printed.out == ""
+    assert f"{name}: it is a folder" in printed.err
 
 
-def test_a_figure_that_cannot_be_written_is_a_sentence(fmus, tmp_path, capsys):
+def test_an_unwritable_figure_is_reported_after_the_summary(fmus, tmp_path, capsys):
     assert report.main([str(fmus["PRBDM"]), str(tmp_path)]) == cli.MISTAKE
-    told = capsys.readouterr()
-    assert "impacts at stop" in told.out
-    assert f"cannot write the figure {tmp_path}: " in told.err
+    printed = capsys.readouterr()
+    assert "impacts at stop" in printed.out
+    assert f"cannot write the figure {tmp_path}: " in printed.err
 
 
 @pytest.mark.parametrize(
@@ -382,13 +389,13 @@ def test_a_figure_that_cannot_be_written_is_a_sentence(fmus, tmp_path, capsys):
         (command.__file__, "python -m prbm.commands.build_fmu"),
     ],
 )
-def test_the_command_answers_by_the_name_that_was_typed(typed, named, monkeypatch, capsys):
+def test_messages_begin_with_the_typed_program_name(typed, named, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", [typed])
     assert cli.main(["--bogus"]) == cli.MISTAKE
     assert capsys.readouterr().err.startswith(f"{named}: unrecognized arguments: --bogus")
 
 
-def test_the_version_is_told(capsys):
+def test_version_is_printed(capsys):
     with pytest.raises(SystemExit) as end:
         cli.main(["--version"])
     assert end.value.code == 0
@@ -396,36 +403,36 @@ def test_the_version_is_told(capsys):
 
 
 def headline(mechanisms, tmp_path, **changes: float) -> str:
-    """Return what is told about a run with other start values, ``stop__position=...``."""
+    """Return the printed summary for other start values, ``stop__position=...``."""
     fmu = tmp_path / "PRBDM.fmu"
     values = {name.replace("__", "."): value for name, value in changes.items()}
     atomic.write(fmu, python_fmu.build(mechanisms["PRBDM"], values))
     return "\n".join(report.headline(report.simulate(fmu, lambda fraction: None)))
 
 
-def test_an_impact_at_the_start_is_the_first_one(mechanisms, tmp_path):
-    told = headline(
+def test_an_impact_at_the_start_is_counted(mechanisms, tmp_path):
+    summary = headline(
         mechanisms, tmp_path,
         release__displacement=0.0, release__velocity=0.5, stop__restitution=0.0,
     )  # fmt: skip
-    assert re.search(r"impacts at stop +1, the first at t = 0\.00000 s with 0\.500 m/s", told)
-    assert "came to rest         at t = 0.000 s" in told
+    assert re.search(r"impacts at stop +1, the first at t = 0\.00000 s with 0\.500 m/s", summary)
+    assert "came to rest         at t = 0.000 s" in summary
 
 
-def test_an_unstable_equilibrium_is_no_place_to_rest(mechanisms, tmp_path):
+def test_an_unstable_equilibrium_is_reported_without_a_rest_position(mechanisms, tmp_path):
     """A column under the shuttle's weight buckles."""
-    told = headline(
+    summary = headline(
         mechanisms, tmp_path, gravity__x=0.0, gravity__y=-200.0, release__displacement=-1e-3
     )
-    assert "the equilibrium under gravity is unstable" in told
-    assert "rest position" not in told
-    assert "Hz" not in told
+    assert "the equilibrium under gravity is unstable" in summary
+    assert "rest position" not in summary
+    assert "Hz" not in summary
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal to a group of processes")
 @pytest.mark.parametrize("moment", [0.3, 1.3], ids=["importing", "simulating"])
 def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
-    """What is told of a simulation that was broken off would be wrong."""
+    """The summary of an interrupted simulation would be wrong."""
     fmu = tmp_path / "PRBDM2R.fmu"
     fmu.write_bytes(fmus["PRBDM2R"].read_bytes())
     code = (
@@ -444,9 +451,9 @@ def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
         assert "simulating" in process.stdout.readline()
         time.sleep(moment)
         os.killpg(process.pid, signal.SIGINT)
-        told, complaints = process.stdout.read(), process.stderr.read()
-    assert told == "interrupted\n"
-    assert "Traceback" not in complaints
+        printed, errors = process.stdout.read(), process.stderr.read()
+    assert printed == "interrupted\n"
+    assert "Traceback" not in errors
 
 
 @pytest.mark.parametrize(
@@ -458,7 +465,7 @@ def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
         ('name = "PRBDM"', 'name = "__debug__"', "'__debug__': Python cannot give it to a class"),
     ],
 )
-def test_what_no_fmu_can_have_is_a_sentence(tmp_path, old, new, sentence):
+def test_names_and_values_that_fmi_forbids_are_reported(tmp_path, old, new, sentence):
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     path = tmp_path / "mine.toml"
     path.write_text(text.replace(old, new, 1), "utf-8")
@@ -466,8 +473,8 @@ def test_what_no_fmu_can_have_is_a_sentence(tmp_path, old, new, sentence):
         python_fmu.build(read_mechanism(path))
 
 
-def test_a_name_of_pythons_own_is_one_like_others(tmp_path):
-    """The script is run twice, the second time beside the class of that name."""
+def test_a_mechanism_may_have_the_name_of_a_python_function(tmp_path):
+    """The script runs twice, the second time beside a class of that name."""
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     path = tmp_path / "mine.toml"
     path.write_text(text.replace('name = "PRBDM"', 'name = "globals"'), "utf-8")
@@ -476,8 +483,8 @@ def test_a_name_of_pythons_own_is_one_like_others(tmp_path):
     assert len(simulate_fmu(str(fmu), stop_time=0.01)) > 1
 
 
-def test_odd_texts_do_no_harm(tmp_path):
-    """A title cannot leave the script's docstring, nor can control characters break the XML."""
+def test_titles_are_escaped_in_script_and_xml(tmp_path):
+    """Quotes do not end the docstring of the script; control characters do not break the XML."""
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     odd = 'title = "{a} \\"\\"\\" \\\\ \\u0007 <b> %s é"'
     path = tmp_path / "mine.toml"
@@ -489,14 +496,14 @@ def test_odd_texts_do_no_harm(tmp_path):
 
 
 @pytest.mark.parametrize("wrong", ["999999999999999999", "soon"])
-def test_a_wrong_date_is_a_sentence_though_it_keeps_scipy_from_being_imported(tmp_path, wrong):
+def test_an_invalid_date_is_reported_before_scipy_is_imported(tmp_path, wrong):
     done = build(tmp_path, "--list", SOURCE_DATE_EPOCH=wrong)
     assert done.returncode == cli.MISTAKE
     assert done.stderr.count("\n") == 1
     assert f"SOURCE_DATE_EPOCH = {wrong!r}" in done.stderr
 
 
-def test_ctrl_c_while_it_imports_is_no_traceback(monkeypatch, capsys):
+def test_ctrl_c_during_the_imports_has_no_traceback(monkeypatch, capsys):
     def interrupted() -> str:
         raise KeyboardInterrupt
 
@@ -505,12 +512,12 @@ def test_ctrl_c_while_it_imports_is_no_traceback(monkeypatch, capsys):
     assert capsys.readouterr().err == "build_fmu.py: interrupted\n"
 
 
-def test_a_package_that_is_missing_is_named(monkeypatch, capsys):
+def test_a_missing_package_is_named(monkeypatch, capsys):
     monkeypatch.delitem(sys.modules, "prbm.commands.building")
     monkeypatch.delattr(sys.modules["prbm.commands"], "building")
-    monkeypatch.setitem(sys.modules, "prbm.mechanics.inputs", None)
+    monkeypatch.setitem(sys.modules, "prbm.base.atomic", None)
     assert command.main() == cli.MISTAKE
-    assert "needs the Python package prbm.mechanics.inputs" in capsys.readouterr().err
+    assert "the Python package prbm.base.atomic is missing" in capsys.readouterr().err
 
 
 FILES = {
@@ -544,8 +551,8 @@ def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, chang
         assert "Input should" not in line
 
 
-def test_a_byte_order_mark_is_no_part_of_a_mechanism_file(mechanisms, tmp_path):
-    """Editors on Windows write one."""
+def test_a_byte_order_mark_in_a_mechanism_file_is_ignored(mechanisms, tmp_path):
+    """Editors on Windows write byte order marks."""
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     path = tmp_path / "mine.toml"
     path.write_text(text, encoding="utf-8-sig")

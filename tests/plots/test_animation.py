@@ -1,4 +1,4 @@
-"""The film shows what the engine computed: to scale, at its times, whole files or none."""
+"""Films: shapes to scale at the recorded times, complete files, error messages."""
 
 import math
 import re
@@ -33,8 +33,8 @@ from prbm.runs.run import simulate
 
 matplotlib.use("Agg")
 
-STOP_TIME = 0.12  # s, in which both guides hit twice
-EXACT = 1e-12  # m, round-off of places
+STOP_TIME = 0.12  # Both guides hit twice in this time [s].
+POSITION_ATOL = 1e-12  # Round-off of positions [m].
 
 
 @pytest.fixture(scope="module", params=["PRBDM", "PRBDM2R"])
@@ -48,7 +48,7 @@ def short(mechanisms: dict[str, Mechanism]) -> Result:
 
 
 def places(artist: object, scene: Scene) -> np.ndarray:
-    """Return what an artist of a scene shows as complex numbers [m]."""
+    """Return the points of an artist of a scene as complex numbers [m]."""
     xy = artist.get_xydata() if hasattr(artist, "get_xydata") else artist.get_xy()[:4]
     return np.asarray(xy) @ np.array([1, 1j]) / scene.factor
 
@@ -58,11 +58,11 @@ def scene_of(result: Result, **settings: float) -> Scene:
     return Scene(moved, film(moved, **settings))
 
 
-# --- what is drawn ----------------------------------------------------------------------------
+# --- drawn shapes -----------------------------------------------------------------------------
 
 
 def test_links_are_drawn_at_their_recorded_angles_with_their_lengths(result: Result) -> None:
-    scene = scene_of(result, slow=40.0, fps=25.0)  # a frame at every communication point
+    scene = scene_of(result, slow=40.0, fps=25.0)  # A frame at every communication point.
     h = result.values["flexure.length"] / 2
     if "flexure.gamma" in result.values:
         gamma = result.values["flexure.gamma"]
@@ -78,13 +78,13 @@ def test_links_are_drawn_at_their_recorded_angles_with_their_lengths(result: Res
         assert scene.film.times[k] == pytest.approx(row["time"], abs=1e-12)
         for number, line in enumerate(scene.links.values()):
             z = places(line, scene)
-            np.testing.assert_allclose(np.abs(np.diff(z)), lengths, atol=EXACT)
+            np.testing.assert_allclose(np.abs(np.diff(z)), lengths, atol=POSITION_ATOL)
             drawn = np.angle(np.diff(z)[1:-1])
             names = [f"link[{number * per_flexure + i + 1}].angle" for i in range(per_flexure)]
             np.testing.assert_allclose(drawn, [row[name] for name in names], atol=1e-9)
 
 
-def test_bodies_are_drawn_where_the_outputs_say(result: Result) -> None:
+def test_bodies_are_drawn_at_their_recorded_positions(result: Result) -> None:
     scene = scene_of(result, slow=40.0, fps=25.0)
     width, length = result.values["shuttle.width"], result.values["flexure.length"]
     centre = complex(width / 2, length + result.values["shuttle.com_height"])
@@ -92,29 +92,29 @@ def test_bodies_are_drawn_where_the_outputs_say(result: Result) -> None:
         scene.frame(k)
         row = result.columns[k]
         corners = places(scene.bodies["shuttle"], scene)
-        moved = centre + complex(row["shuttle.x"], row["shuttle.y"])
-        assert abs(corners.mean() - moved) < 1e-9
+        expected = centre + complex(row["shuttle.x"], row["shuttle.y"])
+        assert abs(corners.mean() - expected) < 1e-9
         side = corners[1] - corners[0]
         assert abs(side) == pytest.approx(width, rel=1e-12)
         assert np.angle(side) == pytest.approx(row["shuttle.angle"], abs=1e-12)
 
 
-def test_flexures_join_ground_and_body(result: Result) -> None:
+def test_flexures_end_at_the_ground_and_the_body(result: Result) -> None:
     scene = scene_of(result)
     scene.frame(40)
     lower = places(scene.bodies["shuttle"], scene)[:2]
     for name, line in scene.links.items():
         z = places(line, scene)
-        assert min(abs(z[-1] - corner) for corner in lower) < EXACT
+        assert min(abs(z[-1] - corner) for corner in lower) < POSITION_ATOL
         drawn = places(scene.curves[name], scene)
-        assert max(abs(drawn[0] - z[0]), abs(drawn[-1] - z[-1])) < EXACT
+        assert max(abs(drawn[0] - z[0]), abs(drawn[-1] - z[-1])) < POSITION_ATOL
 
 
 @pytest.mark.parametrize("recorded", [True, False], ids=["engine", "columns"])
 def test_the_hit_point_touches_the_wall_in_the_frame_of_an_impact(
     mechanisms: dict[str, Mechanism], recorded: bool
 ) -> None:
-    """Also when the wall moves, and when only the latched outputs tell of the impact."""
+    """The wall moves; the impacts are known from the engine, or from latched outputs only."""
     omega = 2 * math.pi * 12
 
     def wall(t: float) -> dict[str, float]:
@@ -141,7 +141,7 @@ def test_the_hit_point_touches_the_wall_in_the_frame_of_an_impact(
     assert not scene.flashes["stop"].get_visible()
 
 
-def test_the_gap_that_is_drawn_is_the_recorded_one(result: Result) -> None:
+def test_the_drawn_gap_is_the_recorded_one(result: Result) -> None:
     scene = scene_of(result, slow=40.0, fps=25.0)
     for k in (0, 20, 70):
         scene.frame(k)
@@ -149,16 +149,16 @@ def test_the_gap_that_is_drawn_is_the_recorded_one(result: Result) -> None:
         assert gap == pytest.approx(result["stop.gap"][k], abs=1e-9)
 
 
-def test_between_two_rows_the_loops_stay_closed(result: Result) -> None:
+def test_loops_are_closed_between_two_rows(result: Result) -> None:
     moved = motion(result)
     for t in (0.0123456, 0.0777):
         e = np.exp(1j * moved.shape(t)[0])
         opened = (moved.system.loops @ e).real + moved.system.loops_c
-        assert np.abs(opened).max() < EXACT
+        assert np.abs(opened).max() < POSITION_ATOL
 
 
 @pytest.mark.fmu
-def test_a_result_of_fmpy_and_one_of_the_engine_are_drawn_alike(
+def test_results_of_fmpy_and_of_the_engine_give_equal_films(
     mechanisms: dict[str, Mechanism], fmus: dict[str, Path]
 ) -> None:
     mechanism = mechanisms["PRBDM"]
@@ -183,13 +183,13 @@ def test_a_result_of_fmpy_and_one_of_the_engine_are_drawn_alike(
             drawn.append(np.concatenate([places(artist, scene) for artist in artists]))
         np.testing.assert_allclose(drawn[0], drawn[1], atol=1e-9, equal_nan=True)
     one_frame, other_frame = (next(pictures(scene, [12])) for scene in scenes)
-    assert (one_frame != other_frame).mean() < 1e-3  # antialiasing may round apart
+    assert (one_frame != other_frame).mean() < 1e-3  # Antialiasing may differ by rounding.
 
 
-def test_where_only_columns_tell_of_impacts_the_shapes_there_are_close(
+def test_shapes_at_impacts_known_from_columns_only_are_close(
     mechanisms: dict[str, Mechanism],
 ) -> None:
-    """The shape between two rows is interpolated and moved onto the wall: half a pixel off."""
+    """The shape is interpolated between two rows and moved to the wall: half a pixel of error."""
     result = simulate(mechanisms["PRBDM2R"], stop_time=0.06)
     exact, estimated = motion(result), motion(replace(result, impacts=()))
     t = exact.marks[0].time
@@ -203,7 +203,7 @@ def test_where_only_columns_tell_of_impacts_the_shapes_there_are_close(
 
 
 def test_a_clamped_flexure_is_drawn_as_the_elastic_line() -> None:
-    """Fixed and guided, y = d (3 s^2 - 2 s^3); at a pin the curvature is zero."""
+    """Fixed and guided: y = d (3 s^2 - 2 s^3).  At a pin, the curvature is zero."""
     guided = curve(np.array([0.0, 0.1, 0.9 + 0.05j, 1.0 + 0.05j]), (True, True))
     s = np.linspace(0.0, 1.0, len(guided))
     np.testing.assert_allclose(guided.imag, 0.05 * (3 * s**2 - 2 * s**3), atol=1e-15)
@@ -211,12 +211,12 @@ def test_a_clamped_flexure_is_drawn_as_the_elastic_line() -> None:
     np.testing.assert_allclose(pinned.imag, 0.2 * (3 * s**2 - s**3) / 2, atol=1e-15)
 
 
-def test_a_flexure_of_many_links_is_its_own_curve(result: Result) -> None:
+def test_only_flexures_of_few_links_have_a_smooth_curve(result: Result) -> None:
     assert all(len(line.c) - 2 <= CHAIN for line in motion(result).system.outlines)
     assert scene_of(result).curves.keys() == {"left_flexure", "right_flexure"}
 
 
-def test_axes_are_equal_and_hold_the_whole_motion(result: Result) -> None:
+def test_axes_are_to_scale_and_contain_the_whole_motion(result: Result) -> None:
     scene = scene_of(result)
     FigureCanvasAgg(scene.figure).draw()
     (x0, y0), (x1, y1) = scene.stage.transData.transform([(0.0, 0.0), (1.0, 1.0)])
@@ -230,7 +230,7 @@ def test_axes_are_equal_and_hold_the_whole_motion(result: Result) -> None:
             assert low < z.imag.min() <= z.imag.max() < high
 
 
-def test_impacts_and_rest_show_in_the_caption_and_the_trace(
+def test_caption_and_trace_show_impacts_and_rest(
     mechanisms: dict[str, Mechanism],
 ) -> None:
     result = simulate(mechanisms["PRBDM"], stop_time=0.3)
@@ -244,7 +244,7 @@ def test_impacts_and_rest_show_in_the_caption_and_the_trace(
 
 
 def test_a_film_ends_shortly_after_the_motion(mechanisms: dict[str, Mechanism]) -> None:
-    """The guide rests at 0.243 s; what bounces to the end is shown to the end."""
+    """The guide comes to rest at 0.243 s.  A motion without rest is shown to its end."""
     moved = motion(simulate(mechanisms["PRBDM"], stop_time=0.6))
     assert 0.23 < film(moved).times[-1] < 0.3
     assert film(moved, start=0.3, slow=1.0).times[-1] == pytest.approx(0.6, abs=0.05)
@@ -256,20 +256,20 @@ def test_a_film_ends_shortly_after_the_motion(mechanisms: dict[str, Mechanism]) 
 
 
 def test_a_gif_has_a_frame_for_every_time(tmp_path: Path, short: Result) -> None:
-    told: list[float] = []
-    path = animate(short, tmp_path / "motion.gif", slow=20.0, fps=10.0, progress=told.append)
+    fractions: list[float] = []
+    path = animate(short, tmp_path / "motion.gif", slow=20.0, fps=10.0, progress=fractions.append)
     with Image.open(path) as image:
         assert image.format == "GIF"
         assert image.n_frames == 0.06 * 20 * 10 + 1
         assert image.info["duration"] == 100  # ms
-        assert image.info["loop"] == 0  # for ever
+        assert image.info["loop"] == 0  # Repeat forever.
         image.seek(5)
         frame = np.asarray(image.convert("RGB"))
     expected = next(pictures(scene_of(short, slow=20.0, fps=10.0), [5]))
     assert frame.shape == expected.shape
-    assert np.abs(frame.astype(int) - expected).mean() < 0.5  # of 255: 256 colours suffice
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert np.abs(frame.astype(int) - expected).mean() < 0.5  # Of 255.
+    assert fractions == sorted(fractions)
+    assert fractions[-1] == 1.0
     assert [p.name for p in tmp_path.iterdir()] == ["motion.gif"]
 
 
@@ -282,33 +282,33 @@ def test_an_mp4_has_a_frame_for_every_time(tmp_path: Path, short: Result) -> Non
     assert [p.name for p in tmp_path.iterdir()] == ["motion.mp4"]
 
 
-def test_a_film_that_fails_leaves_the_old_file(
+def test_a_failed_film_leaves_the_old_file(
     tmp_path: Path, short: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "motion.gif"
     path.write_text("the old one")
 
-    def stumble(fraction: float) -> None:
+    def interrupt(fraction: float) -> None:
         if fraction > 0.5:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        animate(short, path, slow=5.0, fps=10.0, progress=stumble)
+        animate(short, path, slow=5.0, fps=10.0, progress=interrupt)
     assert path.read_text() == "the old one"
     assert [p.name for p in tmp_path.iterdir()] == ["motion.gif"]
 
 
-def test_a_program_that_fails_is_quoted(
+def test_messages_of_a_failed_encoder_are_quoted(
     tmp_path: Path, short: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Python in the place of ffmpeg knows nothing of its options."""
+    """Python in place of ffmpeg rejects its options."""
     monkeypatch.setattr("shutil.which", lambda program: sys.executable)
     with pytest.raises(AnimationError, match=r"failed: .*(option|usage)"):
         animate(short, tmp_path / "motion.mp4", slow=5.0)
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_window_runs_the_film(short: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_window_shows_the_film(short: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     figure = Figure()
     canvas = FigureCanvasAgg(figure)
     shown: list[bool] = []
@@ -324,36 +324,36 @@ def test_a_window_runs_the_film(short: Result, monkeypatch: pytest.MonkeyPatch) 
     assert len(figure.axes) == 2
 
 
-# --- what can go wrong ------------------------------------------------------------------------
+# --- errors -----------------------------------------------------------------------------------
 
 
-def test_no_display_is_a_sentence_with_a_remedy(short: Result) -> None:
+def test_a_missing_display_is_reported_with_a_remedy(short: Result) -> None:
     with pytest.raises(AnimationError, match=r"no window can be opened: .*animate\(result"):
         show(short)
 
 
-def test_a_result_without_its_mechanism_is_refused(short: Result) -> None:
+def test_columns_without_their_mechanism_are_rejected(short: Result) -> None:
     with pytest.raises(ResultError, match="give the mechanism"):
         motion(short.columns)
 
 
-def test_missing_angles_are_named_with_what_to_record(short: Result) -> None:
+def test_missing_angles_are_named_with_the_variables_to_record(short: Result) -> None:
     few = short.columns[["time", "shuttle.angle", "link[1].angle"]]
     with pytest.raises(ResultError, match=r"lacks link\[2\]\.angle; record .*needed\(mechanism"):
         motion(few, short.mechanism)
 
 
-def test_angles_of_something_else_are_refused(short: Result) -> None:
+def test_angles_of_another_mechanism_are_rejected(short: Result) -> None:
     columns = short.columns.copy()
     columns["link[1].angle"] += 0.1
-    with pytest.raises(ResultError, match="loops of PRBDM stand open"):
+    with pytest.raises(ResultError, match="loops of PRBDM are open"):
         motion(columns, short.mechanism)
     columns["link[1].angle"] = np.nan
     with pytest.raises(ResultError, match="not finite numbers"):
         motion(columns, short.mechanism)
 
 
-def test_times_that_run_backwards_are_refused(short: Result) -> None:
+def test_decreasing_times_are_rejected(short: Result) -> None:
     with pytest.raises(ResultError, match="must not decrease"):
         motion(short.columns[::-1], short.mechanism)
 
@@ -377,24 +377,24 @@ def test_a_result_without_latched_outputs_has_no_marks(short: Result) -> None:
         ({"stop": 9.0}, "choose a span within 0 s to 0.06 s"),
     ],
 )
-def test_a_film_of_nothing_or_of_too_much_is_refused(
+def test_films_with_too_few_or_too_many_frames_are_rejected(
     short: Result, settings: dict[str, float], sentence: str
 ) -> None:
     with pytest.raises(ParameterError, match=sentence):
         film(motion(short), **settings)
 
 
-def test_other_kinds_of_files_are_refused(tmp_path: Path, short: Result) -> None:
+def test_other_kinds_of_files_are_rejected(tmp_path: Path, short: Result) -> None:
     with pytest.raises(AnimationError, match=r"end the name in \.gif or \.mp4"):
         animate(short, tmp_path / "motion.avi")
 
 
-def test_a_folder_that_does_not_exist_is_a_sentence(tmp_path: Path, short: Result) -> None:
+def test_a_missing_folder_is_reported(tmp_path: Path, short: Result) -> None:
     with pytest.raises(AnimationError, match=r"motion\.gif: cannot be written \(No such file"):
         animate(short, tmp_path / "nowhere" / "motion.gif", slow=5.0)
 
 
-def test_without_ffmpeg_the_remedy_is_named(
+def test_a_missing_ffmpeg_is_reported_with_a_remedy(
     tmp_path: Path, short: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("shutil.which", lambda program: None)
@@ -403,7 +403,7 @@ def test_without_ffmpeg_the_remedy_is_named(
         animate(short, tmp_path / "motion.mp4")
 
 
-def test_without_pillow_the_remedy_is_named(
+def test_a_missing_pillow_is_reported_with_a_remedy(
     tmp_path: Path, short: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "PIL.Image", None)
@@ -414,7 +414,7 @@ def test_without_pillow_the_remedy_is_named(
 # --- command ----------------------------------------------------------------------------------
 
 
-def test_the_command_simulates_and_writes(
+def test_the_command_simulates_a_mechanism_and_writes_the_film(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "motion.gif"
@@ -435,7 +435,7 @@ def test_the_command_identifies_the_mechanism_of_a_result(tmp_path: Path, short:
     assert (tmp_path / "a.gif").read_bytes() == (tmp_path / "b.gif").read_bytes()
 
 
-def test_the_command_shows_a_part(tmp_path: Path) -> None:
+def test_the_command_shows_a_time_span(tmp_path: Path) -> None:
     path = tmp_path / "motion.gif"
     span = ["--from", "0.02", "--to", "0.04", "--slow", "20", "--fps", "10"]
     assert main(["animate", "--model", "PRBDM", "--stop-time", "0.05", *span, str(path)]) == 0
@@ -444,7 +444,7 @@ def test_the_command_shows_a_part(tmp_path: Path) -> None:
 
 
 @pytest.mark.fmu
-def test_a_result_without_the_links_leads_to_a_command_that_records_them(
+def test_for_a_result_without_links_a_command_that_records_them_is_printed(
     tmp_path: Path,
     fmus: dict[str, Path],
     monkeypatch: pytest.MonkeyPatch,
@@ -469,7 +469,7 @@ def test_a_result_without_the_links_leads_to_a_command_that_records_them(
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["out.gif"], "name the source of the film: RESULT.csv, --model or --mechanism"),
+        (["out.gif"], "nothing to show: give RESULT.csv, MECHANISM, --model or --mechanism"),
         (
             ["--model", "PRBDN", "out.gif"],
             "unknown mechanism 'PRBDN' (mechanism files end in .toml); did you mean PRBDM",
@@ -485,7 +485,7 @@ def test_a_result_without_the_links_leads_to_a_command_that_records_them(
         (["--model", "PRBDM", "--slow", "x", "out.gif"], "invalid float value"),
     ],
 )
-def test_mistakes_end_the_command_with_a_sentence(
+def test_mistakes_are_reported_in_one_sentence(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -498,7 +498,7 @@ def test_mistakes_end_the_command_with_a_sentence(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_result_of_an_unknown_mechanism_asks_for_its_name(
+def test_an_unidentified_mechanism_must_be_named(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "result.csv").write_text("time,crank.angle\n0,0\n1,0\n")

@@ -1,4 +1,4 @@
-"""Pictures of mechanisms: what is drawn where, with which names, by which command."""
+"""Pictures of mechanisms: positions, names, modes, icons, and the command that draws them."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +30,7 @@ from support import mechanism
 LEAF = FlexureType("leaf", "2R", 2e-4, 1e-2, 2e11, 7800.0, axial=True)
 CRANK = Mechanism(
     "Crank",
-    "A leaning bar on pins between a lever and a guide",
+    "Inclined bar on pins between a lever and a guide",
     {"left": (0.0, 0.0), "right": (0.02, 0.0), "hinge": (0.1, 0.0)},
     (
         Body("stage", 0.05, 1e-5, (0.01, 0.06), {
@@ -67,8 +67,8 @@ def shapes_of(chosen: Mechanism, displacement: float | None = None) -> tuple[Sha
 # --- shapes -----------------------------------------------------------------------------------
 
 
-def test_bodies_turn_with_what_they_carry() -> None:
-    """Pins, the hit point, the wall and the probe stay where they are on their bodies."""
+def test_points_move_with_their_bodies() -> None:
+    """Pins, the hit point, the wall and the probe are fixed to their bodies."""
     shapes, E = shapes_of(CRANK, -4e-3)
     at = {name: shapes.centre(name, E) for name in shapes.bodies}
     turn = {name: E[shapes.system.bodies[name].j] for name in at}
@@ -87,7 +87,7 @@ def test_bodies_turn_with_what_they_carry() -> None:
     assert abs(np.angle((wall[1] - wall[0]) / (1j * turn["lever"]))) < 1e-12
 
 
-def test_the_gap_that_is_drawn_to_a_wall_on_a_body_is_that_of_the_engine() -> None:
+def test_the_drawn_gap_to_a_wall_on_a_body_is_that_of_the_engine() -> None:
     simulation = Simulation(CRANK)
     simulation.advance(0.003)
     shapes = Shapes(simulation.system)
@@ -98,20 +98,20 @@ def test_the_gap_that_is_drawn_to_a_wall_on_a_body_is_that_of_the_engine() -> No
     assert abs(apart) == pytest.approx(simulation.outputs()["knock.gap"], abs=1e-12)
 
 
-def test_a_leaning_bar_is_drawn_as_one() -> None:
-    """Along its points, and as thin as a body without height; a square is upright."""
+def test_an_inclined_bar_is_drawn_as_an_inclined_thin_box() -> None:
+    """A body whose points form a square is drawn upright."""
     shapes, E = shapes_of(CRANK)
     z = shapes.body("bar", E)
     sides = np.diff(z, append=z[:1])
     longest = max(sides, key=abs)
     assert abs(longest) == pytest.approx(abs(0.08 - 0.04j), rel=1e-9)
-    assert abs((longest * (0.08 + 0.04j)).imag) < 1e-12  # along the bar
+    assert abs((longest * (0.08 + 0.04j)).imag) < 1e-12  # Along the bar.
     assert min(abs(side) for side in sides) < 0.1 * abs(longest)
     upright = box(np.array([1.0, 1j, -1.0]), 0.01)
     np.testing.assert_allclose(sorted(np.angle(upright, deg=True)), [-135, -45, 45, 135])
 
 
-def test_a_body_whose_points_surround_its_centre_is_their_hull() -> None:
+def test_a_body_is_the_hull_of_its_points_around_the_centre_of_mass() -> None:
     shapes, E = shapes_of(CRANK)
     z = shapes.body("stage", E)
     expected = {0.05j, 0.02 + 0.05j, 0.02 + 0.07j, 0.07j}
@@ -123,18 +123,18 @@ def test_a_body_whose_points_surround_its_centre_is_their_hull() -> None:
     assert area == pytest.approx(0.5)
 
 
-def test_stretches_follow_from_what_a_result_tells() -> None:
-    """Angles, loops and places of the bodies give back the stretches of the engine."""
+def test_stretches_follow_from_recorded_outputs() -> None:
+    """Angles, loops and positions of the bodies determine the stretches of the engine."""
     for name, stop_time in (("FoldedSuspension", 0.02), ("Bistable", 0.03), ("PRBDM2RAxial", 0.01)):
         result = simulate(mechanism(name), stop_time=stop_time)
-        told = motion(result)
+        recorded = motion(result)
         simulation = Simulation(mechanism(name))
         simulation.advance(stop_time)
         n = simulation.system.n
         exact = simulation.state()[:n]
         assert len(simulation.system.stretches)
         assert np.abs(exact[simulation.system.stretches]).max() > 1e-8
-        np.testing.assert_allclose(told.q[-1], exact, atol=1e-12)
+        np.testing.assert_allclose(recorded.q[-1], exact, atol=1e-12)
         assert {f"{body}.x" for body in simulation.system.bodies} <= set(needed(mechanism(name)))
 
 
@@ -142,7 +142,7 @@ def test_stretches_follow_from_what_a_result_tells() -> None:
 
 
 @pytest.mark.parametrize("name", [*shipped(), "Crank"])
-def test_every_name_is_written_and_everything_is_in_the_picture(name: str) -> None:
+def test_the_picture_contains_all_parts_and_their_names(name: str) -> None:
     chosen = CRANK if name == "Crank" else mechanism(name)
     figure = picture(chosen, shown=1)
     png(figure)
@@ -153,7 +153,7 @@ def test_every_name_is_written_and_everything_is_in_the_picture(name: str) -> No
     assert chosen.title in {text.get_text() for text in stage.findobj(Text)}
     shapes, E = shapes_of(chosen)
     (left, right), (low, high) = stage.get_xlim(), stage.get_ylim()
-    scale = 1e3  # all are drawn in mm
+    scale = 1e3  # All are drawn in mm.
     for body in shapes.bodies:
         z = scale * shapes.body(body, E)
         assert left < z.real.min() < z.real.max() < right
@@ -168,8 +168,8 @@ def test_modes_are_titled_with_their_frequencies() -> None:
     assert titles == [f"{f:.4g} Hz" for f in exact]
 
 
-def test_a_mode_moves_the_largest_part_by_what_can_be_seen() -> None:
-    """Linear in the mode, the loops closed to first order: flexures end on their bodies."""
+def test_the_largest_displacement_of_a_drawn_mode_is_fixed() -> None:
+    """The displacement is linear in the mode, so that the loops stay closed."""
     for name in shipped():
         shapes, E = shapes_of(mechanism(name), 0.0)
         system = shapes.system
@@ -186,8 +186,8 @@ def test_a_mode_moves_the_largest_part_by_what_can_be_seen() -> None:
             assert np.abs(phi).max() < 1e-9 * shapes.size if len(phi) else True
 
 
-def test_an_unstable_shape_says_so() -> None:
-    """A mass on top of a leaf that is too thin to hold it upright."""
+def test_an_unstable_mode_is_titled_unstable() -> None:
+    """A mass stands on a leaf that is too thin to hold it upright."""
     top = replace(
         mechanism("Cantilever"), gravity=(-9.81, 0.0), stops=(), flexure_types=(
             replace(mechanism("Cantilever").flexure_types[0], thickness=6e-5),
@@ -196,8 +196,8 @@ def test_an_unstable_shape_says_so() -> None:
     assert [axes.get_title() for axes in picture(top, shown=1).axes[1:]] == ["unstable"]
 
 
-def test_of_fewer_modes_all_are_drawn() -> None:
-    """The page has no gap where the third would be."""
+def test_a_mechanism_with_fewer_modes_is_drawn_with_all_of_them() -> None:
+    """There is no empty space for the missing third mode."""
     two, three = (picture(mechanism("ImpactOscillator"), shown=shown) for shown in (2, 3))
     titles = [[axes.get_title() for axes in one.axes] for one in (two, three)]
     assert titles[0] == titles[1]
@@ -205,13 +205,13 @@ def test_of_fewer_modes_all_are_drawn() -> None:
     assert tuple(two.get_size_inches()) == tuple(three.get_size_inches())
 
 
-def test_too_many_modes_are_refused() -> None:
+def test_too_many_modes_are_rejected() -> None:
     with pytest.raises(ParameterError, match="choose a number from 0 to"):
         picture(mechanism("ImpactOscillator"), shown=99)
 
 
 @pytest.mark.parametrize("name", [*shipped(), "Crank"])
-def test_a_film_holds_the_whole_motion_of_any_mechanism(name: str) -> None:
+def test_films_contain_the_whole_motion_of_any_mechanism(name: str) -> None:
     chosen = CRANK if name == "Crank" else mechanism(name)
     result = simulate(chosen, stop_time=0.02)
     scene = Scene(motion(result), film(motion(result)))
@@ -251,7 +251,7 @@ def test_the_command_draws_a_shipped_mechanism(
         assert min(image.size) > 300
 
 
-def test_a_file_is_found_as_well_as_a_name() -> None:
+def test_mechanisms_are_found_by_path_and_by_name() -> None:
     path = shipped()["Bistable"]
     assert load(str(path)) == load("Bistable")
 
@@ -271,7 +271,7 @@ def test_a_file_is_found_as_well_as_a_name() -> None:
         (["PRBDM", "--out", "/dev"], "cannot write /dev: it is a folder"),
     ],
 )
-def test_mistakes_end_the_command_with_a_sentence(
+def test_mistakes_are_reported_in_one_sentence(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],

@@ -1,6 +1,8 @@
-"""The default experiment shows the motion of a mechanism, be it of micrometres or of metres."""
+"""The default experiment of mechanisms of any size, and its reference results."""
 
 import dataclasses
+import itertools
+import time
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from support import COSTLY, mechanism
 
 
 def guide(size, model="2R", **section):
-    """Return a steel guide of a size [m], similar to those of other sizes."""
+    """Return a steel guide of a size [m]; guides of all sizes are geometrically similar."""
     leaf = FlexureType("leaf", model, 0.01 * size, 0.1 * size, 2e11, 7800.0, **section)
     return Mechanism(
         name="Scaled",
@@ -42,25 +44,26 @@ def guide(size, model="2R", **section):
 
 
 @pytest.mark.parametrize("name", shipped())
-def test_of_the_shipped_mechanisms_it_is_a_second(name):
+def test_default_experiments_of_shipped_mechanisms_take_one_second(name):
     assert experiment(mechanism(name)) == Experiment(1.0)
     assert Experiment().step == 1e-3
 
 
-@pytest.mark.parametrize("size", [2e-5, 2e-4, 0.2, 20.0])
-def test_it_shows_some_periods_at_any_size(size):
-    """Between one and a thousand, and not one in a few communication steps."""
+@pytest.mark.parametrize("size", [2e-5, 2e-4, 0.02, 0.2, 20.0])
+def test_default_experiments_have_1_to_25_periods_at_any_size(size):
+    """About ten periods, if one second has fewer than 1 or more than 25: 40 rows in each period."""
     scaled = guide(size)
     chosen = experiment(scaled)
     frequency = Simulation(scaled).outputs()["mode.frequency"]
-    assert 1.0 <= chosen.stop_time * frequency <= 1000.0
-    if not 1.0 <= frequency <= 1000.0:
+    assert 1.0 <= chosen.stop_time * frequency <= 25.0
+    assert chosen.step * frequency <= 1.0 / 40.0
+    if not 1.0 <= frequency <= 25.0:
         assert 5.0 <= chosen.stop_time * frequency <= 20.0
     assert chosen.step == pytest.approx(chosen.stop_time / 1000, rel=1e-15)
 
 
-def test_similar_mechanisms_move_alike():
-    """Without gravity lengths, times go with the size: displacements, impacts, energies scale."""
+def test_motion_scales_with_the_size_of_the_mechanism():
+    """Without gravity, lengths and times are proportional to the size, energies to its cube."""
     small, large = 1e-4, 1.0
     found = []
     for size in (small, large):
@@ -78,17 +81,58 @@ def test_similar_mechanisms_move_alike():
     np.testing.assert_allclose(energy_a / small**3, energy_b / large**3, rtol=1e-6)
 
 
-def test_reference_results_are_left_out_where_they_would_take_minutes():
-    told: list[str] = []
-    stiff = guide(0.1, "nR", n=40, axial=True)
-    assert reference.reference(stiff, {}, (), experiment(stiff), told.append) == {}
-    assert told == ["no reference results: the default experiment takes the Python engine minutes"]
+@pytest.mark.parametrize(("links", "axial"), [(40, True), (12, False)])
+def test_reference_results_are_omitted_if_they_take_minutes(links, axial, monkeypatch):
+    """The first chain is excluded by its frequencies, the second one after 10,000 steps."""
+    monkeypatch.setattr(reference, "STEPS_MAX", 5e4)
+    messages: list[str] = []
+    chain = guide(0.1, "nR", n=links, axial=axial)
+    begin = time.process_time()
+    assert reference.reference(chain, {}, (), experiment(chain), messages.append) == {}
+    assert time.process_time() - begin < 30.0
+    assert messages[-1] == f"no reference results: {reference.SLOW}"
+
+
+def test_reference_results_of_shipped_mechanisms_are_not_excluded_by_their_frequencies():
     for name in ("PRBDM2R", *COSTLY):
         assert reference.steps(mechanism(name), {}, Experiment()) < reference.STEPS_MAX
 
 
-def test_damping_shortens_the_steps_that_are_expected():
-    """By 1/(beta omega^2), of the fastest mode."""
+def test_versions_of_fmi_share_the_reference_results_of_many_mechanisms(monkeypatch):
+    """All FMUs of one version are built before those of the next."""
+    computed: list[str] = []
+    simulate = reference.simulate
+
+    def counted(one, *arguments, **options):
+        computed.append(one.name)
+        return simulate(one, *arguments, **options)
+
+    monkeypatch.setattr(reference, "simulate", counted)
+    short = Experiment(0.003)
+    chosen = [dataclasses.replace(mechanism("PRBDM"), name=f"Guide{k}") for k in range(8)]
+    for _ in ("FMI 2.0", "FMI 3.0"):
+        for one in chosen:
+            assert reference.reference(one, {}, interface(one, {}), short)
+    assert computed == [one.name for one in chosen]
+
+
+def test_the_computation_of_reference_results_reports_its_progress(monkeypatch):
+    """The clock advances by a second at each of the 1001 communication points."""
+    clock = itertools.count()
+    monkeypatch.setattr(time, "monotonic", lambda: float(next(clock)))
+    messages: list[str] = []
+    small = mechanism("PRBDM")
+    variables = interface(small, {})
+    assert reference.reference(
+        small, {"stop.offset": 1e-3}, variables, Experiment(), messages.append
+    )
+    assert messages[0] == "reference results   0% done"
+    assert "reference results  50% done, 8 min left" in messages
+    assert len(messages) == 200
+
+
+def test_damping_increases_the_estimated_number_of_steps():
+    """The step is limited to 1/(beta omega^2) of the fastest mode."""
     quiet = dataclasses.replace(guide(0.1), damping_beta=0.0)
     plain = reference.steps(quiet, {}, Experiment())
     omega = plain * reference.STABLE_STEP_FACTOR
@@ -97,7 +141,7 @@ def test_damping_shortens_the_steps_that_are_expected():
 
 
 @pytest.mark.parametrize("inside", [True, False])
-def test_the_page_shows_the_experiment_and_tells_of_results_that_are_inside(inside):
+def test_the_documentation_shows_the_experiment_and_included_results(inside):
     small = guide(1e-5)
     chosen = experiment(small)
     native = described(small, {}, 3)

@@ -1,22 +1,26 @@
-"""Results: the columns that FMPy would give, and their figures."""
+"""Results with the columns of FMPy, their files and figures."""
 
 import io
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import fmpy.util
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from PIL import Image
 
-from prbm.base.errors import ParameterError
+from prbm.base.errors import PrbmError
 from prbm.base.progress import reporter
 from prbm.drawing.style import png
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanism.description import Mechanism
 from prbm.plots.figures import response
+from prbm.runs.headline import headline
 from prbm.runs.result import Result, ResultError, read_csv, rest_time
 from prbm.runs.run import simulate
 
@@ -55,8 +59,8 @@ def test_the_last_step_ends_at_the_stop_time(mechanisms: dict[str, Mechanism]) -
     np.testing.assert_allclose(short["time"], [0.0, 0.002, 0.004, 0.005], rtol=1e-15)
 
 
-def test_a_source_acts_from_its_row_on(mechanisms: dict[str, Mechanism]) -> None:
-    """Force times displacement is the work of a force that is constant within each step."""
+def test_inputs_act_from_their_row_on(mechanisms: dict[str, Mechanism]) -> None:
+    """The work of a force that is constant within each step is force times displacement."""
     driven = simulate(
         mechanisms["PRBDM"], stop_time=0.03, source=lambda t: {"force.x": 0.2 if t < 0.01 else -0.1}
     )
@@ -66,7 +70,7 @@ def test_a_source_acts_from_its_row_on(mechanisms: dict[str, Mechanism]) -> None
     np.testing.assert_allclose(driven["energy.work"][1:], work, atol=1e-9)
 
 
-def test_the_values_are_those_of_the_start(mechanisms: dict[str, Mechanism]) -> None:
+def test_values_are_those_at_the_start(mechanisms: dict[str, Mechanism]) -> None:
     driven = simulate(
         mechanisms["PRBDM"],
         {"stop.offset": 1e-3, "force.y": 0.1},
@@ -79,9 +83,9 @@ def test_the_values_are_those_of_the_start(mechanisms: dict[str, Mechanism]) -> 
 
 
 def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
-    told: list[float] = []
-    simulate(mechanisms["PRBDM"], stop_time=0.004, progress=told.append)
-    np.testing.assert_allclose(told, [0.0, 0.25, 0.5, 0.75, 1.0])
+    fractions: list[float] = []
+    simulate(mechanisms["PRBDM"], stop_time=0.004, progress=fractions.append)
+    np.testing.assert_allclose(fractions, [0.0, 0.25, 0.5, 0.75, 1.0])
 
 
 @pytest.mark.parametrize(
@@ -92,17 +96,31 @@ def test_progress_ends_at_one(mechanisms: dict[str, Mechanism]) -> None:
         ({"step": -1e-3}, "step = -0.001 s must be positive"),
         ({"step": 1e-9}, "step = 1e-09 s makes 1000000000 steps"),
         ({"changes": {"stop.restitutoin": 0.5}}, "did you mean stop.restitution"),
+        ({"changes": {"stop.restitutoin": "0.5"}}, "did you mean stop.restitution"),
+        ({"changes": {"stop.position": "1 kg"}}, "stop.position = 1 kg: 'kg' is the unit of"),
+        ({"stop_time": "a"}, "stop_time = a: write a number in s, or a number and a unit"),
+        ({"stop_time": [1.0]}, r"stop_time = \[1\.0\]: must be a number, in s, or a text"),
+        ({"step": "5 mm"}, "step = 5 mm: 'mm' is the unit of something else"),
+        ({"tolerance": "fine"}, "tolerance = fine: write a number"),
         ({"tolerance": 1.0}, "tolerance = 1 must lie between"),
     ],
 )
-def test_what_cannot_be_simulated_is_refused(
+def test_invalid_arguments_are_rejected(
     mechanisms: dict[str, Mechanism], settings: dict[str, float], sentence: str
 ) -> None:
-    with pytest.raises(ParameterError, match=sentence):
+    with pytest.raises(PrbmError, match=sentence):
         simulate(mechanisms["PRBDM"], **settings)
 
 
-def test_a_column_that_is_missing_is_named(result: Result) -> None:
+def test_texts_with_units_equal_numbers_in_si(mechanisms: dict[str, Mechanism]) -> None:
+    guide = mechanisms["PRBDM"]
+    texts = simulate(guide, {"release.displacement": "-10 mm"}, stop_time="20 ms", step="2 ms")
+    numbers = simulate(guide, {"release.displacement": -0.01}, stop_time=0.02, step=0.002)
+    np.testing.assert_array_equal(texts.columns, numbers.columns)
+    assert texts.values == numbers.values
+
+
+def test_a_missing_column_is_named(result: Result) -> None:
     with pytest.raises(ResultError, match=r"no column 'stop\.gapp'"):
         result["stop.gapp"]
 
@@ -127,54 +145,60 @@ def test_a_file_of_fmpy_is_read_back_exactly(tmp_path: Path, result: Result) -> 
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "is no result"),
-        ("shuttle.x,time\n0,0\n0,1\n", "is no result"),
-        ("time,a\n0,0\n", "two rows or more"),
-        ("time,a,a\n0,0,0\n1,0,0\n", "a column stands there twice"),
+        ("", "not a result"),
+        ("shuttle.x,time\n0,0\n0,1\n", "not a result"),
+        ("time,a\n0,0\n", "at least two rows must follow"),
+        ("time,a,a\n0,0,0\n1,0,0\n", "two columns are named 'a'"),
         ("time,a\n0,0\n1\n", "row 3 has 1 values for 2 columns"),
-        ("time,a\n0,0\n1,x\n", "row 3 holds what is no number"),
+        ("time,a\n0,0\n1,x\n", "row 3 has a cell that is not a number"),
     ],
 )
-def test_a_file_that_is_no_result_is_refused(tmp_path: Path, text: str, sentence: str) -> None:
+def test_files_of_another_layout_are_rejected(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "result.csv"
     path.write_text(text)
     with pytest.raises(ResultError, match=sentence):
         read_csv(path)
 
 
-def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+def test_binary_files_are_rejected(tmp_path: Path) -> None:
     (tmp_path / "result.csv").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(ResultError, match="is no CSV file"):
+    with pytest.raises(ResultError, match="not a CSV file"):
         read_csv(tmp_path / "result.csv")
 
 
-def test_a_byte_order_mark_is_no_part_of_the_first_name(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_ignored(tmp_path: Path) -> None:
     (tmp_path / "result.csv").write_text("time,a\n0,0\n1,2\n", encoding="utf-8-sig")
     assert read_csv(tmp_path / "result.csv").dtype.names == ("time", "a")
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_progress_is_told_after_a_second(terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In one line on a terminal; elsewhere in a line every other second."""
-    clock = iter([0.0, *np.arange(0.25, 5.25, 0.25)])
+def test_progress_is_reported_after_a_second(
+    terminal: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A terminal shows one updated line; another stream gets a line every five seconds."""
+    clock = iter([0.0, *np.arange(0.5, 20.5, 0.5)])
     monkeypatch.setattr(time, "monotonic", lambda: next(clock))
     stream = io.StringIO()
     monkeypatch.setattr(stream, "isatty", lambda: terminal)
     report = reporter(stream)
-    for k in range(1, 21):
-        report(k / 20)
-    told = stream.getvalue()
+    for k in range(1, 41):
+        report(k / 40)
+    written = stream.getvalue()
     if terminal:
-        assert told.startswith("\r 20%\r 25%")
-        assert told.endswith("\r100%\n")
+        texts = [text.rstrip() for text in written.split("\r")]
+        assert texts[:3] == ["", "  5%, 19 s left", "  8%, 19 s left"]
+        assert texts[-2:] == [" 98%, 1 s left", "100%"]
     else:
-        assert told.split() == ["20%", "done", "60%", "done"]
+        assert written.splitlines() == [
+            "  5% done, 19 s left", " 30% done, 14 s left", " 55% done, 9 s left",
+            " 80% done, 4 s left",
+        ]  # fmt: skip
 
 
-def test_a_figure_does_not_depend_on_the_users_taste(result: Result) -> None:
+def test_figures_do_not_depend_on_matplotlibrc(result: Result) -> None:
     plain = png(response(result))
-    taste = {"lines.linewidth": 5.0, "savefig.transparent": True, "xtick.direction": "in"}
-    with matplotlib.rc_context(taste):
+    settings = {"lines.linewidth": 5.0, "savefig.transparent": True, "xtick.direction": "in"}
+    with matplotlib.rc_context(settings):
         assert png(response(result)) == plain
 
 
@@ -187,14 +211,14 @@ def test_the_response_shows_all_impacts_and_a_constant_balance(
     closing, opening = (line.get_ydata() for line in speeds.lines)
     np.testing.assert_allclose(np.divide(opening, closing), 0.6, rtol=1e-6)
     balance = energies.lines[-1].get_ydata()
-    assert np.ptp(balance) < 1e-5  # of 17 mJ, at the default tolerance
+    assert np.ptp(balance) < 1e-5  # [mJ], of 17 mJ, at the default tolerance
     figure.savefig(tmp_path / "response.png")
     with Image.open(tmp_path / "response.png") as image:
         assert image.format == "PNG"
 
 
-def test_legends_lie_beside_what_the_response_shows() -> None:
-    """Of a leaf that falls from the upper left to the lower right, with curves everywhere."""
+def test_legends_of_the_response_do_not_cover_the_curves() -> None:
+    """The curves of the cantilever leave little room."""
     figure = response(simulate(read_mechanism(shipped()["Cantilever"]), stop_time=0.06, step=1e-4))
     figure.draw_without_rendering()
     displacement, _, speeds, energies = figure.axes
@@ -205,10 +229,101 @@ def test_legends_lie_beside_what_the_response_shows() -> None:
             assert legend.count_contains(points) == 0, line.get_label()
 
 
-def test_the_response_has_a_panel_for_what_was_recorded(result: Result) -> None:
+def test_the_response_has_a_panel_per_recorded_quantity(result: Result) -> None:
     few = result.columns[["time", "shuttle.x", "shuttle.y"]]
     assert len(response(few, result.mechanism).axes) == 1
     with pytest.raises(ResultError, match=r"nothing to plot: record shuttle\.x"):
         response(result.columns[["time"]], result.mechanism)
     with pytest.raises(ResultError, match="give the mechanism"):
         response(few)
+
+
+STIFF = {"flexure.thickness": 1e-3, "release.displacement": -3e-3}  # 150 Hz
+
+
+def test_the_time_axis_ends_shortly_after_the_motion_has_settled(
+    mechanisms: dict[str, Mechanism],
+) -> None:
+    """The stiff guide comes to rest at 36 ms; the free guide moves to the end of the result."""
+    stiff = response(simulate(mechanisms["PRBDM"], STIFF, stop_time=0.2, step=1e-3))
+    assert 36.0 < stiff.axes[-1].get_xlim()[1] < 45.0
+    assert stiff.axes[-1].get_xlabel() == "time [ms]"
+    free = simulate(mechanisms["PRBDM"], {"stop.position": 0.03}, stop_time=0.2)
+    assert response(free).axes[-1].get_xlim()[1] == pytest.approx(200.0)
+
+
+def test_a_result_without_motion_is_reported_and_not_plotted(
+    mechanisms: dict[str, Mechanism],
+) -> None:
+    """Released in the straight equilibrium without gravity, with round-off in the columns."""
+    at_rest = {"gravity.x": 0.0, "release.displacement": 0.0, "stop.position": 5e-3}
+    still = simulate(mechanisms["PRBDM2R"], at_rest, stop_time=0.05)
+    still.columns["shuttle.x"][::2] += 1e-16
+    (axes,) = response(still).axes
+    assert not axes.lines
+    assert [text.get_text() for text in axes.texts] == ["nothing moves in 0.05 s"]
+    lines = headline(still.columns, still.mechanism, still.values)
+    assert any("nothing moves" in line for line in lines)
+    moving = simulate(mechanisms["PRBDM2R"], at_rest | {"force.x": 1e-6}, stop_time=0.05)
+    lines = headline(moving.columns, moving.mechanism, moving.values)
+    assert not any("nothing moves" in line for line in lines)
+
+
+def test_round_off_of_a_resting_body_is_not_drawn() -> None:
+    """The oscillator moves; the hammer, which is the released body, stays at rest."""
+    pair = read_mechanism(shipped()["ImpactOscillator"])
+    start = {"release.displacement": 0.0}
+    result = simulate(pair, start, stop_time=0.05)
+    result.columns["oscillator.x"] += 1e-4 * np.sin(100.0 * result["time"])
+    result.columns["hammer.x"] += 1e-17 * np.sin(300.0 * result["time"])
+    result.columns["hammer.vx"] += 1e-15
+    axes, velocity, *_ = response(result).axes
+    for panel in (axes, velocity):
+        np.testing.assert_array_equal(panel.lines[0].get_ydata(), 0.0)
+    low, high = axes.get_ylim()
+    assert low < -1.0 < 1.0 < high  # [mm]
+
+
+def wall_of(figure: Figure) -> Line2D:
+    """Return the line of the wall in the panel of the displacement."""
+    (line,) = [line for line in figure.axes[0].lines if line.get_label() == "wall"]
+    return line
+
+
+def test_the_panel_of_the_displacement_shows_the_wall(mechanisms: dict[str, Mechanism]) -> None:
+    """A fixed wall off the centre of mass, a moving wall, and a wall on another body."""
+    guide = mechanisms["PRBDM2R"]
+    fixed = simulate(guide, {"stop.position": -2e-3, "stop.offset": 4e-3}, stop_time=0.1)
+    np.testing.assert_allclose(wall_of(response(fixed)).get_ydata(), -2.0, atol=0.05)
+    moving = simulate(
+        mechanisms["PRBDM"],
+        stop_time=0.1,
+        source=lambda t: {"stop.displacement": 1e-3 * t / 0.1, "stop.velocity": 1e-2},
+    )
+    assert wall_of(response(moving)).get_ydata()[-1] == pytest.approx(1.0, rel=0.02)
+    pair = simulate(read_mechanism(shipped()["ImpactOscillator"]), stop_time=0.2)
+    expected = 1e3 * pair["oscillator.x"] + 2.0
+    np.testing.assert_allclose(wall_of(response(pair)).get_ydata(), expected, atol=1e-6)
+    far = simulate(mechanisms["PRBDM"], {"stop.position": 0.079}, stop_time=0.01)
+    assert "wall" not in [line.get_label() for line in response(far).axes[0].lines]
+
+
+@pytest.mark.parametrize("speeds", [[0.5], [0.9, 0.3], [0.3, 0.04], [0.9, 0.2, 0.03], [2.0, 1e-4]])
+def test_axes_of_impact_speeds_have_several_labels(result: Result, speeds: list[float]) -> None:
+    impacts = tuple(
+        replace(impact, latched=replace(impact.latched, approach_speed=v, rebound_speed=0.6 * v))
+        for impact, v in zip(result.impacts, speeds, strict=False)
+    )
+    figure = response(replace(result, impacts=impacts))
+    figure.draw_without_rendering()
+    axes = figure.axes[2]
+    low, high = axes.get_ylim()
+    labels = zip(axes.get_yticks(), axes.get_yticklabels(), strict=True)
+    assert len([text for y, text in labels if low <= y <= high and text.get_text()]) >= 2
+
+
+def test_units_of_the_panels_follow_the_magnitudes(mechanisms: dict[str, Mechanism]) -> None:
+    small = {"release.displacement": -1e-5, "gravity.x": 0.0, "stop.rest_speed": 1e-6}
+    figure = response(simulate(mechanisms["PRBDM"], small, stop_time=0.1))
+    labels = [axes.get_ylabel() for axes in figure.axes]
+    assert labels == ["displacement [µm]", "velocity [mm/s]", "impact speed [mm/s]", "energy [nJ]"]

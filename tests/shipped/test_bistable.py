@@ -1,4 +1,4 @@
-"""The bistable shuttle against the closed form of four struts of the stiffness EA."""
+"""The bistable shuttle against the closed form of four struts of axial stiffness EA."""
 
 import math
 from dataclasses import replace
@@ -27,7 +27,7 @@ def energy(d: float) -> float:
 
 
 def force(d: float) -> float:
-    """Return dU/dd, which pushes the shuttle down by d [N]."""
+    """Return the force dU/dd that holds the shuttle at a displacement d downwards [N]."""
     length = math.hypot(SPAN, RISE - d)
     return -4 * EA * LENGTH * math.log(length / LENGTH) * (RISE - d) / length**2
 
@@ -35,19 +35,19 @@ def force(d: float) -> float:
 def speed(start: float, d: float) -> float:
     """Return the speed at d after a release from rest, undamped [m/s].
 
-    A strut moves about its pin as a rod, also while it stretches: a third of its mass goes along.
+    A strut rotates and stretches about its pin as a rod: a third of its mass adds to the shuttle.
     """
     strut = V["polyurethane.density"] * V["strut.thickness"] * V["strut.width"] * LENGTH
     return math.sqrt(2 * (energy(start) - energy(d)) / (MASS + 4 * strut / 3))
 
 
-def test_forces_are_those_of_four_struts() -> None:
+def test_holding_force_is_that_of_four_struts() -> None:
     d = np.linspace(-0.3, 2.4, 28) * RISE
     np.testing.assert_allclose(force_curve(SYSTEM, d), [force(x) for x in d], atol=1e-9)
 
 
-def test_there_are_two_stable_places_and_one_between_them() -> None:
-    """Drawn, mirrored at the pins' level, and where the struts are shortest."""
+def test_there_are_two_stable_equilibria_and_an_unstable_one_between_them() -> None:
+    """They are the drawn shape, its mirror image, and the shape with the shortest struts."""
     found = rests(SYSTEM, np.array([-0.3, 0.4, 1.3, 2.3]) * RISE)
     assert [rest.stable for rest in found] == [True, False, True]
     np.testing.assert_allclose([r.displacement for r in found], [0, RISE, 2 * RISE], atol=1e-12)
@@ -55,36 +55,36 @@ def test_there_are_two_stable_places_and_one_between_them() -> None:
 
 def test_snap_force_is_the_extremum_of_the_closed_form() -> None:
     options = {"xatol": 1e-10}
-    there = minimize_scalar(
+    minimum = minimize_scalar(
         lambda d: -force(d), bounds=(0, RISE), method="bounded", options=options
     )
-    place, largest = snap(SYSTEM, 0.0, RISE)
-    assert largest == pytest.approx(-there.fun, rel=1e-12)  # flat there
-    assert place == pytest.approx(there.x, abs=1e-7)
+    d, largest = snap(SYSTEM, 0.0, RISE)
+    assert largest == pytest.approx(-minimum.fun, rel=1e-12)
+    assert d == pytest.approx(minimum.x, abs=1e-7)  # The extremum is flat.
     back = snap(SYSTEM, RISE, 2 * RISE)
     assert back[1] == pytest.approx(-largest, rel=1e-9)
 
 
-def test_struts_that_are_clamped_to_the_ground_are_stiffer_by_their_bending() -> None:
-    """Four cantilevers of 3 EI/L^3 across their length, beside the struts along it.
+def test_clamping_the_struts_to_the_ground_adds_their_bending_stiffness() -> None:
+    """The additional stiffness is that of four cantilevers, 3 EI/L^3 across their length.
 
-    Small displacements; the 2R is 0.7 % too soft.
+    The displacements are small; the 2R model is 0.7 % too soft.
     """
-    values = {"strut.thickness": 2e-3, "strut.width": 5e-2}  # the same EA
+    values = {"strut.thickness": 2e-3, "strut.width": 5e-2}  # EA is unchanged.
     kind = replace(BISTABLE.flexure_types[0], model="2R")
-    bent = replace(
+    clamped = replace(
         BISTABLE,
         flexure_types=(kind,),
         flexures=tuple(replace(f, ends=("clamp", "pin")) for f in BISTABLE.flexures),
     )
-    system = assemble(bent, bent.values(values))
+    system = assemble(clamped, clamped.values(values))
     EI = EA * values["strut.thickness"] ** 2 / 12
     across = 4 * 3 * EI / LENGTH**3 * (SPAN / LENGTH) ** 2
-    more = (holding_force(system, 1e-6) - force(1e-6)) / 1e-6
-    assert more == pytest.approx(across, rel=0.01)
+    additional = (holding_force(system, 1e-6) - force(1e-6)) / 1e-6
+    assert additional == pytest.approx(across, rel=0.01)
 
 
-def test_it_snaps_hits_the_far_stop_and_rests_there() -> None:
+def test_after_the_snap_it_comes_to_rest_on_the_far_stop() -> None:
     result = run(BISTABLE, stop_time=0.5)
     y = result.column("shuttle.y")
     assert y[0] == pytest.approx(-0.0125)
@@ -93,15 +93,15 @@ def test_it_snaps_hits_the_far_stop_and_rests_there() -> None:
     assert 0.0 < first.latched.approach_speed < speed(0.0125, 0.022)
     assert y[-1] == pytest.approx(-0.022, abs=1e-12)
     assert result.outputs[-1]["far_stop.contact"]
-    # held against the stop by what would push it on to the second stable place
+    # The struts press it against the stop, towards the second stable equilibrium.
     assert result.outputs[-1]["far_stop.force"] == pytest.approx(-force(0.022), rel=1e-8)
     assert result.outputs[-1]["energy.elastic"] == pytest.approx(energy(0.022), rel=1e-8)
 
 
-def test_speed_of_the_snap_is_that_of_the_energy_set_free() -> None:
-    """Without damping, at every point of the way and at the stop.
+def test_without_damping_the_elastic_energy_becomes_kinetic() -> None:
+    """The speed is exact at all points of the path and at the stop.
 
-    To the tolerance, of the energy of a unit stretch (EA L = 122 J).
+    The tolerance is relative to the energy of a unit stretch, EA L = 122 J.
     """
     result = run(BISTABLE, {"damping.beta": 0.0}, stop_time=0.04, step=2e-3, tolerance=1e-11)
     impact = result.simulation.record[0]
@@ -114,14 +114,14 @@ def test_speed_of_the_snap_is_that_of_the_energy_set_free() -> None:
         assert abs(row["shuttle.vx"]) < 1e-9
 
 
-def test_released_before_the_half_it_goes_back_to_where_it_was_drawn() -> None:
+def test_released_before_the_unstable_equilibrium_it_returns_to_the_drawn_shape() -> None:
     result = run(BISTABLE, {"release.displacement": 0.0115, "damping.beta": 2e-3}, stop_time=0.5)
     assert abs(result.outputs[-1]["shuttle.y"]) < 1e-4
     assert result.outputs[-1]["far_stop.impact_count"] == 0
 
 
-def test_the_curve_of_the_fundamental_lies_within_its_panel() -> None:
-    """Even one that hardly changes; where nothing is stable there is none."""
+def test_the_figure_contains_the_curve_of_the_fundamental() -> None:
+    """The first range has a nearly constant frequency, the second no stable shape."""
     for low, high in ((-1e-3, 1e-3), (10e-3, 14e-3)):
         force = holding.curve(SYSTEM, np.linspace(low, high, 5))
         panel = holding_figure(force, "").axes[-1]

@@ -1,4 +1,4 @@
-"""The cantilever with a mass at its tip against Euler-Bernoulli beams."""
+"""The cantilever with a tip mass against Euler-Bernoulli beams."""
 
 import math
 from dataclasses import replace
@@ -16,7 +16,7 @@ LEAF = mechanism("Cantilever")
 V = LEAF.values()
 L, M, J, C = V["leaf.length"], V["tip.mass"], V["tip.inertia"], V["tip.length"] / 2
 EI = V["steel.youngs_modulus"] * V["leaf.width"] * V["leaf.thickness"] ** 3 / 12
-LINE = V["steel.density"] * V["leaf.width"] * V["leaf.thickness"]  # kg/m
+MASS_PER_LENGTH = V["steel.density"] * V["leaf.width"] * V["leaf.thickness"]  # [kg/m]
 STRAIGHT = {"gravity.y": 0.0}
 
 
@@ -25,7 +25,7 @@ def residual(omega: float) -> float:
 
     EI w''' = -omega^2 M w_c and EI w'' = omega^2 (J w' + C M w_c), w_c = w + C w' of its centre.
     """
-    k = (LINE * omega**2 / EI) ** 0.25
+    k = (MASS_PER_LENGTH * omega**2 / EI) ** 0.25
     c, s, ch, sh = math.cos(k * L), math.sin(k * L), math.cosh(k * L), math.sinh(k * L)
     w, w1 = np.array([c - ch, s - sh]), k * np.array([-s - sh, c - ch])
     w2, w3 = k**2 * np.array([-c - ch, -s - sh]), k**3 * np.array([s - sh, -c - ch])
@@ -50,13 +50,13 @@ def frequencies(model: str, n: int = 0) -> np.ndarray:
     return modes(system, equilibrium(system)).frequency
 
 
-def test_first_frequency_is_that_of_a_beam_with_a_tip_mass() -> None:
+def test_fundamental_frequency_is_that_of_a_beam_with_a_tip_mass() -> None:
     """The model error of the 3R is -0.8 %."""
     assert frequencies("3R")[0] == pytest.approx(exact_frequencies()[0], rel=0.01)
 
 
-def test_a_chain_in_its_place_converges_to_the_beam() -> None:
-    """Second order in 1/n, in three frequencies: the slope over n = 10, 20, 40, 80."""
+def test_frequencies_of_a_chain_converge_to_the_beam() -> None:
+    """Three frequencies converge with second order in 1/n, n = 10, 20, 40, 80."""
     exact = np.array(exact_frequencies()[:3])
     counts = np.array([10, 20, 40, 80])
     errors = np.array([np.abs(frequencies("nR", n)[:3] / exact - 1.0) for n in counts])
@@ -65,29 +65,29 @@ def test_a_chain_in_its_place_converges_to_the_beam() -> None:
     assert errors[-1].max() < 1e-3
 
 
-def test_its_free_end_carries_the_body() -> None:
-    """Three links, the last of them the tip's: three coordinates and no loop."""
+def test_the_last_link_belongs_to_the_tip() -> None:
+    """Three links, the last of them rigidly connected to the tip: 3 coordinates and no loop."""
     system = assemble(LEAF, V)
     assert (system.n, len(system.loops)) == (3, 0)
 
 
-def test_it_sags_as_a_beam_does() -> None:
-    """A hundredth of the gravity: M g at L + C, and the leaf's own weight; 3R +2.2 %."""
+def test_static_deflection_is_that_of_a_beam() -> None:
+    """Loads at a hundredth of gravity: M g at L + C, and the weight of the leaf; 3R +2.2 %."""
     g = 9.81e-2
     system = assemble(LEAF, LEAF.values({"gravity.y": -g}))
     E = system.directions(equilibrium(system).q)
     frame = system.bodies["tip"]
     sag = -complex(frame.A @ E + frame.c - frame.drawn).imag
     tip = M * g * (L**3 / 3 + L**2 * C + L * C**2) / EI
-    own = LINE * g * (L**4 / 8 + C * L**3 / 6) / EI
+    own = MASS_PER_LENGTH * g * (L**4 / 8 + C * L**3 / 6) / EI
     assert sag == pytest.approx(tip + own, rel=0.025)
 
 
-def test_it_bounces_and_rests_on_its_stop() -> None:
-    """Pressed by what its weight exceeds the bending force by.
+def test_force_at_rest_on_the_stop_is_weight_less_bending_force() -> None:
+    """Beam theory for small slopes: (M g - P) compliance + deflection by its own weight = 3 mm.
 
-    Beam theory, small slopes: (M g - P) compliance + own sag = 3 mm.  The slope of the tip, 4
-    degrees, moves the contact under it, and the 3R is softer: 1.3 % together.
+    The slope of the tip, 4 degrees, which shifts the contact point, and the softer 3R model cause
+    a difference of 1.3 %.
     """
     result = run(LEAF, stop_time=1.0, step=2e-3)
     last = result.outputs[-1]
@@ -96,21 +96,21 @@ def test_it_bounces_and_rests_on_its_stop() -> None:
     assert last["stop.impact_count"] > 5
     assert last["energy.kinetic"] < 1e-9
     compliance = (L**3 / 3 + L**2 * C + L * C**2) / EI
-    own = LINE * 9.81 * (L**4 / 8 + C * L**3 / 6) / EI
+    own = MASS_PER_LENGTH * 9.81 * (L**4 / 8 + C * L**3 / 6) / EI
     pressed = M * 9.81 - (3e-3 - own) / compliance
     assert last["stop.force"] == pytest.approx(pressed, rel=0.02)
     assert result.imbalance < 1e-8 * result.outputs[0]["energy.elastic"]
 
 
-def test_impacts_at_the_foot_keep_newtons_law() -> None:
-    """The foot is below the centre of mass: the tip turns when it is hit."""
+def test_impacts_at_the_foot_obey_newtons_law_and_turn_the_tip() -> None:
+    """The foot is below the centre of mass."""
     result = run(LEAF, stop_time=0.2)
     system = result.simulation.system
     for impact in result.simulation.record:
         latched = impact.latched
         assert latched.rebound_speed == pytest.approx(0.6 * latched.approach_speed, rel=1e-9)
         turned = (impact.after - impact.before)[system.bodies["tip"].j]
-        assert abs(turned) > 1e-2  # rad/s
+        assert abs(turned) > 1e-2  # [rad/s]
         energy = [0.5 * v @ _mass(system, impact.q) @ v for v in (impact.before, impact.after)]
         assert energy[0] - energy[1] == pytest.approx(latched.energy_lost, rel=1e-8)
 

@@ -1,4 +1,4 @@
-"""The folded suspension: straight, as stiff and as fast as beam theory says, in need of stretch."""
+"""The folded suspension against beam theory: straightness, stiffness, frequency."""
 
 import runpy
 from dataclasses import replace
@@ -28,7 +28,7 @@ def beam() -> tuple[float, float, float, float]:
     return EI / L**3, v["pmma.density"] * b * h * L, v["shuttle.mass"], v["upper_truss.mass"]
 
 
-def test_it_is_two_trusses_and_eight_flexures() -> None:
+def test_it_has_two_trusses_and_eight_flexures() -> None:
     assert sorted(f.name for f in FOLDED.flexures) == sorted(SIDES)
     assert [body.name for body in FOLDED.bodies] == ["shuttle", "upper_truss", "lower_truss"]
     assert SYSTEM.n == 8 * (5 + 1) + 3
@@ -42,30 +42,31 @@ def test_rigid_links_are_over_constrained_when_straight() -> None:
         assemble(rigid, rigid.values())
 
 
-def test_stiffness_is_that_of_pairs_in_series_in_parallel() -> None:
-    """Two trusses, each with two pairs in series: (12 + 12) EI/L^3; the 3R makes -2.2 % of it."""
+def test_stiffness_is_24_ei_over_l3() -> None:
+    """Two trusses, each with two pairs of flexures in series; the model error of 3R is -2.2 %."""
     EI_L3, *_ = beam()
     rate = holding_force(SYSTEM, 1e-5) / 1e-5
-    assert rate == pytest.approx(2 * guided_rate(SYSTEM.values), rel=1e-6)  # the code: next order
-    assert rate == pytest.approx(24 * EI_L3, rel=0.022)  # the model
+    assert rate == pytest.approx(2 * guided_rate(SYSTEM.values), rel=1e-6)  # Higher orders in x/L.
+    assert rate == pytest.approx(24 * EI_L3, rel=0.022)  # Model error.
 
 
-def test_it_hardens_by_a_percent_over_its_stroke() -> None:
-    """What the inner flexures shorten the outer ones give back: no tension builds up.
+def test_stiffness_rises_by_less_than_a_percent_over_the_stroke() -> None:
+    """The inner and outer flexures shorten equally, so that no tension builds up.
 
-    A flexure that could not shorten would add EA/L (3/5 (x/2L)^2)... hundreds of percent.
+    Flexures that could not shorten would add a stiffness of the order EA/L (3/5) (x/2L)^2,
+    hundreds of percent.
     """
     x = np.array([1e-5, 0.03])
     rates = force_curve(SYSTEM, x) / x
     assert 0.0 < rates[1] / rates[0] - 1.0 < 0.01
 
 
-def test_fundamental_frequency_is_rayleighs_with_the_trusses_at_half_speed() -> None:
+def test_fundamental_frequency_is_below_rayleighs_quotient() -> None:
     """Mass M + 2 M_t/4 + 4 m 13/35 / 4 + 4 m (1/4 + 1/4 + 13/140), stiffness 24 EI/L^3.
 
-    Fixed-guided shape 3 s^2 - 2 s^3: its square has the mean 13/35, itself 1/2.  Rayleigh's
-    quotient is an upper bound, here by 1.1 %, because the trusses' own inertia makes them go more
-    than half the way; the model adds the -1.1 % of its stiffness.
+    The fixed-guided shape 3 s^2 - 2 s^3 has the mean 1/2 and the mean square 13/35.  Rayleigh's
+    quotient is an upper bound, here 1.1 % too high: because of their inertia, the trusses move more
+    than half as far as the shuttle.  The stiffness of the 3R model adds -1.1 %.
     """
     EI_L3, m, shuttle, truss = beam()
     mass = shuttle + 2 * truss / 4 + 4 * m * 13 / 35 / 4 + 4 * m * (0.25 + 0.25 + 13 / 140)
@@ -75,8 +76,8 @@ def test_fundamental_frequency_is_rayleighs_with_the_trusses_at_half_speed() -> 
     assert found == pytest.approx(np.sqrt(24 * EI_L3 / mass) / (2 * np.pi), rel=0.025)
 
 
-def test_trusses_go_half_the_way_and_down_as_a_guide_does() -> None:
-    """Down by 3 (x/2)^2 / (5 L); the 3R is 0.9 % short of that."""
+def test_trusses_move_half_as_far_and_descend_as_a_guide() -> None:
+    """The descent is 3 (x/2)^2 / (5 L); that of the 3R model is 0.9 % less."""
     x, L = 0.02, SYSTEM.values["flexure.length"]
     E = SYSTEM.directions(equilibrium(SYSTEM, x).q)
     for name, sign in (("upper_truss", 1), ("lower_truss", -1)):
@@ -86,19 +87,19 @@ def test_trusses_go_half_the_way_and_down_as_a_guide_does() -> None:
         assert -sign * moved.imag == pytest.approx(0.6 * (x / 2) ** 2 / L, rel=0.015)
 
 
-def test_the_path_is_straight_far_beyond_that_of_the_guide() -> None:
-    """Lateral errors at strokes up to 30 mm, in 0.2 m long flexures (docs/figures)."""
+def test_the_path_is_far_straighter_than_that_of_a_parallel_guide() -> None:
+    """Lateral errors at strokes up to 30 mm with flexures of 0.2 m."""
     x, L = EXAMPLE["STROKES"], SYSTEM.values["flexure.length"]
     errors = {name: np.abs(error) for name, error in EXAMPLE["simulate"]().items()}
     guide = 0.6 * x**2 / L
-    np.testing.assert_allclose(errors["two leaves"], guide, rtol=0.015, atol=1e-12)  # the 3R
-    assert errors["folded"].max() < 1e-12  # by symmetry
+    np.testing.assert_allclose(errors["two leaves"], guide, rtol=0.015, atol=1e-12)
+    assert errors["folded"].max() < 1e-12  # Zero by symmetry.
     assert np.all(errors["folded, one truss"][1:] < 2e-3 * guide[1:])
     assert np.all(errors["folded, one leaf 5 % thicker"][1:] < 0.1 * guide[1:])
 
 
-def test_the_shuttle_does_not_turn_through_its_first_impact() -> None:
-    """The hit goes through the centre of mass, and the mechanism is symmetric about it."""
+def test_the_first_impact_does_not_turn_the_shuttle() -> None:
+    """The line of impact passes through the centre of mass, and the mechanism is symmetric."""
     result = run(FOLDED, stop_time=0.2)
     assert len(result.simulation.record) == 1
     assert np.abs(result.column("shuttle.angle")).max() < 1e-9

@@ -1,4 +1,4 @@
-"""The 1R guide against its own scalar equation."""
+"""The 1R guide against its scalar equation of motion."""
 
 import math
 
@@ -15,20 +15,20 @@ def scalar(changes):
 
 
 def test_bounce_times_and_speeds_are_those_of_the_scalar_equation():
-    """Quadrature of the scalar equation gives each flight; eps turns the speed."""
+    """Quadrature of the scalar equation gives the flights, the restitution the rebound speeds."""
     times, speeds = scalar(STEEL).bounces(-0.01, 0.6, 8)
     sim = simulation("PRBDM", STEEL)
     sim.advance(0.2)
     found = sim.record[:8]
     np.testing.assert_allclose([i.time for i in found], times, rtol=0, atol=1e-7)
     np.testing.assert_allclose([i.latched.approach_speed for i in found], speeds, rtol=1e-6)
-    assert times[:5] == pytest.approx(  # the numbers that the project is built on
+    assert times[:5] == pytest.approx(  # Documented reference times [s].
         [0.034981, 0.087268, 0.122819, 0.145415, 0.159290], abs=1e-6
     )
 
 
 def test_events_are_located_to_a_picosecond():
-    """At tolerance 1e-12 what is left is the location of the events."""
+    """At the tolerance 1e-12, the error of the event location dominates."""
     times, _ = scalar(STEEL).bounces(-0.01, 0.6, 3)
     sim = simulation("PRBDM", STEEL, tolerance=1e-12)
     sim.advance(0.13)
@@ -40,12 +40,12 @@ def test_events_are_located_to_a_picosecond():
 
 
 @pytest.mark.parametrize(("rest_speed", "when"), [(1e-5, 0.1803), (1e-3, None)])
-def test_accumulating_bounces_end_in_rest(rest_speed, when):
-    """They accumulate at 0.18034 s; capture at v_r is at most 2 eps v_r/(a (1 - eps)) early."""
+def test_accumulating_bounces_end_in_a_resting_contact(rest_speed, when):
+    """The bounces accumulate at 0.18034 s; rest begins up to 2 eps v_r/(a (1 - eps)) earlier."""
     guide = scalar(STEEL)
     times, speeds = guide.bounces(-0.01, 0.6, 16)
-    a = guide.g  # at the straight shape the springs are relaxed and gravity alone presses
-    flights = 2 * 0.6 * speeds[-1] / a / (1 - 0.6)  # parabolas from there on
+    a = guide.g  # In the straight shape only gravity presses.
+    flights = 2 * 0.6 * speeds[-1] / a / (1 - 0.6)  # The remaining flights are parabolas.
     accumulation = times[-1] + flights
     assert accumulation == pytest.approx(0.18034, abs=1e-5)
     sim = simulation("PRBDM", STEEL | {"stop.rest_speed": rest_speed})
@@ -58,14 +58,14 @@ def test_accumulating_bounces_end_in_rest(rest_speed, when):
             rest = rest or t
             assert out["stop.force"] == pytest.approx(guide.mass * guide.g, rel=1e-9)
         else:
-            assert rest is None, "it rests to the end of the run"
+            assert rest is None, "the resting contact ends"
     assert accumulation - 2 * 0.6 * rest_speed / (a * 0.4) - 2e-5 <= rest <= accumulation + 2e-5
     if when:
         assert rest == pytest.approx(when, abs=6e-5)
 
 
-def test_zeno_without_a_rest_speed_ends_in_rest_too():
-    """Infinitely many bounces in finite time: no hang, no message, rest at the accumulation."""
+def test_infinitely_many_bounces_end_in_rest_without_a_rest_speed():
+    """With rest_speed = 0, rest begins at the accumulation time; the simulation does not hang."""
     sim = simulation("PRBDM", STEEL | {"stop.rest_speed": 0.0})
     sim.advance(0.2)
     assert sim.outputs()["stop.contact"] is True
@@ -77,8 +77,8 @@ def test_zeno_without_a_rest_speed_ends_in_rest_too():
     ("K_theta", "frequency", "amplitude"),
     [(2.65, 5.74656, 27.574e-3), (2.5449, 5.63145, 28.132e-3)],
 )
-def test_pmma_guide(K_theta, frequency, amplitude):
-    """Frequency about straight and amplitude after 1 m/s: closed form, thesis figure, engine."""
+def test_frequency_and_amplitude_of_the_pmma_guide(K_theta, frequency, amplitude):
+    """The closed form, the value in the thesis and the engine agree after a start at 1 m/s."""
     values = PMMA | {"flexure.K_theta": K_theta}
     guide = scalar(values)
     sim = simulation("PRBDM", values, tolerance=1e-11)
@@ -128,8 +128,8 @@ def test_stiffness_proportional_damping_is_beta_omega_over_two():
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.3, 1.0])
-def test_restitution_from_nothing_to_everything(restitution):
-    """With eps = 0 it stays on the wall at once; with eps = 1 it returns to the release."""
+def test_rebound_speed_is_restitution_times_approach_speed(restitution):
+    """With restitution 0 the shuttle stays on the wall; with 1 it returns to the release."""
     sim = simulation("PRBDM", STEEL | {"stop.restitution": restitution}, tolerance=1e-11)
     times, _ = scalar(STEEL).bounces(-0.01, 0.6, 1)
     sim.advance(2 * times[0])
@@ -148,7 +148,7 @@ def test_restitution_from_nothing_to_everything(restitution):
 
 
 def test_base_reaction_at_rest_is_the_weight():
-    """At rest on the wall the ground carries all that moves: through clamps, and the stop."""
+    """At rest on the wall, the ground carries the total weight through the clamps and the stop."""
     guide = scalar(STEEL)
     sim = simulation("PRBDM", STEEL)
     sim.advance(0.5)
@@ -158,6 +158,6 @@ def test_base_reaction_at_rest_is_the_weight():
     values = mechanism("PRBDM").values(STEEL)
     lump = (guide.mass - values["shuttle.mass"]) / 2
     height = 0.04 + values["shuttle.com_height"]
-    pivot = 0.04 - (1 - 0.8517) / 2 * 0.04  # the stub next to the shuttle is below its clamp
+    pivot = 0.04 - (1 - 0.8517) / 2 * 0.04  # The stub at the shuttle is below its clamp.
     lever = values["shuttle.mass"] * height + 2 * lump * pivot
     assert out["base.moment"] == pytest.approx(-9.81 * lever, rel=1e-9)

@@ -1,4 +1,4 @@
-"""The 2R guide: reference figures, conservation, the default run, sensitivity."""
+"""The 2R guide: reference values, conservation, the default experiment, sensitivity."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ GUIDE = mechanism("PRBDM2R")
 
 
 def test_rest_position_and_modes_at_rest():
-    """Figures of the 2R steel structure, to the four digits given."""
+    """Reference values of the 2R steel structure, given with four digits."""
     system = assemble(GUIDE, GUIDE.values())
     rest = equilibrium(system)
     frame = system.bodies["shuttle"]
@@ -35,7 +35,7 @@ def test_fundamental_frequency_straight_without_gravity(model, f1):
 
 @pytest.mark.slow
 def test_energy_of_a_conservative_second_drifts_less_than_1e_8():
-    """No damping, no wall within reach; exchanged: what the kinetic energy rises to."""
+    """The drift is relative to the largest kinetic energy; no damping, no wall within reach."""
     values = {"damping.beta": 0.0, "stop.position": 0.05}
     sim = simulation("PRBDM2R", values, tolerance=1e-10)
     balance, kinetic = [energy_balance(sim.outputs())], []
@@ -61,7 +61,7 @@ def default_run():
     return run()
 
 
-def test_default_run_bounces_about_fourteen_times_and_rests(default_run):
+def test_default_experiment_has_about_14_impacts_and_ends_at_rest(default_run):
     sim, rows = default_run
     assert 12 <= len(sim.record) <= 16
     contact = np.array([row["stop.contact"] for row in rows])
@@ -75,19 +75,19 @@ def test_default_run_bounces_about_fourteen_times_and_rests(default_run):
     assert np.ptp(force[-100:]) < 1e-4 * force[-1], "the force becomes steady"
 
 
-def test_default_run_balances_its_energy_through_the_impacts(default_run):
+def test_energy_balance_of_the_default_experiment_includes_the_impacts(default_run):
     _, rows = default_run
     balance = [energy_balance(row) for row in rows]
     assert np.ptp(balance) < 1e-6 * rows[-1]["energy.dissipated"]
 
 
-def test_nothing_passes_through_the_wall(default_run):
+def test_the_gap_is_never_negative(default_run):
     _, rows = default_run
     assert min(row["stop.gap"] for row in rows) > -1e-9
 
 
-def test_constraints_are_kept():
-    """Loops to 1e-12 m and 1e-9 m/s, at every output."""
+def test_loops_stay_closed():
+    """To 1e-12 m and 1e-9 m/s, at every output."""
     sim = Simulation(GUIDE)
     n, system = sim.system.n, sim.system
     for t in np.linspace(0, 0.4, 333)[1:]:
@@ -98,17 +98,17 @@ def test_constraints_are_kept():
         assert np.abs((system.loops @ (e * v)).imag).max() < 1e-9
 
 
-def test_a_change_of_1e_11_m_moves_the_impacts_less_than_a_nanosecond(default_run):
-    """The default damping makes the run well posed."""
+def test_a_change_of_1e_11_m_shifts_the_impacts_by_less_than_a_nanosecond(default_run):
+    """Without the default damping, the motion would be chaotic."""
     sim, _ = default_run
     other, _ = run({"release.displacement": -0.018 + 1e-11})
     assert len(other.record) == len(sim.record)
-    moved = [abs(a.time - b.time) for a, b in zip(sim.record, other.record, strict=True)]
-    assert max(moved) < 1e-9
+    shifts = [abs(a.time - b.time) for a, b in zip(sim.record, other.record, strict=True)]
+    assert max(shifts) < 1e-9
 
 
 def test_momentum_balance_and_energy_loss_at_each_impact(default_run):
-    """M (v+ - v-) = G^T P + Phi_q^T Lambda, -P (u- + u+)/2 lost, opening = eps closing."""
+    """M (v+ - v-) = G^T P + Phi_q^T Lambda, energy loss -P (u- + u+)/2, u+ = -eps u-."""
     sim, _ = default_run
     system = sim.system
     for impact in sim.record:
@@ -128,7 +128,7 @@ def test_momentum_balance_and_energy_loss_at_each_impact(default_run):
         assert T[0] - T[1] == pytest.approx(loss, rel=1e-6)
 
 
-FE = {  # rows: offset of the hit [mm], columns: wall at -10, 0, 10 mm
+FE = {  # By offset of the hit point [mm]; columns: wall at -10, 0, 10 mm.
     -4: (0.4089, 0.5483, 0.4084),
     0: (0.4519, 0.5947, 0.4519),
     4: (0.4104, 0.5482, 0.4108),
@@ -144,19 +144,19 @@ def algebraic(model, offset, height):
 @pytest.mark.parametrize("offset", FE)
 @pytest.mark.parametrize("column", range(3))
 def test_modal_restitution_against_finite_elements(offset, column):
-    """The model error of the inextensible 2R is 0.048: straight, it cannot rotate its shuttle."""
+    """The model error is 0.048: the shuttle of the straight inextensible 2R cannot rotate."""
     found = algebraic("PRBDM2R", offset * 1e-3, (-10e-3, 0.0, 10e-3)[column])
     assert found == pytest.approx(FE[offset][column], abs=0.05)
 
 
 @pytest.mark.parametrize("height", [-0.01, 0.0, 0.005])
 def test_modal_restitution_of_one_degree_of_freedom_is_the_restitution(height):
-    """There is no other mode to lose energy to."""
+    """There is no other mode that could take up energy."""
     assert algebraic("PRBDM", 0.003, height) == pytest.approx(0.6, abs=1e-12)
 
 
 def test_a_simulated_pure_mode_has_the_algebraic_modal_restitution():
-    """A hit at the static shape in its fundamental mode: both routes agree."""
+    """The impact is at the static shape, in the fundamental mode."""
     values = {
         "gravity.x": 0.0, "release.displacement": -0.01, "stop.position": -0.01,
         "stop.offset": 0.002, "damping.beta": 0.0,

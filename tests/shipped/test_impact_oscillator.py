@@ -1,4 +1,4 @@
-"""Impacts between two bodies, each on a parallelogram of its own (1R)."""
+"""Impacts between two bodies on parallel guides (1R)."""
 
 import math
 
@@ -12,7 +12,7 @@ NAME = "ImpactOscillator"
 
 
 def guides(values) -> tuple[ScalarGuide, ScalarGuide]:
-    """Return the two parallelograms as scalar equations."""
+    """Return the scalar equations of the hammer and the oscillator."""
     found = []
     for body, leaf in (("hammer", "hammer_leaf"), ("oscillator", "oscillator_leaf")):
         v = {key.replace(leaf, "flexure"): x for key, x in values.items() if key.startswith(leaf)}
@@ -27,8 +27,8 @@ def default():
     return run(NAME)
 
 
-def speeds(simulation: Simulation, q, v) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return path slopes dy/dx and speeds along x of the two bodies."""
+def motions(simulation: Simulation, q, v) -> list[tuple[complex, complex]]:
+    """Return complex displacements and velocities of the two bodies."""
     system = simulation.system
     E = system.directions(q)
     out = []
@@ -40,17 +40,17 @@ def speeds(simulation: Simulation, q, v) -> tuple[tuple[float, float], tuple[flo
     return out
 
 
-def test_every_impact_keeps_newtons_law_and_the_momentum_of_the_pair(default) -> None:
+def test_impacts_obey_newtons_law_and_conserve_momentum(default) -> None:
     """P = (1 + e) g' / (1/m1 + 1/m2), m_i = M_i / cos(phi_i)^2, sin(phi_i) = x_i / r_i.
 
-    A body on a parallelogram moves along a circle of the radius r = gamma L; the push is along x.
+    A body on a parallel guide moves along a circle of radius r = gamma L; the impulse is along x.
     """
     hammer, oscillator = guides(default.simulation.values)
     assert len(default.simulation.record) > 10
     for impact in default.simulation.record:
         mass, change = [], []
-        before = speeds(default.simulation, impact.q, impact.before)
-        after = speeds(default.simulation, impact.q, impact.after)
+        before = motions(default.simulation, impact.q, impact.before)
+        after = motions(default.simulation, impact.q, impact.after)
         for guide, (z, old), (_, new) in zip((hammer, oscillator), before, after, strict=True):
             mass.append(guide.mass / (1.0 - (z.real / guide.r) ** 2))
             change.append(new.real - old.real)
@@ -65,8 +65,8 @@ def test_every_impact_keeps_newtons_law_and_the_momentum_of_the_pair(default) ->
         assert impact.latched.energy_lost == pytest.approx(lost, rel=1e-9)
 
 
-def test_the_hammer_touches_the_face_of_the_oscillator(default) -> None:
-    """The gap is what is between the two, 2 mm as drawn, and never negative."""
+def test_the_gap_is_the_distance_of_hammer_and_oscillator(default) -> None:
+    """The gap is the distance of the two bodies, 2 mm in the drawn shape, and never negative."""
     apart = default.column("oscillator.x") - default.column("hammer.x") + 2e-3
     np.testing.assert_allclose(default.column("impact.gap"), apart, atol=1e-12)
     assert apart.min() > -1e-12
@@ -74,7 +74,7 @@ def test_the_hammer_touches_the_face_of_the_oscillator(default) -> None:
 
 
 def test_first_hit_is_at_the_time_of_the_scalar_equation() -> None:
-    """The hammer swings from -6 mm to the face at 2 mm, the oscillator waits at rest."""
+    """The hammer moves from -6 mm to the face at 2 mm; the oscillator is at rest."""
     undamped = {"damping.beta": 0.0, "damping.zeta": 0.0}
     result = run(NAME, undamped, stop_time=0.012, tolerance=1e-11)
     hammer, _ = guides(result.simulation.values)
@@ -85,7 +85,7 @@ def test_first_hit_is_at_the_time_of_the_scalar_equation() -> None:
     assert impact.latched.approach_speed == pytest.approx(closing, rel=1e-9)
 
 
-def test_elastic_hits_keep_the_energy() -> None:
+def test_impacts_with_restitution_one_conserve_energy() -> None:
     values = {"impact.restitution": 1.0, "damping.beta": 0.0, "damping.zeta": 0.0}
     result = run(NAME, values, stop_time=0.3, tolerance=1e-11)
     assert len(result.simulation.record) > 5
@@ -94,7 +94,7 @@ def test_elastic_hits_keep_the_energy() -> None:
 
 
 def driven(gap: float) -> tuple[np.ndarray, Simulation]:
-    """Return the oscillator's displacement while a periodic force pushes the hammer at it [m]."""
+    """Return the displacement of the oscillator while a periodic force acts on the hammer [m]."""
     values = {"release.displacement": 0.0, "impact.distance": gap}
     simulation = Simulation(mechanism(NAME), values)
     period = 1.0 / simulation.frequency
@@ -107,7 +107,7 @@ def driven(gap: float) -> tuple[np.ndarray, Simulation]:
     return np.array(x), simulation
 
 
-def test_the_hammer_drives_the_oscillator_by_its_hits_alone() -> None:
+def test_the_hammer_drives_the_oscillator_only_by_impacts() -> None:
     x, simulation = driven(2e-3)
     assert simulation.outputs()["impact.impact_count"] > 5
     assert np.abs(x[300:]).max() > 1e-3

@@ -209,17 +209,17 @@ def test_a_crash_that_is_not_reproduced_costs_no_row(mishap, log):
     assert runs(log) == {1.0: 1, 2.0: 2, 3.0: 2}
 
 
-def test_only_failed_runs_are_repeated_on_request(mishap, log):
-    """Other runs in the same part are kept."""
+def test_failed_runs_are_repeated_on_request(mishap, log):
+    """Successful runs in the same part are not repeated; the files have all rows in order."""
     table = pd.DataFrame({"x": np.arange(12.0), "trouble": FINE})
     table.loc[4, "trouble"] = CRASHES_ONCE
     out = sweep(mishap, table, step=0.5, workers=1, retries=0)
     assert (out["status"] == "ok").tolist() == [row != 4 for row in range(12)]
     assert len(list(Path("results.parquet").glob("part*"))) < 12
     assert sweep(mishap, table, step=0.5).equals(out)
-    out = sweep(mishap, table, step=0.5, workers=1, failed=True)
+    out = sweep(mishap, table, step=0.5, workers=1, retry_failed=True)
     assert out["y"].tolist() == table["x"].tolist()
-    assert len(pd.read_parquet("results.parquet")) == 12
+    assert pd.read_parquet("results.parquet")["row"].tolist() == list(range(12)), "rows in order"
     assert runs(log) == Counter([*table["x"], 4.0])
 
 
@@ -256,15 +256,14 @@ def on_disk() -> int:
     return len(pd.read_parquet("results.parquet"))
 
 
-def test_a_killed_sweep_continues_with_the_missing_runs(mishap, log):
-    """No stored run is repeated, and no part is rewritten."""
+def test_a_killed_sweep_continues_with_the_remaining_rows(mishap, log):
+    """No run that is on disk is repeated, and the files have all rows in order."""
     LONG.to_csv("table.csv", index=False)
     process = started(mishap, 5)
     process.kill()
     process.communicate()
     done = pd.read_parquet("results.parquet")
     assert 5 <= len(done) < 24
-    before = {path: path.stat().st_mtime_ns for path in Path("results.parquet").glob("part*")}
     log.unlink()
 
     fractions: list[float] = []
@@ -275,7 +274,7 @@ def test_a_killed_sweep_continues_with_the_missing_runs(mishap, log):
     assert (fractions[0], fractions[-1]) == (pytest.approx(len(done) / 24), 1.0)
     assert sweep(mishap, "table.csv", step=0.5).equals(results)
     assert runs(log).total() == 24 - len(done)
-    assert before == {path: path.stat().st_mtime_ns for path in before}
+    assert pd.read_parquet("results.parquet")["row"].tolist() == list(range(24))
 
 
 @pytest.mark.slow
@@ -307,7 +306,7 @@ def test_a_second_sweep_into_the_same_folder_is_rejected(mishap, log):
     with pytest.raises(ParameterError, match=rf"in use by another sweep \(process {process.pid} "):
         sweep(mishap, "table.csv", step=0.5, workers=1)
     with pytest.raises(ParameterError, match="in use by another sweep"):
-        sweep(mishap, "table.csv", step=0.5, workers=1, anew=True)
+        sweep(mishap, "table.csv", step=0.5, workers=1, overwrite=True)
     assert process.poll() is None
     assert draft.exists()
     process.communicate(timeout=60)
@@ -352,21 +351,21 @@ def test_results_of_another_sweep_are_rejected_or_replaced(mishap, log, native):
         ({"table": table[:1]}, "another table: row 1 is missing now"),
         ({"table": table.assign(pause=0.0)}, "another parameters"),
     ):
-        with pytest.raises(ParameterError, match=rf"{message}.*delete the old"):
+        with pytest.raises(ParameterError, match=rf"{message}.*overwrite them"):
             sweep(**({"fmu": mishap, "table": table, "step": 0.5, "workers": 1} | change))
     with pytest.raises(ParameterError, match="another FMU"):
         sweep(native["PRBDM", 2], GRID)
     assert runs(log).total() == 2
-    assert sweep(mishap, table, step=0.25, workers=1, anew=True)["y"].tolist() == [1.0, 2.0]
+    assert sweep(mishap, table, step=0.25, workers=1, overwrite=True)["y"].tolist() == [1.0, 2.0]
     assert runs(log).total() == 4
 
 
 def test_a_folder_with_other_contents_is_rejected_and_unchanged(mishap):
     Path("results.parquet").mkdir()
     Path("results.parquet/letter.txt").write_text("keep me")
-    for anew in (False, True):
+    for overwrite in (False, True):
         with pytest.raises(ParameterError, match=r"results\.parquet exists without a sweep"):
-            sweep(mishap, pd.DataFrame({"x": [1.0]}), anew=anew)
+            sweep(mishap, pd.DataFrame({"x": [1.0]}), overwrite=overwrite)
     assert Path("results.parquet/letter.txt").read_text() == "keep me"
 
 

@@ -3,7 +3,7 @@
 :func:`compare` evaluates the same quantities by the pseudo-rigid-body model and by finite elements
 of the same file, and compares them with measured values and their uncertainties:
 
-* the rest position of the released body, and the lowest frequencies about that shape;
+* the equilibrium of the released body under gravity, and the lowest frequencies about that shape;
 * the holding force in the drawn shape, the stiffness and the frequencies there;
 * the modal restitution of an arriving fundamental mode, for every wall that a force on the released
   body reaches.
@@ -21,6 +21,7 @@ from pathlib import Path
 
 from ..base.errors import EquilibriumError, ParameterError
 from ..base.progress import Progress
+from ..base.unit_text import frequency_unit
 from ..data.uncertainty import Estimate
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import Modes, modes
@@ -32,6 +33,7 @@ from ..references.finite_elements import FiniteElements
 from .impact_map import algebraic, by_elements
 from .stretching import notes as stretching_notes
 
+PERCENT_DECIMALS = 1e3  # Larger differences are printed without decimals [%].
 FREQUENCIES = 3  # Number of the lowest frequencies that are compared.
 DIFFERENCE_STEP = 1e-4  # Step of the stiffness, as a share of the size of the mechanism.
 ZERO_RTOL = 1e-9  # Smaller displacements, relative to the size, and their forces are round-off.
@@ -151,23 +153,28 @@ def _shown(x: float, form: str = ".5g") -> str:
 
 
 def _line(row: Row, measured: bool) -> str:
-    """Return a row as a line of the table.
-
-    The difference is in percent, except for ratios and for differences above 100 %.
-    """
-    percent = row.unit and abs(row.relative) <= 1.0
-    off = (
-        f"{100 * row.relative:+.2f} %"
-        if percent
-        else _shown(row.error, "+.3g" if row.error else "g")
-    )
-    name = f"{row.name} [{row.unit}]" if row.unit else row.name
-    line = f"{name:<34}{_shown(row.model):>12}{_shown(row.elements):>12}"
-    line += f"{'-' if math.isnan(row.error) else off:>12}"
+    """Return a row as a line of the table; high frequencies without a measurement are in kHz."""
+    factor, unit = 1.0, row.unit
+    if unit == "Hz" and row.measured is None and math.isfinite(row.elements):
+        factor, unit = frequency_unit(row.elements)
+    name = f"{row.name} [{unit}]" if unit else row.name
+    line = f"{name:<34}{_shown(factor * row.model):>12}{_shown(factor * row.elements):>12}"
+    line += f"{_difference(row):>12}"
     if measured and row.measured is not None:
         line += f"  {row.measured!s:<22}{_shown(row.away(row.model), '+.1f'):>8}"
         line += f"{_shown(row.away(row.elements), '+.1f'):>10}"
     return line
+
+
+def _difference(row: Row) -> str:
+    """Return the difference: in percent, absolute for ratios and if the elements give 0."""
+    if math.isnan(row.error):
+        return "-"
+    if row.unit and not math.isnan(row.relative):
+        percent = 100.0 * row.relative
+        return f"{percent:+.2f} %" if abs(percent) < PERCENT_DECIMALS else f"{percent:+.4g} %"
+    unit = f" {row.unit}" if row.unit and row.error else ""
+    return _shown(row.error, "+.3g" if row.error else "g") + unit
 
 
 # --- the two sides ------------------------------------------------------------------------------

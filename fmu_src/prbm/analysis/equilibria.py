@@ -1,4 +1,4 @@
-"""Force over displacement of a held body, and its rest positions without a force.
+"""Force over displacement of a held body, and its equilibria without a force.
 
 The displacement is given, not the force.  The curve then continues through the extrema of the
 force, where a mechanism under a given load snaps through.
@@ -16,12 +16,12 @@ from ..mechanics.modal import modes
 from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System
 
-REST_RTOL = 1e-12  # Tolerance of a rest position, relative to the size of the mechanism.
+REST_RTOL = 1e-12  # Of the size: tolerance of the displacement of an equilibrium.
 
 
 @dataclass(frozen=True)
 class Rest:
-    """A rest position of the released body without a holding force.
+    """An equilibrium of the released body without a holding force.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def force_curve(system: System, displacements: Sequence[float] | Real) -> Real:
 def rests(
     system: System, displacements: Sequence[float] | Real, forces: Real | None = None
 ) -> list[Rest]:
-    """Return the rest positions within a range of displacements, in order.
+    """Return the equilibria within a range of displacements, in order.
 
     Parameters
     ----------
@@ -90,14 +90,14 @@ def rests(
 
 
 def snap(system: System, low: float, high: float) -> tuple[float, float]:
-    """Return the holding force of largest magnitude between two rest positions.
+    """Return the holding force of largest magnitude between two equilibria.
 
     Parameters
     ----------
     system : System
         The mechanism.
     low, high : float
-        Displacements of neighbouring rest positions [m].
+        Displacements of neighbouring equilibria [m].
 
     Returns
     -------

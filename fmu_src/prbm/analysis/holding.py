@@ -36,7 +36,7 @@ class Held:
         Displacement of the released body along the direction of the release, from the drawn shape
         [m].
     force : float
-        Holding force on the body along that direction [N]; 0 at a rest position.
+        Holding force on the body along that direction [N]; 0 at an equilibrium.
     stiffness : float
         Derivative of the force by the displacement [N/m]; NaN where the loops prevent a further
         motion along that direction.
@@ -111,9 +111,9 @@ class Curve:
     points : tuple of Held
         Points in the order of the displacements.
     rests : tuple of Rest
-        Rest positions without a holding force.
+        Equilibria without a holding force.
     snaps : tuple of (float, float)
-        Displacement [m] and force [N] of the largest force between neighbouring rest positions:
+        Displacement [m] and force [N] of the largest force between neighbouring equilibria:
         there the mechanism snaps through under a force.
     """
 
@@ -125,7 +125,7 @@ class Curve:
 def curve(
     system: System, displacements: Sequence[float] | Real, progress: Progress | None = None
 ) -> Curve:
-    """Return the holding forces at displacements, with the rest positions and the snaps.
+    """Return the holding forces at displacements, with the equilibria and the snap-throughs.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Progress of a computation, written to a stream."""
+"""Progress of a computation, with the remaining time, reported on a stream or as messages."""
 
 import math
 import sys
@@ -8,16 +8,18 @@ from typing import TextIO
 
 Progress = Callable[[float], object]
 
-DELAY = 1.0  # s; shorter computations write nothing.
-LINE_INTERVAL = 2.0  # s between lines in a file.
-TERMINAL_INTERVAL = 0.1  # s between updates of the line on a terminal.
+DELAY = 1.0  # A shorter computation reports nothing [s].
+LINE_INTERVAL = 5.0  # Least time between two lines or messages [s].
+TERMINAL_INTERVAL = 0.1  # Least time between two updates of a line on a terminal [s].
+WIDTH = 24  # Characters of the line on a terminal.
+CLEAR = f"\r{'':{WIDTH}}\r"
 
 
 def reporter(stream: TextIO | None = None) -> Progress:
-    """Return a progress callback; its argument is the completed fraction of the work.
+    """Return a progress callback, to be called with the completed fraction, from 0 to 1.
 
     It writes nothing in the first second.  After that it updates one line on a terminal; to any
-    other stream it adds a line every two seconds.
+    other stream it writes a line at most every five seconds.
 
     Parameters
     ----------
@@ -25,21 +27,75 @@ def reporter(stream: TextIO | None = None) -> Progress:
         Destination (default: standard error).
     """
     out = sys.stderr if stream is None else stream
-    terminal = out.isatty()
-    interval = TERMINAL_INTERVAL if terminal else LINE_INTERVAL
-    begin = time.monotonic()
-    last = -math.inf  # time of the last output [s]
+    if not out.isatty():
+        return messages(lambda text: print(text, file=out, flush=True))
+    shown = False
+
+    def update(text: str) -> None:
+        nonlocal shown
+        shown = True
+        print(f"\r{text:{WIDTH}}", end="", file=out, flush=True)
+
+    timed = messages(update, TERMINAL_INTERVAL, done="")
 
     def report(fraction: float) -> None:
-        nonlocal last
-        now = time.monotonic() - begin
-        done = fraction >= 1.0
-        if done and terminal and last > 0.0:
-            print("\r100%", file=out, flush=True)
-            last = -math.inf
-        elif not done and now >= DELAY and now - last >= interval:
-            text, end = (f"\r{fraction:4.0%}", "") if terminal else (f"{fraction:4.0%} done", "\n")
-            print(text, end=end, file=out, flush=True)
-            last = now
+        nonlocal shown
+        timed(fraction)
+        if fraction >= 1.0 and shown:
+            print(f"\r{'100%':{WIDTH}}", file=out, flush=True)
+            shown = False
 
     return report
+
+
+def messages(
+    write: Callable[[str], object], interval: float = LINE_INTERVAL, done: str = " done"
+) -> Progress:
+    """Return a progress callback that calls ``write`` with a text such as `` 20% done, 12 s left``.
+
+    Parameters
+    ----------
+    write : callable
+        Called with each text, not in the first second and not after the end.
+    interval : float
+        Least time between two texts [s].
+    done : str
+        Text after the percentage.
+    """
+    begin = time.monotonic()
+    last = -math.inf  # Time of the last text [s].
+    first: tuple[float, float] | None = None  # Time [s] and fraction of the first call.
+
+    def report(fraction: float) -> None:
+        nonlocal last, first
+        now = time.monotonic() - begin
+        first = first or (now, fraction)
+        if fraction < 1.0 and now >= DELAY and now - last >= interval:
+            last = now
+            write(f"{fraction:4.0%}{done}{_remaining(now - first[0], fraction, first[1])}")
+
+    return report
+
+
+def _remaining(elapsed: float, fraction: float, first: float) -> str:
+    """Return the remaining time as text, if it can be estimated.
+
+    Parameters
+    ----------
+    elapsed : float
+        Time since the first call [s].
+    fraction, first : float
+        Completed fraction now and in the first call; a continued computation starts above 0.
+
+    Examples
+    --------
+    >>> _remaining(3.0, 0.2, 0.0), _remaining(60.0, 0.5, 0.25), _remaining(1.0, 0.5, 0.5)
+    (', 12 s left', ', 2 min left', '')
+    """
+    if fraction <= first:
+        return ""
+    seconds = elapsed * (1.0 - fraction) / (fraction - first)
+    for size, unit in ((3600.0, "h"), (60.0, "min")):
+        if seconds >= 1.5 * size:
+            return f", {seconds / size:.0f} {unit} left"
+    return f", {max(1, round(seconds))} s left"

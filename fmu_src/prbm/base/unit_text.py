@@ -29,6 +29,34 @@ def frequency_unit(frequency: float) -> tuple[float, str]:
     return 1e-9, "GHz"
 
 
+def frequency_text(frequency: float, digits: int = 4) -> str:
+    """Return a frequency [Hz] with its display unit.
+
+    Examples
+    --------
+    >>> frequency_text(4.957), frequency_text(92086.3), frequency_text(12345.0, 5)
+    ('4.957 Hz', '92.09 kHz', '12.345 kHz')
+    """
+    factor, name = frequency_unit(frequency)
+    return f"{factor * frequency:.{digits}g} {name}"
+
+
+def prefixed_unit(largest: float, unit: str) -> tuple[float, str]:
+    """Return the display unit of a quantity in a unit, by its largest magnitude.
+
+    Examples
+    --------
+    >>> prefixed_unit(0.8, "m/s"), prefixed_unit(0.017, "J"), prefixed_unit(0.0, "J")
+    ((1.0, 'm/s'), (1000.0, 'mJ'), (1.0, 'J'))
+    """
+    if largest == 0.0:
+        return 1.0, unit
+    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"), (1e12, "p")):
+        if largest * factor >= 0.1:
+            return factor, prefix + unit
+    return 1e15, f"f{unit}"
+
+
 def time_unit(span: float) -> tuple[float, str]:
     """Return factor and name of the display unit of a duration [s].
 

@@ -1,49 +1,106 @@
-"""Arguments that commands share.  It imports no slow packages, so that help appears at once."""
+"""Arguments shared by several commands, and a parser that proposes similar words.
 
+This module imports no slow packages, so that help appears at once.
+"""
+
+import re
 from argparse import ArgumentParser
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 ANIMATION_USAGE = "[options] (RESULT.csv | MECHANISM | --model NAME | --mechanism FILE) OUT.gif"
 
+INVALID_CHOICE = re.compile(r"invalid choice: '(?P<word>.*?)' \(choose from (?P<choices>.*)\)")
+SIMILARITY_MIN = 0.6  # Of difflib, from 0 to 1, for a word to be proposed.
+
+
+class ProposingParser(ArgumentParser):
+    """A parser whose messages about unknown options and commands propose similar ones."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """Parse arguments; report unknown options before missing arguments."""
+        if args is not None and not self.allow_abbrev and self._subparsers is None:
+            self._check_options(args)
+        return super().parse_known_args(args, namespace)
+
+    def _check_options(self, words: Sequence[str]) -> None:
+        """Report the first unknown option."""
+        for word in words:
+            if word == "--":
+                return
+            option = word.partition("=")[0]
+            if option.startswith("--") and option not in self._option_string_actions:
+                self.error(f"unrecognized arguments: {option}")
+
+    def proposed(self, message: str) -> str:
+        """Return a message of argparse with similar options or choices."""
+        invalid = INVALID_CHOICE.search(message)
+        if invalid:
+            choices = re.findall(r"[\w.-]+", invalid["choices"])
+            return f"{message}{_proposal(invalid['word'], choices)}"
+        prefix, _, words = message.partition("unrecognized arguments: ")
+        if not prefix and words.startswith("--"):
+            options = [x for x in self._option_string_actions if x.startswith("--")]
+            return f"{message}{_proposal(words.split()[0], options)}"
+        return message
+
+
+def _proposal(word: str, known: Iterable[str]) -> str:
+    from difflib import get_close_matches  # imported here: needed for mistakes only
+
+    names = {name.lstrip("-"): name for name in known}
+    near = get_close_matches(word.lstrip("-"), names, n=1, cutoff=SIMILARITY_MIN)
+    return f"; did you mean {names[near[0]]}?" if near else ""
+
 
 def picture_arguments(parser: ArgumentParser) -> None:
-    """Add the arguments of a picture."""
+    """Add the arguments of ``prbm picture``."""
     add = parser.add_argument
-    add("mechanism", metavar="MECHANISM", help="a mechanism file, or the name of a shipped one")
-    add("--modes", type=int, default=0, metavar="N", help="how many modes to draw, too")
-    add("--out", type=Path, metavar="FILE.png", help="default: the name of the mechanism, .png")
+    add("mechanism", metavar="MECHANISM", help="mechanism file, or name of a shipped mechanism")
+    add("--modes", type=int, default=0, metavar="N", help="number of modes to draw (default: 0)")
+    add(
+        "--out", type=Path, metavar="FILE.png",
+        help="file to write (default: the mechanism's name with .png)",
+    )  # fmt: skip
     set_argument(parser)
 
 
 def animation_arguments(parser: ArgumentParser) -> None:
-    """Add the arguments of a film."""
+    """Add the arguments of ``prbm animate``."""
     add = parser.add_argument
     add(
         "files", nargs="+", metavar="FILE",
-        help="RESULT.csv or a mechanism to show; OUT.gif or OUT.mp4 to write",
+        help="RESULT.csv or a mechanism to show, then OUT.gif or OUT.mp4 to write",
     )  # fmt: skip
-    which = parser.add_mutually_exclusive_group()
-    which.add_argument("--model", metavar="NAME", help="a mechanism that comes with the package")
-    which.add_argument("--mechanism", metavar="FILE.toml", help="one of your own")
-    set_argument(parser, "a parameter or input")
+    mechanism = parser.add_mutually_exclusive_group()
+    mechanism.add_argument("--model", metavar="NAME", help="name of a shipped mechanism")
+    mechanism.add_argument("--mechanism", metavar="FILE.toml", help="mechanism file")
+    set_argument(parser, "value of a parameter or input")
     stop_time_argument(parser)
-    add("--slow", type=float, help="factor of slow motion; a round one for about ten seconds")
-    add("--fps", type=float, help="frames per second; 25")
-    add("--from", dest="start", metavar="T", help="first time shown [s]")
-    add("--to", dest="stop", metavar="T", help="last time shown [s]")
+    add(
+        "--slow", type=float, metavar="FACTOR",
+        help="factor of slow motion (default: a round factor for a film of about ten seconds)",
+    )  # fmt: skip
+    add("--fps", type=float, metavar="N", help="frames per second (default: 25)")
+    add("--from", dest="start", metavar="T", help="first time shown [s] (default: the release)")
+    add(
+        "--to", dest="stop", metavar="T",
+        help="last time shown [s] (default: shortly after the motion ends)",
+    )  # fmt: skip
 
 
 def stop_time_argument(parser: ArgumentParser) -> None:
     """Add --stop-time."""
     parser.add_argument(
         "--stop-time", metavar="T",
-        help="duration of the simulation [s]; as in an FMU of the mechanism, mostly 1",
+        help="duration of the simulation [s] (default: that of the mechanism's FMU, usually 1)",
     )  # fmt: skip
 
 
-def set_argument(parser: ArgumentParser, what: str = "a parameter") -> None:
+def set_argument(parser: ArgumentParser, meaning: str = "value of a parameter") -> None:
     """Add --set."""
     parser.add_argument(
         "--set", action="append", default=[], metavar="NAME=VALUE",
-        help=f'{what}, in SI or with a unit, "release.displacement=-10 mm"; may be repeated',
+        help=f'{meaning}, in SI or with a unit: "release.displacement=-10 mm"; repeatable',
     )  # fmt: skip

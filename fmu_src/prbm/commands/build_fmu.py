@@ -1,7 +1,7 @@
-"""The entry point of the command that builds FMUs.
+"""Entry point of the command that builds FMUs.
 
-NumPy and SciPy are imported after ``SOURCE_DATE_EPOCH`` has been checked, and a missing package is
-reported in a sentence.
+It checks ``SOURCE_DATE_EPOCH`` before NumPy and SciPy are imported, and reports a missing package
+in one sentence.
 """
 
 import sys
@@ -14,17 +14,17 @@ def main() -> int:
     """Run the command; return its exit status."""
     try:
         try:
-            date()  # a wrong one fails the import of SciPy: numpy.f2py reads it, too
+            date()  # SciPy cannot be imported with an invalid date: numpy.f2py reads it, too.
         except ValueError as error:
             print(f"{command_name()}: {error}", file=sys.stderr)
             return MISTAKE
-        from . import building  # here, because it takes a second and packages may be missing
+        from . import building  # imported here: it takes a second, and packages may be missing
 
         return building.main()
     except ModuleNotFoundError as error:
         print(
-            f"{command_name()} needs the Python package {error.name}; install what it needs with "
-            "'python -m pip install .' in the folder of build_fmu.py",
+            f"{command_name()}: the Python package {error.name} is missing; install all required "
+            "packages with 'python -m pip install .' in the folder of build_fmu.py",
             file=sys.stderr,
         )
         return MISTAKE

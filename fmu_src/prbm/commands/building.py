@@ -1,14 +1,15 @@
-"""The command that builds FMUs, and shows that they run."""
+"""The command that builds FMUs and, with ``--simulate``, simulates them."""
 
 import argparse
 import json
-import math
 import os
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from pathlib import Path
 from typing import NoReturn
 
@@ -16,25 +17,25 @@ from ..base.atomic import check_no_folder, check_writable, write
 from ..base.errors import PrbmError
 from ..base.version import __version__
 from ..files.mechanism_file import read_mechanism, schema, shipped
-from ..files.settings import UserMistake
+from ..files.settings import UserMistake, assigned, units_of
 from ..fmu import native_fmu, python_fmu
 from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
-from ..mechanics.inputs import input_names
 from ..mechanism.description import Mechanism
+from .arguments import ProposingParser
 from .program import FAILED, INTERRUPTED, MISTAKE, OK, command_name
 
-TERMINATION_TIMEOUT = 2.0  # s for the process of a simulation to end after Ctrl-C
-REPORT = f"""
+TERMINATION_TIMEOUT = 2.0  # Time for the process of a simulation to end after Ctrl-C [s].
+REPORT_SCRIPT = f"""
 import os, signal, sys
 signal.signal(signal.SIGINT, lambda *_: os._exit({INTERRUPTED}))
 from prbm.commands.fmu_report import main
 sys.exit(main(sys.argv[1:]))
-"""  # Ctrl-C while it imports needs no traceback
+"""  # Ctrl-C during the imports ends it without a traceback.
 
 
 @dataclass(frozen=True)
 class Flavour:
-    """A kind of FMU: the folder it goes to, its version of FMI, whether it has an output clock."""
+    """A kind of FMU: its output folder, version of FMI, and whether it has an output clock."""
 
     folder: str
     fmi: int = 2
@@ -47,59 +48,67 @@ NATIVE = {"2": Flavour("fmi2", 2), "3": Flavour("fmi3", 3)}
 CLOCKED = Flavour("fmi3-clock", 3, clock=True)
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser that answers a mistake with one sentence."""
+class _Parser(ProposingParser):
+    """A parser that raises a mistake as :class:`UserMistake`."""
 
     def error(self, message: str) -> NoReturn:
-        raise UserMistake(f"{message}; see {self.prog} --help")
+        raise UserMistake(f"{self.proposed(message)}; see {self.prog} --help")
 
 
 def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     p = _Parser(
         prog=command_name(),
-        description="Build FMUs of compliant mechanisms with impacts.",
+        description="Build Functional Mock-up Units (FMUs) of compliant mechanisms with impacts.",
         epilog="Without options, all shipped mechanisms are built into dist/: as Python FMUs, and "
         "as native FMUs of FMI 2.0 and 3.0 for this machine.",
     )
-    which = p.add_mutually_exclusive_group()
-    which.add_argument(
+    mechanism = p.add_mutually_exclusive_group()
+    mechanism.add_argument(
         "--model", action="append", metavar="NAME",
-        help="a shipped mechanism, may be repeated (default: all, see --list)",
+        help="shipped mechanism, see --list; repeatable (default: all of them)",
     )  # fmt: skip
-    which.add_argument(
-        "--mechanism", type=Path, metavar="FILE.toml", help="a mechanism of your own"
+    mechanism.add_argument(
+        "--mechanism", type=Path, metavar="FILE.toml", help="mechanism file to build instead"
     )
     p.add_argument(
         "--flavour", choices=("python", "native"),
-        help="python: readable source, needs NumPy and SciPy where it runs; native: compiled, "
-        "needs nothing (default: both)",
+        help="python: readable source, needs Python with NumPy and SciPy where it runs; native: "
+        "compiled, needs no other software (default: both)",
     )  # fmt: skip
     p.add_argument("--fmi", choices=("2", "3"), help="version of FMI (default: both)")
     p.add_argument(
         "--platform", action="append", metavar="NAME",
-        help=f"where native FMUs run: {HOST}, {ALL}, or some of {', '.join(PLATFORMS)}; may be "
-        f"repeated (default: {HOST}; all others take the Python package ziglang)",
+        help=f"platform of native FMUs: {HOST} (this machine), {ALL}, or some of "
+        f"{', '.join(PLATFORMS)}; repeatable; platforms other than {HOST} need the Python package "
+        f"ziglang (default: {HOST})",
     )  # fmt: skip
     p.add_argument(
         "--clock", action="store_true",
-        help="build the variant of FMI 3.0 whose stops have an output clock, and nothing else",
+        help="build only the variant of FMI 3.0 whose stops have an output clock",
     )  # fmt: skip
-    p.add_argument("--out", type=Path, default=Path("dist"), metavar="DIR", help="default: dist")
+    p.add_argument(
+        "--out", type=Path, default=Path("dist"), metavar="DIR",
+        help="output folder (default: dist)",
+    )  # fmt: skip
     p.add_argument(
         "--set", action="append", default=[], dest="changes", metavar="NAME=VALUE",
-        help="start value of a parameter or input, in SI units; may be repeated",
+        help='start value of a parameter or input, in SI or with a unit: "stop.position=1 mm"; '
+        "repeatable",
     )  # fmt: skip
     p.add_argument(
         "--simulate", action="store_true",
-        help="simulate each FMU with FMPy, print what happens and plot it beside the FMU",
+        help="simulate each FMU with FMPy, print a summary and write a plot beside the FMU",
     )  # fmt: skip
     p.add_argument(
         "--schema", action="store_true",
-        help="print the JSON schema of mechanism files, for editors, and stop",
+        help="print the JSON schema of mechanism files, for editors, and exit",
     )  # fmt: skip
-    p.add_argument("--list", action="store_true", help="list the shipped mechanisms and stop")
-    p.add_argument("--version", action="version", version=f"prbm-impact {__version__}")
+    p.add_argument("--list", action="store_true", help="list the shipped mechanisms and exit")
+    p.add_argument(
+        "--version", action="version", version=f"prbm-impact {__version__}",
+        help="print the version and exit",
+    )  # fmt: skip
     return p
 
 
@@ -113,8 +122,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.schema:
             print(json.dumps(schema(), indent=2))
             return OK
-        order = _order(options)
-        built, missing = _build(order)
+        plan = _plan(options)
+        built, missing = _build(plan)
         status = _simulate(built) if options.simulate else OK
         if missing:
             print(f"{command_name()}: {missing}", file=sys.stderr)
@@ -135,41 +144,41 @@ def _list() -> None:
         print(f"{name:{width}}  {read_mechanism(path).title}")
 
 
-def asked_flavours(options: argparse.Namespace) -> tuple[Flavour, ...]:
-    """Return the kinds of FMU that were asked for.
+def selected_flavours(options: argparse.Namespace) -> tuple[Flavour, ...]:
+    """Return the kinds of FMU that the options select.
 
     Raises
     ------
     UserMistake
-        If there is no such kind.
+        If the options exclude each other.
     """
     python, native = options.flavour != "native", options.flavour != "python"
     if options.clock:
         if not native or options.fmi == "2":
             raise UserMistake(
-                "--clock: only native FMUs of FMI 3.0 have clocks; leave out --flavour python and "
+                "--clock: only native FMUs of FMI 3.0 have clocks; omit --flavour python and "
                 "--fmi 2"
             )
         return (CLOCKED,)
     if not native:
         if options.fmi == "3":
-            raise UserMistake("Python FMUs are FMI 2.0; leave out --fmi 3 or --flavour python")
+            raise UserMistake("--fmi 3: Python FMUs are FMI 2.0; omit --fmi 3 or --flavour python")
         if options.platform:
             raise UserMistake(
                 f"--platform {options.platform[0]}: Python FMUs run on Linux and Windows (x86-64) "
-                "as they are; leave it out, or leave out --flavour python"
+                "without a choice of platform; omit --platform or --flavour python"
             )
     kinds = [flavour for fmi, flavour in NATIVE.items() if native and options.fmi in (None, fmi)]
     return (*([PYTHON] if python and options.fmi != "3" else []), *kinds)
 
 
-def asked_platforms(options: argparse.Namespace) -> tuple[str, ...]:
-    """Return the platforms that were asked for, by our names.
+def selected_platforms(options: argparse.Namespace) -> tuple[str, ...]:
+    """Return the names of the selected platforms; the names of FMI 2.0 are translated.
 
     Raises
     ------
     UserMistake
-        If there is no such platform, or none that can simulate what is to be simulated here.
+        If a platform is unknown, or ``--simulate`` is given and none of them is this machine.
     """
     names = [name.strip() for text in options.platform or [HOST] for name in text.split(",")]
     aliases = {p.folder2: p.name for p in PLATFORMS.values()}
@@ -177,59 +186,73 @@ def asked_platforms(options: argparse.Namespace) -> tuple[str, ...]:
     for name in chosen:
         if name not in (HOST, ALL, *PLATFORMS):
             raise UserMistake(
-                f"--platform {name}: there is no such platform; choose {HOST}, {ALL} or some of "
+                f"--platform {name}: unknown platform; choose {HOST}, {ALL} or some of "
                 f"{', '.join(PLATFORMS)}"
             )
     here = this_platform()
     if options.simulate and here and not {HOST, ALL, here.name} & {*chosen}:
         raise UserMistake(
-            f"--simulate: what is built for {', '.join(chosen)} does not run on this machine; add "
-            f"--platform {HOST}, or leave out --simulate"
+            f"--simulate: FMUs for {', '.join(chosen)} do not run on this machine; add --platform "
+            f"{HOST}, or omit --simulate"
         )
     return chosen
 
 
 @dataclass(frozen=True)
-class Order:
-    """What to build, checked as far as that takes no time.
+class BuildPlan:
+    """The FMUs to build; all checks that take no time have passed.
 
-    ``native`` tells whether native FMUs were asked for, and not just built with all others.
+    Parameters
+    ----------
+    mechanisms : tuple of Mechanism
+        The mechanisms.
+    changes : mapping
+        Start values that differ from the defaults.
+    flavours : tuple of Flavour
+        Kinds of FMU to build of each mechanism.
+    platforms : tuple of str
+        Platforms of the native FMUs.
+    native_required : bool
+        Whether an option selects native FMUs, so that a missing compiler is an error.
+    out : Path
+        Output folder.
     """
 
     mechanisms: tuple[Mechanism, ...]
     changes: Mapping[str, float]
     flavours: tuple[Flavour, ...]
     platforms: tuple[str, ...]
-    native: bool
+    native_required: bool
     out: Path
 
     def path(self, flavour: Flavour, name: str) -> Path:
-        """Return where an FMU goes."""
+        """Return the file of an FMU."""
         return self.out / flavour.folder / f"{name}.fmu"
 
 
-def _order(options: argparse.Namespace) -> Order:
-    order = Order(
-        tuple(mechanisms(options)),
-        start_values(options.changes),
-        asked_flavours(options),
-        asked_platforms(options),
+def _plan(options: argparse.Namespace) -> BuildPlan:
+    """Return the plan of a command line, after all checks that take no time."""
+    chosen = mechanisms(options)
+    plan = BuildPlan(
+        tuple(chosen),
+        start_values(chosen, options.changes),
+        selected_flavours(options),
+        selected_platforms(options),
         bool(options.flavour or options.fmi or options.platform or options.clock),
         options.out,
     )
-    _check_names(order.mechanisms, order.changes)
-    for flavour in order.flavours:
-        check_writable(order.out / flavour.folder)
-        for mechanism in order.mechanisms:
-            path = order.path(flavour, mechanism.name)
+    for flavour in plan.flavours:
+        check_writable(plan.out / flavour.folder)
+        for mechanism in plan.mechanisms:
+            path = plan.path(flavour, mechanism.name)
             check_no_folder(path)
             if options.simulate:
                 check_no_folder(path.with_suffix(".png"))
-    return order
+    return plan
 
 
 def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
-    """Return the mechanisms that were asked for.
+    """Return the selected mechanisms.
 
     Raises
     ------
@@ -245,56 +268,56 @@ def mechanisms(options: argparse.Namespace) -> list[Mechanism]:
     for name in names:
         if name not in files:
             raise UserMistake(
-                f"there is no mechanism {name!r}; shipped are {', '.join(files)}, and "
-                "--mechanism FILE.toml takes your own"
+                f"--model {name}: unknown mechanism; the shipped ones are {', '.join(files)}; "
+                "give your own with --mechanism FILE.toml"
             )
     return [read_mechanism(files[name]) for name in names]
 
 
-def start_values(texts: Sequence[str]) -> dict[str, float]:
-    """Read NAME=VALUE pairs.
+def start_values(chosen: Sequence[Mechanism], texts: Sequence[str]) -> dict[str, float]:
+    """Read NAME=VALUE pairs of parameters and inputs of mechanisms, in SI or with a unit.
 
     Raises
     ------
     UserMistake
-        If a text is no such pair.
+        If a text is not such a pair, or only some of the mechanisms have the variable.
+    ParameterError
+        If no mechanism has the variable.
 
     Examples
     --------
-    >>> start_values(["stop.restitution=0.5", "stop.position = 1e-3"])
+    >>> start_values([load(shipped()["PRBDM"])], ["stop.restitution=0.5", "stop.position = 1 mm"])
     {'stop.restitution': 0.5, 'stop.position': 0.001}
     """
-    changes = {}
-    for text in texts:
-        name, equals, value = (part.strip() for part in text.partition("="))
-        try:
-            number = float(value)
-        except ValueError:
-            number = math.nan
-        if not (name and equals and math.isfinite(number)):
+    units = {mechanism.name: units_of(mechanism) for mechanism in chosen}
+    changes = assigned(reduce(or_, units.values()), texts)
+    for name in changes:
+        having = [model for model in units if name in units[model]]
+        lacking = [model for model in units if name not in units[model]]
+        if lacking:
+            options = " ".join(f"--model {model}" for model in having)
             raise UserMistake(
-                f"--set {text}: write NAME=VALUE with a finite number in SI units, for instance "
-                "--set stop.restitution=0.5"
+                f"--set {name}: no such parameter or input in {', '.join(lacking)}; add {options} "
+                "to build only mechanisms that have it"
             )
-        changes[name] = number
     return changes
 
 
-def _build(order: Order) -> tuple[list[Path], str]:
-    """Build everything, then write everything; return the files, and what is missing and why.
+def _build(plan: BuildPlan) -> tuple[list[Path], str]:
+    """Build all FMUs, then write them; return the files, and a sentence about missing FMUs.
 
-    Whoever asks for native FMUs gets them or an error.  Whoever asks for nothing in particular and
-    has no compiler gets the Python FMUs, and is told.
+    Without a compiler, the native FMUs are missing.  That is an error if an option selects native
+    FMUs; otherwise the Python FMUs are built.
     """
     built: dict[Path, bytes] = {}
     missing = ""
     try:
-        for flavour in order.flavours:
-            for mechanism in order.mechanisms:
-                path = order.path(flavour, mechanism.name)
-                built[path] = _fmu(order, flavour, mechanism)
+        for flavour in plan.flavours:
+            for mechanism in plan.mechanisms:
+                path = plan.path(flavour, mechanism.name)
+                built[path] = _fmu(plan, flavour, mechanism)
     except CompilerError as error:
-        if order.native:
+        if plan.native_required:
             raise
         missing = f"only the Python FMUs were built: {error}"
     for path, content in built.items():
@@ -302,37 +325,23 @@ def _build(order: Order) -> tuple[list[Path], str]:
             write(path, content)
         except OSError as error:
             raise UserMistake(
-                f"cannot write {path}: {error.strerror}; choose a folder with --out"
+                f"cannot write {path}: {error.strerror}; choose another folder with --out"
             ) from None
         print(f"{path.stem}: {path} ({len(content) / 1000:.0f} kB)", flush=True)
     return [*built], missing
 
 
-def _fmu(order: Order, flavour: Flavour, mechanism: Mechanism) -> bytes:
-    told = _progress(f"{flavour.folder}/{mechanism.name}")
-    changes, platforms = order.changes, order.platforms
+def _fmu(plan: BuildPlan, flavour: Flavour, mechanism: Mechanism) -> bytes:
+    progress = _progress(f"{flavour.folder}/{mechanism.name}")
+    changes, platforms = plan.changes, plan.platforms
     try:
         if not flavour.native:
-            return python_fmu.build(mechanism, changes, told)
-        return native_fmu.build(mechanism, changes, flavour.fmi, platforms, flavour.clock, told)
+            return python_fmu.build(mechanism, changes, progress)
+        return native_fmu.build(mechanism, changes, flavour.fmi, platforms, flavour.clock, progress)
     except CompilerError:
-        raise  # which has nothing to do with the mechanism
+        raise  # It does not depend on the mechanism.
     except PrbmError as error:
         raise UserMistake(f"{mechanism.name}: {error}") from None
-
-
-def _check_names(chosen: Sequence[Mechanism], changes: Mapping[str, float]) -> None:
-    """Refuse start values that some of the mechanisms know and others do not."""
-    known = {m.name: {*m.values(), *input_names(m)} for m in chosen}
-    for name in changes:
-        having = [model for model in known if name in known[model]]
-        lacking = [model for model in known if name not in known[model]]
-        if having and lacking:
-            options = " ".join(f"--model {model}" for model in having)
-            raise UserMistake(
-                f"--set {name}: {', '.join(lacking)} has no such parameter or input; add {options} "
-                "to build without it"
-            )
 
 
 def _progress(name: str) -> Callable[[str], None]:
@@ -340,26 +349,27 @@ def _progress(name: str) -> Callable[[str], None]:
 
 
 def _simulate(fmus: Sequence[Path]) -> int:
-    """Simulate each FMU in a process of its own."""
+    """Simulate each FMU in a separate process; return the exit status."""
     source = str(Path(__file__).resolve().parents[1])
     paths = os.pathsep.join(filter(None, (source, os.environ.get("PYTHONPATH"))))
     status = OK
     for fmu in fmus:
-        command = [sys.executable, "-c", REPORT, str(fmu), str(fmu.with_suffix(".png"))]
+        command = [sys.executable, "-c", REPORT_SCRIPT, str(fmu), str(fmu.with_suffix(".png"))]
         print(f"{fmu.parent.name}/{fmu.stem}: simulating ...", flush=True)
-        code = _ended(command, os.environ | {"PYTHONPATH": paths})
+        code = _run(command, os.environ | {"PYTHONPATH": paths})
         if code == INTERRUPTED:
             raise KeyboardInterrupt
         if code != OK:
-            ended = f"was ended by signal {-code}" if code < 0 else "failed"
-            print(f"{command_name()}: the simulation of {fmu} {ended}", file=sys.stderr)
+            reason = f"was ended by signal {-code}" if code < 0 else "failed"
+            print(f"{command_name()}: the simulation of {fmu} {reason}", file=sys.stderr)
             status = max(status, code if code == MISTAKE else FAILED)
     return status
 
 
-def _ended(command: Sequence[str], environment: Mapping[str, str]) -> int:
-    """Run a command to its end, return its status; what Ctrl-C means to it, it decides itself."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # it inherits that until it is ready
+def _run(command: Sequence[str], environment: Mapping[str, str]) -> int:
+    """Run a command, which handles Ctrl-C itself; return its exit status."""
+    # The process inherits the ignored signal and so survives Ctrl-C until it sets its own handler.
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         process = subprocess.Popen(command, env=environment)
     finally:
@@ -367,12 +377,12 @@ def _ended(command: Sequence[str], environment: Mapping[str, str]) -> int:
     try:
         return process.wait()
     except KeyboardInterrupt:
-        _end(process)
+        _stop(process)
         raise
 
 
-def _end(process: subprocess.Popen[bytes]) -> None:
-    """Wait for a process that should end by itself; insist if it does not."""
+def _stop(process: subprocess.Popen[bytes]) -> None:
+    """Wait for a process to end after Ctrl-C; interrupt, then terminate it after a timeout."""
     for number in (signal.SIGINT, signal.SIGTERM):
         try:
             process.wait(TERMINATION_TIMEOUT)

@@ -1,8 +1,8 @@
 """The command ``prbm``: its arguments, and the function that runs each command.
 
-Text goes to standard output; tables and figures into a folder, if ``--out`` names one, all at
-once when everything is computed; progress and mistakes to standard error.  The status is 0, 1 if
-a computation fails, 2 if the user made a mistake, 130 after Ctrl-C.
+Text goes to standard output, progress and errors to standard error.  Tables and figures go into the
+folder given by ``--out``, all at once after the computation.  The exit status is 0, 1 if a
+computation fails, 2 for a mistake of the user, 130 after Ctrl-C.
 """
 
 import argparse
@@ -16,9 +16,12 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..base.errors import EquilibriumError, PrbmError, SimulationError
+from ..base.progress import CLEAR
+from ..base.version import __version__
 from ..mechanism.flexure import MODELS
 from .arguments import (
     ANIMATION_USAGE,
+    ProposingParser,
     animation_arguments,
     picture_arguments,
     set_argument,
@@ -27,34 +30,58 @@ from .arguments import (
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
 from .remedies import in_options
 
-WIDTH = 79  # columns of a description
+WIDTH = 79  # Columns of a description.
 NEGATIVE = re.compile(r"-\.?\d")
-MECHANISM = "name of a shipped mechanism (prbm list), or a mechanism file, FILE.toml"
-QUANTITIES = 'quantities are in SI, or have a unit: 0.01, 10mm, "-10 mm"; lists also -10 0 10 mm'
+MECHANISM = "name of a shipped mechanism (see prbm list), or mechanism file FILE.toml"
+QUANTITIES = 'quantities are in SI or have a unit: 0.01, 10mm, "-10 mm"; in lists also -10 0 10 mm'
+METHODS = ("algebraic", "simulated", "fitted", "elements", "closed-form")
 
 
 class _ArgumentError(Exception):
     """Invalid command line."""
 
 
-class _Parser(argparse.ArgumentParser):
+class _Parser(ProposingParser):
     """A parser that reports a mistake in one sentence."""
 
     def error(self, message: str) -> NoReturn:
-        raise _ArgumentError(f"{self.prog}: {message}; see {self.prog} --help")
+        raise _ArgumentError(f"{self.prog}: {self.proposed(message)}; see {self.prog} --help")
 
 
 Commands = Any  # argparse does not name the type of add_subparsers()
 
 
 def _command(
-    commands: Commands, name: str, run: str, summary: str, example: str, **more: Any
+    commands: Commands,
+    name: str,
+    run: str,
+    summary: str,
+    example: str,
+    *,
+    details: str = "",
+    **more: Any,
 ) -> argparse.ArgumentParser:
-    """Add a command; ``run`` is module:function, imported when it is needed."""
+    """Add a command.
+
+    Parameters
+    ----------
+    commands : subparsers of argparse
+        The commands so far.
+    name : str
+        Name of the command.
+    run : str
+        Its function as module:function, imported when the command runs.
+    summary, details : str
+        Phrase for the list of commands; further sentences for the help of this command.
+    example : str
+        Examples of command lines.
+    more : dict
+        Further arguments of the parser.
+    """
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
         help=summary,
-        description=textwrap.fill(f"{summary[0].upper()}{summary[1:]}.", WIDTH),
+        description=textwrap.fill(f"{summary[0].upper()}{summary[1:]}.  {details}", WIDTH),
         epilog=f"{example}\n\n{QUANTITIES}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
@@ -72,19 +99,23 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     p = _Parser(
         prog="prbm",
-        description="What a compliant mechanism does: its modes, places of rest, motion through "
-        "impacts,\nand its parameters from measured data.",
+        description="Analyse a compliant mechanism with stops: natural frequencies, equilibria, "
+        "motion\nthrough impacts, and parameters from measured data.",
         epilog=_examples(
             "prbm list",
             "prbm modes PRBDM2R",
             "prbm simulate PRBDM2R --set stop.restitution=0.5 --out results",
             "prbm simulate my_mechanism.toml",
         )
-        + "\n\nText is printed; --out DIR also writes tables (CSV) and figures (PNG) into a "
-        "folder.\nprbm-build-fmu makes FMUs of the same mechanisms.",
+        + "\n\nResults are printed; --out DIR also writes tables (CSV) and figures (PNG) into a "
+        "folder.\nprbm-build-fmu builds FMUs of the same mechanisms.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
+    p.add_argument(
+        "--version", action="version", version=f"prbm-impact {__version__}",
+        help="print the version and exit",
+    )  # fmt: skip
     commands = p.add_subparsers(title="commands", metavar="COMMAND", parser_class=_Parser)
     _list(commands)
     _modes(commands)
@@ -110,28 +141,30 @@ def _mechanism(parser: argparse.ArgumentParser) -> None:
 def _out(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR",
-        help="folder for tables and figures; default: print only",
+        help="folder for tables and figures (default: none are written)",
     )  # fmt: skip
 
 
 def _list(commands: Commands) -> None:
     _command(
-        commands, "list", "shipped:listed", "the shipped mechanisms, a line each",
-        _examples("prbm list"),
-    )  # fmt: skip
+        commands, "list", "shipped:listed", "list the shipped mechanisms", _examples("prbm list")
+    )
 
 
 def _modes(commands: Commands) -> None:
     parser = _command(
         commands, "modes", "modes:frequencies",
-        "natural frequencies and modes, at rest under gravity or held at a displacement",
+        "natural frequencies and modes, about the equilibrium under gravity or a held shape",
         _examples("prbm modes PRBDM2R", "prbm modes PRBDM2R --held -10mm --out modes"),
     )  # fmt: skip
     _mechanism(parser)
-    parser.add_argument("--count", type=int, default=6, metavar="N", help="how many; %(default)s")
     parser.add_argument(
-        "--held", metavar="X", help="displacement at which a force holds the released body [m]"
+        "--count", type=int, default=6, metavar="N", help="number of modes (default: %(default)s)"
     )
+    parser.add_argument(
+        "--held", metavar="X",
+        help="displacement at which a force holds the released body [m] (default: no force)",
+    )  # fmt: skip
     set_argument(parser)
     _out(parser)
 
@@ -139,20 +172,23 @@ def _modes(commands: Commands) -> None:
 def _equilibrium(commands: Commands) -> None:
     parser = _command(
         commands, "equilibrium", "rest:equilibria",
-        "places of rest under gravity, the force that holds the released body elsewhere, where "
-        "it snaps through",
+        "equilibria under gravity, the force that holds the released body at other "
+        "displacements, and snap-through",
         _examples(
             "prbm equilibrium PRBDM2R",
             "prbm equilibrium PRBDM2R --held -10 -5 5 10 mm",
-            "prbm equilibrium Bistable --from -14mm --to 14mm --out curve",
+            "prbm equilibrium Bistable --from -2mm --to 26mm --out curve",
         ),
     )  # fmt: skip
     _mechanism(parser)
     add = parser.add_argument
-    add("--held", nargs="+", metavar="X", help="displacements at which it is held [m]")
-    add("--from", dest="start", metavar="A", help="first displacement of a curve [m]")
-    add("--to", dest="end", metavar="B", help="last displacement of the curve [m]")
-    add("--points", type=int, default=41, metavar="N", help="of the curve; %(default)s")
+    add("--held", nargs="+", metavar="X", help="displacements at which the body is held [m]")
+    add("--from", dest="start", metavar="A", help="first displacement of a force curve [m]")
+    add("--to", dest="end", metavar="B", help="last displacement of the force curve [m]")
+    add(
+        "--points", type=int, default=41, metavar="N",
+        help="number of points of the force curve (default: %(default)s)",
+    )  # fmt: skip
     set_argument(parser)
     _out(parser)
 
@@ -160,7 +196,7 @@ def _equilibrium(commands: Commands) -> None:
 def _simulate(commands: Commands) -> None:
     parser = _command(
         commands, "simulate", "simulation:simulated",
-        "the motion from the release through impacts to rest",
+        "simulate the motion after the release, through all impacts",
         _examples(
             "prbm simulate PRBDM2R --set stop.restitution=0.5 --out results",
             "prbm simulate PRBDM2R --spectrum first --out results",
@@ -169,64 +205,76 @@ def _simulate(commands: Commands) -> None:
     _mechanism(parser)
     add = parser.add_argument
     stop_time_argument(parser)
-    add("--step", metavar="T", help="between rows of the table [s]; mostly 0.001")
-    add("--tolerance", metavar="X", help="relative, of the integration; default: solver.tolerance")
-    set_argument(parser, "a parameter or an input")
+    add(
+        "--step", metavar="T",
+        help="time between rows of the table [s] (default: at most a thousandth of the duration, "
+        "and at least 40 rows per fundamental period)",
+    )  # fmt: skip
+    add(
+        "--tolerance", metavar="X",
+        help="relative tolerance of the integration (default: solver.tolerance)",
+    )  # fmt: skip
+    set_argument(parser, "value of a parameter or input")
     add(
         "--spectrum", nargs="?", const="first", choices=("first", "last"),
-        help="frequencies after the first impact, simulated without the wall from there on, or "
-        "after the last one of the simulation; default: first",
+        help="compute spectra of the vibration after an impact; first: after the first impact, "
+        "simulated without the wall from there; last: after the last impact of the simulation; "
+        "without a value: first",
     )  # fmt: skip
     add(
         "--spectrum-time", default="0.2", metavar="T",
-        help="how long to listen after the first impact [s]; %(default)s",
+        help="duration of the vibration after the first impact [s] (default: %(default)s)",
     )  # fmt: skip
     _out(parser)
 
 
 def _record(parser: argparse.ArgumentParser) -> None:
-    """Add what a record needs whose head says too little."""
-    group = parser.add_argument_group("how to read a file")
+    """Add the options for files whose head lacks names or units."""
+    group = parser.add_argument_group("names and units of columns")
     group.add_argument(
         "--unit", action="append", default=[], metavar="NAME=UNIT",
-        help="unit of a column that has none, or a wrong one; may be repeated",
+        help="unit of a column without a unit, or with a wrong one; repeatable",
     )  # fmt: skip
     group.add_argument(
         "--columns", nargs="+", metavar="HEAD",
-        help='heads of all columns of a file without any, --columns "t [s]" "x [mm]"',
+        help='names and units of all columns of a file without a head: --columns "t [s]" "x [mm]"',
     )  # fmt: skip
 
 
 def _signal(parser: argparse.ArgumentParser) -> None:
-    """Add which part of a record is the signal."""
-    group = parser.add_argument_group("which part of the record")
+    """Add the options that select the signal and its time span."""
+    group = parser.add_argument_group("selection of the signal")
     group.add_argument(
-        "--column", metavar="NAME", help="of the signal; default: the only one that can be it"
-    )
-    group.add_argument("--from", dest="start", metavar="T", help="leave out what is before [s]")
-    group.add_argument("--to", dest="end", metavar="T", help="leave out what is after [s]")
+        "--column", metavar="NAME",
+        help="column of the signal (default: the only column with a suitable unit)",
+    )  # fmt: skip
+    group.add_argument("--from", dest="start", metavar="T", help="start of the time span [s]")
+    group.add_argument("--to", dest="end", metavar="T", help="end of the time span [s]")
     group.add_argument(
         "--calibration", metavar="FILE.csv",
-        help="record of a sensor beside a reference, by which to convert the signal",
+        help="readings of the sensor beside a reference; the signal is converted accordingly",
     )  # fmt: skip
 
 
 def _response(parser: argparse.ArgumentParser) -> None:
-    """Add what a response is besides a signal."""
+    """Add the options that relate a recorded signal to a simulation."""
     add = parser.add_argument
-    add("--release", metavar="T", help="time of the release in the record [s]; 0")
+    add("--release", metavar="T", help="time of the release in the record [s] (default: 0)")
     add(
         "--output", metavar="NAME",
-        help="output of the mechanism that was recorded, as shuttle.x; default: the displacement "
-        "of the released body along its release",
+        help="recorded output of the mechanism, e.g. shuttle.x (default: the displacement of the "
+        "released body along the direction of the release)",
     )  # fmt: skip
-    add("--uncertainty", metavar="U", help="standard, of a sample; default: from the residuals")
+    add(
+        "--uncertainty", metavar="U",
+        help="standard uncertainty of a sample (default: estimated from the residuals)",
+    )  # fmt: skip
 
 
 def _fit(commands: Commands) -> None:
     parser = _command(
         commands, "fit", "fitting:fitted",
-        "parameters of a mechanism fitted to frequencies, a response, a force curve",
+        "fit parameters of a mechanism to natural frequencies, a response or a force curve",
         _examples(
             'prbm fit PRBDM --free flexure.K_theta --frequency "4.82 Hz +- 0.06"',
             "prbm fit PRBDM2R --free flexure.youngs_modulus=100:250GPa \\\n"
@@ -239,25 +287,29 @@ def _fit(commands: Commands) -> None:
     add = parser.add_argument
     add(
         "--free", action="append", required=True, metavar="NAME[=LOW:HIGH]",
-        help="a parameter to fit, with bounds; may be repeated.  record.shift is the time [s] and "
-        "record.zero the reading at which the record begins",
+        help="parameter to fit, with bounds; repeatable.  record.shift [s] and record.zero are "
+        "the time and the reading at which the record begins",
     )  # fmt: skip
     set_argument(parser)
-    targets = parser.add_argument_group("what to fit to (one or more)")
+    targets = parser.add_argument_group("measured data (at least one)")
     targets.add_argument(
         "--frequency", action="append", default=[], metavar="F",
-        help='"4.82 Hz +- 0.06", a natural frequency at rest with its standard uncertainty; "130 '
-        'Hz +- 1 mode 2 at -10 mm" of another mode, held; may be repeated',
+        help='natural frequency with its standard uncertainty: "4.82 Hz +- 0.06" of the first '
+        'mode at rest, "130 Hz +- 1 mode 2 at -10 mm" of the second mode held at -10 mm; '
+        "repeatable",
     )  # fmt: skip
     targets.add_argument(
-        "--response", metavar="FILE.csv", help="motion over time, from the release"
+        "--response", metavar="FILE.csv", help="motion over time since the release"
     )
     targets.add_argument(
         "--force-deflection", metavar="FILE.csv", help="holding forces over displacements"
     )
-    add("--deflection", metavar="NAME", help="column of the displacements")
-    add("--force", metavar="NAME", help="column of the forces")
-    add("--force-uncertainty", metavar="U", help="standard, of a force [N]")
+    add("--deflection", metavar="NAME", help="column of displacements (default: the only lengths)")
+    add("--force", metavar="NAME", help="column of forces (default: the only forces)")
+    add(
+        "--force-uncertainty", metavar="U",
+        help="standard uncertainty of a force [N] (default: estimated from the residuals)",
+    )  # fmt: skip
     _response(parser)
     _signal(parser)
     _record(parser)
@@ -267,39 +319,48 @@ def _fit(commands: Commands) -> None:
 def _impact_map(commands: Commands) -> None:
     parser = _command(
         commands, "impact-map", "maps:mapped",
-        "how much of the fundamental mode an impact gives back, over walls and offsets of the hit",
+        "maps of the modal restitution over positions of the wall and offsets of the hit point",
         _examples(
             "prbm impact-map PRBDM2R --model 2R --axial",
-            "prbm impact-map PRBDM2R --way algebraic simulated --heights -10 0 10 mm \\\n"
-            "      --offsets -4 0 4 mm --out map",
+            "prbm impact-map PRBDM2R --method algebraic simulated \\\n"
+            "      --wall-positions -10 0 10 mm --offsets -4 0 4 mm --out map",
         ),
+        details="The modal restitution is the velocity of the fundamental mode after an impact, "
+        "divided by that before, with the sign reversed.",
     )  # fmt: skip
     _mechanism(parser)
     add = parser.add_argument
     add(
-        "--heights", nargs="+", metavar="H",
-        help="positions of the wall [m]; default: five, to 5/9 of the release on both sides",
+        "--wall-positions", nargs="+", metavar="X",
+        help="positions of the wall [m] (default: five, up to 5/9 of the release on both sides)",
     )  # fmt: skip
     add(
         "--offsets", nargs="+", metavar="D",
-        help="offsets of the hit [m]; default: five, to 1/20 of the size on both sides",
+        help="offsets of the hit point [m] (default: five, up to 1/20 of the size on both sides)",
     )  # fmt: skip
     add(
-        "--way", nargs="+", default=["algebraic"], metavar="WAY",
-        choices=("algebraic", "simulated", "fitted", "elements", "closed-form"),
-        help="algebraic: a pure mode arrives; simulated: the first impact after the release; "
-        "fitted: the restitution of a 1R model with the same motion, minutes; elements: finite "
-        "elements; closed-form: a free body on the same path, of a mechanism in which one body "
-        "moves and does not turn.  Default: algebraic",
+        "--method", nargs="+", default=["algebraic"], metavar="METHOD", choices=METHODS,
+        help="algebraic: the arriving motion is the fundamental mode alone; simulated: first "
+        "impact after the release; fitted: restitution of a 1R model with the same motion (takes "
+        "minutes); elements: finite elements; closed-form: formula for a single body that moves "
+        "along a path without turning (default: algebraic)",
     )  # fmt: skip
+    add("--heights", nargs="+", dest="wall_positions", help=argparse.SUPPRESS)  # former name
+    add("--way", nargs="+", dest="method", choices=METHODS, help=argparse.SUPPRESS)  # former name
     add(
         "--model", nargs="+", default=[], metavar="M", choices=tuple(MODELS),
-        help=f"models of the flexures: {', '.join(MODELS)} (default: the mechanism's own)",
+        help=f"models of the flexures: {', '.join(MODELS)} (default: those of the mechanism)",
     )  # fmt: skip
-    add("--axial", action="store_true", help="flexures of --model stretch")
-    add("--links", type=int, default=12, metavar="N", help="of nR; %(default)s")
-    add("--elements", type=int, default=16, metavar="N", help="a flexure; %(default)s")
-    add("--stop", metavar="NAME", help="which stop is hit; default: the first")
+    add("--axial", action="store_true", help="the flexures of --model stretch")
+    add(
+        "--links", type=int, default=12, metavar="N",
+        help="number of links of an nR flexure (default: %(default)s)",
+    )  # fmt: skip
+    add(
+        "--elements", type=int, default=16, metavar="N",
+        help="number of finite elements per flexure (default: %(default)s)",
+    )  # fmt: skip
+    add("--stop", metavar="NAME", help="stop that is hit (default: the first)")
     set_argument(parser)
     _out(parser)
 
@@ -307,40 +368,53 @@ def _impact_map(commands: Commands) -> None:
 def _sweep(commands: Commands) -> None:
     parser = _command(
         commands, "sweep", "sweeps:swept",
-        "one run of an FMU for each row of a table: parameter studies, Monte Carlo",
+        "simulate an FMU once for each row of a table: parameter studies, Monte Carlo",
         _examples(
             "prbm sweep dist/fmi2/PRBDM2R.fmu table.csv --output stop.impact_count \\\n"
             '      --output "max(shuttle.x)" --stop-time 500ms --out settling.parquet'
         ),
     )  # fmt: skip
     add = parser.add_argument
-    add("fmu", metavar="FMU", help="of FMI 2.0 or 3.0, with co-simulation")
-    add("table", metavar="TABLE", help="CSV or Parquet: a column a variable, a row a run; in SI")
-    add("--out", default="results.parquet", metavar="DIR", help="of the results; %(default)s")
+    add("fmu", metavar="FMU", help="FMU of FMI 2.0 or 3.0 with co-simulation")
+    add(
+        "table", metavar="TABLE",
+        help="CSV or Parquet file with one column per variable and one row per run, in SI units",
+    )  # fmt: skip
+    add(
+        "--out", default="results.parquet", metavar="DIR",
+        help="folder of the results (default: %(default)s)",
+    )  # fmt: skip
     add(
         "--output", action="append", metavar="OUTPUT",
-        help="a variable, for its final value, or max, min, mean, first or since of one, as "
-        "'max(shuttle.x)', 'first(shuttle.x > 0)'; may be repeated; default: all outputs",
+        help="recorded output: a variable, for its final value; 'max(shuttle.x)', or min, mean; "
+        "'first(shuttle.x > 0)', the first time of a condition; 'since(stop.contact)', the time "
+        "from which it holds to the end; repeatable (default: all outputs)",
     )  # fmt: skip
     set_argument(parser, "start value of all runs")
-    add("--stop-time", metavar="T", help="end of the runs [s]; default: the FMU's")
-    add("--step", metavar="T", help="communication step [s]; default: the FMU's")
-    add("--tolerance", metavar="X", help="relative, of the integration; default: the FMU's")
-    add("--workers", type=int, metavar="N", help="runs at a time; default: one a core")
-    add("--scheduler", metavar="ADDRESS", help="Dask scheduler, tcp://host:8786, for its workers")
+    add("--stop-time", metavar="T", help="end of the runs [s] (default: that of the FMU)")
+    add("--step", metavar="T", help="communication step [s] (default: that of the FMU)")
+    add(
+        "--tolerance", metavar="X",
+        help="relative tolerance of the integration (default: that of the FMU)",
+    )  # fmt: skip
+    add("--workers", type=int, metavar="N", help="number of parallel runs (default: one per core)")
+    add(
+        "--scheduler", metavar="ADDRESS",
+        help="Dask scheduler that runs the sweep, e.g. tcp://host:8786 (default: this machine)",
+    )  # fmt: skip
     add(
         "--retries", type=int, default=1, metavar="N",
-        help="how often a run that crashed is tried again; %(default)s",
+        help="number of repetitions of a run that crashed (default: %(default)s)",
     )  # fmt: skip
-    add("--timeout", metavar="T", help="give a run up after so long [s]; default: never")
-    add("--anew", action="store_true", help="forget what is in the results")
-    add("--failed", action="store_true", help="do again what failed before")
+    add("--timeout", metavar="T", help="longest duration of a run [s] (default: no limit)")
+    add("--overwrite", action="store_true", help="delete earlier results")
+    add("--retry-failed", action="store_true", help="repeat runs that failed earlier")
 
 
 def _picture(commands: Commands) -> None:
     parser = _command(
         commands, "picture", "pictures:drawn",
-        "a drawing of a mechanism with the names of its parts, and modes, as PNG",
+        "draw a mechanism with the names of its parts, and its modes, as PNG",
         _examples("prbm picture FoldedSuspension --modes 3 --out folded.png"),
     )  # fmt: skip
     picture_arguments(parser)
@@ -349,7 +423,7 @@ def _picture(commands: Commands) -> None:
 def _animate(commands: Commands) -> None:
     parser = _command(
         commands, "animate", "pictures:animated",
-        "a GIF or MP4 film of a result, or of a mechanism simulated now",
+        "film of a result, or of a new simulation, as GIF or MP4",
         _examples(
             "prbm animate PRBDM2R motion.gif --stop-time 0.3",
             "prbm animate results/PRBDM2R.csv motion.mp4",
@@ -362,21 +436,32 @@ def _animate(commands: Commands) -> None:
 def _validate(commands: Commands) -> None:
     parser = _command(
         commands, "validate", "validation:validated",
-        "the source's results reproduced, or one mechanism beside finite elements and "
-        "measurements",
+        "compare a mechanism with finite elements and measurements, or reproduce the thesis "
+        "behind the models",
         _examples(
             "prbm validate --out validation",
             'prbm validate my_mechanism.toml --measured "frequency 1 at rest=4.82 Hz +- 0.06"',
         ),
+        details="The thesis is S. Boersma, Modelling and Validation of the Impact Response in "
+        "Compliant Mechanisms, TU Delft, 2015.",
     )  # fmt: skip
     add = parser.add_argument
-    add("mechanism", nargs="?", metavar="MECHANISM", help=f"{MECHANISM}; default: the source's")
-    add("--only", nargs="+", default=[], metavar="NAME", help="some of the source's results")
-    add("--list", action="store_true", help="list the names of the source's results")
-    add("--elements", type=int, metavar="N", help="a flexure of MECHANISM; 32")
+    add(
+        "mechanism", nargs="?", metavar="MECHANISM",
+        help=f"{MECHANISM} (default: reproduce the thesis)",
+    )  # fmt: skip
+    add(
+        "--only", nargs="+", default=[], metavar="NAME",
+        help="results of the thesis to reproduce (default: all)",
+    )  # fmt: skip
+    add("--list", action="store_true", help="list the names of the results of the thesis and exit")
+    add(
+        "--elements", type=int, metavar="N",
+        help="number of finite elements per flexure of MECHANISM (default: 32)",
+    )  # fmt: skip
     add(
         "--measured", action="append", default=[], metavar="NAME=VALUE+-U",
-        help="a measured value with its standard uncertainty; may be repeated",
+        help="measured value with its standard uncertainty; repeatable",
     )  # fmt: skip
     set_argument(parser)
     _out(parser)
@@ -402,7 +487,7 @@ def _measure(commands: Commands) -> None:
 def _modulus(kinds: Commands) -> None:
     parser = _command(
         kinds, "youngs-modulus", "measure:modulus",
-        "Young's modulus from cantilevers bent by a force, a file a beam",
+        "Young's modulus from cantilever beams bent by a force, one file per beam",
         _examples(
             'prbm measure youngs-modulus bending.csv --length "40 mm +- 0.05" \\\n'
             '      --width "8 mm +- 0.02" --thickness "0.1 mm +- 0.5 %"'
@@ -410,28 +495,32 @@ def _modulus(kinds: Commands) -> None:
     )  # fmt: skip
     add = parser.add_argument
     add("files", nargs="+", metavar="FILE.csv", help="deflections and forces in order of time")
-    for what, means in (
-        ("length", "from the clamp to the force"), ("width", "of the beam"),
-        ("thickness", "in the direction of bending"),
+    for size, meaning in (
+        ("length", "distance from the clamp to the force"), ("width", "width of the beam"),
+        ("thickness", "thickness in the direction of bending"),
     ):  # fmt: skip
         add(
-            f"--{what}", action="append", required=True, metavar="X+-U",
-            help=f"{means} [m], with its standard uncertainty; once for all, or once for each file",
+            f"--{size}", action="append", required=True, metavar="X+-U",
+            help=f"{meaning} [m] with its standard uncertainty; once for all files, or once per "
+            "file",
         )  # fmt: skip
-    add("--deflection", metavar="NAME", help="column; default: the only length")
-    add("--force", metavar="NAME", help="column; default: the only force")
+    add("--deflection", metavar="NAME", help="column of deflections (default: the only lengths)")
+    add("--force", metavar="NAME", help="column of forces (default: the only forces)")
     add(
         "--fit-range", nargs=2, type=float, default=(0.25, 0.9), metavar=("LOW", "HIGH"),
-        help="fractions of the deflection between which the line is fitted; 0.25 0.9",
+        help="range of the fitted line, as shares of the largest deflection (default: 0.25 0.9)",
     )  # fmt: skip
-    add("--window", type=int, default=1, metavar="N", help="samples to average; %(default)s")
+    add(
+        "--window", type=int, default=1, metavar="N",
+        help="number of samples to average (default: %(default)s)",
+    )  # fmt: skip
     add(
         "--sensor-angle", default="0", metavar="A+-U",
-        help="between the sensor and the force [deg]; %(default)s",
+        help="angle between the sensor and the force [deg] (default: %(default)s)",
     )  # fmt: skip
     add(
         "--force-gain", default="1", metavar="G+-U",
-        help="factor on the force, with the uncertainty of its calibration; %(default)s",
+        help="factor on the force, with the uncertainty of its calibration (default: %(default)s)",
     )  # fmt: skip
     _record(parser)
     _out(parser)
@@ -440,13 +529,13 @@ def _modulus(kinds: Commands) -> None:
 def _calibration(kinds: Commands) -> None:
     parser = _command(
         kinds, "calibration", "measure:calibration",
-        "the sensitivity of a sensor beside a reference",
+        "sensitivity of a sensor, from its readings beside a reference",
         _examples("prbm measure calibration stage.csv --quantity position --reading laser"),
     )  # fmt: skip
     add = parser.add_argument
-    add("file", metavar="FILE.csv", help="the reference and the reading, in two columns")
-    add("--quantity", metavar="NAME", help="column of the reference; default: the only length")
-    add("--reading", metavar="NAME", help="column of the reading; default: the only other one")
+    add("file", metavar="FILE.csv", help="reference and readings, in two columns")
+    add("--quantity", metavar="NAME", help="column of the reference (default: the only lengths)")
+    add("--reading", metavar="NAME", help="column of the readings (default: the other column)")
     _record(parser)
     _out(parser)
 
@@ -456,7 +545,7 @@ def _frequency(kinds: Commands) -> None:
         kinds, "frequency", "measure:frequency", "frequency and damping of a free vibration",
         _examples("prbm measure frequency free.csv --column laser --from 0.5 --to 5.5"),
     )  # fmt: skip
-    parser.add_argument("file", metavar="FILE.csv", help="a signal over time")
+    parser.add_argument("file", metavar="FILE.csv", help="signal over time")
     _signal(parser)
     _record(parser)
     _out(parser)
@@ -465,20 +554,23 @@ def _frequency(kinds: Commands) -> None:
 def _restitution(kinds: Commands) -> None:
     parser = _command(
         kinds, "restitution", "measure:restitution",
-        "the restitution of a stop that fits a bouncing response; of a 1R guide it is that of "
-        "the fundamental mode",
+        "restitution of a stop, fitted to a bouncing response; for a 1R guide it is the modal "
+        "restitution of the fundamental mode",
         _examples(
             'prbm measure restitution bounce.csv --set "release.displacement=-10 mm" \\\n'
             "      --free record.shift=-2:2ms --calibration stage.csv"
         ),
     )  # fmt: skip
     add = parser.add_argument
-    add("file", metavar="FILE.csv", help="motion over time, from the release")
-    add("--mechanism", default="PRBDM", metavar="MECHANISM", help=f"{MECHANISM}; %(default)s")
-    add("--stop", metavar="NAME", help="which stop; default: the first")
+    add("file", metavar="FILE.csv", help="motion over time since the release")
+    add(
+        "--mechanism", default="PRBDM", metavar="MECHANISM",
+        help=f"{MECHANISM} (default: %(default)s)",
+    )  # fmt: skip
+    add("--stop", metavar="NAME", help="stop that is hit (default: the first)")
     add(
         "--free", action="append", default=[], metavar="NAME[=LOW:HIGH]",
-        help="a further parameter to fit, as stop.position=-1:1mm; may be repeated",
+        help="further parameter to fit, e.g. stop.position=-1:1mm; repeatable",
     )  # fmt: skip
     set_argument(parser)
     _response(parser)
@@ -495,13 +587,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         status = _run([*(sys.argv[1:] if arguments is None else arguments)])
         sys.stdout.flush()
-    except BrokenPipeError:  # whoever read the text has seen enough of it
+    except BrokenPipeError:  # The reader of the output, for instance head, has closed the pipe.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     return status
 
 
 def _run(words: Sequence[str]) -> int:
+    """Parse the words of a command line and run its command; return the exit status."""
     if not words:
         parser().print_help(sys.stderr)
         return MISTAKE
@@ -511,21 +604,23 @@ def _run(words: Sequence[str]) -> int:
         name = options.prog
         _function(options.run)(options)
         return OK
-    except SystemExit:  # after the help
+    except SystemExit:  # argparse has printed the help or the version
         return OK
     except _ArgumentError as error:
-        return _told(str(error), MISTAKE)
+        return _reported(str(error), MISTAKE)
     except KeyboardInterrupt as stop:
-        return _told(f"{name}: {str(stop) or 'interrupted'}", INTERRUPTED)
+        return _reported(f"{name}: {str(stop) or 'interrupted'}", INTERRUPTED)
     except Exception as error:
         status = _status(error)
         if status is None:
             raise
-        return _told(f"{name}: {in_options(str(error))}", status)
+        return _reported(f"{name}: {in_options(str(error))}", status)
 
 
 def protected(words: Sequence[str]) -> list[str]:
-    """Return the words of a command line with negative quantities kept from looking like options.
+    """Return the words of a command line with a space before negative quantities.
+
+    The space keeps argparse from reading them as options.
 
     Examples
     --------
@@ -536,6 +631,7 @@ def protected(words: Sequence[str]) -> list[str]:
 
 
 def _function(run: str) -> Callable[[argparse.Namespace], None]:
+    """Import and return the function named by module:function."""
     module, _, function = run.partition(":")
     found: Callable[[argparse.Namespace], None] = getattr(
         importlib.import_module(f".{module}", __package__), function
@@ -544,14 +640,15 @@ def _function(run: str) -> Callable[[argparse.Namespace], None]:
 
 
 def _status(error: Exception) -> int | None:
-    """Return the status of a mistake or a failed computation; None if it is an error of ours."""
+    """Return the exit status after an error; None for an error in the program itself."""
     if isinstance(error, EquilibriumError | SimulationError):
         return FAILED
     return MISTAKE if isinstance(error, PrbmError) else None
 
 
-def _told(sentence: str, status: int) -> int:
+def _reported(sentence: str, status: int) -> int:
+    """Print a sentence on standard error; return the status."""
     if sys.stderr.isatty():
-        print("\r", end="", file=sys.stderr)  # over what is written of the progress
+        print(CLEAR, end="", file=sys.stderr)
     print(sentence, file=sys.stderr)
     return status

@@ -1,4 +1,4 @@
-"""Records that a command is given: read, the columns found, cut, calibrated, checked."""
+"""Measured records of a command line: reading, selection of columns, calibration, checks."""
 
 import argparse
 import math
@@ -24,53 +24,53 @@ OUTPUT_UNITS = {
 
 
 def record(path: str, options: argparse.Namespace) -> Record:
-    """Read a record, with the names and units that were given.
+    """Read a record with the names and units of ``--columns`` and ``--unit``.
 
     Raises
     ------
     RecordError
-        If it cannot be read.
+        If the file cannot be read.
     """
     units = dict(pair(text, "--unit") for text in options.unit)
     return read_record(Path(path), columns=options.columns or None, units=units)
 
 
-def only(found: Record, unit: str, what: str, option: str, but: Sequence[str] = ()) -> str:
-    """Return the name of the one column that measures what a unit does.
+def only(found: Record, unit: str, role: str, option: str, excluded: Sequence[str] = ()) -> str:
+    """Return the name of the only column with a unit of the same dimension.
 
     Parameters
     ----------
     found : Record
-        Where it is.
+        The record.
     unit : str
-        For instance ``m``; empty: whatever is not the time.
-    what, option : str
-        What it is, and the option that names it, for messages.
-    but : sequence of str
-        Names of columns that it is not.
+        For instance ``m``; empty: any column but the time.
+    role, option : str
+        Role of the column and the option that names it, for messages.
+    excluded : sequence of str
+        Names of columns to ignore.
 
     Raises
     ------
     UserMistake
-        If there is none, or several.
+        If there is no such column, or more than one.
     """
     time = {c.name for c in found.channels if unit == "" and c.unit == "s"}
     fits = [
         c.name
         for c in found.channels
-        if c.name not in but and c.name not in time and (unit == "" or _measures(c, unit))
+        if c.name not in excluded and c.name not in time and (unit == "" or _measures(c, unit))
     ]
     if len(fits) == 1:
         return fits[0]
     heads = ", ".join(f"{c.name} [{c.written or '?'}]" for c in found.channels)
     if fits:
         raise UserMistake(
-            f"{found.source}: {', '.join(fits)} can all be the {what}: say which, {option} NAME"
+            f"{found.source}: the {role} can be {' or '.join(fits)}; name it with {option} NAME"
         )
     needed = f" in {unit} or a multiple of it" if unit else ""
     raise UserMistake(
-        f"{found.source}: no column{needed} can be the {what}; columns are {heads}: name it, "
-        f'{option} NAME, and give its unit if it has none, --unit "NAME={unit or "mm"}"'
+        f"{found.source}: no column{needed} for the {role}; columns are {heads}; name it with "
+        f'{option} NAME, and give a missing unit with --unit "NAME={unit or "mm"}"'
     )
 
 
@@ -79,17 +79,17 @@ def _measures(channel: Channel, unit: str) -> bool:
 
 
 def series(path: str, options: argparse.Namespace, unit: str) -> Series:
-    """Return the signal of a record over time, cut and counted as the options say.
+    """Return the signal of a record over time, in the time span and by the calibration of options.
 
     Parameters
     ----------
     unit : str
-        What it must measure; empty: anything.
+        Required unit; empty: any.
 
     Raises
     ------
     RecordError, UserMistake, EvaluationError
-        If there is no such signal, or it cannot be evaluated.
+        If the record has no such signal, or it cannot be evaluated.
     """
     found = record(path, options)
     sensor = getattr(options, "calibration", None)
@@ -107,8 +107,8 @@ def series(path: str, options: argparse.Namespace, unit: str) -> Series:
         signal = _sensor(sensor, signal.unit).applied(signal)
         if unit and signal.unit != unit:
             raise UserMistake(
-                f"{found.source}: {name}, calibrated by {sensor}, is in {signal.unit}, but {unit} "
-                "was expected"
+                f"{found.source}: {name}, converted by {sensor}, is in {signal.unit}; expected "
+                f"{unit}"
             )
     low, high = (
         limit if text is None else quantity(text, "s", option)
@@ -124,12 +124,12 @@ def series(path: str, options: argparse.Namespace, unit: str) -> Series:
 
 
 def calibration(path: str, options: argparse.Namespace) -> tuple[Calibration, Real, Real]:
-    """Return the calibration in a record, its quantities and its readings.
+    """Return the calibration by a record, the values of the reference and the readings.
 
     Raises
     ------
     RecordError, UserMistake, EvaluationError
-        If there is none.
+        If a column is missing or the data cannot be evaluated.
     """
     found, reading = record(path, options), options.reading
     name = options.quantity
@@ -143,48 +143,48 @@ def calibration(path: str, options: argparse.Namespace) -> tuple[Calibration, Re
 def _calibrated(found: Record, name: str, reading: str) -> tuple[Calibration, Real, Real]:
     one, other = found.channel(name), found.channel(reading)
     for channel in (one, other):
-        found.column(channel.name, channel.unit or "m")  # says what is wrong if there is no unit
+        found.column(channel.name, channel.unit or "m")  # Raise if there is no unit.
     sensor = calibrate(one.values, other.values, str(one.unit), str(other.unit))
     return sensor, one.values, other.values
 
 
 def _sensor(path: str, unit: str) -> Calibration:
-    """Return the calibration of a sensor whose readings have a unit."""
+    """Return the calibration of a sensor with readings in a unit."""
     found = read_record(Path(path))
     readings = [c.name for c in found.channels if _measures(c, unit)]
     lengths = [c.name for c in found.channels if _measures(c, "m") and c.name not in readings]
     if len(readings) != 1 or len(lengths) != 1:
         heads = ", ".join(f"{c.name} [{c.written or '?'}]" for c in found.channels)
         raise UserMistake(
-            f"--calibration {path}: it needs one column in {unit}, as the signal is, and one "
-            f"length beside it; columns are {heads}: leave it out if the signal is a length already"
+            f"--calibration {path}: it must have one column in {unit}, the unit of the signal, and "
+            f"one length; columns are {heads}; omit --calibration if the signal is a length already"
         )
     return _calibrated(found, lengths[0], readings[0])[0]
 
 
-def output_unit(name: str, channel: str = "") -> str:
-    """Return the unit of an output by its name; empty if it is not known.
+def output_unit(name: str, default: str = "") -> str:
+    """Return the unit of an output by its name; the default for an unknown name.
 
     Examples
     --------
     >>> output_unit("shuttle.x"), output_unit("displacement"), output_unit("energy.kinetic")
     ('m', 'm', '')
     """
-    return OUTPUT_UNITS.get(name.rpartition(".")[2], channel)
+    return OUTPUT_UNITS.get(name.rpartition(".")[2], default)
 
 
-def check_size(found: Real, mechanism: Mechanism, where: str) -> None:
-    """Refuse displacements that are larger than the mechanism: their unit is wrong.
+def check_size(displacements: Real, mechanism: Mechanism, column: str) -> None:
+    """Reject displacements [m] larger than the mechanism, whose unit must be wrong.
 
     Raises
     ------
     UserMistake
-        If one is.
+        If a displacement is larger than the size of the mechanism.
     """
     size = assemble(mechanism, mechanism.values()).length
-    largest = float(abs(found).max())
+    largest = float(abs(displacements).max())
     if largest > size:
         raise UserMistake(
-            f"{where} reaches {largest:.4g} m, more than the whole {mechanism.name}, {size:.4g} m: "
+            f"{column} reaches {largest:.4g} m, but the size of {mechanism.name} is {size:.4g} m; "
             "check the unit of the column"
         )

@@ -1,4 +1,4 @@
-"""Duration and communication step of a simulation, from a command line or by default."""
+"""Duration and communication step of a simulation, from the command line or by default."""
 
 from collections.abc import Mapping
 
@@ -15,22 +15,22 @@ def span(
 ) -> tuple[float, float]:
     """Return duration and communication step of a simulation [s].
 
-    Both are those of the default experiment by default.  With a duration alone, the step is at
-    most a thousandth of it.
+    By default, they are those of the default experiment.  If only the duration is given, the step
+    is at most a thousandth of it.
 
     Parameters
     ----------
     mechanism : Mechanism
         The mechanism to simulate.
     values : mapping
-        Its parameters and inputs that differ from their defaults.
+        Parameters and inputs that differ from their defaults.
     stop_time, step : str or None
-        Options of the command, with or without a unit.
+        Options of the command, in seconds or with a unit.
 
     Raises
     ------
     UserMistake
-        If an option is no time.
+        If an option is not a time.
     ParameterError, EquilibriumError
         If the mechanism cannot start with these values.
 
@@ -45,7 +45,7 @@ def span(
         return duration, quantity(step, "s", "--step")
     chosen = experiment(mechanism, values)
     if duration is None:
-        duration, distance = chosen.stop_time, chosen.step
+        duration, default = chosen.stop_time, chosen.step
     else:
-        distance = min(chosen.step, Experiment(duration).step) if duration > 0.0 else chosen.step
-    return duration, distance if step is None else quantity(step, "s", "--step")
+        default = min(chosen.step, Experiment(duration).step) if duration > 0.0 else chosen.step
+    return duration, default if step is None else quantity(step, "s", "--step")

@@ -1,4 +1,4 @@
-"""``prbm fit``: parameters of a mechanism from data."""
+"""``prbm fit``: parameters of a mechanism fitted to measured data."""
 
 import argparse
 
@@ -14,13 +14,13 @@ from .words import free, frequency
 
 
 def fitted(options: argparse.Namespace) -> None:
-    """Print the parameters that fit best, and what the data cannot tell."""
+    """Print the fitted parameters and their uncertainties; write tables and figures."""
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
-    wanted = [free(mechanism, text) for text in options.free]
+    parameters = [free(mechanism, text) for text in options.free]
     output = Output(options.out)
-    found = fit(mechanism, wanted, _targets(options, mechanism), values, progress=reporter())
-    tell(found, output, mechanism.name)
+    found = fit(mechanism, parameters, _targets(options, mechanism), values, progress=reporter())
+    report(found, output, mechanism.name)
     output.write()
 
 
@@ -32,14 +32,13 @@ def _targets(options: argparse.Namespace, mechanism: Mechanism) -> list[Target]:
         targets.append(_force_deflection(options, mechanism))
     if not targets:
         raise UserMistake(
-            "there is nothing to fit to: give --frequency, --response FILE or --force-deflection "
-            "FILE"
+            "no measured data: give --frequency, --response FILE or --force-deflection FILE"
         )
     return targets
 
 
 def response(options: argparse.Namespace, path: str, mechanism: Mechanism) -> Response:
-    """Return a recorded response that a fit is to."""
+    """Return a recorded response as a target of a fit."""
     name = options.output or DISPLACEMENT
     signal = series(path, options, output_unit(name))
     if signal.unit == "m":
@@ -48,13 +47,13 @@ def response(options: argparse.Namespace, path: str, mechanism: Mechanism) -> Re
 
 
 def uncertainty(text: str | None, unit: str) -> float | None:
-    """Read a standard uncertainty above zero; None if there is none."""
+    """Read a positive standard uncertainty; None if it is not given."""
     if text is None:
         return None
     found = quantity(text, unit, "--uncertainty")
     if found <= 0.0:
         raise UserMistake(
-            f"--uncertainty {text}: it must be positive; leave it out to have it estimated"
+            f"--uncertainty {text}: must be positive; omit it to estimate it from the residuals"
         )
     return found
 
@@ -62,16 +61,19 @@ def uncertainty(text: str | None, unit: str) -> float | None:
 def _force_deflection(options: argparse.Namespace, mechanism: Mechanism) -> ForceDeflection:
     found = record(options.force_deflection, options)
     name = options.deflection or only(found, "m", "deflection", "--deflection")
-    of_force = options.force or only(found, "N", "force", "--force")
-    d, F = found.column(name, "m"), found.column(of_force, "N")
+    force = options.force or only(found, "N", "force", "--force")
+    d, F = found.column(name, "m"), found.column(force, "N")
     check_size(d, mechanism, f"{found.source}: {name}")
     return ForceDeflection(d, F, uncertainty(options.force_uncertainty, "N"))
 
 
-def tell(found: Fit, output: Output, name: str) -> None:
-    """Print a fit and keep its table and figures, its valley among them if there is one."""
+def report(found: Fit, output: Output, name: str) -> None:
+    """Print a fit; add its table, its figures and, if there is one, its valley to the output."""
     print(found)
-    print("to go on with: " + " ".join(f"--set {k}={x:.6g}" for k, x in _own(found).items()))
+    print(
+        "to use these values: "
+        + " ".join(f"--set {k}={x:.6g}" for k, x in _fitted_values(found).items())
+    )
     estimates, problem = found.estimates, found.problem
     output.table(
         f"{name}-fit.csv",
@@ -101,18 +103,18 @@ def tell(found: Fit, output: Output, name: str) -> None:
             )
             output.figure(f"{name}-force.png", lambda: figures.force_figure(found))
     if found.valleys and len(problem.names) > 1:
-        _tell_valley(found, output, name)
+        _report_valley(found, output, name)
 
 
-def _own(found: Fit) -> dict[str, float]:
-    """Return the fitted parameters of the mechanism, those of a record left out."""
+def _fitted_values(found: Fit) -> dict[str, float]:
+    """Return the fitted parameters of the mechanism, without those of a record."""
     return {name: found.values[name] for name in found.problem.names if name in found.values}
 
 
-def _tell_valley(found: Fit, output: Output, name: str) -> None:
-    """Print the valley: parameters that fit about equally well."""
+def _report_valley(found: Fit, output: Output, name: str) -> None:
+    """Print a valley, the combinations of parameters that fit about equally well."""
     along = valley(found, progress=reporter())
-    print(f"as good, or nearly (the valley along {along.along}):")
+    print(f"other parameters with nearly the same misfit (valley along {along.along}):")
     print(along)
     output.table(
         f"{name}-valley.csv",

@@ -1,6 +1,6 @@
-"""Simulate an FMU with FMPy, report the headline and plot it.
+"""Simulate an FMU with FMPy, print a summary and plot the result.
 
-python -m prbm.commands.fmu_report FMU PNG
+Usage: python -m prbm.commands.fmu_report FMU PNG
 """
 
 import signal
@@ -37,9 +37,9 @@ class Run:
     name : str
         Name of the model.
     mechanism : Mechanism
-        The mechanism in it.
+        The mechanism of the FMU.
     values : dict of str to float
-        Its parameters and inputs at the start.
+        Parameters and inputs at the start.
     record : structured array
         Time, all outputs and the fundamental frequency.
     stop_time : float
@@ -67,19 +67,19 @@ def simulate(fmu: Path, progress: Progress) -> Run:
     Raises
     ------
     KeyboardInterrupt
-        If the user has interrupted it; the FMU has finished its step.
+        After Ctrl-C, when the FMU has finished its step.
     """
-    with unpacked(fmu) as folder, interruptible() as wanted:
+    with unpacked(fmu) as folder, interruptible() as running:
         description = fmpy.read_model_description(str(folder))
         listed = description.modelVariables
         outputs = [v.name for v in listed if v.causality == "output" and v.type != CLOCK]
-        clocks = any(v.type == CLOCK for v in listed)  # which demand event mode
+        clocks = any(v.type == CLOCK for v in listed)  # Clocks require event mode.
         model = read(folder / "resources")
         stop_time = float(description.defaultExperiment.stopTime)
 
         def step_finished(t: float, _: object) -> bool:
             progress(t / stop_time)
-            return wanted()
+            return running()
 
         begin = time.perf_counter()
         record = fmpy.simulate_fmu(
@@ -91,7 +91,7 @@ def simulate(fmu: Path, progress: Progress) -> Run:
             step_finished=step_finished,
         )
         seconds = time.perf_counter() - begin
-        if not wanted():
+        if not running():
             raise KeyboardInterrupt
     return Run(
         description.modelName, model.mechanism, dict(model.given), record, stop_time, seconds
@@ -100,14 +100,14 @@ def simulate(fmu: Path, progress: Progress) -> Run:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Return a function that is false after Ctrl-C; a second Ctrl-C interrupts the process."""
+    """Yield a function that returns false after Ctrl-C; a second Ctrl-C raises as usual."""
     interrupted: list[int] = []
 
-    def note(number: int, _: object) -> None:
+    def record_signal(number: int, _: object) -> None:
         interrupted.append(number)
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
-    before = signal.signal(signal.SIGINT, note)
+    before = signal.signal(signal.SIGINT, record_signal)
     try:
         yield lambda: not interrupted
     finally:
@@ -129,7 +129,7 @@ def headline(run: Run) -> list[str]:
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Simulate the FMU given first, plot into the file given second."""
+    """Simulate the FMU of the first argument; write the plot to the second."""
     fmu, picture = Path(arguments[0]), Path(arguments[1])
     try:
         run = simulate(fmu, reporter())

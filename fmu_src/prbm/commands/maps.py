@@ -1,11 +1,10 @@
-"""``prbm impact-map``: modal restitution over walls and offsets."""
+"""``prbm impact-map``: modal restitution over positions of the wall and offsets of the hit."""
 
 import argparse
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-
-import numpy as np
 
 from ..analysis import impact_map
 from ..analysis.impact_map import ImpactMap
@@ -20,14 +19,17 @@ from ..plots import impact_map as figures
 from .output import Output
 from .systems import check_length
 
-WALLS, OFFSETS = 5 / 9, 1 / 20  # of the release, of the size: the source's, whatever the size
-STEPS = (-1.0, -0.5, 0.0, 0.5, 1.0)
-MOST_POINTS = 400  # points of a map; more are a mistake
-OF_MODELS = {"algebraic", "simulated", "fitted"}  # ways whose maps are of models of flexures
+# The default grid has about the proportions of that in the thesis, in round numbers.
+WALL_SHARE = 5 / 9  # Largest default wall position, as a share of the displacement at release.
+OFFSET_SHARE = 1 / 20  # Largest default offset, as a share of the size of the mechanism.
+ROUND_RTOL = 1e-9  # Smaller excesses over a round number are round-off.
+GRID = (-1.0, -0.5, 0.0, 0.5, 1.0)  # Default positions and offsets, relative to the largest.
+POINTS_MAX = 400  # Points of a map.
+FLEXURE_METHODS = {"algebraic", "simulated", "fitted"}  # Methods that depend on flexure models.
 
-Way = Callable[..., ImpactMap]
+Method = Callable[..., ImpactMap]
 Job = Callable[[Progress], ImpactMap]
-WAYS: Mapping[str, Way] = {
+METHODS: Mapping[str, Method] = {
     "algebraic": impact_map.algebraic,
     "simulated": impact_map.simulated,
     "fitted": impact_map.fitted,
@@ -37,116 +39,132 @@ WAYS: Mapping[str, Way] = {
 
 
 def mapped(options: argparse.Namespace) -> None:
-    """Print the maps of all ways and models that were asked for."""
+    """Print the impact maps of all selected methods and flexure models."""
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
-    heights, offsets = _points(options, mechanism, values)
-    jobs = list(_jobs(options, mechanism, values, heights, offsets))
+    positions, offsets = _points(options, mechanism, values)
+    jobs = list(_jobs(options, mechanism, values, positions, offsets))
     report = reporter()
     maps = [job(_part(report, k, len(jobs))) for k, job in enumerate(jobs)]
-    print("modal restitution, over walls h and offsets d of the hit")
+    name = mechanism.name
+    print(f"{name}: modal restitution over wall positions h and offsets d of the hit point")
     for one in maps:
         print(one)
-    for sentence in _notes(options, mechanism, values, heights, offsets):
+    for sentence in _notes(options, mechanism, values, positions, offsets):
         print(sentence)
-    _keep(maps, output, mechanism.name)
+    _add_files(maps, output, name, mechanism.title)
     output.write()
 
 
 def _part(report: Progress, k: int, count: int) -> Progress:
-    """Return what reports the progress of the k-th of several works of like length."""
+    """Return the progress callback of the k-th of several jobs of similar duration."""
     return lambda fraction: report((k + fraction) / count)
 
 
 def _points(
     options: argparse.Namespace, mechanism: Mechanism, values: Mapping[str, float]
 ) -> tuple[list[float], list[float]]:
-    """Return walls and offsets in order, the source's in proportion where none are given."""
+    """Return wall positions and offsets in increasing order [m], from options or by default."""
     known = {name for name in values if name in mechanism.values()}
     system = assemble(mechanism, mechanism.values({name: values[name] for name in known}))
     scales = {
-        "heights": WALLS * abs(system.values["release.displacement"]),
-        "offsets": OFFSETS * system.length,
+        "wall-positions": WALL_SHARE * abs(system.values["release.displacement"]),
+        "offsets": OFFSET_SHARE * system.length,
     }
     result = []
     for name, scale in scales.items():
-        texts = getattr(options, name)
+        texts = getattr(options, name.replace("-", "_"))
         chosen = (
             quantities(texts, "m", f"--{name}") if texts
-            else [float(f"{scale * step:.3g}") for step in STEPS]
+            else [rounded_down(scale) * share for share in GRID]
         )  # fmt: skip
         if scale == 0.0 and not texts:
             raise UserMistake(
-                "release.displacement is 0, so there are no default heights: give --heights"
+                "release.displacement = 0 m: no default wall positions; give --wall-positions"
             )
         if len(set(chosen)) < len(chosen):
-            raise UserMistake(f"--{name} {' '.join(texts or [])}: a place stands there twice")
+            raise UserMistake(f"--{name} {' '.join(texts or [])}: a value is given twice")
         result.append(sorted(check_length(x, system.length, f"--{name}") for x in chosen))
-    heights, offsets = result
-    if len(heights) * len(offsets) > MOST_POINTS:
+    positions, offsets = result
+    if len(positions) * len(offsets) > POINTS_MAX:
         raise UserMistake(
-            f"{len(heights)} walls and {len(offsets)} offsets are {len(heights) * len(offsets)} "
-            f"points: choose {MOST_POINTS} or fewer"
+            f"{len(positions)} wall positions and {len(offsets)} offsets make "
+            f"{len(positions) * len(offsets)} points; choose at most {POINTS_MAX}"
         )
-    return heights, offsets
+    return positions, offsets
+
+
+def rounded_down(x: float) -> float:
+    """Return the largest number 1, 2, 4, 6 or 8 times a power of ten up to x; 0 for 0.
+
+    Examples
+    --------
+    >>> [rounded_down(x) for x in (0.01, 0.004, 5.56e-7, 0.0)]
+    [0.01, 0.004, 4e-07, 0.0]
+    """
+    if x == 0.0:
+        return 0.0
+    power = math.floor(math.log10(x * (1.0 + ROUND_RTOL)))
+    limit = x * (1.0 + ROUND_RTOL)
+    return max(y for digit in (1, 2, 4, 6, 8) if (y := float(f"{digit}e{power}")) <= limit)
 
 
 def _jobs(
     options: argparse.Namespace,
     mechanism: Mechanism,
     values: Mapping[str, float],
-    heights: Sequence[float],
+    positions: Sequence[float],
     offsets: Sequence[float],
 ) -> Iterator[Job]:
-    """Give what computes each map."""
+    """Yield the function that computes each map."""
     models = dict(_models(options, mechanism))
-    for way in dict.fromkeys(options.way):
+    for name in dict.fromkeys(options.method):
         for label, model in models.items():
-            one = partial(WAYS[way], model, heights, offsets, values, stop=options.stop)
-            if way == "elements":
-                yield partial(_told, one, "finite elements", elements=options.elements)
-                break  # which know nothing of the model
-            yield partial(_told, one, f"{label}, {way}")
+            method = partial(METHODS[name], model, positions, offsets, values, stop=options.stop)
+            if name == "elements":
+                yield partial(_computed, method, "finite elements", elements=options.elements)
+                break  # Finite elements do not depend on the flexure model.
+            yield partial(_computed, method, f"{label}, {name}")
+
+
+def _computed(method: Method, label: str, progress: Progress, **more: object) -> ImpactMap:
+    return method(label=label, progress=progress, **more)
 
 
 def _notes(
     options: argparse.Namespace,
     mechanism: Mechanism,
     values: Mapping[str, float],
-    heights: Sequence[float],
+    positions: Sequence[float],
     offsets: Sequence[float],
 ) -> Iterator[str]:
-    """Give what models that do not stretch hide, where the hit is farthest off the centre."""
-    if not OF_MODELS.intersection(options.way):
+    """Yield notes on inextensible flexures, for the hit farthest from the centre of mass."""
+    if not FLEXURE_METHODS.intersection(options.method):
         return
-    stop, nearest = stop_index(mechanism, options.stop), min(heights, key=abs)
+    stop, nearest = stop_index(mechanism, options.stop), min(positions, key=abs)
     name = mechanism.stops[stop].name
     for label, model in _models(options, mechanism):
         known = {**values, f"{name}.position": nearest, f"{name}.offset": 0.0}
-        centred = lever(assemble(model, model.values(known)), stop)
-        farthest = max(offsets, key=partial(_off, centred))
+        lever_arm = lever(assemble(model, model.values(known)), stop)
+        farthest = max(offsets, key=partial(_distance, lever_arm))
         sentence = note(model, {**known, f"{name}.offset": farthest}, stop)
         if sentence is not None:
             yield f"note, {label}: {sentence}"
 
 
-def _off(centred: float, offset: float) -> float:
-    return abs(centred + offset)
-
-
-def _told(way: Way, label: str, progress: Progress, **more: object) -> ImpactMap:
-    return way(label=label, progress=progress, **more)
+def _distance(lever_arm: float, offset: float) -> float:
+    return abs(lever_arm + offset)
 
 
 def _models(options: argparse.Namespace, mechanism: Mechanism) -> Iterator[tuple[str, Mechanism]]:
-    """Give the mechanism with each model of its flexures, by label."""
+    """Yield the label and the mechanism for each model of its flexures."""
     if options.links < 1:
-        raise UserMistake(f"--links {options.links}: a chain has one link or more")
+        raise UserMistake(f"--links {options.links}: must be at least 1")
     if not options.model:
         kinds = mechanism.flexure_types
         if options.axial:
-            raise UserMistake("--axial goes with --model, for instance --model 2R --axial")
+            raise UserMistake("--axial needs --model, for instance --model 2R --axial")
         label = " ".join(dict.fromkeys(_label(k.model, k.n, k.axial) for k in kinds))
         yield label or mechanism.name, mechanism
     for model in options.model:
@@ -159,15 +177,13 @@ def _label(model: str, n: int, axial: bool) -> str:
     return (f"{n}R" if n else model) + (" axial" if axial else "")
 
 
-def _keep(maps: Sequence[ImpactMap], output: Output, name: str) -> None:
-    """Keep tables and figures of maps."""
+def _add_files(maps: Sequence[ImpactMap], output: Output, name: str, title: str) -> None:
+    """Add tables and figures of maps to the output."""
     head, rows = maps[0].csv().split("\n", 1)
     rest = [one.csv().split("\n", 1)[1] for one in maps[1:]]
     output.text(f"{name}-impact-map.csv", head + "\n" + rows + "".join(rest))
-    output.figure(f"{name}-impact-map.png", lambda: figures.heat_map(maps))
-    if np.all(np.array(maps[0].restitution.shape) > 1):
-        output.figure(f"{name}-impact-map-3d.png", lambda: figures.surface(maps))
+    output.figure(f"{name}-impact-map.png", lambda: figures.heat_map(maps, title=title))
     for one in maps:
         if one.hits:
             slug = re.sub(r"[^\w.]+", "-", one.label)
-            output.figure(f"{name}-energies-{slug}.png", partial(figures.energies, one))
+            output.figure(f"{name}-energies-{slug}.png", partial(figures.energies, one, title))

@@ -1,4 +1,4 @@
-"""``prbm measure``: one evaluation of measured data each."""
+"""``prbm measure``: quantities evaluated from measured data, with their uncertainties."""
 
 import argparse
 from collections.abc import Sequence
@@ -23,12 +23,14 @@ def modulus(options: argparse.Namespace) -> None:
     """Print Young's modulus of one beam, or of several with their mean."""
     output = Output(options.out)
     sizes = [
-        _one_each(getattr(options, what), f"--{what}", len(options.files))
-        for what in ("length", "width", "thickness")
+        _one_each(getattr(options, size), f"--{size}", len(options.files))
+        for size in ("length", "width", "thickness")
     ]
     names = [stem(path) for path in options.files]
     if len(set(names)) < len(names):
-        raise UserMistake("two files have the same name: beams are called after their files")
+        raise UserMistake(
+            "two files have the same name; beams are named after their files: rename one"
+        )
     found = []
     for path, name, size in zip(options.files, names, zip(*sizes, strict=True), strict=True):
         found.append(_modulus(options, path, Beam(name, *size)))
@@ -61,11 +63,11 @@ def _row(one: YoungsModulus) -> list[object]:
 
 
 def _one_each(texts: Sequence[str], option: str, count: int) -> list[Estimate]:
-    """Return a dimension of every beam: one for all, or one each."""
+    """Return a dimension of every beam; a single value is that of all beams."""
     if len(texts) not in (1, count):
         raise UserMistake(
-            f"{option} is given {len(texts)} times for {count} files: give it once for all beams, "
-            "or once for each file in their order"
+            f"{option} is given {len(texts)} times for {count} files; give it once for all files, "
+            "or once per file in the same order"
         )
     sizes = [estimate(text, "m", option) for text in texts]
     return sizes * (count if len(sizes) == 1 else 1)
@@ -132,16 +134,16 @@ def frequency(options: argparse.Namespace) -> None:
 
 
 def restitution(options: argparse.Namespace) -> None:
-    """Print the restitution of a stop that fits a bouncing response."""
+    """Print the restitution of a stop, fitted to a bouncing response."""
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
-    more = [free(mechanism, text) for text in options.free]
+    further = [free(mechanism, text) for text in options.free]
     output = Output(options.out)
     target = fitting.response(options, options.file, mechanism)
     stop = mechanism.stops[stop_index(mechanism, options.stop or None)].name
     found = fitted_restitution(
         mechanism, target.series, values, output=target.output, stop=stop,
-        uncertainty=target.uncertainty, free=more, progress=reporter(),
+        uncertainty=target.uncertainty, free=further, progress=reporter(),
     )  # fmt: skip
-    fitting.tell(found, output, stem(options.file))
+    fitting.report(found, output, stem(options.file))
     output.write()

@@ -1,4 +1,4 @@
-"""``prbm modes``: frequencies, and the shares of the parts in each mode."""
+"""``prbm modes``: frequencies, and the distribution of the kinetic energy in each mode."""
 
 import argparse
 from collections.abc import Mapping
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..base.unit_text import frequency_unit
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.modal import modes
@@ -14,41 +15,43 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .output import Output, aligned
-from .systems import assembled, check_length, tiny
+from .systems import assembled, check_length, rounded
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 def frequencies(options: argparse.Namespace) -> None:
-    """Print frequencies and what moves in each mode."""
+    """Print frequencies and the share of each motion in the kinetic energy of a mode."""
     mechanism, values, system = assembled(options)
     output = Output(options.out)
     if options.count < 1:
-        raise UserMistake(f"--count {options.count}: ask for one mode or more")
+        raise UserMistake(f"--count {options.count}: must be at least 1")
     at = None
     if options.held is not None:
         at = check_length(quantity(options.held, "m", "--held"), system.length, "--held")
     shape = equilibrium(system, at)
     found = modes(system, shape)
     count = min(options.count, len(found.frequency))
-    parts = [(body.name, what) for body in mechanism.bodies for what in ("x", "y", "turning")]
+    motions = [(body.name, m) for body in mechanism.bodies for m in ("x", "y", "turning")]
     e = system.directions(shape.q)
     shares = np.array([_shares(system, e, found.shape[:, k]) for k in range(count)])
     print(_where(system, shape, at))
-    head = ["mode", "frequency", *(f"{body} {what}" for body, what in parts), "flexures"]
+    head = ["mode", "frequency", *(f"{body} {m}" for body, m in motions), "flexures"]
     rows = [
         [str(k + 1), _hertz(float(found.frequency[k])), *(f"{100 * x:.1f} %" for x in shares[k])]
         for k in range(count)
     ]
     print(aligned(head, rows))
-    print("percentages: where the kinetic energy of the mode is")
+    print("percentages: shares of the kinetic energy of the mode")
     if count < len(found.frequency):
-        print(f"{len(found.frequency) - count} higher modes are not shown; --count N shows more")
+        print(
+            f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
+        )
     output.table(
         f"{mechanism.name}-modes.csv",
         ["mode", "frequency [Hz]",
-         *(f"share of {body} {what} [-]" for body, what in parts), "share of flexures [-]"],
+         *(f"share of {body} {m} [-]" for body, m in motions), "share of flexures [-]"],
         [[k + 1, float(found.frequency[k]), *map(float, shares[k])] for k in range(count)],
     )  # fmt: skip
     output.figure(f"{mechanism.name}-modes.png", lambda: _figure(mechanism, values, count, at))
@@ -58,28 +61,31 @@ def frequencies(options: argparse.Namespace) -> None:
 def _figure(
     mechanism: Mechanism, values: Mapping[str, float], count: int, at: float | None
 ) -> "Figure":
-    from ..plots.picture import MODES_MAX, picture  # here, because it takes a second
+    from ..plots.picture import MODES_MAX, picture  # imported here: it takes a second
 
     return picture(mechanism, values, min(count, MODES_MAX), at)
 
 
 def _shares(system: System, e: Complex, phi: Real) -> list[float]:
-    """Return the shares of the kinetic energy of a mode: x, y, turning of each body; the rest."""
+    """Return shares of the kinetic energy of a mode: x, y, turning of each body; flexures."""
     shares = []
     for body in system.mechanism.bodies:
         frame = system.bodies[body.name]
         _, velocity = system.motion(frame, e, phi)
         m, J = (value(body, name, system.values) for name in ("mass", "inertia"))
         shares += [m * velocity.real**2, m * velocity.imag**2, J * float(phi[frame.j]) ** 2]
-    return [*shares, max(0.0, 1.0 - sum(shares))]  # modes have the mass 1
+    return [*shares, max(0.0, 1.0 - sum(shares))]  # The modal masses are 1.
 
 
 def _hertz(frequency: float) -> str:
-    return f"{frequency:#.5g} Hz" if frequency > 0.0 else "unstable"
+    if frequency <= 0.0:
+        return "unstable"
+    factor, unit = frequency_unit(frequency)
+    return f"{factor * frequency:#.5g} {unit}"
 
 
 def _where(system: System, shape: Equilibrium, at: float | None) -> str:
-    """Tell about which shape it is."""
+    """Return a description of the shape about which the mechanism vibrates."""
     name, release = system.mechanism.name, system.mechanism.release
     along = "" if release.direction == 0.0 else f" along {release.direction:g} degrees"
     if at is not None:
@@ -90,5 +96,5 @@ def _where(system: System, shape: Equilibrium, at: float | None) -> str:
     e = system.directions(shape.q)
     rest = float((system.release @ e).real) + system.release_c
     at_rest = "at rest under gravity" if system.gravity else "at rest without gravity"
-    place = tiny(1e3 * rest, 1e3 * system.length)
+    place = rounded(1e3 * rest, 1e3 * system.length)
     return f"{name} {at_rest}, {release.body} {place} mm from straight{along}"

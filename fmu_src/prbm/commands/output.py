@@ -1,4 +1,4 @@
-"""Output of a command: text on standard output; tables and figures in a folder, if one is given."""
+"""Output files of a command: tables and figures, written together at the end."""
 
 import csv
 import io
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 
 @dataclass
 class Output:
-    """Files that are collected during a computation and then written at once.
+    """Files collected during a computation and then written together.
 
     Parameters
     ----------
     folder : Path or None
-        Their folder; None: no file is written and no figure is drawn.
+        Output folder; None: no file is written and no figure is drawn.
 
     Raises
     ------
     FileError
-        If nothing can be written there.
+        If the folder is not writable.
     """
 
     folder: Path | None
@@ -36,29 +36,29 @@ class Output:
             check_writable(self.folder)
 
     def text(self, name: str, content: str) -> None:
-        """Keep a file of text."""
+        """Add a text file."""
         if self.folder is not None:
             self.files[self.folder / name] = content.encode()
 
     def table(self, name: str, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-        """Keep a table as CSV, numbers with all their digits."""
+        """Add a table as CSV, numbers with all digits."""
         if self.folder is not None:
             self.text(name, csv_text(head, rows))
 
     def figure(self, name: str, draw: Callable[[], "Figure"]) -> None:
-        """Keep a figure as PNG."""
+        """Add a figure as PNG."""
         if self.folder is not None:
-            from ..drawing.style import png  # here, because it takes a second
+            from ..drawing.style import png  # imported here: it takes a second
 
             self.files[self.folder / name] = png(draw())
 
     def write(self) -> None:
-        """Write all files, or none, and say where they are.
+        """Write all files or none; print their paths.
 
         Raises
         ------
         FileError
-            If one cannot be written.
+            If a file cannot be written.
         """
         if self.folder is None:
             return
@@ -68,8 +68,8 @@ class Output:
             write_all(self.files)
         except OSError as error:
             raise FileError(
-                f"cannot write {error.filename or self.folder}: {error.strerror}; choose a folder "
-                "with --out"
+                f"cannot write {error.filename or self.folder}: {error.strerror}; choose another "
+                "folder with --out"
             ) from None
         for path in self.files:
             print(path)
@@ -92,7 +92,7 @@ def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 
 def _cell(x: object) -> str:
-    """Return a cell: numbers with all their digits, True and False as FMPy writes them."""
+    """Return a cell: numbers with all digits, Booleans as 1 and 0, as FMPy writes them."""
     if isinstance(x, str):
         return x
     if x is None:
@@ -103,7 +103,7 @@ def _cell(x: object) -> str:
 
 
 def aligned(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table in columns for people.
+    """Return a table with aligned columns.
 
     Examples
     --------
@@ -112,9 +112,9 @@ def aligned(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
        1  4.5
        2  130
     """
-    every = [list(head), *map(list, rows)]
-    widths = [max(len(row[i]) for row in every) for i in range(len(head))]
+    lines = [list(head), *map(list, rows)]
+    widths = [max(len(row[i]) for row in lines) for i in range(len(head))]
     return "\n".join(
         "  ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True))
-        for row in every
+        for row in lines
     )

@@ -1,4 +1,4 @@
-"""``prbm picture`` and ``prbm animate``."""
+"""``prbm picture`` and ``prbm animate``: drawings and films of mechanisms."""
 
 import argparse
 from collections.abc import Iterable
@@ -37,7 +37,7 @@ def drawn(options: argparse.Namespace) -> None:
 
 
 def animated(options: argparse.Namespace) -> None:
-    """Write a film of a result, or of a mechanism simulated now."""
+    """Write a film of a result, or of a new simulation."""
     path = Path(options.files[-1])
     check_encoder(path)
     check_file(path)
@@ -57,16 +57,18 @@ def _seconds(text: str | None, option: str) -> float | None:
 
 
 def _result(options: argparse.Namespace) -> Result:
-    """Return the requested result, read from a file or simulated."""
+    """Return the result to show, read from a file or simulated."""
     mechanism, files = _named(options)
     if len(files) == 1:
         if mechanism is None:
-            raise ParameterError("name the source of the film: RESULT.csv, --model or --mechanism")
+            raise ParameterError(
+                "nothing to show: give RESULT.csv, MECHANISM, --model or --mechanism"
+            )
         changes = settings(mechanism, options.set)
         stop_time, step = span(mechanism, changes, options.stop_time)
         return simulate(mechanism, changes, stop_time=stop_time, step=step)
     if len(files) > 2:
-        raise ParameterError(f"{len(files)} files are given: RESULT.csv OUT, or OUT")
+        raise ParameterError(f"{len(files)} files are given; expected RESULT.csv OUT, or OUT")
     columns = read_csv(files[0])
     mechanism = mechanism or _owner(columns)
     changes, known = settings(mechanism, options.set), mechanism.values()
@@ -91,8 +93,8 @@ def _named(options: argparse.Namespace) -> tuple[Mechanism | None, list[str]]:
 def _owner(columns: Columns) -> Mechanism:
     """Return the shipped mechanism whose angles are exactly those of a result.
 
-    Several mechanisms may have the same angles, for instance guides with and without stretching
-    flexures.  Then it is the one with the fewest coordinates whose loops are closed.
+    Guides with and without stretching flexures have the same angles.  Among several candidates,
+    the one with the fewest coordinates whose loops are closed is returned.
     """
     recorded = {name for name in names(columns) if name.endswith(".angle")}
     every = [read_mechanism(path) for path in shipped().values()]

@@ -1,10 +1,10 @@
-"""Exit statuses of the commands, and the name by which the FMU builder was started."""
+"""Exit statuses of the commands, and the name under which the FMU builder was started."""
 
 import sys
 from pathlib import Path
 
 OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
-BUILDER = "build_fmu"  # the module that python -m runs
+BUILDER = "build_fmu"  # Module that python -m runs.
 
 
 def command_name() -> str:

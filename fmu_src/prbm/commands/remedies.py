@@ -1,8 +1,8 @@
-"""Error messages of the library, with their remedies as options of the command line."""
+"""Conversion of the remedies in error messages from Python arguments to options."""
 
 import re
 
-REMEDIES = (  # arguments of Python functions, and the options in their place
+REMEDIES = (  # Arguments of Python functions, and the corresponding options.
     (re.compile(r"units=\{'([^']*)': '([^']*)'\}"), r'--unit "\1=\2"'),
     (re.compile(r"columns=\[\.\.\.\]"), "--columns"),
     (re.compile(r"columns=\[([^\]]*\][^\]]*\][^\]]*)\]"), r"--columns \1"),
@@ -14,7 +14,7 @@ REMEDIES = (  # arguments of Python functions, and the options in their place
 
 
 def in_options(sentence: str) -> str:
-    r"""Return a sentence of the library with its remedies as options of the command.
+    r"""Return an error message with options in place of Python arguments.
 
     Examples
     --------
@@ -23,6 +23,6 @@ def in_options(sentence: str) -> str:
     >>> in_options('write a head, or give columns=["t [s]", "x [mm]"] and the like')
     'write a head, or give --columns "t [s]" "x [mm]" and the like'
     """
-    for pattern, words in REMEDIES:
-        sentence = pattern.sub(words, sentence)
+    for pattern, option in REMEDIES:
+        sentence = pattern.sub(option, sentence)
     return sentence

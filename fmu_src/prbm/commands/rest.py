@@ -1,4 +1,4 @@
-"""``prbm equilibrium``: places of rest, holding forces, snaps."""
+"""``prbm equilibrium``: equilibria, holding forces and snap-through."""
 
 import argparse
 import math
@@ -14,42 +14,44 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..plots.holding import holding_figure
 from .output import Output, aligned
-from .systems import assembled, check_length, tiny
+from .systems import assembled, check_length, rounded
 
 HELD_HEAD = (
     "displacement [m]", "holding force [N]", "stiffness [N/m]", "across [m]", "angle [rad]",
     "fundamental frequency [Hz]",
 )  # fmt: skip
-HELD_WORDS = ("at, mm", "force, N", "stiffness, N/m", "across, um", "angle, mrad", "f, Hz")
-MOST_POINTS = 100_000
+PRINTED_HEAD = (
+    "at [mm]", "force [N]", "stiffness [N/m]", "across [µm]", "angle [mrad]", "f [Hz]",
+)  # fmt: skip
+POINTS_MAX = 100_000
 
 
 def equilibria(options: argparse.Namespace) -> None:
-    """Print where the mechanism rests, what holds it elsewhere, where it snaps."""
+    """Print the equilibria, or the forces that hold the released body at displacements."""
     mechanism, _, system = assembled(options)
     output = Output(options.out)
     ranged = (options.start, options.end)
     if None in ranged and ranged != (None, None):
-        raise UserMistake("--from and --to go together: give both ends of the range")
+        raise UserMistake("--from and --to: give both ends of the range")
     if ranged != (None, None) and options.held:
-        raise UserMistake("--held and --from, --to are two ways to say where: take one of them")
+        raise UserMistake("--held excludes --from and --to: give one or the other")
     body, direction = mechanism.release.body, mechanism.release.direction
-    way = "x" if direction == 0.0 else f"{direction:g} degrees"
+    axis = "x" if direction == 0.0 else f"{direction:g} degrees"
     weight = "gravity acts" if system.gravity else "no gravity acts"
-    head = f"{mechanism.name}: displacement of {body} along {way}, from straight; {weight}"
+    head = f"{mechanism.name}: displacement of {body} along {axis}, from straight; {weight}"
     if ranged != (None, None):
         _range(options, mechanism, system, output, head)
     elif options.held:
-        places = quantities(options.held, "m", "--held")
-        points = [holding.held(system, check_length(x, system.length, "--held")) for x in places]
-        _tell(head, points, system)
+        displacements = quantities(options.held, "m", "--held")
+        points = [
+            holding.held(system, check_length(x, system.length, "--held")) for x in displacements
+        ]
+        _print(head, points, system)
         output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows(points))
     else:
         rest = holding.free(system)
-        _tell(head, [rest], system)
-        stable = rest.frequency > 0.0
-        at = tiny(1e3 * rest.displacement, 1e3 * system.length)
-        print(f"rests at {at} mm: {'stable' if stable else 'unstable'}")
+        _print(head, [rest], system)
+        _print_equilibrium(rest.displacement, rest.frequency > 0.0, system)
         output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows([rest]))
     output.write()
 
@@ -57,34 +59,34 @@ def equilibria(options: argparse.Namespace) -> None:
 def _range(
     options: argparse.Namespace, mechanism: Mechanism, system: System, output: Output, head: str
 ) -> None:
+    """Print equilibria and snap-through in a range of displacements; write the force curve."""
     low, high = (
         check_length(quantity(text, "m", option), system.length, option)
         for text, option in ((options.start, "--from"), (options.end, "--to"))
     )
     if not low < high:
-        raise UserMistake(f"--from {low:g} m is not below --to {high:g} m")
-    if not 3 <= options.points <= MOST_POINTS:
-        raise UserMistake(f"--points {options.points}: choose a number from 3 to {MOST_POINTS}")
+        raise UserMistake(f"--from {low:g} m must be below --to {high:g} m")
+    if not 3 <= options.points <= POINTS_MAX:
+        raise UserMistake(f"--points {options.points}: must lie between 3 and {POINTS_MAX}")
     curve = holding.curve(system, np.linspace(low, high, options.points), reporter())
     every = -(-options.points // 11)
-    _tell(head, curve.points[::every], system)
+    _print(head, curve.points[::every], system)
     if every > 1:
-        print(f"every {every}th of {options.points} points; --out DIR writes all")
+        print(f"every {every}th of {options.points} points; write all with --out DIR")
     for rest in curve.rests:
-        at = tiny(1e3 * rest.displacement, 1e3 * system.length)
-        print(f"rests at {at} mm: {'stable' if rest.stable else 'unstable'}")
+        _print_equilibrium(rest.displacement, rest.stable, system)
     if not curve.rests:
-        print("no place of rest in this range")
-    for place, force in curve.snaps:
-        print(f"snaps through under {force:.5g} N, at {1e3 * place:.6g} mm")
+        print("no equilibrium in this range")
+    for x, force in curve.snaps:
+        print(f"snap-through at {1e3 * x:.6g} mm, under {force:.5g} N")
     output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows(curve.points))
     output.table(
-        f"{mechanism.name}-rests.csv",
+        f"{mechanism.name}-stability.csv",
         ["kind", "displacement [m]", "force [N]"],
         [
-            *(["stable rest" if x.stable else "unstable rest", x.displacement, 0.0]
+            *([f"{_stability(x.stable)} equilibrium", x.displacement, 0.0]
               for x in curve.rests),
-            *(["snap", place, force] for place, force in curve.snaps),
+            *(["snap-through", x, force] for x, force in curve.snaps),
         ],
     )  # fmt: skip
     output.figure(
@@ -92,11 +94,22 @@ def _range(
     )
 
 
+def _stability(stable: bool) -> str:
+    return "stable" if stable else "unstable"
+
+
+def _print_equilibrium(displacement: float, stable: bool, system: System) -> None:
+    at = rounded(1e3 * displacement, 1e3 * system.length)
+    print(f"equilibrium at {at} mm: {_stability(stable)}")
+
+
 def _rows(points: Sequence[holding.Held]) -> list[list[float]]:
+    """Return the rows of the table of held shapes, in SI units."""
     return [[p.displacement, p.force, p.stiffness, p.across, p.angle, p.frequency] for p in points]
 
 
-def _tell(head: str, points: Sequence[holding.Held], system: System) -> None:
+def _print(head: str, points: Sequence[holding.Held], system: System) -> None:
+    """Print held shapes, and the reason for a missing stiffness."""
     print(head)
     print(_table(points, system.length))
     if any(math.isnan(p.stiffness) for p in points):
@@ -104,14 +117,15 @@ def _tell(head: str, points: Sequence[holding.Held], system: System) -> None:
 
 
 def _table(points: Sequence[holding.Held], size: float) -> str:
-    most = max(abs(p.force) for p in points)
+    """Return the printed table of held shapes of a mechanism of a size [m]."""
+    largest = max(abs(p.force) for p in points)
     rows = [
         [
-            tiny(1e3 * p.displacement, 1e3 * size, ".5g"), tiny(p.force, most),
+            rounded(1e3 * p.displacement, 1e3 * size, ".5g"), rounded(p.force, largest),
             "-" if math.isnan(p.stiffness) else f"{p.stiffness:.5g}",
-            tiny(1e6 * p.across, 1e3), tiny(1e3 * p.angle, 1e3),
+            rounded(1e6 * p.across, 1e3), rounded(1e3 * p.angle, 1e3),
             f"{p.frequency:.5g}" if p.frequency > 0.0 else "unstable",
         ]
         for p in points
     ]  # fmt: skip
-    return aligned(HELD_WORDS, rows)
+    return aligned(PRINTED_HEAD, rows)

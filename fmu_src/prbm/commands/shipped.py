@@ -6,7 +6,7 @@ from ..files.mechanism_file import read_mechanism, shipped
 
 
 def listed(options: argparse.Namespace) -> None:
-    """Print the shipped mechanisms, a line each."""
+    """Print name and title of each shipped mechanism."""
     files = shipped()
     width = max(map(len, files))
     for name, path in files.items():

@@ -1,4 +1,4 @@
-"""``prbm simulate``: the motion after the release."""
+"""``prbm simulate``: the motion after the release, and spectra after impacts."""
 
 import argparse
 import time
@@ -9,6 +9,7 @@ import numpy as np
 
 from ..analysis.stretching import notes
 from ..base.progress import reporter
+from ..base.unit_text import frequency_text
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantity, settings
 from ..mechanics.arrays import Real
@@ -19,7 +20,7 @@ from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
 from .duration import span
 from .output import Output
-from .systems import ROUNDING
+from .systems import ZERO_RTOL
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,12 +29,12 @@ IMPACT_HEAD = (
     "number", "stop", "time [s]", "approach speed [m/s]", "rebound speed [m/s]", "impulse [N.s]",
     "energy lost [J]", "modal restitution [-]",
 )  # fmt: skip
-PEAKS_TOLD = 6
-SHOWN = 1.5  # times the highest mode that is marked: as far as a spectrum is drawn
+PEAKS_MAX = 6  # Printed peaks per signal.
+SPECTRUM_END = 1.5  # Upper end of a drawn spectrum, in multiples of its highest marked mode.
 
 
 def simulated(options: argparse.Namespace) -> None:
-    """Print what happens after the release."""
+    """Simulate the motion after the release and print a summary."""
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
@@ -60,31 +61,33 @@ def simulated(options: argparse.Namespace) -> None:
 
 
 def _tolerance(text: str | None) -> float | None:
+    """Return the relative tolerance; None if it is not given."""
     if text is None:
         return None
     tolerance = quantity(text, "", "--tolerance")
     if not 0.0 < tolerance < 1.0:
-        raise UserMistake(f"--tolerance {text}: choose a number between 0 and 1, as 1e-8")
+        raise UserMistake(f"--tolerance {text}: must lie between 0 and 1, for instance 1e-8")
     return tolerance
 
 
 def _notes(mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
-    """Return what flexures that do not stretch hide of the impacts."""
-    own = {p.name for p in mechanism.parameters}
-    return notes(mechanism, {name: x for name, x in values.items() if name in own})
+    """Return notes on effects of impacts that inextensible flexures suppress."""
+    parameters = {p.name for p in mechanism.parameters}
+    return notes(mechanism, {name: x for name, x in values.items() if name in parameters})
 
 
 def _impacts(result: Result) -> Iterator[list[object]]:
+    """Yield a row of the table of impacts for each impact."""
     for number, impact in enumerate(result.impacts, start=1):
-        last = impact.latched
+        latched = impact.latched
         yield [
-            number, impact.stop, impact.time, last.approach_speed, last.rebound_speed,
-            last.impulse, last.energy_lost, last.modal_restitution,
+            number, impact.stop, impact.time, latched.approach_speed, latched.rebound_speed,
+            latched.impulse, latched.energy_lost, latched.modal_restitution,
         ]  # fmt: skip
 
 
 def _figure(result: Result) -> "Figure":
-    from ..plots.figures import response  # here, because it takes a second
+    from ..plots.figures import response  # imported here: it takes a second
 
     return response(result)
 
@@ -92,48 +95,53 @@ def _figure(result: Result) -> "Figure":
 def _spectrum(
     options: argparse.Namespace, result: Result, values: dict[str, float], duration: float
 ) -> None:
-    """Tell which frequencies are heard after an impact."""
-    from ..analysis import spectrum  # here for the start-up time
+    """Print the frequencies of the vibration after an impact; write its spectrum."""
+    from ..analysis import spectrum  # imported here: slow
     from ..plots.spectrum import spectrum_figure
 
     mechanism, output = result.mechanism, Output(options.out)
     if not result.impacts:
         raise UserMistake(
-            f"--spectrum: there is no impact in {result.columns['time'][-1]:g} s; simulate longer "
-            "(--stop-time), or move the stop (--set)"
+            f"--spectrum: no impact in {result.columns['time'][-1]:g} s; simulate longer with "
+            "--stop-time, or move the stop with --set"
         )
     if options.spectrum == "first":
         stop = next(i for i, s in enumerate(mechanism.stops) if s.name == result.impacts[0].stop)
-        heard = spectrum.after_impact(mechanism, values, duration, stop=stop)
+        vibration = spectrum.after_impact(mechanism, values, duration, stop=stop)
     else:
-        heard = spectrum.after_last_impact(result)
-    lines = {name: spectrum.spectrum(heard.time, getattr(heard, name)) for name in spectrum.SIGNALS}
-    grid, modes = lines["along"][0], spectrum.numbered(heard.modes)
+        vibration = spectrum.after_last_impact(result)
+    lines = {
+        name: spectrum.spectrum(vibration.time, getattr(vibration, name))
+        for name in spectrum.SIGNALS
+    }
+    grid, modes = lines["along"][0], spectrum.numbered(vibration.modes)
     print(
-        f"after the {options.spectrum} impact, at t = {heard.impact.time:.5f} s, "
-        f"{1e3 * (heard.time[-1] - heard.time[0]):.4g} ms"
+        f"after the {options.spectrum} impact, at t = {vibration.impact.time:.5f} s, "
+        f"{1e3 * (vibration.time[-1] - vibration.time[0]):.4g} ms"
         + (" without the wall" if options.spectrum == "first" else "")
-        + f", lines {grid[1]:.3g} Hz apart"
+        + f", resolution {grid[1]:.3g} Hz"
     )
-    print("modes at its shape   " + ", ".join(f"{i}: {f:.4g} Hz" for i, f in modes))
-    _tell_peaks(lines, assemble(mechanism, mechanism.values()).length)
+    print("modes at that shape  " + ", ".join(f"{i}: {frequency_text(f)}" for i, f in modes))
+    _print_peaks(lines, assemble(mechanism, mechanism.values()).length)
     output.table(
         f"{mechanism.name}-spectrum.csv",
         ["frequency [Hz]", "along [m/s]", "across [m/s]", "turning [rad/s]"],
         np.column_stack([grid, *(amplitude for _, amplitude in lines.values())]).tolist(),
     )
-    highest = min(SHOWN * max([f for _, f in modes], default=grid[-1]), float(grid[-1]))
-    output.figure(f"{mechanism.name}-spectrum.png", lambda: spectrum_figure(heard, highest=highest))
+    highest = min(SPECTRUM_END * max([f for _, f in modes], default=grid[-1]), float(grid[-1]))
+    output.figure(
+        f"{mechanism.name}-spectrum.png", lambda: spectrum_figure(vibration, highest=highest)
+    )
     output.write()
 
 
-def _tell_peaks(lines: Mapping[str, tuple[Real, Real]], size: float) -> None:
-    """Print the peaks of every signal that is more than rounding."""
-    from ..analysis.spectrum import peaks  # here, because it takes two seconds
+def _print_peaks(lines: Mapping[str, tuple[Real, Real]], size: float) -> None:
+    """Print the peaks of each signal above round-off."""
+    from ..analysis.spectrum import peaks  # imported here: it takes two seconds
 
-    loudest = float(lines["along"][1].max())
+    largest = float(lines["along"][1].max())
     for name, (frequency, amplitude) in lines.items():
         speed = float(amplitude.max()) * (size if name == "turning" else 1.0)
-        loud = speed > ROUNDING * loudest
-        found = peaks(frequency, amplitude)[:PEAKS_TOLD].tolist() if loud else []
-        print(f"peaks {name:14} {', '.join(f'{f:.4g} Hz' for f in found) or 'none'}")
+        significant = speed > ZERO_RTOL * largest
+        found = peaks(frequency, amplitude)[:PEAKS_MAX].tolist() if significant else []
+        print(f"peaks {name:14} {', '.join(map(frequency_text, found)) or 'none'}")

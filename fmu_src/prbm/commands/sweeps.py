@@ -1,4 +1,4 @@
-"""``prbm sweep``: an FMU run once for each row of a table."""
+"""``prbm sweep``: one simulation of an FMU per row of a table."""
 
 import argparse
 from collections.abc import Sequence
@@ -10,7 +10,7 @@ from ..sweeps.sweep import read_fmu, summary, sweep
 
 
 def swept(options: argparse.Namespace) -> None:
-    """Print how the runs went; their results go into a folder as they are done."""
+    """Run a sweep and print a summary; results are written during the sweep."""
     found = sweep(
         options.fmu, options.table, options.out, outputs=options.output,
         values=_values(options.fmu, options.set),
@@ -19,7 +19,7 @@ def swept(options: argparse.Namespace) -> None:
         tolerance=_optional(options.tolerance, "", "--tolerance"),
         scheduler=options.scheduler, workers=options.workers, retries=options.retries,
         timeout=_optional(options.timeout, "s", "--timeout"),
-        anew=options.anew, failed=options.failed, progress=reporter(),
+        overwrite=options.overwrite, retry_failed=options.retry_failed, progress=reporter(),
     )  # fmt: skip
     print(summary(found, options.out))
 

@@ -1,4 +1,4 @@
-"""The mechanism of a command line, put together."""
+"""The mechanism of a command line and its assembled system."""
 
 import argparse
 
@@ -8,45 +8,48 @@ from ..mechanics.assembly import assemble
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 
-ROUNDING = 1e-9  # of its scale: what a computation leaves of zero
+ZERO_RTOL = 1e-9  # Numbers below this fraction of their scale are round-off.
 
 
 def assembled(options: argparse.Namespace) -> tuple[Mechanism, dict[str, float], System]:
-    """Return the mechanism, what --set changes, and the system that they make."""
+    """Return the mechanism, the parameters given by --set, and the assembled system.
+
+    Raises
+    ------
+    UserMistake
+        If --set gives an input, which has no effect on an equilibrium.
+    """
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     own = {p.name for p in mechanism.parameters}
     for name in values:
         if name not in own:
-            raise UserMistake(
-                f"--set {name}: it is an input, which acts while the mechanism moves: "
-                "prbm simulate takes it"
-            )
+            raise UserMistake(f"--set {name}: inputs act only in simulations; use prbm simulate")
     return mechanism, values, assemble(mechanism, mechanism.values(values))
 
 
 def check_length(x: float, size: float, option: str) -> float:
-    """Return a length that is not larger than the mechanism.
+    """Return a length [m] if it is not larger than the mechanism.
 
     Raises
     ------
     UserMistake
-        If it is: its unit was forgotten, or is another one.
+        If it is larger: its unit is missing or wrong.
     """
     if abs(x) > size:
         raise UserMistake(
-            f"{option} {x:g} m is more than the whole mechanism, {size:.3g} m: check the unit, as "
-            f"in {option} {x:g}mm"
+            f"{option} {x:g} m: more than the size of the mechanism, {size:.3g} m; check the unit, "
+            f"for instance {option} {x:g}mm"
         )
     return x
 
 
-def tiny(x: float, scale: float, form: str = ".6g") -> str:
-    """Return a number, what rounding leaves of zero as zero.
+def rounded(x: float, scale: float, form: str = ".6g") -> str:
+    """Return a number as text; round-off relative to a scale becomes 0.
 
     Examples
     --------
-    >>> tiny(12.5, 1.0), tiny(-1e-14, 1.0)
+    >>> rounded(12.5, 1.0), rounded(-1e-14, 1.0)
     ('12.5', '0')
     """
-    return format(x, form) if abs(x) > ROUNDING * scale else "0"
+    return format(x, form) if abs(x) > ZERO_RTOL * scale else "0"

@@ -1,4 +1,4 @@
-"""``prbm validate``: the results of the thesis, or one mechanism beside references."""
+"""``prbm validate``: the thesis reproduced, or a mechanism beside finite elements."""
 
 import argparse
 import tempfile
@@ -11,23 +11,23 @@ from ..files.settings import UserMistake, settings
 from .output import Output
 from .words import measured
 
-ELEMENTS = 32  # a flexure
+ELEMENTS = 32  # Finite elements per flexure.
 
 
 def validated(options: argparse.Namespace) -> None:
-    """Print how the models compare."""
+    """Reproduce the thesis, or compare the given mechanism with references."""
     if options.mechanism is None:
-        _source(options)
+        _thesis(options)
     else:
         _mechanism(options)
 
 
-def _source(options: argparse.Namespace) -> None:
-    """Reproduce the source's results."""
+def _thesis(options: argparse.Namespace) -> None:
+    """Reproduce results of the thesis and print their verdicts."""
     for option in ("measured", "set", "elements"):
         if getattr(options, option) not in (None, []):
-            raise UserMistake(f"--{option} goes with a mechanism: prbm validate MECHANISM ...")
-    from ..validation.page import PAGE, chosen, reproduce  # here for the start-up time
+            raise UserMistake(f"--{option} needs a mechanism: prbm validate MECHANISM ...")
+    from ..validation.page import PAGE, chosen, reproduce  # imported here: slow
 
     if options.list:
         for one in chosen(options.only):
@@ -46,15 +46,21 @@ def _source(options: argparse.Namespace) -> None:
 def _mechanism(options: argparse.Namespace) -> None:
     """Compare a mechanism with finite elements and measurements."""
     if options.only or options.list:
-        raise UserMistake("--only and --list concern the source's results: leave MECHANISM out")
+        raise UserMistake("--only and --list select results of the thesis: omit MECHANISM")
     mechanism = load(options.mechanism)
     values, output = settings(mechanism, options.set), Output(options.out)
-    known = dict(map(measured, options.measured))
-    from ..analysis.comparison import compare  # here for the start-up time
+    measurements = dict(map(measured, options.measured))
+    from ..analysis.comparison import compare  # imported here: slow
     from ..plots.comparison import comparison_figure
 
     elements = ELEMENTS if options.elements is None else options.elements
-    found = compare(mechanism, values, elements=elements, measured=known, progress=reporter())
+    found = compare(
+        mechanism,
+        values,
+        elements=elements,
+        measured=measurements,
+        progress=reporter(),
+    )
     print(found)
     output.text(f"{mechanism.name}-comparison.csv", found.csv())
     output.figure(f"{mechanism.name}-comparison.png", lambda: comparison_figure(found))

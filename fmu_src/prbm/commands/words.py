@@ -1,4 +1,4 @@
-"""Values with uncertainties, fitted parameters and targets, parsed from a command line."""
+"""Parsers of values with uncertainties, free parameters and measured quantities."""
 
 import re
 from pathlib import Path
@@ -15,13 +15,13 @@ PLUS_MINUS = re.compile(r"\s*(?:\+\s*/?\s*-|±)\s*")
 WHERE = re.compile(r"(?P<value>.*?)(?:\s+mode\s+(?P<mode>\d+))?(?:\s+at\s+(?P<at>.+))?\s*")
 
 
-def estimate(text: str, unit: str, what: str) -> Estimate:
-    """Read a value with its standard uncertainty, which is zero if there is none.
+def estimate(text: str, unit: str, option: str) -> Estimate:
+    """Read a value with its standard uncertainty, which is 0 if not given.
 
     Raises
     ------
     UserMistake
-        If it is none.
+        If the text is not a value with at most one uncertainty.
 
     Examples
     --------
@@ -34,32 +34,34 @@ def estimate(text: str, unit: str, what: str) -> Estimate:
     """
     parts = PLUS_MINUS.split(text.strip())
     if len(parts) == 1:
-        return Estimate(quantity(text, unit, what), 0.0, unit)
+        return Estimate(quantity(text, unit, option), 0.0, unit)
     if len(parts) > 2:
-        raise UserMistake(f"{what} {text}: write a value and one uncertainty, as 4.82 +- 0.06")
+        raise UserMistake(
+            f"{option} {text}: write a value and one uncertainty, for instance 4.82 +- 0.06"
+        )
     value, u = parts
     share = PERCENT.fullmatch(u)
     if share and unit:
-        x = quantity(value, unit, what)
-        return Estimate(x, abs(x) * quantity(u, "", what), unit)
+        x = quantity(value, unit, option)
+        return Estimate(x, abs(x) * quantity(u, "", option), unit)
     own, of_u = (re.search(r"[A-Za-zµμ°].*", without_exponent(part)) for part in parts)
     if own and not of_u:
         u = f"{u} {own[0]}"
     elif of_u and not own:
         value = f"{value} {of_u[0]}"
-    spread = quantity(u, unit, what)
+    spread = quantity(u, unit, option)
     if spread < 0.0:
-        raise UserMistake(f"{what} {text}: the uncertainty must not be negative")
-    return Estimate(quantity(value, unit, what), spread, unit)
+        raise UserMistake(f"{option} {text}: the uncertainty must not be negative")
+    return Estimate(quantity(value, unit, option), spread, unit)
 
 
 def free(mechanism: Mechanism, text: str) -> Free:
-    """Read a parameter that is to be fitted, NAME or NAME=LOW:HIGH.
+    """Read a free parameter of a fit, NAME or NAME=LOW:HIGH.
 
     Raises
     ------
     UserMistake
-        If it is none.
+        If the bounds are invalid.
     ParameterError
         If there is no such parameter.
 
@@ -83,19 +85,19 @@ def free(mechanism: Mechanism, text: str) -> Free:
         ends[0] = f"{ends[0].strip()} {last[0]}"
     low, high = (quantity(end, units[name], f"--free {name}=") for end in ends)
     if not low < high:
-        raise UserMistake(f"--free {text}: the lower bound is not below the upper one")
+        raise UserMistake(f"--free {text}: the lower bound must be below the upper bound")
     return Free(name, low, high)
 
 
 def frequency(text: str) -> Frequency:
-    """Read a frequency with its uncertainty, the number of the mode, and where it was measured.
+    """Read a measured natural frequency, VALUE +- U [mode N] [at DISPLACEMENT].
 
     Raises
     ------
     UserMistake
-        If it is none.
+        If a quantity is invalid or the uncertainty is missing.
     EvaluationError
-        If its uncertainty is missing.
+        If the frequency, its uncertainty or the number of the mode is not positive.
 
     Examples
     --------
@@ -104,25 +106,25 @@ def frequency(text: str) -> Frequency:
     (2, -0.01, 130.7)
     """
     found = WHERE.fullmatch(text.strip())
-    assert found is not None  # it matches everything
+    assert found is not None  # The pattern matches every text.
     value = estimate(found["value"], "Hz", "--frequency")
     if value.uncertainty == 0.0:
         raise UserMistake(
-            f"--frequency {text}: give its standard uncertainty, as in --frequency "
-            f'"{value.value:g} Hz +- {0.01 * value.value:.1g}"; for a computed one half of its '
-            "last digit"
+            f"--frequency {text}: add the standard uncertainty, for instance --frequency "
+            f'"{value.value:g} Hz +- {0.01 * value.value:.1g}"; for a computed frequency, half of '
+            "its last digit"
         )
     at = None if found["at"] is None else quantity(found["at"], "m", "--frequency ... at")
     return Frequency(value, int(found["mode"] or 1), at)
 
 
 def measured(text: str) -> tuple[str, Estimate]:
-    """Read NAME=VALUE+-U in any unit, the value with its uncertainty in SI.
+    """Read NAME=VALUE+-U in any unit; return the name and the value with its uncertainty in SI.
 
     Raises
     ------
     UserMistake
-        If it is none.
+        If the text has another form, or a unit is unknown.
 
     Examples
     --------
@@ -133,7 +135,8 @@ def measured(text: str) -> tuple[str, Estimate]:
     name, equals, value = (part.strip() for part in text.partition("="))
     if not (name and equals and value):
         raise UserMistake(
-            f'--measured {text}: write NAME=VALUE+-U, as "frequency 1 at rest=4.82 Hz +- 0.06"'
+            f"--measured {text}: write NAME=VALUE+-U, for instance "
+            '"frequency 1 at rest=4.82 Hz +- 0.06"'
         )
     unit = ""
     for part in reversed(PLUS_MINUS.split(value)):
@@ -141,20 +144,21 @@ def measured(text: str) -> tuple[str, Estimate]:
     return name, estimate(value, unit, f"--measured {name}=")
 
 
-def _si(text: str, what: str) -> str:
+def _si(text: str, option: str) -> str:
+    """Return the SI unit of the dimension of a quantity."""
     try:
         return si_unit(text)
     except MechanismError as error:
-        raise UserMistake(f"{what}: {error}") from None
+        raise UserMistake(f"{option}: {error}") from None
 
 
-def pair(text: str, what: str) -> tuple[str, str]:
+def pair(text: str, option: str) -> tuple[str, str]:
     """Read NAME=TEXT.
 
     Raises
     ------
     UserMistake
-        If it is none.
+        If the name or the equals sign is missing.
 
     Examples
     --------
@@ -163,12 +167,12 @@ def pair(text: str, what: str) -> tuple[str, str]:
     """
     name, equals, value = (part.strip() for part in text.partition("="))
     if not (name and equals):
-        raise UserMistake(f"{what} {text}: write NAME=TEXT, for instance {what} x=mm")
+        raise UserMistake(f"{option} {text}: write NAME=TEXT, for instance {option} x=mm")
     return name, value
 
 
 def stem(path: str) -> str:
-    """Return the name of a file without its end, for the files that are made of it.
+    """Return the name of a file without folder and suffix, for the names of output files.
 
     Examples
     --------

@@ -1,1 +1,1 @@
-"""Shapes and lines of a mechanism, its icon, and the style of all drawings."""
+"""Shapes and outlines of a mechanism, its icon, and the style of all drawings."""

@@ -1,4 +1,4 @@
-"""The icon of a mechanism, and its drawing in a shape."""
+"""The icon of a mechanism."""
 
 from collections.abc import Mapping
 
@@ -19,7 +19,7 @@ from .style import CHAIN, own_style, png
 STEEL, BODY, WALL, GHOST = "#1f4e79", "#9dc3e6", "#595959", "#d0d0d0"
 PIXELS = 256
 DPI = 128
-MANY = 4  # flexures; more of them are drawn with thinner lines
+THIN_LINES_MIN = 5  # Mechanisms with at least this many flexures are drawn with thin lines.
 
 
 @own_style()
@@ -31,7 +31,7 @@ def icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
     mechanism : Mechanism
         The mechanism.
     sample : mapping
-        Outputs: the angles of the links and the positions of the bodies.
+        Outputs at release: the angles of the links, angles and positions of the bodies.
     """
     figure = Figure(figsize=(PIXELS / DPI, PIXELS / DPI), dpi=DPI)
     axes = figure.add_axes((0.02, 0.02, 0.96, 0.96))
@@ -46,20 +46,20 @@ def icon(mechanism: Mechanism, sample: Mapping[str, float]) -> bytes:
 
 
 def shape(system: System, sample: Mapping[str, float]) -> Real:
-    """Return the coordinates of outputs: angles, and stretches that close the loops."""
+    """Return the coordinates of a sample of outputs; the stretches close the loops."""
     q = np.array(system.q0)
     for name, j in angles(system).items():
         q[j] = sample[name]
-    placed = {
+    displacements = {
         name: np.array([complex(sample[f"{name}.x"], sample[f"{name}.y"])])
         for name in system.bodies
     }
-    return closed(system, stretched(system, q[None], placed)[0])
+    return closed(system, stretched(system, q[None], displacements)[0])
 
 
 def draw(axes: Axes, shapes: Shapes, E: Complex, *, faint: bool = False) -> None:
     """Draw flexures, bodies, pins, ground and walls in a shape."""
-    thin = len(shapes.flexures) > MANY
+    thin = len(shapes.flexures) >= THIN_LINES_MIN
     for line in shapes.flexures:
         z = corners(line.outline, E)
         z = z if len(z) - 2 > CHAIN else curve(z, line.guided)

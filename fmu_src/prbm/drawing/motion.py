@@ -1,4 +1,4 @@
-"""Shapes of a mechanism from its angles: closed loops, stretches of its flexures."""
+"""Shapes of a mechanism from recorded angles: closure of loops, stretches of flexures."""
 
 from collections.abc import Mapping
 
@@ -8,22 +8,27 @@ from ..mechanics.arrays import Complex, Real
 from ..mechanics.constraints import project_positions
 from ..mechanics.system import FIXED, Rows, System
 
-STRETCH_ITERATIONS = 4  # They converge quadratically, and stretches are small.
+STRETCH_ITERATIONS = 4  # The convergence is quadratic, and stretches are small.
 
 
 def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) -> Real:
-    """Return the nearest shape with closed loops, which touches a wall if ``stop`` is given.
+    """Return the nearest shape with closed loops; with ``stop``, it touches the wall.
 
     Parameters
     ----------
     system : System
         The mechanism.
     q : (n,)
-        Angles near that shape [rad].
+        Coordinates near that shape.
     stop : int or None
-        The stop that touches its wall.
+        Index of the stop that touches its wall; None: no contact.
     wall : float
         Position of the wall [m].
+
+    Returns
+    -------
+    (n,)
+        Coordinates of the shape.
     """
     touching = [] if stop is None else [stop]
     B = np.vstack([system.loops, system.gaps[touching]])
@@ -33,10 +38,10 @@ def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) 
     return project_positions(system, Rows(system, B, c, z, on), q, c)[0]
 
 
-def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
-    """Return shapes of given angles with the stretches that close the loops and place the bodies.
+def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> Real:
+    """Return shapes with the stretches that close the loops and displace the bodies as given.
 
-    If these are not unique, they are the smallest ones (Gauss-Newton with the pseudoinverse).
+    Gauss-Newton with the pseudoinverse: if the stretches are not unique, the smallest are returned.
 
     Parameters
     ----------
@@ -44,7 +49,7 @@ def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
         The mechanism.
     q : (m, n)
         Angles [rad]; the entries of stretches are ignored.
-    placed : mapping of str to (m,)
+    displacements : mapping of str to (m,) complex
         Displacements of bodies from the straight shape [m].
     """
     k, arms = system.stretches, system.stretched
@@ -53,11 +58,11 @@ def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
     q = q.copy()
     q[:, k] = 0.0
     B, c = [system.loops], [np.tile(system.loops_c, (len(q), 1))]
-    for name, displacement in placed.items():
+    for name, displacement in displacements.items():
         frame = system.bodies[name]
-        short = frame.c - frame.drawn - displacement
+        missing = frame.c - frame.drawn - displacement
         B += [frame.A[None], -1j * frame.A[None]]
-        c += [short.real[:, None], short.imag[:, None]]
+        c += [missing.real[:, None], missing.imag[:, None]]
     rows, constants = np.vstack(B), np.hstack(c)
     for _ in range(STRETCH_ITERATIONS):
         E = system.directions(q)
@@ -68,6 +73,6 @@ def stretched(system: System, q: Real, placed: Mapping[str, Complex]) -> Real:
 
 
 def angles(system: System) -> dict[str, int]:
-    """Return the indices of the coordinates by the names of their angles."""
+    """Return the indices of the angles among the coordinates, by the names of their outputs."""
     links = {f"link[{i}].angle": j for i, j in enumerate(system.links, start=1)}
     return links | {f"{name}.angle": frame.j for name, frame in system.bodies.items()}

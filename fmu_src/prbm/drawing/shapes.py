@@ -1,7 +1,7 @@
-r"""The lines of a mechanism in a shape: flexures, bodies, walls, ground, as complex numbers.
+r"""Outlines of flexures, bodies, walls and ground in a shape of a mechanism, as complex numbers.
 
-A shape is given by its arms E = exp(s + i theta) (:mod:`prbm.mechanics.assembly`); every place is
-linear in them, so that E (1 + i a w) is the shape moved by the amplitude a along a mode w.
+A shape is given by its arms E = exp(s + i theta) (:mod:`prbm.mechanics.assembly`).  All positions
+are linear in E, so that E (1 + i a w) is the shape displaced by the amplitude a along a mode w.
 """
 
 from collections.abc import Sequence
@@ -16,13 +16,14 @@ from ..mechanism.expressions import affine
 from ..mechanism.flexure import PIN
 from ..mechanism.parts import GROUND, Flexure, Stop, body_of, value
 
-SMOOTH = 40  # points along a flexure's curve
-THINNEST_BODY = 0.04  # of the size of the mechanism: a body without height is drawn this thick
-WALL_LENGTH, GROUND_LENGTH = 0.36, 0.16  # of the size of the mechanism
-SHARE = 0.4  # of a flexure, which the ground at its end may be long
-STROKES = 6  # of the hatching
-LEANS = 0.4  # of the upright box: a box that leans must be smaller than this
-SURROUNDED = 1e-9  # of the size: a centre of mass nearer to the hull's sides lies outside
+CURVE_POINTS = 40  # Points of the drawn curve of a flexure.
+# Shares of the size of the mechanism:
+BODY_THICKNESS_MIN = 0.04  # Drawn thickness of a body without height.
+WALL_LENGTH, GROUND_LENGTH = 0.36, 0.16
+INSIDE_RTOL = 1e-9  # A point nearer to the sides of a hull is regarded as outside.
+GROUND_SHARE_MAX = 0.4  # Longest ground at the end of a flexure, as a share of its length.
+STROKES = 6  # Strokes of the hatching.
+INCLINED_AREA_MAX = 0.4  # An inclined box must be smaller than this share of the upright box.
 
 
 def corners(outline: Outline, E: Complex) -> Complex:
@@ -32,17 +33,17 @@ def corners(outline: Outline, E: Complex) -> Complex:
 
 
 def curve(z: Complex, guided: tuple[bool, bool]) -> Complex:
-    """Return a smooth curve between the ends of a flexure, along its stubs where these guide it.
+    """Return a smooth curve between the ends of a flexure, tangential to its stubs at guided ends.
 
-    Hermite's cubic, which for small deflections is the elastic line; at a pin its curvature
-    is zero.
+    The curve is Hermite's cubic, which for small deflections is the elastic line.  At a pin its
+    curvature is zero.
 
     Parameters
     ----------
     z : (p,)
         Corners of the flexure: start, pivots, end [m].
     guided : pair of bool
-        Whether the start and the end take the direction of what holds them: all but pins.
+        Whether the start and the end are guided, not pinned.
     """
     length = float(np.abs(np.diff(z)).sum())
     steps = [d for d in np.diff(z) if abs(d) > 1e-9 * length]
@@ -54,7 +55,7 @@ def curve(z: Complex, guided: tuple[bool, bool]) -> Complex:
         a = (3.0 * chord - b) / 2.0
     elif not guided[1]:
         b = (3.0 * chord - a) / 2.0
-    s = np.linspace(0.0, 1.0, SMOOTH)
+    s = np.linspace(0.0, 1.0, CURVE_POINTS)
     r = 1.0 - s
     result: Complex = (
         z[0] * (1.0 + 2.0 * s) * r**2 + z[-1] * (3.0 - 2.0 * s) * s**2 + r * s * (r * a - s * b)
@@ -62,18 +63,21 @@ def curve(z: Complex, guided: tuple[bool, bool]) -> Complex:
     return result
 
 
-def hatched(place: complex, into: complex, size: float) -> Complex:
-    """Return a line through a place, hatched towards ``into``; breaks are not numbers."""
+def hatched(point: complex, into: complex, size: float) -> Complex:
+    """Return a line through a point, hatched on the side of the unit vector ``into``.
+
+    The strokes are separated by NaN.
+    """
     along = 1j * into * size
-    parts = [place - along / 2, place + along / 2, complex(np.nan, np.nan)]
+    parts = [point - along / 2, point + along / 2, complex(np.nan, np.nan)]
     for k in range(STROKES):
-        z = place + along * ((k + 0.5) / STROKES - 0.5)
+        z = point + along * ((k + 0.5) / STROKES - 0.5)
         parts += [z, z + (into * size - along) * 0.6 / STROKES, complex(np.nan, np.nan)]
     return np.array(parts)
 
 
 def hull(points: Complex) -> Complex:
-    """Return the corners of the convex hull of points, counter-clockwise; none if it has no area.
+    """Return the corners of the convex hull of points, counter-clockwise; empty without an area.
 
     Examples
     --------
@@ -92,12 +96,14 @@ def hull(points: Complex) -> Complex:
 
 
 def box(points: Complex, least: float) -> Complex:
-    """Return the smallest box about the origin that holds points, upright unless it is slender.
+    """Return the smallest box about the origin that contains points.
+
+    An inclined box is returned only if it is much smaller than the upright one.
 
     Parameters
     ----------
     points : (p,)
-        From the centre of the box [m].
+        Relative to the centre of the box [m].
     least : float
         Least distance of a side from the centre [m].
 
@@ -113,18 +119,18 @@ def box(points: Complex, least: float) -> Complex:
     best: tuple[float, complex, float, float] | None = None
     for side in (1.0 + 0j, *sides):
         turn = complex(side / abs(side))
-        turn *= 1j ** -round(float(np.angle(turn)) / (np.pi / 2))  # the box that leans the least
-        seen = points * turn.conjugate()
-        x, y = (max(least, float(np.abs(part).max())) for part in (seen.real, seen.imag))
+        turn *= 1j ** -round(float(np.angle(turn)) / (np.pi / 2))  # The least inclination.
+        rotated = points * turn.conjugate()
+        x, y = (max(least, float(np.abs(part).max())) for part in (rotated.real, rotated.imag))
         if best is None or x * y < best[0]:
-            best = (x * y if best else LEANS * x * y), turn, x, y
+            best = (x * y if best else INCLINED_AREA_MAX * x * y), turn, x, y
     assert best is not None
     _, turn, x, y = best
     return turn * np.array([complex(-x, -y), complex(x, -y), complex(x, y), complex(-x, y)])
 
 
 def _surrounds(around: Complex, distance: float) -> bool:
-    """Tell whether a hull holds the origin, by more than a distance from its sides."""
+    """Return whether the origin lies in a hull, farther than a distance from its sides."""
     if not len(around):
         return False
     sides = np.diff(around, append=around[:1])
@@ -133,7 +139,7 @@ def _surrounds(around: Complex, distance: float) -> bool:
 
 @dataclass(frozen=True)
 class FlexureLine:
-    """A flexure, its line, and whether its ends are guided."""
+    """A flexure and its outline."""
 
     flexure: Flexure
     outline: Outline
@@ -145,13 +151,13 @@ class FlexureLine:
         return start != PIN, end != PIN
 
     def pins(self, E: Complex) -> Complex:
-        """Return the places of the ends that are pinned [m]."""
+        """Return the positions of the pinned ends in a shape [m]."""
         z = corners(self.outline, E)
         return np.array([z[k] for k, g in zip((0, -1), self.guided, strict=True) if not g], complex)
 
 
 class Shapes:
-    """What there is to draw of a mechanism, in any of its shapes.
+    """The drawn parts of a mechanism, in any of its shapes.
 
     Parameters
     ----------
@@ -171,12 +177,12 @@ class Shapes:
         self.bodies = {name: self._body(name) for name in system.bodies}
 
     def arms(self, q: Real) -> Complex:
-        """Return E of a shape; at stretches, which no place depends on, anything."""
+        """Return the arms E of a shape; entries at stretches are undefined and have no effect."""
         return self.system.directions(q)
 
     @property
     def size(self) -> float:
-        """Size of the mechanism, scale of what is drawn [m]."""
+        """Size of the mechanism, the scale of the drawing [m]."""
         return self.system.length
 
     def _number(self, x: float | str) -> float:
@@ -187,7 +193,7 @@ class Shapes:
         return complex(self._number(x), self._number(y))
 
     def _hit(self, stop: Stop) -> complex:
-        """Return where the hit point of a stop is drawn [m]."""
+        """Return the hit point of a stop as drawn [m]."""
         offset = value(stop, "offset", self.system.values)
         x, y = stop.point
         return complex(self._number(x), self._number(y)) + 1j * unit(stop.direction) * offset
@@ -195,8 +201,8 @@ class Shapes:
     def _body(self, name: str) -> Complex:
         """Return the corners of a body about its centre of mass, as drawn [m].
 
-        The hull of its points and of the points that hit, if they surround the centre of mass;
-        else the smallest box about the centre that holds them.
+        The corners are the hull of its points and hit points if it contains the centre of mass,
+        otherwise the smallest box about the centre of mass that contains them.
         """
         body = next(b for b in self.system.mechanism.bodies if b.name == name)
         drawn = [complex(self._number(x), self._number(y)) for x, y in body.points.values()]
@@ -204,19 +210,19 @@ class Shapes:
         drawn += [z for stop, z in zip(stops, self.hits, strict=True) if stop.body == name]
         reach = np.array(drawn) - self.system.bodies[name].drawn
         around = hull(reach)
-        if _surrounds(around, SURROUNDED * self.size):
+        if _surrounds(around, INSIDE_RTOL * self.size):
             return around
-        return box(reach, THINNEST_BODY * self.size / 2)
+        return box(reach, BODY_THICKNESS_MIN * self.size / 2)
 
     def carried(self, body: str, drawn: complex, E: Complex) -> complex:
-        """Return where a drawn point of a body, or of the ground, is in a shape [m]."""
+        """Return the position in a shape of a drawn point of a body or of the ground [m]."""
         if body == GROUND:
             return drawn
         frame = self.system.bodies[body]
         return complex(frame.c + frame.A @ E + E[frame.j] * (drawn - frame.drawn))
 
     def centre(self, name: str, E: Complex) -> complex:
-        """Return where the centre of mass of a body is in a shape [m]."""
+        """Return the centre of mass of a body in a shape [m]."""
         frame = self.system.bodies[name]
         return complex(frame.c + frame.A @ E)
 
@@ -227,7 +233,7 @@ class Shapes:
         return result
 
     def hit(self, i: int, E: Complex) -> complex:
-        """Return where the hit point of a stop is in a shape [m]."""
+        """Return the hit point of a stop in a shape [m]."""
         return self.carried(self.system.mechanism.stops[i].body, self.hits[i], E)
 
     def wall(self, i: int, position: float, E: Complex) -> Complex:
@@ -236,21 +242,21 @@ class Shapes:
         Parameters
         ----------
         i : int
-            Which stop.
+            Index of the stop.
         position : float
-            Of the wall along the stop's direction, from the hit point as drawn [m].
+            Position of the wall along the direction of the stop, from the drawn hit point [m].
         E : (n,)
             Arms of the shape.
         """
         stop, j = self.system.mechanism.stops[i], int(self.system.on[i])
         into = unit(stop.direction)
-        touched = self.carried(stop.on, self.hits[i] + position * into, E)
+        point = self.carried(stop.on, self.hits[i] + position * into, E)
         if j != FIXED:
             into *= complex(E[j])
-        return hatched(touched, into, WALL_LENGTH * self.wall_size(stop))
+        return hatched(point, into, WALL_LENGTH * self.wall_size(stop))
 
     def wall_size(self, stop: Stop) -> float:
-        """Return the size that a wall's length is in proportion to [m]."""
+        """Return the length scale of the wall of a stop [m]."""
         if stop.on == GROUND:
             return self.size
         return min(self.size, 2.0 * float(np.abs(self.bodies[stop.on]).max()))
@@ -260,11 +266,11 @@ class Shapes:
         lines = []
         for line in self.flexures:
             z = corners(line.outline, self.straight)
-            length = min(GROUND_LENGTH * self.size, SHARE * abs(z[-1] - z[0]))
+            length = min(GROUND_LENGTH * self.size, GROUND_SHARE_MAX * abs(z[-1] - z[0]))
             ends = (line.flexure.start, z[0], z[0] - z[-1]), (line.flexure.end, z[-1], z[-1] - z[0])
             lines += [
-                hatched(complex(place), complex(into / abs(into)), length)
-                for end, place, into in ends
+                hatched(complex(point), complex(into / abs(into)), length)
+                for end, point, into in ends
                 if body_of(end) == GROUND
             ]
         grounded = {
@@ -278,18 +284,18 @@ class Shapes:
         return lines
 
     def pins(self, E: Complex) -> Complex:
-        """Return the places of joints and of the pinned ends of flexures in a shape [m]."""
+        """Return the positions of joints and of pinned ends of flexures in a shape [m]."""
         ends = [line.pins(E) for line in self.flexures]
         return np.concatenate([*ends, *(corners(joint, E) for joint in self.joints), []])
 
     def probes(self, E: Complex) -> Complex:
-        """Return the places that are watched [m]."""
-        return _places(self.system.probes, E)
+        """Return the positions of the probes [m]."""
+        return _positions(self.system.probes, E)
 
     def forces(self, E: Complex) -> Complex:
-        """Return the places where forces act [m]."""
-        return _places(self.system.pushed, E)
+        """Return the points of application of the forces [m]."""
+        return _positions(self.system.pushed, E)
 
 
-def _places(frames: Sequence[BodyFrame], E: Complex) -> Complex:
+def _positions(frames: Sequence[BodyFrame], E: Complex) -> Complex:
     return np.array([frame.c + frame.A @ E for frame in frames], complex)

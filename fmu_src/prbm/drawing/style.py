@@ -1,7 +1,7 @@
 """Colours and style of all drawings: the icon here, figures and films in ``prbm.plots``.
 
-They share colours, so that a body, a flexure or a wall looks the same in each of them, and the
-PNG encoder.  That is why this module is in ``prbm.drawing``, the lowest package that draws.
+A body, a flexure or a wall has the same colour in all drawings.  This module is in
+``prbm.drawing`` because that is the lowest package that draws.
 """
 
 import io
@@ -13,14 +13,14 @@ from matplotlib.figure import Figure
 LINK, FLEXURE, BODY, WALL = "#1f4e79", "#8fb4d8", "#9dc3e6", "#595959"
 STRAIGHT, GRID, PROBE = "#b4bcc6", "#eeeeee", "#cc79a7"
 PAST, FUTURE, IMPACT, REST = "#1f4e79", "#c8ced6", "#d55e00", "#009e73"
-CHAIN = 9  # pivots; a flexure with more of them is drawn with straight lines between them
+CHAIN = 9  # A flexure with more pivots is drawn with straight lines between them.
 
-own_style = partial(matplotlib.style.context, "default")  # independent of the user's matplotlibrc
+own_style = partial(matplotlib.style.context, "default")  # Independent of the user's matplotlibrc.
 
 
 @own_style()
 def png(figure: Figure) -> bytes:
-    """Return a figure as a PNG file, the same bytes for the same figure."""
+    """Return a figure as a PNG file; equal figures give equal bytes."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format="png", metadata={"Software": None})
     return buffer.getvalue()

@@ -15,13 +15,15 @@ from xml.etree.ElementTree import Element, SubElement
 from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
+from ..base.progress import messages
 from ..hybrid.simulation import Simulation
 from ..interface.variables import Variable
+from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at
 from ..mechanism.description import Mechanism
 from ..runs.experiment import Experiment
 from ..runs.result import names
-from ..runs.run import simulate
+from ..runs.run import SlowSimulationError, simulate
 from .description import serialized
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
@@ -32,9 +34,12 @@ ATTRIBUTES = {
     "fmi-ls-description": "Layered Standard providing information on related files included in "
     "an FMU.",
 }
+SLOW = "the default experiment takes the Python engine more than about half a minute"
 DIGITS = 9  # Significant digits; the error of the engine is larger.
-STEPS_MAX = 1e5  # Steps of the Python engine, which take a minute or two.
-STABLE_STEP_FACTOR = 3.0  # Stable step of the explicit method, times the rate of fastest motion.
+STEPS_MAX = 1e5  # Integration steps that the Python engine takes in about half a minute.
+CACHED_MAX = 32  # Results in memory: FMI 2.0 and 3.0 share them, mechanism by mechanism.
+LARGE = 40  # Mechanisms with more coordinates take fewer steps in that time.
+STABLE_STEP_FACTOR = 3.0  # Largest stable step of an explicit method, in units of 1/omega.
 
 
 def reference(
@@ -57,20 +62,21 @@ def reference(
     experiment : Experiment
         The default experiment.
     progress : callable
-        Called with the reason if there are no results.
+        Called with the remaining time, and with the reason if there are no results.
 
     Returns
     -------
     dict of str to bytes
-        Files by path in the FMU.  Empty if the simulation fails, or if the Python engine would
-        need more than ``STEPS_MAX`` steps.
+        Files by path in the FMU.  Empty if the simulation fails, or takes the Python engine more
+        than about half a minute.  The time is limited by a number of integration steps, so that
+        every machine builds the same FMU.
     """
-    if steps(mechanism, changes, experiment) > STEPS_MAX:
-        progress("no reference results: the default experiment takes the Python engine minutes")
-        return {}
-    columns = _columns(_Hashed(mechanism), tuple(changes.items()), experiment)
-    if columns is None:
-        progress("no reference results: the simulation of the default experiment fails")
+    columns: NDArray[Any] | str = SLOW
+    if steps(mechanism, changes, experiment) <= STEPS_MAX:
+        cached = _Cached(mechanism, progress)
+        columns = _columns(cached, tuple(changes.items()), experiment)
+    if isinstance(columns, str):
+        progress(f"no reference results: {columns}")
         return {}
     outputs = [v.name for v in variables if v.causality == "output" and v.name in names(columns)]
     file = f"{mechanism.name}_out.csv"
@@ -94,33 +100,39 @@ def steps(mechanism: Mechanism, changes: Mapping[str, float], experiment: Experi
     return experiment.stop_time * fastest / STABLE_STEP_FACTOR
 
 
-class _Hashed:
-    """A cache key for a mechanism by identity, because its mappings cannot be hashed."""
+class _Cached:
+    """A mechanism that is hashed by its identity, with a callback that is no part of the hash."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
+    def __init__(self, mechanism: Mechanism, progress: Callable[[str], None]) -> None:
+        self.mechanism, self.progress = mechanism, progress
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Hashed) and self.mechanism is other.mechanism
+        return isinstance(other, _Cached) and self.mechanism is other.mechanism
 
     def __hash__(self) -> int:
         return id(self.mechanism)
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=CACHED_MAX)
 def _columns(
-    hashed: _Hashed, changes: tuple[tuple[str, float], ...], experiment: Experiment
-) -> NDArray[Any] | None:
-    """Return the results of the default experiment, or None if it fails.
+    cached: _Cached, changes: tuple[tuple[str, float], ...], experiment: Experiment
+) -> NDArray[Any] | str:
+    """Return the result of the default experiment, or the reason why there is none.
 
-    They are cached, because the FMUs of one export share them.
+    The FMUs of one export share it.
     """
+    mechanism = cached.mechanism
+    size = assemble(mechanism, mechanism.values()).n
     try:
         result = simulate(
-            hashed.mechanism, dict(changes), stop_time=experiment.stop_time, step=experiment.step
-        )
+            mechanism, dict(changes), stop_time=experiment.stop_time, step=experiment.step,
+            steps_max=STEPS_MAX / max(1.0, size / LARGE) ** 2,
+            progress=messages(lambda text: cached.progress(f"reference results {text}")),
+        )  # fmt: skip
+    except SlowSimulationError:
+        return SLOW
     except PrbmError:
-        return None
+        return "the simulation of the default experiment fails"
     return result.columns
 
 

@@ -107,6 +107,7 @@ class Simulation:
         self.controller = StepSizeController()
         self.window = EventWindow(self.time)
         self.record: list[Impact] | None = None
+        self.step_count = 0  # Integration steps since the start, for limits of the effort.
         self._output_cache: tuple[float, Outputs] | None = None
 
     # -- mechanism and equations --
@@ -286,6 +287,7 @@ class Simulation:
 
     def _take_step(self) -> None:
         """Take one step from the front, up to the first event within it."""
+        self.step_count += 1
         front = walls.arrived(self.front)
         if front is not self.front:
             self._set_front(front, [])

@@ -46,8 +46,8 @@ class FlexureType:
     ----------
     name : str
         Prefix of the parameters, for instance ``flexure``.
-    model : {"1R", "2R", "3R", "nR"}
-        Pseudo-rigid-body model.
+    model : str
+        Pseudo-rigid-body model, a key of :data:`prbm.mechanism.flexure.MODELS`.
     thickness, width : Quantity
         Dimensions of the section in the plane of motion and across it [m].
     youngs_modulus : Quantity

@@ -6,15 +6,27 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..base.atomic import write
-from ..base.unit_text import length_unit, time_unit
-from ..drawing.style import IMPACT, PAST, REST, own_style, png
+from ..base.unit_text import length_unit, prefixed_unit, time_unit
+from ..drawing.style import IMPACT, PAST, REST, WALL, own_style, png
 from ..mechanics.arrays import Real
+from ..mechanics.assembly import assemble
 from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
+from ..mechanism.parts import GROUND
 from ..runs.marks import Mark, marks
-from ..runs.result import Columns, Result, ResultError, column, names
+from ..runs.result import (
+    ZERO_MOTION_RTOL,
+    Columns,
+    Result,
+    ResultError,
+    body_motions,
+    column,
+    moves,
+    names,
+)
 from .scene import plain
 
 ENERGIES = {  # Colours that colour-blind readers can distinguish.
@@ -25,6 +37,14 @@ ENERGIES = {  # Colours that colour-blind readers can distinguish.
     "work": "#e69f00",
 }
 PANEL_HEIGHT, WIDTH = 1.9, 8.0  # Inches.
+SETTLED_RTOL = 5e-3  # Deviation from the final position at which a motion has settled.
+SETTLED_MARGIN = 0.15  # Time shown after the settling, as a share of the settling time.
+SETTLED_SHARE_MAX = 0.7  # A motion that takes longer is shown up to the end of the result.
+WALL_MARGIN = 0.5  # Walls are drawn up to this distance from the motion, as a share of it.
+Y_MARGIN = 0.05  # Above and below the displacement, as a share of its range.
+PARALLEL_ATOL = 1e-6  # Walls are drawn if their sine to the direction of release is smaller.
+LOG_RATIO_MIN = 5.0  # Smaller ratios of impact speeds are drawn on a linear axis.
+LABELLED_RATIO_MAX = 300.0  # Up to this ratio, 2 and 5 are labelled on a logarithmic axis.
 
 Panel = Callable[[Axes, "_Plot"], None]
 
@@ -47,19 +67,40 @@ class _Plot:
         self.columns = result.columns if isinstance(result, Result) else result
         self.mechanism = mechanism
         self.marks = marks(result, mechanism)
-        span = float(column(self.columns, "time")[-1])
-        self.factor, self.unit = time_unit(span)
-        self.time: Real = self.factor * self.columns["time"]
+        self.size = assemble(mechanism, mechanism.values()).length
+        self.seconds: Real = np.asarray(column(self.columns, "time"), float)
+        self.end = self._end()
+        self.factor, self.unit = time_unit(self.end)
+        self.time: Real = self.factor * self.seconds
 
     def has(self, *wanted: str) -> bool:
         """Return whether columns were recorded."""
         return all(name in names(self.columns) for name in wanted)
+
+    def _end(self) -> float:
+        """Return the last time to show: shortly after the motion has settled [s]."""
+        first, last = float(self.seconds[0]), float(self.seconds[-1])
+        motions = np.array(body_motions(self.columns, self.mechanism, self.size))
+        if not len(motions) or not float(np.ptp(motions, axis=1).max()):
+            return last
+        limit = SETTLED_RTOL * float(np.ptp(motions, axis=1).max())
+        moving = np.flatnonzero((np.abs(motions - motions[:, -1:]) > limit).any(axis=0))
+        settled = max([float(self.seconds[moving[-1]]), *(mark.time for mark in self.marks)])
+        end = settled + SETTLED_MARGIN * (settled - first)
+        return end if first < end < first + SETTLED_SHARE_MAX * (last - first) else last
 
     def along(self, x: str, y: str) -> Real:
         """Return a vector of the released body along the direction of the release."""
         body, u = self.mechanism.release.body, unit(self.mechanism.release.direction)
         result: Real = u.real * self.columns[f"{body}.{x}"] + u.imag * self.columns[f"{body}.{y}"]
         return result
+
+    def at_rest(self) -> bool:
+        """Return whether the recorded displacement of the released body is round-off."""
+        body = self.mechanism.release.body
+        if not self.has(f"{body}.x", f"{body}.y"):
+            return False
+        return float(np.ptp(self.along("x", "y"))) <= ZERO_MOTION_RTOL * self.size
 
 
 @own_style()
@@ -78,7 +119,8 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
     Figure
         One panel for each recorded quantity: displacement and velocity of the released body along
         the direction of its release, closing and opening speeds of the impacts, energies.  The sum
-        of the energies less the work is constant.  Times at which a stop holds are shaded.
+        of the energies less the work is constant.  Times at which a stop holds are shaded.  The
+        time axis ends shortly after the motion has settled.  If no body moves, the figure says so.
 
     Raises
     ------
@@ -92,6 +134,8 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
             "the result has no mechanism; give the mechanism: response(result, mechanism)"
         )
     plot = _Plot(result, mechanism)
+    if not moves(plot.columns, mechanism, plot.size):
+        return _motionless(plot)
     body = mechanism.release.body
     drawn: list[Panel] = []
     if plot.has(f"{body}.x", f"{body}.y"):
@@ -116,8 +160,18 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
     above = 20.0 if drawn[0] is _energies else None  # Room for the legend [points].
     every[0].set_title(mechanism.title, fontsize=11, loc="left", pad=above)
     every[-1].set_xlabel(f"time [{plot.unit}]")
-    every[-1].set_xlim(plot.time[0], plot.time[-1])
+    every[-1].set_xlim(plot.time[0], plot.factor * plot.end)
     figure.align_ylabels(list(every))
+    return figure
+
+
+def _motionless(plot: _Plot) -> Figure:
+    """Return the figure of a result without motion."""
+    figure = Figure((WIDTH, PANEL_HEIGHT), dpi=120, layout="constrained")
+    axes = figure.subplots()
+    axes.axis("off")
+    axes.set_title(plot.mechanism.title, fontsize=11, loc="left")
+    axes.text(0.5, 0.5, f"nothing moves in {plot.seconds[-1]:g} s", ha="center", va="center")
     return figure
 
 
@@ -146,47 +200,93 @@ def _shade_rest(axes: Axes, plot: _Plot) -> None:
 
 def _displacement(axes: Axes, plot: _Plot) -> None:
     x = plot.along("x", "y")
-    factor, unit_name = length_unit(float(np.abs(x).max()) or 1.0)
+    if plot.at_rest():
+        x = np.full(len(x), round(float(x[0]) / plot.size, 9) * plot.size)
+    factor, unit_name = length_unit(float(np.abs(x).max()) or plot.size)
     body = plot.mechanism.release.body
     axes.plot(plot.time, factor * x, color=PAST, linewidth=1.4, label=body)
     if plot.marks:
         when = plot.factor * np.array([mark.time for mark in plot.marks])
         at_hit = np.interp(when, plot.time, factor * x)
         axes.plot(when, at_hit, "v", color=IMPACT, markersize=5, label="impact")
-        axes.legend(loc="best", fontsize=9, frameon=False, ncols=2)
+    _walls(axes, plot, x, factor)
+    if len(axes.lines) > 1:
+        axes.legend(loc="best", fontsize=9, frameon=False, ncols=3)
     axes.set_ylabel(f"displacement [{unit_name}]")
 
 
+def _walls(axes: Axes, plot: _Plot, x: Real, factor: float) -> None:
+    """Draw the displacements at which the released body touches its walls."""
+    release = plot.mechanism.release
+    low, high, room = float(x.min()), float(x.max()), WALL_MARGIN * float(np.ptp(x))
+    shown = [low, high]
+    for stop in plot.mechanism.stops:
+        turn = unit(stop.direction) * unit(release.direction).conjugate()
+        if stop.body != release.body or abs(turn.imag) > PARALLEL_ATOL:
+            continue
+        if not plot.has(f"{stop.name}.gap"):
+            continue
+        gap = plot.columns[f"{stop.name}.gap"]
+        wall = x + turn.real * gap
+        moving = f"{stop.name}.displacement"
+        if stop.on == GROUND and not (plot.has(moving) and np.ptp(plot.columns[moving])):
+            wall = np.full(len(x), wall[np.argmin(gap)])  # Rotations of the body shift the others.
+        if low - room <= wall.max() and wall.min() <= high + room:
+            name = stop.name if len(plot.mechanism.stops) > 1 else "wall"
+            axes.plot(plot.time, factor * wall, color=WALL, linewidth=1.6, zorder=1.5, label=name)
+            shown += np.clip(wall, low - room, high + room).tolist()
+    margin = Y_MARGIN * ((max(shown) - min(shown)) or plot.size)
+    axes.set_ylim(factor * (min(shown) - margin), factor * (max(shown) + margin))
+
+
 def _velocity(axes: Axes, plot: _Plot) -> None:
-    axes.plot(plot.time, plot.along("vx", "vy"), color=PAST, linewidth=1.2)
-    axes.set_ylabel("velocity [m/s]")
+    v = np.zeros(len(plot.time)) if plot.at_rest() else plot.along("vx", "vy")
+    factor, unit_name = prefixed_unit(float(np.abs(v).max()), "m/s")
+    axes.plot(plot.time, factor * v, color=PAST, linewidth=1.2)
+    axes.set_ylabel(f"velocity [{unit_name}]")
 
 
 def _speeds(axes: Axes, plot: _Plot) -> None:
-    """Plot the speeds of the impacts on a logarithmic scale."""
+    """Plot the speeds of the impacts, on a logarithmic axis if they differ much."""
     kinds: dict[str, tuple[str, str, Callable[[Mark], float]]] = {
         "closing": ("v", IMPACT, lambda mark: mark.speed),
         "opening": ("^", PAST, lambda mark: mark.rebound),
     }
+    speeds = [x for *_, speed in kinds.values() for x in map(speed, plot.marks) if x > 0.0]
+    factor, unit_name = prefixed_unit(max(speeds, default=0.0), "m/s")
     for label, (marker, color, speed) in kinds.items():
-        seen = [(plot.factor * m.time, speed(m)) for m in plot.marks if speed(m) > 0.0]
+        seen = [(plot.factor * m.time, factor * speed(m)) for m in plot.marks if speed(m) > 0.0]
         if seen:
             axes.plot(*zip(*seen, strict=True), marker, color=color, markersize=5, label=label)
     if axes.lines:
-        axes.set_yscale("log")
+        _set_scale(axes, max(speeds) / min(speeds))
         axes.legend(loc="best", fontsize=9, frameon=False)
-    axes.set_ylabel("impact speed [m/s]")
+    axes.set_ylabel(f"impact speed [{unit_name}]")
+
+
+def _set_scale(axes: Axes, ratio: float) -> None:
+    """Choose a linear or logarithmic axis with several labels for values of a ratio."""
+    if ratio < LOG_RATIO_MIN:
+        axes.set_ylim(bottom=0.0)
+        return
+    axes.set_yscale("log")
+    if ratio <= LABELLED_RATIO_MAX:
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
 
 
 def _energies(axes: Axes, plot: _Plot) -> None:
     total = np.zeros(len(plot.time))
+    largest = max(float(np.abs(plot.columns[f"energy.{name}"]).max()) for name in ENERGIES)
+    factor, unit_name = prefixed_unit(largest, "J")
     for name, color in ENERGIES.items():
-        energy = 1e3 * plot.columns[f"energy.{name}"]
+        energy = factor * plot.columns[f"energy.{name}"]
         total += -energy if name == "work" else energy
         if np.any(energy):
             axes.plot(plot.time, energy, color=color, linewidth=1.2, label=name)
     axes.plot(plot.time, total, "--", color="black", linewidth=1.0, label="sum - work")
-    axes.set_ylabel("energy [mJ]")
+    axes.set_ylabel(f"energy [{unit_name}]")
     axes.legend(  # Above the panel: there is no room between six curves.
         loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=6, fontsize=9, frameon=False,
         borderaxespad=0.0, columnspacing=1.4, handlelength=1.6,

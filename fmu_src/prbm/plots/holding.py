@@ -1,11 +1,11 @@
-"""Figure of a holding force over the displacement, with places of rest and snaps."""
+"""Figure of a holding force over the displacement, with equilibria and snap-through."""
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..analysis.holding import Curve
-from ..base.unit_text import length_unit
+from ..base.unit_text import frequency_unit, length_unit
 from ..drawing.style import IMPACT, PAST, REST, own_style
 from ..mechanics.arrays import Real
 from .scene import plain
@@ -17,7 +17,7 @@ SIDEWAYS_RTOL = 1e-9  # Sideways motion below this fraction of the displacement 
 def holding_figure(curve: Curve, title: str) -> Figure:
     """Draw holding force, sideways motion and fundamental frequency over the displacement.
 
-    Stable places of rest are filled circles, unstable ones are open circles; diamonds mark the
+    Stable equilibria are filled circles, unstable ones are open circles; diamonds mark the
     displacements at which the mechanism snaps through under a force.
     """
     x = np.array([point.displacement for point in curve.points])
@@ -44,23 +44,23 @@ def _frequencies(curve: Curve) -> Real:
 
 
 def _draw_force(axes: Axes, curve: Curve, factor: float) -> None:
-    """Draw the holding force, the places of rest and the snaps."""
+    """Draw the holding force, the equilibria and the points of snap-through."""
     scale, newton = _force_unit(max(abs(point.force) for point in curve.points))
     axes.plot(
         [factor * p.displacement for p in curve.points], [scale * p.force for p in curve.points],
         color=PAST, linewidth=1.4,
     )  # fmt: skip
     axes.axhline(0.0, color="#808080", linewidth=0.8)
-    for stable, words in ((True, "stable rest"), (False, "unstable rest")):
-        places = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
-        if places:
+    for stable, label in ((True, "stable equilibrium"), (False, "unstable equilibrium")):
+        equilibria = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
+        if equilibria:
             axes.plot(
-                places, np.zeros(len(places)), "o", color=REST, markersize=7,
-                markerfacecolor=REST if stable else "white", label=words,
+                equilibria, np.zeros(len(equilibria)), "o", color=REST, markersize=7,
+                markerfacecolor=REST if stable else "white", label=label,
             )  # fmt: skip
     if curve.snaps:
         snaps = np.array(curve.snaps) * (factor, scale)
-        axes.plot(*snaps.T, "D", color=IMPACT, markersize=5, label="snaps through")
+        axes.plot(*snaps.T, "D", color=IMPACT, markersize=5, label="snap-through")
     if curve.rests:
         axes.legend(fontsize=9, frameon=False)
     axes.set_ylabel(f"holding force [{newton}]")
@@ -80,14 +80,16 @@ def _draw_frequency(axes: Axes, curve: Curve, factor: float) -> None:
     """Draw the fundamental frequency where the free mechanism is stable."""
     x = np.array([point.displacement for point in curve.points])
     hertz = _frequencies(curve)
-    axes.plot(factor * x, np.where(hertz > 0.0, hertz, np.nan), color=PAST, linewidth=1.2)
+    scale, unit = frequency_unit(float(hertz.max()))
+    shown = np.where(hertz > 0.0, scale * hertz, np.nan)
+    axes.plot(factor * x, shown, color=PAST, linewidth=1.2)
     if (hertz <= 0.0).any():
         axes.annotate(
             "shaded: unstable when released", (0.5, 0.06), xycoords="axes fraction", ha="center",
             fontsize=9, color=IMPACT,
         )  # fmt: skip
-    axes.set_ylim(0.0, 1.15 * max(float(hertz.max()), 0.0) or 1.0)
-    axes.set_ylabel("fundamental [Hz]")
+    axes.set_ylim(0.0, 1.15 * scale * max(float(hertz.max()), 0.0) or 1.0)
+    axes.set_ylabel(f"fundamental [{unit}]")
 
 
 def _shade_unstable(every: list[Axes], x: Real, hertz: Real) -> None:

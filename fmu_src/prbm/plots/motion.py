@@ -84,10 +84,10 @@ def _gaps(system: System, q: Real) -> Real:
 def needed(mechanism: Mechanism) -> list[str]:
     """Return the variables for an animation of a mechanism, for FMPy's ``output``."""
     system = assemble(mechanism, mechanism.values())
-    places = [f"{name}.{axis}" for name in system.bodies for axis in "xy"]
+    positions = [f"{name}.{axis}" for name in system.bodies for axis in "xy"]
     return (
         list(angles(system))
-        + (places if len(system.stretches) else [])
+        + (positions if len(system.stretches) else [])
         + [
             f"{stop.name}.{variable}"
             for stop in mechanism.stops
@@ -140,7 +140,7 @@ def motion(
     )
     time = np.asarray(column(columns, "time"), float)
     if len(time) < 2 or not (np.diff(time) >= 0.0).all():
-        raise ResultError("the times of the result must not decrease, and be two or more")
+        raise ResultError("the result must have at least two times, which must not decrease")
     columns_of = angles(system)
     missing = [name for name in columns_of if name not in names(columns)]
     if missing:
@@ -154,7 +154,7 @@ def motion(
         q[:, j] = columns[name]
     if not np.isfinite(q).all():
         raise ResultError("the result has angles that are not finite numbers")
-    q = stretched(system, q, _placed(system, columns))
+    q = stretched(system, q, _displacements(system, columns))
     _check_loops(system, q)
     stops = range(len(mechanism.stops))
     walls = np.array([_wall(system, i, columns, q) for i in stops]).reshape(-1, len(time)).T
@@ -163,7 +163,7 @@ def motion(
     return _with_impacts(Motion(system, time, q, walls, holds, marks(result, mechanism)), result)
 
 
-def _placed(system: System, columns: Columns) -> dict[str, Complex]:
+def _displacements(system: System, columns: Columns) -> dict[str, Complex]:
     """Return the recorded displacements of bodies [m]."""
     return {
         name: columns[f"{name}.x"] + 1j * columns[f"{name}.y"]
@@ -177,9 +177,8 @@ def _check_loops(system: System, q: Real) -> None:
     opened = np.abs((system.directions(q) @ system.loops.T).real + system.loops_c)
     if opened.size and opened.max() > LOOP_OPEN_RTOL * system.length:
         raise ResultError(
-            f"the loops of {system.mechanism.name} stand open by {opened.max():.3g} m in the "
-            "result: is it of this mechanism, and were all lengths given that differ from the "
-            "defaults?"
+            f"the loops of {system.mechanism.name} are open by {opened.max():.3g} m in the result; "
+            "give the mechanism of this result, with all lengths that differ from the defaults"
         )
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from ..hybrid.simulation import Simulation
 from ..mechanism.description import Mechanism
 
-PERIODS_MAX = 1000.0  # of the fundamental mode in a default experiment of one second
-PERIODS = 10.0  # about as many for mechanisms with less than one period, or more, in a second
-STEPS = 1000  # communication steps of the default experiment
+PERIODS_MAX = 25.0  # Most fundamental periods in one second: 40 communication steps in each.
+PERIODS = 10.0  # Approximate number of periods if one second has fewer than one or too many.
+STEPS = 1000  # Communication steps of the default experiment.
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ class Experiment:
 def experiment(mechanism: Mechanism, values: Mapping[str, float] | None = None) -> Experiment:
     """Return the default experiment of a mechanism.
 
-    It takes one second if that is between one and a thousand periods of the fundamental mode.
-    Otherwise it takes about ten periods: 1, 2 or 5 times a power of ten.
+    Its duration is one second if that is between 1 and 25 periods of the fundamental mode.
+    Otherwise it is about ten periods, rounded to 1, 2 or 5 times a power of ten.
 
     Parameters
     ----------

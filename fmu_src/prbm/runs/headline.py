@@ -1,4 +1,4 @@
-"""The headline of a result: frequency, free rest position, impacts, rest on a stop."""
+"""The summary of a result: frequency, free rest position, impacts, rest on a stop."""
 
 from collections.abc import Mapping
 
@@ -8,16 +8,16 @@ from ..mechanics.statics import free_displacement
 from ..mechanics.system import System, unit
 from ..mechanism.description import Mechanism
 from .marks import marks
-from .result import Columns, column, rest_time
+from .result import Columns, column, moves, rest_time
 
 FREQUENCY = "mode.frequency"
-SECONDS_MIN = 0.1  # s; the times of a shorter run have a smaller unit
+SECONDS_MIN = 0.1  # Times of shorter runs are printed in ms or µs [s].
 
 
 def length(x: float, size: float) -> str:
     """Return a length [m] with two decimals, in mm or in the unit of a smaller mechanism.
 
-    A negative zero loses its sign.
+    A negative zero is printed without its sign.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def length(x: float, size: float) -> str:
 
 
 def instant(t: float, span: float, digits: int) -> str:
-    """Return a time of a run in seconds, or in a smaller unit if the run is short.
+    """Return a time of a run as text, in seconds, or in ms or µs if the run is short.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
     Parameters
     ----------
     columns : structured array
-        Of :func:`prbm.runs.run.simulate`, or of FMPy, with all outputs.
+        Result of :func:`prbm.runs.run.simulate`, or of FMPy, with all outputs.
     mechanism : Mechanism
         The mechanism that was simulated.
     values : mapping
-        Its parameters and inputs at the start.
+        Parameters and inputs at the start.
 
     Raises
     ------
@@ -76,15 +76,20 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
     time = column(columns, "time")
     span = float(time[-1] - time[0])
     lines = _free(columns, system)
-    seen = marks(columns, mechanism)
+    if not moves(columns, mechanism, system.length):
+        lines.append(
+            "motion               nothing moves: release the mechanism away from its equilibrium, "
+            "or apply an input"
+        )
+    impacts = marks(columns, mechanism)
     for i, stop in enumerate(s.name for s in mechanism.stops):
         count = int(column(columns, f"{stop}.impact_count")[-1])
-        first = next((mark for mark in seen if mark.stop == i), None)
-        more = ""
+        first = next((mark for mark in impacts if mark.stop == i), None)
+        details = ""
         if first is not None:
             which = "the first" if first.count == 1 else f"number {first.count}"
-            more = f", {which} at t = {instant(first.time, span, 5)} with {first.speed:.3f} m/s"
-        lines.append(f"impacts at {stop:9} {count}{more}")
+            details = f", {which} at t = {instant(first.time, span, 5)} with {first.speed:.3f} m/s"
+        lines.append(f"impacts at {stop:9} {count}{details}")
         since = rest_time(columns, stop)
         if since is not None:
             lines.append(
@@ -113,12 +118,12 @@ def _free(columns: Columns, system: System) -> list[str]:
 
 
 def _along(direction: float) -> str:
-    """Return the direction of a displacement [degrees] in words, nothing for that of x."""
+    """Return the direction of a displacement [degrees] as text, empty for the x direction."""
     return "" if direction == 0.0 else f" along {direction:g} degrees"
 
 
 def _place(columns: Columns, system: System) -> str:
-    """Return the position of the released body at the end."""
+    """Return the final position of the released body as text."""
     body, direction = system.mechanism.release.body, system.mechanism.release.direction
     x, y = (float(column(columns, f"{body}.{axis}")[-1]) for axis in "xy")
     u = unit(direction)

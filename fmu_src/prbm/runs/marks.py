@@ -1,4 +1,4 @@
-"""The impacts in a result."""
+"""The impacts in a result, from the engine or from recorded outputs."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ class Mark:
     Parameters
     ----------
     stop : int
-        Number of the stop.
+        Index of the stop.
     time : float
         Time of the impact [s].
     speed, rebound : float
@@ -35,8 +35,8 @@ class Mark:
 def marks(result: Result | Columns, mechanism: Mechanism) -> tuple[Mark, ...]:
     """Return the impacts of a result in order.
 
-    A result of the engine has all of them; columns of FMPy have the last one of each step, or none
-    if the outputs of the impacts were not recorded.
+    A result of the engine contains all impacts.  Columns of FMPy contain the last impact of each
+    communication step, and none if the latched outputs were not recorded.
     """
     if isinstance(result, Result) and result.impacts:
         numbers = {stop.name: i for i, stop in enumerate(mechanism.stops)}
@@ -56,9 +56,9 @@ def marks(result: Result | Columns, mechanism: Mechanism) -> tuple[Mark, ...]:
 
 
 def _latched(i: int, columns: Columns, mechanism: Mechanism) -> Iterator[Mark]:
-    """Yield the impacts at a stop that changed its latched outputs."""
+    """Yield the impacts at a stop that are visible in its latched outputs."""
     stop = mechanism.stops[i].name
-    needed = [f"{stop}.{what}" for what in ("impact_count", "impact_time", "approach_speed")]
+    needed = [f"{stop}.{output}" for output in ("impact_count", "impact_time", "approach_speed")]
     if any(name not in names(columns) for name in needed):
         return
     count, when, speed = (columns[name] for name in needed)

@@ -1,4 +1,4 @@
-"""The result of a simulation: columns by name, impacts, and results read from files."""
+"""Results of simulations, computed or read from files: columns by name, and impacts."""
 
 import csv
 from collections.abc import Iterable, Mapping
@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
 from ..hybrid.impacts import Impact
+from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 
 Columns = NDArray[Any]
-BOOLEANS = {"true": 1.0, "false": 0.0}  # as some tools write them
+ZERO_MOTION_RTOL = 1e-9  # Smaller motions, relative to the size of the mechanism, are round-off.
+BOOLEANS = {"true": 1.0, "false": 0.0}  # Texts that some tools write for Booleans.
 
 
 class ResultError(PrbmError, ValueError):
@@ -25,14 +27,14 @@ class ResultError(PrbmError, ValueError):
 class Result:
     """The result of a simulation.
 
-    ``result["shuttle.x"]`` is a column by its name.
+    ``result["shuttle.x"]`` is the column ``shuttle.x``.
 
     Parameters
     ----------
     mechanism : Mechanism
         The mechanism that was simulated.
     values : mapping
-        All its parameters at the start, and the inputs that were given then.
+        All parameters at the start, and the inputs that were given at the start.
     columns : (m,) structured array
         ``time`` and the variables by name, in SI units, one row per communication point.
     impacts : tuple of Impact
@@ -55,11 +57,11 @@ def column(columns: Columns, name: str) -> Columns:
     Raises
     ------
     ResultError
-        If there is no column of that name.
+        If the result has no column of that name.
     """
     if name not in names(columns):
         raise ResultError(
-            f"the result has no column {name!r}; record it, with FMPy as in "
+            f"the result has no column {name!r}; record it, in FMPy with "
             f"simulate_fmu(..., output=[..., {name!r}])"
         )
     found: Columns = columns[name]
@@ -100,15 +102,16 @@ def read_csv(path: str | Path) -> Columns:
     except OSError as error:
         raise ResultError(f"{path}: cannot be read ({error.strerror})") from None
     except (UnicodeDecodeError, csv.Error) as error:
-        raise ResultError(f"{path}: is no CSV file ({error})") from None
+        raise ResultError(f"{path}: not a CSV file ({error})") from None
     if len(lines) < 3 or lines[0][0].strip() != "time":
         raise ResultError(
-            f"{path}: is no result; the first line names the columns, the first of them is "
-            "time, and two rows or more follow"
+            f"{path}: not a result; the first line must name the columns, the first of them time, "
+            "and at least two rows must follow"
         )
     header = [name.strip() for name in lines[0]]
-    if len(set(header)) < len(header):
-        raise ResultError(f"{path}: a column stands there twice")
+    repeated = [name for k, name in enumerate(header) if name in header[:k]]
+    if repeated:
+        raise ResultError(f"{path}: two columns are named {repeated[0]!r}")
     rows = []
     for number, line in enumerate(lines[1:], start=2):
         if len(line) != len(header):
@@ -118,19 +121,49 @@ def read_csv(path: str | Path) -> Columns:
         try:
             rows.append(tuple(_number(x) for x in line))
         except ValueError:
-            raise ResultError(f"{path}: row {number} holds what is no number") from None
+            raise ResultError(f"{path}: row {number} has a cell that is not a number") from None
     return np.array(rows, [(name, np.float64) for name in header])
 
 
 def _number(cell: str) -> float:
-    """Return the number in a cell, 1 or 0 for a Boolean."""
+    """Return the number in a cell; 1 or 0 for a Boolean."""
     return BOOLEANS[cell.lower()] if cell.lower() in BOOLEANS else float(cell)
+
+
+def body_motions(columns: Columns, mechanism: Mechanism, size: float) -> list[Real]:
+    """Return the recorded displacements and rotations of the bodies, rotations times the size [m].
+
+    Parameters
+    ----------
+    columns : structured array
+        The result.
+    mechanism : Mechanism
+        The mechanism that was simulated.
+    size : float
+        Size of the mechanism [m].
+    """
+    scales = {"x": 1.0, "y": 1.0, "angle": size}
+    return [
+        scale * columns[f"{body.name}.{name}"]
+        for body in mechanism.bodies
+        for name, scale in scales.items()
+        if f"{body.name}.{name}" in names(columns)
+    ]
+
+
+def moves(columns: Columns, mechanism: Mechanism, size: float) -> bool:
+    """Return whether a body moves by more than round-off; true if no motion was recorded.
+
+    Parameters as for :func:`body_motions`.
+    """
+    motions = body_motions(columns, mechanism, size)
+    return not motions or any(float(np.ptp(x)) > ZERO_MOTION_RTOL * size for x in motions)
 
 
 def rest_time(columns: Columns, stop: str = "stop") -> float | None:
     """Return the first recorded time of the last hold at a stop [s].
 
-    It is None if the stop does not hold at the end of the result.
+    Without a hold at the end, it returns None.
 
     Examples
     --------

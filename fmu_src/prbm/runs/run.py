@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Callable, Mapping
+from typing import Any
 
-from ..base.errors import ParameterError
+from ..base.errors import ParameterError, SimulationError
+from ..base.names import unknown
 from ..base.progress import Progress
 from ..hybrid.simulation import Simulation
 from ..mechanism.description import Mechanism
@@ -13,17 +15,23 @@ from .result import Result, structured
 Source = Callable[[float], Mapping[str, float]]
 ROWS_MAX = 10_000_000  # More communication points are a mistake in the unit of the step.
 LAST_STEP_RTOL = 1e-9  # A last step below this fraction of a communication step is round-off.
+EARLY_SHARE = 0.2  # Share of the steps that may be taken early, where most impacts are.
+
+
+class SlowSimulationError(SimulationError):
+    """A simulation takes more integration steps than permitted."""
 
 
 def simulate(
     mechanism: Mechanism,
-    changes: Mapping[str, float] | None = None,
+    changes: Mapping[str, float | str] | None = None,
     *,
-    stop_time: float | None = None,
-    step: float | None = None,
+    stop_time: float | str | None = None,
+    step: float | str | None = None,
     tolerance: float | None = None,
     source: Source | None = None,
     progress: Progress | None = None,
+    steps_max: float | None = None,
 ) -> Result:
     """Simulate a mechanism from its release.
 
@@ -32,30 +40,38 @@ def simulate(
     mechanism : Mechanism
         The mechanism.
     changes : mapping or None
-        Parameters and inputs that differ from their defaults.
-    stop_time, step : float or None
-        Duration and communication step [s] (default: those of the default experiment, for most
-        mechanisms 1 s and 1 ms).  The last step may be shorter.
+        Parameters and inputs that differ from their defaults: numbers in SI units, or texts with
+        a unit, ``"-10 mm"``.
+    stop_time, step : float, str or None
+        Duration and communication step, numbers [s] or texts, ``"20 ms"``; None: those
+        of the default experiment, for most mechanisms 1 s and 1 ms.  The last step may be shorter.
     tolerance : float or None
-        Relative tolerance of the integration (default: ``solver.tolerance``).
+        Relative tolerance of the integration; None: ``solver.tolerance``.
     source : callable or None
         Function of time that returns inputs and tunable parameters by name, for the step that
         begins at that time [s].
     progress : callable or None
-        Called with the fraction of the steps that are done, from 0 to 1.
+        Called with the completed fraction, from 0 to 1.
+    steps_max : float or None
+        Most integration steps of the simulation; it is already abandoned if it takes more than a
+        proportional part of them.  None: no limit.
 
     Returns
     -------
     Result
-        The columns have one row per communication point.  An input is in the row at which it
-        begins to act.
+        The columns have one row per communication point.  The row of an input is the time from
+        which it acts.
 
     Raises
     ------
     ParameterError
-        If a name is unknown, a value out of bounds or a time not positive.
+        If a name is unknown, a value is not a number or out of bounds, or a time is not positive.
+    UserMistake
+        If a text is not a quantity of the right dimension.
     EquilibriumError, SimulationError
-        As :class:`prbm.Simulation` does.
+        As :class:`prbm.Simulation`.
+    SlowSimulationError
+        If the simulation takes more than ``steps_max`` steps.
 
     Examples
     --------
@@ -63,18 +79,30 @@ def simulate(
     >>> result = simulate(load("PRBDM"), {"stop.restitution": 0.5}, stop_time=0.05)
     >>> len(result["time"]), int(result["stop.impact_count"][-1])
     (51, 1)
+    >>> result = simulate(load("PRBDM"), {"release.displacement": "-10 mm"}, stop_time="20 ms")
+    >>> result.values["release.displacement"], float(result["time"][-1])
+    (-0.01, 0.02)
     """
-    if stop_time is None or step is None:
-        default = experiment(mechanism, changes)
-        stop_time = default.stop_time if stop_time is None else stop_time
-        step = default.step if step is None else step
-    times = communication_points(stop_time, step)
-    simulation = Simulation(mechanism, changes, tolerance=tolerance)
+    values = _values(mechanism, changes)
+    duration, spacing = (
+        None if x is None else _number(name, x, "s")
+        for name, x in (("stop_time", stop_time), ("step", step))
+    )
+    if duration is None or spacing is None:
+        default = experiment(mechanism, values)
+        duration = default.stop_time if duration is None else duration
+        spacing = default.step if spacing is None else spacing
+    times = communication_points(duration, spacing)
+    if tolerance is not None:
+        tolerance = _number("tolerance", tolerance, "")
+    simulation = Simulation(mechanism, values, tolerance=tolerance)
     simulation.record = []
     start = {**simulation.values, **simulation.given}
     rows = []
     for k, t in enumerate(times):
         simulation.advance(t)
+        if steps_max is not None:
+            _check_steps(simulation, steps_max, k / (len(times) - 1))
         outputs = simulation.outputs()
         if source is not None:
             simulation.set(source(t))
@@ -84,13 +112,51 @@ def simulate(
     return Result(mechanism, start, structured(rows), tuple(simulation.record))
 
 
+def _check_steps(simulation: Simulation, steps_max: float, fraction: float) -> None:
+    """Reject a simulation that takes more than a proportional part of the steps."""
+    if simulation.step_count > steps_max * max(fraction, EARLY_SHARE):
+        raise SlowSimulationError(
+            f"the simulation takes {simulation.step_count} integration steps until t = "
+            f"{simulation.time:.6g} s; at most {steps_max:g} are permitted in total"
+        )
+
+
+def _values(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Mapping[str, float]:
+    """Return changes with texts converted to numbers in SI."""
+    texts = {name: x for name, x in (changes or {}).items() if isinstance(x, str)}
+    if not texts:
+        return changes or {}  # type: ignore[return-value]
+    from ..files.settings import units_of  # imported here: pint takes half a second
+
+    units = units_of(mechanism)
+    for name in texts:
+        if name not in units:
+            raise ParameterError(unknown(name, units))
+    return {
+        name: _number(name, x, units[name]) if isinstance(x, str) else x
+        for name, x in (changes or {}).items()
+    }
+
+
+def _number(name: str, value: Any, unit: str) -> float:
+    """Return a number in a unit, from a number or a text with a unit."""
+    if isinstance(value, str):
+        from ..files.settings import quantity  # imported here: pint takes half a second
+
+        return quantity(value, unit, f"{name} =")
+    if isinstance(value, bool | bytes) or not hasattr(value, "__float__"):
+        remedy = f', in {unit}, or a text, "1 {unit}"' if unit else ""
+        raise ParameterError(f"{name} = {value!r}: must be a number{remedy}")
+    return float(value)
+
+
 def communication_points(stop_time: float, step: float) -> list[float]:
     """Return 0, step, 2 step, ... up to the stop time [s].
 
     Raises
     ------
     ParameterError
-        If that is not a finite number of steps forwards.
+        If a time is not positive and finite, or there are more than :data:`ROWS_MAX` steps.
 
     Examples
     --------
@@ -103,6 +169,6 @@ def communication_points(stop_time: float, step: float) -> list[float]:
     steps = math.ceil(stop_time / step - LAST_STEP_RTOL)
     if steps > ROWS_MAX:
         raise ParameterError(
-            f"step = {step:g} s makes {steps} steps in {stop_time:g} s: choose a larger one"
+            f"step = {step:g} s makes {steps} steps in {stop_time:g} s; choose a larger step"
         )
     return [*(k * step for k in range(max(steps, 1))), stop_time]

@@ -1,1 +1,1 @@
-"""The shipped mechanisms, one TOML file each."""
+"""The shipped mechanisms, one TOML file per mechanism."""

@@ -85,7 +85,7 @@ class Results:
                 f"{self.folder} exists without a sweep in it; give another name for the results"
             )
 
-    def begin(self, anew: bool = False) -> None:
+    def begin(self, overwrite: bool = False) -> None:
         """Create the folder, or continue in a folder of a sweep with the same settings.
 
         The folder must be locked, since drafts of an interrupted sweep are deleted.
@@ -93,14 +93,14 @@ class Results:
         Raises
         ------
         ParameterError
-            If the folder cannot be written, or has a sweep with other settings and ``anew`` is
-            false.
+            If the folder cannot be written, or has a sweep with other settings and ``overwrite``
+            is false.
         """
         file = self.folder / SETTINGS
         try:
             for draft in self.folder.glob("_*.draft"):
                 draft.unlink()
-            if file.exists() and anew:
+            if file.exists() and overwrite:
                 self._clear()
             if file.exists():
                 self._compare(json.loads(file.read_text(encoding="utf-8")))
@@ -114,7 +114,7 @@ class Results:
                 f"{self.folder} cannot be written ({error.strerror}); give another name"
             ) from None
         except json.JSONDecodeError:
-            raise ParameterError(f"{file} is damaged; remove {self.folder}") from None
+            raise ParameterError(f"{file} is damaged; delete {self.folder}") from None
 
     def _compare(self, before: Mapping[str, Any]) -> None:
         """Reject a sweep whose settings differ from the stored ones."""
@@ -123,8 +123,8 @@ class Results:
             if old != new:
                 raise ParameterError(
                     f"{self.folder} contains a sweep with another {name} ({_short(old)}, now "
-                    f"{_short(new)}); give another name for the results, or delete the old ones "
-                    "with --anew"
+                    f"{_short(new)}); give another name for the results, or overwrite them "
+                    "(--overwrite)"
                 )
 
     def _clear(self) -> None:
@@ -159,6 +159,21 @@ class Results:
                 raise ParameterError(
                     f"{part} cannot be read ({reason}); remove it, and its runs are repeated"
                 ) from None
+
+    def sort(self) -> None:
+        """Replace all parts by one part with the rows in order, so that any reader gets them so.
+
+        A kill leaves the new part beside old ones; :meth:`read` drops the duplicate rows.
+        """
+        parts = self._parts()
+        rows = [row for _, table in self._tables() for row in table[ROW].to_pylist()]
+        if rows == sorted(rows):
+            return
+        table = pa.Table.from_pandas(self.read(), schema=self.schema, preserve_index=False)
+        self._write(table, self.folder / f"part-{0:06d}-{os.urandom(3).hex()}.parquet")
+        for part in parts:
+            part.unlink()
+        self.count = 1
 
     def forget_failures(self) -> None:
         """Remove the rows of failed runs, so that these are repeated."""

@@ -74,8 +74,8 @@ def sweep(
     workers: int | None = None,
     retries: int = 1,
     timeout: float | None = None,
-    anew: bool = False,
-    failed: bool = False,
+    overwrite: bool = False,
+    retry_failed: bool = False,
     progress: Progress | None = None,
 ) -> "pd.DataFrame":
     """Run an FMU once for each row of a table.
@@ -115,9 +115,9 @@ def sweep(
         Number of repetitions of a run whose process crashed.
     timeout : float or None
         Longest duration of a run [s]; None: no limit.
-    anew : bool
+    overwrite : bool
         Delete earlier results in ``out`` (default: False).
-    failed : bool
+    retry_failed : bool
         Repeat failed runs (default: False).
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
@@ -149,18 +149,19 @@ def sweep(
     with ExitStack() as stack:
         stack.enter_context(results.lock())
         # Earlier results are deleted only after the scheduler has responded.
-        client = stack.enter_context(_client(scheduler, workers)) if anew else None
-        results.begin(anew)
+        client = stack.enter_context(_client(scheduler, workers)) if overwrite else None
+        results.begin(overwrite)
         done = results.read()
         _same_rows(plan, done, results.folder)
-        seen = set(done["row"][done["status"].isin(GOOD)] if failed else done["row"])
+        seen = set(done["row"][done["status"].isin(GOOD)] if retry_failed else done["row"])
         rest = [row for row in range(len(plan.rows)) if row not in seen]
         report(1.0 - len(rest) / len(plan.rows))
         if rest:
             client = client or stack.enter_context(_client(scheduler, workers))
-            if failed:
+            if retry_failed:
                 results.forget_failures()
             _Sweep(client, plan, results, report).run(rest, retries, timeout)
+        results.sort()
     return results.read()
 
 
@@ -375,7 +376,7 @@ def _same_rows(plan: Plan, done: "pd.DataFrame", folder: Path) -> None:
             raise ParameterError(
                 f"{folder} contains a sweep over another table: row {k} "
                 f"{'is missing now' if now is None else 'has changed'}; give another name for the "
-                "results, or delete the old ones with --anew"
+                "results, or overwrite them (--overwrite)"
             )
 
 

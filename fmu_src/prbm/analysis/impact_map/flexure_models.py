@@ -14,9 +14,9 @@ def with_flexures(
     ----------
     mechanism : Mechanism
         The mechanism.
-    model : {"1R", "2R", "3R", "nR"}
-        Model with its published coefficients.  A flexure that has this model already keeps its own
-        coefficients.
+    model : str
+        Model with its published coefficients, a key of :data:`prbm.mechanism.flexure.MODELS`.  A
+        flexure that has this model already keeps its own coefficients.
     axial : bool
         Whether the flexures stretch.
     n : int

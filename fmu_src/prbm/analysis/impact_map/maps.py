@@ -16,6 +16,7 @@ import numpy as np
 
 from ...base.errors import ParameterError
 from ...base.progress import Progress
+from ...base.unit_text import length_unit
 from ...mechanics.arrays import Real
 from ...mechanism.description import Mechanism
 from ..touching import stop_index
@@ -109,10 +110,12 @@ class ImpactMap:
         return path
 
     def __str__(self) -> str:
-        head = "".join(f"{1e3 * h:9.3g}" for h in self.walls)
-        lines = [self.label, f"d \\ h, mm{head}"]
+        largest = float(max(np.abs(self.walls).max(), np.abs(self.offsets).max()))
+        factor, unit = length_unit(largest or 1.0)
+        head = "".join(f"{factor * h:9.3g}" for h in self.walls)
+        lines = [self.label, f"d \\ h, {unit}{head}"]
         for d, row in zip(self.offsets, self.restitution, strict=True):
-            lines.append(f"{1e3 * d:9.3g}" + "".join(f"{c:9.4f}" for c in row))
+            lines.append(f"{factor * d:{6 + len(unit) + 1}.3g}" + "".join(f"{c:9.4f}" for c in row))
         return "\n".join(lines)
 
 
