@@ -260,8 +260,8 @@ MISTAKES = {
     "--model PRBDM --set stop.restitution=high": "write a number",
     "--model PRBDM --set stop.restitution": "write NAME=VALUE",
     "--model PRBDM --set stop.restitution=1.5": "stop.restitution = 1.5 must be at most 1",
-    "--model PRBDM --set shuttle.x=0.1": "there is no variable 'shuttle.x'",
-    "--model PRBDM --set stop.position=1kg": "'kg' is the unit of something else",
+    "--model PRBDM --set shuttle.x=0.1": "unknown variable 'shuttle.x'",
+    "--model PRBDM --set stop.position=1kg": "the unit 'kg' has another dimension",
     "--model PRBDM --set release.displacement=0.02": "penetrated",
     "--model PRBDM --set release.displacement=-0.2": "cannot be reached",
     "--model PRBDM3": "the shipped ones are Bistable, Cantilever",
@@ -461,8 +461,12 @@ def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
     [
         ('unit = "m"', 'unit = "furlong"', r"flexure\.length has the unit 'furlong'"),
         ("nominal = 1e-2", "nominal = inf", r"flexure\.length: nominal = inf must be positive"),
-        ('name = "stop"', 'name = "wänd"', r"wänd\.position: names of FMI .* rename the part"),
-        ('name = "PRBDM"', 'name = "__debug__"', "'__debug__': Python cannot give it to a class"),
+        (
+            'name = "stop"',
+            'name = "wänd"',
+            r"wänd\.position: variable names of FMI .* rename the part",
+        ),
+        ('name = "PRBDM"', 'name = "__debug__"', "'__debug__': not a valid name of a Python class"),
     ],
 )
 def test_names_and_values_that_fmi_forbids_are_reported(tmp_path, old, new, sentence):

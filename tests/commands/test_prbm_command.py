@@ -647,7 +647,7 @@ MALFORMED = {
     "no head": (
         text(*GOOD, change=without(0, 1)), FREQUENCY, 'for instance --columns "t [s]" "x [mm]"'
     ),
-    "too many names": (text(*GOOD), f"{FREQUENCY} --columns 't [s]'", "1 names were given for 2"),
+    "too many names": (text(*GOOD), f"{FREQUENCY} --columns 't [s]'", "1 names for 2"),
     "no force": (text("d [mm],x [mm]", TIME, SWING), MODULUS, "the deflection can be d or x"),
     "volts for a force": (text("d [mm],F [V]", TIME, SWING), MODULUS, "no column in N or a multip"),
     "longer than the beam": (text("d [m],F [N]", TIME, SWING), MODULUS, "is longer than the beam"),
