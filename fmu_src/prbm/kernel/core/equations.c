@@ -179,14 +179,18 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
 
 /* --- walls ------------------------------------------------------------------------------------ */
 
+PRBM double reference_at(const Wall *wall, double t) {
+    return wall->position + wall->rate * (t - wall->since);
+}
+
 /* With s = min((t - since) / span, 1):
  *     x = reference + offset (1 - 3 s^2 + 2 s^3) + excess span (s - 2 s^2 + s^3).
  * Beyond the end of the cubic the wall is to be replaced by its reference. */
 PRBM WallMotion wall_motion(const Wall *wall, double t) {
-    double tau = t - wall->since, T = wall->span;
-    WallMotion result = {wall->position + wall->rate * tau, wall->rate, 0.0};
+    double T = wall->span;
+    WallMotion result = {reference_at(wall, t), wall->rate, 0.0};
     if (T > 0.0) {
-        double s = lesser(tau / T, 1.0), e = wall->offset, u = wall->excess;
+        double s = lesser((t - wall->since) / T, 1.0), e = wall->offset, u = wall->excess;
         result.x += e * (1.0 + s * s * (2.0 * s - 3.0)) + u * T * s * (1.0 - s) * (1.0 - s);
         result.v += 6.0 * e / T * s * (s - 1.0) + u * (1.0 - s) * (1.0 - 3.0 * s);
         result.a = (6.0 * e / T * (2.0 * s - 1.0) + u * (6.0 * s - 4.0)) / T;

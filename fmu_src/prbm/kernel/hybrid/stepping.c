@@ -94,13 +94,14 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
            (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
-/* Find a step that keeps the tolerance: its stages in the arc, its end in stepping. */
-static bool find_step(Simulation *sim, double *h, Problem *problem) {
+/* Find a step that keeps the tolerance, no longer than the longest: its stages in the arc, its end
+ * in stepping. */
+static bool find_step(Simulation *sim, double longest, double *h, Problem *problem) {
     State *state = &sim->state;
     int ny = state_size(sim);
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
     wanted = lesser(wanted, longest_step(sim));
-    double first = lesser(wanted, longest_wall_step(sim));
+    double first = lesser(wanted, longest);
     StepSizeController controller = {first, state->log_of_error, STEP_GROWTH_MAX};
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
@@ -134,13 +135,12 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
-    double h = 0.0;
-    arrive_walls(sim);
+    double h = 0.0, longest = follow_cubics(sim);
     if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL, &stepping->evaluation,
                                 state->k1, problem)) {
         return false;
     }
-    if (!find_step(sim, &h, problem)) {
+    if (!find_step(sim, longest, &h, problem)) {
         return false;
     }
     double start = state->front_time, end = start + h;
