@@ -44,7 +44,8 @@ typedef struct {
     Rows active;
     Complex *w, *w_input;   /* (n,) */
     double *moment;         /* (even,) */
-    bool driven, walls_push;
+    bool driven;
+    bool walls_push, walls_join; /* walls of held stops move; walls are off their references */
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
 } Equations;

@@ -101,8 +101,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
     int ny = state_size(sim);
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
     wanted = lesser(wanted, longest_step(sim));
-    double first = lesser(wanted, longest);
-    StepSizeController controller = {first, state->log_of_error, STEP_GROWTH_MAX};
+    StepSizeController controller = {lesser(wanted, longest), state->log_of_error, STEP_GROWTH_MAX};
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
     do {
@@ -111,8 +110,10 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
             return false;
         }
     } while (!next(&controller, step_error(sim, *h, problem)));
-    bool cut = *h == first && first < wanted; /* by a wall: it says little about the next step */
-    state->step_size = cut ? greater(controller.h, wanted) : controller.h;
+    state->step_size = controller.h;
+    if (*h == longest && longest < wanted) { /* cut by a wall: it says little about the next step */
+        state->step_size = greater(controller.h, wanted);
+    }
     state->log_of_error = controller.log_of_error;
     return true;
 }
@@ -135,7 +136,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
-    double h = 0.0, longest = follow_cubics(sim);
+    double h = 0.0, longest = sim->equations.walls_join ? follow_cubics(sim) : HUGE_VAL;
     if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL, &stepping->evaluation,
                                 state->k1, problem)) {
         return false;

@@ -34,6 +34,12 @@ PRBM Wall turned_wall(const Wall *wall, double t, double velocity, double rate) 
     return joining(wall, reference, velocity, wall->span);
 }
 
+/* The change of stop.position at a communication point, which is not differenced. */
+static double shift(const Simulation *sim, int i) {
+    Expression position = sim->configuration.mechanism->stops[i].position;
+    return evaluate(position, sim->state.values) - evaluate(position, sim->state.acting_values);
+}
+
 /* The walls from a communication point on, to which a step to a time follows; returns whether a
  * reference has changed.  Without stop.velocity its velocity is the mean rate over the recent
  * longest step, but in a step that is longer than that it goes less far than the displacement did.
@@ -46,13 +52,12 @@ PRBM bool join_walls(Simulation *sim, double time, Wall *joined) {
     double longest = greater(0.5 * T, last), share = lesser(longest / following, 1.0);
     bool changed = false;
     for (int i = 0; i < system_of(sim)->s; i++) {
-        Expression position = sim->configuration.mechanism->stops[i].position;
         Wall *wall = &state->walls[i], line = given_reference(sim, i);
         double off = line.position - reference_at(wall, now);
-        double shift = evaluate(position, state->values) - evaluate(position, state->acting_values);
         state->driven[i] = state->driven[i] || line.rate != 0.0;
         if (!state->driven[i]) {
-            line.rate = (wall->rate + (last > 0.0 ? off - shift : 0.0) / longest) * share * share;
+            double moved = last > 0.0 && off != 0.0 ? off - shift(sim, i) : 0.0;
+            line.rate = (wall->rate + moved / longest) * share * share;
         }
         bool same = fabs(off) + fabs(line.rate - wall->rate) * T <=
                     WALL_PATH_RTOL * system_of(sim)->length;
@@ -91,12 +96,12 @@ PRBM double follow_cubics(Simulation *sim) {
     double longest = HUGE_VAL;
     for (int i = 0; i < system_of(sim)->s; i++) {
         Wall *wall = &sim->state.walls[i];
-        double left = wall->since + wall->span - sim->state.front_time;
-        if (wall->span > 0.0 && left <= EVENT_TIME_ATOL) {
+        double left = wall->span > 0.0 ? wall->since + wall->span - sim->state.front_time : HUGE_VAL;
+        if (left <= EVENT_TIME_ATOL) {
             wall->offset = wall->excess = wall->span = 0.0;
             sim->state.has_k1 = false;
             set_inputs(sim);
-        } else if (wall->span > 0.0) {
+        } else if (left < HUGE_VAL) {
             longest = lesser(longest, lesser(WALL_STEP_RTOL * wall->span, left));
         }
     }
