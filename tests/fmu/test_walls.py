@@ -8,6 +8,7 @@ import pytest
 
 from fmu_host import Instance as PythonInstance
 from native_host import OK, Instance, Integrator
+from prbm.systems.cosimulation import simulate
 from support import energy_balance, simulation
 
 WAYS = [(2, "cs"), (3, "cs"), (3, "events"), (3, "late")]
@@ -269,3 +270,33 @@ def test_in_model_exchange_a_pressed_body_follows_its_wall(native, fmi):
     assert found["stop.contact"]
     assert found["stop.impact_count"] == count
     assert abs(found["stop.gap"]) < 1e-5
+
+
+RESTING = {
+    "body.stop.displacement": "carrier.shuttle.x",
+    "body.stop.velocity": "carrier.shuttle.vx",
+    "carrier.force.x": "body.stop.force",
+}
+
+
+@pytest.mark.parametrize("step", [1e-4, 1e-3, 5e-3])
+@pytest.mark.parametrize("share", [0.33, 0.40])
+def test_a_body_rests_on_a_carrier_of_more_than_eleven_quarters_of_its_mass(native, share, step):
+    """The whole force first acts on the carrier alone, which so accelerates with share times g.
+
+    After one step h the wall is e = -a h^2/2 and u = -a h behind, so that its cubic begins with
+    -(6 e/T + 4 u)/T = 11 a/4: the body is pressed by g - 11/4 share g.
+    """
+    fmus = {name: native["PRBDM", 3] for name in ("carrier", "body")}
+    mass = simulation("PRBDM").values["shuttle.mass"]
+    start = {
+        "carrier.stop.position": 1.0,
+        "carrier.gravity.x": 0.0,
+        "carrier.release.displacement": 0.0,
+        "carrier.shuttle.mass": mass / share,
+        "body.release.displacement": 0.0,
+    }
+    found = simulate(
+        fmus, RESTING, 8 * step, step, start, ["body.stop.contact"], scheme="jacobi", events=True
+    )
+    assert found["body.stop.contact"].all() == (share < 4 / 11)
