@@ -6,11 +6,15 @@ import math
 import numpy as np
 import pytest
 
-from native_host import OK, Instance
+from fmu_host import Instance as PythonInstance
+from native_host import OK, Instance, Integrator
+from prbm.systems.cosimulation import simulate
 from support import energy_balance, simulation
 
 WAYS = [(2, "cs"), (3, "cs"), (3, "events"), (3, "late")]
+"""Versions and interfaces of co-simulation with native FMUs."""
 ways = pytest.mark.parametrize(("fmi", "kind"), WAYS)
+all_ways = pytest.mark.parametrize(("fmi", "kind"), [("python", "cs"), *WAYS])
 PRESSED = {"release.displacement": 0.0}
 AMPLITUDE, RATE = 1e-3, 10 * math.pi
 
@@ -24,20 +28,121 @@ def sine(t):
     }
 
 
-def points(end):
-    """Return communication points at random distances from 1 us to 20 ms."""
+def points(end, longest=2e-2):
+    """Return communication points at random distances from 1 us up."""
     rng, found = np.random.default_rng(7), [0.0]
     while found[-1] < end:
-        found.append(found[-1] + float(np.exp(rng.uniform(math.log(1e-6), math.log(2e-2)))))
+        found.append(found[-1] + float(np.exp(rng.uniform(math.log(1e-6), math.log(longest)))))
     return found
 
 
-@ways
-def test_uniform_motion_is_followed_exactly(native, fmi, kind):
+class Guide(PythonInstance):
+    """A Python FMU with the calls of the native ones."""
+
+    time = 0.0
+
+    def initialize(self, *, values):
+        return super().initialize(**{name.replace(".", "__"): x for name, x in values.items()})
+
+    def set(self, values):
+        super().set(values)
+        return OK
+
+    def advance(self, end):
+        assert self.step(self.time, end - self.time) == OK
+        self.time = end
+
+    def saved(self):
+        state = self.fmu.getFMUState()
+        data = self.fmu.serializeFMUstate(state)
+        self.fmu.freeFMUState(state)
+        return data
+
+    def restore(self, data):
+        state = self.fmu.deSerializeFMUstate(data)
+        self.fmu.setFMUState(state)
+        self.fmu.freeFMUState(state)
+
+    def reset(self):
+        self.fmu.reset()
+        self.time = 0.0
+
+
+@pytest.fixture
+def opened(fmus, native):
+    """Return a function that instantiates an FMU of a model, version and interface."""
+
+    def instance(model, fmi, kind):
+        return Guide(fmus[model]) if fmi == "python" else Instance(native[model, fmi], kind)
+
+    return instance
+
+
+AWAY = {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 0.01}
+"""The shuttle at rest, the wall out of reach."""
+
+
+def place(found):
+    """Return how far the wall is from its place without displacement."""
+    return found["stop.gap"] + found["stop.point.displacement"]
+
+
+@all_ways
+@pytest.mark.parametrize("longest", [1e-3, 1e-2])
+def test_a_wall_is_within_twice_the_acceleration_times_the_step_squared(opened, fmi, kind, longest):
+    grid = points(0.25, longest)
+    with opened("PRBDM", fmi, kind).initialize(values=AWAY) as instance:
+        begin = place(instance.values())
+        for t, end in itertools.pairwise(grid):
+            assert instance.set(sine(t)) == OK
+            instance.advance(end)
+            if t > 6 * longest and end - t > 0.1 * longest:
+                off = place(instance.values()) - begin - sine(end)["stop.displacement"]
+                assert abs(off) < 2 * AMPLITUDE * RATE**2 * longest**2
+
+
+@all_ways
+def test_a_displacement_that_jumps_is_not_overshot_by_more_than_the_jump(opened, fmi, kind):
+    jump = -1e-3
+    with opened("PRBDM", fmi, kind).initialize(values=AWAY) as instance:
+        begin = place(instance.values())
+        for t, end in itertools.pairwise(points(0.15)):
+            given = jump if t > 0.05 else 0.0
+            assert instance.set({"stop.displacement": given}) == OK
+            instance.advance(end)
+            off = place(instance.values()) - begin - given
+            assert abs(off) <= abs(jump) * (1 + 1e-9)
+    assert off == pytest.approx(0.0, abs=1e-12)
+
+
+class Moved(Integrator):
+    """An integrator that gives a wall in uniform motion its place at each evaluation."""
+
+    speed = -0.1
+
+    def put(self, time, x):
+        super().put(time, x)
+        self.it.set({"stop.displacement": self.speed * time, "stop.velocity": self.speed})
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_in_model_exchange_uniform_motion_is_followed_exactly(native, fmi):
+    distance = 5e-3
+    values = AWAY | {"stop.position": distance, "stop.velocity": Moved.speed}
+    with Instance(native["PRBDM", fmi], "me", substep=2e-3) as instance:
+        instance.initialize(values=values)
+        Moved(instance).advance(0.051)
+        found = instance.values()
+    assert found["stop.impact_count"] == 1
+    assert found["stop.impact_time"] == pytest.approx(-distance / Moved.speed, abs=1e-9)
+    assert found["stop.approach_speed"] == pytest.approx(-Moved.speed, rel=1e-9)
+
+
+@all_ways
+def test_uniform_motion_is_followed_exactly(opened, fmi, kind):
     speed, distance = -0.1, 5e-3
-    values = {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": distance,
-              "stop.velocity": speed}  # fmt: skip
-    with Instance(native["PRBDM", fmi], kind) as instance:
+    values = AWAY | {"stop.position": distance, "stop.velocity": speed}
+    with opened("PRBDM", fmi, kind) as instance:
         instance.initialize(values=values)
         for t, end in itertools.pairwise(points(0.1)):
             assert instance.set({"stop.displacement": speed * t, "stop.velocity": speed}) == OK
@@ -49,10 +154,10 @@ def test_uniform_motion_is_followed_exactly(native, fmi, kind):
     assert found["stop.approach_speed"] == pytest.approx(-speed, rel=1e-9)
 
 
-@ways
+@all_ways
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_a_pressed_body_stays_on_its_wall(native, model, fmi, kind):
-    with Instance(native[model, fmi], kind).initialize(values=PRESSED) as instance:
+def test_a_pressed_body_stays_on_its_wall(opened, model, fmi, kind):
+    with opened(model, fmi, kind).initialize(values=PRESSED) as instance:
         count, rested = None, False
         for t, end in itertools.pairwise(points(0.2)):
             assert instance.set(sine(t)) == OK
@@ -104,33 +209,51 @@ def test_a_jump_below_rest_speed_keeps_a_stop_closed_and_is_a_capture(native, sp
         assert lost == pytest.approx(mass * speed**2 / 2, rel=1e-6)
 
 
-@ways
-def test_a_state_saved_while_a_wall_catches_up_restores_to_the_same_bytes(native, fmi, kind):
-    def goes_on(instance, begin):
-        rows = []
-        for k in range(10):
-            t = begin + k * 1e-3
-            instance.set({"stop.displacement": sine(t)["stop.displacement"]})
-            instance.advance(t + 1e-3)
-            rows.append(instance.bytes())
-        return rows
+def goes_on(instance):
+    """Return the bytes of ten steps in which the wall catches up with its displacement alone."""
+    rows = []
+    for _ in range(10):
+        given = sine(instance.time)["stop.displacement"]
+        assert instance.set({"stop.displacement": given}) == OK
+        instance.advance(instance.time + 1e-3)
+        rows.append(instance.bytes())
+    return rows
 
-    with Instance(native["PRBDM", fmi], kind).initialize() as instance:
-        goes_on(instance, 0.0)
-        state, time = instance.fmu.getFMUState(), instance.time
-        first = goes_on(instance, time)
-        instance.fmu.setFMUState(state)
+
+@all_ways
+def test_a_state_saved_while_a_wall_catches_up_restores_to_the_same_bytes(opened, fmi, kind):
+    with opened("PRBDM", fmi, kind).initialize(values={}) as instance:
+        goes_on(instance)
+        data, time = instance.saved(), instance.time
+        first = goes_on(instance)
+        goes_on(instance)
+        instance.restore(data)
         instance.time = time
-        assert goes_on(instance, time) == first
-        instance.fmu.freeFMUState(state)
+        assert instance.saved() == data
+        assert goes_on(instance) == first
+
+
+@all_ways
+def test_a_reset_forgets_the_motion_of_a_wall(opened, fmi, kind):
+    with opened("PRBDM", fmi, kind).initialize(values={}) as instance:
+        first = goes_on(instance)
+        instance.reset()
+        instance.initialize(values={})
+        assert goes_on(instance) == first
+
+
+@all_ways
+def test_walls_of_two_instances_in_one_process_move_on_their_own(opened, fmi, kind):
     with (
-        Instance(native["PRBDM", fmi], kind).initialize() as one,
-        Instance(native["PRBDM", fmi], kind).initialize() as other,
+        opened("PRBDM", fmi, kind).initialize(values={}) as one,
+        opened("PRBDM", fmi, kind).initialize(values={}) as other,
     ):
-        goes_on(one, 0.0)
-        other.set({"stop.displacement": 1e-3})
+        first = goes_on(one)
+        assert other.set({"stop.velocity": 0.01}) == OK
         other.advance(0.02)
-        assert goes_on(one, time) == first
+        second = goes_on(one)
+    with opened("PRBDM", fmi, kind).initialize(values={}) as alone:
+        assert [goes_on(alone), goes_on(alone)] == [first, second]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
@@ -147,3 +270,33 @@ def test_in_model_exchange_a_pressed_body_follows_its_wall(native, fmi):
     assert found["stop.contact"]
     assert found["stop.impact_count"] == count
     assert abs(found["stop.gap"]) < 1e-5
+
+
+RESTING = {
+    "body.stop.displacement": "carrier.shuttle.x",
+    "body.stop.velocity": "carrier.shuttle.vx",
+    "carrier.force.x": "body.stop.force",
+}
+
+
+@pytest.mark.parametrize("step", [1e-4, 1e-3, 5e-3])
+@pytest.mark.parametrize("share", [0.33, 0.40])
+def test_a_body_rests_on_a_carrier_of_more_than_eleven_quarters_of_its_mass(native, share, step):
+    """The whole force first acts on the carrier alone, which so accelerates with share times g.
+
+    After one step h the wall is e = -a h^2/2 and u = -a h behind, so that its cubic begins with
+    -(6 e/T + 4 u)/T = 11 a/4: the body is pressed by g - 11/4 share g.
+    """
+    fmus = {name: native["PRBDM", 3] for name in ("carrier", "body")}
+    mass = simulation("PRBDM").values["shuttle.mass"]
+    start = {
+        "carrier.stop.position": 1.0,
+        "carrier.gravity.x": 0.0,
+        "carrier.release.displacement": 0.0,
+        "carrier.shuttle.mass": mass / share,
+        "body.release.displacement": 0.0,
+    }
+    found = simulate(
+        fmus, RESTING, 8 * step, step, start, ["body.stop.contact"], scheme="jacobi", events=True
+    )
+    assert found["body.stop.contact"].all() == (share < 4 / 11)

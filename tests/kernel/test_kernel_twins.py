@@ -593,10 +593,12 @@ def test_projections_lead_to_the_same_state(name):
         M, rows = kinetics.inertia(system.H, J, e)[0], loops.jacobian(e)
         assert_same_turn(found, expected, q, system, M, rows)
         assert_same(e_found, system.directions(found))
-        moved = v.copy()
-        kernel().project_velocities(n, r, M, rows, rates, moved)
+        moved, impulses = v.copy(), np.zeros(r)
+        kernel().project_velocities(n, r, M, rows, rates, moved, impulses)
         rel = spread(np.linalg.cond(constraints.saddle(M, rows, rows)))
         assert_same(moved, constraints.project_velocities(M, rows, rates, v), rel)
+        momentum = M @ (moved - v)
+        assert_same(rows.T @ impulses, momentum, rel, scale=np.abs(M).max() * np.abs(v).max())
 
 
 def test_what_cannot_be_closed_is_told_in_the_same_words():

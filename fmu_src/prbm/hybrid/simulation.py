@@ -243,8 +243,9 @@ class Simulation:
     def _advance(self, time: float) -> None:
         """Continue the motion to a later time."""
         self.course, moved = walls.join(
-            self.prepared, self.given, self.course, self.inputs.walls, self.time, time
-        )
+            self.configuration, self.prepared, self.given, self.course, self.inputs.walls,
+            self.time, time,
+        )  # fmt: skip
         if self.changed or moved != self.inputs.walls:
             self._restart(moved)
         while True:

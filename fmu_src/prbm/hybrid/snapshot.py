@@ -13,7 +13,7 @@ from .arc import Arc
 from .configuration import Configuration
 from .events import Event, EventKind
 from .front import Front, Latched
-from .walls import Course, Sample
+from .walls import Course
 
 Plain = dict[str, Any]
 
@@ -65,8 +65,7 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
 
 def course_of(plain: Mapping[str, Any]) -> Course:
     """Return the course of the walls from plain values."""
-    samples = tuple(Sample(**sample) for sample in plain["samples"])
-    return Course(plain["point"], plain["longest"], samples)
+    return Course(plain["point"], plain["longest"], tuple(plain["driven"]))
 
 
 def plain_arc(arc: Arc | None) -> Plain | None:

@@ -11,7 +11,7 @@ of the period.  So position and velocity are continuous, and the acceleration is
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 from ..base.tolerances import (
@@ -28,24 +28,8 @@ from .front import Front
 
 
 @dataclass(frozen=True)
-class Sample:
-    """The inputs of a wall at the last communication point.
-
-    Parameters
-    ----------
-    displacement : float
-        [m].
-    driven : bool
-        Whether ``stop.velocity`` has ever been non-zero: then nothing is differenced.
-    """
-
-    displacement: float
-    driven: bool
-
-
-@dataclass(frozen=True)
 class Course:
-    """What the walls remember of earlier communication points.
+    """Earlier communication points, as far as the walls depend on them.
 
     Parameters
     ----------
@@ -53,29 +37,42 @@ class Course:
         The last communication point [s].
     longest : float
         The recent longest communication step [s].
-    samples : (s,) tuple of Sample
-        Of the walls.
+    driven : (s,) tuple of bool
+        Whether ``stop.velocity`` has ever been non-zero: then nothing is differenced.
     """
 
     point: float
     longest: float
-    samples: tuple[Sample, ...]
+    driven: tuple[bool, ...]
 
 
 def start(
     configuration: Configuration, given: Mapping[str, float], time: float
 ) -> tuple[Course, tuple[Wall, ...]]:
     """Return the walls at the start: on their references, with the velocities of these [s]."""
-    walls, samples = [], []
-    for stop in configuration.mechanism.stops:
-        displacement, velocity = given[f"{stop.name}.displacement"], given[f"{stop.name}.velocity"]
-        drawn = value(stop, "position", configuration.values)
-        walls.append(Wall(drawn + displacement, velocity, time))
-        samples.append(Sample(displacement, velocity != 0.0))
-    return Course(time, 0.0, tuple(samples)), tuple(walls)
+    walls = tuple(
+        _given_reference(configuration, given, i, time)
+        for i in range(len(configuration.mechanism.stops))
+    )
+    return Course(time, 0.0, tuple(wall.rate != 0.0 for wall in walls)), walls
+
+
+def _given_reference(
+    configuration: Configuration, given: Mapping[str, float], stop: int, time: float
+) -> Wall:
+    """Return the reference that the inputs of a stop define at a time [s]."""
+    name = configuration.mechanism.stops[stop].name
+    position = _position(configuration, stop) + given[f"{name}.displacement"]
+    return Wall(position, given[f"{name}.velocity"], time)
+
+
+def _position(configuration: Configuration, stop: int) -> float:
+    """Return ``stop.position`` [m]."""
+    return value(configuration.mechanism.stops[stop], "position", configuration.values)
 
 
 def join(
+    acting: Configuration,
     configuration: Configuration,
     given: Mapping[str, float],
     course: Course,
@@ -90,8 +87,8 @@ def join(
 
     Parameters
     ----------
-    configuration : Configuration
-        With the present values of the parameters.
+    acting, configuration : Configuration
+        With the values of the parameters up to now, and from now on.
     given : mapping
         Values of all inputs.
     course : Course
@@ -104,45 +101,35 @@ def join(
     last, following = now - course.point, time - now
     longest = max(last or following, course.longest - WALL_FADING_FACTOR * last)
     longest = min(longest, WALL_LONGEST_RTOL * configuration.scales.time)
-    round_off = WALL_PATH_RTOL * configuration.system.length
-    joined, samples = list(walls), []
-    for i, (stop, wall, old) in enumerate(
-        zip(configuration.mechanism.stops, walls, course.samples, strict=True)
-    ):
-        displacement, velocity = given[f"{stop.name}.displacement"], given[f"{stop.name}.velocity"]
-        sample = Sample(displacement, old.driven or velocity != 0.0)
-        if not sample.driven:
-            change = displacement - old.displacement
-            velocity = _difference_quotient(wall.rate, change, last, longest, following)
-        samples.append(sample)
-        here, span = value(stop, "position", configuration.values) + displacement, 2.0 * longest
-        off = abs(here - wall.reference(now)) + abs(velocity - wall.rate) * span
-        if off > round_off:
-            x, rate, _ = (float(part) for part in wall.motion(now))
-            excess = rate - velocity if last > 0.0 else 0.0
-            joined[i] = Wall(here, velocity, now, x - here, excess, span)
-    return Course(now, longest, tuple(samples)), tuple(joined)
+    span, round_off = 2.0 * longest, WALL_PATH_RTOL * configuration.system.length
+    joined, driven = list(walls), list(course.driven)
+    for i, wall in enumerate(walls):
+        line = _given_reference(configuration, given, i, now)
+        off = line.position - wall.reference(now)
+        driven[i] = driven[i] or line.rate != 0.0
+        if not driven[i]:
+            moved = off - (_position(configuration, i) - _position(acting, i)) if last else 0.0
+            line = replace(line, rate=_mean_rate(wall.rate, moved, max(longest, last), following))
+        if abs(off) + abs(line.rate - wall.rate) * span > round_off:
+            velocity = float(wall.motion(now)[1]) if last else line.rate
+            joined[i] = wall.joining(line, velocity, span)
+    return Course(now, longest, tuple(driven)), tuple(joined)
 
 
-def _difference_quotient(
-    velocity: float, change: float, last: float, longest: float, following: float
-) -> float:
-    """Return the velocity of a displacement that has changed in the last step [m/s].
+def _mean_rate(rate: float, off: float, longest: float, following: float) -> float:
+    """Return the velocity of a reference whose displacement is off it after a step [m/s].
 
     It is the mean over the recent longest step.  In a step that is longer than that the reference
     goes less far than the displacement did, so that a jump is not extrapolated.
 
     Examples
     --------
-    >>> _difference_quotient(0.0, 1e-6, last=1e-3, longest=1e-3, following=1e-3)
+    >>> _mean_rate(0.0, 1e-6, longest=1e-3, following=1e-3)
     0.001
-    >>> _difference_quotient(0.0, 1e-6, last=1e-3, longest=1e-3, following=2e-3)
+    >>> _mean_rate(0.0, 1e-6, longest=1e-3, following=2e-3)
     0.00025
     """
-    share = min(last / longest, 1.0)
-    if share > 0.0:
-        velocity += share * (change / last - velocity)
-    return velocity * min(1.0, max(longest, last) / following) ** 2
+    return (rate + off / longest) * min(1.0, longest / following) ** 2
 
 
 def step_limit(walls: Sequence[Wall], t: float) -> float:

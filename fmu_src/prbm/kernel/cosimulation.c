@@ -53,6 +53,13 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
     return true;
 }
 
+/* Whether the inputs that move walls are those that act. */
+static bool same_walls(const Simulation *sim) {
+    const InputGroups *from = &sim->configuration.mechanism->input;
+    size_t bytes = (size_t)(from->impulses - from->walls) * sizeof(double);
+    return memcmp(sim->state.given + from->walls, sim->state.acting_given + from->walls, bytes) == 0;
+}
+
 /* Begin a communication step: join the walls to their references, and take over changed inputs and
  * parameters.  After an interruption the references go on unless an input of a wall has changed. */
 static bool begin_step(Simulation *sim, double time, Problem *problem) {
@@ -141,24 +148,12 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* --- event mode ------------------------------------------------------------------------------- */
 
-/* Whether stop.velocity of any stop has been set to another value. */
-static bool velocities_changed(const Simulation *sim) {
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        if (new_velocity(sim, i)) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Give the walls the velocities that have been set, and apply the pending event, if any, with the
  * inputs that have been set, and the impulses. */
-static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *problem) {
+static bool apply_here(Simulation *sim, const Wall *walls, bool event, bool impulses,
+                       Problem *problem) {
     State *state = &sim->state;
-    Wall walls[STOPS_MAX];
-    for (int i = 0; i < system_of(sim)->s; i++) {
-        walls[i] = wall_at_event(sim, i);
-    }
+    state->interrupted = state->interrupted && same_walls(sim);
     if (!event) {
         return restart(sim, walls, !impulses, problem);
     }
@@ -171,11 +166,13 @@ static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *prob
 
 PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
     Simulation *sim = simulation;
+    Wall walls[STOPS_MAX];
     bool event = event_due(&sim->state, sim->state.time), impulses = impulses_changed(sim);
-    if (!event && !impulses && !velocities_changed(sim)) {
+    bool turned = turn_walls(sim, walls);
+    if (!event && !impulses && !turned) {
         return true;
     }
     keep_backup(sim);
     sim->present.fresh = NOTHING;
-    return attempt(sim, apply_here(sim, event, impulses, problem), problem);
+    return attempt(sim, apply_here(sim, walls, event, impulses, problem), problem);
 }

@@ -88,11 +88,25 @@ class Wall:
         acceleration = (6.0 * e / T * (2.0 * s - 1.0) + u * (6.0 * s - 4.0)) / T
         return x, velocity, acceleration
 
+    def joining(self, line: "Wall", velocity: float, span: float) -> "Wall":
+        """Return the wall from the beginning of another reference on, with a velocity there.
+
+        Parameters
+        ----------
+        line : Wall
+            The reference.
+        velocity : float
+            Of the wall [m/s].
+        span : float
+            Time in which it joins the reference [s].
+        """
+        x = float(self.motion(line.since)[0])
+        return replace(line, offset=x - line.position, excess=velocity - line.rate, span=span)
+
     def pushed(self, t: float, change: float) -> "Wall":
         """Return the wall after a change of its velocity and that of its reference [m/s]."""
-        x, velocity, _ = (float(part) for part in self.motion(t))
-        here = self.reference(t)
-        return Wall(here, self.rate + change, t, x - here, velocity - self.rate, self.span)
+        line = Wall(self.reference(t), self.rate + change, t)
+        return self.joining(line, float(self.motion(t)[1]) + change, self.span)
 
     def arrived(self) -> "Wall":
         """Return the wall on its reference."""

@@ -204,7 +204,8 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
 }
 
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
-                             const double *rates, double *v, Scratch *scratch, Problem *problem) {
+                             const double *rates, double *v, double *impulses, Scratch *scratch,
+                             Problem *problem) {
     size_t mark = scratch->used, size = (size_t)(n + r);
     double *kkt = take(scratch, size * size), *right = take(scratch, size);
     memset(right, 0, (size_t)n * sizeof *right);
@@ -215,6 +216,9 @@ PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
     bool regular = solve((int)size, kkt, right, scratch, problem);
     for (int i = 0; regular && i < n; i++) {
         v[i] += right[i];
+    }
+    for (int k = 0; regular && impulses && k < r; k++) {
+        impulses[k] = -right[n + k];
     }
     scratch->used = mark;
     return regular;

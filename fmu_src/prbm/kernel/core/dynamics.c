@@ -23,25 +23,25 @@ static double rubbing_power(const Equations *q, const Evaluation *at, const doub
 }
 
 /* The power of the inputs and of the moving walls of closed stops. */
-static double input_power(const Equations *q, double t, const Evaluation *at, const double *v) {
+static double input_power(const Equations *q, const Evaluation *at, const double *v) {
     int n = q->system->n;
     double power = 0.0;
     for (int j = 0; q->driven && j < n; j++) {
         power += (product(q->w_input[j], at->at.e[j]).re + q->moment[j]) * v[j];
     }
     for (int k = 0; k < q->held_count; k++) {
-        double velocity = wall_motion(&q->inputs.walls[q->held[k]], t).v;
+        double velocity = wall_motion(&q->inputs.walls[q->held[k]], at->at.time).v;
         power -= at->lam[q->first_hold + k] * velocity;
     }
     return power;
 }
 
-SIZED bool rates_of_length(int even, const Equations *q, double t, const double *y,
-                           const Reference *near, Evaluation *result, double *dy) {
+SIZED bool rates_of_length(int even, const Equations *q, const double *y, const Reference *near,
+                           Evaluation *result, double *dy) {
     int n = q->system->n;
     pad_of(even, n, y, result->at.angle);
     pad_second(even, n, y, result->at.speed);
-    if (!motion_of_length(even, q, t, near, result)) {
+    if (!motion_of_length(even, q, near, result)) {
         return false;
     }
     join(even, n, result->at.speed, result->a, dy);
@@ -49,23 +49,22 @@ SIZED bool rates_of_length(int even, const Equations *q, double t, const double 
 }
 
 /* The lengths of the guides' vectors are known where they are compiled, so that loops unroll. */
-static bool rates_of_motion(const Equations *q, double t, const double *y, const Reference *near,
+static bool rates_of_motion(const Equations *q, const double *y, const Reference *near,
                             Evaluation *result, double *dy) {
     int even = q->system->even;
     switch (even) {
-    case 4: return rates_of_length(4, q, t, y, near, result, dy);
-    case 8: return rates_of_length(8, q, t, y, near, result, dy);
-    default: return rates_of_length(even, q, t, y, near, result, dy);
+    case 4: return rates_of_length(4, q, y, near, result, dy);
+    case 8: return rates_of_length(8, q, y, near, result, dy);
+    default: return rates_of_length(even, q, y, near, result, dy);
     }
 }
 
-/* Only moving walls depend on the time. */
-PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
-               Evaluation *result, double *dy, Problem *problem) {
+PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
+                       Evaluation *result, double *dy, Problem *problem) {
     const Equations *q = equations;
     int n = q->system->n;
     const double *v = y + n;
-    if (!rates_of_motion(q, t, y, near, result, dy)) {
+    if (!rates_of_motion(q, y, near, result, dy)) {
         return fail(problem, "%s", SINGULAR);
     }
     dy[2 * n] = result->spring_loss;
@@ -77,9 +76,15 @@ PRBM bool rate(const Equations *equations, double t, const double *y, const Refe
         dy[2 * n] += rubbing_power(q, result, v);
     }
     if (q->driven || q->walls_push) {
-        dy[2 * n + 1] = input_power(q, t, result, v);
+        dy[2 * n + 1] = input_power(q, result, v);
     }
     return true;
+}
+
+PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
+               Evaluation *result, double *dy, Problem *problem) {
+    result->at.time = t;
+    return rate_at_time(equations, y, near, result, dy, problem);
 }
 
 /* --- stops ------------------------------------------------------------------------------------ */

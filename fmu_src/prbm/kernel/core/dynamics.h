@@ -7,6 +7,9 @@
 /* The rates dy of y = (q, v, dissipated energy, work), and their evaluation. */
 PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
                Evaluation *result, double *dy, Problem *problem);
+/* The same at the time of the evaluation, which matters only if the walls of held stops move. */
+PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
+                       Evaluation *result, double *dy, Problem *problem);
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e);
 PRBM double gap_acceleration(const Equations *equations, int i, double t, const Complex *e,
                              const double *v, const double *a);

@@ -44,7 +44,8 @@ typedef struct {
     Rows active;
     Complex *w, *w_input;   /* (n,) */
     double *moment;         /* (even,) */
-    bool driven, walls_push;
+    bool driven;
+    bool walls_push, walls_join; /* walls of held stops move; walls are off their references */
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
 } Equations;
@@ -53,6 +54,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 /* Set up the rows and loads of a contact state. */
 PRBM void set_equations(Equations *equations, const Inputs *inputs,
                         const ContactState *contacts, double omega);
+PRBM double reference_at(const Wall *wall, double t);
 PRBM WallMotion wall_motion(const Wall *wall, double t);
 
 #endif

@@ -19,6 +19,7 @@ PRBM void reference_place(Reference *reference, const System *system, Memory *me
 static Kinematics place_kinematics(const System *system, Memory *memory) {
     size_t even = (size_t)system->even;
     Kinematics at;
+    at.time = 0.0;
     at.angle = place(memory, even, sizeof(double));
     at.speed = place(memory, even + 2, sizeof(double));
     at.squares = place(memory, even, sizeof(double));
@@ -450,15 +451,15 @@ RARE void add_walls(const Equations *q, double t, double *right) {
     }
 }
 
-/* Solve for a and lam at a time, and the angles and rates of the evaluation. */
-SIZED bool motion_of_length(int even, const Equations *q, double t, const Reference *near,
+/* Solve for a and lam at the time, angles and rates of the evaluation. */
+SIZED bool motion_of_length(int even, const Equations *q, const Reference *near,
                             Evaluation *result) {
     directions_of(even, q->system, near, &result->at);
     find_loads(even, q, result);
     add_springs(even, q, result);
     rows_of_length(even, q, &result->at, result->factors.Z, result->lam);
     if (q->walls_push) {
-        add_walls(q, t, result->lam);
+        add_walls(q, result->at.time, result->lam);
     }
     add_rubs(q, result);
     if (!factor_motion(even, q, result)) {
@@ -476,7 +477,8 @@ PRBM bool evaluate_equations(const Equations *equations, double t, const double 
     int n = equations->system->n;
     pad(n, q, result->at.angle);
     pad(n, v, result->at.speed);
-    return motion_of_length(equations->system->even, equations, t, near, result) ||
+    result->at.time = t;
+    return motion_of_length(equations->system->even, equations, near, result) ||
            fail(problem, "%s", SINGULAR);
 }
 

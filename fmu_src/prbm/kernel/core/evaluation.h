@@ -14,6 +14,7 @@ typedef struct {
 
 /* Position and velocity of a system; of the coordinates and, behind them, of the ground. */
 typedef struct {
+    double time;                     /* used if the walls of held stops move */
     double *angle, *speed, *squares; /* (even,), (even + 2,), (even,): speed^2 */
     Complex *e;                      /* (n,) */
     Parts e_parts;                   /* (even,) */

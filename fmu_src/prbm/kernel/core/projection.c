@@ -21,8 +21,8 @@ static double prescribed(const Equations *q, int k, double t) {
     return moves ? wall_motion(&q->inputs.walls[q->held[k - q->first_hold]], t).v : 0.0;
 }
 
-PRBM bool project(const Equations *equations, double t, double *y, Scratch *scratch,
-                  Problem *problem) {
+PRBM bool project_with_impulses(const Equations *equations, double t, double *y, double *impulses,
+                                Scratch *scratch, Problem *problem) {
     const Equations *q = equations;
     size_t mark = scratch->used, n = (size_t)q->system->n, r = (size_t)q->r;
     double *c = take(scratch, r), *rates = take(scratch, r), *rows = take(scratch, r * n);
@@ -38,10 +38,16 @@ PRBM bool project(const Equations *equations, double t, double *y, Scratch *scra
     if (right) {
         jacobian(&q->active, e, rows);
         inertia((int)n, q->system->H, q->system->J, e, M, C);
-        right = project_velocities((int)n, q->r, M, rows, rates, y + n, scratch, problem);
+        right = project_velocities((int)n, q->r, M, rows, rates, y + n, impulses, scratch,
+                                   problem);
     }
     scratch->used = mark;
     return right;
+}
+
+PRBM bool project(const Equations *equations, double t, double *y, Scratch *scratch,
+                  Problem *problem) {
+    return project_with_impulses(equations, t, y, NULL, scratch, problem);
 }
 
 PRBM void correction_place(Correction *correction, const System *system, Memory *memory) {

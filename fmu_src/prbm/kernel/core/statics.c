@@ -253,7 +253,7 @@ PRBM bool release_velocity(const System *system, const double *q, double speed, 
     zeros(r, rates);
     rates[r - 1] = -speed;
     bool found = releasable(system, M, r, rows, speed, scratch, problem) &&
-                 project_velocities(n, r, M, rows, rates, v, scratch, problem);
+                 project_velocities(n, r, M, rows, rates, v, NULL, scratch, problem);
     scratch->used = used;
     return found;
 }

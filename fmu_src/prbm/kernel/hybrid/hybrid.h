@@ -110,7 +110,6 @@ typedef struct {
     double *received;                     /* (3 b,): impulses that have acted */
     double *front, *k1;                   /* (ny,): the end of the last step, its rates */
     double *floors;                       /* (s,): gaps close this far below zero */
-    double *displacements;                /* (s,): stop.displacement at the last point */
     double *states;                       /* model exchange: as they were set */
 } State;
 
@@ -205,15 +204,12 @@ PRBM bool first_event(Simulation *sim, Event *event, Problem *problem);
 /* --- walls.c ---------------------------------------------------------------------------------- */
 
 PRBM void start_walls(Simulation *sim);
-PRBM bool same_walls(const Simulation *sim);
 PRBM bool join_walls(Simulation *sim, double time, Wall *joined);
-PRBM double jump_allowed(const Simulation *sim, int i);
-PRBM bool new_velocity(const Simulation *sim, int i);
-PRBM Wall wall_at_event(const Simulation *sim, int i);
-PRBM Wall pushed_wall(const Wall *wall, double t, double change);
+PRBM bool turn_walls(const Simulation *sim, Wall *turned);
+PRBM Wall turned_wall(const Wall *wall, double t, double velocity, double rate);
 PRBM double wall_reach(const Wall *wall, double h);
-PRBM double longest_wall_step(const Simulation *sim);
-PRBM void arrive_walls(Simulation *sim);
+PRBM double follow_cubics(Simulation *sim);
+PRBM double jump_allowed(const Simulation *sim, int i);
 PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem);
 
 /* --- impacts.c -------------------------------------------------------------------------------- */

@@ -415,8 +415,9 @@ static void book_energies(Simulation *sim, const Hits *hits, const double *q, co
         double wall = wall_motion(&sim->state.walls[i], t).v, P = hits->normal[i];
         account->before[i] = gap_rate(&sim->equations, i, t, e, v);
         if (hits->with_normal[i]) {
+            Wall *hit = &sim->state.walls[i];
             double change = sim->equations.inputs.mobilities[i] * P;
-            sim->state.walls[i] = pushed_wall(&sim->state.walls[i], t, change);
+            *hit = change != 0.0 ? turned_wall(hit, t, wall + change, hit->rate + change) : *hit;
             sim->state.latched[i].impulse_sum += P;
         }
         account->after[i] = gap_rate(&sim->equations, i, t, e, hits->after);

@@ -47,8 +47,7 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->received, LOADS * (size_t)m->force_count},
         {&state->front, ny},         {&state->k1, ny},
         {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
-        {&state->floors, s},         {&state->displacements, s},
-        {&state->states, 2 * (size_t)m->independent_count + 2},
+        {&state->floors, s},         {&state->states, 2 * (size_t)m->independent_count + 2},
     };
     state->number_count = 0;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {

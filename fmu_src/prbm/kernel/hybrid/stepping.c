@@ -94,14 +94,14 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
            (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
-/* Find a step that keeps the tolerance: its stages in the arc, its end in stepping. */
-static bool find_step(Simulation *sim, double *h, Problem *problem) {
+/* Find a step that keeps the tolerance, no longer than the longest: its stages in the arc, its end
+ * in stepping. */
+static bool find_step(Simulation *sim, double longest, double *h, Problem *problem) {
     State *state = &sim->state;
     int ny = state_size(sim);
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
     wanted = lesser(wanted, longest_step(sim));
-    double first = lesser(wanted, longest_wall_step(sim));
-    StepSizeController controller = {first, state->log_of_error, STEP_GROWTH_MAX};
+    StepSizeController controller = {lesser(wanted, longest), state->log_of_error, STEP_GROWTH_MAX};
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
     do {
@@ -110,8 +110,10 @@ static bool find_step(Simulation *sim, double *h, Problem *problem) {
             return false;
         }
     } while (!next(&controller, step_error(sim, *h, problem)));
-    bool cut = *h == first && first < wanted; /* by a wall: it says little about the next step */
-    state->step_size = cut ? greater(controller.h, wanted) : controller.h;
+    state->step_size = controller.h;
+    if (*h == longest && longest < wanted) { /* cut by a wall: it says little about the next step */
+        state->step_size = greater(controller.h, wanted);
+    }
     state->log_of_error = controller.log_of_error;
     return true;
 }
@@ -134,13 +136,12 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
-    double h = 0.0;
-    arrive_walls(sim);
+    double h = 0.0, longest = sim->equations.walls_join ? follow_cubics(sim) : HUGE_VAL;
     if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL, &stepping->evaluation,
                                 state->k1, problem)) {
         return false;
     }
-    if (!find_step(sim, &h, problem)) {
+    if (!find_step(sim, longest, &h, problem)) {
         return false;
     }
     double start = state->front_time, end = start + h;
