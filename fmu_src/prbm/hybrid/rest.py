@@ -28,12 +28,15 @@ class RestForces:
         Friction forces and their limits [N].
     slide : (m,)
         Accelerations of sliding [m/s^2].
+    mobility : (m,)
+        Accelerations of sliding by unit friction forces [1/kg].
     """
 
     normal: Real
     friction: Real
     limit: Real
     slide: Real
+    mobility: Real
 
 
 def rest_forces(
@@ -83,4 +86,4 @@ def rest_forces(
     if P is None:
         return None
     limit = fixed + friction * np.append(P[:k], 0.0)[normal]
-    return RestForces((P * np.diag(W))[:k], P[k:], limit, (W @ P + u)[k:])
+    return RestForces((P * np.diag(W))[:k], P[k:], limit, (W @ P + u)[k:], np.diag(W)[k:])

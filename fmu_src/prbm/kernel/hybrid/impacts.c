@@ -361,7 +361,7 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
     soft.restitution[0] = 0.0;
     soft.held_count = hits->held_count;
     memcpy(soft.held, hits->held, sizeof soft.held);
-    HoldingSet resting = {0, {0}, 0.0, false};
+    HoldingSet resting = {0, {0}, false};
     candidates[0] = stop;
     memcpy(candidates + 1, hits->held, (size_t)hits->held_count * sizeof(int));
     bool rests = false;
