@@ -36,6 +36,7 @@ SPRINGLESS_RATE = 2 * math.pi  # rad/s: rate scale of a linkage without springs.
 COMPLEMENTARITY_RTOL = 1e-10  # Of the largest approach speed: allowed violation.
 PIVOT_RTOL = 1e-11  # Of the largest entry of its column: a smaller pivot is round-off.
 RATIO_RTOL = 1e-12  # Of the largest constant: ratios this close are equal.
+ROTATION_SWEEPS_MAX = 60  # Sweeps of Jacobi's method; about six are usual.
 PIVOTS_FACTOR = 50  # Pivots of a complementarity problem, for each of its unknowns.
 COVER_FACTOR = 32.0  # Weight of one normal force in the covering vector of a second path.
 WEDGED_RTOL = 1e-10  # Of the inverse normal mass: a smaller rate of the approach is round-off.
@@ -58,6 +59,7 @@ WALL_FADING_FACTOR = 1 / 3  # Of each step, by which the recent longest one is f
 WALL_LONGEST_RTOL = 0.1  # Of the period: longest communication step that walls remember.
 WALL_STEP_RTOL = 0.5  # Of the time in which a wall joins its reference: longest step meanwhile.
 WALL_MOBILITY_MAX = 1e100  # 1/kg; larger mobilities lose impulses to underflow.
+EVENTS_AT_ONCE_MAX = 16  # Events of one contact at one time in model exchange.
 IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 
 # --- location of events ------------------------------------------------------------------------

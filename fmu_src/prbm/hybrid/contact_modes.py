@@ -229,8 +229,29 @@ def _with_friction(
     SimulationError
         If no forces satisfy the laws of all contacts.
     """
-    scales, stops, contacts = configuration.scales, sorted(set(candidates)), front.contacts
-    rubbing = _with_coefficients(front.equations, stops)
+    held, every = list(front.contacts.held), sorted(set(candidates))
+    for stops in (held, every) if len(held) < len(every) else (held,):
+        found = _modes_of(configuration.scales, front, stops, every, slipped, slow)
+        if found is not None:
+            return front.with_contacts(found)
+    raise SimulationError(
+        _jammed(configuration, front, {*every, *_with_coefficients(front.equations, every)})
+    )
+
+
+def _modes_of(
+    scales: Scales,
+    front: Front,
+    stops: Sequence[int],
+    every: Sequence[int],
+    slipped: int | None,
+    slow: Mapping[int, float],
+) -> ContactState | None:
+    """Return the modes by the forces of some stops and of the contacts with friction.
+
+    None without such forces, or if one of the other stops that touch would close.
+    """
+    contacts, rubbing = front.contacts, _with_coefficients(front.equations, stops)
     modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}
     # Where the loops and the held stops leave a contact no mobility of its own, they carry all of
     # the load.
@@ -238,20 +259,18 @@ def _with_friction(
     for c in rubbing:
         contacts = contacts.with_mode(c, modes[c]) if contacts.modes[c].closed else contacts
     if not at_rest:
-        return front.with_contacts(contacts)
-    slips = [modes[i].slip for i in stops]
-    equations = front.equations.with_contacts(contacts.opened())
+        return contacts
+    contacts, slips = contacts.opened(), [modes[i].slip for i in stops]
+    equations = front.equations.with_contacts(contacts)
     found = rest_forces(equations, front.time, front.q, front.v, stops, slips, at_rest)
-    if found is not None:
-        contacts = contacts.opened()
-        for i, press in zip(stops, found.normal, strict=True):
-            if press > scales.zero_acceleration:
-                contacts = contacts.with_mode(i, modes[i] if i in rubbing else FRICTIONLESS)
-        contacts = _sticking_or_slipping(scales, front, contacts, at_rest, found, slipped)
-        slack = scales.zero_acceleration / found.mobility
-        if _agrees(scales, front, contacts, stops, dict(zip(at_rest, slack, strict=True))):
-            return front.with_contacts(contacts)
-    raise SimulationError(_jammed(configuration, front, {*stops, *rubbing}))
+    if found is None:
+        return None
+    for i, press in zip(stops, found.normal, strict=True):
+        if press > scales.zero_acceleration:
+            contacts = contacts.with_mode(i, modes[i] if i in rubbing else FRICTIONLESS)
+    contacts = _sticking_or_slipping(scales, front, contacts, at_rest, found, slipped)
+    slack = dict(zip(at_rest, scales.zero_acceleration / found.mobility, strict=True))
+    return contacts if _agrees(scales, front, contacts, every, slack) else None
 
 
 def _with_coefficients(equations: Equations, stops: Sequence[int]) -> list[int]:

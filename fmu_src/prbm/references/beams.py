@@ -18,6 +18,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
+from ..base.errors import EquilibriumError
+
 SMALLEST_LOAD = 1e-9  # below, the elliptic integrals lose the difference that they are used for
 
 
@@ -113,6 +115,11 @@ def wavenumber(mode: int, mass: float = 0.0, inertia: float = 0.0) -> float:
     mass, inertia : float
         mu, nu [-].
 
+    Raises
+    ------
+    EquilibriumError
+        If the mode is not found.
+
     Examples
     --------
     Without a body cos b cosh b = -1; the first root is 1.8751, the second 4.6941:
@@ -135,5 +142,10 @@ def wavenumber(mode: int, mass: float = 0.0, inertia: float = 0.0) -> float:
     looks = np.geomspace(1e-3, (mode + 1) * math.pi, 400 * (mode + 1))
     values = [determinant(float(b)) for b in looks]
     changes = [i for i in range(len(looks) - 1) if values[i] * values[i + 1] < 0]
+    if len(changes) < mode:
+        raise EquilibriumError(
+            f"mode {mode} of a cantilever with mass = {mass:g} and inertia = {inertia:g} was not "
+            "found: give a mass and an inertia of the order of the beam's"
+        )
     i = changes[mode - 1]
     return float(brentq(determinant, looks[i], looks[i + 1], xtol=1e-15, rtol=1e-14))

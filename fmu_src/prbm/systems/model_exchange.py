@@ -23,6 +23,7 @@ from .components import MODEL_EXCHANGE, Component, CouplingError, Value, start_v
 Real = NDArray[np.float64]
 Partner = Callable[[float, Mapping[str, Value], Real], tuple[Mapping[str, float], Sequence[float]]]
 LOCATED = 1e-14  # s, to which events are located
+UPDATES_MAX = 1000  # Updates of discrete states at one time.
 ABSOLUTE = 1e-3  # of the relative tolerance times a nominal value: the absolute tolerance
 NAMES2 = {
     "updateDiscreteStates": "newDiscreteStates",
@@ -74,9 +75,21 @@ class Model(Component):
         self.call("exitInitializationMode")
 
     def update(self) -> None:
-        """Let happen what is due in event mode, and leave it."""
-        while self.call("updateDiscreteStates")[0]:
-            pass
+        """Update the discrete states until they stay, and leave event mode.
+
+        Raises
+        ------
+        CouplingError
+            If the model wants ever more updates.
+        """
+        for _ in range(UPDATES_MAX):
+            if not self.call("updateDiscreteStates")[0]:
+                break
+        else:
+            raise CouplingError(
+                f"at {self.time:g} s the model wants more than {UPDATES_MAX} updates of its "
+                "discrete states: its events do not end; check its parameters"
+            )
         self.call("enterContinuousTimeMode")
 
     def put(self, time: float, x: Real) -> None:

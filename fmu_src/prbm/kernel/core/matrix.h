@@ -18,11 +18,11 @@ PRBM void forward(int n, const double *a, double *b);  /* b := L^-1 b */
 PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */
 /* The x of least norm among those that minimise |a x - b|, as np.linalg.lstsq: singular values
  * below rcond times the largest count as zero.  a is (m, n). */
-PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
-                        Scratch *scratch);
+PRBM bool least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
+                        Scratch *scratch, Problem *problem);
 /* Eigenvalues w in rising order and, unless NULL, orthonormal eigenvectors as columns of z, of a
  * symmetric matrix, which is destroyed (cyclic Jacobi). */
-PRBM void symmetric_eigen(int n, double *a, double *w, double *z);
+PRBM bool symmetric_eigen(int n, double *a, double *w, double *z, Problem *problem);
 /* An orthonormal basis z (n, n - r) of what the rows (r, n), of full rank, send to zero. */
 PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch);
 

@@ -61,8 +61,8 @@ static bool obeys_coulomb(Simulation *sim, int contact, double slack, const Comp
 
 /* Whether the modes of the trial equations satisfy the laws of all contacts, up to round-off. */
 static bool modes_agree(Simulation *sim, const double *q, const double *v,
-                        const RestContacts *rest, const RestForces *found, bool *result,
-                        Problem *problem) {
+                        const HoldingSet *touching, const RestContacts *rest,
+                        const RestForces *found, bool *result, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *equations = &sim->trial.equations;
     const Evaluation *tried = &sim->trial.evaluation;
@@ -72,8 +72,8 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
     bool right = evaluate_equations(equations, sim->state.front_time, q, v, NULL,
                                     &sim->trial.evaluation, problem);
     *result = right;
-    for (int k = 0; *result && k < rest->stop_count; k++) {
-        int i = rest->stops[k];
+    for (int k = 0; *result && k < touching->count; k++) {
+        int i = touching->stops[k];
         *result = sim->trial.contacts.modes[i] != CONTACT_OPEN
                       ? stop_force(equations, tried->lam, i) > 0.0
                       : !(gap_acceleration(equations, i, sim->state.front_time, e, v, tried->a) <
@@ -127,7 +127,7 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
         return true; /* a stop alone is pressed or opens; several may depend on each other */
     }
     equations_holding(sim, holding, q, v);
-    return modes_agree(sim, q, v, &rest, &found, &holding->found, problem);
+    return modes_agree(sim, q, v, &every, &rest, &found, &holding->found, problem);
 }
 
 static bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
@@ -227,17 +227,17 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
     return right;
 }
 
-/* The stops that touch, and the contacts with friction at rest that have a mobility of their own
+/* Some of the stops that touch, and the contacts with friction at rest that have a mobility of their own
  * beside the loops and the closed stops: else these carry all of the load.  sliding: the modes of
- * all that touches, stops closed. */
-static bool find_rest(Simulation *sim, int count, const int *touching, const FrictionEvent *event,
+ * all contacts, stops closed. */
+static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
                       const int *modes, RestContacts *rest, int *sliding, Problem *problem) {
     bool right = true, mobile = false;
     rest->stop_count = rest->count = 0;
     for (int contact = 0; right && contact < contact_count(sim); contact++) {
         bool stop = is_stop(system_of(sim), contact);
         sliding[contact] = sliding_mode(sim, contact, event);
-        if (stop && !has_contact(count, touching, contact)) {
+        if (stop && !has_contact(stops->count, stops->stops, contact)) {
             continue;
         }
         if (stop) {
@@ -253,35 +253,36 @@ static bool find_rest(Simulation *sim, int count, const int *touching, const Fri
     return right;
 }
 
-static bool friction_jams(const Simulation *sim, const RestContacts *rest, Problem *problem) {
+static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Problem *problem) {
     int all[CONTACTS_MAX], count = 0;
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool stop = is_stop(system_of(sim), contact);
         all[count] = contact;
-        count += stop ? has_contact(rest->stop_count, rest->stops, contact)
+        count += stop ? has_contact(touching->count, touching->stops, contact)
                       : friction_of(sim, contact) > 0.0;
     }
     return contacts_jammed(sim, count, all, problem);
 }
 
-/* Choose the modes of all contacts with friction.  At first, those that touch and hold without
- * friction at rest are closed and frictionless. */
-static bool settle_friction(Simulation *sim, int touching_count, const int *touching,
-                            const FrictionEvent *event, int *modes, Problem *problem) {
+/* Choose the modes by the forces of some stops and of the contacts with friction.  *agree is false
+ * without such forces, or if one of the other stops that touch would close. */
+static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const HoldingSet *touching,
+                            const FrictionEvent *event, int *modes, bool *agree,
+                            Problem *problem) {
     const System *system = system_of(sim);
     const double *q = sim->state.front, *v = q + system->n;
     int sliding[CONTACTS_MAX];
-    bool agree = false;
     RestContacts rest;
     RestForces found;
-    if (!find_rest(sim, touching_count, touching, event, modes, &rest, sliding, problem)) {
+    if (!find_rest(sim, stops, event, modes, &rest, sliding, problem)) {
         return false;
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool rubs = modes[contact] != CONTACT_OPEN && friction_of(sim, contact) > 0.0;
         modes[contact] = rubs ? sliding[contact] : modes[contact];
     }
-    if (rest.count == 0) {
+    *agree = rest.count == 0;
+    if (*agree) {
         return true;
     }
     for (int i = 0; i < system->s; i++) {
@@ -291,22 +292,40 @@ static bool settle_friction(Simulation *sim, int touching_count, const int *touc
     if (!rest_forces(sim, q, v, &rest, &found, problem)) {
         return false;
     }
-    for (int k = 0; found.solved && k < rest.stop_count; k++) {
+    if (!found.solved) {
+        return true;
+    }
+    for (int k = 0; k < rest.stop_count; k++) {
         int i = rest.stops[k];
-        bool pressed = found.normal[k] > zero_acceleration(&sim->configuration);
         int closed = friction_of(sim, i) > 0.0 ? sliding[i] : CONTACT_FRICTIONLESS;
+        bool pressed = found.normal[k] > zero_acceleration(&sim->configuration);
         modes[i] = pressed ? closed : CONTACT_OPEN;
     }
-    if (found.solved) {
-        if (!stick_or_slip(sim, &rest, &found, event, modes, problem)) {
-            return false;
-        }
-        try_contacts(sim, modes);
-        if (!modes_agree(sim, q, v, &rest, &found, &agree, problem)) {
+    if (!stick_or_slip(sim, &rest, &found, event, modes, problem)) {
+        return false;
+    }
+    try_contacts(sim, modes);
+    return modes_agree(sim, q, v, touching, &rest, &found, agree, problem);
+}
+
+/* Choose the modes of all contacts with friction: the stops that hold without friction at rest go
+ * on to hold, else all that touch are considered. */
+static bool settle_friction(Simulation *sim, const HoldingSet *holding, const HoldingSet *touching,
+                            const FrictionEvent *event, int *modes, Problem *problem) {
+    int first[CONTACTS_MAX];
+    size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
+    bool agree = false;
+    memcpy(first, modes, bytes);
+    if (!modes_by_forces(sim, holding, touching, event, modes, &agree, problem)) {
+        return false;
+    }
+    if (!agree && holding->count < touching->count) {
+        memcpy(modes, first, bytes);
+        if (!modes_by_forces(sim, touching, touching, event, modes, &agree, problem)) {
             return false;
         }
     }
-    return agree || friction_jams(sim, &rest, problem);
+    return agree || friction_jams(sim, touching, problem);
 }
 
 /* --- all -------------------------------------------------------------------------------------- */
@@ -382,7 +401,7 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
     const System *system = system_of(sim);
     const double *front = sim->state.front;
     FrictionEvent friction;
-    HoldingSet holding;
+    HoldingSet holding, all = {0, {0}, true};
     int candidates[2 * STOPS_MAX], modes[CONTACTS_MAX];
     if (!friction_event(sim, event, &friction, problem)) {
         return false;
@@ -395,7 +414,12 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
         bool open = is_stop(system, contact) && !has_contact(holding.count, holding.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
-    if (!settle_friction(sim, count, candidates, &friction, modes, problem)) {
+    for (int i = 0; i < system->s; i++) {
+        if (has_contact(count, candidates, i)) {
+            all.stops[all.count++] = i;
+        }
+    }
+    if (!settle_friction(sim, &holding, &all, &friction, modes, problem)) {
         return false;
     }
     set_contacts(sim, modes);
