@@ -19,7 +19,14 @@ static int slip_mode(const Simulation *sim, double speed) {
                                                           : slipping_mode(speed);
 }
 
-/* The contact state in which a set of stops is closed and all contacts that move slip. */
+static double friction_of(const Simulation *sim, int contact) {
+    const System *system = system_of(sim);
+    return is_stop(system, contact) ? sim->equations.stop_friction[contact]
+                                    : sim->equations.rub_law[3 * (contact - system->s)];
+}
+
+/* The contact state in which a set of stops is closed and all contacts that move slip, if they have
+ * friction. */
 static void modes_holding(Simulation *sim, const HoldingSet *holding, const double *q,
                           const double *v, int *modes) {
     size_t mark = sim->scratch.used;
@@ -28,8 +35,10 @@ static void modes_holding(Simulation *sim, const HoldingSet *holding, const doub
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool open = is_stop(system, contact) &&
                     !has_contact(holding->count, holding->stops, contact);
-        modes[contact] = open ? CONTACT_OPEN
-                              : slip_mode(sim, sliding_velocity(system, contact, e, v));
+        modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
+        if (!open && friction_of(sim, contact) > 0.0) {
+            modes[contact] = slip_mode(sim, sliding_velocity(system, contact, e, v));
+        }
     }
     sim->scratch.used = mark;
 }
@@ -178,12 +187,6 @@ static int sliding_mode(Simulation *sim, int contact, const FrictionEvent *event
     return fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
 }
 
-static double friction_of(const Simulation *sim, int contact) {
-    const System *system = system_of(sim);
-    return is_stop(system, contact) ? sim->equations.stop_friction[contact]
-                                    : sim->equations.rub_law[3 * (contact - system->s)];
-}
-
 /* Choose whether a contact at rest begins to slip, sticks, bears the limit of its friction, or
  * none. */
 static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
@@ -229,16 +232,19 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
 
 /* Some of the stops that touch, and the contacts with friction at rest that have a mobility of their own
  * beside the loops and the closed stops: else these carry all of the load.  sliding: the modes of
- * all contacts, stops closed. */
+ * those with friction that slide. */
 static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
                       const int *modes, RestContacts *rest, int *sliding, Problem *problem) {
     bool right = true, mobile = false;
     rest->stop_count = rest->count = 0;
     for (int contact = 0; right && contact < contact_count(sim); contact++) {
         bool stop = is_stop(system_of(sim), contact);
-        sliding[contact] = sliding_mode(sim, contact, event);
+        sliding[contact] = CONTACT_FRICTIONLESS;
         if (stop && !has_contact(stops->count, stops->stops, contact)) {
             continue;
+        }
+        if (friction_of(sim, contact) > 0.0) {
+            sliding[contact] = sliding_mode(sim, contact, event);
         }
         if (stop) {
             rest->stops[rest->stop_count] = contact;
