@@ -1,8 +1,8 @@
 """Forces of all contacts at rest together: a complementarity problem on their accelerations.
 
 Stops that touch press or open; contacts without a sliding velocity stick or begin to slip.  While
-nothing slides there always are such forces; the friction of contacts that slide may exclude them
-(Painleve's paradox).
+nothing slides and no walls close in on the mechanism there are such forces.  The friction of
+contacts that slide may exclude them (Painleve's paradox).
 """
 
 from collections.abc import Sequence

@@ -139,7 +139,9 @@ def wavenumber(mode: int, mass: float = 0.0, inertia: float = 0.0) -> float:
         force = [q + mu * b * w for q, w in zip(shear, W, strict=True)]
         return bend[0] * force[1] - bend[1] * force[0]
 
-    looks = np.geomspace(1e-3, (mode + 1) * math.pi, 400 * (mode + 1))
+    # Dunkerley: the beam, the mass and the inertia alone have omega^-2 = 1/12.36, mu/3 and nu.
+    lowest = 0.9 * (mu / 3 + nu + 1 / 12) ** -0.25
+    looks = np.geomspace(min(1e-3, lowest), (mode + 1) * math.pi, 400 * (mode + 1))
     values = [determinant(float(b)) for b in looks]
     changes = [i for i in range(len(looks) - 1) if values[i] * values[i + 1] < 0]
     if len(changes) < mode:
