@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from prbm.base.tolerances import RESTING_SETS_MAX, STEP_GROWTH_MAX, STEP_SHRINK_MIN
+from prbm.base.tolerances import STEP_GROWTH_MAX, STEP_SHRINK_MIN
 from prbm.hybrid import events
 from prbm.hybrid.events import TRANSITIONS, EventKind
 from prbm.hybrid.simulation import Simulation
@@ -96,7 +96,7 @@ def test_an_evaluation_does_not_change_when_another_state_is_evaluated():
 def test_any_number_of_stops_can_rest_at_once():
     """Of stops along one wall, one holds the guide: as one stop would, alone."""
     guide = mechanism("PRBDM")
-    stops = tuple(replace(guide.stops[0], name=f"wall{k}") for k in range(2 * RESTING_SETS_MAX))
+    stops = tuple(replace(guide.stops[0], name=f"wall{k}") for k in range(24))
     crowded = Simulation(replace(guide, stops=stops), {"release.displacement": 0.0})
     alone = Simulation(guide, {"release.displacement": 0.0})
     assert len(crowded.contacts.held) == 1

@@ -1,16 +1,22 @@
 """Searches without a solution end in errors that name the contacts, and change nothing."""
 
+import ctypes
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from kernel_library import KernelError, kernel
 from kernel_simulation import KernelMistake, KernelSimulation
-from prbm.base.errors import SimulationError
+from native_host import DISCARD, ERROR, OK, WAYS, Instance
+from prbm.base import tolerances
+from prbm.base.errors import EquilibriumError, SimulationError
+from prbm.hybrid import events, guards
 from prbm.hybrid.simulation import Simulation
-from prbm.mechanics import contact
-from support import mechanism
+from prbm.mechanics import complementarity, constraints, contact, statics
+from support import built, mechanism
 
 
 def vice():
@@ -71,3 +77,178 @@ def test_a_guide_between_closing_walls_is_left_as_it_was(engine):
     with pytest.raises((SimulationError, KernelMistake), match=closing):
         sim.advance(0.1)
     assert sim.outputs() == before
+
+
+# -- friction that jams --
+
+
+def rod():
+    """Return a guide that rests on its wall with the end of a long arm, and its values.
+
+    Once it slides to one side its friction presses it the more: Painleve's paradox.
+    """
+    guide = mechanism("PRBDM2RAxial")
+    (stop,) = guide.stops
+    point = ("shuttle.width + 0.3", stop.point[1])
+    values = {
+        "release.displacement": 0.0, "stop.offset": 0.027, "stop.friction": 2.75,
+        "base.acceleration.x": -6.0,
+    }  # fmt: skip
+    return replace(guide, name="Rod", stops=(replace(stop, point=point),)), values
+
+
+THROW = {"force.impulse.y": 0.01}
+JAMS = r"no forces satisfy the laws of contact and friction at t = 0 s \(stop\): friction jams"
+
+
+@pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+def test_friction_that_jams_is_rejected(engine):
+    sim = engine(*rod())
+    before = sim.outputs()
+    assert before["stop.force"] > 0.5
+    sim.set(THROW)
+    with pytest.raises((SimulationError, KernelMistake), match=JAMS):
+        sim.advance(1e-3)
+    assert sim.outputs()["stop.force"] == pytest.approx(before["stop.force"], rel=1e-12)
+    sim.set({"force.impulse.y": 0.0})
+    sim.advance(1e-3)
+    assert sim.outputs()["stop.contact"]
+
+
+@pytest.fixture(scope="module")
+def rods(tmp_path_factory):
+    """Return the native FMUs of the rod by version of FMI."""
+    folder, (guide, _) = tmp_path_factory.mktemp("rods"), rod()
+    for fmi in (2, 3):
+        (folder / f"{fmi}.fmu").write_bytes(built(guide, fmi=fmi))
+    return {fmi: folder / f"{fmi}.fmu" for fmi in (2, 3)}
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+@pytest.mark.parametrize(("fmi", "kind"), WAYS)
+def test_friction_that_jams_is_logged_by_fmus_which_work_after_a_reset(rods, fmi, kind):
+    """A step of co-simulation is discarded; an update of discrete states is an error."""
+    _, values = rod()
+    with Instance(rods[fmi], kind).initialize(values=values) as instance:
+        if kind == "cs":
+            assert instance.set(THROW) == OK
+            assert instance.step(0.0, 1e-3) == DISCARD
+        else:
+            with pytest.raises(FMICallException) as caught:
+                instance.change(THROW)
+            assert caught.value.status in (DISCARD, ERROR)
+        assert any(re.search(JAMS, text) for text in instance.messages)
+        instance.reset()
+        instance.initialize(values=values).advance(2e-3)
+        assert instance.values()["stop.contact"]
+
+
+# -- crowds --
+
+
+def crowd():
+    """Return a guide with 24 stops along one wall and eight points with friction."""
+    guide = mechanism("PRBDM2RAxial")
+    stops = tuple(replace(guide.stops[0], name=f"wall{k}") for k in range(24))
+    points = tuple(replace(guide.frictions[0], name=f"point{k}") for k in range(8))
+    values = {"release.displacement": 0.0, "force.y": 0.2}
+    for k in range(8):
+        values |= {f"point{k}.coefficient": 0.3, f"point{k}.normal_force": 0.1 + 0.01 * k}
+    values |= {f"wall{k}.friction": 0.1 + 0.01 * k for k in range(12)}
+    return replace(guide, name="Crowd", stops=stops, frictions=points), values
+
+
+def test_a_crowd_of_contacts_rests_as_one_does():
+    """Equal rows share one force; what rests moves no more in one engine than in the other."""
+    guide, values = crowd()
+    twins = [engine(guide, values) for engine in (Simulation, KernelSimulation)]
+    alone = Simulation(mechanism("PRBDM2RAxial"), {"release.displacement": 0.0})
+    for sim in twins:
+        sim.advance(1e-2)
+        out = sim.outputs()
+        force = sum(out[f"wall{k}.force"] for k in range(24))
+        assert force == pytest.approx(alone.outputs()["stop.force"], rel=1e-3)
+        assert abs(out["shuttle.vy"]) < 1e-9
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_crowd_of_contacts_rests_in_an_fmu(tmp_path, fmi):
+    guide, values = crowd()
+    (tmp_path / "crowd.fmu").write_bytes(built(guide, fmi=fmi))
+    expected = KernelSimulation(guide, values)
+    expected.advance(1e-2)
+    with Instance(tmp_path / "crowd.fmu").initialize(values=values) as instance:
+        assert instance.step(0.0, 1e-2) == OK
+        found = instance.values()
+        for k in range(24):
+            force = expected.get(f"wall{k}.force")
+            assert found[f"wall{k}.force"] == pytest.approx(force, abs=1e-9)
+
+
+# -- limits of searches --
+
+LIMITS = [
+    ("LOCATION_ITERATIONS_MAX", guards, {}, "no impact of stop could be located within"),
+    ("CONSTRAINT_ITERATIONS_MAX", constraints, {}, "the loops of the mechanism cannot be closed"),
+    ("PIVOTS_FACTOR", complementarity, {}, r"impact at t = 0\.\d+ s \(stop\): no impulses"),
+    ("PIVOTS_FACTOR", complementarity, {"release.displacement": 0.0}, r"\(stop\): friction jams"),
+    ("EVENTS_MAX", events, {"stop.restitution": 0.3}, r"more than 1 events \(\w+ the last\)"),
+    ("STATICS_ITERATIONS_MAX", statics, {}, "no static equilibrium under gravity was found"),
+]
+
+
+@pytest.mark.parametrize("engine", ["package", "kernel"])
+@pytest.mark.parametrize(("limit", "module", "values", "message"), LIMITS)
+def test_a_search_that_ends_at_its_limit_is_an_error(
+    monkeypatch, engine, limit, module, values, message
+):
+    """The limit is lowered until the search needs more."""
+    lowered = {"PIVOTS_FACTOR": 0}.get(limit, 1)
+    if engine == "package":
+        monkeypatch.setattr(module, limit, lowered)
+    old = f"enum {{ {limit} = {getattr(tolerances, limit)} }};"
+    changes = (("generated.h", old, f"enum {{ {limit} = {lowered} }};"),)
+    guide = mechanism("PRBDM2R")
+
+    def run():
+        if engine == "kernel":
+            return KernelSimulation(guide, values, changes=changes).advance(1.0)
+        return Simulation(guide, values).advance(1.0)
+
+    with pytest.raises((SimulationError, EquilibriumError, KernelMistake), match=message):
+        run()
+
+
+SWEEPS = ("generated.h", "enum { ROTATION_SWEEPS_MAX = 60 };", "enum { ROTATION_SWEEPS_MAX = 1 };")
+EVENTS = ("generated.h", "enum { EVENTS_AT_ONCE_MAX = 16 };", "enum { EVENTS_AT_ONCE_MAX = 0 };")
+SINGULAR = (
+    "hybrid/guards.c",
+    "if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &problem)) {",
+    'if (!fail(&problem, "the equations are singular")) {',
+)
+
+
+def test_eigenvalues_without_convergence_are_rejected():
+    with pytest.raises(KernelMistake, match="the eigenvalues of a matrix were not found"):
+        KernelSimulation(mechanism("PRBDM2R"), changes=(SWEEPS,))
+
+
+def test_a_guard_that_cannot_be_evaluated_is_no_event():
+    """Zero in place of the force of the stop would look like its release."""
+    rubs = {"release.displacement": 0.0, "stop.friction": 0.5}
+    sim = KernelSimulation(mechanism("PRBDM2R"), rubs, changes=(SINGULAR,))
+    before = sim.outputs()
+    with pytest.raises(KernelMistake, match=r"no release of stop could be .*: the equations are"):
+        sim.advance(1e-3)
+    assert sim.outputs() == before
+
+
+def test_events_without_end_are_rejected_in_model_exchange():
+    sim = KernelSimulation(mechanism("PRBDM"), {"release.displacement": 0.0}, exchange=True,
+                           changes=(EVENTS,))  # fmt: skip
+    sim.set({"base.acceleration.x": 100.0})
+    with pytest.raises(KernelMistake, match=r"more than 0 events \(release of stop the last\) at"):
+        sim.call("exchange_event", ctypes.byref(ctypes.c_bool()))

@@ -737,8 +737,9 @@ def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
         Q = rng.normal(size=k + m)
         wrong = kernel().violation(k, m, W, u, Q, limit)
         assert wrong == pytest.approx(complementarity.violation(W, u, Q, limit), rel=1e-12)
-        assert kernel().lemke(k + m, W, u, z)
-        assert_same(z, complementarity.lemke(W, u), 1e-10)
+        cover = rng.uniform(0.5, 2, k + m)
+        assert kernel().lemke(k + m, W, u, cover, z)
+        assert_same(z, complementarity.lemke(W, u, cover), 1e-10)
 
 
 @twin(impulses=complementarity.impulses)
@@ -756,8 +757,8 @@ def test_impulses_above_a_least_impulse_are_the_same(k):
 
 def test_a_problem_without_a_solution_has_none_in_either():
     M, q, z = np.array([[1.0, -1.0], [-1.0, 1.0]]), np.array([-1.0, -1.0]), np.zeros(2)
-    assert complementarity.lemke(M, q) is None
-    assert not kernel().lemke(2, M, q, z)
+    assert complementarity.lemke(M, q, np.ones(2)) is None
+    assert not kernel().lemke(2, M, q, np.ones(2), z)
 
 
 @twin(stronge=contact.stronge)

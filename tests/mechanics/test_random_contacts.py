@@ -1,8 +1,13 @@
 """Random impacts and contacts at rest: a solution that satisfies all laws, or an error."""
 
+from itertools import product
+
+import numpy as np
 import pytest
+from scipy.optimize import linprog
 
 import random_contacts
+from prbm.mechanics import complementarity
 
 ERRORS = {"newton": 0.0, "stronge": 0.02, "several": 0.02, "rest": 0.02}
 """Largest shares of errors: walls that move against what friction locks."""
@@ -19,6 +24,63 @@ def test_random_contacts_satisfy_their_laws_or_are_rejected(kind, engine):
 @pytest.mark.parametrize("kind", random_contacts.SEARCHES)
 def test_100_000_random_contacts_satisfy_their_laws_or_are_rejected(kind, engine):
     check(random_contacts.search(engine, kind, 100_000, seed=1), ERRORS[kind])
+
+
+def test_contacts_that_are_rejected_have_no_forces():
+    """An independent route: of all combinations of modes, each a linear program, none fits."""
+    rng, rejected, second_paths = np.random.default_rng(0), 0, 0
+    for _ in range(6000):
+        k, m = int(rng.integers(1, 4)), 2
+        W, u = random_contacts.drawn(rng, k + m, k)
+        mu, normal = rng.uniform(0, 2, m), np.array([0, min(1, k - 1)])
+        P = complementarity.coulomb(W, u, mu, np.zeros(m), normal)
+        if P is None and rejected < 20:
+            rejected += 1
+            assert not any(fits(W, u, mu, normal, *modes) for modes in combinations(k, m))
+        elif P is not None:
+            wrong = complementarity.violation(W, u, P, mu * P[normal])
+            assert wrong < 1e-9 * np.abs(u).max()
+            second_paths += not one_path(W, u, mu, normal)
+    assert rejected > 10
+    assert second_paths > 0
+
+
+def one_path(W, u, mu, normal):
+    """Return whether the path of the first covering vector alone leads to a solution."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(complementarity, "COVER_FACTOR", 1.0)
+        return complementarity.coulomb(W, u, mu, np.zeros(len(mu)), normal) is not None
+
+
+def combinations(k, m):
+    """Return all modes of k normals (1: closed) and m tangents (0: stick, else the slip)."""
+    return product(product((0, 1), repeat=k), product((0, 1, -1), repeat=m))
+
+
+def fits(W, u, mu, normal, closed, slips):
+    """Return whether forces satisfy the laws in given modes, to 1e-9 of the largest rate."""
+    scale = 1 / np.sqrt(np.diag(W))
+    S, b = scale[:, None] * W * scale, scale * u / np.abs(scale * u).max()
+    n, k, unit = len(u), len(closed), np.eye(len(u))
+    bounds, equal = [], []
+    for i in range(k):
+        zero, positive = ((S[i], b[i]), (unit[i], 0.0))[:: 1 if closed[i] else -1]
+        equal.append(zero)
+        bounds.append(positive)
+    for j, slip in enumerate(slips):
+        limit = mu[j] * scale[normal[j]] / scale[k + j] * unit[normal[j]]
+        if slip:
+            equal.append((unit[k + j] + slip * limit, 0.0))
+            bounds.append((slip * S[k + j], slip * b[k + j]))
+        else:
+            equal.append((S[k + j], b[k + j]))
+            bounds += [(limit - unit[k + j], 0.0), (limit + unit[k + j], 0.0)]
+    # Every a.P + c >= 0 or = 0 may be violated by t, which is minimised.
+    rows = [*bounds, *equal, *((-a, -c) for a, c in equal)]
+    A = np.array([[*-a, -1.0] for a, _ in rows])
+    found = linprog([0.0] * n + [1.0], A, [c for _, c in rows],
+                    bounds=[(None, None)] * n + [(0.0, None)])  # fmt: skip
+    return found.status == 0 and found.fun < 1e-9
 
 
 def check(found, errors):

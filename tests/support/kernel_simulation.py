@@ -2,7 +2,9 @@
 
 import ctypes
 import re
+import shutil
 import subprocess
+import zlib
 from functools import cache
 from pathlib import Path
 
@@ -52,19 +54,29 @@ class KernelMistake(Exception):
     """What the kernel refuses, in its words."""
 
 
-def _compile(folder: Path) -> None:
+Changes = tuple[tuple[str, str, str], ...]
+"""Files of the kernel, texts in them, and the texts in their place."""
+
+
+def _compile(folder: Path, changes: Changes = ()) -> None:
     """Compile the kernel up to the simulation, all functions visible."""
-    folder.mkdir()
-    kernel = (KERNEL / "prbm_fmu.c").read_text().partition('#include "fmi/')[0]
+    shutil.copytree(KERNEL, folder)
+    for file, old, new in changes:
+        text = (folder / file).read_text()
+        assert text.count(old) == 1, f"{old} in {file}"
+        (folder / file).write_text(text.replace(old, new))
+    kernel = (folder / "prbm_fmu.c").read_text().partition('#include "fmi/')[0]
     source, built = folder / "kernel.c", folder / "kernel.so"
     source.write_text(kernel)
-    subprocess.run(["cc", *FLAGS, str(source), "-o", str(built), "-lm"], check=True)
+    flags = [flag for flag in FLAGS if not flag.startswith("-I")]
+    subprocess.run(["cc", *flags, f"-I{folder}", str(source), "-o", str(built), "-lm"], check=True)
 
 
 @cache
-def library() -> ctypes.CDLL:
+def library(changes: Changes = ()) -> ctypes.CDLL:
     """Return the kernel up to the simulation, compiled once, all functions visible."""
-    found = ctypes.CDLL(str(once("kernel-simulation", _compile) / "kernel.so"))
+    name = f"kernel-simulation-{zlib.crc32(repr(changes).encode())}"
+    found = ctypes.CDLL(str(once(name, lambda f: _compile(f, changes)) / "kernel.so"))
     for name, (result, *arguments) in FUNCTIONS.items():
         function = getattr(found, name)
         function.restype, function.argtypes = result, arguments
@@ -82,6 +94,8 @@ class KernelSimulation:
         Parameters and inputs that differ from their defaults.
     exchange : bool
         Whether somebody else integrates.
+    changes : tuple
+        Of the sources of the kernel.
     """
 
     def __init__(
@@ -92,8 +106,9 @@ class KernelSimulation:
         start_time: float = 0.0,
         tolerance: float = 0.0,
         exchange: bool = False,
+        changes: Changes = (),
     ) -> None:
-        self.library = library()
+        self.library = library(changes)
         self.sentence = ctypes.create_string_buffer(SENTENCE)
         self.inner, self.states_of = None, None
         self.stops = mechanism.stops

@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from ..base.errors import EquilibriumError
 from ..mechanics.arrays import Real
 from ..mechanics.modal import modes
 from ..mechanics.statics import Equilibrium, equilibrium
@@ -74,16 +75,23 @@ def rests(
     Raises
     ------
     EquilibriumError
-        If there is no shape with one of the displacements.
+        If there is no shape with one of the displacements, or a place of rest is not found.
     """
     if forces is None:
         forces = force_curve(system, displacements)
     found = []
     for (a, b), (low, high) in zip(pairwise(displacements), pairwise(forces), strict=True):
         if (low > 0.0) != (high > 0.0):
-            place = brentq(
-                lambda d: holding_force(system, d), a, b, xtol=REST_RTOL * system.length, rtol=1e-15
-            )
+            place, search = brentq(
+                lambda d: holding_force(system, d), a, b, xtol=REST_RTOL * system.length,
+                rtol=1e-15, full_output=True, disp=False,
+            )  # fmt: skip
+            if not search.converged:
+                raise EquilibriumError(
+                    f"the place of rest between {a:g} and {b:g} m was not found in "
+                    f"{search.iterations} iterations: the holding force jumps there; narrow the "
+                    "range of displacements"
+                )
             shape = equilibrium(system, place)
             found.append(Rest(float(place), bool(modes(system, shape).frequency[0] > 0.0), shape))
     return found
@@ -103,9 +111,19 @@ def snap(system: System, low: float, high: float) -> tuple[float, float]:
     -------
     displacement, force : float
         Displacement [m] and force [N] at which the mechanism snaps through under a force.
+
+    Raises
+    ------
+    EquilibriumError
+        If there is no shape with one of the displacements, or the search does not converge.
     """
     found = minimize_scalar(
         lambda d: -abs(holding_force(system, d)), bounds=(low, high), method="bounded",
         options={"xatol": 1e-9 * system.length},
     )  # fmt: skip
+    if not found.success:
+        raise EquilibriumError(
+            f"the largest holding force between {low:g} and {high:g} m was not found: "
+            f"{found.message} Give places of rest that are closer to each other"
+        )
     return float(found.x), holding_force(system, float(found.x))

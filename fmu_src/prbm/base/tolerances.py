@@ -36,7 +36,9 @@ SPRINGLESS_RATE = 2 * math.pi  # rad/s: rate scale of a linkage without springs.
 COMPLEMENTARITY_RTOL = 1e-10  # Of the largest approach speed: allowed violation.
 PIVOT_RTOL = 1e-11  # Of the largest entry of its column: a smaller pivot is round-off.
 RATIO_RTOL = 1e-12  # Of the largest constant: ratios this close are equal.
+ROTATION_SWEEPS_MAX = 60  # Sweeps of Jacobi's method; about six are usual.
 PIVOTS_FACTOR = 50  # Pivots of a complementarity problem, for each of its unknowns.
+COVER_FACTOR = 32.0  # Weight of one normal force in the covering vector of a second path.
 WEDGED_RTOL = 1e-10  # Of the inverse normal mass: a smaller rate of the approach is round-off.
 ZERO_SPEED_RTOL = 1e-12  # Of the speeds before an impact: what is left of a vanished speed.
 IMPULSE_RANK_RTOL = 1e-13  # Of the largest singular value: rank of the inverse mass in contact.
@@ -48,9 +50,6 @@ TOUCHING_RTOL = 1e-10  # Of the size: gaps below this close together with the on
 RELEASE_PENETRATION_ATOL = 1e-9  # m; a wall may be penetrated at release by no more than this.
 SHORTEST_FLIGHT_RTOL = 5e-7  # Of the period: the arc of a shorter bounce is lost in round-off.
 DEPENDENT_FRICTION_RTOL = 1e-4  # Of a contact's free mobility: below, held stops carry the load.
-DEPENDENT_STOP_RTOL = 1e-9  # The same for a stop among other stops that hold.
-STICKING_SETS_MAX = 6  # Contacts with friction at rest of which every combination is tried.
-RESTING_SETS_MAX = 12  # Resting stops of which every subset is tried.
 ZERO_RATE_RTOL = 1e-9  # Of the velocity scale: a slower rate is round-off.
 FRICTION_EXCESS_RTOL = 1e-6  # Of the friction limit: excess at which a sticking contact slips.
 EVENTS_MAX = 1000  # Events within EVENT_WINDOW_RTOL that end a simulation.
@@ -60,6 +59,7 @@ WALL_FADING_FACTOR = 1 / 3  # Of each step, by which the recent longest one is f
 WALL_LONGEST_RTOL = 0.1  # Of the period: longest communication step that walls remember.
 WALL_STEP_RTOL = 0.5  # Of the time in which a wall joins its reference: longest step meanwhile.
 WALL_MOBILITY_MAX = 1e100  # 1/kg; larger mobilities lose impulses to underflow.
+EVENTS_AT_ONCE_MAX = 16  # Events of one contact at one time in model exchange.
 IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 
 # --- location of events ------------------------------------------------------------------------

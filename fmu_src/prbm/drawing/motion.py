@@ -4,11 +4,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ..base.errors import EquilibriumError
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.constraints import project_positions
 from ..mechanics.system import FIXED, Rows, System
 
-STRETCH_ITERATIONS = 4  # The convergence is quadratic, and stretches are small.
+STRETCH_ITERATIONS_MAX = 20  # The convergence is quadratic: four iterations are usual.
+STRETCH_RTOL = 1e-9  # Largest last change of a stretch, far below the resolution of a picture.
 
 
 def closed(system: System, q: Real, stop: int | None = None, wall: float = 0.0) -> Real:
@@ -51,6 +53,11 @@ def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> 
         Angles [rad]; the entries of stretches are ignored.
     displacements : mapping of str to (m,) complex
         Displacements of bodies from the straight shape [m].
+
+    Raises
+    ------
+    EquilibriumError
+        If the iteration does not converge.
     """
     k, arms = system.stretches, system.stretched
     if not len(k):
@@ -64,12 +71,17 @@ def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> 
         B += [frame.A[None], -1j * frame.A[None]]
         c += [missing.real[:, None], missing.imag[:, None]]
     rows, constants = np.vstack(B), np.hstack(c)
-    for _ in range(STRETCH_ITERATIONS):
+    for _ in range(STRETCH_ITERATIONS_MAX):
         E = system.directions(q)
         x = (E @ rows.T).real + constants
         change = np.linalg.pinv((rows[:, arms] * E[:, None, arms]).real) @ x[:, :, None]
         q[:, k] -= change[:, :, 0]
-    return q
+        if not np.abs(change).max() > STRETCH_RTOL:
+            return q
+    raise EquilibriumError(
+        "no stretches of the flexures place the bodies where the result has them: check that the "
+        "result is of this mechanism with these parameters"
+    )
 
 
 def angles(system: System) -> dict[str, int]:

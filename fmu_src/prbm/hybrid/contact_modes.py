@@ -5,20 +5,16 @@ candidates have.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import combinations, product
-from math import inf, ulp
+from math import ulp
 
 import numpy as np
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
     DEPENDENT_FRICTION_RTOL,
-    DEPENDENT_STOP_RTOL,
     EVENT_TIME_ATOL,
     FRICTION_EXCESS_RTOL,
     RELEASE_PENETRATION_ATOL,
-    RESTING_SETS_MAX,
-    STICKING_SETS_MAX,
 )
 from ..mechanics import contact
 from ..mechanics.arrays import Real
@@ -29,8 +25,6 @@ from .front import Front
 from .rest import RestForces, rest_forces
 
 FRICTIONLESS, STICK = ContactMode.FRICTIONLESS, ContactMode.STICK
-AT_REST = (STICK, ContactMode.SLIP_POSITIVE, ContactMode.SLIP_NEGATIVE)
-"""Modes of a contact at rest that has a mobility of its own, in the order of trial."""
 
 
 # --- resets -----------------------------------------------------------------------------------
@@ -144,56 +138,24 @@ def find_holding_stops(
 ) -> list[int] | None:
     """Return the stops at rest that hold: pressed together, while the others open.
 
-    Contacts that move slip meanwhile.  Of stops that can move only together, one holds: the one
-    that keeps the others from closing.  None if no stops hold in this way.
+    Contacts that move slip meanwhile, those at rest are frictionless.  Of stops that can move only
+    together, those hold whose rows are independent.  None if no stops hold in this way.
     """
-    every = sorted(set(candidates))
+    every, scales = sorted(set(candidates)), configuration.scales
     if not every:
         return []
-    tried = range(len(every), -1, -1) if len(every) <= RESTING_SETS_MAX else ()
-    e, M, loops = front.equations.mass_and_loops(front.q)
-    G = configuration.system.gap_rows.jacobian(e)
-    least = -configuration.scales.zero_acceleration
-    for size in tried:
-        found: list[tuple[float, list[int]]] = []
-        for members in combinations(every, size):
-            holding = list(members)
-            if _independent(G[holding], M, loops):
-                found.append((_opening(configuration, front, every, holding), holding))
-        opens, holding = max(found, key=lambda one: one[0], default=(-inf, []))
-        if opens >= least:
-            return holding
-    holding = _pressed_stops(configuration, front, every)
-    opens = _opening(configuration, front, every, holding)
-    return holding if opens >= least else None
-
-
-def _opening(
-    configuration: Configuration, front: Front, stops: Sequence[int], holding: list[int]
-) -> float:
-    """Return the least acceleration at which stops open while others hold [m/s^2].
-
-    Zero if all of them hold, -inf if one of those that hold would have to pull.
-    """
-    equations = equations_holding(configuration.scales, front, holding)
-    a, lam, _, _ = equations.evaluate(front.time, front.q, front.v)
-    if not all(equations.stop_forces(lam)[i] > 0.0 for i in holding):
-        return -inf
-    opening = equations.gap_accelerations(front.time, front.e, front.v, a)
-    return min((float(opening[i]) for i in stops if i not in holding), default=0.0)
-
-
-def _pressed_stops(configuration: Configuration, front: Front, stops: Sequence[int]) -> list[int]:
-    """Return the stops that are pressed where nothing but what slides has friction."""
-    scales = configuration.scales
-    sliding = equations_holding(scales, front, stops).contacts.modes
+    sliding = equations_holding(scales, front, every).contacts.modes
     equations = equations_holding(scales, front, ())
-    slips = [sliding[i].slip for i in stops]
-    found = rest_forces(equations, front.time, front.q, front.v, stops, slips, ())
+    slips = [sliding[i].slip for i in every]
+    found = rest_forces(equations, front.time, front.q, front.v, every, slips, ())
     if found is None:
-        return []
-    pressing = zip(stops, found.normal, strict=True)
-    return [i for i, press in pressing if press > scales.zero_acceleration]
+        return None
+    pressing = zip(every, found.normal, strict=True)
+    holding = [i for i, press in pressing if press > scales.zero_acceleration]
+    contacts = equations_holding(scales, front, holding).contacts
+    # A stop alone is pressed or opens; several may depend on each other.
+    agrees = len(every) == 1 or _agrees(scales, front, contacts, every, {})
+    return holding if agrees else None
 
 
 def _jammed(configuration: Configuration, front: Front, contacts: Iterable[int]) -> str:
@@ -216,16 +178,6 @@ def equations_holding(scales: Scales, front: Front, stops: Sequence[int]) -> Equ
         for c, speed in enumerate(speeds)
     )
     return front.equations.with_contacts(ContactState(modes, contacts.stops))
-
-
-def _independent(rows: Real, M: Real, loops: Real) -> bool:
-    """Return whether each of the rows has a mobility of its own beside those before it."""
-    for k in range(1, len(rows)):
-        row = rows[k : k + 1]
-        left = mobility(M, np.vstack([loops, rows[:k]]), row)
-        if left <= DEPENDENT_STOP_RTOL * mobility(M, loops, row):
-            return False
-    return True
 
 
 def mobility(M: Real, held: Real, row: Real) -> float:
@@ -257,27 +209,68 @@ def _with_friction(
     slipped: int | None,
     slow: Mapping[int, float],
 ) -> Front:
-    """Return the front with the modes of all closed contacts with friction.
+    """Return the front with the modes of all contacts with friction.
 
-    The mode of one contact may change that of another: they are chosen one by one until none
-    changes, else all at once.
+    Parameters
+    ----------
+    configuration : Configuration
+        Mechanism and scales.
+    front : Front
+        State, with the stops that hold if contacts at rest are frictionless.
+    candidates : sequence of int
+        Stops that touch, held or not.
+    slipped : int or None
+        A contact that has reached the limit of friction: it cannot stick.
+    slow : mapping
+        Sliding speeds that are round-off, by contact [m/s].
+
+    Raises
+    ------
+    SimulationError
+        If no forces satisfy the laws of all contacts.
     """
-    scales, equations = configuration.scales, front.equations
-    rubbing = _with_coefficients(equations, front.contacts.held)
-    for _ in range(len(rubbing) + 1):
-        before, fits = front.contacts, True
-        for c in rubbing:
-            mode, one_fits = _friction_mode(scales, front, c, slipped == c, slow.get(c, 0.0))
-            front, fits = front.with_contacts(front.contacts.with_mode(c, mode)), fits and one_fits
-        if fits and front.contacts == before:
-            return front
-    resting = [
-        c for c in rubbing if _sliding_mode(scales, front, c, slow.get(c, 0.0)) is FRICTIONLESS
-    ]
-    together = joint_modes(front, resting, slipped)
-    if together is None:
-        together = _joint_forces(configuration, front, candidates, slipped, slow)
-    return front.with_contacts(together)
+    held, every = list(front.contacts.held), sorted(set(candidates))
+    for stops in (held, every) if len(held) < len(every) else (held,):
+        found = _modes_of(configuration.scales, front, stops, every, slipped, slow)
+        if found is not None:
+            return front.with_contacts(found)
+    raise SimulationError(
+        _jammed(configuration, front, {*every, *_with_coefficients(front.equations, every)})
+    )
+
+
+def _modes_of(
+    scales: Scales,
+    front: Front,
+    stops: Sequence[int],
+    every: Sequence[int],
+    slipped: int | None,
+    slow: Mapping[int, float],
+) -> ContactState | None:
+    """Return the modes by the forces of some stops and of the contacts with friction.
+
+    None without such forces, or if one of the other stops that touch would close.
+    """
+    contacts, rubbing = front.contacts, _with_coefficients(front.equations, stops)
+    modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}
+    # Where the loops and the held stops leave a contact no mobility of its own, they carry all of
+    # the load.
+    at_rest = [c for c in rubbing if modes[c] is FRICTIONLESS and _mobile(front, contacts, c)]
+    for c in rubbing:
+        contacts = contacts.with_mode(c, modes[c]) if contacts.modes[c].closed else contacts
+    if not at_rest:
+        return contacts
+    contacts, slips = contacts.opened(), [modes[i].slip for i in stops]
+    equations = front.equations.with_contacts(contacts)
+    found = rest_forces(equations, front.time, front.q, front.v, stops, slips, at_rest)
+    if found is None:
+        return None
+    for i, press in zip(stops, found.normal, strict=True):
+        if press > scales.zero_acceleration:
+            contacts = contacts.with_mode(i, modes[i] if i in rubbing else FRICTIONLESS)
+    contacts = _sticking_or_slipping(scales, front, contacts, at_rest, found, slipped)
+    slack = dict(zip(at_rest, scales.zero_acceleration / found.mobility, strict=True))
+    return contacts if _agrees(scales, front, contacts, every, slack) else None
 
 
 def _with_coefficients(equations: Equations, stops: Sequence[int]) -> list[int]:
@@ -285,38 +278,6 @@ def _with_coefficients(equations: Equations, stops: Sequence[int]) -> list[int]:
     laws = enumerate(equations.friction_laws, start=equations.contacts.stops)
     rubbing = [i for i in stops if equations.stop_friction[i] > 0.0]
     return rubbing + [c for c, law in laws if law.coefficient > 0.0]
-
-
-def _friction_mode(
-    scales: Scales, front: Front, contact: int, slipped: bool, slow: float
-) -> tuple[ContactMode, bool]:
-    """Return the mode of a closed contact while all others keep theirs, and whether it fits.
-
-    A contact that moves faster than ``slow`` slips.  At rest it is frictionless where the loops
-    and the held stops leave it no mobility of its own: the stops carry all of the load.  Else it
-    sticks as far as Coulomb's law allows, and beyond slips in the direction in which sliding
-    accelerates it.
-    """
-    moving = _sliding_mode(scales, front, contact, slow)
-    if moving is not FRICTIONLESS:
-        return moving, True
-    contacts, q, v, e = front.contacts, front.q, front.v, front.e
-    if not _mobile(front, contacts, contact):
-        return FRICTIONLESS, True
-    equations = front.equations.with_contacts(contacts.with_mode(contact, STICK))
-    friction, limit = equations.friction(contact, e, equations.evaluate(front.time, q, v).lam)
-    if abs(friction) <= limit and not slipped:
-        return STICK, True
-    pushed, greatest = ContactMode.slipping(-1 if friction > 0.0 else 1), 0.0
-    for mode in (pushed, ContactMode.slipping(-pushed.slip)):
-        trial = front.equations.with_contacts(contacts.with_mode(contact, mode))
-        a = trial.evaluate(front.time, q, v).a
-        acceleration = mode.slip * trial.slip_acceleration(contact, e, v, a)
-        if acceleration > 0.0:
-            return mode, True
-        greatest = max(greatest, -acceleration)
-    # Where there is as good as no friction, either of these fits.
-    return FRICTIONLESS if slipped else STICK, greatest <= scales.zero_acceleration
 
 
 def _sliding_mode(scales: Scales, front: Front, contact: int, slow: float) -> ContactMode:
@@ -334,96 +295,6 @@ def _mobile(front: Front, contacts: ContactState, contact: int) -> bool:
     return left > DEPENDENT_FRICTION_RTOL * mobility(M, loops, row)
 
 
-def joint_modes(front: Front, at_rest: Sequence[int], slipped: int | None) -> ContactState | None:
-    """Return the modes of all contacts, with those of the contacts at rest chosen together.
-
-    They are the first combination in which sticking contacts need no more than their friction,
-    slipping contacts are accelerated in their direction, and held stops are pressed.  None
-    without one, or with too many contacts at rest.
-    """
-    alone = front.contacts
-    for c in at_rest:
-        alone = alone.with_mode(c, FRICTIONLESS)
-    free = [c for c in at_rest if _mobile(front, alone, c)]
-    if len(free) > STICKING_SETS_MAX:
-        return None
-    for modes in product(AT_REST, repeat=len(free)):
-        chosen = dict(zip(free, modes, strict=True))
-        if slipped is not None and chosen.get(slipped) is STICK:
-            continue
-        together = alone
-        for c, mode in chosen.items():
-            together = together.with_mode(c, mode)
-        if _consistent(front, together, chosen):
-            return together
-    return None
-
-
-def _consistent(front: Front, contacts: ContactState, chosen: Mapping[int, ContactMode]) -> bool:
-    """Return whether forces and accelerations are those that the modes stand for."""
-    if not all(_mobile(front, contacts, c) for c, mode in chosen.items() if mode is STICK):
-        return False
-    e, v, equations = front.e, front.v, front.equations.with_contacts(contacts)
-    a, lam, _, _ = equations.evaluate(front.time, front.q, v)
-    if not all(equations.stop_forces(lam)[i] > 0.0 for i in equations.held):
-        return False
-    for c, mode in chosen.items():
-        if mode is STICK:
-            friction, limit = equations.friction(c, e, lam)
-            if abs(friction) > limit:
-                return False
-        elif mode.slip * equations.slip_acceleration(c, e, v, a) <= 0.0:
-            return False
-    return True
-
-
-def _joint_forces(
-    configuration: Configuration,
-    front: Front,
-    stops: Sequence[int],
-    slipped: int | None,
-    slow: Mapping[int, float],
-) -> ContactState:
-    """Return the modes of all contacts from forces that satisfy all laws at once.
-
-    Parameters
-    ----------
-    configuration : Configuration
-        Mechanism and scales.
-    front : Front
-        State.
-    stops : sequence of int
-        Stops that touch, held or not.
-    slipped : int or None
-        A contact that has reached the limit of friction.
-    slow : mapping
-        Sliding speeds that are round-off, by contact [m/s].
-
-    Raises
-    ------
-    SimulationError
-        If there are no such forces.
-    """
-    scales, stops = configuration.scales, sorted(set(stops))
-    rubbing = _with_coefficients(front.equations, stops)
-    modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}
-    contacts = ContactState.holding((), front.contacts.stops, front.contacts.points)
-    for c in rubbing:
-        contacts = contacts if contacts.is_stop(c) else contacts.with_mode(c, modes[c])
-    at_rest = [c for c in rubbing if modes[c] is FRICTIONLESS]
-    slips = [modes[i].slip for i in stops]
-    equations = front.equations.with_contacts(contacts)
-    found = rest_forces(equations, front.time, front.q, front.v, stops, slips, at_rest)
-    if found is not None:
-        for i, press in zip(stops, found.normal, strict=True):
-            if press > scales.zero_acceleration:
-                contacts = contacts.with_mode(i, modes[i])
-        contacts = _sticking_or_slipping(scales, front, contacts, at_rest, found, slipped)
-        if _agrees(scales, front, contacts, stops, at_rest):
-            return contacts
-    raise SimulationError(_jammed(configuration, front, {*stops, *rubbing}))
-
-
 def _sticking_or_slipping(
     scales: Scales,
     front: Front,
@@ -437,7 +308,7 @@ def _sticking_or_slipping(
     Of contacts that can stick only together, some stick; the others bear the limit of their
     friction, or none.
     """
-    at_limit = np.abs(found.friction) >= found.limit
+    at_limit = np.abs(found.friction) >= found.limit - scales.zero_acceleration / found.mobility
     for j in sorted(range(len(at_rest)), key=lambda j: bool(at_limit[j])):
         c, force = at_rest[j], found.friction[j]
         if not contacts.modes[c].closed:
@@ -458,9 +329,24 @@ def _agrees(
     front: Front,
     contacts: ContactState,
     stops: Sequence[int],
-    at_rest: Sequence[int],
+    at_rest: Mapping[int, float],
 ) -> bool:
-    """Return whether the modes satisfy the laws of all contacts, up to round-off."""
+    """Return whether the modes satisfy the laws of all contacts, up to round-off.
+
+    Parameters
+    ----------
+    scales : Scales
+        Of the mechanism.
+    front : Front
+        State.
+    contacts : ContactState
+        Modes of all contacts.
+    stops : sequence of int
+        Stops that touch.
+    at_rest : mapping
+        Contacts with friction and without a sliding velocity, with the force that is round-off
+        [N].
+    """
     e, v, equations = front.e, front.v, front.equations.with_contacts(contacts)
     a, lam, _, _ = equations.evaluate(front.time, front.q, v)
     opening = equations.gap_accelerations(front.time, e, v, a)
@@ -468,11 +354,11 @@ def _agrees(
     for i in stops:
         if forces[i] <= 0.0 if contacts.modes[i].closed else opening[i] < -zero:
             return False
-    for c in at_rest:
+    for c, slack in at_rest.items():
         mode = contacts.modes[c]
         if mode is STICK:
             force, limit = equations.friction(c, e, lam)
-            if abs(force) > (1.0 + FRICTION_EXCESS_RTOL) * limit:
+            if abs(force) > limit + max(FRICTION_EXCESS_RTOL * limit, slack):
                 return False
         elif mode.slip * equations.slip_acceleration(c, e, v, a) < -zero:
             return False

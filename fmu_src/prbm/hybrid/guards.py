@@ -184,7 +184,8 @@ def _closing_time_between(looks: Looks, guard: Guard, stop: int, j: int) -> floa
         if z(a) <= 0.0:
             return a  # The flight is lower than the resolution of a position.
     elif gap_a <= 0.0:
-        return a if gap_b < -near else None  # Without a rate of its own it only touches.
+        # Without a rate of its own it only touches; it may open from a small penetration.
+        return a if gap_b < gap_a - near else None
     if rate_a < 0.0 < rate_b:
         b = fall_time(looks.along(_gap_rate, stop, sign=-1.0), a, b)
         if z(b) > 0.0:

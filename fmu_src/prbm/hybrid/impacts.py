@@ -171,7 +171,7 @@ def _impulses(
         if mu.any():
             return _impulses_with_friction(configuration, front, struck, held, mu, restitution)
         return _impulses_without_friction(configuration, front, struck, held, restitution)
-    except SimulationError as error:
+    except (SimulationError, np.linalg.LinAlgError) as error:
         names = contact_names(configuration.mechanism, [*struck, *held])
         raise SimulationError(f"impact at t = {front.time:.9g} s ({names}): {error}") from None
 

@@ -1,8 +1,8 @@
 """Forces of all contacts at rest together: a complementarity problem on their accelerations.
 
 Stops that touch press or open; contacts without a sliding velocity stick or begin to slip.  While
-nothing slides there always are such forces; the friction of contacts that slide may exclude them
-(Painleve's paradox).
+nothing slides and no walls close in on the mechanism there are such forces.  The friction of
+contacts that slide may exclude them (Painleve's paradox).
 """
 
 from collections.abc import Sequence
@@ -28,12 +28,15 @@ class RestForces:
         Friction forces and their limits [N].
     slide : (m,)
         Accelerations of sliding [m/s^2].
+    mobility : (m,)
+        Accelerations of sliding by unit friction forces [1/kg].
     """
 
     normal: Real
     friction: Real
     limit: Real
     slide: Real
+    mobility: Real
 
 
 def rest_forces(
@@ -83,4 +86,4 @@ def rest_forces(
     if P is None:
         return None
     limit = fixed + friction * np.append(P[:k], 0.0)[normal]
-    return RestForces((P * np.diag(W))[:k], P[k:], limit, (W @ P + u)[k:])
+    return RestForces((P * np.diag(W))[:k], P[k:], limit, (W @ P + u)[k:], np.diag(W)[k:])

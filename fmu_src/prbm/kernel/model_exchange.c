@@ -431,9 +431,15 @@ static void stop_sliding(Simulation *sim, int contact) {
     double speed = sliding_velocity(system_of(sim), contact, at.e, at.v);
     if (fabs(speed) <= DRIFT_RTOL * speed_scale(sim)) {
         Problem ignored; /* closed and sticking may be one constraint too many: then it stays */
+        size_t mark = sim->scratch.used;
+        double *kept = take(&sim->scratch, (size_t)state_size(sim));
+        copy(state_size(sim), sim->state.front, kept);
         set_mode(sim, contact, CONTACT_STICK);
-        (void)project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch,
-                      &ignored);
+        if (!project(&sim->equations, sim->state.time, sim->state.front, &sim->scratch,
+                     &ignored)) {
+            copy(state_size(sim), kept, sim->state.front);
+        }
+        sim->scratch.used = mark;
     }
 }
 
@@ -492,16 +498,27 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
                     : follow_walls(sim, drifted, sim->state.time - sim->state.point, problem);
 }
 
+static bool too_many_events(const Simulation *sim, const Event *event, Problem *problem) {
+    return fail(problem,
+                "more than %d events (%s of %s the last) at t = %.9g s: the contact chatters; raise "
+                "rest_speed or damping.beta, lower the restitution, or give the body room between "
+                "its walls",
+                EVENTS_AT_ONCE_MAX * contact_count(sim), transition(event->kind)->name,
+                contact_name(sim->configuration.mechanism, event->contact), sim->state.time);
+}
+
 static bool apply_due_events(Simulation *sim, Problem *problem) {
-    enum { EVENTS_AT_ONCE_MAX = 16 };
     bool struck[STOPS_MAX] = {false};
-    for (int i = 0; i < EVENTS_AT_ONCE_MAX; i++) {
+    for (int i = 0;; i++) {
         if (!exchange_rates(sim, problem)) {
             return false;
         }
         Event event = due_here(sim, struck);
         if (event.kind == EVENT_NONE) {
-            break;
+            return true;
+        }
+        if (i == EVENTS_AT_ONCE_MAX * contact_count(sim)) {
+            return too_many_events(sim, &event, problem);
         }
         changed_front(sim);
         if (event.kind == EVENT_IMPACT) {
@@ -513,7 +530,6 @@ static bool apply_due_events(Simulation *sim, Problem *problem) {
             return false;
         }
     }
-    return exchange_rates(sim, problem);
 }
 
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem) {

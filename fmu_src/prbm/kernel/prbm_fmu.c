@@ -39,7 +39,6 @@
 #include "hybrid/walls.c"
 #include "hybrid/impacts.c"
 #include "hybrid/rest.c"
-#include "hybrid/holding_stops.c"
 #include "hybrid/contact_modes.c"
 #include "hybrid/stepping.c"
 #include "hybrid/simulation.c"

@@ -4,9 +4,12 @@ A linear complementarity problem asks for z with
 
     z >= 0,    w = M z + q >= 0,    z . w = 0.
 
-Lemke's method follows a path of pivots.  For the problems of contacts it ends in a solution if
-there is one: without friction, with friction at contacts that are all at rest, and in impacts.
-With contacts that slide, forces that satisfy the laws may not exist (Painleve's paradox).
+Lemke's method follows a path of pivots from a ray, which the covering vector gives.  The path ends
+in a solution or in another ray.  For contacts whose rates without forces are those of a possible
+motion, it ends in a solution [2].  Walls that close in on the mechanism, contacts that slide, and
+accelerations may exclude all solutions (Painleve's paradox).  There, too, a path may end in a ray
+although there is a solution: the paths of other covering vectors are tried before the problem
+counts as unsolvable.
 
 Sources
 -------
@@ -20,14 +23,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base.tolerances import PIVOT_RTOL, PIVOTS_FACTOR, RATIO_RTOL
+from ..base.tolerances import COVER_FACTOR, PIVOT_RTOL, PIVOTS_FACTOR, RATIO_RTOL
 from .arrays import Real
 
 Integers = NDArray[np.int_]
 
 
-def lemke(M: Real, q: Real) -> Real | None:
-    """Return a solution z of a linear complementarity problem; None without one.
+def lemke(M: Real, q: Real, cover: Real) -> Real | None:
+    """Return a solution z of a linear complementarity problem; None if the path ends in a ray.
 
     Parameters
     ----------
@@ -35,21 +38,24 @@ def lemke(M: Real, q: Real) -> Real | None:
         Matrix, with entries near one in magnitude.
     q : (m,)
         Constant part.
+    cover : (m,)
+        Covering vector, positive.
 
     Examples
     --------
-    >>> lemke(np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-4.0, 1.0])).tolist()
+    >>> ones = np.ones(2)
+    >>> lemke(np.array([[2.0, 1.0], [1.0, 2.0]]), np.array([-4.0, 1.0]), ones).tolist()
     [2.0, 0.0]
-    >>> lemke(np.array([[0.0]]), np.array([-1.0])) is None
+    >>> lemke(np.array([[0.0]]), np.array([-1.0]), ones[:1]) is None
     True
     """
     m, size = len(q), math.ldexp(1.0, math.frexp(float(np.abs(q).max(initial=0.0)))[1])
     if not m or q.min() >= 0.0:
         return np.zeros(m)
     # Columns of w (m), z (m), the covering variable, and the values.
-    table = np.hstack([np.eye(m), -M, -np.ones((m, 1)), (q / size)[:, None]])
+    table = np.hstack([np.eye(m), -M, -cover[:, None], (q / size)[:, None]])
     basis = list(range(m))
-    row, entering = _first_row(q / size), 2 * m
+    row, entering = _first_row(q / size / cover), 2 * m
     for _ in range(PIVOTS_FACTOR * m):
         leaving = basis[row]
         _exchange(table, row, entering)
@@ -152,8 +158,14 @@ def coulomb(W: Real, u: Real, friction: Real, fixed: Real, normal: Integers) -> 
     for j in range(m):
         if normal[j] >= 0:
             M[size + j, normal[j]] = friction[j] * scale[normal[j]] / scale[k + j]
-    z = lemke(M, np.concatenate([spread.T @ b, fixed / scale[k:]]))
-    return None if z is None else scale * (spread @ z[:size])
+    q = np.concatenate([spread.T @ b, fixed / scale[k:]])
+    for heavy in range(-1, k):
+        cover = np.ones(len(q))
+        cover[:k][np.arange(k) == heavy] = COVER_FACTOR
+        z = lemke(M, q, cover)
+        if z is not None:
+            return scale * (spread @ z[:size])
+    return None
 
 
 def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real | None:

@@ -211,7 +211,7 @@ class _Hit:
             work -= self.receive(step)
             self.u_n = 0.0 if step == closed else self.u_n + self.rate_n * step
             self.u_t = 0.0 if step == sticking else self.u_t + self.rate_t * step
-        if self.u_n < -max(small_n, COMPLEMENTARITY_RTOL * speed):
+        if not self.u_n >= -max(small_n, COMPLEMENTARITY_RTOL * speed):
             raise SimulationError(WEDGED)
         # With one degree of freedom both rates vanish together, up to round-off.
         self.u_n = self.u_n if self.u_n > small_n else 0.0

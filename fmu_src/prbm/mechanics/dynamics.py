@@ -221,7 +221,7 @@ class Equations:
         if self.mass_damping:
             Q -= self.mass_damping * (M @ v)
         for c in self.slipping_points:
-            Q += self._point_force(c, e) * self.slip_row(c, e)
+            Q -= self.contacts.modes[c].slip * self.friction_limit(c, e) * self.slip_row(c, e)
         for i in self.slipping_stops:
             share = -self.stop_friction[i] * self.contacts.modes[i].slip
             kkt[:n, n + self._hold_row(i)] += share * self.slip_row(i, e)
@@ -265,7 +265,8 @@ class Equations:
         e = self.system.directions(q)
         power = 0.0
         for c in self.slipping_points:
-            power -= self._point_force(c, e) * self.slip_rate(c, e, v)
+            limit = self.friction_limit(c, e)
+            power += self.contacts.modes[c].slip * limit * self.slip_rate(c, e, v)
         for i in self.slipping_stops:
             rate = self.slip_rate(i, e, v)
             force = float(lam[self._hold_row(i)])
@@ -424,10 +425,6 @@ class Equations:
         mu, preload, stiffness = self.friction_laws[point]
         lift = float((self.system.lifts[point] @ e).real) + self.system.lifts_c[point]
         return mu * forces.normal_force(lift, preload, stiffness)
-
-    def _point_force(self, contact: int, e: Complex) -> float:
-        """Return the friction force of a slipping friction point along its direction [N]."""
-        return -self.contacts.modes[contact].slip * self.friction_limit(contact, e)
 
     # -- reactions --
 

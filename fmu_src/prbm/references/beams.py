@@ -18,6 +18,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc
 
+from ..base.errors import EquilibriumError
+
 LOAD_MIN = 1e-9  # Below this load the difference of the elliptic integrals is round-off.
 
 
@@ -113,6 +115,11 @@ def wavenumber(mode: int, mass: float = 0.0, inertia: float = 0.0) -> float:
     mass, inertia : float
         mu, nu [-] (default: 0, no body).
 
+    Raises
+    ------
+    EquilibriumError
+        If the mode is not found.
+
     Examples
     --------
     Without a body cos b cosh b = -1; the first root is 1.8751, the second 4.6941:
@@ -132,8 +139,15 @@ def wavenumber(mode: int, mass: float = 0.0, inertia: float = 0.0) -> float:
         force = [q + mu * b * w for q, w in zip(shear, W, strict=True)]
         return bend[0] * force[1] - bend[1] * force[0]
 
-    grid = np.geomspace(1e-3, (mode + 1) * math.pi, 400 * (mode + 1))
+    # Dunkerley: the beam, the mass and the inertia alone have omega^-2 = 1/12.36, mu/3 and nu.
+    lowest = 0.9 * (mu / 3 + nu + 1 / 12) ** -0.25
+    grid = np.geomspace(min(1e-3, lowest), (mode + 1) * math.pi, 400 * (mode + 1))
     values = [determinant(float(b)) for b in grid]
     changes = [i for i in range(len(grid) - 1) if values[i] * values[i + 1] < 0]
+    if len(changes) < mode:
+        raise EquilibriumError(
+            f"mode {mode} of a cantilever with mass = {mass:g} and inertia = {inertia:g} was not "
+            "found: give a mass and an inertia of the order of the beam's"
+        )
     i = changes[mode - 1]
     return float(brentq(determinant, grid[i], grid[i + 1], xtol=1e-15, rtol=1e-14))

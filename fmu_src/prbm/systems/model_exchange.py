@@ -23,6 +23,7 @@ from .components import MODEL_EXCHANGE, Component, CouplingError, Value, start_v
 Real = NDArray[np.float64]
 Partner = Callable[[float, Mapping[str, Value], Real], tuple[Mapping[str, float], Sequence[float]]]
 EVENT_TIME_ATOL = 1e-14  # s
+UPDATES_MAX = 1000  # Updates of discrete states at one time.
 STATE_ATOL_FACTOR = 1e-3  # Absolute tolerance over (relative tolerance times nominal value).
 NAMES2 = {
     "updateDiscreteStates": "newDiscreteStates",
@@ -75,9 +76,21 @@ class Model(Component):
         self.call("exitInitializationMode")
 
     def update(self) -> None:
-        """Update discrete states until no further update is needed; leave event mode."""
-        while self.call("updateDiscreteStates")[0]:
-            pass
+        """Update discrete states until no further update is needed; leave event mode.
+
+        Raises
+        ------
+        CouplingError
+            If the model requests more than ``UPDATES_MAX`` updates.
+        """
+        for _ in range(UPDATES_MAX):
+            if not self.call("updateDiscreteStates")[0]:
+                break
+        else:
+            raise CouplingError(
+                f"at {self.time:g} s the model requests more than {UPDATES_MAX} updates of its "
+                "discrete states: its events do not end; check its parameters"
+            )
         self.call("enterContinuousTimeMode")
 
     def put(self, time: float, x: Real) -> None:

@@ -8,6 +8,7 @@ from scipy.optimize import minimize_scalar
 from ..analysis.impact_map import algebraic, by_elements
 from ..analysis.spectrum import after_impact, spectrum
 from ..base.progress import Progress
+from ..data.uncertainty import EvaluationError
 from ..drawing.style import own_style
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
@@ -113,6 +114,10 @@ def figure_6_2(progress: Progress) -> Result:
             method="bounded",
             options={"xatol": 1e-3},
         )
+        if not best.success:
+            raise EvaluationError(
+                f"K_theta_2 was not fitted for K_theta_1 = {first}: {best.message}"
+            )
         valley.append((first, float(best.x), float(best.fun)))
         progress((i + 1) / (len(TRIED) + 1))
     f = repeated(target.t, target.x)

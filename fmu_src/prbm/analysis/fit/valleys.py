@@ -70,7 +70,7 @@ def valley(
     Raises
     ------
     EvaluationError
-        If there is only one parameter, or ``along`` was not fitted.
+        If there is only one parameter, ``along`` was not fitted, or a fit does not converge.
     """
     problem = found.problem
     if len(problem.names) < 2:
@@ -92,7 +92,13 @@ def valley(
     for order in (range(centre, len(values)), range(centre - 1, -1, -1)):
         near = found.p
         for j in order:
-            rows[j] = near = problem.minimised(_replaced(near, i, values[j]), others)[0]
+            near, evaluations, converged = problem.minimised(_replaced(near, i, values[j]), others)
+            if not converged:
+                raise EvaluationError(
+                    f"the fit with {along} = {values[j]:g} did not converge in {evaluations} model "
+                    "evaluations: narrow the span, or the bounds of the other parameters"
+                )
+            rows[j] = near
             if progress is not None:
                 progress(len(rows) / len(values))
     ordered = np.array([rows[j] for j in sorted(rows)])

@@ -465,7 +465,10 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
         M[i] /= scale[i / n] * scale[i % n];
     }
     if (sound) {
-        symmetric_eigen(system->n, M, w, NULL);
+        if (!symmetric_eigen(system->n, M, w, NULL, problem)) {
+            scratch->used = mark;
+            return false;
+        }
         sound = w[0] > MASSLESS_RTOL;
     }
     scratch->used = mark;

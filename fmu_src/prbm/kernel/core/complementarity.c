@@ -16,8 +16,8 @@ typedef struct {
     int *basis;
 } Pivots;
 
-static Pivots first_pivots(int m, const double *M, const double *q, double size,
-                           Scratch *scratch) {
+static Pivots first_pivots(int m, const double *M, const double *q, const double *cover,
+                           double size, Scratch *scratch) {
     int width = 2 * m + 2;
     Pivots pivots = {m, width, take_matrix(scratch, m, width), take_integers(scratch, m)};
     for (int i = 0; i < m; i++) {
@@ -27,7 +27,7 @@ static Pivots first_pivots(int m, const double *M, const double *q, double size,
         for (int j = 0; j < m; j++) {
             row[m + j] = -M[i * m + j];
         }
-        row[2 * m] = -1.0;
+        row[2 * m] = -cover[i];
         row[2 * m + 1] = q[i] / size;
         pivots.basis[i] = i;
     }
@@ -129,19 +129,20 @@ static bool follow_pivots(Pivots *pivots, int row, int *rows) {
     return false;
 }
 
-PRBM bool lemke(int m, const double *M, const double *q, double *z, Scratch *scratch) {
+PRBM bool lemke(int m, const double *M, const double *q, const double *cover, double *z,
+                Scratch *scratch) {
     size_t used = scratch->used;
     int last = 0, exponent;
     zeros(m, z);
     for (int i = 0; i < m; i++) {
-        last = q[i] <= q[last] ? i : last; /* the least in lexicographic order */
+        last = q[i] / cover[i] <= q[last] / cover[last] ? i : last; /* in lexicographic order */
     }
     if (m == 0 || q[last] >= 0.0) {
         return true;
     }
     (void)frexp(largest(m, q), &exponent);
     double size = ldexp(1.0, exponent);
-    Pivots pivots = first_pivots(m, M, q, size, scratch);
+    Pivots pivots = first_pivots(m, M, q, cover, size, scratch);
     bool solved = follow_pivots(&pivots, last, take_integers(scratch, m));
     if (solved) {
         values_of(&pivots, size, z);
@@ -190,12 +191,19 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *
     int size = k + 3 * m;
     double *scale = take(scratch, (size_t)(k + m)), *M = take_matrix(scratch, size, size);
     double *q = take(scratch, (size_t)size), *z = take(scratch, (size_t)size);
+    double *cover = take(scratch, (size_t)size);
+    bool solved = false;
     for (int i = 0; i < k + m; i++) {
         double mobility = fabs(W[i * (k + m) + i]);
         scale[i] = mobility > 0.0 ? 1.0 / sqrt(mobility) : 1.0;
     }
     set_problem(k, m, W, u, friction, fixed, normal, scale, M, q);
-    bool solved = lemke(size, M, q, z, scratch);
+    for (int heavy = -1; !solved && heavy < k; heavy++) {
+        for (int i = 0; i < size; i++) {
+            cover[i] = i == heavy ? COVER_FACTOR : 1.0;
+        }
+        solved = lemke(size, M, q, cover, z, scratch);
+    }
     for (int i = 0; solved && i < k + m; i++) {
         P[i] = scale[i] * (i < k ? z[i] : z[i] - z[i + m]);
     }

@@ -5,7 +5,8 @@
 #include "core/memory.h"
 
 /* z >= 0, w = M z + q >= 0, z.w = 0, all (m,), by Lemke's method; false without a solution. */
-PRBM bool lemke(int m, const double *M, const double *q, double *z, Scratch *scratch);
+PRBM bool lemke(int m, const double *M, const double *q, const double *cover, double *z,
+                Scratch *scratch);
 /* Forces P (k + m,) of k normals and m tangents that satisfy the laws of contact and of friction,
  * with the rates W P + u; false without a solution.  normal: on which the limit fixed + friction
  * P_n of each tangent depends; -1: none. */

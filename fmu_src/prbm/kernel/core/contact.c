@@ -36,10 +36,10 @@ static bool closing_in(Problem *problem) {
                          "them apart, or slow them down");
 }
 
-/* W_ss P_s = -b_s for the members s; returns whether none of them pulls.  Those that do have no
+/* W_ss P_s = -b_s for the members s; *pulling: whether one of them pulls.  Those that do have no
  * impulse and are members no longer. */
 static bool share_impulses(int k, int *size, int *members, const double *W, const double *b,
-                           double *P, Scratch *scratch) {
+                           double *P, bool *pulling, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int count = *size, pushing = 0;
     double *part = take_matrix(scratch, count, count), *right = take(scratch, (size_t)count);
@@ -50,7 +50,8 @@ static bool share_impulses(int k, int *size, int *members, const double *W, cons
             part[i * count + j] = W[members[i] * k + members[j]];
         }
     }
-    least_squares(count, count, part, right, IMPULSE_RANK_RTOL, found, scratch);
+    bool solved = least_squares(count, count, part, right, IMPULSE_RANK_RTOL, found, scratch,
+                                problem);
     zeros(k, P);
     for (int i = 0; i < count; i++) {
         if (!(found[i] < 0.0)) {
@@ -59,14 +60,15 @@ static bool share_impulses(int k, int *size, int *members, const double *W, cons
         }
     }
     *size = pushing;
+    *pulling = pushing < count;
     scratch->used = used;
-    return pushing == count;
+    return solved;
 }
 
 /* Share the impulses between the stops that open neither sooner nor later than they must, as evenly
  * as they can be shared. */
-static void share_evenly(int k, const double *W, const double *b, double tolerance, double *P,
-                         Scratch *scratch) {
+static bool share_evenly(int k, const double *W, const double *b, double tolerance, double *P,
+                         Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     double *shared = take(scratch, (size_t)k);
     int *members = take_integers(scratch, k), size = 0;
@@ -76,14 +78,15 @@ static void share_evenly(int k, const double *W, const double *b, double toleran
         }
     }
     zeros(k, shared);
-    bool pulling = size > 0;
-    while (pulling && size > 0) {
-        pulling = !share_impulses(k, &size, members, W, b, shared, scratch);
+    bool pulling = true, solved = true;
+    while (solved && pulling && size > 0) {
+        solved = share_impulses(k, &size, members, W, b, shared, &pulling, scratch, problem);
     }
-    if (violation(k, 0, W, b, shared, NULL) <= tolerance) {
+    if (solved && violation(k, 0, W, b, shared, NULL) <= tolerance) {
         copy(k, shared, P);
     }
     scratch->used = used;
+    return solved;
 }
 
 PRBM bool newton(int k, const double *W, const double *u, const double *restitution, double speed,
@@ -96,11 +99,9 @@ PRBM bool newton(int k, const double *W, const double *u, const double *restitut
         b[i] = (1.0 + restitution[i]) * u[i];
     }
     bool solved = impulses(k, 0, W, b, NULL, least, tolerance, P, scratch);
-    if (solved) {
-        share_evenly(k, W, b, tolerance, P, scratch);
-    }
+    solved = solved ? share_evenly(k, W, b, tolerance, P, scratch, problem) : closing_in(problem);
     scratch->used = used;
-    return solved || closing_in(problem);
+    return solved;
 }
 
 /* --- one hit with friction -------------------------------------------------------------------- */
@@ -198,7 +199,7 @@ PRBM bool stronge(const double *W, const double *u, double friction, double rest
     double small_n = ZERO_SPEED_RTOL * fabs(hit.u_n);
     double small_t = ZERO_SPEED_RTOL * (fabs(hit.u_t) + reach);
     double work = compress(&hit);
-    if (hit.u_n < -greater(small_n, COMPLEMENTARITY_RTOL * speed)) {
+    if (!(hit.u_n >= -greater(small_n, COMPLEMENTARITY_RTOL * speed))) {
         return fail(problem, "the wall pushes the mechanism in a direction that friction locks; "
                              "reduce the friction of the stop, or the velocity of the wall");
     }

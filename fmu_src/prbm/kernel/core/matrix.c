@@ -8,8 +8,6 @@
 
 #include "core/matrix.h"
 
-enum { ROTATION_SWEEPS_MAX = 60 }; /* Jacobi sweeps converge quadratically; six are usual. */
-
 PRBM double dot(int n, const double *a, const double *b) {
     double sum = 0.0;
     for (int i = 0; i < n; i++) {
@@ -161,10 +159,11 @@ static void rotate(int n, double c, double s, double *p, double *q, int stride) 
 
 /* One-sided Jacobi: rotate the rows of g (k, n) until they are orthogonal, and the rows of v (k,
  * k), unless NULL, with them.  The norms of the rows are then the singular values.  Rows shorter
- * than the round-off of the longest count as orthogonal. */
-static void orthogonalise(int k, int n, double *g, double *v) {
+ * than the round-off of the longest count as orthogonal.  False without convergence, or if a
+ * number is not finite. */
+static bool orthogonalise(int k, int n, double *g, double *v) {
     double noise = DBL_EPSILON * largest(k * n, g);
-    bool turned = true;
+    bool turned = finite_number(noise);
     for (int sweep = 0; turned && sweep < ROTATION_SWEEPS_MAX; ++sweep) {
         turned = false;
         for (int i = 0; i < k; i++) {
@@ -185,6 +184,7 @@ static void orthogonalise(int k, int n, double *g, double *v) {
             }
         }
     }
+    return !turned && finite_number(noise);
 }
 
 static void identity(int n, double *a) {
@@ -208,27 +208,28 @@ static double norm(int n, const double *x) {
 
 /* Compute the singular values s (k,) of a = sum s_i u_i v_i^T or its transpose, k = min(m, n).  The
  * rows of g (k, n) are s_i u_i, those of v (k, k), unless NULL, are v_i. */
-static void singular_values(int m, int n, const double *a, double *s, double *g, double *v) {
+static bool singular_values(int m, int n, const double *a, double *s, double *g, double *v) {
     int k = m < n ? m : n, length = m < n ? n : m;
     wide(m, n, a, g);
     if (v != NULL) {
         identity(k, v);
     }
-    orthogonalise(k, length, g, v);
+    bool found = orthogonalise(k, length, g, v);
     for (int i = 0; i < k; i++) {
         s[i] = norm(length, g + i * length);
     }
+    return found;
 }
 
 /* x = sum (left_i . b) right_i/s_i^2 over the s_i above the limit, where either left_i or right_i
  * has the norm s_i and the other the norm 1. */
-PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
-                        Scratch *scratch) {
+PRBM bool least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
+                        Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int k = m < n ? m : n;
     double *s = take(scratch, (size_t)k), *v = take_matrix(scratch, k, k);
     double *g = take_matrix(scratch, m, n);
-    singular_values(m, n, a, s, g, v);
+    bool found = singular_values(m, n, a, s, g, v);
     const double *left = m <= n ? v : g, *right = m <= n ? g : v;
     double least = rcond * largest(k, s);
     zeros(n, x);
@@ -241,6 +242,8 @@ PRBM void least_squares(int m, int n, const double *a, const double *b, double r
         }
     }
     scratch->used = used;
+    return found || fail(problem, "a sum of least squares was not found: a mass, a length or an "
+                                  "input is too large or too small; check the parameters");
 }
 
 /* --- eigenvalues ------------------------------------------------------------------------------ */
@@ -257,9 +260,10 @@ static void jacobi_rotation(int n, double *a, double *z, int p, int q) {
     }
 }
 
-static void jacobi_sweeps(int n, double *a, double *z) {
+/* False without convergence, or if a number is not finite. */
+static bool jacobi_sweeps(int n, double *a, double *z) {
     double negligible = 0.5 * DBL_EPSILON * DBL_EPSILON * largest(n * n, a);
-    bool turned = true;
+    bool turned = finite_number(negligible);
     for (int sweep = 0; turned && sweep < ROTATION_SWEEPS_MAX; ++sweep) {
         turned = false;
         for (int p = 0; p < n; p++) {
@@ -272,6 +276,7 @@ static void jacobi_sweeps(int n, double *a, double *z) {
             }
         }
     }
+    return !turned && finite_number(negligible);
 }
 
 /* Sort the eigenvalues, and the columns of z with them, in ascending order. */
@@ -292,15 +297,19 @@ static void sort_eigen(int n, double *w, double *z) {
     }
 }
 
-PRBM void symmetric_eigen(int n, double *a, double *w, double *z) {
+PRBM bool symmetric_eigen(int n, double *a, double *w, double *z, Problem *problem) {
     if (z != NULL) {
         identity(n, z);
     }
-    jacobi_sweeps(n, a, z);
+    if (!jacobi_sweeps(n, a, z)) {
+        return fail(problem, "the eigenvalues of a matrix were not found: a mass, a stiffness or a "
+                             "length is too large or too small; check the parameters");
+    }
     for (int i = 0; i < n; i++) {
         w[i] = a[i * n + i];
     }
     sort_eigen(n, w, z);
+    return true;
 }
 
 /* --- null space ------------------------------------------------------------------------------- */

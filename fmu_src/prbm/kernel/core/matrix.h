@@ -18,11 +18,11 @@ PRBM void forward(int n, const double *a, double *b);  /* b := L^-1 b */
 PRBM void backward(int n, const double *a, double *b); /* b := L^-T b */
 /* Compute the x of least norm that minimises |a x - b|, as np.linalg.lstsq.  a is (m, n); singular
  * values below rcond times the largest count as zero. */
-PRBM void least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
-                        Scratch *scratch);
+PRBM bool least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
+                        Scratch *scratch, Problem *problem);
 /* Compute the eigenvalues w of a symmetric matrix in ascending order and, unless z is NULL, its
  * orthonormal eigenvectors, the columns of z, by cyclic Jacobi rotations; a is overwritten. */
-PRBM void symmetric_eigen(int n, double *a, double *w, double *z);
+PRBM bool symmetric_eigen(int n, double *a, double *w, double *z, Problem *problem);
 /* Compute an orthonormal basis z (n, n - r) of the null space of rows (r, n) of full rank. */
 PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch);
 

@@ -63,7 +63,10 @@ static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y,
         return fail(problem, "the modes cannot be computed: a part that can move has no mass");
     }
     divide_twice(n, M, K, column);
-    symmetric_eigen(n, K, w, Y);
+    if (!symmetric_eigen(n, K, w, Y, problem)) {
+        scratch->used = used;
+        return false;
+    }
     for (int j = 0; j < n; j++) {
         for (int i = 0; i < n; i++) {
             column[i] = Y[i * n + j];

@@ -4,15 +4,148 @@
 
 #include "hybrid/hybrid.h"
 
-/* Set up the trial equations in the present contact state with one mode changed. */
-static void try_mode(Simulation *sim, int contact, int mode) {
-    size_t bytes = (size_t)contact_count(sim) * sizeof(int);
-    memcpy(sim->trial.contacts.modes, sim->state.modes, bytes);
-    sim->trial.contacts.modes[contact] = mode;
-    try_contacts(sim);
+/* --- trial equations -------------------------------------------------------------------------- */
+
+/* Set up the trial equations in a contact state. */
+static void try_contacts(Simulation *sim, const int *modes) {
+    memmove(sim->trial.contacts.modes, modes, (size_t)contact_count(sim) * sizeof *modes);
+    set_equations(&sim->trial.equations, &sim->equations.inputs, &sim->trial.contacts,
+                  sim->configuration.omega);
 }
 
-/* --- friction of one contact ------------------------------------------------------------------ */
+/* The mode of a closed contact with a sliding velocity, CONTACT_FRICTIONLESS at round-off. */
+static int slip_mode(const Simulation *sim, double speed) {
+    return fabs(speed) <= zero_speed(&sim->configuration) ? CONTACT_FRICTIONLESS
+                                                          : slipping_mode(speed);
+}
+
+static double friction_of(const Simulation *sim, int contact) {
+    const System *system = system_of(sim);
+    return is_stop(system, contact) ? sim->equations.stop_friction[contact]
+                                    : sim->equations.rub_law[3 * (contact - system->s)];
+}
+
+/* The contact state in which a set of stops is closed and all contacts that move slip, if they have
+ * friction. */
+static void modes_holding(Simulation *sim, const HoldingSet *holding, const double *q,
+                          const double *v, int *modes) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    Complex *e = directions_at(sim, q);
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        bool open = is_stop(system, contact) &&
+                    !has_contact(holding->count, holding->stops, contact);
+        modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
+        if (!open && friction_of(sim, contact) > 0.0) {
+            modes[contact] = slip_mode(sim, sliding_velocity(system, contact, e, v));
+        }
+    }
+    sim->scratch.used = mark;
+}
+
+PRBM void equations_holding(Simulation *sim, const HoldingSet *holding, const double *q,
+                            const double *v) {
+    int modes[CONTACTS_MAX];
+    modes_holding(sim, holding, q, v, modes);
+    try_contacts(sim, modes);
+}
+
+/* Whether a contact at rest satisfies its law in the trial equations, up to round-off; slack is the
+ * friction that is round-off. */
+static bool obeys_coulomb(Simulation *sim, int contact, double slack, const Complex *e,
+                          const double *v, double *row) {
+    const System *system = system_of(sim);
+    const Equations *equations = &sim->trial.equations;
+    const Evaluation *tried = &sim->trial.evaluation;
+    int mode = sim->trial.contacts.modes[contact];
+    if (mode == CONTACT_STICK) {
+        double limit = friction_limit(equations, e, tried->lam, contact);
+        return fabs(stick_force(equations, tried->lam, contact)) <=
+               limit + greater(FRICTION_EXCESS_RTOL * limit, slack);
+    }
+    tangential_row(system, contact, e, row);
+    double slide = dot(system->n, row, tried->a) - tangential_convective(system, contact, e, v);
+    return !(slip_sign(mode) * slide < -zero_acceleration(&sim->configuration));
+}
+
+/* Whether the modes of the trial equations satisfy the laws of all contacts, up to round-off. */
+static bool modes_agree(Simulation *sim, const double *q, const double *v,
+                        const HoldingSet *touching, const RestContacts *rest,
+                        const RestForces *found, bool *result, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    const Equations *equations = &sim->trial.equations;
+    const Evaluation *tried = &sim->trial.evaluation;
+    double *row = take(&sim->scratch, (size_t)system_of(sim)->n);
+    double zero = zero_acceleration(&sim->configuration);
+    Complex *e = directions_at(sim, q);
+    bool right = evaluate_equations(equations, sim->state.front_time, q, v, NULL,
+                                    &sim->trial.evaluation, problem);
+    *result = right;
+    for (int k = 0; *result && k < touching->count; k++) {
+        int i = touching->stops[k];
+        *result = sim->trial.contacts.modes[i] != CONTACT_OPEN
+                      ? stop_force(equations, tried->lam, i) > 0.0
+                      : !(gap_acceleration(equations, i, sim->state.front_time, e, v, tried->a) <
+                          -zero);
+    }
+    for (int j = 0; *result && j < rest->count; j++) {
+        *result = obeys_coulomb(sim, rest->contacts[j], zero / found->mobility[j], e, v, row);
+    }
+    sim->scratch.used = mark;
+    return right;
+}
+
+/* --- stops ------------------------------------------------------------------------------------ */
+
+/* The stops at rest that hold: pressed together, while the others open.  Contacts that move slip
+ * meanwhile, those at rest are frictionless.  Of stops that can move only together, those hold
+ * whose rows are independent. */
+PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
+                             const double *v, HoldingSet *holding, Problem *problem) {
+    HoldingSet every = {0, {0}, false}, none = {0, {0}, true};
+    int modes[CONTACTS_MAX];
+    RestContacts rest;
+    RestForces found;
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        if (has_contact(count, candidates, i)) {
+            every.stops[every.count++] = i;
+        }
+    }
+    *holding = none;
+    if (every.count == 0) {
+        return true;
+    }
+    modes_holding(sim, &every, q, v, modes);
+    rest.stop_count = every.count;
+    rest.count = 0;
+    for (int k = 0; k < every.count; k++) {
+        rest.stops[k] = every.stops[k];
+        rest.slips[k] = slip_sign(modes[every.stops[k]]);
+    }
+    equations_holding(sim, &none, q, v);
+    if (!rest_forces(sim, q, v, &rest, &found, problem)) {
+        return false;
+    }
+    for (int k = 0; found.solved && k < every.count; k++) {
+        if (found.normal[k] > zero_acceleration(&sim->configuration)) {
+            holding->stops[holding->count++] = every.stops[k];
+        }
+    }
+    holding->found = found.solved;
+    if (!found.solved || every.count == 1) {
+        return true; /* a stop alone is pressed or opens; several may depend on each other */
+    }
+    equations_holding(sim, holding, q, v);
+    return modes_agree(sim, q, v, &every, &rest, &found, &holding->found, problem);
+}
+
+static bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
+                          const double *v, HoldingSet *holding, Problem *problem) {
+    return find_holding_stops(sim, count, candidates, q, v, holding, problem) &&
+           (holding->found || contacts_jammed(sim, count, candidates, problem));
+}
+
+/* --- friction --------------------------------------------------------------------------------- */
 
 /* The contact that an event of friction has, or -1: it slips and cannot stick, or its sliding has
  * ended with no more than a slow speed left. */
@@ -23,212 +156,25 @@ typedef struct {
 } FrictionEvent;
 
 /* Whether a contact at rest has a mobility of its own beside the closed and sticking ones. */
-static bool has_mobility(Simulation *sim, int contact, const Inertia *at, const double *row,
-                         bool *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
+static bool is_mobile(Simulation *sim, int contact, const int *modes, bool *result,
+                      Problem *problem) {
+    size_t mark = sim->scratch.used, bytes = (size_t)contact_count(sim) * sizeof *modes;
     const System *system = system_of(sim);
     const Equations *q = &sim->trial.equations;
-    double left = 0.0, own = 0.0;
-    try_mode(sim, contact, CONTACT_FRICTIONLESS);
+    double left = 0.0, own = 0.0, *row = take(&sim->scratch, (size_t)system->n);
+    int others[CONTACTS_MAX];
+    Inertia at = inertia_at(sim, sim->state.front);
+    memcpy(others, modes, bytes);
+    others[contact] = CONTACT_FRICTIONLESS;
+    try_contacts(sim, others);
+    tangential_row(system, contact, at.e, row);
     double *held = take_matrix(&sim->scratch, q->r, system->n);
-    jacobian(&q->active, at->e, held);
-    bool right = mobility(sim, at, q->r, held, row, &left, problem) &&
-                 mobility(sim, at, system->r, at->loops, row, &own, problem);
+    jacobian(&q->active, at.e, held);
+    bool right = mobility(sim, &at, q->r, held, row, &left, problem) &&
+                 mobility(sim, &at, system->r, at.loops, row, &own, problem);
     *result = left > DEPENDENT_FRICTION_RTOL * own;
     sim->scratch.used = mark;
     return right;
-}
-
-/* Whether a contact that is at rest and may move sticks, or which way it slips; and whether this
- * fits while all others keep their modes. */
-static bool mode_at_rest(Simulation *sim, int contact, const Inertia *at, const double *row,
-                         bool slips, int *mode, bool *fits, Problem *problem) {
-    double greatest = 0.0;
-    const System *system = system_of(sim);
-    const Evaluation *tried = &sim->trial.evaluation;
-    const double *q = sim->state.front, *v = q + system->n;
-    try_mode(sim, contact, CONTACT_STICK);
-    if (!evaluate_trial(sim, q, v, problem)) {
-        return false;
-    }
-    double friction = stick_force(&sim->trial.equations, tried->lam, contact);
-    double limit = friction_limit(&sim->trial.equations, at->e, tried->lam, contact);
-    *mode = CONTACT_STICK;
-    if (fabs(friction) <= limit && !slips) {
-        return true;
-    }
-    double convective = tangential_convective(system, contact, at->e, v);
-    int first = friction > 0.0 ? -1 : 1;
-    for (int attempts = 0; attempts < 2; attempts++) {
-        int sign = attempts == 0 ? first : -first;
-        try_mode(sim, contact, slipping_mode(sign));
-        if (!evaluate_trial(sim, q, v, problem)) {
-            return false;
-        }
-        double acceleration = sign * (dot(system->n, row, tried->a) - convective);
-        if (acceleration > 0.0) {
-            *mode = slipping_mode(sign);
-            return true;
-        }
-        greatest = greater(greatest, -acceleration);
-    }
-    /* where there is as good as no friction, either of these fits */
-    *mode = slips ? CONTACT_FRICTIONLESS : CONTACT_STICK;
-    *fits = greatest <= zero_acceleration(&sim->configuration);
-    return true;
-}
-
-/* The mode of a closed contact with friction.  It slips if it moves faster than slow.  At rest it
- * is frictionless where the loops and the closed stops leave it no mobility of its own: they
- * carry all of the load.  Else it sticks as far as Coulomb's law allows, and beyond slips in the
- * direction in which sliding accelerates it. */
-static bool choose_mode(Simulation *sim, int contact, const FrictionEvent *event, bool *fits,
-                        Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    bool this_one = event->contact == contact, mobile = false, right = true;
-    double slow = this_one ? event->slow : 0.0, *row = take(&sim->scratch, (size_t)system->n);
-    Inertia at = inertia_at(sim, sim->state.front);
-    *fits = true;
-    tangential_row(system, contact, at.e, row);
-    double speed = dot(system->n, row, sim->state.front + system->n);
-    int mode = fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
-    if (mode == CONTACT_FRICTIONLESS) {
-        right = has_mobility(sim, contact, &at, row, &mobile, problem);
-        if (right && mobile) {
-            right = mode_at_rest(sim, contact, &at, row, this_one && event->slips, &mode, fits,
-                                 problem);
-        }
-    }
-    sim->scratch.used = mark;
-    if (right) {
-        set_mode(sim, contact, mode);
-    }
-    return right;
-}
-
-/* --- friction of several contacts ------------------------------------------------------------- */
-
-/* Whether a contact at rest has a mobility of its own beside what is closed and sticks now. */
-static bool is_mobile(Simulation *sim, int contact, bool *result, Problem *problem) {
-    size_t mark = sim->scratch.used;
-    double *row = take(&sim->scratch, (size_t)system_of(sim)->n);
-    Inertia at = inertia_at(sim, sim->state.front);
-    tangential_row(system_of(sim), contact, at.e, row);
-    bool right = has_mobility(sim, contact, &at, row, result, problem);
-    sim->scratch.used = mark;
-    return right;
-}
-
-/* Whether the forces and accelerations in the present contact state agree with its modes. */
-static bool forces_agree(Simulation *sim, int count, const int *contacts, bool *result,
-                         Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    const Equations *equations = &sim->trial.equations;
-    const Evaluation *tried = &sim->trial.evaluation;
-    const double *q = sim->state.front, *v = q + system->n;
-    double *row = take(&sim->scratch, (size_t)system->n);
-    Complex *e = directions_at(sim, q);
-    memcpy(sim->trial.contacts.modes, sim->state.modes, (size_t)contact_count(sim) * sizeof(int));
-    try_contacts(sim);
-    bool right = evaluate_trial(sim, q, v, problem);
-    for (int k = 0; right && *result && k < equations->held_count; k++) {
-        *result = tried->lam[equations->first_hold + k] > 0.0;
-    }
-    for (int k = 0; right && *result && k < count; k++) {
-        int contact = contacts[k], mode = sim->state.modes[contact];
-        if (mode == CONTACT_STICK) {
-            *result = fabs(stick_force(equations, tried->lam, contact)) <=
-                      friction_limit(equations, e, tried->lam, contact);
-        } else {
-            tangential_row(system, contact, e, row);
-            double convective = tangential_convective(system, contact, e, v);
-            *result = slip_sign(mode) * (dot(system->n, row, tried->a) - convective) > 0.0;
-        }
-    }
-    sim->scratch.used = mark;
-    return right;
-}
-
-static bool state_agrees(Simulation *sim, int count, const int *contacts, bool *result,
-                         Problem *problem) {
-    *result = true;
-    for (int k = 0; *result && k < count; k++) {
-        if (sim->state.modes[contacts[k]] == CONTACT_STICK &&
-            !is_mobile(sim, contacts[k], result, problem)) {
-            return false;
-        }
-    }
-    return !*result || forces_agree(sim, count, contacts, result, problem);
-}
-
-/* The contacts at rest that have a mobility beside the closed stops; all at rest are left without
- * friction. */
-static bool mobile_at_rest(Simulation *sim, int count, const int *contacts,
-                           const FrictionEvent *event, int *mobile_count, int *mobile,
-                           Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    int n = system->n, resting = 0, at_rest[CONTACTS_MAX];
-    bool right = true, moves = false;
-    double *row = take(&sim->scratch, (size_t)n);
-    Complex *e = directions_at(sim, sim->state.front);
-    for (int k = 0; k < count; k++) {
-        tangential_row(system, contacts[k], e, row);
-        double speed = dot(n, row, sim->state.front + n);
-        double slow = event->contact == contacts[k] ? event->slow : 0.0;
-        if (fabs(speed) <= slow || slip_mode(sim, speed) == CONTACT_FRICTIONLESS) {
-            at_rest[resting++] = contacts[k];
-        }
-    }
-    sim->scratch.used = mark;
-    for (int k = 0; k < resting; k++) {
-        set_mode(sim, at_rest[k], CONTACT_FRICTIONLESS);
-    }
-    *mobile_count = 0;
-    for (int k = 0; right && k < resting; k++) {
-        right = is_mobile(sim, at_rest[k], &moves, problem);
-        if (right && moves) {
-            mobile[(*mobile_count)++] = at_rest[k];
-        }
-    }
-    return right;
-}
-
-/* Set the modes of the c-th combination; false if the contact that slips would stick in it. */
-static bool set_combination(Simulation *sim, int c, int count, const int *contacts,
-                            const FrictionEvent *event) {
-    static const int modes[3] = {CONTACT_STICK, CONTACT_SLIP_POSITIVE, CONTACT_SLIP_NEGATIVE};
-    bool allowed = true;
-    for (int k = count - 1, rest = c; k >= 0; k--, rest /= 3) {
-        int mode = modes[rest % 3];
-        set_mode(sim, contacts[k], mode);
-        allowed = allowed && !(event->slips && event->contact == contacts[k] &&
-                               mode == CONTACT_STICK);
-    }
-    return allowed;
-}
-
-/* Choose the modes of the contacts at rest together, if choosing them one by one does not end.  It
- * is the first combination in which sticking needs no more than its friction, slipping accelerates
- * in its direction, and all closed stops are pressed.  None is found with too many at rest. */
-static bool settle_together(Simulation *sim, int count, const int *contacts,
-                            const FrictionEvent *event, bool *found, Problem *problem) {
-    int mobile[CONTACTS_MAX], many, combinations = 1;
-    if (!mobile_at_rest(sim, count, contacts, event, &many, mobile, problem)) {
-        return false;
-    }
-    for (int k = 0; k < many && many <= STICKING_SETS_MAX; k++) {
-        combinations *= 3;
-    }
-    for (int c = 0; many <= STICKING_SETS_MAX && !*found && c < combinations; c++) {
-        if (set_combination(sim, c, many, mobile, event) &&
-            !state_agrees(sim, many, mobile, found, problem)) {
-            return false;
-        }
-    }
-    return true;
 }
 
 /* The mode of a contact that slides faster than the event leaves; CONTACT_FRICTIONLESS at rest. */
@@ -241,192 +187,151 @@ static int sliding_mode(Simulation *sim, int contact, const FrictionEvent *event
     return fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
 }
 
-static double friction_of(const Simulation *sim, int contact) {
-    const System *system = system_of(sim);
-    return is_stop(system, contact) ? sim->equations.stop_friction[contact]
-                                    : sim->equations.rub_law[3 * (contact - system->s)];
-}
-
-/* Whether a contact at rest begins to slip, sticks, bears the limit of its friction, or none. */
+/* Choose whether a contact at rest begins to slip, sticks, bears the limit of its friction, or
+ * none. */
 static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
-                           bool slipped, Problem *problem) {
-    bool mobile = false, at_limit = fabs(found->friction[j]) >= found->limit[j];
-    int mode = CONTACT_FRICTIONLESS;
+                           bool at_limit, bool slipped, int *modes, Problem *problem) {
+    bool mobile = false;
     if (fabs(found->slide[j]) > zero_acceleration(&sim->configuration)) {
-        set_mode(sim, contact, slipping_mode(found->slide[j]));
+        modes[contact] = slipping_mode(found->slide[j]);
         return true;
     }
-    if (!(at_limit && slipped) && !is_mobile(sim, contact, &mobile, problem)) {
+    if (!(at_limit && slipped) && !is_mobile(sim, contact, modes, &mobile, problem)) {
         return false;
     }
     if (mobile) {
-        mode = CONTACT_STICK;
+        modes[contact] = CONTACT_STICK;
     } else if (at_limit && found->limit[j] > 0.0) {
-        mode = slipping_mode(-found->friction[j]);
+        modes[contact] = slipping_mode(-found->friction[j]);
+    } else {
+        modes[contact] = CONTACT_FRICTIONLESS;
     }
-    set_mode(sim, contact, mode);
     return true;
 }
 
 /* Choose the modes of contacts at rest by their forces: first of those whose friction is below its
- * limit. */
+ * limit.  Of contacts that can stick only together, some stick; the others bear the limit of their
+ * friction, or none. */
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
-                          const FrictionEvent *event, Problem *problem) {
+                          const FrictionEvent *event, int *modes, Problem *problem) {
+    double zero = zero_acceleration(&sim->configuration);
     bool right = true;
     for (int limited = 0; limited < 2; limited++) {
         for (int j = 0; right && j < rest->count; j++) {
             int contact = rest->contacts[j];
-            bool at_limit = fabs(found->friction[j]) >= found->limit[j];
-            if (at_limit == (limited == 1) && sim->state.modes[contact] != CONTACT_OPEN) {
-                right = mode_of_forces(sim, found, j, contact,
-                                       event->slips && event->contact == contact, problem);
+            double slack = zero / found->mobility[j];
+            bool at_limit = fabs(found->friction[j]) >= found->limit[j] - slack;
+            if (at_limit == (limited == 1) && modes[contact] != CONTACT_OPEN) {
+                bool slipped = event->slips && event->contact == contact;
+                right = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, problem);
             }
         }
     }
     return right;
 }
 
-/* Whether a contact at rest satisfies its law in the trial equations, up to round-off. */
-static bool obeys_coulomb(Simulation *sim, int contact, const Complex *e, double *row) {
-    const System *system = system_of(sim);
-    const Equations *equations = &sim->trial.equations;
-    const Evaluation *tried = &sim->trial.evaluation;
-    const double *v = sim->state.front + system->n;
-    int mode = sim->state.modes[contact];
-    if (mode == CONTACT_STICK) {
-        return fabs(stick_force(equations, tried->lam, contact)) <=
-               (1.0 + FRICTION_EXCESS_RTOL) * friction_limit(equations, e, tried->lam, contact);
-    }
-    tangential_row(system, contact, e, row);
-    double slide = dot(system->n, row, tried->a) - tangential_convective(system, contact, e, v);
-    return !(slip_sign(mode) * slide < -zero_acceleration(&sim->configuration));
-}
-
-/* Whether the modes satisfy the laws of all contacts, up to round-off. */
-static bool modes_agree(Simulation *sim, const RestContacts *rest, bool *result,
-                        Problem *problem) {
-    size_t mark = sim->scratch.used;
-    const System *system = system_of(sim);
-    const Equations *equations = &sim->trial.equations;
-    const Evaluation *tried = &sim->trial.evaluation;
-    const double *q = sim->state.front, *v = q + system->n;
-    double *row = take(&sim->scratch, (size_t)system->n);
-    Rows gaps = gap_rows(system);
-    Complex *e = directions_at(sim, q);
-    memcpy(sim->trial.contacts.modes, sim->state.modes, (size_t)contact_count(sim) * sizeof(int));
-    try_contacts(sim);
-    bool right = evaluate_trial(sim, q, v, problem);
-    *result = right;
-    for (int k = 0; *result && k < rest->stop_count; k++) {
-        int i = rest->stops[k];
-        row_jacobian(&gaps, i, e, row);
-        double opening = dot(system->n, row, tried->a) - row_convective(&gaps, i, e, v);
-        *result = sim->state.modes[i] != CONTACT_OPEN
-                      ? stop_force(equations, tried->lam, i) > 0.0
-                      : !(opening < -zero_acceleration(&sim->configuration));
-    }
-    for (int j = 0; *result && j < rest->count; j++) {
-        *result = obeys_coulomb(sim, rest->contacts[j], e, row);
-    }
-    sim->scratch.used = mark;
-    return right;
-}
-
-/* The stops that touch and the contacts at rest; the modes of all that slides, stops open. */
-static void find_rest(Simulation *sim, int count, const int *touching, const FrictionEvent *event,
-                      RestContacts *rest, int *modes, int *sliding) {
-    const System *system = system_of(sim);
+/* Some of the stops that touch, and the contacts with friction at rest that have a mobility of their own
+ * beside the loops and the closed stops: else these carry all of the load.  sliding: the modes of
+ * those with friction that slide. */
+static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
+                      const int *modes, RestContacts *rest, int *sliding, Problem *problem) {
+    bool right = true, mobile = false;
     rest->stop_count = rest->count = 0;
-    for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool stop = is_stop(system, contact);
-        modes[contact] = stop ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
-        sliding[contact] = sliding_mode(sim, contact, event);
-        if (stop && !has_contact(count, touching, contact)) {
+    for (int contact = 0; right && contact < contact_count(sim); contact++) {
+        bool stop = is_stop(system_of(sim), contact);
+        sliding[contact] = CONTACT_FRICTIONLESS;
+        if (stop && !has_contact(stops->count, stops->stops, contact)) {
             continue;
+        }
+        if (friction_of(sim, contact) > 0.0) {
+            sliding[contact] = sliding_mode(sim, contact, event);
         }
         if (stop) {
             rest->stops[rest->stop_count] = contact;
             rest->slips[rest->stop_count++] = slip_sign(sliding[contact]);
         }
-        if (friction_of(sim, contact) > 0.0) {
-            modes[contact] = stop ? CONTACT_OPEN : sliding[contact];
-            if (sliding[contact] == CONTACT_FRICTIONLESS) {
-                rest->contacts[rest->count++] = contact;
-            }
+        if (friction_of(sim, contact) > 0.0 && sliding[contact] == CONTACT_FRICTIONLESS) {
+            right = is_mobile(sim, contact, modes, &mobile, problem);
+            rest->contacts[rest->count] = contact;
+            rest->count += right && mobile;
         }
     }
+    return right;
 }
 
-/* Choose the modes of all contacts by the forces that satisfy all laws at once. */
-static bool settle_by_forces(Simulation *sim, int count, const int *touching,
-                             const FrictionEvent *event, Problem *problem) {
+static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Problem *problem) {
+    int all[CONTACTS_MAX], count = 0;
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        bool stop = is_stop(system_of(sim), contact);
+        all[count] = contact;
+        count += stop ? has_contact(touching->count, touching->stops, contact)
+                      : friction_of(sim, contact) > 0.0;
+    }
+    return contacts_jammed(sim, count, all, problem);
+}
+
+/* Choose the modes by the forces of some stops and of the contacts with friction.  *agree is false
+ * without such forces, or if one of the other stops that touch would close. */
+static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const HoldingSet *touching,
+                            const FrictionEvent *event, int *modes, bool *agree,
+                            Problem *problem) {
     const System *system = system_of(sim);
-    const double *q = sim->state.front;
-    int modes[CONTACTS_MAX], sliding[CONTACTS_MAX], all[CONTACTS_MAX], many = 0;
-    size_t bytes = (size_t)contact_count(sim) * sizeof(int);
+    const double *q = sim->state.front, *v = q + system->n;
+    int sliding[CONTACTS_MAX];
     RestContacts rest;
     RestForces found;
-    bool agree = false;
-    find_rest(sim, count, touching, event, &rest, modes, sliding);
-    memcpy(sim->trial.contacts.modes, modes, bytes);
-    try_contacts(sim);
-    if (!rest_forces(sim, q, q + system->n, &rest, &found, problem)) {
+    if (!find_rest(sim, stops, event, modes, &rest, sliding, problem)) {
         return false;
     }
-    for (int k = 0; found.solved && k < rest.stop_count; k++) {
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        bool rubs = modes[contact] != CONTACT_OPEN && friction_of(sim, contact) > 0.0;
+        modes[contact] = rubs ? sliding[contact] : modes[contact];
+    }
+    *agree = rest.count == 0;
+    if (*agree) {
+        return true;
+    }
+    for (int i = 0; i < system->s; i++) {
+        modes[i] = CONTACT_OPEN;
+    }
+    try_contacts(sim, modes);
+    if (!rest_forces(sim, q, v, &rest, &found, problem)) {
+        return false;
+    }
+    if (!found.solved) {
+        return true;
+    }
+    for (int k = 0; k < rest.stop_count; k++) {
         int i = rest.stops[k];
+        int closed = friction_of(sim, i) > 0.0 ? sliding[i] : CONTACT_FRICTIONLESS;
         bool pressed = found.normal[k] > zero_acceleration(&sim->configuration);
-        modes[i] = pressed ? sliding[i] : CONTACT_OPEN;
+        modes[i] = pressed ? closed : CONTACT_OPEN;
     }
-    set_contacts(sim, modes);
-    if (found.solved && !(stick_or_slip(sim, &rest, &found, event, problem) &&
-                          modes_agree(sim, &rest, &agree, problem))) {
+    if (!stick_or_slip(sim, &rest, &found, event, modes, problem)) {
         return false;
     }
-    for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool touches = is_stop(system, contact) ? has_contact(count, touching, contact)
-                                                : friction_of(sim, contact) > 0.0;
-        all[many] = contact;
-        many += touches;
-    }
-    return agree || contacts_jammed(sim, many, all, problem);
+    try_contacts(sim, modes);
+    return modes_agree(sim, q, v, touching, &rest, &found, agree, problem);
 }
 
-/* The closed contacts that have friction. */
-static int contacts_with_friction(const Simulation *sim, int *contacts) {
-    int count = 0;
-    for (int contact = 0; contact < contact_count(sim); contact++) {
-        if (sim->state.modes[contact] != CONTACT_OPEN && friction_of(sim, contact) > 0.0) {
-            contacts[count++] = contact;
+/* Choose the modes of all contacts with friction: the stops that hold without friction at rest go
+ * on to hold, else all that touch are considered. */
+static bool settle_friction(Simulation *sim, const HoldingSet *holding, const HoldingSet *touching,
+                            const FrictionEvent *event, int *modes, Problem *problem) {
+    int first[CONTACTS_MAX];
+    size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
+    bool agree = false;
+    memcpy(first, modes, bytes);
+    if (!modes_by_forces(sim, holding, touching, event, modes, &agree, problem)) {
+        return false;
+    }
+    if (!agree && holding->count < touching->count) {
+        memcpy(modes, first, bytes);
+        if (!modes_by_forces(sim, touching, touching, event, modes, &agree, problem)) {
+            return false;
         }
     }
-    return count;
-}
-
-/* Choose the modes one by one until none changes: one may change the mode of another.  Else choose
- * them all at once. */
-static bool settle_friction(Simulation *sim, int touching_count, const int *touching,
-                            const FrictionEvent *event, Problem *problem) {
-    int before[CONTACTS_MAX], contacts[CONTACTS_MAX];
-    int count = contacts_with_friction(sim, contacts);
-    size_t bytes = (size_t)contact_count(sim) * sizeof(int);
-    for (int round = 0; round <= count; round++) {
-        bool fits = true;
-        memcpy(before, sim->state.modes, bytes);
-        for (int k = 0; k < count; k++) {
-            bool one_fits;
-            if (!choose_mode(sim, contacts[k], event, &one_fits, problem)) {
-                return false;
-            }
-            fits = fits && one_fits;
-        }
-        if (fits && memcmp(before, sim->state.modes, bytes) == 0) {
-            return true;
-        }
-    }
-    bool found = false;
-    return settle_together(sim, count, contacts, event, &found, problem) &&
-           (found || settle_by_forces(sim, touching_count, touching, event, problem));
+    return agree || friction_jams(sim, touching, problem);
 }
 
 /* --- all -------------------------------------------------------------------------------------- */
@@ -502,23 +407,28 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
     const System *system = system_of(sim);
     const double *front = sim->state.front;
     FrictionEvent friction;
-    HoldingSet resting;
+    HoldingSet holding, all = {0, {0}, true};
     int candidates[2 * STOPS_MAX], modes[CONTACTS_MAX];
     if (!friction_event(sim, event, &friction, problem)) {
         return false;
     }
     int count = resting_candidates(sim, touching, touching_count, candidates);
-    if (!holding_stops(sim, count, candidates, front, front + system->n, &resting, problem)) {
+    if (!holding_stops(sim, count, candidates, front, front + system->n, &holding, problem)) {
         return false;
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        bool open = is_stop(system, contact) && !has_contact(resting.count, resting.stops, contact);
+        bool open = is_stop(system, contact) && !has_contact(holding.count, holding.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
-    set_contacts(sim, modes);
-    if (!settle_friction(sim, count, candidates, &friction, problem)) {
+    for (int i = 0; i < system->s; i++) {
+        if (has_contact(count, candidates, i)) {
+            all.stops[all.count++] = i;
+        }
+    }
+    if (!settle_friction(sim, &holding, &all, &friction, modes, problem)) {
         return false;
     }
+    set_contacts(sim, modes);
     return sim->equations.held_count == 0 ||
            project(&sim->equations, sim->state.front_time, sim->state.front, &sim->scratch,
                    problem);

@@ -298,8 +298,8 @@ static bool detect_closing(Simulation *sim, int stop, int k, Closing *closing,
             return true;
         }
     } else if (gaps[0] <= 0.0) {
-        closing->at_a = true; /* else it touches without a rate of its own */
-        return gaps[1] < -near;
+        closing->at_a = true; /* else it touches, or opens from a small penetration */
+        return gaps[1] < gaps[0] - near;
     }
     if (dips) {
         rate.sign = -1.0;

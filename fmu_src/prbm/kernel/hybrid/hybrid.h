@@ -242,11 +242,12 @@ typedef struct {
 } RestContacts;
 
 /* Their forces and accelerations: the acceleration that each normal force alone gives its gap;
- * friction, its limits and the accelerations of sliding. */
+ * friction, its limits, and the accelerations of sliding, also by unit friction. */
 typedef struct {
     bool solved;
     double normal[STOPS_MAX];
     double friction[CONTACTS_MAX], limit[CONTACTS_MAX], slide[CONTACTS_MAX];
+    double mobility[CONTACTS_MAX];
 } RestForces;
 
 typedef struct {
@@ -265,20 +266,17 @@ PRBM bool contacts_jammed(const Simulation *sim, int count, const int *contacts,
 
 /* --- contact_modes.c -------------------------------------------------------------------------- */
 
-/* The stops that stay closed, and the acceleration at which the others open; whether there are any
- * that are pressed while the others open. */
+/* The stops that hold; whether there are any that are pressed while the others open. */
 typedef struct {
     int count, stops[STOPS_MAX];
-    double opening;
     bool found;
 } HoldingSet;
 
 PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
-                             const double *v, HoldingSet *resting, Problem *problem);
-PRBM bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
-                       const double *v, HoldingSet *resting, Problem *problem);
-PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const double *q,
-                      const double *v);
+                             const double *v, HoldingSet *holding, Problem *problem);
+/* Set up the trial equations in which a set of stops is closed; what slides has friction. */
+PRBM void equations_holding(Simulation *sim, const HoldingSet *holding, const double *q,
+                            const double *v);
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem);
 PRBM bool settle_moved(Simulation *sim, Problem *problem); /* after velocities have jumped */

@@ -116,9 +116,9 @@ static bool impulses_without_friction(Simulation *sim, const Approach *approach,
 }
 
 /* The impulses along rows (r, n), M (v+ - v-) - GT^T P = rows^T reaction; GT (k, n). */
-static void reaction_impulses(Simulation *sim, const Approach *approach, const double *after,
+static bool reaction_impulses(Simulation *sim, const Approach *approach, const double *after,
                               int k, const double *GT, const double *P, int r,
-                              const double *rows, double *reaction) {
+                              const double *rows, double *reaction, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = system_of(sim)->n;
     const double *M = approach->at->M;
@@ -136,10 +136,10 @@ static void reaction_impulses(Simulation *sim, const Approach *approach, const d
             columns[j * r + a] = rows[a * n + j];
         }
     }
-    if (r > 0) {
-        least_squares(n, r, columns, left, REACTION_RANK_RTOL, reaction, &sim->scratch);
-    }
+    bool right = r == 0 || least_squares(n, r, columns, left, REACTION_RANK_RTOL, reaction,
+                                         &sim->scratch, problem);
     sim->scratch.used = mark;
+    return right;
 }
 
 /* The normal and tangential rows GT (2 k, n) of the stops struck, their rates before the impact,
@@ -220,7 +220,9 @@ static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hi
         return false;
     }
     add_impulses(2 * k, n, approach->v, X, P, hits->after);
-    reaction_impulses(sim, approach, hits->after, 2 * k, GT, P, r, rows, reaction);
+    if (!reaction_impulses(sim, approach, hits->after, 2 * k, GT, P, r, rows, reaction, problem)) {
+        return false;
+    }
     *pulling = remove_pulling(kept_count, kept, reaction + system->r);
     if (!*pulling) {
         set_impulses(hits, P, *kept_count, kept, reaction + system->r);
@@ -361,7 +363,7 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
     soft.restitution[0] = 0.0;
     soft.held_count = hits->held_count;
     memcpy(soft.held, hits->held, sizeof soft.held);
-    HoldingSet resting = {0, {0}, 0.0, false};
+    HoldingSet resting = {0, {0}, false};
     candidates[0] = stop;
     memcpy(candidates + 1, hits->held, (size_t)hits->held_count * sizeof(int));
     bool rests = false;

@@ -93,6 +93,7 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
         }
         found->friction[j] = P[i];
         found->limit[j] = fixed[j] + (normal[j] < 0 ? 0.0 : friction[j] * P[normal[j]]);
+        found->mobility[j] = W[i * size + i];
         found->slide[j] = dot(size, W + i * size, P) + u[i];
     }
     sim->scratch.used = mark;
