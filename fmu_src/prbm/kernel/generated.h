@@ -86,23 +86,24 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 
 /* --- prbm.mechanics.contact_state --------------------------------------------------------------- */
 
-enum ContactMode {
+typedef enum {
     CONTACT_OPEN = 0,
     CONTACT_FRICTIONLESS = 1,
     CONTACT_STICK = 2,
     CONTACT_SLIP_POSITIVE = 3,
     CONTACT_SLIP_NEGATIVE = 4,
-};
+} ContactMode;
 
 /* --- prbm.hybrid.events ------------------------------------------------------------------------- */
 
-enum EventKind {
+typedef enum {
     EVENT_NONE = 0,
-    EVENT_IMPACT = 1,
-    EVENT_RELEASE = 2,
-    EVENT_SLIP = 3,
-    EVENT_REVERSAL = 4,
-};
+    EVENT_RELEASE = 1,
+    EVENT_SLIP = 2,
+    EVENT_REVERSAL = 3,
+    EVENT_IMPACT = 4,
+    EVENT_KINDS = 5,
+} EventKind;
 
 /* --- prbm.mechanism.parts ----------------------------------------------------------------------- */
 
@@ -110,11 +111,11 @@ enum EventKind {
 
 /* --- prbm.mechanism.flexure --------------------------------------------------------------------- */
 
-enum End {
+typedef enum {
     CLAMP = 0,
     PIN = 1,
     FREE = 2,
-};
+} End;
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
@@ -126,48 +127,48 @@ enum { PLACES_MAX = 1024 };
 enum { GROUND_POINTS_MAX = 4096 };
 enum { PIVOTS_MAX = 256 };
 enum { GROUND = 0 };
-enum VariableType {
+typedef enum {
     REAL = 0,
     INTEGER = 1,
     BOOLEAN = 2,
     CLOCK = 3,
-};
+} VariableType;
 
 /* --- prbm.interface.variables ------------------------------------------------------------------- */
 
-enum BodyOutput {
+typedef enum {
     BODY_X = 0,
     BODY_Y = 1,
     BODY_ANGLE = 2,
     BODY_VX = 3,
     BODY_VY = 4,
     BODY_OMEGA = 5,
-};
+} BodyOutput;
 enum { PER_BODY = 6 };
-enum StopOutput {
+typedef enum {
     STOP_GAP = 0,
     STOP_GAP_RATE = 1,
     STOP_FORCE = 2,
     STOP_POINT_DISPLACEMENT = 3,
     STOP_POINT_VELOCITY = 4,
     STOP_POINT_MOBILITY = 5,
-};
+} StopOutput;
 enum { PER_STOP = 6 };
-enum BaseOutput {
+typedef enum {
     BASE_FORCE_X = 0,
     BASE_FORCE_Y = 1,
     BASE_MOMENT = 2,
-};
+} BaseOutput;
 enum { PER_BASE = 3 };
-enum EnergyOutput {
+typedef enum {
     ENERGY_KINETIC = 0,
     ENERGY_ELASTIC = 1,
     ENERGY_GRAVITATIONAL = 2,
     ENERGY_DISSIPATED = 3,
     ENERGY_WORK = 4,
-};
+} EnergyOutput;
 enum { PER_ENERGY = 5 };
-enum LatchedOutput {
+typedef enum {
     LATCHED_CONTACT = 0,
     LATCHED_IMPACT_COUNT = 1,
     LATCHED_IMPACT_TIME = 2,
@@ -177,24 +178,24 @@ enum LatchedOutput {
     LATCHED_ENERGY_LOST = 6,
     LATCHED_MODAL_RESTITUTION = 7,
     LATCHED_IMPULSE_SUM = 8,
-};
+} LatchedOutput;
 enum { PER_LATCHED = 9 };
-enum LinkOutput {
+typedef enum {
     LINK_ANGLE = 0,
     LINK_OMEGA = 1,
-};
+} LinkOutput;
 enum { PER_LINK = 2 };
-enum StretchOutput {
+typedef enum {
     STRETCH_STRAIN = 0,
     STRETCH_STRAIN_RATE = 1,
-};
+} StretchOutput;
 enum { PER_STRETCH = 2 };
-enum ProbeOutput {
+typedef enum {
     PROBE_X = 0,
     PROBE_Y = 1,
     PROBE_VX = 2,
     PROBE_VY = 3,
-};
+} ProbeOutput;
 enum { PER_PROBE = 4 };
 enum { STOP_INDICATORS = 3 };
 

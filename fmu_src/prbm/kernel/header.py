@@ -61,7 +61,7 @@ def header() -> str:
         ),
         _section(
             sys.modules[EventKind.__module__],
-            [_enumeration("EventKind", "EVENT", {"NONE": 0} | {k.name: k for k in EventKind})],
+            [_enumeration("EventKind", "EVENT", _kinds())],
         ),
         _section("prbm.mechanism.parts", [_constant("LENGTH_MIN", LENGTH_MIN)]),
         _section("prbm.mechanism.flexure", [_enumeration("End", "", _numbers(ENDS))]),
@@ -108,7 +108,12 @@ def _number(value: float) -> str:
 def _enumeration(name: str, prefix: str, values: Mapping[str, int | IntEnum]) -> str:
     start = f"{prefix}_" if prefix else ""
     rows = (f"    {start}{key.upper()} = {int(value)}," for key, value in values.items())
-    return "\n".join((f"enum {name} {{", *rows, "};"))
+    return "\n".join(("typedef enum {", *rows, f"}} {name};"))
+
+
+def _kinds() -> dict[str, int]:
+    """Return the kinds of events, that of none and their number."""
+    return {"NONE": 0} | {kind.name: kind for kind in EventKind} | {"KINDS": len(EventKind) + 1}
 
 
 def _numbers(names: Sequence[str]) -> dict[str, int]:

@@ -295,7 +295,7 @@ static double speed_scale(const Simulation *sim) {
 }
 
 /* The unit of the guard of a kind of event. */
-static double guard_scale(const Simulation *sim, int kind) {
+static double guard_scale(const Simulation *sim, EventKind kind) {
     switch (kind) {
     case EVENT_IMPACT: return sim->configuration.scales.length;
     case EVENT_REVERSAL: return speed_scale(sim);
@@ -305,7 +305,7 @@ static double guard_scale(const Simulation *sim, int kind) {
 
 /* The indicator that a kind of event has at a contact: three for each stop, then one for each
  * friction point. */
-static int indicator_place(const Simulation *sim, int kind, int contact) {
+static int indicator_place(const Simulation *sim, EventKind kind, int contact) {
     int s = system_of(sim)->s, offset = kind == EVENT_IMPACT ? 0 : kind == EVENT_RELEASE ? 1 : 2;
     return contact < s ? STOP_INDICATORS * contact + offset
                        : STOP_INDICATORS * s + contact - s;
@@ -317,9 +317,9 @@ static Instant present_instant(const Simulation *sim) {
 
 /* A guard, lifted by the value below which its event is due: gaps close a little late, and speeds
  * within round-off have fallen to zero. */
-static double lifted_guard(const Simulation *sim, int kind, int contact) {
+static double lifted_guard(const Simulation *sim, EventKind kind, int contact) {
     Instant at = present_instant(sim);
-    double z = transition(kind)->guard(&sim->equations, &at, contact);
+    double z = transition(kind)->guard.value(&sim->equations, &at, contact);
     if (kind == EVENT_IMPACT) {
         return z + sim->state.floors[contact];
     }
@@ -349,7 +349,7 @@ static double release_indicator(const Simulation *sim, int i) {
     return lesser(pressed, steady);
 }
 
-static double indicator(const Simulation *sim, int kind, int contact) {
+static double indicator(const Simulation *sim, EventKind kind, int contact) {
     switch (kind) {
     case EVENT_IMPACT: return impact_indicator(sim, contact);
     case EVENT_RELEASE: return release_indicator(sim, contact);
@@ -362,9 +362,9 @@ PRBM void event_indicators(const Simulation *sim, double *z) {
     for (int i = 0; i < exchange_indicators(sim); i++) {
         z[i] = 1.0;
     }
-    for (int kind = EVENT_IMPACT; kind <= EVENT_REVERSAL; kind++) {
+    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
         for (int contact = 0; contact < contact_count(sim); contact++) {
-            if (watched(&sim->equations, kind, contact)) {
+            if (transition(kind)->watched(&sim->equations, contact)) {
                 z[indicator_place(sim, kind, contact)] = indicator(sim, kind, contact);
             }
         }
@@ -447,17 +447,21 @@ static bool closes_here(const Simulation *sim, int stop) {
            (lifted_guard(sim, EVENT_IMPACT, stop) <= 0.0 && speed < 0.0);
 }
 
-/* The next event that is due at the front: releases, slips and reversals, then impacts of stops
- * that have not been struck in this event. */
-static Event due_here(const Simulation *sim, bool *struck) {
-    static const int order[] = {EVENT_RELEASE, EVENT_SLIP, EVENT_REVERSAL, EVENT_IMPACT};
+/* Whether an event is due here; a stop is struck once at most. */
+static bool due(const Simulation *sim, const bool *struck, EventKind kind, int contact) {
+    if (!transition(kind)->watched(&sim->equations, contact)) {
+        return false;
+    }
+    return kind == EVENT_IMPACT ? !struck[contact] && closes_here(sim, contact)
+                                : lifted_guard(sim, kind, contact) <= 0.0;
+}
+
+/* The first event that is due at the front. */
+static Event due_here(const Simulation *sim, const bool *struck) {
     Event event = {EVENT_NONE, 0, sim->state.time};
-    for (size_t k = 0; k < sizeof order / sizeof *order; k++) {
-        int kind = order[k];
+    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
         for (int contact = 0; contact < contact_count(sim); contact++) {
-            if (watched(&sim->equations, kind, contact) &&
-                (kind == EVENT_IMPACT ? !struck[contact] && closes_here(sim, contact)
-                                      : lifted_guard(sim, kind, contact) <= 0.0)) {
+            if (due(sim, struck, kind, contact)) {
                 event.kind = kind;
                 event.contact = contact;
                 return event;

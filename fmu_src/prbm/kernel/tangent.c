@@ -591,7 +591,7 @@ static double reversal_indicator_change(const Tangent *t, int contact) {
     return sliding_sign(t, contact) * rate_change(t, &rows, i) / speed_scale(t->sim);
 }
 
-static double indicator_change(const Tangent *t, int kind, int contact) {
+static double indicator_change(const Tangent *t, EventKind kind, int contact) {
     switch (kind) {
     case EVENT_IMPACT: return impact_indicator_change(t, contact);
     case EVENT_RELEASE: return release_indicator_change(t, contact);
@@ -601,9 +601,9 @@ static double indicator_change(const Tangent *t, int kind, int contact) {
 }
 
 static void indicator_changes(const Tangent *t, double *out) {
-    for (int kind = EVENT_IMPACT; kind <= EVENT_REVERSAL; kind++) {
+    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
         for (int contact = 0; contact < contact_count(t->sim); contact++) {
-            if (watched(t->q, kind, contact)) {
+            if (transition(kind)->watched(t->q, contact)) {
                 out[indicator_place(t->sim, kind, contact)] = indicator_change(t, kind, contact);
             }
         }

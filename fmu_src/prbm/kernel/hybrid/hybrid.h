@@ -35,7 +35,8 @@ PRBM double stop_field(const Simulation *sim, Expression field);
 /* --- events.c --------------------------------------------------------------------------------- */
 
 typedef struct {
-    int kind, contact;
+    EventKind kind;
+    int contact;
     double time;
 } Event;
 
@@ -47,20 +48,69 @@ typedef struct {
     const double *lam;
 } Instant;
 
-typedef double Guard(const Equations *equations, const Instant *at, int contact);
+/* --- guards.c --------------------------------------------------------------------------------- */
+
+typedef double GuardValue(const Equations *equations, const Instant *at, int contact);
+
+/* The scalar z of a kind of event, positive before it: the event is the fall z > 0 -> z <= 0. */
+typedef struct {
+    const char *event;
+    GuardValue *value;
+    bool forces; /* whether it needs multipliers */
+} Guard;
+
+/* Whether and when a guard falls in the latest step. */
+typedef struct {
+    bool found;
+    double time;
+} Fall;
+
+PRBM double release_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double slip_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double reversal_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double gap_guard(const Equations *equations, const Instant *at, int contact);
+/* The contacts at which events may occur. */
+PRBM bool held_stop(const Equations *equations, int contact);
+PRBM bool sticking_contact(const Equations *equations, int contact);
+PRBM bool slipping_contact(const Equations *equations, int contact);
+PRBM bool open_stop(const Equations *equations, int contact);
+/* Whether events may occur in the latest step at any contact. */
+PRBM bool release_near(Simulation *sim);
+PRBM bool slip_near(Simulation *sim);
+PRBM bool reversal_near(Simulation *sim);
+PRBM bool impact_near(Simulation *sim);
+/* When the guard of a contact falls first in the latest step; a fall that has not been found is
+ * given. */
+PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                     Problem *problem);
+PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                        Problem *problem);
+PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
+                       Problem *problem);
+PRBM void sample_arc(Simulation *sim); /* for reversal_time and closing_time */
+
+/* --- events.c --------------------------------------------------------------------------------- */
+
+typedef bool Watched(const Equations *equations, int contact);
+typedef bool Near(Simulation *sim);
+typedef bool Detect(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                    Problem *problem);
 typedef bool Reset(Simulation *sim, const Event *event, Problem *problem);
 
-/* A kind of event: it occurs where the guard crosses zero in a direction; the reset applies it. */
+/* A row of the table of events. */
 typedef struct {
-    const char *name;
-    Guard *guard;
-    bool forces; /* whether the guard needs multipliers */
-    int direction;
-    Reset *reset;
+    Guard guard;
+    Watched *watched; /* whether the event may occur at a contact */
+    Near *near;       /* whether it may occur in the latest step */
+    bool samples;     /* whether its detection needs the samples of the step */
+    Detect *detect;
+    Reset *reset;     /* the change of state at the event */
 } Transition;
 
-PRBM const Transition *transition(int kind);
-PRBM bool watched(const Equations *equations, int kind, int contact); /* whether it may occur */
+/* The rows are in the order of the kinds, in which events of one time are applied. */
+PRBM const Transition *transition(EventKind kind);
+/* The first event within the latest step, of kind EVENT_NONE without one. */
+PRBM bool first_event(Simulation *sim, Event *first, Problem *problem);
 PRBM bool apply_event(Simulation *sim, const Event *event, Problem *problem);
 
 /* --- simulation.c: state and parts ------------------------------------------------------------ */
@@ -122,6 +172,13 @@ typedef struct {
     Evaluation evaluation;
 } Trial;
 
+/* The state at which a guard is evaluated in the search for its fall. */
+typedef struct {
+    double *y;             /* (ny,) */
+    Complex *e;            /* (n,) */
+    Evaluation evaluation; /* of guards that need forces */
+} Located;
+
 /* Working memory of a step and of the location of events in it. */
 typedef struct {
     Evaluation evaluation; /* at the last stage */
@@ -130,11 +187,9 @@ typedef struct {
     ForceRange forces;
     double *end, *error;   /* (ny,) */
     double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
-    double *sample_y, *sample_gap, *sample_rate;
+    double *sample_y;      /* (2 n,), (n,) of each */
     Complex *sample_e;
-    double *located_y;     /* (ny,), (n,): a state of the dense output */
-    Complex *located_e;
-    bool guards_fail;      /* whether a guard could not be evaluated in the step */
+    Located located;
     double *reach;         /* (n,) largest changes of the arms */
 } Stepping;
 
@@ -192,15 +247,6 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, boo
 PRBM void arc_at(const Simulation *sim, double t, double *y);
 /* The state at the present time, on the constraints; the reference becomes one near it. */
 PRBM bool arc_state(Simulation *sim, double *y, Problem *problem);
-
-/* --- guards.c --------------------------------------------------------------------------------- */
-
-PRBM double gap_guard(const Equations *equations, const Instant *at, int contact);
-PRBM double release_guard(const Equations *equations, const Instant *at, int contact);
-PRBM double slip_guard(const Equations *equations, const Instant *at, int contact);
-PRBM double reversal_guard(const Equations *equations, const Instant *at, int contact);
-/* The first event within the latest step, of kind EVENT_NONE without one. */
-PRBM bool first_event(Simulation *sim, Event *event, Problem *problem);
 
 /* --- walls.c ---------------------------------------------------------------------------------- */
 

@@ -102,10 +102,9 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     stepping->error = place(memory, ny, d);
     stepping->sample_y = place(memory, samples * 2 * n, d);
     stepping->sample_e = place(memory, samples * n, sizeof(Complex));
-    stepping->sample_gap = place(memory, samples, d);
-    stepping->sample_rate = place(memory, samples, d);
-    stepping->located_y = place(memory, ny, d);
-    stepping->located_e = place(memory, n, sizeof(Complex));
+    stepping->located.y = place(memory, ny, d);
+    stepping->located.e = place(memory, n, sizeof(Complex));
+    evaluation_place(&stepping->located.evaluation, system, memory);
     stepping->reach = place(memory, n, d);
 }
 

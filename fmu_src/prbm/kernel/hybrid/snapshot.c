@@ -81,7 +81,7 @@ static void get_scalars(State *state, StateReader *reader) {
     state->has_k1 = get_flag(reader);
     state->arc.valid = get_flag(reader);
     state->interrupted = get_flag(reader);
-    state->pending.kind = get_integer(reader, EVENT_NONE, EVENT_REVERSAL);
+    state->pending.kind = (EventKind)get_integer(reader, EVENT_NONE, EVENT_KINDS - 1);
     state->pending.contact = get_integer(reader, 0, 2 * STOPS_MAX);
     state->window_count = get_integer(reader, 0, EVENTS_MAX);
     state->pending.time = get_number(reader);
@@ -144,7 +144,7 @@ static bool read_state(Simulation *sim, const double *from) {
 static bool consistent(const Simulation *sim) {
     const State *state = &sim->state;
     const Mechanism *m = sim->configuration.mechanism;
-    int kind = state->pending.kind;
+    EventKind kind = state->pending.kind;
     bool friction = kind == EVENT_SLIP || kind == EVENT_REVERSAL;
     int contacts = friction ? contact_count(sim) : m->stop_count;
     if (state->step_size < 0.0 || (kind != EVENT_NONE && state->pending.contact >= contacts)) {
