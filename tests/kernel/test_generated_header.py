@@ -49,11 +49,9 @@ ALLOWED = {
     "hybrid/simulation.c": {"60": "working memory", "64": "working memory"},
     "hybrid/walls.c": {"20.0": "a factor of the zero speed"},
     "hybrid/stepping.c": {"0.75": "of the exponent of the memory [Hairer, IV.2]"},
-    "model_exchange.c": {
-        "10.0": "base of powers of ten, and a factor of the zero speed",
-        "80": "length of a name",
-    },
-    "hybrid/snapshot.c": {"20": "scalars of the state"},
+    "model_exchange.c": {"10.0": "base of powers of ten"},
+    "dependents.c": {"80": "length of a name"},
+    "hybrid/snapshot.c": {"21": "scalars of the state"},
     "fmi/state.c": {
         "20": "offset", "24": "offset", "28": "offset",
         "32": "offset or flag", "36": "offset", "64": "flag", "127": "all flags",

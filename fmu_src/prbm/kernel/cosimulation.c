@@ -10,11 +10,10 @@
  * whether held stops may follow jumps of their walls. */
 static bool restart(Simulation *sim, const Wall *walls, bool follow, Problem *problem) {
     State *state = &sim->state;
-    if (!arc_state(sim, sim->present.y, problem)) {
+    if (!arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem)) {
         return false;
     }
     memmove(state->walls, walls, (size_t)system_of(sim)->s * sizeof *walls);
-    copy(state_size(sim), sim->present.y, state->front);
     state->front_time = state->time;
     state->arc.valid = state->has_k1 = false;
     if (values_changed(sim) && !take_values(sim, problem)) {

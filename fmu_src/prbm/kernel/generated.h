@@ -197,6 +197,11 @@ typedef enum {
     PROBE_VY = 3,
 } ProbeOutput;
 enum { PER_PROBE = 4 };
+typedef enum {
+    INDICATOR_IMPACT = 0,
+    INDICATOR_RELEASE = 1,
+    INDICATOR_SLIP = 2,
+} StopIndicator;
 enum { STOP_INDICATORS = 3 };
 
 /* --- prbm.mechanics.inputs ---------------------------------------------------------------------- */

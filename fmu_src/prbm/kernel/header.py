@@ -144,6 +144,7 @@ def _groups() -> Iterator[str]:
     ):
         yield _enumeration(f"{name.capitalize()}Output", name, _numbers(outputs))
         yield _constant(f"PER_{name}", len(outputs))
+    yield _enumeration("StopIndicator", "INDICATOR", _numbers(INDICATORS))
     yield _constant("STOP_INDICATORS", len(INDICATORS))
 
 

@@ -442,7 +442,7 @@ static double spacing(double x) {
 static bool residual_speed(Simulation *sim, int contact, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
-    Evaluation *evaluation = &sim->trial.evaluation;
+    Evaluation *evaluation = &sim->at_front;
     const double *q = sim->state.front, *v = q + system->n;
     if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, NULL, evaluation, problem)) {
         return false;

@@ -65,9 +65,8 @@ static bool independent_rows(Simulation *sim, int count, const double *rows, con
     return right;
 }
 
-/* Set up the trial equations in which a set of stops is closed; what slides has friction. */
-PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const double *q,
-                      const double *v) {
+PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *resting,
+                                        const double *q, const double *v) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     Complex *e = directions_at(sim, q);
@@ -79,6 +78,7 @@ PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const do
     }
     sim->scratch.used = mark;
     try_contacts(sim);
+    return &sim->trial.equations;
 }
 
 /* Whether all stops of a set are pressed, and at which acceleration the other stops open. */

@@ -135,9 +135,16 @@ typedef struct {
     double growth_max;      /* 1 after a rejected step */
 } StepSizeController;
 
+/* The mode of a simulation, and the height of a bounce that it cannot resolve, of the size. */
+typedef struct {
+    bool exchange; /* model exchange: an importer integrates */
+    double lowest_bounce;
+} SimulationMode;
+
 /* Everything that a simulation continues from. */
 typedef struct {
-    bool started, exchange;
+    bool started;
+    SimulationMode mode;
     double time, tolerance, frequency;
     double step_size, log_of_error; /* of the step size controller */
     double front_time;
@@ -161,11 +168,11 @@ typedef struct {
     double *front, *k1;                   /* (ny,): the end of the last step, its rates */
     double *floors;                       /* (s,): gaps close this far below zero */
     double *displacements;                /* (s,): stop.displacement at the last point */
+    double *accepted;                     /* model exchange: (n,) angles of the last step */
     double *states;                       /* model exchange: as they were set */
 } State;
 
-/* Equations in a contact state that is being tried, and evaluations of states other than the end
- * of a step. */
+/* Equations in a contact state that is being tried, and their evaluation. */
 typedef struct {
     Equations equations;
     ContactState contacts;
@@ -183,7 +190,6 @@ typedef struct {
 typedef struct {
     Evaluation evaluation; /* at the last stage */
     Reference reference;   /* at the start */
-    Correction correction;
     ForceRange forces;
     double *end, *error;   /* (ny,) */
     double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
@@ -193,26 +199,24 @@ typedef struct {
     double *reach;         /* (n,) largest changes of the arms */
 } Stepping;
 
-enum { NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8, MOBILITIES = 16 }; /* outputs */
+/* Groups of present quantities: outputs, the rates and, in model exchange, the front itself. */
+enum {
+    NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8, MOBILITIES = 16, RATES = 32,
+    FRONT = 64
+};
 
-/* The present state and its outputs. */
+/* The present state, its outputs and rates, as far as they are up to date: read them by
+ * present_outputs and present_moment. */
 typedef struct {
     double *y;             /* (ny,) */
     Complex *e;            /* (n,) */
     Reference reference;
-    Evaluation evaluation;
+    Evaluation evaluation; /* of the outputs */
     double *outputs;
-    int fresh;             /* the groups of outputs that are up to date */
-} Present;
-
-/* The rates of the present state, for derivatives and event indicators. */
-typedef struct {
-    const double *y;       /* the state */
     double *rates;         /* (ny,) */
-    Evaluation evaluation;
-    bool evaluated;        /* model exchange: of the front as it is now */
-    bool stale;            /* model exchange: states, time or inputs have changed */
-} PresentRates;
+    Evaluation rated;      /* the evaluation that the rates come from */
+    int fresh;             /* the groups that are up to date */
+} Present;
 
 struct Simulation {
     Configuration configuration;
@@ -223,7 +227,8 @@ struct Simulation {
     Trial trial;
     Stepping stepping;
     Present present;
-    PresentRates rates;
+    Evaluation at_front;   /* of the present equations at the front, while contacts change there */
+    Correction correction; /* working memory of projections */
     Scratch scratch;
     Hear *hear;
     void *listener;
@@ -234,19 +239,20 @@ PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 */
 PRBM const System *system_of(const Simulation *sim);
 PRBM int contact_count(const Simulation *sim);
 PRBM Complex *directions_at(Simulation *sim, const double *q); /* in working memory */
-PRBM Instant instant_of(const Simulation *sim, double time, const double *y,
-                        const Evaluation *evaluation);
 PRBM void set_inputs(Simulation *sim); /* the equations of the present contacts and inputs */
 PRBM void set_contacts(Simulation *sim, const int *modes);
 PRBM void set_mode(Simulation *sim, int contact, int mode);
-PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, bool exchange,
+/* Start the motion; the caller keeps a backup for the case of failure. */
+PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, SimulationMode mode,
                        Problem *problem);
 
 /* --- arc.c ------------------------------------------------------------------------------------ */
 
 PRBM void arc_at(const Simulation *sim, double t, double *y);
-/* The state at the present time, on the constraints; the reference becomes one near it. */
-PRBM bool arc_state(Simulation *sim, double *y, Problem *problem);
+/* The state at the present time, on the constraints; near becomes a reference near it, and the
+ * evaluation is working memory. */
+PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *evaluation,
+                    Problem *problem);
 
 /* --- walls.c ---------------------------------------------------------------------------------- */
 
@@ -327,8 +333,9 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
                              const double *v, HoldingSet *resting, Problem *problem);
 PRBM bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                        const double *v, HoldingSet *resting, Problem *problem);
-PRBM void equations_holding(Simulation *sim, const HoldingSet *resting, const double *q,
-                      const double *v);
+/* The trial equations in which a set of stops is closed; what slides has friction. */
+PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *resting,
+                                        const double *q, const double *v);
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem);
 PRBM bool settle_moved(Simulation *sim, Problem *problem); /* after velocities have jumped */
@@ -348,16 +355,54 @@ PRBM bool attempt(Simulation *sim, bool right, Problem *problem); /* back to the
 PRBM int output_groups(const Simulation *sim, int slot);
 PRBM bool compute_outputs(Simulation *sim, int groups, bool near, Problem *problem);
 
+/* --- present.c -------------------------------------------------------------------------------- */
+
+/* A state, its rates (ny,) and the evaluation that they come from. */
+typedef struct {
+    Instant at;
+    const double *rates;
+    const Evaluation *evaluation;
+} Moment;
+
+PRBM void forget_present(Simulation *sim); /* time, states, inputs or parameters have been set */
+PRBM void forget_outputs(Simulation *sim); /* the front or its equations have changed */
+/* The present moment at the present state y. */
+PRBM bool moment_at(Simulation *sim, const double *y, Moment *now, Problem *problem);
+
+/* --- dependents.c ----------------------------------------------------------------------------- */
+
+/* The loops in the dependent coordinates, in working memory. */
+typedef struct {
+    int *dependent, *pivot; /* (r,) */
+    double *rows, *a, *s;   /* (r, n), (r, r) factored, (r,) residuals */
+} Loops;
+
+PRBM Loops take_loops(Simulation *sim);
+/* The loops' Jacobian in the dependent coordinates, from all rows. */
+PRBM bool factor_dependents(const Simulation *sim, Loops *loops);
+PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem);
+PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem);
+PRBM void states_of(const Simulation *sim, const double *y, double *x);
+
+/* --- indicators.c ----------------------------------------------------------------------------- */
+
+PRBM int indicator_place(const Simulation *sim, EventKind kind, int contact);
+PRBM double guard_scale(const Simulation *sim, EventKind kind);
+PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kind, int contact);
+PRBM double leaving_rate(const Simulation *sim, const Instant *at, int i);
+PRBM double release_indicator(const Simulation *sim, const Instant *at, int i);
+PRBM void event_indicators(const Simulation *sim, const Instant *at, double *z);
+
 /* --- model_exchange.c ------------------------------------------------------------------------- */
 
 PRBM void exchange_begin(Simulation *sim);
 PRBM bool exchange_refresh(Simulation *sim, Problem *problem);
-PRBM bool exchange_rates(Simulation *sim, Problem *problem);
-PRBM void event_indicators(const Simulation *sim, double *z);
+PRBM bool exchange_moment(Simulation *sim, Moment *now, Problem *problem);
 
 /* --- values.c --------------------------------------------------------------------------------- */
 
-PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem);
-PRBM bool present_rates(Simulation *sim, Problem *problem);
+/* The vector of outputs with these groups up to date; NULL if they cannot be computed. */
+PRBM const double *present_outputs(Simulation *sim, int groups, Problem *problem);
+PRBM bool present_moment(Simulation *sim, Moment *now, Problem *problem);
 
 #endif

@@ -4,7 +4,7 @@
 
 #include "hybrid/hybrid.h"
 
-enum { SCALARS = 20, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
+enum { SCALARS = 21, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
@@ -33,11 +33,12 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
     const State *state = &simulation->state;
     const Mechanism *m = simulation->configuration.mechanism;
     const double scalars[SCALARS] = {
-        state->started,      state->exchange,       state->has_k1,       state->arc.valid,
+        state->started,      state->mode.exchange,  state->has_k1,       state->arc.valid,
         state->interrupted,  state->pending.kind,   state->pending.contact, state->window_count,
         state->pending.time, state->time,           state->tolerance,    state->frequency,
         state->step_size,    state->log_of_error,   state->front_time,   state->arc.start,
         state->arc.h,        state->window_since,   state->point,        state->longest,
+        state->mode.lowest_bounce,
     };
     memcpy(to, scalars, sizeof scalars);
     to += SCALARS;
@@ -77,7 +78,7 @@ static bool get_flag(StateReader *reader) {
 
 static void get_scalars(State *state, StateReader *reader) {
     state->started = get_flag(reader);
-    state->exchange = get_flag(reader);
+    state->mode.exchange = get_flag(reader);
     state->has_k1 = get_flag(reader);
     state->arc.valid = get_flag(reader);
     state->interrupted = get_flag(reader);
@@ -96,6 +97,7 @@ static void get_scalars(State *state, StateReader *reader) {
     state->window_since = get_number(reader);
     state->point = get_number(reader);
     state->longest = get_number(reader);
+    state->mode.lowest_bounce = get_number(reader);
 }
 
 static void get_stop(State *state, int i, StateReader *reader) {
@@ -136,7 +138,8 @@ static bool read_state(Simulation *sim, const double *from) {
     for (double *x = state->numbers; x < state->states; x++) {
         *x = get_number(&reader);
     }
-    copy(exchange_states(sim), reader.at, state->states);
+    size_t left = state->number_count - (size_t)(state->states - state->numbers);
+    memcpy(state->states, reader.at, left * sizeof *state->states);
     return reader.sound;
 }
 
@@ -153,7 +156,7 @@ static bool consistent(const Simulation *sim) {
     return !state->started ||
            (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_MAX &&
             state->frequency >= 0.0 && (!state->arc.valid || state->arc.h > 0.0) &&
-            (state->exchange || state->front_time >= state->time));
+            state->front_time >= state->time);
 }
 
 /* --- attempts --------------------------------------------------------------------------------- */
@@ -184,7 +187,7 @@ PRBM bool attempt(Simulation *sim, bool right, Problem *problem) {
         Problem ignored;
         (void)read_state(sim, sim->backup);
         sim->scratch.used = 0;
-        sim->present.fresh = NOTHING;
+        forget_present(sim);
         (void)rebuild(sim, &ignored);
     }
     return right;
@@ -199,8 +202,7 @@ PRBM bool simulation_restore(Simulation *simulation, const double *state, Proble
                  check_values(m, sim->state.values, &ignored) &&
                  (!sim->state.started || check_values(m, sim->state.acting_values, &ignored)) &&
                  rebuild(sim, &ignored);
-    sim->rates.stale = true;
-    sim->present.fresh = NOTHING;
+    forget_present(sim);
     if (!right) {
         fail(problem, "the saved state is damaged: its numbers are not those of a motion");
     }

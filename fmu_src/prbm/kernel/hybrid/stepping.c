@@ -149,7 +149,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     state->pending.kind = EVENT_NONE;
     copy(ny, stepping->end, state->front); /* the state of the last stage */
     if (!project_near(&sim->equations, &stepping->evaluation, &stepping->reference, end,
-                      state->front, &stepping->correction, &sim->scratch, problem)) {
+                      state->front, &sim->correction, &sim->scratch, problem)) {
         return false;
     }
     Event event;

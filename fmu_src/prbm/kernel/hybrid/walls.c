@@ -143,7 +143,7 @@ PRBM void arrive_walls(Simulation *sim) {
 PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
-    Evaluation *at = &sim->trial.evaluation;
+    Evaluation *at = &sim->at_front;
     int n = system_of(sim)->n, size = n + q->r, h = q->first_hold;
     double *y = sim->state.front, t = sim->state.front_time, lost = 0.0, work = 0.0;
     double *kkt = take_matrix(&sim->scratch, size, size), *x = take(&sim->scratch, (size_t)size);
