@@ -112,7 +112,7 @@ def assert_directional(guide, parameters, inputs, discrete):
         assert error[worst] <= 1e-6, (names[worst], found[worst], error[worst])
 
 
-@pytest.mark.parametrize(("model", "discrete"), [*discrete_states()], ids=lambda guide: guide.name)
+@pytest.mark.parametrize(("model", "discrete"), [*discrete_states()], ids=str)
 def test_directional_derivatives_are_those_of_differences(model, discrete):
     assert_directional(mechanism(model), FRICTION, INPUTS, discrete)
 

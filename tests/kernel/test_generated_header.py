@@ -43,7 +43,7 @@ ALLOWED = {
     "fmi/resources.c": {
         "64": "kB a block", "248": "length of paths on Windows", "1024": "bytes a kB",
     },
-    "hybrid/hybrid.h": {"6.283185307179586": "2 pi"},
+    "hybrid/state.h": {"6.283185307179586": "2 pi"},
     "hybrid/guards.c": {"4.5e-16": "spacing of doubles, by R. P. Brent"},
     "hybrid/contact_modes.c": {"53": "binary digits of doubles"},
     "hybrid/simulation.c": {"60": "working memory", "64": "working memory"},

@@ -2,7 +2,15 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/arc.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/events.h"
+#include "hybrid/impacts.h"
+#include "hybrid/simulation.h"
+#include "hybrid/snapshot.h"
+#include "hybrid/stepping.h"
+#include "hybrid/walls.h"
 
 /* --- communication steps ---------------------------------------------------------------------- */
 

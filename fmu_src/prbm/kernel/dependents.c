@@ -6,7 +6,8 @@
 #include <math.h>
 #include <stdio.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/simulation.h"
+#include "dependents.h"
 
 /* The coordinates that the loops determine, in rising order. */
 static void dependents(const Mechanism *m, int *result) {

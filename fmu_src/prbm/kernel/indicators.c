@@ -1,7 +1,12 @@
 /* Event indicators of model exchange: the guards of events in units of the motion. */
 #include <math.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/events.h"
+#include "hybrid/guards.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
+#include "indicators.h"
 
 PRBM int exchange_indicators(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;

@@ -5,7 +5,18 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/events.h"
+#include "hybrid/guards.h"
+#include "hybrid/impacts.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "hybrid/snapshot.h"
+#include "hybrid/walls.h"
+#include "dependents.h"
+#include "indicators.h"
+#include "model_exchange.h"
 
 /* --- states ----------------------------------------------------------------------------------- */
 

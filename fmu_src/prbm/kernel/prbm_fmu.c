@@ -6,9 +6,8 @@
  */
 #include "generated.h"
 #include "kernel.h"
-#include "simulation.h"
+#include "motion.h"
 #include "core/memory.c"
-#include "core/vectors.c"
 #include "core/numbers.c"
 #include "core/matrix.c"
 #include "core/mechanism.c"
@@ -62,3 +61,5 @@
 #include "fmi/state.c"
 #include "fmi/fmi2.c"
 #include "fmi/fmi3.c"
+#include "fmi/fmi3_values.c"
+#include "fmi/fmi3_absent.c"

@@ -1,7 +1,14 @@
 /* Directional derivatives: exact changes of all values along changes of states and inputs. */
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/events.h"
+#include "hybrid/guards.h"
+#include "hybrid/impacts.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "dependents.h"
+#include "indicators.h"
+#include "values.h"
 
 /* A change of everything with the states and inputs: dq, dv, da, dlam.  With the complex changes
  * dphi = dtheta - i ds of an arm E, and dw of its rate, dE = i E dphi, d(E w) = E (i dphi w +

@@ -1,7 +1,15 @@
 /* The values of a simulation in either mode: co-simulation or model exchange. */
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "core/vectors.h"
+#include "hybrid/arc.h"
+#include "hybrid/outputs.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "hybrid/snapshot.h"
+#include "indicators.h"
+#include "model_exchange.h"
+#include "values.h"
 
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
                            bool exchange, Problem *problem) {

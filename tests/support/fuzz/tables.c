@@ -14,7 +14,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "simulation.h"
+#include "motion.h"
 
 enum {
     HEAD = 16,

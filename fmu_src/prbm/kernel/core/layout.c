@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "core/flexure.h"
+#include "core/layout.h"
 #include "core/tables.h"
 
 static const FlexureType *kind_of(const Mechanism *m, const Flexure *flexure) {
@@ -12,7 +13,7 @@ static int link_count(const Mechanism *m, const Flexure *flexure) {
     return links_of(kind_of(m, flexure), flexure->start_end, flexure->end_end);
 }
 
-static void count_coordinates(Reader *reader, Mechanism *m) {
+PRBM void count_coordinates(Reader *reader, Mechanism *m) {
     long long links = 0, stretching = 0;
     for (int i = 0; i < m->flexure_count && !reader->wrong; i++) {
         int count = link_count(m, &m->flexures[i]);
@@ -110,7 +111,7 @@ static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
 }
 
 /* The order of the assembly, and what each coordinate is. */
-static void lay_out_coordinates(Reader *reader, Mechanism *m) {
+PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     size_t parts = (size_t)m->flexure_count + (size_t)m->joint_count;
     size_t n = (size_t)m->coordinate_count, b = (size_t)m->body_count;
     Walk walk = {kept(reader, b + 1, sizeof(bool)), kept(reader, parts, sizeof(bool)),
@@ -137,7 +138,7 @@ static void lay_out_coordinates(Reader *reader, Mechanism *m) {
     m->stretches = walk.stretches;
 }
 
-static void lay_out_inputs(Mechanism *m) {
+PRBM void lay_out_inputs(Mechanism *m) {
     InputGroups *input = &m->input;
     input->walls = LOADS * m->force_count;
     input->impulses = input->walls + PER_WALL * m->stop_count;
@@ -145,7 +146,7 @@ static void lay_out_inputs(Mechanism *m) {
     input->base = input->mobilities + m->stop_count;
 }
 
-static void lay_out_slots(Mechanism *m) {
+PRBM void lay_out_slots(Mechanism *m) {
     Slots *s = &m->slots;
     s->parameters = 0;
     s->inputs = m->parameter_count;

@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "core/matrix.h"
+#include "core/vectors.h"
 
 enum { ROTATION_SWEEPS = 60 }; /* Jacobi's converge quadratically: about six are usual */
 
@@ -19,7 +20,7 @@ PRBM double dot(int n, const double *a, const double *b) {
 }
 
 /* Of vectors of an even length. */
-static double even_dot(int even, const double *a, const double *b) {
+PRBM double even_dot(int even, const double *a, const double *b) {
     Lanes sum[SUMS] = {NO_LANES};
     for (int i = 0; i < even; i += LANES) {
         sum[SUM_OF(i)] += lanes_at(a + i) * lanes_at(b + i);
@@ -64,7 +65,7 @@ static int largest_below(int n, const double *a, int k) {
     return best;
 }
 
-static void exchange(int n, double *a, double *b) {
+PRBM void exchange(int n, double *a, double *b) {
     for (int i = 0; i < n; i++) {
         double keep = a[i];
         a[i] = b[i];

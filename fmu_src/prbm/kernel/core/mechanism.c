@@ -63,6 +63,6 @@ PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t referenc
 }
 
 /* Displacement and velocity of a wall, among some inputs (input_count,). */
-static const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop) {
+PRBM const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop) {
     return inputs + mechanism->input.walls + PER_WALL * stop;
 }

@@ -10,6 +10,7 @@
 #include <string.h>
 
 #include "core/numbers.h"
+#include "core/vectors.h"
 
 /* --- exp(i q) --------------------------------------------------------------------------------- */
 
@@ -22,23 +23,6 @@
 /* Adding it rounds to an integer, which the last bits of the sum then are. */
 #define ROUNDER 6755399441055744.0 /* 1.5 2^52 */
 
-static LaneBits bits_of(Lanes x) {
-    LaneBits bits;
-    memcpy(&bits, &x, sizeof bits);
-    return bits;
-}
-
-static Lanes from_bits(LaneBits bits) {
-    Lanes x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
-}
-
-static Lanes magnitudes(Lanes x) {
-    return from_bits(bits_of(x) & (UINT64_MAX >> 1));
-}
-
-/* The angle, or something that is not a number (all bits set) unless it is below the limit. */
 static Lanes valid_angle(Lanes q) {
     LaneBits magnitude = bits_of(q) & (UINT64_MAX >> 1);
     LaneBits invalid = ((magnitude - LARGEST_ANGLE) >> 63) - UINT64_C(1);
@@ -131,8 +115,8 @@ SIZED void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
 
 /* e = exp(i q) by turning e_start = exp(i start): exp(i q) = e_start exp(i (q - start)).  False
  * unless all angles are near their start. */
-SIZED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
-                             Parts parts, Complex *e) {
+SHARED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
+                              Parts parts, Complex *e) {
     LaneBits near = ~(bits_of(lanes_at(q)) & 0);
     UNROLLED_BY_LANES
     for (int i = 0; i < even; i += LANES) {

@@ -31,6 +31,11 @@
 #else
 #define SIZED static
 #endif
+/* Such a function of which others in another file consist.  A test that compiles each file alone
+ * defines SHARED as nothing. */
+#ifndef SHARED
+#define SHARED SIZED
+#endif
 /* Code that few mechanisms need is not inlined into the code that all of them run. */
 #if defined(__GNUC__)
 #define RARE static __attribute__((noinline))

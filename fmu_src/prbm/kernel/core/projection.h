@@ -19,5 +19,6 @@ PRBM bool project(const Equations *equations, double t, double *y, Scratch *scra
 PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
                        const Reference *near, double t, double *y, Correction *correction,
                        Scratch *scratch, Problem *problem);
+PRBM double prescribed(const Equations *q, int k, double t);
 
 #endif

@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/layout.h"
 #include "core/tables.h"
 
 enum {
@@ -260,7 +261,7 @@ static void read_variables(Reader *reader, Mechanism *m) {
 
 /* --- the whole -------------------------------------------------------------------------------- */
 
-static uint32_t checksum(const unsigned char *bytes, size_t size) {
+PRBM uint32_t checksum(const unsigned char *bytes, size_t size) {
     uint32_t remainder = 0xFFFFFFFFu;
     for (size_t i = 0; i < size; i++) {
         remainder ^= bytes[i];

@@ -1,4 +1,7 @@
-/* Part of fmi3.c: values and their derivatives. */
+/* Values of FMI 3.0 and their derivatives. */
+#if !defined(PRBM_FMI) || PRBM_FMI == 3
+
+#include "fmi/fmi3.h"
 
 /* Both arrays of a get or a set, of as many values as references since all variables are scalar. */
 static Instance *accessed3(fmi3Instance handle, int rule, const fmi3ValueReference references[],
@@ -186,3 +189,5 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     return (fmi3Status)directional_derivative(it, unknowns, nUnknowns, knowns, nKnowns, seed,
                                               sensitivity);
 }
+
+#endif

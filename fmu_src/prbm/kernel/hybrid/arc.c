@@ -1,5 +1,6 @@
 /* The latest step and its dense output: the twin of hybrid/arc.py. */
-#include "hybrid/hybrid.h"
+#include "hybrid/arc.h"
+#include "hybrid/simulation.h"
 
 PRBM void arc_at(const Simulation *sim, double t, double *y) {
     const Arc *arc = &sim->state.arc;

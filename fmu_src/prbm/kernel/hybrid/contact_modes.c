@@ -2,11 +2,16 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/holding_stops.h"
+#include "hybrid/impacts.h"
+#include "hybrid/rest.h"
+#include "hybrid/simulation.h"
 
 /* Set up the trial equations in the present contact state with one mode changed. */
-static void try_mode(Simulation *sim, int contact, int mode) {
-    size_t bytes = (size_t)contact_count(sim) * sizeof(int);
+static void try_mode(Simulation *sim, int contact, ContactMode mode) {
+    size_t bytes = (size_t)contact_count(sim) * sizeof(ContactMode);
     memcpy(sim->trial.contacts.modes, sim->state.modes, bytes);
     sim->trial.contacts.modes[contact] = mode;
     try_contacts(sim);
@@ -42,7 +47,7 @@ static bool has_mobility(Simulation *sim, int contact, const Inertia *at, const 
 /* Whether a contact that is at rest and may move sticks, or which way it slips; and whether this
  * fits while all others keep their modes. */
 static bool mode_at_rest(Simulation *sim, int contact, const Inertia *at, const double *row,
-                         bool slips, int *mode, bool *fits, Problem *problem) {
+                         bool slips, ContactMode *mode, bool *fits, Problem *problem) {
     double greatest = 0.0;
     const System *system = system_of(sim);
     const Evaluation *tried = &sim->trial.evaluation;
@@ -92,7 +97,7 @@ static bool choose_mode(Simulation *sim, int contact, const FrictionEvent *event
     *fits = true;
     tangential_row(system, contact, at.e, row);
     double speed = dot(system->n, row, sim->state.front + system->n);
-    int mode = fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
+    ContactMode mode = fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
     if (mode == CONTACT_FRICTIONLESS) {
         right = has_mobility(sim, contact, &at, row, &mobile, problem);
         if (right && mobile) {
@@ -130,14 +135,15 @@ static bool forces_agree(Simulation *sim, int count, const int *contacts, bool *
     const double *q = sim->state.front, *v = q + system->n;
     double *row = take(&sim->scratch, (size_t)system->n);
     Complex *e = directions_at(sim, q);
-    memcpy(sim->trial.contacts.modes, sim->state.modes, (size_t)contact_count(sim) * sizeof(int));
+    memcpy(sim->trial.contacts.modes, sim->state.modes, (size_t)contact_count(sim) * sizeof(ContactMode));
     try_contacts(sim);
     bool right = evaluate_trial(sim, q, v, problem);
     for (int k = 0; right && *result && k < equations->held_count; k++) {
         *result = tried->lam[equations->first_hold + k] > 0.0;
     }
     for (int k = 0; right && *result && k < count; k++) {
-        int contact = contacts[k], mode = sim->state.modes[contact];
+        int contact = contacts[k];
+        ContactMode mode = sim->state.modes[contact];
         if (mode == CONTACT_STICK) {
             *result = fabs(stick_force(equations, tried->lam, contact)) <=
                       friction_limit(equations, e, tried->lam, contact);
@@ -199,10 +205,11 @@ static bool mobile_at_rest(Simulation *sim, int count, const int *contacts,
 /* Set the modes of the c-th combination; false if the contact that slips would stick in it. */
 static bool set_combination(Simulation *sim, int c, int count, const int *contacts,
                             const FrictionEvent *event) {
-    static const int modes[3] = {CONTACT_STICK, CONTACT_SLIP_POSITIVE, CONTACT_SLIP_NEGATIVE};
+    static const ContactMode modes[3] = {CONTACT_STICK, CONTACT_SLIP_POSITIVE,
+                                         CONTACT_SLIP_NEGATIVE};
     bool allowed = true;
     for (int k = count - 1, rest = c; k >= 0; k--, rest /= 3) {
-        int mode = modes[rest % 3];
+        ContactMode mode = modes[rest % 3];
         set_mode(sim, contacts[k], mode);
         allowed = allowed && !(event->slips && event->contact == contacts[k] &&
                                mode == CONTACT_STICK);
@@ -232,7 +239,7 @@ static bool settle_together(Simulation *sim, int count, const int *contacts,
 }
 
 /* The mode of a contact that slides faster than the event leaves; CONTACT_FRICTIONLESS at rest. */
-static int sliding_mode(Simulation *sim, int contact, const FrictionEvent *event) {
+static ContactMode sliding_mode(Simulation *sim, int contact, const FrictionEvent *event) {
     size_t mark = sim->scratch.used;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
     double speed = sliding_velocity(system_of(sim), contact, directions_at(sim, q), v);
@@ -251,7 +258,7 @@ static double friction_of(const Simulation *sim, int contact) {
 static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
                            bool slipped, Problem *problem) {
     bool mobile = false, at_limit = fabs(found->friction[j]) >= found->limit[j];
-    int mode = CONTACT_FRICTIONLESS;
+    ContactMode mode = CONTACT_FRICTIONLESS;
     if (fabs(found->slide[j]) > zero_acceleration(&sim->configuration)) {
         set_mode(sim, contact, slipping_mode(found->slide[j]));
         return true;
@@ -292,7 +299,7 @@ static bool obeys_coulomb(Simulation *sim, int contact, const Complex *e, double
     const Equations *equations = &sim->trial.equations;
     const Evaluation *tried = &sim->trial.evaluation;
     const double *v = sim->state.front + system->n;
-    int mode = sim->state.modes[contact];
+    ContactMode mode = sim->state.modes[contact];
     if (mode == CONTACT_STICK) {
         return fabs(stick_force(equations, tried->lam, contact)) <=
                (1.0 + FRICTION_EXCESS_RTOL) * friction_limit(equations, e, tried->lam, contact);
@@ -313,7 +320,7 @@ static bool modes_agree(Simulation *sim, const RestContacts *rest, bool *result,
     double *row = take(&sim->scratch, (size_t)system->n);
     Rows gaps = gap_rows(system);
     Complex *e = directions_at(sim, q);
-    memcpy(sim->trial.contacts.modes, sim->state.modes, (size_t)contact_count(sim) * sizeof(int));
+    memcpy(sim->trial.contacts.modes, sim->state.modes, (size_t)contact_count(sim) * sizeof(ContactMode));
     try_contacts(sim);
     bool right = evaluate_trial(sim, q, v, problem);
     *result = right;
@@ -334,7 +341,7 @@ static bool modes_agree(Simulation *sim, const RestContacts *rest, bool *result,
 
 /* The stops that touch and the contacts at rest; the modes of all that slides, stops open. */
 static void find_rest(Simulation *sim, int count, const int *touching, const FrictionEvent *event,
-                      RestContacts *rest, int *modes, int *sliding) {
+                      RestContacts *rest, ContactMode *modes, ContactMode *sliding) {
     const System *system = system_of(sim);
     rest->stop_count = rest->count = 0;
     for (int contact = 0; contact < contact_count(sim); contact++) {
@@ -362,8 +369,9 @@ static bool settle_by_forces(Simulation *sim, int count, const int *touching,
                              const FrictionEvent *event, Problem *problem) {
     const System *system = system_of(sim);
     const double *q = sim->state.front;
-    int modes[CONTACTS_MAX], sliding[CONTACTS_MAX], all[CONTACTS_MAX], many = 0;
-    size_t bytes = (size_t)contact_count(sim) * sizeof(int);
+    ContactMode modes[CONTACTS_MAX], sliding[CONTACTS_MAX];
+    int all[CONTACTS_MAX], many = 0;
+    size_t bytes = (size_t)contact_count(sim) * sizeof(ContactMode);
     RestContacts rest;
     RestForces found;
     bool agree = false;
@@ -407,9 +415,10 @@ static int contacts_with_friction(const Simulation *sim, int *contacts) {
  * them all at once. */
 static bool settle_friction(Simulation *sim, int touching_count, const int *touching,
                             const FrictionEvent *event, Problem *problem) {
-    int before[CONTACTS_MAX], contacts[CONTACTS_MAX];
+    ContactMode before[CONTACTS_MAX];
+    int contacts[CONTACTS_MAX];
     int count = contacts_with_friction(sim, contacts);
-    size_t bytes = (size_t)contact_count(sim) * sizeof(int);
+    size_t bytes = (size_t)contact_count(sim) * sizeof(ContactMode);
     for (int round = 0; round <= count; round++) {
         bool fits = true;
         memcpy(before, sim->state.modes, bytes);
@@ -503,7 +512,8 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
     const double *front = sim->state.front;
     FrictionEvent friction;
     HoldingSet resting;
-    int candidates[2 * STOPS_MAX], modes[CONTACTS_MAX];
+    int candidates[2 * STOPS_MAX];
+    ContactMode modes[CONTACTS_MAX];
     if (!friction_event(sim, event, &friction, problem)) {
         return false;
     }

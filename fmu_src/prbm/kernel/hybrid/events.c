@@ -1,6 +1,10 @@
 /* Events: the table of guards and resets, the first event of a step, and how often events may
  * occur: the twin of hybrid/events.py. */
-#include "hybrid/hybrid.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/events.h"
+#include "hybrid/guards.h"
+#include "hybrid/impacts.h"
+#include "hybrid/simulation.h"
 
 /* --- resets ----------------------------------------------------------------------------------- */
 

@@ -2,7 +2,12 @@
  * of hybrid/guards.py. */
 #include <math.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/arc.h"
+#include "hybrid/configuration.h"
+#include "hybrid/guards.h"
+#include "hybrid/rest.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* --- guards ----------------------------------------------------------------------------------- */
 

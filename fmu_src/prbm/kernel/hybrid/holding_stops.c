@@ -2,21 +2,25 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/holding_stops.h"
+#include "hybrid/impacts.h"
+#include "hybrid/rest.h"
+#include "hybrid/simulation.h"
 
 /* Set up the trial equations in the trial's contact state. */
-static void try_contacts(Simulation *sim) {
+PRBM void try_contacts(Simulation *sim) {
     set_equations(&sim->trial.equations, &sim->equations.inputs, &sim->trial.contacts,
                   sim->configuration.omega);
 }
 
-static bool evaluate_trial(Simulation *sim, const double *q, const double *v, Problem *problem) {
+PRBM bool evaluate_trial(Simulation *sim, const double *q, const double *v, Problem *problem) {
     return evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL,
                               &sim->trial.evaluation, problem);
 }
 
 /* The mode of a closed contact with a sliding velocity, CONTACT_FRICTIONLESS at round-off. */
-static int slip_mode(const Simulation *sim, double speed) {
+PRBM ContactMode slip_mode(const Simulation *sim, double speed) {
     return fabs(speed) <= zero_speed(&sim->configuration) ? CONTACT_FRICTIONLESS
                                                           : slipping_mode(speed);
 }

@@ -2,7 +2,13 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/holding_stops.h"
+#include "hybrid/impacts.h"
+#include "hybrid/rest.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* --- mobility --------------------------------------------------------------------------------- */
 
@@ -572,7 +578,7 @@ PRBM bool impulses_changed(const Simulation *sim) {
 
 static void free_sticking(Simulation *sim) {
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        int *mode = &sim->state.modes[contact];
+        ContactMode *mode = &sim->state.modes[contact];
         *mode = *mode == CONTACT_STICK ? CONTACT_FRICTIONLESS : *mode;
     }
     set_contacts(sim, sim->state.modes);

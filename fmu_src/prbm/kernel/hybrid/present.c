@@ -1,5 +1,7 @@
 /* The present moment, and which of the present quantities are up to date. */
-#include "hybrid/hybrid.h"
+#include "hybrid/guards.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
 
 PRBM void forget_present(Simulation *sim) {
     sim->present.fresh = NOTHING;

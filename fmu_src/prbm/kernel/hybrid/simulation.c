@@ -3,7 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* --- access ----------------------------------------------------------------------------------- */
 
@@ -60,7 +65,7 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
 static void place_state(State *state, const Mechanism *m, Memory *memory) {
     size_t s = (size_t)m->stop_count;
     place_numbers(state, m, memory);
-    state->modes = place(memory, s + (size_t)m->friction_count, sizeof(int));
+    state->modes = place(memory, s + (size_t)m->friction_count, sizeof *state->modes);
     state->driven = place(memory, s, sizeof(bool));
     state->latched = place(memory, s, sizeof(Latched));
     state->walls = place(memory, s, sizeof(Wall));
@@ -122,7 +127,8 @@ static void place_all(Simulation *sim, Memory *memory) {
     system_place(system, m, memory);
     equations_place(&sim->equations, system, memory);
     equations_place(&sim->trial.equations, system, memory);
-    sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim), sizeof(int));
+    sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim),
+                                     sizeof(ContactMode));
     evaluation_place(&sim->trial.evaluation, system, memory);
     place_stepping(&sim->stepping, system, memory);
     place_present(sim, system, memory);
@@ -198,13 +204,13 @@ PRBM void set_inputs(Simulation *sim) {
     forget_outputs(sim);
 }
 
-PRBM void set_contacts(Simulation *sim, const int *modes) {
+PRBM void set_contacts(Simulation *sim, const ContactMode *modes) {
     memmove(sim->state.modes, modes, (size_t)contact_count(sim) * sizeof *modes);
     sim->state.has_k1 = false;
     set_inputs(sim);
 }
 
-PRBM void set_mode(Simulation *sim, int contact, int mode) {
+PRBM void set_mode(Simulation *sim, int contact, ContactMode mode) {
     sim->state.modes[contact] = mode;
     set_contacts(sim, sim->state.modes);
 }

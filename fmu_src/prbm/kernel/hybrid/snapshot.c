@@ -2,7 +2,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "hybrid/snapshot.h"
 
 enum { SCALARS = 21, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
 
@@ -103,7 +106,7 @@ static void get_scalars(State *state, StateReader *reader) {
 static void get_stop(State *state, int i, StateReader *reader) {
     Latched *last = &state->latched[i];
     Wall *wall = &state->walls[i];
-    state->modes[i] = get_integer(reader, CONTACT_OPEN, CONTACT_SLIP_NEGATIVE);
+    state->modes[i] = (ContactMode)get_integer(reader, CONTACT_OPEN, CONTACT_SLIP_NEGATIVE);
     state->driven[i] = get_flag(reader);
     wall->position = get_number(reader);
     wall->rate = get_number(reader);
@@ -133,7 +136,7 @@ static bool read_state(Simulation *sim, const double *from) {
     }
     for (int i = 0; i < m->friction_count; i++) {
         state->modes[m->stop_count + i] =
-            get_integer(&reader, CONTACT_FRICTIONLESS, CONTACT_SLIP_NEGATIVE);
+            (ContactMode)get_integer(&reader, CONTACT_FRICTIONLESS, CONTACT_SLIP_NEGATIVE);
     }
     for (double *x = state->numbers; x < state->states; x++) {
         *x = get_number(&reader);

@@ -1,7 +1,11 @@
 /* Steps of variable size: the twin of hybrid/stepping.py. */
 #include <math.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/arc.h"
+#include "hybrid/events.h"
+#include "hybrid/simulation.h"
+#include "hybrid/stepping.h"
+#include "hybrid/walls.h"
 
 #define STEP_ERROR_EXPONENT (1.0 / (double)ORDER)
 #define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT)

@@ -2,7 +2,11 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* Displacement and velocity of a wall, as they were given. */
 static const double *told(const Simulation *sim, int i) {
