@@ -1184,7 +1184,7 @@ def test_gaps_are_the_same(name):
     is_stop=ContactState.is_stop, stop_force=dynamics.Equations.stop_forces,
     stick_force=dynamics.Equations.friction, friction_limit=dynamics.Equations.friction,
 )  # fmt: skip
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", ["PRBDM2R", "Rich"])
 def test_contact_forces_are_the_same(name):
     """Of closed stops and of what sticks, for any multipliers."""
     for theirs, mine, y, rng in equations(name, 3):
@@ -1361,8 +1361,8 @@ def report():
         lines += [file, *compared] if compared else []
     lines.append("Functions that are not compared one by one:")
     for file in sorted(KERNEL.rglob("*.c")):
-        functions = {f.name for f in sizes.c_functions(file.read_text(), file.name)}
-        left = len(functions - TWINS.keys())
+        functions = [f.name for f in sizes.c_functions(file.read_text(), file.name)]
+        left = sum(name not in TWINS for name in functions)
         lines += [f"  {file.relative_to(KERNEL).as_posix()}: {left} of {len(functions)}"] * (
             left > 0
         )

@@ -16,6 +16,7 @@
 enum { CONSTRAINT_ITERATIONS_MAX = 20 };
 enum { STATICS_ITERATIONS_MAX = 30 };
 #define STATICS_TURN_MAX 0.5
+#define STATICS_TURN_MIN 1e-300
 #define STATICS_LOAD_STEP_MIN 0.001953125
 #define STATICS_CONSTRAINT_RTOL 1e-13
 #define STATICS_FORCE_RTOL 1e-12
@@ -49,9 +50,12 @@ enum { EVENTS_MAX = 1000 };
 #define WALL_FADING_FACTOR 0.3333333333333333
 #define WALL_LONGEST_RTOL 0.1
 #define WALL_STEP_RTOL 0.5
+#define REST_SPEED_MIN_FACTOR 20.0
 #define WALL_MOBILITY_MAX 1e+100
 enum { IMPACT_COUNT_MAX = 2147483647 };
 #define EVENT_TIME_ATOL 1e-13
+#define EVENT_TIME_FACTOR 2.0
+#define EVENT_TIME_ULPS 8.0
 #define RELEASE_WATCH_FACTOR 0.5
 enum { LOCATION_ITERATIONS_MAX = 100 };
 enum { GUARD_INTERVALS = 8 };
@@ -64,6 +68,7 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define STEP_SHRINK_MIN 0.2
 #define STEP_GROWTH_MAX 5.0
 #define STEP_MEMORY_EXPONENT 0.04
+#define STEP_TREND_FACTOR 0.75
 #define STEP_ERROR_FACTOR 0.6
 #define STEP_ERROR_MIN 0.0001
 #define STEP_MAX_RTOL 0.05
@@ -79,6 +84,9 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define MOVING_DRIFT_FACTOR 100.0
 #define DRIFT_CORRECTED_RTOL 1e-12
 #define PENETRATION_WARNING_RTOL 0.01
+#define REST_JUMP_FACTOR 0.5
+#define SLIDING_ENDS_FACTOR 0.5
+enum { EVENTS_AT_ONCE_MAX = 16 };
 #define GAP_CLOSED_RTOL 1e-12
 #define LOWEST_BOUNCE_RTOL 1e-10
 #define INDICATOR_LEAD_RTOL 0.01
@@ -116,6 +124,7 @@ typedef enum {
     PIN = 1,
     FREE = 2,
 } End;
+enum { LINKS_MAX = 200 };
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
@@ -125,8 +134,25 @@ enum { COORDINATES_MAX = 512 };
 enum { STOPS_MAX = 64 };
 enum { PLACES_MAX = 1024 };
 enum { GROUND_POINTS_MAX = 4096 };
-enum { PIVOTS_MAX = 256 };
 enum { GROUND = 0 };
+typedef enum {
+    SLOTS_PARAMETERS = 0,
+    SLOTS_INPUTS = 1,
+    SLOTS_BODIES = 2,
+    SLOTS_STOPS = 3,
+    SLOTS_BASE = 4,
+    SLOTS_ENERGIES = 5,
+    SLOTS_LATCHED = 6,
+    SLOTS_LINKS = 7,
+    SLOTS_STRETCHES = 8,
+    SLOTS_PROBES = 9,
+    SLOTS_FREQUENCY = 10,
+    SLOTS_CALCULATED = 11,
+    SLOTS_DERIVATIVES = 12,
+    SLOTS_INDICATORS = 13,
+    SLOTS_TIME = 14,
+    SLOTS_GROUPS = 15,
+} SlotGroup;
 typedef enum {
     REAL = 0,
     INTEGER = 1,
@@ -209,6 +235,14 @@ enum { STOP_INDICATORS = 3 };
 enum { LOADS = 3 };
 enum { PER_WALL = 2 };
 enum { AXES = 2 };
+typedef enum {
+    INPUTS_FORCES = 0,
+    INPUTS_WALLS = 1,
+    INPUTS_IMPULSES = 2,
+    INPUTS_MOBILITIES = 3,
+    INPUTS_BASE = 4,
+    INPUTS_GROUPS = 5,
+} InputGroup;
 
 /* --- prbm.hybrid.runge_kutta -------------------------------------------------------------------- */
 

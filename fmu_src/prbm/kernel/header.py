@@ -33,8 +33,8 @@ from ..interface.variables import (
     STRETCH_OUTPUTS,
 )
 from ..mechanics.contact_state import ContactMode
-from ..mechanics.inputs import BASE_AXES, LOADS, WALL_INPUTS
-from ..mechanism.flexure import ENDS
+from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
+from ..mechanism.flexure import ENDS, LINKS_MAX
 from ..mechanism.parts import LENGTH_MIN
 
 PATH = Path(__file__).with_name("generated.h")
@@ -64,7 +64,10 @@ def header() -> str:
             [_enumeration("EventKind", "EVENT", _kinds())],
         ),
         _section("prbm.mechanism.parts", [_constant("LENGTH_MIN", LENGTH_MIN)]),
-        _section("prbm.mechanism.flexure", [_enumeration("End", "", _numbers(ENDS))]),
+        _section(
+            "prbm.mechanism.flexure",
+            [_enumeration("End", "", _numbers(ENDS)), _constant("LINKS_MAX", LINKS_MAX)],
+        ),
         _section(tables, _tables()),
         _section("prbm.interface.variables", _groups()),
         _section("prbm.mechanics.inputs", _inputs()),
@@ -120,6 +123,11 @@ def _numbers(names: Sequence[str]) -> dict[str, int]:
     return {name.replace(".", "_"): i for i, name in enumerate(names)}
 
 
+def _counted(names: Sequence[str]) -> dict[str, int]:
+    """Return the places of names, and their number behind them."""
+    return _numbers((*names, "groups"))
+
+
 def _tables() -> Iterator[str]:
     yield _constant("TABLES_VERSION", tables.VERSION)
     yield _constant("TABLES_HEAD", tables.HEAD)
@@ -127,6 +135,7 @@ def _tables() -> Iterator[str]:
         if name.endswith("_MAX"):
             yield _constant(name, value)
     yield _constant("GROUND", tables.GROUND_NUMBER)
+    yield _enumeration("SlotGroup", "SLOTS", _counted(tables.SLOT_GROUPS))
     yield _enumeration("VariableType", "", tables.TYPES)
 
 
@@ -152,6 +161,7 @@ def _inputs() -> Iterator[str]:
     yield _constant("LOADS", len(LOADS))
     yield _constant("PER_WALL", len(WALL_INPUTS))
     yield _constant("AXES", len(BASE_AXES))
+    yield _enumeration("InputGroup", "INPUTS", _counted(INPUT_GROUPS))
 
 
 def _tableau(tableau: Tableau) -> Iterator[str]:

@@ -43,7 +43,8 @@ PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kin
     if (kind == EVENT_IMPACT) {
         return z + sim->state.floors[contact];
     }
-    return kind == EVENT_REVERSAL ? z + 0.5 * zero_speed(&sim->configuration) : z;
+    return kind == EVENT_REVERSAL ? z + SLIDING_ENDS_FACTOR * zero_speed(&sim->configuration)
+                                 : z;
 }
 
 /* Positive while an open gap stays open.  An opening gap is lifted off zero, so that its indicator
@@ -63,8 +64,8 @@ PRBM double leaving_rate(const Simulation *sim, const Instant *at, int i) {
  * keeps it closed. */
 PRBM double release_indicator(const Simulation *sim, const Instant *at, int i) {
     double pressed = lifted_guard(sim, at, EVENT_RELEASE, i) / guard_scale(sim, EVENT_RELEASE);
-    double steady = (0.5 * jump_allowed(sim, i) - fabs(leaving_rate(sim, at, i))) /
-                    guard_scale(sim, EVENT_REVERSAL);
+    double room = REST_JUMP_FACTOR * jump_allowed(sim, i) - fabs(leaving_rate(sim, at, i));
+    double steady = room / guard_scale(sim, EVENT_REVERSAL);
     return lesser(pressed, steady);
 }
 

@@ -268,7 +268,6 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
 
 /* Apply all events that are due; now becomes the moment after them. */
 static bool apply_due_events(Simulation *sim, Moment *now, Problem *problem) {
-    enum { EVENTS_AT_ONCE_MAX = 16 };
     bool struck[STOPS_MAX] = {false};
     for (int i = 0; i < EVENTS_AT_ONCE_MAX; i++) {
         if (!exchange_moment(sim, now, problem)) {

@@ -90,8 +90,11 @@ PRBM void error_of(int n, const double *k, double h, double *error) {
 PRBM void furthest(int n, int ny, const double *k, double h, double *distance) {
     for (int j = 0; j < n; j += LANES) {
         Lanes sum = NO_LANES;
+        UNROLLED
         for (int i = 0; i < STAGES; i++) {
-            sum += LARGEST_WEIGHT[i] * magnitudes(lanes_at(k + i * ny + j));
+            if (LARGEST_WEIGHT[i] > 0.0) {
+                sum += LARGEST_WEIGHT[i] * magnitudes(lanes_at(k + i * ny + j));
+            }
         }
         set_lanes(distance + j, h * sum);
     }

@@ -90,8 +90,8 @@ static void read_types(Reader *reader, Mechanism *m) {
         t->lumped = read_flag(reader);
         t->rate_with_gamma = read_flag(reader);
         t->axial = read_flag(reader);
-        t->pivots = read_index(reader, 0, PIVOTS_MAX + 1);
-        t->links = read_index(reader, 0, PIVOTS_MAX + 1);
+        t->pivots = read_index(reader, 0, LINKS_MAX + 1);
+        t->links = read_index(reader, 0, LINKS_MAX + 1);
         if ((t->pivots == 0) == (t->links == 0)) {
             reader->wrong = reader->wrong ? reader->wrong : "a flexure of no kind";
         }

@@ -447,6 +447,11 @@ static double spacing(double x) {
     return ldexp(1.0, exponent - 53);
 }
 
+/* The error of the time of an event. */
+static double time_resolution(double time) {
+    return EVENT_TIME_FACTOR * EVENT_TIME_ATOL + EVENT_TIME_ULPS * spacing(time);
+}
+
 /* The sliding speed that the resolution of time leaves where sliding ends. */
 static bool residual_speed(Simulation *sim, int contact, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -460,7 +465,7 @@ static bool residual_speed(Simulation *sim, int contact, double *result, Problem
     Complex *e = directions_at(sim, q);
     tangential_row(system, contact, e, row);
     double rate = dot(system->n, row, evaluation->a) - tangential_convective(system, contact, e, v);
-    *result = fabs(rate) * (2 * EVENT_TIME_ATOL + 8 * spacing(sim->state.front_time));
+    *result = fabs(rate) * time_resolution(sim->state.front_time);
     sim->scratch.used = mark;
     return true;
 }

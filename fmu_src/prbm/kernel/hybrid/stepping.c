@@ -8,7 +8,7 @@
 #include "hybrid/walls.h"
 
 #define STEP_ERROR_EXPONENT (1.0 / (double)ORDER)
-#define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT)
+#define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - STEP_TREND_FACTOR * STEP_MEMORY_EXPONENT)
 
 /* --- errors ----------------------------------------------------------------------------------- */
 

@@ -95,7 +95,8 @@ PRBM bool join_walls(Simulation *sim, double time, Wall *joined) {
 /* The jump of a wall's velocity with which a stop that holds keeps holding. */
 PRBM double jump_allowed(const Simulation *sim, int i) {
     const Stop *stop = &sim->configuration.mechanism->stops[i];
-    return greater(stop_field(sim, stop->rest_speed), 20.0 * zero_speed(&sim->configuration));
+    return greater(stop_field(sim, stop->rest_speed),
+                   REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
 }
 
 /* A wall after a change of its velocity and that of its reference. */
