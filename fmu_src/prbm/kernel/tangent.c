@@ -32,14 +32,6 @@ static Complex times_i(Complex z) {
     return complex_of(-z.im, z.re);
 }
 
-static double multiplier(const Tangent *t, int k) {
-    return t->lam[k];
-}
-
-static double multiplier_change(const Tangent *t, int k) {
-    return t->dlam[k];
-}
-
 /* --- of rows --- */
 
 /* A vector that turns, and its motion. */
@@ -303,7 +295,7 @@ static void row_change(const Tangent *t) {
     const Equations *q = t->q;
     Rows walls = slide_rows(q->system);
     for (int k = 0; k < q->r; k++) {
-        add_pull(t, &q->active, k, multiplier(t, k));
+        add_pull(t, &q->active, k, t->lam[k]);
         t->dlam[k] = -second_change(t, &q->active, k);
     }
     for (int k = 0; k < q->slipping_stops; k++) {
@@ -397,7 +389,7 @@ static void stop_changes(const Tangent *t, double *out) {
         d[STOP_POINT_VELOCITY] = wall[1] - d[STOP_GAP_RATE];
     }
     for (int k = 0; k < t->q->held_count; k++) {
-        double change = multiplier_change(t, t->q->first_hold + k);
+        double change = t->dlam[t->q->first_hold + k];
         out[PER_STOP * t->q->held[k] + STOP_FORCE] = change;
     }
 }
@@ -537,8 +529,8 @@ static double dissipation_change(const Tangent *t) {
     for (int k = 0; k < q->slipping_stops; k++) {
         int i = q->slipping[k], h = q->first_hold + held_at(q, i);
         sum += q->stop_friction[i] * sliding_sign(t, i) *
-               (multiplier_change(t, h) * row_rate(&walls, i, t->e, t->v) +
-                multiplier(t, h) * rate_change(t, &walls, i));
+               (t->dlam[h] * row_rate(&walls, i, t->e, t->v) +
+                t->lam[h] * rate_change(t, &walls, i));
     }
     return sum;
 }
@@ -555,7 +547,7 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
         int i = q->held[k], h = q->first_hold + k;
         double velocity = wall_change(t, i)[1];
         double w = wall_motion(&q->inputs.walls[i], t->at->time).v;
-        sum -= multiplier_change(t, h) * w + multiplier(t, h) * velocity;
+        sum -= t->dlam[h] * w + t->lam[h] * velocity;
     }
     return sum;
 }
@@ -577,17 +569,17 @@ static double release_indicator_change(const Tangent *t, int i) {
     double force = guard_scale(sim, EVENT_RELEASE), speed = guard_scale(sim, EVENT_REVERSAL);
     double pressed = lifted_guard(sim, t->at, EVENT_RELEASE, i) / force;
     return pressed <= release_indicator(sim, t->at, i)
-               ? multiplier_change(t, t->q->first_hold + held_at(t->q, i)) / force
+               ? t->dlam[t->q->first_hold + held_at(t->q, i)] / force
                : -sign_times(leaving_rate(sim, t->at, i), gap_rate_change(t, i)) / speed;
 }
 
 static double slip_indicator_change(const Tangent *t, int contact) {
     const Equations *q = t->q;
     int row = q->first_stick + place_in(q->sticking, contact);
-    double friction = sign_times(multiplier(t, row), multiplier_change(t, row)), limit;
+    double friction = sign_times(t->lam[row], t->dlam[row]), limit;
     if (is_stop(q->system, contact)) {
         int held = q->first_hold + held_at(q, contact);
-        limit = q->stop_friction[contact] * multiplier_change(t, held);
+        limit = q->stop_friction[contact] * t->dlam[held];
     } else {
         limit = limit_change(t, contact - q->system->s);
     }
