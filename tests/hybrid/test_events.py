@@ -37,8 +37,22 @@ def sine(t):
 
 
 def test_each_kind_of_event_has_one_guard_and_one_reset():
-    assert sorted(row.kind for row in TRANSITIONS) == list(EventKind)
-    assert {row.direction for row in TRANSITIONS} == {events.FALLING}
+    assert [row.kind for row in TRANSITIONS] == list(EventKind)
+
+
+def test_of_events_at_one_time_contacts_change_their_modes_before_an_impact(monkeypatch):
+    """The kinds are in the order of release, slip, reversal, impact, whatever was found first."""
+    found = dict.fromkeys(EventKind, 1.0) | {EventKind.SLIP: 0.5}
+    rows = [
+        replace(row, watched=lambda looks: (0,), detect=lambda *_, kind=row.kind: found[kind])
+        for row in TRANSITIONS
+    ]
+    monkeypatch.setattr(events, "TRANSITIONS", rows)
+    assert events.first_event(None).kind == EventKind.SLIP
+    found[EventKind.SLIP] = 1.0
+    assert events.first_event(None).kind == EventKind.RELEASE
+    found[EventKind.RELEASE] = found[EventKind.SLIP] = found[EventKind.REVERSAL] = None
+    assert events.first_event(None) == events.Event(EventKind.IMPACT, 0, 1.0)
 
 
 @pytest.mark.parametrize(

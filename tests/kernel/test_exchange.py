@@ -5,7 +5,7 @@ import pytest
 
 from kernel_library import constants
 from kernel_simulation import KernelMistake, KernelSimulation
-from many_parts import anvil, elastic
+from many_parts import anvil, elastic, two_stops
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.independent import conditioning, independent
 from prbm.mechanics.inputs import input_names
@@ -330,3 +330,21 @@ def test_bounces_without_end_end_in_rest_although_gaps_close_late():
     missing = other.get("stop.impact_count") - kernel.get("stop.impact_count")
     assert 0 <= missing <= 10
     assert kernel.get("stop.force") == pytest.approx(other.get("stop.force"), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    "model", [anvil(), two_stops("PRBDM"), two_stops("PRBDM2R")], ids=lambda guide: guide.name
+)
+def test_derivatives_after_an_event_with_impulses_are_those_of_the_state_after_it(model):
+    """A restored state knows of no evaluation before it."""
+    values = {name: 0.0 for name in ("release.displacement",) if name in model.values()}
+    kernel = KernelSimulation(model, values, exchange=True)
+    before = kernel.derivatives()
+    kernel.set({f"{model.forces[0].name}.impulse.x": 1e-3})
+    kernel.event()
+    found = kernel.derivatives(), kernel.indicators()
+    kernel.restore(kernel.state)
+    expected = kernel.derivatives(), kernel.indicators()
+    assert np.abs(expected[0] - before).max() > 1e-3
+    for x, same in zip(found, expected, strict=True):
+        np.testing.assert_allclose(x, same, rtol=1e-9, atol=1e-9 * np.abs(same).max())

@@ -1,5 +1,6 @@
 """The constants of the C kernel come from Python, and from nowhere else."""
 
+import ast
 import re
 from ctypes import c_double
 from functools import cache
@@ -13,7 +14,7 @@ from prbm.hybrid.runge_kutta import TSITOURAS_PAPAKOSTAS, powers
 from prbm.interface import tables
 from prbm.kernel import header
 
-PLAIN = {"0.0", "0.25", "0.5", "1.0", "2.0", "3.0", "4.0"}  # Coefficients of formulas.
+PLAIN = {"0.0", "0.25", "0.5", "1.0", "2.0", "3.0", "4.0", "6.0"}  # Coefficients of formulas.
 PLAIN_INTEGER = 16
 WHOLE_FILES = {
     "generated.h": "it is generated",
@@ -24,7 +25,6 @@ ALLOWED = {
         "0.21132486540518708": "1/2 - 1/(2 sqrt 3): points of a rod with its mass and moments",
         "0.7886751345948129": "1/2 + 1/(2 sqrt 3): the other one",
     },
-    "core/equations.c": {"6.0": "derivatives of a cubic"},
     "core/factors.c": {
         "1e-280": "smallest product of pivots that doubles hold with all digits, with a margin",
         "1e280": "largest one",
@@ -32,7 +32,6 @@ ALLOWED = {
     "core/matrix.c": {"60": "sweeps of Jacobi's rotations, for which Python calls NumPy"},
     "core/memory.h": {"640": "length of a message"},
     "core/modal.c": {"6.283185307179586": "2 pi"},
-    "core/statics.c": {"1e-300": "any positive number: avoids a division by zero"},
     "core/reader.c": {"32": "bits of a word, and bytes by which a block may be rounded up"},
     "core/tables.c": {
         "32": "bytes of memory for a coordinate, bits of a word",
@@ -43,17 +42,13 @@ ALLOWED = {
     "fmi/resources.c": {
         "64": "kB a block", "248": "length of paths on Windows", "1024": "bytes a kB",
     },
-    "hybrid/hybrid.h": {"6.283185307179586": "2 pi"},
+    "hybrid/state.h": {"6.283185307179586": "2 pi", "32": "flag", "64": "flag"},
     "hybrid/guards.c": {"4.5e-16": "spacing of doubles, by R. P. Brent"},
     "hybrid/contact_modes.c": {"53": "binary digits of doubles"},
     "hybrid/simulation.c": {"60": "working memory", "64": "working memory"},
-    "hybrid/walls.c": {"20.0": "a factor of the zero speed"},
-    "hybrid/stepping.c": {"0.75": "of the exponent of the memory [Hairer, IV.2]"},
-    "model_exchange.c": {
-        "10.0": "base of powers of ten, and a factor of the zero speed",
-        "80": "length of a name",
-    },
-    "hybrid/snapshot.c": {"20": "scalars of the state"},
+    "model_exchange.c": {"10.0": "base of powers of ten"},
+    "dependents.c": {"80": "length of a name"},
+    "hybrid/snapshot.c": {"21": "scalars of the state"},
     "fmi/state.c": {
         "20": "offset", "24": "offset", "28": "offset",
         "32": "offset or flag", "36": "offset", "64": "flag", "127": "all flags",
@@ -96,6 +91,41 @@ def test_a_stale_header_fails_the_check(tmp_path, monkeypatch, capsys):
 def test_no_number_is_typed_again_in_c(file):
     if file not in WHOLE_FILES:
         assert numbers(sources()[file]) <= ALLOWED.get(file, {}).keys()
+
+
+ENGINE_PLAIN = {0.0, 0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0}
+ENGINE_ALLOWED = {
+    "mechanics/system.py": {90.0: "degrees of a quarter turn"},
+    "mechanics/assembly.py": {90.0: "degrees of a quarter turn"},
+}
+ENGINE_DATA = {"hybrid/runge_kutta.py": "the tableau, which is generated into C"}
+ENGINE = [
+    path.relative_to(KERNEL.parent).as_posix()
+    for package in ("mechanics", "hybrid")
+    for path in sorted((KERNEL.parent / package).glob("*.py"))
+]
+
+
+def literals(text):
+    """Return the floating-point numbers of a Python text."""
+    constants = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Constant))
+    return {node.value for node in constants if isinstance(node.value, float)}
+
+
+@pytest.mark.parametrize("file", ENGINE)
+def test_no_tolerance_is_typed_in_the_engine_but_among_the_tolerances(file):
+    found = literals((KERNEL.parent / file).read_text()) - ENGINE_PLAIN
+    assert found <= ENGINE_ALLOWED.get(file, {}).keys() or file in ENGINE_DATA
+
+
+def test_every_exception_of_the_engine_is_needed():
+    for file, allowed in ENGINE_ALLOWED.items():
+        assert allowed.keys() <= literals((KERNEL.parent / file).read_text())
+
+
+def test_a_tolerance_is_found_in_python_and_c():
+    assert literals("x = 2.0 * y + 1e-7  # 0.3") - ENGINE_PLAIN == {1e-7}
+    assert numbers("x = 2.0 * y + 1e-7 + 0.75;") == {"1e-7", "0.75"}
 
 
 def test_no_name_of_the_header_is_defined_again_in_c():

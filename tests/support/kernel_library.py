@@ -46,6 +46,11 @@ DTYPES = {
 }
 
 
+ENUMERATIONS = ("ContactMode",)  # of which functions and structures have values
+SCALARS |= dict.fromkeys(ENUMERATIONS, ctypes.c_int)
+DTYPES |= dict.fromkeys(ENUMERATIONS, np.int32)
+
+
 class KernelError(Exception):
     """What a function of the kernel says when it returns false."""
 

@@ -13,6 +13,8 @@ from ..base.errors import SimulationError
 from ..base.tolerances import (
     DEPENDENT_FRICTION_RTOL,
     EVENT_TIME_ATOL,
+    EVENT_TIME_FACTOR,
+    EVENT_TIME_ULPS,
     FRICTION_EXCESS_RTOL,
     RELEASE_PENETRATION_ATOL,
 )
@@ -199,7 +201,12 @@ def _residual_speed(front: Front, contact: int) -> float:
     """Return the sliding speed that the resolution of time leaves at a reversal [m/s]."""
     a = front.equations.evaluate(front.time, front.q, front.v).a
     rate = front.equations.slip_acceleration(contact, front.e, front.v, a)
-    return abs(rate) * (2 * EVENT_TIME_ATOL + 8 * ulp(front.time))
+    return abs(rate) * time_resolution(front.time)
+
+
+def time_resolution(time: float) -> float:
+    """Return the error of the time of an event [s]."""
+    return EVENT_TIME_FACTOR * EVENT_TIME_ATOL + EVENT_TIME_ULPS * ulp(time)
 
 
 def _with_friction(

@@ -14,16 +14,19 @@ from .impacts import Impact
 
 
 class EventKind(IntEnum):
-    """The kind of an event; 0 is that of none."""
+    """The kind of an event, in the order in which events of one time are applied; 0: none.
 
-    IMPACT = 1
-    """The gap of an open stop closes: an impact or a capture."""
-    RELEASE = 2
+    Contacts change their modes first, so that an impact acts on the modes that hold at its time.
+    """
+
+    RELEASE = 1
     """The force of a held stop falls to zero."""
-    SLIP = 3
+    SLIP = 2
     """A sticking contact reaches the limit of friction."""
-    REVERSAL = 4
+    REVERSAL = 3
     """The sliding velocity of a contact falls to zero: it sticks or slips back."""
+    IMPACT = 4
+    """The gap of an open stop closes: an impact or a capture."""
 
 
 @dataclass(frozen=True)
@@ -35,7 +38,6 @@ class Event:
     time: float
 
 
-FALLING = -1  # Domain change z > 0 -> z <= 0.
 Reset = Callable[[Configuration, Front, int], tuple[Front, list[Impact]]]
 
 
@@ -43,28 +45,27 @@ Reset = Callable[[Configuration, Front, int], tuple[Front, list[Impact]]]
 class Transition:
     """A row of the table of events.
 
+    The event is the fall of the guard, z > 0 -> z <= 0, at a contact for which it is watched.
+
     Parameters
     ----------
     kind : EventKind
         Kind of the event.
     guard : Guard
-        The scalar z that is watched.
-    direction : int
-        Sign of the change of z at the event.
-    reset : Reset
-        The change of state at the event.
+        The scalar z, positive before the event.
     watched : callable
         Returns the contacts whose guard may fall in a step.
     detect : callable
         Returns when the guard of a contact falls in a step, or None.
+    reset : Reset
+        The change of state at the event.
     """
 
     kind: EventKind
     guard: Guard
-    direction: int
-    reset: Reset
     watched: Callable[[Looks], Sequence[int]]
     detect: Callable[[Looks, Guard, int], float | None]
+    reset: Reset
 
 
 def _settling(change: Callable[[Configuration, Front, int], Front]) -> Reset:
@@ -74,23 +75,22 @@ def _settling(change: Callable[[Configuration, Front, int], Front]) -> Reset:
 
 TRANSITIONS = (
     Transition(
-        EventKind.IMPACT, guards.gap, FALLING, impacts.impact,
-        guards.open_stops, guards.closing_time,
+        EventKind.RELEASE, guards.stop_force, guards.releasing_stops, guards.release_time,
+        _settling(contact_modes.release),
     ),
     Transition(
-        EventKind.REVERSAL, guards.slip_speed, FALLING, _settling(contact_modes.reverse),
-        guards.slipping_contacts, guards.reversal_time,
+        EventKind.SLIP, guards.friction_margin, guards.sticking_contacts, guards.slip_time,
+        _settling(contact_modes.slip),
     ),
     Transition(
-        EventKind.RELEASE, guards.stop_force, FALLING, _settling(contact_modes.release),
-        guards.releasing_stops, guards.release_time,
+        EventKind.REVERSAL, guards.slip_speed, guards.slipping_contacts, guards.reversal_time,
+        _settling(contact_modes.reverse),
     ),
     Transition(
-        EventKind.SLIP, guards.friction_margin, FALLING, _settling(contact_modes.slip),
-        guards.sticking_contacts, guards.slip_time,
+        EventKind.IMPACT, guards.gap, guards.open_stops, guards.closing_time, impacts.impact,
     ),
 )  # fmt: skip
-"""Guards and resets of all events, in the order in which events of one time are applied."""
+"""Guards and resets of all events, in the order of their kinds."""
 
 _RESETS = {row.kind: row.reset for row in TRANSITIONS}
 

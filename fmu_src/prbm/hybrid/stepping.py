@@ -23,6 +23,7 @@ from ..base.tolerances import (
     STEP_MIN_ATOL,
     STEP_SAFETY_FACTOR,
     STEP_SHRINK_MIN,
+    STEP_TREND_FACTOR,
 )
 from ..mechanics.arrays import Real
 from ..mechanics.constraints import Factors
@@ -34,7 +35,7 @@ from .runge_kutta import stages
 from .walls import step_limit
 
 REJECTED_EXPONENT = 1.0 / (PAIR.error_order + 1)
-ACCEPTED_EXPONENT = REJECTED_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT
+ACCEPTED_EXPONENT = REJECTED_EXPONENT - STEP_TREND_FACTOR * STEP_MEMORY_EXPONENT
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from ..mechanics.assembly import assemble
 from ..mechanics.inputs import input_names
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
-from ..mechanism.flexure import ENDS
+from ..mechanism.flexure import ENDS  # of a chain; also pivots of a flexure
 from ..mechanism.parts import (
     FIELDS,
     GROUND,
@@ -51,8 +51,12 @@ COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
 STOPS_MAX = 64  # Largest number of stops, and of friction points.
 PLACES_MAX = 1024  # Largest number of forces, and of probes.
 GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
-PIVOTS_MAX = 256  # Largest number of pivots of a flexure, and of links of a chain.
 GROUND_NUMBER = 0  # Bodies are counted from 1.
+SLOT_GROUPS = (
+    "parameters", "inputs", "bodies", "stops", "base", "energies", "latched", "links", "stretches",
+    "probes", "frequency", "calculated", "derivatives", "indicators", "time",
+)  # fmt: skip
+"""The groups of values in the order of the vector of all values."""
 FIXED_NAMES = ("gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta")
 
 
@@ -117,26 +121,40 @@ def slots(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, int]:
 
 def _names(mechanism: Mechanism, independent: Sequence[int]) -> Iterator[str]:
     """Yield the names of all values in the order of their slots."""
+    groups = _groups(mechanism, independent)
+    for group in SLOT_GROUPS:
+        yield from groups[group]
+
+
+def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Iterable[str]]:
+    """Return the names of the values in each group."""
     stops = [stop.name for stop in mechanism.stops]
-    yield from (p.name for p in mechanism.parameters)
-    yield from input_names(mechanism)
-    yield from (f"{body.name}.{output}" for body in mechanism.bodies for output in BODY_OUTPUTS)
-    yield from (f"{stop}.{output}" for stop in stops for output in STOP_OUTPUTS)
-    yield from BASE_OUTPUTS
-    yield from ENERGIES
-    yield from (f"{stop}.{output}" for stop in stops for output in LATCHED)
     coordinates = coordinate_variables(mechanism)
-    for of_links in (LINK_ANGLE, LINK_STRAIN):
-        yield from (name for pair in coordinates if of_links.search(pair[0]) for name in pair)
-    yield from (f"{probe.name}.{output}" for probe in mechanism.probes for output in PROBE_OUTPUTS)
-    yield "mode.frequency"
-    for kind in mechanism.flexure_types:
-        if len(mechanism.model(kind).gamma) > 1:
-            yield f"{kind.name}.gamma0"
-    yield from state_derivatives(coordinates, independent)
-    yield from (f"{stop}.{kind}_indicator" for stop in stops for kind in INDICATORS)
-    yield from (f"{friction.name}.slip_indicator" for friction in mechanism.frictions)
-    yield "time"
+    links, stretches = (
+        [name for pair in coordinates if group.search(pair[0]) for name in pair]
+        for group in (LINK_ANGLE, LINK_STRAIN)
+    )
+    several = [k.name for k in mechanism.flexure_types if len(mechanism.model(k).gamma) > 1]
+    return {
+        "parameters": [p.name for p in mechanism.parameters],
+        "inputs": input_names(mechanism),
+        "bodies": [f"{body.name}.{output}" for body in mechanism.bodies for output in BODY_OUTPUTS],
+        "stops": [f"{stop}.{output}" for stop in stops for output in STOP_OUTPUTS],
+        "base": BASE_OUTPUTS,
+        "energies": ENERGIES,
+        "latched": [f"{stop}.{output}" for stop in stops for output in LATCHED],
+        "links": links,
+        "stretches": stretches,
+        "probes": [f"{p.name}.{output}" for p in mechanism.probes for output in PROBE_OUTPUTS],
+        "frequency": ["mode.frequency"],
+        "calculated": [f"{name}.gamma0" for name in several],
+        "derivatives": state_derivatives(coordinates, independent),
+        "indicators": [
+            *(f"{stop}.{kind}_indicator" for stop in stops for kind in INDICATORS),
+            *(f"{friction.name}.slip_indicator" for friction in mechanism.frictions),
+        ],
+        "time": ["time"],
+    }
 
 
 def _u32(*numbers: int) -> bytes:

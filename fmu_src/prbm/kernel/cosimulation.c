@@ -2,7 +2,15 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/arc.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/events.h"
+#include "hybrid/impacts.h"
+#include "hybrid/simulation.h"
+#include "hybrid/snapshot.h"
+#include "hybrid/stepping.h"
+#include "hybrid/walls.h"
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
@@ -10,11 +18,10 @@
  * whether held stops may follow jumps of their walls. */
 static bool restart(Simulation *sim, const Wall *walls, bool follow, Problem *problem) {
     State *state = &sim->state;
-    if (!arc_state(sim, sim->present.y, problem)) {
+    if (!arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem)) {
         return false;
     }
     memmove(state->walls, walls, (size_t)system_of(sim)->s * sizeof *walls);
-    copy(state_size(sim), sim->present.y, state->front);
     state->front_time = state->time;
     state->arc.valid = state->has_k1 = false;
     if (values_changed(sim) && !take_values(sim, problem)) {

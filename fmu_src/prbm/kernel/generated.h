@@ -16,6 +16,7 @@
 enum { CONSTRAINT_ITERATIONS_MAX = 20 };
 enum { STATICS_ITERATIONS_MAX = 30 };
 #define STATICS_TURN_MAX 0.5
+#define STATICS_TURN_MIN 1e-300
 #define STATICS_LOAD_STEP_MIN 0.001953125
 #define STATICS_CONSTRAINT_RTOL 1e-13
 #define STATICS_FORCE_RTOL 1e-12
@@ -48,10 +49,13 @@ enum { EVENTS_MAX = 1000 };
 #define WALL_FADING_FACTOR 0.3333333333333333
 #define WALL_LONGEST_RTOL 0.1
 #define WALL_STEP_RTOL 0.5
+#define REST_SPEED_MIN_FACTOR 20.0
 #define WALL_MOBILITY_MAX 1e+100
 enum { EVENTS_AT_ONCE_MAX = 16 };
 enum { IMPACT_COUNT_MAX = 2147483647 };
 #define EVENT_TIME_ATOL 1e-13
+#define EVENT_TIME_FACTOR 2.0
+#define EVENT_TIME_ULPS 8.0
 #define RELEASE_WATCH_FACTOR 0.5
 enum { LOCATION_ITERATIONS_MAX = 100 };
 enum { GUARD_INTERVALS = 8 };
@@ -64,6 +68,7 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define STEP_SHRINK_MIN 0.2
 #define STEP_GROWTH_MAX 5.0
 #define STEP_MEMORY_EXPONENT 0.04
+#define STEP_TREND_FACTOR 0.75
 #define STEP_ERROR_FACTOR 30.0
 #define STEP_ERROR_MIN 0.0001
 #define STEP_MAX_RTOL 0.08
@@ -79,6 +84,8 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define MOVING_DRIFT_FACTOR 100.0
 #define DRIFT_CORRECTED_RTOL 1e-12
 #define PENETRATION_WARNING_RTOL 0.01
+#define REST_JUMP_FACTOR 0.5
+#define SLIDING_ENDS_FACTOR 0.5
 #define GAP_CLOSED_RTOL 1e-12
 #define LOWEST_BOUNCE_RTOL 1e-10
 #define INDICATOR_LEAD_RTOL 0.01
@@ -86,23 +93,24 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 
 /* --- prbm.mechanics.contact_state --------------------------------------------------------------- */
 
-enum ContactMode {
+typedef enum {
     CONTACT_OPEN = 0,
     CONTACT_FRICTIONLESS = 1,
     CONTACT_STICK = 2,
     CONTACT_SLIP_POSITIVE = 3,
     CONTACT_SLIP_NEGATIVE = 4,
-};
+} ContactMode;
 
 /* --- prbm.hybrid.events ------------------------------------------------------------------------- */
 
-enum EventKind {
+typedef enum {
     EVENT_NONE = 0,
-    EVENT_IMPACT = 1,
-    EVENT_RELEASE = 2,
-    EVENT_SLIP = 3,
-    EVENT_REVERSAL = 4,
-};
+    EVENT_RELEASE = 1,
+    EVENT_SLIP = 2,
+    EVENT_REVERSAL = 3,
+    EVENT_IMPACT = 4,
+    EVENT_KINDS = 5,
+} EventKind;
 
 /* --- prbm.mechanism.parts ----------------------------------------------------------------------- */
 
@@ -110,11 +118,12 @@ enum EventKind {
 
 /* --- prbm.mechanism.flexure --------------------------------------------------------------------- */
 
-enum End {
+typedef enum {
     CLAMP = 0,
     PIN = 1,
     FREE = 2,
-};
+} End;
+enum { LINKS_MAX = 200 };
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
@@ -124,50 +133,67 @@ enum { COORDINATES_MAX = 512 };
 enum { STOPS_MAX = 64 };
 enum { PLACES_MAX = 1024 };
 enum { GROUND_POINTS_MAX = 4096 };
-enum { PIVOTS_MAX = 256 };
 enum { GROUND = 0 };
-enum VariableType {
+typedef enum {
+    SLOTS_PARAMETERS = 0,
+    SLOTS_INPUTS = 1,
+    SLOTS_BODIES = 2,
+    SLOTS_STOPS = 3,
+    SLOTS_BASE = 4,
+    SLOTS_ENERGIES = 5,
+    SLOTS_LATCHED = 6,
+    SLOTS_LINKS = 7,
+    SLOTS_STRETCHES = 8,
+    SLOTS_PROBES = 9,
+    SLOTS_FREQUENCY = 10,
+    SLOTS_CALCULATED = 11,
+    SLOTS_DERIVATIVES = 12,
+    SLOTS_INDICATORS = 13,
+    SLOTS_TIME = 14,
+    SLOTS_GROUPS = 15,
+} SlotGroup;
+typedef enum {
     REAL = 0,
     INTEGER = 1,
     BOOLEAN = 2,
     CLOCK = 3,
-};
+} VariableType;
 
 /* --- prbm.interface.variables ------------------------------------------------------------------- */
 
-enum BodyOutput {
+typedef enum {
     BODY_X = 0,
     BODY_Y = 1,
     BODY_ANGLE = 2,
     BODY_VX = 3,
     BODY_VY = 4,
     BODY_OMEGA = 5,
-};
+} BodyOutput;
 enum { PER_BODY = 6 };
-enum StopOutput {
+typedef enum {
     STOP_GAP = 0,
     STOP_GAP_RATE = 1,
     STOP_FORCE = 2,
     STOP_POINT_DISPLACEMENT = 3,
     STOP_POINT_VELOCITY = 4,
     STOP_POINT_MOBILITY = 5,
-};
+} StopOutput;
 enum { PER_STOP = 6 };
-enum BaseOutput {
+typedef enum {
     BASE_FORCE_X = 0,
     BASE_FORCE_Y = 1,
     BASE_MOMENT = 2,
-};
+} BaseOutput;
 enum { PER_BASE = 3 };
-enum EnergyOutput {
+typedef enum {
     ENERGY_KINETIC = 0,
     ENERGY_ELASTIC = 1,
     ENERGY_GRAVITATIONAL = 2,
     ENERGY_DISSIPATED = 3,
     ENERGY_WORK = 4,
-};
+} EnergyOutput;
 enum { PER_ENERGY = 5 };
-enum LatchedOutput {
+typedef enum {
     LATCHED_CONTACT = 0,
     LATCHED_IMPACT_COUNT = 1,
     LATCHED_IMPACT_TIME = 2,
@@ -177,25 +203,30 @@ enum LatchedOutput {
     LATCHED_ENERGY_LOST = 6,
     LATCHED_MODAL_RESTITUTION = 7,
     LATCHED_IMPULSE_SUM = 8,
-};
+} LatchedOutput;
 enum { PER_LATCHED = 9 };
-enum LinkOutput {
+typedef enum {
     LINK_ANGLE = 0,
     LINK_OMEGA = 1,
-};
+} LinkOutput;
 enum { PER_LINK = 2 };
-enum StretchOutput {
+typedef enum {
     STRETCH_STRAIN = 0,
     STRETCH_STRAIN_RATE = 1,
-};
+} StretchOutput;
 enum { PER_STRETCH = 2 };
-enum ProbeOutput {
+typedef enum {
     PROBE_X = 0,
     PROBE_Y = 1,
     PROBE_VX = 2,
     PROBE_VY = 3,
-};
+} ProbeOutput;
 enum { PER_PROBE = 4 };
+typedef enum {
+    INDICATOR_IMPACT = 0,
+    INDICATOR_RELEASE = 1,
+    INDICATOR_SLIP = 2,
+} StopIndicator;
 enum { STOP_INDICATORS = 3 };
 
 /* --- prbm.mechanics.inputs ---------------------------------------------------------------------- */
@@ -203,6 +234,14 @@ enum { STOP_INDICATORS = 3 };
 enum { LOADS = 3 };
 enum { PER_WALL = 2 };
 enum { AXES = 2 };
+typedef enum {
+    INPUTS_FORCES = 0,
+    INPUTS_WALLS = 1,
+    INPUTS_IMPULSES = 2,
+    INPUTS_MOBILITIES = 3,
+    INPUTS_BASE = 4,
+    INPUTS_GROUPS = 5,
+} InputGroup;
 
 /* --- prbm.hybrid.runge_kutta -------------------------------------------------------------------- */
 

@@ -33,8 +33,8 @@ from ..interface.variables import (
     STRETCH_OUTPUTS,
 )
 from ..mechanics.contact_state import ContactMode
-from ..mechanics.inputs import BASE_AXES, LOADS, WALL_INPUTS
-from ..mechanism.flexure import ENDS
+from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
+from ..mechanism.flexure import ENDS, LINKS_MAX
 from ..mechanism.parts import LENGTH_MIN
 
 PATH = Path(__file__).with_name("generated.h")
@@ -61,10 +61,13 @@ def header() -> str:
         ),
         _section(
             sys.modules[EventKind.__module__],
-            [_enumeration("EventKind", "EVENT", {"NONE": 0} | {k.name: k for k in EventKind})],
+            [_enumeration("EventKind", "EVENT", _kinds())],
         ),
         _section("prbm.mechanism.parts", [_constant("LENGTH_MIN", LENGTH_MIN)]),
-        _section("prbm.mechanism.flexure", [_enumeration("End", "", _numbers(ENDS))]),
+        _section(
+            "prbm.mechanism.flexure",
+            [_enumeration("End", "", _numbers(ENDS)), _constant("LINKS_MAX", LINKS_MAX)],
+        ),
         _section(tables, _tables()),
         _section("prbm.interface.variables", _groups()),
         _section("prbm.mechanics.inputs", _inputs()),
@@ -108,11 +111,21 @@ def _number(value: float) -> str:
 def _enumeration(name: str, prefix: str, values: Mapping[str, int | IntEnum]) -> str:
     start = f"{prefix}_" if prefix else ""
     rows = (f"    {start}{key.upper()} = {int(value)}," for key, value in values.items())
-    return "\n".join((f"enum {name} {{", *rows, "};"))
+    return "\n".join(("typedef enum {", *rows, f"}} {name};"))
+
+
+def _kinds() -> dict[str, int]:
+    """Return the kinds of events, that of none and their number."""
+    return {"NONE": 0} | {kind.name: kind for kind in EventKind} | {"KINDS": len(EventKind) + 1}
 
 
 def _numbers(names: Sequence[str]) -> dict[str, int]:
     return {name.replace(".", "_"): i for i, name in enumerate(names)}
+
+
+def _counted(names: Sequence[str]) -> dict[str, int]:
+    """Return the places of names, and their number behind them."""
+    return _numbers((*names, "groups"))
 
 
 def _tables() -> Iterator[str]:
@@ -122,6 +135,7 @@ def _tables() -> Iterator[str]:
         if name.endswith("_MAX"):
             yield _constant(name, value)
     yield _constant("GROUND", tables.GROUND_NUMBER)
+    yield _enumeration("SlotGroup", "SLOTS", _counted(tables.SLOT_GROUPS))
     yield _enumeration("VariableType", "", tables.TYPES)
 
 
@@ -139,6 +153,7 @@ def _groups() -> Iterator[str]:
     ):
         yield _enumeration(f"{name.capitalize()}Output", name, _numbers(outputs))
         yield _constant(f"PER_{name}", len(outputs))
+    yield _enumeration("StopIndicator", "INDICATOR", _numbers(INDICATORS))
     yield _constant("STOP_INDICATORS", len(INDICATORS))
 
 
@@ -146,6 +161,7 @@ def _inputs() -> Iterator[str]:
     yield _constant("LOADS", len(LOADS))
     yield _constant("PER_WALL", len(WALL_INPUTS))
     yield _constant("AXES", len(BASE_AXES))
+    yield _enumeration("InputGroup", "INPUTS", _counted(INPUT_GROUPS))
 
 
 def _tableau(tableau: Tableau) -> Iterator[str]:

@@ -10,7 +10,10 @@ from ..base.version import GENERATION_TOOL
 
 UNIT = "prbm_fmu.c"  # The file that is compiled; it includes all others.
 TABLES = "mechanism_tables.h"
-WRAPPERS = {2: "fmi/fmi2.c", 3: "fmi/fmi3.c"}
+WRAPPERS = {
+    2: ("fmi/fmi2.c",),
+    3: ("fmi/fmi3.c", "fmi/fmi3_values.c", "fmi/fmi3_absent.c"),
+}
 INCLUDE = re.compile(r'#\s*include\s+"([^"]+)"\s*')
 OVERRIDE = "FMI{}_OVERRIDE_FUNCTION_PREFIX"
 BYTES_PER_LINE = 20
@@ -53,7 +56,7 @@ def _files(folder: Traversable, prefix: str) -> Iterator[tuple[str, bytes]]:
 def amalgamation(name: str, title: str, version: int) -> str:
     """Return the kernel as one C file, with the wrapper for one version of FMI."""
     texts = {file: content.decode() for file, content in kernel().items()}
-    left_out = {file for number, file in WRAPPERS.items() if number != version}
+    left_out = {file for number in WRAPPERS if number != version for file in WRAPPERS[number]}
     head = HEAD.format(
         name=name,
         title=printable(title).replace("*/", "* /"),

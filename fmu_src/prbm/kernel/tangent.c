@@ -1,7 +1,14 @@
 /* Directional derivatives: exact changes of all values along changes of states and inputs. */
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/events.h"
+#include "hybrid/guards.h"
+#include "hybrid/impacts.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "dependents.h"
+#include "indicators.h"
+#include "values.h"
 
 /* A change of everything with the states and inputs: dq, dv, da, dlam.  With the complex changes
  * dphi = dtheta - i ds of an arm E, and dw of its rate, dE = i E dphi, d(E w) = E (i dphi w +
@@ -11,6 +18,7 @@ typedef struct {
     const Equations *q;
     const Complex *e;
     const Factors *factors;
+    const Instant *at;
     const double *y, *v, *a, *lam, *du;
     double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,) = da, (r,) */
     Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
@@ -22,14 +30,6 @@ typedef struct {
 
 static Complex times_i(Complex z) {
     return complex_of(-z.im, z.re);
-}
-
-static double multiplier(const Tangent *t, int k) {
-    return t->lam[k];
-}
-
-static double multiplier_change(const Tangent *t, int k) {
-    return t->dlam[k];
 }
 
 /* --- of rows --- */
@@ -164,7 +164,7 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
     Loops x = take_loops(sim);
     Rows loops = plain_rows(system, r, system->loops, system->loops_c);
     jacobian(&loops, t->e, x.rows);
-    if (!factor_dependents(sim, x.rows, x.dependent, x.a, x.pivot)) {
+    if (!factor_dependents(sim, &x)) {
         return singular_choice(sim, x.dependent, problem);
     }
     zeros(n, t->dq);
@@ -295,7 +295,7 @@ static void row_change(const Tangent *t) {
     const Equations *q = t->q;
     Rows walls = slide_rows(q->system);
     for (int k = 0; k < q->r; k++) {
-        add_pull(t, &q->active, k, multiplier(t, k));
+        add_pull(t, &q->active, k, t->lam[k]);
         t->dlam[k] = -second_change(t, &q->active, k);
     }
     for (int k = 0; k < q->slipping_stops; k++) {
@@ -389,7 +389,7 @@ static void stop_changes(const Tangent *t, double *out) {
         d[STOP_POINT_VELOCITY] = wall[1] - d[STOP_GAP_RATE];
     }
     for (int k = 0; k < t->q->held_count; k++) {
-        double change = multiplier_change(t, t->q->first_hold + k);
+        double change = t->dlam[t->q->first_hold + k];
         out[PER_STOP * t->q->held[k] + STOP_FORCE] = change;
     }
 }
@@ -529,8 +529,8 @@ static double dissipation_change(const Tangent *t) {
     for (int k = 0; k < q->slipping_stops; k++) {
         int i = q->slipping[k], h = q->first_hold + held_at(q, i);
         sum += q->stop_friction[i] * sliding_sign(t, i) *
-               (multiplier_change(t, h) * row_rate(&walls, i, t->e, t->v) +
-                multiplier(t, h) * rate_change(t, &walls, i));
+               (t->dlam[h] * row_rate(&walls, i, t->e, t->v) +
+                t->lam[h] * rate_change(t, &walls, i));
     }
     return sum;
 }
@@ -546,8 +546,8 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k], h = q->first_hold + k;
         double velocity = wall_change(t, i)[1];
-        double w = wall_motion(&q->inputs.walls[i], t->sim->state.time).v;
-        sum -= multiplier_change(t, h) * w + multiplier(t, h) * velocity;
+        double w = wall_motion(&q->inputs.walls[i], t->at->time).v;
+        sum -= t->dlam[h] * w + t->lam[h] * velocity;
     }
     return sum;
 }
@@ -559,39 +559,42 @@ static double sign_times(double x, double change) {
 
 static double impact_indicator_change(const Tangent *t, int i) {
     const Scales *scales = &t->sim->configuration.scales;
-    bool opens = gap_rate(t->q, i, t->sim->state.time, t->e, t->v) > 0.0;
+    bool opens = gap_rate(t->q, i, t->at->time, t->e, t->v) > 0.0;
     double ahead = opens ? INDICATOR_LEAD_RTOL * scales->time * gap_rate_change(t, i) : 0.0;
     return (gap_change(t, i) + ahead) / scales->length;
 }
 
 static double release_indicator_change(const Tangent *t, int i) {
     const Simulation *sim = t->sim;
-    double pressed = lifted_guard(sim, EVENT_RELEASE, i) / force_scale(sim);
-    return pressed <= release_indicator(sim, i)
-               ? multiplier_change(t, t->q->first_hold + held_at(t->q, i)) / force_scale(sim)
-               : -sign_times(leaving_rate(sim, i), gap_rate_change(t, i)) / speed_scale(sim);
+    double force = guard_scale(sim, EVENT_RELEASE), speed = guard_scale(sim, EVENT_REVERSAL);
+    double pressed = lifted_guard(sim, t->at, EVENT_RELEASE, i) / force;
+    return pressed <= release_indicator(sim, t->at, i)
+               ? t->dlam[t->q->first_hold + held_at(t->q, i)] / force
+               : -sign_times(leaving_rate(sim, t->at, i), gap_rate_change(t, i)) / speed;
 }
 
 static double slip_indicator_change(const Tangent *t, int contact) {
     const Equations *q = t->q;
     int row = q->first_stick + place_in(q->sticking, contact);
-    double friction = sign_times(multiplier(t, row), multiplier_change(t, row)), limit;
+    double friction = sign_times(t->lam[row], t->dlam[row]), limit;
     if (is_stop(q->system, contact)) {
         int held = q->first_hold + held_at(q, contact);
-        limit = q->stop_friction[contact] * multiplier_change(t, held);
+        limit = q->stop_friction[contact] * t->dlam[held];
     } else {
         limit = limit_change(t, contact - q->system->s);
     }
-    return ((1.0 + FRICTION_EXCESS_RTOL) * limit - friction) / force_scale(t->sim);
+    return ((1.0 + FRICTION_EXCESS_RTOL) * limit - friction) /
+           guard_scale(t->sim, EVENT_SLIP);
 }
 
 static double reversal_indicator_change(const Tangent *t, int contact) {
     int i;
     Rows rows = tangential_rows(t->q->system, contact, &i);
-    return sliding_sign(t, contact) * rate_change(t, &rows, i) / speed_scale(t->sim);
+    return sliding_sign(t, contact) * rate_change(t, &rows, i) /
+           guard_scale(t->sim, EVENT_REVERSAL);
 }
 
-static double indicator_change(const Tangent *t, int kind, int contact) {
+static double indicator_change(const Tangent *t, EventKind kind, int contact) {
     switch (kind) {
     case EVENT_IMPACT: return impact_indicator_change(t, contact);
     case EVENT_RELEASE: return release_indicator_change(t, contact);
@@ -601,9 +604,9 @@ static double indicator_change(const Tangent *t, int kind, int contact) {
 }
 
 static void indicator_changes(const Tangent *t, double *out) {
-    for (int kind = EVENT_IMPACT; kind <= EVENT_REVERSAL; kind++) {
+    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
         for (int contact = 0; contact < contact_count(t->sim); contact++) {
-            if (watched(t->q, kind, contact)) {
+            if (transition(kind)->watched(t->q, contact)) {
                 out[indicator_place(t->sim, kind, contact)] = indicator_change(t, kind, contact);
             }
         }
@@ -631,10 +634,10 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     indicator_changes(t, out + slots->indicators);
 }
 
-/* Room for the changes, at the present state and its rates. */
-static Tangent begin_tangent(Simulation *sim, const double *du) {
+/* Room for the changes at a moment. */
+static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *du) {
     const System *system = system_of(sim);
-    const Evaluation *at = &sim->rates.evaluation;
+    const Evaluation *at = now->evaluation;
     Scratch *scratch = &sim->scratch;
     int n = system->n;
     Tangent t = {0};
@@ -644,8 +647,9 @@ static Tangent begin_tangent(Simulation *sim, const double *du) {
     t.q = &sim->equations;
     t.e = at->at.e;
     t.factors = &at->factors;
-    t.y = sim->rates.y;
-    t.v = t.y + n;
+    t.at = &now->at;
+    t.y = now->at.q;
+    t.v = now->at.v;
     t.a = at->a;
     t.lam = at->lam;
     t.du = du;
@@ -668,10 +672,11 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
     Simulation *sim = simulation;
     size_t mark = sim->scratch.used;
     int stops = sim->configuration.mechanism->slots.stops;
-    if (!present_rates(sim, problem)) {
+    Moment now;
+    if (!present_moment(sim, &now, problem)) {
         return false;
     }
-    Tangent t = begin_tangent(sim, du);
+    Tangent t = begin_tangent(sim, &now, du);
     double *dmoment = take(&sim->scratch, (size_t)system_of(sim)->n);
     Complex *dw = take_complex(&sim->scratch, system_of(sim)->n, 1);
     bool right = tangent_coordinates(&t, dx, problem);

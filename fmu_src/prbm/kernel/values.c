@@ -1,13 +1,22 @@
 /* The values of a simulation in either mode: co-simulation or model exchange. */
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "core/vectors.h"
+#include "hybrid/arc.h"
+#include "hybrid/outputs.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "hybrid/snapshot.h"
+#include "indicators.h"
+#include "model_exchange.h"
+#include "values.h"
 
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
                            bool exchange, Problem *problem) {
     Simulation *sim = simulation;
+    SimulationMode mode = {exchange, exchange ? LOWEST_BOUNCE_RTOL : 0.0};
     keep_backup(sim);
-    bool right = start_motion(sim, start_time, tolerance, exchange, problem);
+    bool right = start_motion(sim, start_time, tolerance, mode, problem);
     if (right && exchange) {
         exchange_begin(sim);
     }
@@ -18,12 +27,12 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
 static bool load_present(Simulation *sim, Problem *problem) {
     const System *system = system_of(sim);
     Present *present = &sim->present;
-    if (sim->state.exchange) {
+    if (sim->state.mode.exchange) {
         copy(state_size(sim), sim->state.front, present->y);
         directions(system, present->y, present->e);
         return true;
     }
-    if (!arc_state(sim, present->y, problem)) {
+    if (!arc_state(sim, present->y, &present->reference, &present->evaluation, problem)) {
         return false;
     }
     pad(system->n, present->y, present->evaluation.at.angle);
@@ -32,50 +41,48 @@ static bool load_present(Simulation *sim, Problem *problem) {
     return true;
 }
 
-/* Bring groups of outputs up to date. */
-PRBM bool update_outputs(Simulation *sim, int groups, Problem *problem) {
-    if (sim->state.exchange && !exchange_refresh(sim, problem)) {
-        return false;
+PRBM const double *present_outputs(Simulation *sim, int groups, Problem *problem) {
+    bool exchange = sim->state.mode.exchange;
+    if (exchange && !exchange_refresh(sim, problem)) {
+        return NULL;
     }
     int missing = groups & ~sim->present.fresh;
     if (((missing & PLACES) && !load_present(sim, problem)) ||
-        !compute_outputs(sim, missing, !sim->state.exchange, problem)) {
-        return false;
+        !compute_outputs(sim, missing, !exchange, problem)) {
+        return NULL;
     }
     sim->present.fresh |= groups;
-    return true;
+    return sim->present.outputs;
 }
 
-/* Bring the rates of the present state up to date. */
-PRBM bool present_rates(Simulation *sim, Problem *problem) {
-    PresentRates *rates = &sim->rates;
-    if (sim->state.exchange) {
-        return exchange_rates(sim, problem);
+PRBM bool present_moment(Simulation *sim, Moment *now, Problem *problem) {
+    if (sim->state.mode.exchange) {
+        return exchange_moment(sim, now, problem);
     }
-    rates->y = sim->present.y;
-    rates->evaluated = false;
-    return update_outputs(sim, PLACES, problem) &&
-           rate(&sim->equations, sim->state.time, rates->y, NULL, &rates->evaluation, rates->rates, problem);
+    return present_outputs(sim, PLACES, problem) &&
+           moment_at(sim, sim->present.y, now, problem);
 }
 
 /* A derivative of a state. */
 static bool get_derivative(Simulation *sim, int k, double *x, Problem *problem) {
     const Mechanism *m = sim->configuration.mechanism;
     int n = m->coordinate_count, count = m->independent_count;
-    if (!present_rates(sim, problem)) {
+    Moment now;
+    if (!present_moment(sim, &now, problem)) {
         return false;
     }
-    *x = sim->rates.rates[k < count ? n + m->independent[k] : 2 * n + k - count];
+    *x = now.rates[k < count ? n + m->independent[k] : 2 * n + k - count];
     return true;
 }
 
 static bool get_indicator(Simulation *sim, int k, double *x, Problem *problem) {
     size_t mark = sim->scratch.used;
-    if (!present_rates(sim, problem)) {
+    Moment now;
+    if (!present_moment(sim, &now, problem)) {
         return false;
     }
     double *z = take(&sim->scratch, (size_t)exchange_indicators(sim));
-    event_indicators(sim, z);
+    event_indicators(sim, &now.at, z);
     *x = z[k];
     sim->scratch.used = mark;
     return true;
@@ -101,9 +108,7 @@ PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *p
     if (slot >= slots->indicators && slot < slots->time) {
         return get_indicator(sim, slot - slots->indicators, x, problem);
     }
-    if (!update_outputs(sim, output_groups(sim, slot), problem)) {
-        return false;
-    }
-    *x = sim->present.outputs[slot];
-    return true;
+    const double *outputs = present_outputs(sim, output_groups(sim, slot), problem);
+    *x = outputs ? outputs[slot] : 0.0;
+    return outputs != NULL;
 }

@@ -22,6 +22,9 @@ WALL_INPUTS = {"displacement": "m", "velocity": "m/s"}
 BASE_AXES = "xy"
 """Components of the acceleration of the base."""
 
+INPUT_GROUPS = ("forces", "walls", "impulses", "mobilities", "base")
+"""The groups of inputs in the order of the interface."""
+
 T = TypeVar("T", float, Real, float | Real)
 
 
@@ -153,12 +156,15 @@ class Inputs:
 
 def input_units(mechanism: Mechanism) -> dict[str, str]:
     """Return the inputs in the order of the interface, with their units."""
-    units = {f"{f.name}.{axis}": unit for f in mechanism.forces for axis, unit in LOADS.items()}
-    for stop in mechanism.stops:
-        units |= {f"{stop.name}.{what}": unit for what, unit in WALL_INPUTS.items()}
-    units |= _impulse_units(mechanism)
-    units |= {f"{stop.name}.{MOBILITY}": "1/kg" for stop in mechanism.stops}
-    return units | {f"base.acceleration.{axis}": "m/s2" for axis in BASE_AXES}
+    stops = mechanism.stops
+    groups = {
+        "forces": {f"{f.name}.{k}": unit for f in mechanism.forces for k, unit in LOADS.items()},
+        "walls": {f"{s.name}.{k}": unit for s in stops for k, unit in WALL_INPUTS.items()},
+        "impulses": _impulse_units(mechanism),
+        "mobilities": {f"{s.name}.{MOBILITY}": "1/kg" for s in stops},
+        "base": {f"base.acceleration.{axis}": "m/s2" for axis in BASE_AXES},
+    }
+    return {name: unit for group in INPUT_GROUPS for name, unit in groups[group].items()}
 
 
 def input_names(mechanism: Mechanism) -> tuple[str, ...]:

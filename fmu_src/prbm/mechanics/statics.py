@@ -23,6 +23,7 @@ from ..base.tolerances import (
     STATICS_LOAD_STEP_MIN,
     STATICS_STEP_ATOL,
     STATICS_TURN_MAX,
+    STATICS_TURN_MIN,
 )
 from ..mechanism.parameters import finite
 from . import constraints, contact
@@ -217,7 +218,7 @@ def _newton(
         turn = float(np.abs(change[:n]).max())
         if not math.isfinite(turn):
             return None
-        state = state + change * min(1.0, STATICS_TURN_MAX / max(turn, 1e-300))
+        state = state + change * min(1.0, STATICS_TURN_MAX / max(turn, STATICS_TURN_MIN))
     return None
 
 

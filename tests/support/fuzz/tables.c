@@ -14,7 +14,7 @@
 #include <string.h>
 #include <time.h>
 
-#include "simulation.h"
+#include "motion.h"
 
 enum {
     HEAD = 16,
@@ -68,7 +68,7 @@ static void advance(Simulation *simulation) {
     read_all(simulation);
 }
 
-static void exchange(Simulation *simulation) {
+static void exchange_some(Simulation *simulation) {
     Problem problem;
     int n = exchange_states(simulation), m = exchange_indicators(simulation);
     double *x = malloc(((size_t)n + 1) * sizeof *x), *dx = malloc(((size_t)n + 1) * sizeof *dx);
@@ -97,7 +97,7 @@ static void start(const Mechanism *mechanism, bool for_exchange) {
     }
     if (simulation_start(simulation, 0.0, 0.0, for_exchange, &problem)) {
         moved++;
-        for_exchange ? exchange(simulation) : advance(simulation);
+        for_exchange ? exchange_some(simulation) : advance(simulation);
     } else {
         must(problem.text[0], "refused to start without a reason");
     }

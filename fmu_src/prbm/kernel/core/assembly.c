@@ -9,6 +9,7 @@
 #include "core/flexure.h"
 #include "core/kinetics.h"
 #include "core/matrix.h"
+#include "core/vectors.h"
 
 /* --- values, points and masses ---------------------------------------------------------------- */
 

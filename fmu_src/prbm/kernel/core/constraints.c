@@ -8,10 +8,6 @@
 #include "core/kinetics.h"
 #include "core/matrix.h"
 
-static const char SINGULAR[] =
-    "the equations of motion are singular in this shape: two constraints are linearly dependent, or "
-    "a part that can move has no mass";
-
 /* --- rows ------------------------------------------------------------------------------------- */
 
 PRBM Rows plain_rows(const System *system, int count, const Complex *B, const double *c) {
@@ -33,12 +29,12 @@ PRBM Rows rub_rows(const System *system) {
     return plain_rows(system, system->f, system->rubs, NULL);
 }
 
-static int seen_from(const Rows *rows, int i) {
+PRBM int seen_from(const Rows *rows, int i) {
     return rows->on == NULL ? FIXED : rows->on[i];
 }
 
 /* Return f (B E + z) of a row that is measured relative to a body. */
-static Complex seen_value(const Rows *rows, int i, const Complex *e) {
+PRBM Complex seen_value(const Rows *rows, int i, const Complex *e) {
     int n = rows->system->n;
     const Complex *B = rows->B + i * n;
     Complex sum = rows->z[i];
@@ -62,7 +58,7 @@ PRBM double row_value(const Rows *rows, int i, const Complex *e) {
 }
 
 /* Return B E w, with the rates w of the arms. */
-static Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
+PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
     const System *system = rows->system;
     const Complex *B = rows->B + i * system->n;
     Complex sum = {0.0, 0.0};

@@ -14,6 +14,11 @@ typedef struct {
     const int *on;          /* (count,) coordinates of the bodies; FIXED: f = 1; NULL: all FIXED */
 } Rows;
 
+/* The message where the equations have no unique solution. */
+#define SINGULAR \
+    "the equations of motion are singular in this shape: two constraints are linearly dependent, " \
+    "or a part that can move has no mass"
+
 PRBM Rows plain_rows(const System *system, int count, const Complex *B, const double *c);
 PRBM Rows gap_rows(const System *system);
 PRBM Rows slide_rows(const System *system);
@@ -35,5 +40,8 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, double *impulses, Scratch *scratch,
                              Problem *problem);
+PRBM int seen_from(const Rows *rows, int i);
+PRBM Complex seen_value(const Rows *rows, int i, const Complex *e);
+PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v);
 
 #endif

@@ -1,39 +1,39 @@
 /* Modes of the contacts and their directions along the walls: the twin of contact_state.py. */
 #include "core/contact_state.h"
 
-PRBM int slip_sign(int mode) {
+PRBM int slip_sign(ContactMode mode) {
     return (mode == CONTACT_SLIP_POSITIVE) - (mode == CONTACT_SLIP_NEGATIVE);
 }
 
-static int slipping_mode(double sign) {
+PRBM ContactMode slipping_mode(double sign) {
     return sign > 0.0 ? CONTACT_SLIP_POSITIVE : CONTACT_SLIP_NEGATIVE;
 }
 
-static bool is_stop(const System *system, int contact) {
+PRBM bool is_stop(const System *system, int contact) {
     return contact < system->s;
 }
 
 /* Return the rows that contain the sliding velocity of a contact; i is its index among them. */
-static Rows tangential_rows(const System *system, int contact, int *i) {
+PRBM Rows tangential_rows(const System *system, int contact, int *i) {
     *i = is_stop(system, contact) ? contact : contact - system->s;
     return is_stop(system, contact) ? slide_rows(system) : rub_rows(system);
 }
 
-static void tangential_row(const System *system, int contact, const Complex *e, double *row) {
+PRBM void tangential_row(const System *system, int contact, const Complex *e, double *row) {
     int i;
     Rows rows = tangential_rows(system, contact, &i);
     row_jacobian(&rows, i, e, row);
 }
 
-static double sliding_velocity(const System *system, int contact, const Complex *e,
-                               const double *v) {
+PRBM double sliding_velocity(const System *system, int contact, const Complex *e,
+                             const double *v) {
     int i;
     Rows rows = tangential_rows(system, contact, &i);
     return row_rate(&rows, i, e, v);
 }
 
-static double tangential_convective(const System *system, int contact, const Complex *e,
-                                    const double *v) {
+PRBM double tangential_convective(const System *system, int contact, const Complex *e,
+                                  const double *v) {
     int i;
     Rows rows = tangential_rows(system, contact, &i);
     return row_convective(&rows, i, e, v);

@@ -6,10 +6,18 @@
 
 /* Contacts are numbered in one list: the stops, then the friction points, which are never open.
  * CONTACT_FRICTIONLESS is a closed contact without friction, or whose load other contacts carry. */
-PRBM int slip_sign(int mode); /* Sign of the sliding velocity: -1, 0 or +1. */
+PRBM int slip_sign(ContactMode mode); /* Sign of the sliding velocity: -1, 0 or +1. */
 
 typedef struct {
-    int *modes; /* (s + f,) */
+    ContactMode *modes; /* (s + f,) */
 } ContactState;
+PRBM ContactMode slipping_mode(double sign);
+PRBM bool is_stop(const System *system, int contact);
+PRBM Rows tangential_rows(const System *system, int contact, int *i);
+PRBM void tangential_row(const System *system, int contact, const Complex *e, double *row);
+PRBM double sliding_velocity(const System *system, int contact, const Complex *e,
+                             const double *v);
+PRBM double tangential_convective(const System *system, int contact, const Complex *e,
+                                  const double *v);
 
 #endif

@@ -4,6 +4,7 @@
 #include "core/dynamics.h"
 #include "core/forces.h"
 #include "core/matrix.h"
+#include "core/vectors.h"
 
 /* The power that friction dissipates. */
 static double rubbing_power(const Equations *q, const Evaluation *at, const double *v) {
@@ -125,7 +126,7 @@ static void arm_accelerations(const System *system, const Complex *e, const doub
 }
 
 /* A E */
-static Complex along_arms(int n, const Complex *A, const Complex *e) {
+PRBM Complex along_arms(int n, const Complex *A, const Complex *e) {
     Complex sum = {0.0, 0.0};
     for (int j = 0; j < n; j++) {
         sum = plus(sum, product(A[j], e[j]));

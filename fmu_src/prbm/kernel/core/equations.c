@@ -5,8 +5,9 @@
 #include "core/equations.h"
 #include "core/forces.h"
 #include "core/matrix.h"
+#include "core/vectors.h"
 
-static Parts place_parts(Memory *memory, size_t count) {
+PRBM Parts place_parts(Memory *memory, size_t count) {
     Parts parts;
     parts.re = place(memory, count, sizeof(double));
     parts.im = place(memory, count, sizeof(double));
@@ -18,7 +19,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     size_t r = (size_t)system->r + 2 * s + f, even = (size_t)system->even;
     Equations q = {0};
     q.system = system;
-    q.contacts.modes = place(memory, s + f, sizeof(int));
+    q.contacts.modes = place(memory, s + f, sizeof(ContactMode));
     q.held = place(memory, s, sizeof(int));
     q.sticking = place(memory, s + f, sizeof(int));
     q.slipping = place(memory, s + f, sizeof(int));
@@ -71,7 +72,8 @@ static void set_rows(Equations *q) {
     }
     q->first_stick = q->r;
     for (int contact = 0; contact < system->s + system->f; contact++) {
-        int mode = q->contacts.modes[contact], point = contact - system->s;
+        ContactMode mode = q->contacts.modes[contact];
+        int point = contact - system->s;
         if (mode == CONTACT_STICK) {
             q->sticking[q->sticking_count++] = contact;
             add_row(q, point < 0 ? &walls : &rubs, point < 0 ? contact : point, 0.0);
@@ -84,7 +86,7 @@ static void set_rows(Equations *q) {
     q->active = active;
 }
 
-static Parts parts_from(Parts parts, int start) {
+PRBM Parts parts_from(Parts parts, int start) {
     parts.re += start;
     parts.im += start;
     return parts;
@@ -103,7 +105,7 @@ static void set_row_parts(Equations *q) {
 }
 
 /* Where an index stands in a list that has it. */
-static int place_in(const int *list, int index) {
+PRBM int place_in(const int *list, int index) {
     int k = 0;
     while (list[k] != index) {
         k++;
@@ -112,7 +114,7 @@ static int place_in(const int *list, int index) {
 }
 
 /* The place of a held stop among those that hold. */
-static int held_at(const Equations *q, int stop) {
+PRBM int held_at(const Equations *q, int stop) {
     return place_in(q->held, stop);
 }
 
@@ -172,7 +174,7 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
     q->inputs = *inputs;
     q->omega = omega;
     q->slipping_stops = 0;
-    memmove(q->contacts.modes, contacts->modes, count * sizeof(int));
+    memmove(q->contacts.modes, contacts->modes, count * sizeof(ContactMode));
     set_laws(q);
     set_rows(q);
     set_row_parts(q);

@@ -56,5 +56,9 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
                         const ContactState *contacts, double omega);
 PRBM double reference_at(const Wall *wall, double t);
 PRBM WallMotion wall_motion(const Wall *wall, double t);
+PRBM Parts place_parts(Memory *memory, size_t count);
+PRBM Parts parts_from(Parts parts, int start);
+PRBM int place_in(const int *list, int index);
+PRBM int held_at(const Equations *q, int stop);
 
 #endif

@@ -5,7 +5,9 @@
 
 #include "core/evaluation.h"
 #include "core/forces.h"
+#include "core/kinetics.h"
 #include "core/matrix.h"
+#include "core/vectors.h"
 
 /* --- memory ----------------------------------------------------------------------------------- */
 
@@ -16,7 +18,7 @@ PRBM void reference_place(Reference *reference, const System *system, Memory *me
     reference->e_parts = place_parts(memory, even);
 }
 
-static Kinematics place_kinematics(const System *system, Memory *memory) {
+PRBM Kinematics place_kinematics(const System *system, Memory *memory) {
     size_t even = (size_t)system->even;
     Kinematics at;
     at.time = 0.0;
@@ -30,7 +32,7 @@ static Kinematics place_kinematics(const System *system, Memory *memory) {
 }
 
 /* Zero what has been placed since a beginning: the padding of vectors and rows stays zero. */
-static void zero_placed(const Memory *memory, size_t begin) {
+PRBM void zero_placed(const Memory *memory, size_t begin) {
     if (memory->base != NULL) {
         memset(memory->base + begin, 0, memory->used - begin);
     }
@@ -86,7 +88,7 @@ static const double *own_inertia(const System *system, const Kinematics *at) {
 }
 
 /* The directions at the angles, from those of a reference nearby if there is one. */
-SIZED void directions_of(int even, const System *system, const Reference *near, Kinematics *at) {
+SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at) {
     if (near == NULL ||
         !turned_directions(even, at->angle, near->angle, near->e_parts, at->e_parts, at->e)) {
         unit_vectors(even, at->angle, at->e);
@@ -97,7 +99,7 @@ SIZED void directions_of(int even, const System *system, const Reference *near, 
     }
 }
 
-static void find_directions(const System *system, const Reference *near, Kinematics *at) {
+PRBM void find_directions(const System *system, const Reference *near, Kinematics *at) {
     directions_of(system->even, system, near, at);
 }
 
@@ -218,8 +220,8 @@ static void rows_and_convection(const Equations *q, const Kinematics *at, double
     rows_to_length(q->system->even, q, at, rows, convective);
 }
 
-SIZED void rows_of_length(int even, const Equations *q, const Kinematics *at, double *rows,
-                          double *convective) {
+SHARED void rows_of_length(int even, const Equations *q, const Kinematics *at, double *rows,
+                           double *convective) {
     if (KNOWN(even)) {
         rows_to_length(even, q, at, rows, convective);
     } else {
@@ -371,24 +373,24 @@ PRBM double rub_limit(const Equations *equations, int i, const Complex *e) {
 }
 
 /* The force of a closed stop. */
-static double stop_force(const Equations *q, const double *lam, int stop) {
+PRBM double stop_force(const Equations *q, const double *lam, int stop) {
     return lam[q->first_hold + held_at(q, stop)];
 }
 
 /* The friction force of a sticking contact. */
-static double stick_force(const Equations *q, const double *lam, int contact) {
+PRBM double stick_force(const Equations *q, const double *lam, int contact) {
     return lam[q->first_stick + place_in(q->sticking, contact)];
 }
 
 /* The largest friction force of a contact, by Coulomb's law. */
-static double friction_limit(const Equations *q, const Complex *e, const double *lam,
-                             int contact) {
+PRBM double friction_limit(const Equations *q, const Complex *e, const double *lam,
+                           int contact) {
     return is_stop(q->system, contact) ? q->stop_friction[contact] * stop_force(q, lam, contact)
                                        : rub_limit(q, contact - q->system->s, e);
 }
 
 /* The friction force of a slipping friction point along its direction. */
-static double rub_force(const Equations *q, int i, const Complex *e) {
+PRBM double rub_force(const Equations *q, int i, const Complex *e) {
     return -slip_sign(q->contacts.modes[q->system->s + i]) * rub_limit(q, i, e);
 }
 
@@ -452,7 +454,7 @@ RARE void add_walls(const Equations *q, double t, double *right) {
 }
 
 /* Solve for a and lam at the time, angles and rates of the evaluation. */
-SIZED bool motion_of_length(int even, const Equations *q, const Reference *near,
+SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,
                             Evaluation *result) {
     directions_of(even, q->system, near, &result->at);
     find_loads(even, q, result);

@@ -45,5 +45,18 @@ PRBM bool factor_equations(const Equations *equations, const double *q, const do
 PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation,
                               const double *v);
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
+SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at);
+SHARED void rows_of_length(int even, const Equations *q, const Kinematics *at, double *rows,
+                           double *convective);
+SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,
+                             Evaluation *result);
+PRBM Kinematics place_kinematics(const System *system, Memory *memory);
+PRBM void zero_placed(const Memory *memory, size_t begin);
+PRBM void find_directions(const System *system, const Reference *near, Kinematics *at);
+PRBM double stop_force(const Equations *q, const double *lam, int stop);
+PRBM double stick_force(const Equations *q, const double *lam, int contact);
+PRBM double friction_limit(const Equations *q, const Complex *e, const double *lam,
+                           int contact);
+PRBM double rub_force(const Equations *q, int i, const Complex *e);
 
 #endif

@@ -1,10 +1,11 @@
 /* Factors of a saddle-point matrix, block by block, for repeated solution. */
 #include "core/factors.h"
 #include "core/matrix.h"
+#include "core/vectors.h"
 
 /* M = L D L^T of the lower triangle of M, L with ones on its diagonal, and the inverse of D; false
  * if M is not positive definite. */
-SIZED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
+SHARED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     for (int i = 0; i < size; i++) {
         double pivot = M[i * size + i];
         for (int j = 0; j < i; j++) {
@@ -39,7 +40,7 @@ RARE bool factor(int size, const double *M, double *L, double *inverse) {
 /* The same of a small M without waiting for one division after the other: elimination without
  * divisions leaves w_0 = M_00, w_1 = M_00 D_1, w_2 = w_0 w_1 D_2, ..., and all w_k L_ik.  False,
  * too, where doubles hardly hold these multiples: factor may still succeed, then. */
-SIZED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
+SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     double w[SMALL][SMALL], multiple = 1.0;
     bool safe;
     UNROLLED
@@ -80,7 +81,7 @@ SIZED bool small_factor(int size, const double *ALONE M, double *ALONE L, double
 }
 
 /* Put what belongs to a block, by pairs if it begins at an even place. */
-SIZED void put_block(int size, int start, const double *from, double *to) {
+SHARED void put_block(int size, int start, const double *from, double *to) {
     to += start;
     if (start % PAIR != 0) {
         UNROLLED
@@ -99,7 +100,7 @@ SIZED void put_block(int size, int start, const double *from, double *to) {
 }
 
 /* b := L^-1 b and b := L^-T b within a block. */
-SIZED void block_forward(int size, const double *ALONE L, double *ALONE b) {
+SHARED void block_forward(int size, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
         double sum = b[i];
@@ -126,8 +127,6 @@ SIZED void block_backward(int size, const double *ALONE L, double *ALONE b) {
     }
 }
 
-typedef enum { BACKWARD, FORWARD } Substitution;
-
 SIZED void block_solve(int size, const double *ALONE L, double *ALONE b, Substitution way) {
     if (way == FORWARD) {
         block_forward(size, L, b);
@@ -137,8 +136,8 @@ SIZED void block_solve(int size, const double *ALONE L, double *ALONE b, Substit
 }
 
 /* The same with a small block, of the coordinates from start. */
-SIZED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
-                       Substitution way) {
+SHARED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
+                        Substitution way) {
     double b[SMALL];
     UNROLLED
     for (int i = 0; i < size; i++) {
@@ -163,7 +162,7 @@ SIZED void solve_blocks(const Factors *factors, double *x, Substitution way) {
     }
 }
 
-static void forward_all(const Factors *factors, double *x) {
+PRBM void forward_all(const Factors *factors, double *x) {
     solve_blocks(factors, x, FORWARD);
 }
 
@@ -231,7 +230,7 @@ PRBM bool factor_schur(Factors *factors) {
     return schur_to_length(factors->even, factors);
 }
 
-SIZED bool schur_of_length(int even, Factors *factors) {
+SHARED bool schur_of_length(int even, Factors *factors) {
     return KNOWN(even) ? schur_to_length(even, factors) : factor_schur(factors);
 }
 
@@ -306,7 +305,7 @@ static void finish(const Factors *factors, double *x, double *lam) {
     finish_to_length(factors->even, factors, x, lam);
 }
 
-SIZED void finish_of_length(int even, const Factors *factors, double *x, double *lam) {
+SHARED void finish_of_length(int even, const Factors *factors, double *x, double *lam) {
     if (KNOWN(even)) {
         finish_to_length(even, factors, x, lam);
     } else {

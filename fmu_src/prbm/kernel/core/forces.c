@@ -1,5 +1,6 @@
 /* Generalised forces: the twin of mechanics/forces.py. */
 #include "core/forces.h"
+#include "core/matrix.h"
 
 PRBM void springs(int n, const double *K, const double *deflection, double *torque) {
     for (int i = 0; i < n; i++) {

@@ -2,6 +2,7 @@
 #include <string.h>
 
 #include "core/flexure.h"
+#include "core/layout.h"
 #include "core/tables.h"
 
 static const FlexureType *kind_of(const Mechanism *m, const Flexure *flexure) {
@@ -12,7 +13,7 @@ static int link_count(const Mechanism *m, const Flexure *flexure) {
     return links_of(kind_of(m, flexure), flexure->start_end, flexure->end_end);
 }
 
-static void count_coordinates(Reader *reader, Mechanism *m) {
+PRBM void count_coordinates(Reader *reader, Mechanism *m) {
     long long links = 0, stretching = 0;
     for (int i = 0; i < m->flexure_count && !reader->wrong; i++) {
         int count = link_count(m, &m->flexures[i]);
@@ -110,7 +111,7 @@ static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
 }
 
 /* The order of the assembly, and what each coordinate is. */
-static void lay_out_coordinates(Reader *reader, Mechanism *m) {
+PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     size_t parts = (size_t)m->flexure_count + (size_t)m->joint_count;
     size_t n = (size_t)m->coordinate_count, b = (size_t)m->body_count;
     Walk walk = {kept(reader, b + 1, sizeof(bool)), kept(reader, parts, sizeof(bool)),
@@ -137,33 +138,77 @@ static void lay_out_coordinates(Reader *reader, Mechanism *m) {
     m->stretches = walk.stretches;
 }
 
-static void lay_out_inputs(Mechanism *m) {
-    InputGroups *input = &m->input;
-    input->walls = LOADS * m->force_count;
-    input->impulses = input->walls + PER_WALL * m->stop_count;
-    input->mobilities = input->impulses + LOADS * m->force_count;
-    input->base = input->mobilities + m->stop_count;
+/* Where groups begin that follow each other. */
+static void begin_groups(int groups, const int *counts, int *begins) {
+    int next_one = 0;
+    for (int i = 0; i < groups; i++) {
+        begins[i] = next_one;
+        next_one += counts[i];
+    }
 }
 
-static void lay_out_slots(Mechanism *m) {
-    Slots *s = &m->slots;
-    s->parameters = 0;
-    s->inputs = m->parameter_count;
-    s->bodies = s->inputs + m->input_count;
-    s->stops = s->bodies + PER_BODY * m->body_count;
-    s->base = s->stops + PER_STOP * m->stop_count;
-    s->energies = s->base + PER_BASE;
-    s->latched = s->energies + PER_ENERGY;
-    s->links = s->latched + PER_LATCHED * m->stop_count;
-    s->stretches = s->links + PER_LINK * m->link_count;
-    s->probes = s->stretches + PER_STRETCH * m->stretch_count;
-    s->frequency = s->probes + PER_PROBE * m->probe_count;
-    s->calculated = s->frequency + 1;
-    s->derivatives = s->calculated;
+PRBM void lay_out_inputs(Mechanism *m) {
+    const int counts[INPUTS_GROUPS] = {
+        [INPUTS_FORCES] = LOADS * m->force_count,
+        [INPUTS_WALLS] = PER_WALL * m->stop_count,
+        [INPUTS_IMPULSES] = LOADS * m->force_count,
+        [INPUTS_MOBILITIES] = m->stop_count,
+        [INPUTS_BASE] = AXES,
+    };
+    int begins[INPUTS_GROUPS];
+    begin_groups(INPUTS_GROUPS, counts, begins);
+    m->input.walls = begins[INPUTS_WALLS];
+    m->input.impulses = begins[INPUTS_IMPULSES];
+    m->input.mobilities = begins[INPUTS_MOBILITIES];
+    m->input.base = begins[INPUTS_BASE];
+}
+
+/* Flexure types of which gamma0 is a calculated parameter. */
+static int calculated_count(const Mechanism *m) {
+    int count = 0;
     for (int i = 0; i < m->type_count; i++) {
-        s->derivatives += m->types[i].pivots > 1;
+        count += m->types[i].pivots > 1;
     }
-    s->indicators = s->derivatives + m->independent_count + 2;
-    s->time = s->indicators + STOP_INDICATORS * m->stop_count + m->friction_count;
-    s->count = s->time + 1;
+    return count;
+}
+
+PRBM void lay_out_slots(Mechanism *m) {
+    const int counts[SLOTS_GROUPS] = {
+        [SLOTS_PARAMETERS] = m->parameter_count,
+        [SLOTS_INPUTS] = m->input_count,
+        [SLOTS_BODIES] = PER_BODY * m->body_count,
+        [SLOTS_STOPS] = PER_STOP * m->stop_count,
+        [SLOTS_BASE] = PER_BASE,
+        [SLOTS_ENERGIES] = PER_ENERGY,
+        [SLOTS_LATCHED] = PER_LATCHED * m->stop_count,
+        [SLOTS_LINKS] = PER_LINK * m->link_count,
+        [SLOTS_STRETCHES] = PER_STRETCH * m->stretch_count,
+        [SLOTS_PROBES] = PER_PROBE * m->probe_count,
+        [SLOTS_FREQUENCY] = 1,
+        [SLOTS_CALCULATED] = calculated_count(m),
+        [SLOTS_DERIVATIVES] = m->independent_count + 2,
+        [SLOTS_INDICATORS] = STOP_INDICATORS * m->stop_count + m->friction_count,
+        [SLOTS_TIME] = 1,
+    };
+    int at[SLOTS_GROUPS];
+    begin_groups(SLOTS_GROUPS, counts, at);
+    const Slots slots = {
+        .parameters = at[SLOTS_PARAMETERS],
+        .inputs = at[SLOTS_INPUTS],
+        .bodies = at[SLOTS_BODIES],
+        .stops = at[SLOTS_STOPS],
+        .base = at[SLOTS_BASE],
+        .energies = at[SLOTS_ENERGIES],
+        .latched = at[SLOTS_LATCHED],
+        .links = at[SLOTS_LINKS],
+        .stretches = at[SLOTS_STRETCHES],
+        .probes = at[SLOTS_PROBES],
+        .frequency = at[SLOTS_FREQUENCY],
+        .calculated = at[SLOTS_CALCULATED],
+        .derivatives = at[SLOTS_DERIVATIVES],
+        .indicators = at[SLOTS_INDICATORS],
+        .time = at[SLOTS_TIME],
+        .count = at[SLOTS_GROUPS - 1] + counts[SLOTS_GROUPS - 1],
+    };
+    m->slots = slots;
 }

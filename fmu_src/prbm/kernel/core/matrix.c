@@ -7,6 +7,7 @@
 #include <math.h>
 
 #include "core/matrix.h"
+#include "core/vectors.h"
 
 PRBM double dot(int n, const double *a, const double *b) {
     double sum = 0.0;
@@ -17,7 +18,7 @@ PRBM double dot(int n, const double *a, const double *b) {
 }
 
 /* Return the dot product of vectors of even length. */
-static double even_dot(int even, const double *a, const double *b) {
+PRBM double even_dot(int even, const double *a, const double *b) {
     Lanes sum[SUMS] = {NO_LANES};
     for (int i = 0; i < even; i += LANES) {
         sum[SUM_OF(i)] += lanes_at(a + i) * lanes_at(b + i);
@@ -62,7 +63,7 @@ static int largest_below(int n, const double *a, int k) {
     return best;
 }
 
-static void exchange(int n, double *a, double *b) {
+PRBM void exchange(int n, double *a, double *b) {
     for (int i = 0; i < n; i++) {
         double keep = a[i];
         a[i] = b[i];

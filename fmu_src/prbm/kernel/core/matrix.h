@@ -25,5 +25,7 @@ PRBM bool least_squares(int m, int n, const double *a, const double *b, double r
 PRBM bool symmetric_eigen(int n, double *a, double *w, double *z, Problem *problem);
 /* Compute an orthonormal basis z (n, n - r) of the null space of rows (r, n) of full rank. */
 PRBM void null_space(int r, int n, const double *rows, double *z, Scratch *scratch);
+PRBM double even_dot(int even, const double *a, const double *b);
+PRBM void exchange(int n, double *a, double *b);
 
 #endif

@@ -63,6 +63,6 @@ PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t referenc
 }
 
 /* Return the displacement and velocity of a wall in the inputs (input_count,). */
-static const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop) {
+PRBM const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop) {
     return inputs + mechanism->input.walls + PER_WALL * stop;
 }

@@ -167,5 +167,6 @@ PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */
 PRBM bool check_values(const Mechanism *mechanism, const double *values, Problem *problem);
 PRBM const Variable *find_variable(const Mechanism *mechanism, uint32_t reference);
+PRBM const double *wall_inputs(const Mechanism *mechanism, const double *inputs, int stop);
 
 #endif

@@ -11,6 +11,7 @@
 #include <string.h>
 
 #include "core/numbers.h"
+#include "core/vectors.h"
 
 /* --- exp(i q) --------------------------------------------------------------------------------- */
 
@@ -22,22 +23,6 @@
 #define QUARTER_LOW 1.0562999066987428e-23
 /* Adding it rounds to an integer, which is then in the last bits of the sum. */
 #define ROUNDER 6755399441055744.0 /* 1.5 2^52 */
-
-static LaneBits bits_of(Lanes x) {
-    LaneBits bits;
-    memcpy(&bits, &x, sizeof bits);
-    return bits;
-}
-
-static Lanes from_bits(LaneBits bits) {
-    Lanes x;
-    memcpy(&x, &bits, sizeof x);
-    return x;
-}
-
-static Lanes magnitudes(Lanes x) {
-    return from_bits(bits_of(x) & (UINT64_MAX >> 1));
-}
 
 /* Return the angle, or NaN (all bits set) if it is not below the limit. */
 static Lanes valid_angle(Lanes q) {
@@ -133,8 +118,8 @@ SIZED void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
 
 /* Compute e = exp(i q) = e_start exp(i (q - start)) from e_start = exp(i start); return false
  * unless all angles are near their start. */
-SIZED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
-                             Parts parts, Complex *e) {
+SHARED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
+                              Parts parts, Complex *e) {
     LaneBits near = ~(bits_of(lanes_at(q)) & 0);
     UNROLLED_BY_LANES
     for (int i = 0; i < even; i += LANES) {

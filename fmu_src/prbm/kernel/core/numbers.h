@@ -31,5 +31,7 @@ PRBM Complex product(Complex a, Complex b);
 PRBM Complex conjugate(Complex a);
 PRBM Complex scaled(double x, Complex a);
 PRBM double modulus(Complex a);
+SHARED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
+                              Parts parts, Complex *e);
 
 #endif

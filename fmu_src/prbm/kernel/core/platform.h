@@ -31,6 +31,11 @@
 #else
 #define SIZED static
 #endif
+/* A SIZED function that functions of other files consist of.  A test that compiles each file alone
+ * defines SHARED as nothing. */
+#ifndef SHARED
+#define SHARED SIZED
+#endif
 /* Functions that few mechanisms need are not inlined. */
 #if defined(__GNUC__)
 #define RARE static __attribute__((noinline))

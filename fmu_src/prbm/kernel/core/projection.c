@@ -5,6 +5,7 @@
 #include "core/kinetics.h"
 #include "core/matrix.h"
 #include "core/projection.h"
+#include "core/vectors.h"
 
 /* The constant part of an active constraint at time t. */
 static double offset(const Equations *q, int k, double t) {
@@ -16,7 +17,7 @@ static double offset(const Equations *q, int k, double t) {
 }
 
 /* The part of the rate of an active constraint that is prescribed at time t. */
-static double prescribed(const Equations *q, int k, double t) {
+PRBM double prescribed(const Equations *q, int k, double t) {
     bool moves = q->walls_push && k >= q->first_hold && k < q->first_stick;
     return moves ? wall_motion(&q->inputs.walls[q->held[k - q->first_hold]], t).v : 0.0;
 }

@@ -1,17 +1,9 @@
 /* The reader of untrusted bytes: numbers, texts, counts and references. */
 #include <string.h>
 
-#include "core/tables.h"
+#include "core/reader.h"
 
-typedef struct {
-    const unsigned char *at;
-    size_t left;
-    const char *wrong; /* the first defect of the tables, or NULL */
-    Memory memory;
-    size_t room;
-} Reader;
-
-static void *kept(Reader *reader, size_t count, size_t size) {
+PRBM void *kept(Reader *reader, size_t count, size_t size) {
     size_t left = reader->room - reader->memory.used; /* place adds less than 32 bytes. */
     if (reader->wrong || left < 32 || count > (left - 32) / size) {
         reader->wrong = reader->wrong ? reader->wrong : "counts that are too large for its size";
@@ -27,7 +19,7 @@ static bool has(Reader *reader, size_t bytes) {
     return !reader->wrong;
 }
 
-static uint32_t read_u32(Reader *reader) {
+PRBM uint32_t read_u32(Reader *reader) {
     uint32_t x = 0;
     if (has(reader, 4)) {
         for (int i = 3; i >= 0; i--) {
@@ -46,7 +38,7 @@ static double read_f64(Reader *reader) {
     return x;
 }
 
-static double read_bound(Reader *reader) {
+PRBM double read_bound(Reader *reader) {
     double x = read_f64(reader);
     if (x != x) {
         reader->wrong = "a bound that is NaN";
@@ -54,7 +46,7 @@ static double read_bound(Reader *reader) {
     return x;
 }
 
-static double read_finite(Reader *reader) {
+PRBM double read_finite(Reader *reader) {
     double x = read_f64(reader);
     if (!finite_number(x)) {
         reader->wrong = "a number that is not finite";
@@ -62,7 +54,7 @@ static double read_finite(Reader *reader) {
     return x;
 }
 
-static const char *read_text(Reader *reader) {
+PRBM const char *read_text(Reader *reader) {
     size_t length = read_u32(reader);
     if (length >= reader->left || !has(reader, length + 1) || reader->at[length] != 0 ||
         memchr(reader->at, 0, length)) {
@@ -79,7 +71,7 @@ static const char *read_text(Reader *reader) {
 }
 
 /* Read an index of at least from and below count. */
-static int read_index(Reader *reader, int from, int count) {
+PRBM int read_index(Reader *reader, int from, int count) {
     uint32_t x = read_u32(reader);
     if (x < (uint32_t)from || x >= (uint32_t)count) {
         reader->wrong = reader->wrong ? reader->wrong : "an index out of range";
@@ -88,12 +80,12 @@ static int read_index(Reader *reader, int from, int count) {
     return (int)x;
 }
 
-static bool read_flag(Reader *reader) {
+PRBM bool read_flag(Reader *reader) {
     return read_index(reader, 0, 2) == 1;
 }
 
 /* Read the number of records of at least so many bytes each that follow. */
-static int read_count(Reader *reader, size_t bytes) {
+PRBM int read_count(Reader *reader, size_t bytes) {
     uint32_t count = read_u32(reader);
     if (count > reader->left / bytes) {
         reader->wrong = reader->wrong ? reader->wrong : "counts that are too large for its size";

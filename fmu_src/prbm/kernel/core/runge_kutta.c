@@ -4,6 +4,7 @@
 #include "core/dynamics.h"
 #include "core/matrix.h"
 #include "core/runge_kutta.h"
+#include "core/vectors.h"
 
 static const double STAGE_TIME[STAGES] = STAGE_TIMES;
 static const double STAGE[STAGES][STAGES] = STAGE_WEIGHTS;
@@ -91,11 +92,14 @@ PRBM void error_of(int n, const double *k, double h, double *error) {
 }
 
 /* How far the first n components of the dense output can be from the start of the step. */
-static void furthest(int n, int ny, const double *k, double h, double *distance) {
+PRBM void furthest(int n, int ny, const double *k, double h, double *distance) {
     for (int j = 0; j < n; j += LANES) {
         Lanes sum = NO_LANES;
+        UNROLLED
         for (int i = 0; i < STAGES; i++) {
-            sum += LARGEST_WEIGHT[i] * magnitudes(lanes_at(k + i * ny + j));
+            if (LARGEST_WEIGHT[i] > 0.0) {
+                sum += LARGEST_WEIGHT[i] * magnitudes(lanes_at(k + i * ny + j));
+            }
         }
         set_lanes(distance + j, h * sum);
     }

@@ -18,5 +18,6 @@ PRBM void error_of(int n, const double *k, double h, double *error);
 PRBM void weights(double theta, double *b);
 PRBM void interpolate(int n, const double *y, const double *k, double h, double theta,
                       double *result);
+PRBM void furthest(int n, int ny, const double *k, double h, double *distance);
 
 #endif

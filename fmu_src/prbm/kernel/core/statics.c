@@ -90,7 +90,7 @@ static bool newton_step(const Balance *balance, const Complex *e, double *torque
     }
     bool solved = solve(size, kkt, change, scratch, &ignored);
     double turn = solved ? largest(n, change) : HUGE_VAL;
-    double share = lesser(1.0, STATICS_TURN_MAX / greater(turn, 1e-300));
+    double share = lesser(1.0, STATICS_TURN_MAX / greater(turn, STATICS_TURN_MIN));
     for (int i = 0; solved && i < size; i++) {
         state[i] += (i < n ? share : -share) * change[i];
     }

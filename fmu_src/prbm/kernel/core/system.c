@@ -6,6 +6,7 @@
  * and -i E for stretches, so that dE/dq = i e for both.
  */
 #include "core/system.h"
+#include "core/vectors.h"
 
 /* Frames with rows of n columns. */
 static BodyFrame *place_frames(Memory *memory, size_t count, size_t n) {
@@ -82,7 +83,7 @@ PRBM int arm_of(const System *system, int j) {
 }
 
 /* Replace the unit vectors e by the arms, and by -i times the arms for stretches. */
-static void stretch(const System *system, const double *q, Complex *e) {
+PRBM void stretch(const System *system, const double *q, Complex *e) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);
         e[a] = scaled(exponential(q[j]), e[a]);

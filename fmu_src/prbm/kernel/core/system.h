@@ -85,5 +85,6 @@ PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e,
                  Complex *displacement, Complex *velocity);
 /* Copy rows (r, n), with the column of each arm repeated for its stretch; rows may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
+PRBM void stretch(const System *system, const double *q, Complex *e);
 
 #endif

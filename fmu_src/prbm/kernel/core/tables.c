@@ -2,6 +2,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/layout.h"
 #include "core/tables.h"
 
 enum {
@@ -89,8 +90,8 @@ static void read_types(Reader *reader, Mechanism *m) {
         t->lumped = read_flag(reader);
         t->rate_with_gamma = read_flag(reader);
         t->axial = read_flag(reader);
-        t->pivots = read_index(reader, 0, PIVOTS_MAX + 1);
-        t->links = read_index(reader, 0, PIVOTS_MAX + 1);
+        t->pivots = read_index(reader, 0, LINKS_MAX + 1);
+        t->links = read_index(reader, 0, LINKS_MAX + 1);
         if ((t->pivots == 0) == (t->links == 0)) {
             reader->wrong = reader->wrong ? reader->wrong
                                           : "a flexure type with neither pivots nor links, or both";
@@ -262,7 +263,7 @@ static void read_variables(Reader *reader, Mechanism *m) {
 
 /* --- the file --------------------------------------------------------------------------------- */
 
-static uint32_t checksum(const unsigned char *bytes, size_t size) {
+PRBM uint32_t checksum(const unsigned char *bytes, size_t size) {
     uint32_t remainder = 0xFFFFFFFFu;
     for (size_t i = 0; i < size; i++) {
         remainder ^= bytes[i];

@@ -8,5 +8,6 @@
  * without pointers to the bytes. */
 PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem *problem);
 PRBM void mechanism_close(Mechanism *mechanism);
+PRBM uint32_t checksum(const unsigned char *bytes, size_t size);
 
 #endif

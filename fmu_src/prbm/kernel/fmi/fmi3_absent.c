@@ -1,4 +1,7 @@
-/* Part of fmi3.c: functions that this FMU does not support. */
+/* Functions of FMI 3.0 that this FMU does not support. */
+#if !defined(PRBM_FMI) || PRBM_FMI == 3
+
+#include "fmi/fmi3.h"
 
 static const char NO_DEPENDENCIES[] =
     "dependencies are those of modelDescription.xml (providesPerElementDependencies = false)";
@@ -98,3 +101,5 @@ fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference 
     (void)clockReference, (void)activationTime;
     return absent3(instance, RULE3_ActivateModelPartition, "there is no scheduled execution");
 }
+
+#endif

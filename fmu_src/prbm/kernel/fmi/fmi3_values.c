@@ -1,4 +1,7 @@
-/* Part of fmi3.c: values and their derivatives. */
+/* Values of FMI 3.0 and their derivatives. */
+#if !defined(PRBM_FMI) || PRBM_FMI == 3
+
+#include "fmi/fmi3.h"
 
 /* Return the instance if a get or set is allowed, both of its arrays are valid and have the same
  * length (all variables are scalar); else NULL. */
@@ -187,3 +190,5 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueRe
     return (fmi3Status)directional_derivative(it, unknowns, nUnknowns, knowns, nKnowns, seed,
                                               sensitivity);
 }
+
+#endif

@@ -7,7 +7,7 @@
 #ifndef PRBM_FMU_H
 #define PRBM_FMU_H
 
-#include "simulation.h"
+#include "motion.h"
 
 /* The status of a call, with the same numbers in both standards. */
 enum { FMU_OK, FMU_WARNING, FMU_DISCARD, FMU_ERROR, FMU_FATAL };
@@ -168,6 +168,9 @@ PRBM int refuse(const Instance *instance, int status, const char *format, ...);
 #endif
 PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t count,
                            const char *const *names);
+PRBM void log_impact(void *listener, const Impact *impact);
+
+#define TO_RESET "reset the instance to start again"
 
 /* --- instance.c ------------------------------------------------------------------------------- */
 
@@ -183,12 +186,21 @@ PRBM int set_up(Instance *instance, bool tolerance_defined, double tolerance, do
 PRBM int exit_initialization(Instance *instance);
 PRBM int end_run(Instance *instance);
 PRBM int reset(Instance *instance);
+PRBM bool is_parameter(const Mechanism *mechanism, int slot);
+PRBM bool is_input(const Mechanism *mechanism, int slot);
+PRBM bool settable(const Mechanism *mechanism, int slot);
+PRBM const char *name_of(const Mechanism *mechanism, int slot);
+PRBM bool has_rejected(const Instance *instance, int status);
+PRBM double impact_count(const Instance *instance, int stop);
+PRBM void acknowledge(Instance *instance);
+PRBM bool started(Instance *instance);
 
 /* --- values.c --------------------------------------------------------------------------------- */
 
 PRBM int read_value(Instance *instance, uint32_t reference, int type, double *x);
 PRBM int write_value(Instance *instance, uint32_t reference, int type, double x);
 PRBM int read_clock(Instance *instance, uint32_t reference, bool *active);
+PRBM bool ticks(const Instance *instance, const Variable *clock);
 
 /* --- step.c ----------------------------------------------------------------------------------- */
 
@@ -196,6 +208,8 @@ PRBM int make_step(Instance *instance, double time, double size, Outcome *outcom
 PRBM int enter_event_mode(Instance *instance);
 PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed);
 PRBM int leave_event_mode(Instance *instance, const Rule *rule, Mode next);
+PRBM void keep(Instance *instance);
+PRBM void go_back(Instance *instance);
 
 /* --- exchange.c ------------------------------------------------------------------------------- */
 

@@ -4,8 +4,6 @@
 
 #include "fmi/fmu.h"
 
-#define TO_RESET "reset the instance to start again"
-
 /* --- the state machine ------------------------------------------------------------------------ */
 
 /* Return the next function to call in order to reach one of some modes, NULL if no function leads
@@ -61,19 +59,19 @@ PRBM bool given(const Instance *instance, const Rule *rule, size_t count, const 
 
 /* --- rejected values -------------------------------------------------------------------------- */
 
-static bool is_parameter(const Mechanism *mechanism, int slot) {
+PRBM bool is_parameter(const Mechanism *mechanism, int slot) {
     return slot >= mechanism->slots.parameters && slot < mechanism->slots.inputs;
 }
 
-static bool is_input(const Mechanism *mechanism, int slot) {
+PRBM bool is_input(const Mechanism *mechanism, int slot) {
     return slot >= mechanism->slots.inputs && slot < mechanism->slots.bodies;
 }
 
-static bool settable(const Mechanism *mechanism, int slot) {
+PRBM bool settable(const Mechanism *mechanism, int slot) {
     return is_parameter(mechanism, slot) || is_input(mechanism, slot);
 }
 
-static const char *name_of(const Mechanism *mechanism, int slot) {
+PRBM const char *name_of(const Mechanism *mechanism, int slot) {
     for (int i = 0; i < mechanism->variable_count; i++) {
         if (mechanism->variables[i].slot == slot && mechanism->variables[i].type != CLOCK) {
             return mechanism->variables[i].name;
@@ -102,7 +100,7 @@ static void log_rejected(const Instance *instance, int status, int slot) {
 }
 
 /* Return whether a rejected value has not been corrected yet; if so, log the first again. */
-static bool has_rejected(const Instance *instance, int status) {
+PRBM bool has_rejected(const Instance *instance, int status) {
     size_t count = (size_t)instance->mechanism->slots.count;
     const unsigned char *first = memchr(instance->refused, 1, count);
     if (first) {
@@ -300,7 +298,7 @@ PRBM int set_up(Instance *instance, bool tolerance_defined, double tolerance, do
     return FMU_OK;
 }
 
-static double impact_count(const Instance *instance, int stop) {
+PRBM double impact_count(const Instance *instance, int stop) {
     Problem problem;
     double count = 0.0;
     int slot = instance->mechanism->slots.latched + PER_LATCHED * stop + LATCHED_IMPACT_COUNT;
@@ -309,14 +307,14 @@ static double impact_count(const Instance *instance, int stop) {
 }
 
 /* Mark all impacts so far as those for which the clocks have ticked. */
-static void acknowledge(Instance *instance) {
+PRBM void acknowledge(Instance *instance) {
     for (int i = 0; i < instance->mechanism->stop_count; i++) {
         instance->acknowledged[i] = impact_count(instance, i);
     }
 }
 
 /* Start the simulation if needed.  Log the reason and return false on failure. */
-static bool started(Instance *instance) {
+PRBM bool started(Instance *instance) {
     Problem problem;
     if (simulation_started(instance->simulation)) {
         return true;

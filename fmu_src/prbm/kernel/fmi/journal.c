@@ -97,7 +97,7 @@ PRBM int choose_categories(Instance *instance, const Rule *rule, bool on, size_t
     return FMU_OK;
 }
 
-static void log_impact(void *listener, const Impact *impact) {
+PRBM void log_impact(void *listener, const Impact *impact) {
     const Instance *instance = listener;
     report(&instance->journal, FMU_OK,
            "impact %d at %s, t = %.9g s: closing at %.6g m/s, opening at %.6g m/s, %.6g J lost",

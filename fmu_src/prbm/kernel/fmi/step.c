@@ -4,11 +4,11 @@
 #include "fmi/fmu.h"
 
 /* Save the state of the simulation for go_back. */
-static void keep(Instance *instance) {
+PRBM void keep(Instance *instance) {
     simulation_save(instance->simulation, instance->before);
 }
 
-static void go_back(Instance *instance) {
+PRBM void go_back(Instance *instance) {
     Problem problem;
     (void)simulation_restore(instance->simulation, instance->before, &problem);
 }

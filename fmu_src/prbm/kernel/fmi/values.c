@@ -182,7 +182,7 @@ PRBM int write_value(Instance *instance, uint32_t reference, int type, double x)
     return FMU_OK;
 }
 
-static bool ticks(const Instance *instance, const Variable *clock) {
+PRBM bool ticks(const Instance *instance, const Variable *clock) {
     int stop = (clock->slot - instance->mechanism->slots.latched) / PER_LATCHED;
     return impact_count(instance, stop) != instance->acknowledged[stop];
 }

@@ -2,7 +2,7 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
 
 PRBM double zero_speed(const Configuration *configuration) {
     const Scales *scales = &configuration->scales;

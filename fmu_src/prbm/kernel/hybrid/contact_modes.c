@@ -2,19 +2,23 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/rest.h"
+#include "hybrid/simulation.h"
 
 /* --- trial equations -------------------------------------------------------------------------- */
 
 /* Set up the trial equations in a contact state. */
-static void try_contacts(Simulation *sim, const int *modes) {
+static void try_contacts(Simulation *sim, const ContactMode *modes) {
     memmove(sim->trial.contacts.modes, modes, (size_t)contact_count(sim) * sizeof *modes);
     set_equations(&sim->trial.equations, &sim->equations.inputs, &sim->trial.contacts,
                   sim->configuration.omega);
 }
 
 /* The mode of a closed contact with a sliding velocity, CONTACT_FRICTIONLESS at round-off. */
-static int slip_mode(const Simulation *sim, double speed) {
+static ContactMode slip_mode(const Simulation *sim, double speed) {
     return fabs(speed) <= zero_speed(&sim->configuration) ? CONTACT_FRICTIONLESS
                                                           : slipping_mode(speed);
 }
@@ -28,7 +32,7 @@ static double friction_of(const Simulation *sim, int contact) {
 /* The contact state in which a set of stops is closed and all contacts that move slip, if they have
  * friction. */
 static void modes_holding(Simulation *sim, const HoldingSet *holding, const double *q,
-                          const double *v, int *modes) {
+                          const double *v, ContactMode *modes) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     Complex *e = directions_at(sim, q);
@@ -43,11 +47,12 @@ static void modes_holding(Simulation *sim, const HoldingSet *holding, const doub
     sim->scratch.used = mark;
 }
 
-PRBM void equations_holding(Simulation *sim, const HoldingSet *holding, const double *q,
-                            const double *v) {
-    int modes[CONTACTS_MAX];
+PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *holding,
+                                        const double *q, const double *v) {
+    ContactMode modes[CONTACTS_MAX];
     modes_holding(sim, holding, q, v, modes);
     try_contacts(sim, modes);
+    return &sim->trial.equations;
 }
 
 /* Whether a contact at rest satisfies its law in the trial equations, up to round-off; slack is the
@@ -57,7 +62,7 @@ static bool obeys_coulomb(Simulation *sim, int contact, double slack, const Comp
     const System *system = system_of(sim);
     const Equations *equations = &sim->trial.equations;
     const Evaluation *tried = &sim->trial.evaluation;
-    int mode = sim->trial.contacts.modes[contact];
+    ContactMode mode = sim->trial.contacts.modes[contact];
     if (mode == CONTACT_STICK) {
         double limit = friction_limit(equations, e, tried->lam, contact);
         return fabs(stick_force(equations, tried->lam, contact)) <=
@@ -103,7 +108,7 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
 PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                              const double *v, HoldingSet *holding, Problem *problem) {
     HoldingSet every = {0, {0}, false}, none = {0, {0}, true};
-    int modes[CONTACTS_MAX];
+    ContactMode modes[CONTACTS_MAX];
     RestContacts rest;
     RestForces found;
     for (int i = 0; i < system_of(sim)->s; i++) {
@@ -156,13 +161,13 @@ typedef struct {
 } FrictionEvent;
 
 /* Whether a contact at rest has a mobility of its own beside the closed and sticking ones. */
-static bool is_mobile(Simulation *sim, int contact, const int *modes, bool *result,
+static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bool *result,
                       Problem *problem) {
     size_t mark = sim->scratch.used, bytes = (size_t)contact_count(sim) * sizeof *modes;
     const System *system = system_of(sim);
     const Equations *q = &sim->trial.equations;
     double left = 0.0, own = 0.0, *row = take(&sim->scratch, (size_t)system->n);
-    int others[CONTACTS_MAX];
+    ContactMode others[CONTACTS_MAX];
     Inertia at = inertia_at(sim, sim->state.front);
     memcpy(others, modes, bytes);
     others[contact] = CONTACT_FRICTIONLESS;
@@ -178,7 +183,7 @@ static bool is_mobile(Simulation *sim, int contact, const int *modes, bool *resu
 }
 
 /* The mode of a contact that slides faster than the event leaves; CONTACT_FRICTIONLESS at rest. */
-static int sliding_mode(Simulation *sim, int contact, const FrictionEvent *event) {
+static ContactMode sliding_mode(Simulation *sim, int contact, const FrictionEvent *event) {
     size_t mark = sim->scratch.used;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
     double speed = sliding_velocity(system_of(sim), contact, directions_at(sim, q), v);
@@ -190,7 +195,7 @@ static int sliding_mode(Simulation *sim, int contact, const FrictionEvent *event
 /* Choose whether a contact at rest begins to slip, sticks, bears the limit of its friction, or
  * none. */
 static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
-                           bool at_limit, bool slipped, int *modes, Problem *problem) {
+                           bool at_limit, bool slipped, ContactMode *modes, Problem *problem) {
     bool mobile = false;
     if (fabs(found->slide[j]) > zero_acceleration(&sim->configuration)) {
         modes[contact] = slipping_mode(found->slide[j]);
@@ -213,7 +218,7 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
  * limit.  Of contacts that can stick only together, some stick; the others bear the limit of their
  * friction, or none. */
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
-                          const FrictionEvent *event, int *modes, Problem *problem) {
+                          const FrictionEvent *event, ContactMode *modes, Problem *problem) {
     double zero = zero_acceleration(&sim->configuration);
     bool right = true;
     for (int limited = 0; limited < 2; limited++) {
@@ -230,11 +235,12 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
     return right;
 }
 
-/* Some of the stops that touch, and the contacts with friction at rest that have a mobility of their own
- * beside the loops and the closed stops: else these carry all of the load.  sliding: the modes of
- * those with friction that slide. */
+/* Some of the stops that touch, and the contacts with friction at rest that have a mobility of
+ * their own beside the loops and the closed stops: else these carry all of the load.  sliding: the
+ * modes of those with friction that slide. */
 static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
-                      const int *modes, RestContacts *rest, int *sliding, Problem *problem) {
+                      const ContactMode *modes, RestContacts *rest,
+                      ContactMode *sliding, Problem *problem) {
     bool right = true, mobile = false;
     rest->stop_count = rest->count = 0;
     for (int contact = 0; right && contact < contact_count(sim); contact++) {
@@ -273,11 +279,11 @@ static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Pro
 /* Choose the modes by the forces of some stops and of the contacts with friction.  *agree is false
  * without such forces, or if one of the other stops that touch would close. */
 static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const HoldingSet *touching,
-                            const FrictionEvent *event, int *modes, bool *agree,
+                            const FrictionEvent *event, ContactMode *modes, bool *agree,
                             Problem *problem) {
     const System *system = system_of(sim);
     const double *q = sim->state.front, *v = q + system->n;
-    int sliding[CONTACTS_MAX];
+    ContactMode sliding[CONTACTS_MAX];
     RestContacts rest;
     RestForces found;
     if (!find_rest(sim, stops, event, modes, &rest, sliding, problem)) {
@@ -303,7 +309,7 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
     }
     for (int k = 0; k < rest.stop_count; k++) {
         int i = rest.stops[k];
-        int closed = friction_of(sim, i) > 0.0 ? sliding[i] : CONTACT_FRICTIONLESS;
+        ContactMode closed = friction_of(sim, i) > 0.0 ? sliding[i] : CONTACT_FRICTIONLESS;
         bool pressed = found.normal[k] > zero_acceleration(&sim->configuration);
         modes[i] = pressed ? closed : CONTACT_OPEN;
     }
@@ -317,8 +323,8 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
 /* Choose the modes of all contacts with friction: the stops that hold without friction at rest go
  * on to hold, else all that touch are considered. */
 static bool settle_friction(Simulation *sim, const HoldingSet *holding, const HoldingSet *touching,
-                            const FrictionEvent *event, int *modes, Problem *problem) {
-    int first[CONTACTS_MAX];
+                            const FrictionEvent *event, ContactMode *modes, Problem *problem) {
+    ContactMode first[CONTACTS_MAX];
     size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
     bool agree = false;
     memcpy(first, modes, bytes);
@@ -343,11 +349,16 @@ static double spacing(double x) {
     return ldexp(1.0, exponent - 53);
 }
 
+/* The error of the time of an event. */
+static double time_resolution(double time) {
+    return EVENT_TIME_FACTOR * EVENT_TIME_ATOL + EVENT_TIME_ULPS * spacing(time);
+}
+
 /* The sliding speed that the resolution of time leaves where sliding ends. */
 static bool residual_speed(Simulation *sim, int contact, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
-    Evaluation *evaluation = &sim->trial.evaluation;
+    Evaluation *evaluation = &sim->at_front;
     const double *q = sim->state.front, *v = q + system->n;
     if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, NULL, evaluation, problem)) {
         return false;
@@ -356,7 +367,7 @@ static bool residual_speed(Simulation *sim, int contact, double *result, Problem
     Complex *e = directions_at(sim, q);
     tangential_row(system, contact, e, row);
     double rate = dot(system->n, row, evaluation->a) - tangential_convective(system, contact, e, v);
-    *result = fabs(rate) * (2 * EVENT_TIME_ATOL + 8 * spacing(sim->state.front_time));
+    *result = fabs(rate) * time_resolution(sim->state.front_time);
     sim->scratch.used = mark;
     return true;
 }
@@ -408,7 +419,8 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
     const double *front = sim->state.front;
     FrictionEvent friction;
     HoldingSet holding, all = {0, {0}, true};
-    int candidates[2 * STOPS_MAX], modes[CONTACTS_MAX];
+    int candidates[2 * STOPS_MAX];
+    ContactMode modes[CONTACTS_MAX];
     if (!friction_event(sim, event, &friction, problem)) {
         return false;
     }

@@ -1,7 +1,10 @@
-/* Kinds of events: their guards and resets, and their count: the twin of hybrid/events.py. */
-#include "hybrid/hybrid.h"
-
-enum { FALLING = -1, EVENT_KINDS = EVENT_REVERSAL + 1 };
+/* Events: the table of guards and resets, the first event of a step, and how often events may
+ * occur: the twin of hybrid/events.py. */
+#include "hybrid/contact_modes.h"
+#include "hybrid/events.h"
+#include "hybrid/guards.h"
+#include "hybrid/impacts.h"
+#include "hybrid/simulation.h"
 
 /* --- resets ----------------------------------------------------------------------------------- */
 
@@ -22,29 +25,54 @@ static bool apply_friction(Simulation *sim, const Event *event, Problem *problem
 /* --- the table -------------------------------------------------------------------------------- */
 
 static const Transition TRANSITIONS[EVENT_KINDS] = {
-    {"none", NULL, false, 0, NULL},
-    {"impact", gap_guard, false, FALLING, apply_impact},
-    {"release", release_guard, true, FALLING, apply_release},
-    {"slip", slip_guard, true, FALLING, apply_friction},
-    {"reversal", reversal_guard, false, FALLING, apply_friction},
+    [EVENT_RELEASE] = {{"release", release_guard, true}, held_stop, release_near, false,
+                       yield_time, apply_release},
+    [EVENT_SLIP] = {{"slip", slip_guard, true}, sticking_contact, slip_near, false, yield_time,
+                    apply_friction},
+    [EVENT_REVERSAL] = {{"reversal", reversal_guard, false}, slipping_contact, reversal_near, true,
+                        reversal_time, apply_friction},
+    [EVENT_IMPACT] = {{"impact", gap_guard, false}, open_stop, impact_near, true, closing_time,
+                      apply_impact},
 };
 
-PRBM const Transition *transition(int kind) {
+PRBM const Transition *transition(EventKind kind) {
     return &TRANSITIONS[kind];
 }
 
-PRBM bool watched(const Equations *equations, int kind, int contact) {
-    const System *system = equations->system;
-    int mode = equations->contacts.modes[contact];
-    bool stop = is_stop(system, contact);
-    switch (kind) {
-    case EVENT_IMPACT: return stop && mode == CONTACT_OPEN;
-    case EVENT_RELEASE: return stop && mode != CONTACT_OPEN;
-    case EVENT_SLIP: return mode == CONTACT_STICK;
-    default:
-        return slip_sign(mode) != 0 &&
-               (stop || equations->rub_law[3 * (contact - system->s)] > 0.0);
+/* --- the first event of a step ---------------------------------------------------------------- */
+
+/* Keep the first event of a kind, if it is earlier than one of the kinds before. */
+static bool find_events(Simulation *sim, EventKind kind, Event *first, Problem *problem) {
+    const Transition *row = transition(kind);
+    for (int contact = 0; contact < contact_count(sim); contact++) {
+        Fall fall = {false, 0.0};
+        if (row->watched(&sim->equations, contact) &&
+            !row->detect(sim, &row->guard, contact, &fall, problem)) {
+            return false;
+        }
+        if (fall.found && (first->kind == EVENT_NONE || fall.time < first->time)) {
+            Event found = {kind, contact, fall.time};
+            *first = found;
+        }
     }
+    return true;
+}
+
+PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {
+    const Event none = {EVENT_NONE, 0, 0.0};
+    bool near[EVENT_KINDS], samples = false, right = true;
+    *first = none;
+    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
+        near[kind] = transition(kind)->near(sim);
+        samples = samples || (near[kind] && transition(kind)->samples);
+    }
+    if (samples) {
+        sample_arc(sim);
+    }
+    for (EventKind kind = EVENT_NONE + 1; right && kind < EVENT_KINDS; kind++) {
+        right = !near[kind] || find_events(sim, kind, first, problem);
+    }
+    return right;
 }
 
 /* --- applying events -------------------------------------------------------------------------- */
@@ -63,7 +91,7 @@ static bool count_event(Simulation *sim, const Event *event, Problem *problem) {
                     "more than %d events (%s the last) within %.3g s at t = %.9g s: the contact "
                     "chatters; raise rest_speed or damping.beta, lower the restitution, or give "
                     "the body room between its walls",
-                    EVENTS_MAX, transition(event->kind)->name, event->time - state->window_since,
+                    EVENTS_MAX, transition(event->kind)->guard.event, event->time - state->window_since,
                     event->time);
     }
     return true;

@@ -1,7 +1,13 @@
-/* Detection and location of events within a step: the twin of hybrid/guards.py. */
+/* Guards: the scalars whose fall through zero is an event, and where in a step they fall: the twin
+ * of hybrid/guards.py. */
 #include <math.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/arc.h"
+#include "hybrid/configuration.h"
+#include "hybrid/guards.h"
+#include "hybrid/rest.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* --- guards ----------------------------------------------------------------------------------- */
 
@@ -28,66 +34,155 @@ PRBM double reversal_guard(const Equations *equations, const Instant *at, int co
     return sign * sliding_velocity(equations->system, contact, at->e, at->v);
 }
 
-/* --- ordering --------------------------------------------------------------------------------- */
+/* --- contacts and steps in which events may occur --------------------------------------------- */
 
-static void keep_earlier(Event *first, int kind, int contact, double time) {
-    if (first->kind == EVENT_NONE || time < first->time) {
-        first->kind = kind;
-        first->contact = contact;
-        first->time = time;
+PRBM bool held_stop(const Equations *equations, int contact) {
+    return is_stop(equations->system, contact) && !open_stop(equations, contact);
+}
+
+PRBM bool sticking_contact(const Equations *equations, int contact) {
+    return equations->contacts.modes[contact] == CONTACT_STICK;
+}
+
+PRBM bool slipping_contact(const Equations *equations, int contact) {
+    const System *system = equations->system;
+    return slip_sign(equations->contacts.modes[contact]) != 0 &&
+           (is_stop(system, contact) || equations->rub_law[3 * (contact - system->s)] > 0.0);
+}
+
+PRBM bool open_stop(const Equations *equations, int contact) {
+    return is_stop(equations->system, contact) &&
+           equations->contacts.modes[contact] == CONTACT_OPEN;
+}
+
+PRBM bool release_near(Simulation *sim) {
+    const Equations *q = &sim->equations;
+    const ForceRange *forces = &sim->stepping.forces;
+    if (q->sticking_count > 0) {
+        return true;
     }
+    for (int k = 0; k < q->held_count; k++) {
+        if (forces->least[k] <= RELEASE_WATCH_FACTOR * forces->largest[k]) {
+            return true;
+        }
+    }
+    return false;
+}
+
+PRBM bool slip_near(Simulation *sim) {
+    return sim->equations.sticking_count > 0;
+}
+
+PRBM bool reversal_near(Simulation *sim) {
+    return sim->equations.slipping_count > 0;
+}
+
+/* How far the arms may move within the step: coordinates change by no more than the dense output
+ * can make of the stages, |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
+static void bound_arms(const Simulation *sim, double *reach) {
+    const System *system = system_of(sim);
+    furthest(system->n, state_size(sim), sim->state.arc.k, sim->state.arc.h, reach);
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k], a = arm_of(system, j);
+        double longest = modulus(sim->stepping.reference.e[a]) * exponential(reach[j]);
+        reach[a] = longest * (reach[a] + reach[j]);
+    }
+}
+
+/* The change of a gap in the step at most: as far as the wall and the arms move, and by the turn of
+ * a body that carries the wall. */
+static double gap_reach(const Simulation *sim, int stop, const Complex *e, const double *arms) {
+    const System *system = system_of(sim);
+    const Complex *row = system->gaps + stop * system->n;
+    double reach = wall_reach(&sim->state.walls[stop], sim->state.arc.h);
+    for (int j = 0; j < system->n; j++) {
+        reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
+    }
+    if (system->on[stop] != FIXED) {
+        Rows gaps = gap_rows(system);
+        reach += modulus(seen_value(&gaps, stop, e)) * arms[system->on[stop]];
+    }
+    return reach;
+}
+
+/* Whether an open stop may be reached within the step. */
+PRBM bool impact_near(Simulation *sim) {
+    const System *system = system_of(sim);
+    const Complex *e = sim->stepping.reference.e;
+    double *arms = sim->stepping.reach;
+    if (sim->equations.held_count == system->s) {
+        return false;
+    }
+    bound_arms(sim, arms);
+    for (int s = 0; s < system->s; s++) {
+        double near = TOUCHING_RTOL * system->length;
+        if (open_stop(&sim->equations, s) && !(gap(&sim->equations, s, sim->state.arc.start, e) >
+                                               near + gap_reach(sim, s, e, arms))) {
+            return true;
+        }
+    }
+    return false;
 }
 
 /* --- location --------------------------------------------------------------------------------- */
 
-/* A function of the time within the step: sign * guard + offset. */
+/* The search for the event of a guard at a contact. */
 typedef struct {
     Simulation *sim;
-    Guard *guard;
-    const char *event;
-    bool forces;
+    const Guard *guard;
     int contact;
-    double sign, offset;
+    bool failed;
     Problem *problem;
+} Search;
+
+/* A function of the time within the step: sign * value + offset. */
+typedef struct {
+    Search *search;
+    GuardValue *value;
+    bool forces;
+    double sign, offset;
 } ArcGuard;
 
-static ArcGuard arc_guard(Simulation *sim, int kind, int contact, Problem *problem) {
-    const Transition *row = transition(kind);
-    ArcGuard result = {sim, row->guard, row->name, row->forces, contact, 1.0, 0.0, problem};
+static ArcGuard arc_guard(Search *search) {
+    ArcGuard result = {search, search->guard->value, search->guard->forces, 1.0, 0.0};
     return result;
 }
 
 /* Fail with the name of the contact at which an event is sought; the value is no event. */
-static double no_guard(const ArcGuard *guard, const char *cause) {
-    Simulation *sim = guard->sim;
+static double no_guard(Search *search, const char *cause) {
+    const Simulation *sim = search->sim;
     const Arc *arc = &sim->state.arc;
-    if (!sim->stepping.guards_fail) {
-        (void)fail(guard->problem, "no %s of %s could be located within %.3g s from t = %.9g s: %s",
-                   guard->event, contact_name(sim->configuration.mechanism, guard->contact), arc->h,
-                   arc->start, cause);
+    if (!search->failed) {
+        (void)fail(search->problem,
+                   "no %s of %s could be located within %.3g s from t = %.9g s: %s",
+                   search->guard->event,
+                   contact_name(sim->configuration.mechanism, search->contact), arc->h, arc->start,
+                   cause);
     }
-    sim->stepping.guards_fail = true;
+    search->failed = true;
     return 1.0;
 }
 
 static double guard_at(const ArcGuard *guard, double t) {
-    Simulation *sim = guard->sim;
+    Search *search = guard->search;
+    Simulation *sim = search->sim;
     const System *system = system_of(sim);
-    double *y = sim->stepping.located_y;
-    Evaluation *evaluation = &sim->trial.evaluation;
-    Instant at = {t, y, y + system->n, sim->stepping.located_e, NULL};
+    Located *located = &sim->stepping.located;
+    double *y = located->y;
+    Instant at = {t, y, y + system->n, located->e, NULL};
     arc_at(sim, t, y);
     if (guard->forces) {
         Problem problem;
+        Evaluation *evaluation = &located->evaluation;
         if (!evaluate_equations(&sim->equations, t, y, y + system->n, NULL, evaluation, &problem)) {
-            return no_guard(guard, problem.text);
+            return no_guard(search, problem.text);
         }
         at.e = evaluation->at.e;
         at.lam = evaluation->lam;
     } else {
-        directions(system, y, sim->stepping.located_e);
+        directions(system, y, located->e);
     }
-    return guard->sign * guard->guard(&sim->equations, &at, guard->contact) + guard->offset;
+    return guard->sign * guard->value(&sim->equations, &at, search->contact) + guard->offset;
 }
 
 static const char NOT_CONVERGED[] =
@@ -156,20 +251,21 @@ static double locate(const ArcGuard *guard, double a, double b) {
         x.fb = guard_at(guard, x.b);
     }
     if (iterations == LOCATION_ITERATIONS_MAX) {
-        (void)no_guard(guard, NOT_CONVERGED);
+        (void)no_guard(guard->search, NOT_CONVERGED);
     }
     return x.b;
 }
 
 /* Move the time of an impact to the root of the projected state.  Never before the apex: the gap is
  * opening there, the impact would have no effect and be located forever. */
-static bool polish_impact(Simulation *sim, int stop, double apex, double *time, Problem *problem) {
-    int n = system_of(sim)->n;
-    double t = *time, *y = sim->stepping.located_y;
-    Complex *e = sim->stepping.located_e;
+static bool polish_impact(const Search *search, double apex, double *time) {
+    Simulation *sim = search->sim;
+    int n = system_of(sim)->n, stop = search->contact;
+    double t = *time, *y = sim->stepping.located.y;
+    Complex *e = sim->stepping.located.e;
     for (int step = 0; step < EVENT_CORRECTIONS_MAX; step++) {
         arc_at(sim, t, y);
-        if (!project(&sim->equations, t, y, &sim->scratch, problem)) {
+        if (!project(&sim->equations, t, y, &sim->scratch, search->problem)) {
             return false;
         }
         directions(system_of(sim), y, e);
@@ -193,7 +289,7 @@ static double sample_time(const Simulation *sim, int k) {
 }
 
 /* Positions, rates and directions at the samples. */
-static void sample_arc(Simulation *sim) {
+PRBM void sample_arc(Simulation *sim) {
     const Arc *arc = &sim->state.arc;
     Stepping *stepping = &sim->stepping;
     int n = system_of(sim)->n, ny = state_size(sim);
@@ -219,46 +315,6 @@ static Instant sample(const Simulation *sim, int k) {
 
 /* --- impacts ---------------------------------------------------------------------------------- */
 
-/* How far the arms may move within the step: coordinates change by no more than the dense output
- * can make of the stages, |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
-static void bound_arms(const Simulation *sim, double *reach) {
-    const System *system = system_of(sim);
-    furthest(system->n, state_size(sim), sim->state.arc.k, sim->state.arc.h, reach);
-    for (int k = 0; k < system->stretch_count; k++) {
-        int j = system->stretches[k], a = arm_of(system, j);
-        double longest = modulus(sim->stepping.reference.e[a]) * exponential(reach[j]);
-        reach[a] = longest * (reach[a] + reach[j]);
-    }
-}
-
-/* Whether an open stop may be reached within the step: gaps change by no more than the arms do, and
- * by the turn of a body that carries the wall. */
-static bool within_reach(Simulation *sim) {
-    const System *system = system_of(sim);
-    const Arc *arc = &sim->state.arc;
-    const Complex *e = sim->stepping.reference.e;
-    int n = system->n;
-    double near = TOUCHING_RTOL * system->length, *arms = sim->stepping.reach;
-    Rows gaps = gap_rows(system);
-    bound_arms(sim, arms);
-    for (int s = 0; s < system->s; s++) {
-        if (watched(&sim->equations, EVENT_IMPACT, s)) {
-            const Complex *row = gaps.B + s * n;
-            double reach = near + wall_reach(&sim->state.walls[s], arc->h);
-            for (int j = 0; j < n; j++) {
-                reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
-            }
-            if (gaps.on[s] != FIXED) {
-                reach += modulus(seen_value(&gaps, s, e)) * arms[gaps.on[s]];
-            }
-            if (!(gap(&sim->equations, s, arc->start, e) > reach)) {
-                return true;
-            }
-        }
-    }
-    return false;
-}
-
 /* Where a gap closes: at a, or between a and b. */
 typedef struct {
     double a, b;
@@ -270,12 +326,11 @@ typedef struct {
  * gap that is opening at the start of the interval closes only after its apex: so the impact that
  * was resolved last, whose gap is zero up to round-off of either sign, is not found again.  A dip
  * below zero between two samples shows in the rates. */
-static bool detect_closing(Simulation *sim, int stop, int k, Closing *closing,
-                           Problem *problem) {
-    const double *gaps = sim->stepping.sample_gap + k, *rates = sim->stepping.sample_rate + k;
+static bool detect_closing(Search *search, const double *gaps, const double *rates, int k,
+                           Closing *closing) {
+    Simulation *sim = search->sim;
     double length = system_of(sim)->length, near = TOUCHING_RTOL * length;
-    ArcGuard guard = arc_guard(sim, EVENT_IMPACT, stop, problem), rate = guard;
-    rate.guard = gap_rate_guard;
+    ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, 1.0, 0.0};
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
     closing->b = sample_time(sim, k + 1);
@@ -309,143 +364,84 @@ static bool detect_closing(Simulation *sim, int stop, int k, Closing *closing,
     return true;
 }
 
-static bool locate_closing(Simulation *sim, int stop, const Closing *closing, double *time,
-                           Problem *problem) {
-    ArcGuard guard = arc_guard(sim, EVENT_IMPACT, stop, problem);
+static bool locate_closing(Search *search, const Closing *closing, double *time) {
+    ArcGuard guard = arc_guard(search);
     if (closing->at_a) {
         *time = closing->a;
         return true;
     }
     if (closing->pressed) {
-        guard.offset = TOUCHING_RTOL * system_of(sim)->length;
+        guard.offset = TOUCHING_RTOL * system_of(search->sim)->length;
         *time = locate(&guard, closing->a, closing->b);
         return true;
     }
     *time = locate(&guard, closing->a, closing->b);
-    return polish_impact(sim, stop, closing->a, time, problem);
+    return polish_impact(search, closing->a, time);
 }
 
-/* The first impact of a stop within the step. */
-static bool find_impact(Simulation *sim, int stop, Event *first, Problem *problem) {
-    Stepping *stepping = &sim->stepping;
+/* The first closing of a gap within the step. */
+PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
+                       Problem *problem) {
+    Search search = {sim, guard, stop, false, problem};
+    double gaps[GUARD_INTERVALS + 1], rates[GUARD_INTERVALS + 1];
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
         Instant at = sample(sim, k);
-        stepping->sample_gap[k] = gap_guard(&sim->equations, &at, stop);
-        stepping->sample_rate[k] = gap_rate_guard(&sim->equations, &at, stop);
+        gaps[k] = guard->value(&sim->equations, &at, stop);
+        rates[k] = gap_rate_guard(&sim->equations, &at, stop);
     }
-    for (int k = 0; k < GUARD_INTERVALS; k++) {
+    for (int k = 0; !fall->found && k < GUARD_INTERVALS; k++) {
         Closing closing;
-        double time;
-        if (detect_closing(sim, stop, k, &closing, problem)) {
-            if (!locate_closing(sim, stop, &closing, &time, problem)) {
-                return false;
-            }
-            keep_earlier(first, EVENT_IMPACT, stop, time);
-            return true;
+        fall->found = detect_closing(&search, gaps + k, rates + k, k, &closing);
+        if (fall->found && !locate_closing(&search, &closing, &fall->time)) {
+            return false;
         }
     }
-    return true;
+    return !search.failed;
 }
 
 /* --- friction and releases -------------------------------------------------------------------- */
 
 /* When a sliding velocity changes its sign.  A contact that begins to slide is at rest up to
  * round-off of either sign: it slides the other way if it does so at the end of the step. */
-static void find_reversal(Simulation *sim, int contact, Event *first, Problem *problem) {
+PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                        Problem *problem) {
+    Search search = {sim, guard, contact, false, problem};
+    ArcGuard on_arc = arc_guard(&search);
     double z[GUARD_INTERVALS + 1];
-    ArcGuard guard = arc_guard(sim, EVENT_REVERSAL, contact, problem);
     for (int k = 0; k <= GUARD_INTERVALS; k++) {
         Instant at = sample(sim, k);
-        z[k] = guard.guard(&sim->equations, &at, contact);
+        z[k] = guard->value(&sim->equations, &at, contact);
     }
     bool begins = z[0] <= zero_speed(&sim->configuration);
-    for (int k = begins; k < GUARD_INTERVALS; k++) {
+    for (int k = begins; !fall->found && k < GUARD_INTERVALS; k++) {
         if (z[k] > 0.0 && z[k + 1] <= 0.0) {
-            double time = locate(&guard, sample_time(sim, k), sample_time(sim, k + 1));
-            keep_earlier(first, EVENT_REVERSAL, contact, time);
-            return;
+            fall->found = true;
+            fall->time = locate(&on_arc, sample_time(sim, k), sample_time(sim, k + 1));
         }
     }
-    if (begins && z[GUARD_INTERVALS] < 0.0) {
-        keep_earlier(first, EVENT_REVERSAL, contact, sample_time(sim, 1));
+    if (!fall->found && begins && z[GUARD_INTERVALS] < 0.0) {
+        fall->found = true;
+        fall->time = sample_time(sim, 1);
     }
-}
-
-/* Whether the forces at the stages of the step come near to a release or slip. */
-static bool may_yield(const Simulation *sim) {
-    const Equations *q = &sim->equations;
-    const ForceRange *forces = &sim->stepping.forces;
-    if (q->sticking_count > 0) {
-        return true;
-    }
-    for (int k = 0; k < q->held_count; k++) {
-        if (forces->least[k] <= RELEASE_WATCH_FACTOR * forces->largest[k]) {
-            return true;
-        }
-    }
-    return false;
+    return !search.failed;
 }
 
 /* When a force is used up, from its guard at the start, the middle and the end of the step. */
-static void find_yield(Simulation *sim, int kind, int contact, Event *first,
-                       Problem *problem) {
-    ArcGuard guard = arc_guard(sim, kind, contact, problem);
+PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                     Problem *problem) {
+    Search search = {sim, guard, contact, false, problem};
+    ArcGuard on_arc = arc_guard(&search);
     const Arc *arc = &sim->state.arc;
     double times[3] = {arc->start, arc->start + arc->h / 2, arc->start + arc->h};
-    double before = guard_at(&guard, times[0]);
-    for (int part = 0; part < 2; part++) {
-        double after = guard_at(&guard, times[part + 1]);
+    double before = guard_at(&on_arc, times[0]);
+    for (int part = 0; !fall->found && part < 2; part++) {
+        double after = guard_at(&on_arc, times[part + 1]);
         if (after <= 0.0) {
             double a = times[part], b = times[part + 1];
-            keep_earlier(first, kind, contact, before > 0.0 ? locate(&guard, a, b) : a);
-            return;
+            fall->found = true;
+            fall->time = before > 0.0 ? locate(&on_arc, a, b) : a;
         }
         before = after;
     }
-}
-
-/* --- all -------------------------------------------------------------------------------------- */
-
-static bool find_contact_event(Simulation *sim, int kind, int contact, Event *first,
-                               Problem *problem) {
-    if (!watched(&sim->equations, kind, contact)) {
-        return true;
-    }
-    switch (kind) {
-    case EVENT_IMPACT:
-        return find_impact(sim, contact, first, problem) && !sim->stepping.guards_fail;
-    case EVENT_REVERSAL: find_reversal(sim, contact, first, problem); break;
-    default: find_yield(sim, kind, contact, first, problem); break;
-    }
-    return !sim->stepping.guards_fail;
-}
-
-static bool find_events(Simulation *sim, int kind, Event *first, Problem *problem) {
-    bool right = true;
-    for (int contact = 0; right && contact < contact_count(sim); contact++) {
-        right = find_contact_event(sim, kind, contact, first, problem);
-    }
-    return right;
-}
-
-PRBM bool first_event(Simulation *sim, Event *event, Problem *problem) {
-    const Equations *q = &sim->equations;
-    Event none = {EVENT_NONE, 0, 0.0};
-    bool right = true, open = q->held_count < system_of(sim)->s && within_reach(sim);
-    *event = none;
-    sim->stepping.guards_fail = false;
-    if (open || q->slipping_count > 0) {
-        sample_arc(sim);
-    }
-    if (open) {
-        right = find_events(sim, EVENT_IMPACT, event, problem);
-    }
-    if (right && q->slipping_count > 0) {
-        right = find_events(sim, EVENT_REVERSAL, event, problem);
-    }
-    if (right && may_yield(sim)) {
-        right = find_events(sim, EVENT_RELEASE, event, problem) &&
-                find_events(sim, EVENT_SLIP, event, problem);
-    }
-    return right;
+    return !search.failed;
 }

@@ -2,7 +2,12 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/rest.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* --- mobility --------------------------------------------------------------------------------- */
 
@@ -320,16 +325,16 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
 /* --- captures --------------------------------------------------------------------------------- */
 
 /* Whether a resting stop is pressed so strongly that a bounce would be shorter than
- * SHORTEST_FLIGHT_RTOL or, in model exchange, lower than LOWEST_BOUNCE_RTOL: by closing late, it
- * would gain what it loses by the impact. */
+ * SHORTEST_FLIGHT_RTOL or lower than the mode resolves: by closing late, it would gain what it
+ * loses by the impact. */
 static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting, const double *q,
                             const double *v, double speed, bool *result, Problem *problem) {
     const System *system = system_of(sim);
-    const Evaluation *tried = &sim->trial.evaluation;
+    Evaluation *tried = &sim->trial.evaluation;
     double *G = take(&sim->scratch, (size_t)system->n), free;
     Rows gaps = gap_rows(system);
-    equations_holding(sim, resting, q, v);
-    if (!evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL, &sim->trial.evaluation, problem)) {
+    const Equations *holding = equations_holding(sim, resting, q, v);
+    if (!evaluate_equations(holding, sim->state.front_time, q, v, NULL, tried, problem)) {
         return false;
     }
     Inertia at = inertia_at(sim, q);
@@ -337,8 +342,8 @@ static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting
     if (!mobility(sim, &at, system->r, at.loops, G, &free, problem)) {
         return false;
     }
-    double pressing = stop_force(&sim->trial.equations, tried->lam, stop) * free;
-    double lowest = (sim->state.exchange ? LOWEST_BOUNCE_RTOL : 0.0) * system->length;
+    double pressing = stop_force(holding, tried->lam, stop) * free;
+    double lowest = sim->state.mode.lowest_bounce * system->length;
     double period = sim->configuration.scales.time;
     *result = 2.0 * speed < pressing * SHORTEST_FLIGHT_RTOL * period ||
               speed * speed < 2.0 * pressing * lowest;
@@ -575,7 +580,7 @@ PRBM bool impulses_changed(const Simulation *sim) {
 
 static void free_sticking(Simulation *sim) {
     for (int contact = 0; contact < contact_count(sim); contact++) {
-        int *mode = &sim->state.modes[contact];
+        ContactMode *mode = &sim->state.modes[contact];
         *mode = *mode == CONTACT_STICK ? CONTACT_FRICTIONLESS : *mode;
     }
     set_contacts(sim, sim->state.modes);

@@ -1,7 +1,10 @@
 /* The outputs at the present state: the twin of hybrid/outputs.py. */
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/impacts.h"
+#include "hybrid/outputs.h"
+#include "hybrid/simulation.h"
 
 static void output_bodies(const Simulation *sim, double *out) {
     const System *system = system_of(sim);

@@ -2,7 +2,9 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/impacts.h"
+#include "hybrid/rest.h"
+#include "hybrid/simulation.h"
 
 /* The rows of the gaps and of the slides, and the forces along them: a stop that slides pushes and
  * rubs. */

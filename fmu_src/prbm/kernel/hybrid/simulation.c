@@ -3,7 +3,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* --- access ----------------------------------------------------------------------------------- */
 
@@ -26,12 +31,6 @@ PRBM Complex *directions_at(Simulation *sim, const double *q) {
     return e;
 }
 
-PRBM Instant instant_of(const Simulation *sim, double time, const double *y,
-                        const Evaluation *evaluation) {
-    Instant at = {time, y, y + system_of(sim)->n, evaluation->at.e, evaluation->lam};
-    return at;
-}
-
 /* --- memory ----------------------------------------------------------------------------------- */
 
 /* The arrays of numbers of the state, one behind the other. */
@@ -47,7 +46,8 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->received, LOADS * (size_t)m->force_count},
         {&state->front, ny},         {&state->k1, ny},
         {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
-        {&state->floors, s},         {&state->states, 2 * (size_t)m->independent_count + 2},
+        {&state->floors, s},         {&state->accepted, (size_t)m->coordinate_count},
+        {&state->states, 2 * (size_t)m->independent_count + 2},
     };
     state->number_count = 0;
     for (size_t i = 0; i < sizeof parts / sizeof *parts; i++) {
@@ -64,7 +64,7 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
 static void place_state(State *state, const Mechanism *m, Memory *memory) {
     size_t s = (size_t)m->stop_count;
     place_numbers(state, m, memory);
-    state->modes = place(memory, s + (size_t)m->friction_count, sizeof(int));
+    state->modes = place(memory, s + (size_t)m->friction_count, sizeof *state->modes);
     state->driven = place(memory, s, sizeof(bool));
     state->latched = place(memory, s, sizeof(Latched));
     state->walls = place(memory, s, sizeof(Wall));
@@ -94,17 +94,15 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     size_t samples = GUARD_INTERVALS + 1;
     evaluation_place(&stepping->evaluation, system, memory);
     reference_place(&stepping->reference, system, memory);
-    correction_place(&stepping->correction, system, memory);
     stepping->forces.least = place(memory, s, d);
     stepping->forces.largest = place(memory, s, d);
     stepping->end = place(memory, ny, d);
     stepping->error = place(memory, ny, d);
     stepping->sample_y = place(memory, samples * 2 * n, d);
     stepping->sample_e = place(memory, samples * n, sizeof(Complex));
-    stepping->sample_gap = place(memory, samples, d);
-    stepping->sample_rate = place(memory, samples, d);
-    stepping->located_y = place(memory, ny, d);
-    stepping->located_e = place(memory, n, sizeof(Complex));
+    stepping->located.y = place(memory, ny, d);
+    stepping->located.e = place(memory, n, sizeof(Complex));
+    evaluation_place(&stepping->located.evaluation, system, memory);
     stepping->reach = place(memory, n, d);
 }
 
@@ -116,8 +114,8 @@ static void place_present(Simulation *sim, const System *system, Memory *memory)
     present->outputs = place(memory, (size_t)system->mechanism->slots.count, d);
     reference_place(&present->reference, system, memory);
     evaluation_place(&present->evaluation, system, memory);
-    sim->rates.rates = place(memory, ny, d);
-    evaluation_place(&sim->rates.evaluation, system, memory);
+    present->rates = place(memory, ny, d);
+    evaluation_place(&present->rated, system, memory);
 }
 
 static void place_all(Simulation *sim, Memory *memory) {
@@ -128,10 +126,13 @@ static void place_all(Simulation *sim, Memory *memory) {
     system_place(system, m, memory);
     equations_place(&sim->equations, system, memory);
     equations_place(&sim->trial.equations, system, memory);
-    sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim), sizeof(int));
+    sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim),
+                                     sizeof(ContactMode));
     evaluation_place(&sim->trial.evaluation, system, memory);
     place_stepping(&sim->stepping, system, memory);
     place_present(sim, system, memory);
+    evaluation_place(&sim->at_front, system, memory);
+    correction_place(&sim->correction, system, memory);
     place_scratch(&sim->scratch, m, memory);
     sim->forces = place(memory, LOADS * (size_t)m->force_count, sizeof(double));
 }
@@ -178,7 +179,7 @@ PRBM size_t simulation_bytes(const Simulation *simulation) {
 
 PRBM void simulation_unstart(Simulation *simulation) {
     simulation->state.started = false;
-    simulation->present.fresh = NOTHING;
+    forget_present(simulation);
 }
 
 PRBM bool simulation_started(const Simulation *simulation) {
@@ -199,16 +200,16 @@ PRBM void set_inputs(Simulation *sim) {
     ContactState contacts = {sim->state.modes};
     copy(LOADS * m->force_count, given, sim->forces);
     set_equations(&sim->equations, &inputs, &contacts, sim->configuration.omega);
-    sim->present.fresh = NOTHING;
+    forget_outputs(sim);
 }
 
-PRBM void set_contacts(Simulation *sim, const int *modes) {
+PRBM void set_contacts(Simulation *sim, const ContactMode *modes) {
     memmove(sim->state.modes, modes, (size_t)contact_count(sim) * sizeof *modes);
     sim->state.has_k1 = false;
     set_inputs(sim);
 }
 
-PRBM void set_mode(Simulation *sim, int contact, int mode) {
+PRBM void set_mode(Simulation *sim, int contact, ContactMode mode) {
     sim->state.modes[contact] = mode;
     set_contacts(sim, sim->state.modes);
 }
@@ -234,8 +235,9 @@ static void clear_stops(Simulation *sim) {
 /* The scalars of a simulation that has not started. */
 static void clear_progress(State *state, double start_time) {
     const Event none = {EVENT_NONE, 0, 0.0};
-    state->started = state->exchange = state->has_k1 = state->arc.valid = false;
-    state->interrupted = false;
+    const SimulationMode cosimulation = {false, 0.0};
+    state->mode = cosimulation;
+    state->started = state->has_k1 = state->arc.valid = state->interrupted = false;
     state->time = state->front_time = state->window_since = start_time;
     state->point = start_time;
     state->longest = state->arc.start = state->arc.h = 0.0;
@@ -259,8 +261,7 @@ PRBM void simulation_reset(Simulation *simulation) {
     for (int i = 0; i < m->input_count; i++) {
         sim->state.given[i] = m->input_starts[i];
     }
-    sim->present.fresh = NOTHING;
-    sim->rates.stale = false;
+    forget_present(sim);
 }
 
 static bool set_parameter(Simulation *sim, int slot, double x, Problem *problem) {
@@ -304,10 +305,7 @@ PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *pr
     const Mechanism *m = sim->configuration.mechanism;
     bool right = slot < m->parameter_count ? set_parameter(sim, slot, x, problem)
                                            : set_input(sim, slot - m->slots.inputs, x, problem);
-    if (right && sim->state.exchange) {
-        sim->rates.stale = true;
-        sim->present.fresh = NOTHING;
-    }
+    forget_present(sim);
     return right;
 }
 
@@ -380,15 +378,14 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
            check_walls(sim, problem) && settle(sim, every, system_of(sim)->s, NULL, problem);
 }
 
-/* Start the simulation; the caller keeps a backup for the case of failure. */
-PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, bool exchange,
+PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, SimulationMode mode,
                        Problem *problem) {
     State *state = &sim->state;
     Configuration *configuration = &sim->configuration;
     int parameter = configuration->mechanism->tolerance;
     clear_progress(state, start_time);
     state->tolerance = tolerance == 0.0 ? state->values[parameter] : tolerance;
-    state->exchange = exchange;
+    state->mode = mode;
     state->log_of_error = natural_log(STEP_ERROR_MIN);
     if (!check_tolerance(state->tolerance, problem) || !take_values(sim, problem) ||
         !fundamental_frequency(&configuration->system, &state->frequency, &sim->scratch,

@@ -2,9 +2,12 @@
 #include <math.h>
 #include <string.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+#include "hybrid/snapshot.h"
 
-enum { SCALARS = 20, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
+enum { SCALARS = 21, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
@@ -33,11 +36,12 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
     const State *state = &simulation->state;
     const Mechanism *m = simulation->configuration.mechanism;
     const double scalars[SCALARS] = {
-        state->started,      state->exchange,       state->has_k1,       state->arc.valid,
+        state->started,      state->mode.exchange,  state->has_k1,       state->arc.valid,
         state->interrupted,  state->pending.kind,   state->pending.contact, state->window_count,
         state->pending.time, state->time,           state->tolerance,    state->frequency,
         state->step_size,    state->log_of_error,   state->front_time,   state->arc.start,
         state->arc.h,        state->window_since,   state->point,        state->longest,
+        state->mode.lowest_bounce,
     };
     memcpy(to, scalars, sizeof scalars);
     to += SCALARS;
@@ -77,11 +81,11 @@ static bool get_flag(StateReader *reader) {
 
 static void get_scalars(State *state, StateReader *reader) {
     state->started = get_flag(reader);
-    state->exchange = get_flag(reader);
+    state->mode.exchange = get_flag(reader);
     state->has_k1 = get_flag(reader);
     state->arc.valid = get_flag(reader);
     state->interrupted = get_flag(reader);
-    state->pending.kind = get_integer(reader, EVENT_NONE, EVENT_REVERSAL);
+    state->pending.kind = (EventKind)get_integer(reader, EVENT_NONE, EVENT_KINDS - 1);
     state->pending.contact = get_integer(reader, 0, 2 * STOPS_MAX);
     state->window_count = get_integer(reader, 0, EVENTS_MAX);
     state->pending.time = get_number(reader);
@@ -96,12 +100,13 @@ static void get_scalars(State *state, StateReader *reader) {
     state->window_since = get_number(reader);
     state->point = get_number(reader);
     state->longest = get_number(reader);
+    state->mode.lowest_bounce = get_number(reader);
 }
 
 static void get_stop(State *state, int i, StateReader *reader) {
     Latched *last = &state->latched[i];
     Wall *wall = &state->walls[i];
-    state->modes[i] = get_integer(reader, CONTACT_OPEN, CONTACT_SLIP_NEGATIVE);
+    state->modes[i] = (ContactMode)get_integer(reader, CONTACT_OPEN, CONTACT_SLIP_NEGATIVE);
     state->driven[i] = get_flag(reader);
     wall->position = get_number(reader);
     wall->rate = get_number(reader);
@@ -131,12 +136,13 @@ static bool read_state(Simulation *sim, const double *from) {
     }
     for (int i = 0; i < m->friction_count; i++) {
         state->modes[m->stop_count + i] =
-            get_integer(&reader, CONTACT_FRICTIONLESS, CONTACT_SLIP_NEGATIVE);
+            (ContactMode)get_integer(&reader, CONTACT_FRICTIONLESS, CONTACT_SLIP_NEGATIVE);
     }
     for (double *x = state->numbers; x < state->states; x++) {
         *x = get_number(&reader);
     }
-    copy(exchange_states(sim), reader.at, state->states);
+    size_t left = state->number_count - (size_t)(state->states - state->numbers);
+    memcpy(state->states, reader.at, left * sizeof *state->states);
     return reader.sound;
 }
 
@@ -144,7 +150,7 @@ static bool read_state(Simulation *sim, const double *from) {
 static bool consistent(const Simulation *sim) {
     const State *state = &sim->state;
     const Mechanism *m = sim->configuration.mechanism;
-    int kind = state->pending.kind;
+    EventKind kind = state->pending.kind;
     bool friction = kind == EVENT_SLIP || kind == EVENT_REVERSAL;
     int contacts = friction ? contact_count(sim) : m->stop_count;
     if (state->step_size < 0.0 || (kind != EVENT_NONE && state->pending.contact >= contacts)) {
@@ -153,7 +159,7 @@ static bool consistent(const Simulation *sim) {
     return !state->started ||
            (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_MAX &&
             state->frequency >= 0.0 && (!state->arc.valid || state->arc.h > 0.0) &&
-            (state->exchange || state->front_time >= state->time));
+            state->front_time >= state->time);
 }
 
 /* --- attempts --------------------------------------------------------------------------------- */
@@ -184,7 +190,7 @@ PRBM bool attempt(Simulation *sim, bool right, Problem *problem) {
         Problem ignored;
         (void)read_state(sim, sim->backup);
         sim->scratch.used = 0;
-        sim->present.fresh = NOTHING;
+        forget_present(sim);
         (void)rebuild(sim, &ignored);
     }
     return right;
@@ -199,8 +205,7 @@ PRBM bool simulation_restore(Simulation *simulation, const double *state, Proble
                  check_values(m, sim->state.values, &ignored) &&
                  (!sim->state.started || check_values(m, sim->state.acting_values, &ignored)) &&
                  rebuild(sim, &ignored);
-    sim->rates.stale = true;
-    sim->present.fresh = NOTHING;
+    forget_present(sim);
     if (!right) {
         fail(problem, "the saved state is damaged: its numbers are not those of a motion");
     }

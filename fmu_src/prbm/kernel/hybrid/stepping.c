@@ -1,10 +1,14 @@
 /* Steps of variable size: the twin of hybrid/stepping.py. */
 #include <math.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/arc.h"
+#include "hybrid/events.h"
+#include "hybrid/simulation.h"
+#include "hybrid/stepping.h"
+#include "hybrid/walls.h"
 
 #define STEP_ERROR_EXPONENT (1.0 / (ERROR_ORDER + 1.0))
-#define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - 0.75 * STEP_MEMORY_EXPONENT)
+#define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - STEP_TREND_FACTOR * STEP_MEMORY_EXPONENT)
 
 /* --- errors ----------------------------------------------------------------------------------- */
 
@@ -150,7 +154,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     state->pending.kind = EVENT_NONE;
     copy(ny, stepping->end, state->front); /* the state of the last stage */
     if (!project_near(&sim->equations, &stepping->evaluation, &stepping->reference, end,
-                      state->front, &stepping->correction, &sim->scratch, problem)) {
+                      state->front, &sim->correction, &sim->scratch, problem)) {
         return false;
     }
     Event event;

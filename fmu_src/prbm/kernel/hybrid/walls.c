@@ -1,7 +1,11 @@
 /* Moving walls: the twin of hybrid/walls.py. */
 #include <math.h>
 
-#include "hybrid/hybrid.h"
+#include "hybrid/configuration.h"
+#include "hybrid/contact_modes.h"
+#include "hybrid/impacts.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* The reference that the inputs of a stop define at the present time. */
 static Wall given_reference(const Simulation *sim, int i) {
@@ -111,7 +115,8 @@ PRBM double follow_cubics(Simulation *sim) {
 /* The jump of a wall's velocity with which a stop that holds keeps holding. */
 PRBM double jump_allowed(const Simulation *sim, int i) {
     const Stop *stop = &sim->configuration.mechanism->stops[i];
-    return greater(stop_field(sim, stop->rest_speed), 20.0 * zero_speed(&sim->configuration));
+    return greater(stop_field(sim, stop->rest_speed),
+                   REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
 }
 
 /* Keep held stops on walls whose velocities have jumped by less than rest_speed; others open or are
@@ -120,7 +125,7 @@ PRBM double jump_allowed(const Simulation *sim, int i) {
 PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
-    Evaluation *at = &sim->trial.evaluation;
+    Evaluation *at = &sim->at_front;
     int ny = state_size(sim), n = system_of(sim)->n;
     double *y = sim->state.front, t = sim->state.front_time;
     double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);

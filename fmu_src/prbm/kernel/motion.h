@@ -1,6 +1,6 @@
 /* A mechanism in motion, as the FMI wrappers and the tests see it. */
-#ifndef PRBM_SIMULATION_H
-#define PRBM_SIMULATION_H
+#ifndef PRBM_MOTION_H
+#define PRBM_MOTION_H
 
 #include "kernel.h"
 

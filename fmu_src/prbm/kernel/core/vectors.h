@@ -1,4 +1,9 @@
 /* Pairs of numbers, and vectors that are padded with zeros to an even length. */
+#ifndef PRBM_VECTORS_H
+#define PRBM_VECTORS_H
+
+#include <string.h>
+
 #include "core/numbers.h"
 
 /* Two numbers at a time if the compiler has vectors, else one, with the same operations on each. */
@@ -17,28 +22,44 @@ typedef double LanesInMemory;
 #endif
 enum { LANES = sizeof(Lanes) / sizeof(double), PAIR = 2, SUMS = PAIR / LANES };
 
-static Lanes lanes_at(const double *x) {
+static inline Lanes lanes_at(const double *x) {
     return *(const LanesInMemory *)x;
 }
 
-static Lanes all_lanes(double x) {
+static inline Lanes all_lanes(double x) {
     Lanes lanes = NO_LANES;
     return x - lanes;
 }
 
-static void set_lanes(double *x, Lanes lanes) {
+static inline void set_lanes(double *x, Lanes lanes) {
     *(LanesInMemory *)x = lanes;
+}
+
+static inline LaneBits bits_of(Lanes x) {
+    LaneBits bits;
+    memcpy(&bits, &x, sizeof bits);
+    return bits;
+}
+
+static inline Lanes from_bits(LaneBits bits) {
+    Lanes x;
+    memcpy(&x, &bits, sizeof x);
+    return x;
+}
+
+static inline Lanes magnitudes(Lanes x) {
+    return from_bits(bits_of(x) & (UINT64_MAX >> 1));
 }
 
 /* Sums are computed as separate sums of the even and the odd terms, which are added at the end:
  * Lanes sum[SUMS], to which term i contributes in sum[SUM_OF(i)]. */
 #define SUM_OF(i) ((i) / LANES % SUMS)
 
-static double total(const Lanes *sum) {
+static inline double total(const Lanes *sum) {
     return LANE(sum[0], 0) + LANE(sum[SUMS - 1], LANES - 1);
 }
 
-static int even_length(int n) {
+static inline int even_length(int n) {
     return n + n % PAIR;
 }
 
@@ -102,13 +123,13 @@ SIZED void join(int even, int n, const double *first, const double *second, doub
     }
 }
 
-static void pad(int n, const double *x, double *padded) {
+static inline void pad(int n, const double *x, double *padded) {
     if (n > 0) {
         pad_of(even_length(n), n, x, padded);
     }
 }
 
-static void pad_parts(int n, const Complex *z, Parts parts) {
+static inline void pad_parts(int n, const Complex *z, Parts parts) {
     parts.re[even_length(n) - 1] = parts.im[even_length(n) - 1] = 0.0;
     for (int i = 0; i < n; i++) {
         parts.re[i] = z[i].re;
@@ -116,9 +137,11 @@ static void pad_parts(int n, const Complex *z, Parts parts) {
     }
 }
 
-static void set_complex(Complex *z, Lanes re, Lanes im) {
+static inline void set_complex(Complex *z, Lanes re, Lanes im) {
     for (int i = 0; i < LANES; i++) {
         z[i].re = LANE(re, i);
         z[i].im = LANE(im, i);
     }
 }
+
+#endif

@@ -1,0 +1,141 @@
+/* The coordinates that the loops determine.
+ *
+ * The loops tie the n coordinates together; r of them are solved from the other n - r, the states of
+ * model exchange, so that a solver without constraints stays on them (mechanics/independent.py
+ * chooses them). */
+#include <math.h>
+#include <stdio.h>
+
+#include "hybrid/simulation.h"
+#include "dependents.h"
+
+/* The coordinates that the loops determine, in rising order. */
+static void dependents(const Mechanism *m, int *result) {
+    int k = 0, count = 0;
+    for (int j = 0; j < m->coordinate_count; j++) {
+        if (k < m->independent_count && m->independent[k] == j) {
+            k++;
+        } else {
+            result[count++] = j;
+        }
+    }
+}
+
+static const char *coordinate_name(const Mechanism *m, int j, char *text, size_t size) {
+    const Coordinate *coordinate = &m->coordinates[j];
+    if (coordinate->link >= 0) {
+        const char *quantity = coordinate->arm == j ? "angle" : "strain";
+        (void)snprintf(text, size, "link[%d].%s", coordinate->link + 1, quantity);
+    } else {
+        (void)snprintf(text, size, "%s.angle", m->bodies[coordinate->body - 1].name);
+    }
+    return text;
+}
+
+PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem) {
+    char name[80] = "";
+    return fail(problem,
+                "the states of model exchange do not determine the other angles (%s and %d more) "
+                "at t = %.9g s: the shape is too far from the one at the start, or the solver has "
+                "left it; shorten its steps, or use co-simulation, which has no such limit",
+                coordinate_name(sim->configuration.mechanism, dependent[0], name, sizeof name),
+                system_of(sim)->r - 1, sim->state.time);
+}
+
+PRBM bool factor_dependents(const Simulation *sim, Loops *loops) {
+    int r = system_of(sim)->r, n = system_of(sim)->n;
+    double *a = loops->a;
+    double least = HUGE_VAL, most = largest(r * n, loops->rows);
+    for (int i = 0; i < r; i++) {
+        for (int k = 0; k < r; k++) {
+            a[i * r + k] = loops->rows[i * n + loops->dependent[k]];
+        }
+    }
+    if (!lu_factor(r, a, loops->pivot)) {
+        return false;
+    }
+    for (int i = 0; i < r; i++) {
+        least = lesser(least, 1.0 / fabs(a[i * r + i])); /* its diagonal is inverted */
+    }
+    return least > DEPENDENT_PIVOT_RTOL * most;
+}
+
+PRBM Loops take_loops(Simulation *sim) {
+    Scratch *scratch = &sim->scratch;
+    int r = system_of(sim)->r, n = system_of(sim)->n;
+    Loops loops = {take_integers(scratch, r), take_integers(scratch, r),
+                   take_matrix(scratch, r, n), take_matrix(scratch, r, r),
+                   take(scratch, (size_t)r)};
+    dependents(sim->configuration.mechanism, loops.dependent);
+    return loops;
+}
+
+/* Solve the loops for the dependent angles, from those in q. */
+static bool complete_angles(Simulation *sim, Loops *x, double *q) {
+    size_t mark = sim->scratch.used;
+    const System *system = system_of(sim);
+    int r = system->r;
+    double best = HUGE_VAL, length = system->length;
+    bool closed = false, regular = true;
+    Rows loops = plain_rows(system, r, system->loops, system->loops_c);
+    Complex *e = take_complex(&sim->scratch, system->n, 1);
+    for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && regular && !closed; step++) {
+        directions(system, q, e);
+        scalars(&loops, e, x->s);
+        double error = largest(r, x->s);
+        closed = error <= CONSTRAINT_RTOL * length ||
+                 (CONSTRAINT_STALLED_RTOL * length >= best && best <= error);
+        best = lesser(best, error);
+        jacobian(&loops, e, x->rows);
+        regular = factor_dependents(sim, x);
+        if (regular && !closed) {
+            lu_solve(r, x->a, x->pivot, x->s);
+            for (int k = 0; k < r; k++) {
+                q[x->dependent[k]] -= x->s[k];
+            }
+        }
+    }
+    sim->scratch.used = mark;
+    return closed && regular;
+}
+
+/* Solve the loops for the dependent rates. */
+static void complete_rates(const Simulation *sim, Loops *x, double *v) {
+    int n = system_of(sim)->n, r = system_of(sim)->r;
+    for (int k = 0; k < r; k++) {
+        v[x->dependent[k]] = 0.0;
+    }
+    for (int i = 0; i < r; i++) {
+        x->s[i] = -dot(n, x->rows + i * n, v);
+    }
+    lu_solve(r, x->a, x->pivot, x->s);
+    for (int k = 0; k < r; k++) {
+        v[x->dependent[k]] = x->s[k];
+    }
+}
+
+/* Solve the loops for the dependent angles and rates, from the angles of the last step. */
+PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
+    size_t mark = sim->scratch.used;
+    Loops loops = take_loops(sim);
+    bool right = complete_angles(sim, &loops, q);
+    if (right) {
+        complete_rates(sim, &loops, v);
+    }
+    sim->scratch.used = mark;
+    return right || (system_of(sim)->r > 0
+                         ? singular_choice(sim, loops.dependent, problem)
+                         : fail(problem, "the states are not finite numbers"));
+}
+
+/* The independent part of y = (q, v, dissipated energy, work). */
+PRBM void states_of(const Simulation *sim, const double *y, double *x) {
+    const Mechanism *m = sim->configuration.mechanism;
+    int n = m->coordinate_count, count = m->independent_count;
+    for (int k = 0; k < count; k++) {
+        x[k] = y[m->independent[k]];
+        x[count + k] = y[n + m->independent[k]];
+    }
+    x[2 * count] = y[2 * n];
+    x[2 * count + 1] = y[2 * n + 1];
+}

@@ -1,0 +1,20 @@
+/* The coordinates that the loops determine. */
+#ifndef PRBM_DEPENDENTS_H
+#define PRBM_DEPENDENTS_H
+
+#include "hybrid/state.h"
+
+/* The loops in the dependent coordinates, in working memory. */
+typedef struct {
+    int *dependent, *pivot; /* (r,) */
+    double *rows, *a, *s;   /* (r, n), (r, r) factored, (r,) residuals */
+} Loops;
+
+PRBM Loops take_loops(Simulation *sim);
+/* The loops' Jacobian in the dependent coordinates, from all rows. */
+PRBM bool factor_dependents(const Simulation *sim, Loops *loops);
+PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem);
+PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem);
+PRBM void states_of(const Simulation *sim, const double *y, double *x);
+
+#endif

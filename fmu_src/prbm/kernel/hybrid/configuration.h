@@ -1,0 +1,15 @@
+/* The assembled mechanism and the scales of its motion. */
+#ifndef PRBM_CONFIGURATION_H
+#define PRBM_CONFIGURATION_H
+
+#include "hybrid/state.h"
+
+PRBM void set_scales(Configuration *configuration, double frequency);
+PRBM bool take_values(Simulation *sim, Problem *problem); /* the values set become acting ones */
+PRBM bool values_changed(const Simulation *sim);
+PRBM bool inputs_changed(const Simulation *sim); /* but those that move walls */
+PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
+PRBM double zero_acceleration(const Configuration *configuration); /* the same of accelerations */
+PRBM double stop_field(const Simulation *sim, Expression field);
+
+#endif

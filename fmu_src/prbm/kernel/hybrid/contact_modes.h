@@ -1,0 +1,22 @@
+/* The choice of the contact state. */
+#ifndef PRBM_CONTACT_MODES_H
+#define PRBM_CONTACT_MODES_H
+
+#include "hybrid/state.h"
+
+/* The stops that hold; whether there are any that are pressed while the others open. */
+typedef struct {
+    int count, stops[STOPS_MAX];
+    bool found;
+} HoldingSet;
+
+PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
+                             const double *v, HoldingSet *holding, Problem *problem);
+/* The trial equations in which a set of stops is closed and all contacts that move slip. */
+PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *holding,
+                                        const double *q, const double *v);
+PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
+                 Problem *problem);
+PRBM bool settle_moved(Simulation *sim, Problem *problem); /* after velocities have jumped */
+
+#endif

@@ -1,0 +1,29 @@
+/* Events: the table of guards and resets, and the first event of a step. */
+#ifndef PRBM_EVENTS_H
+#define PRBM_EVENTS_H
+
+#include "hybrid/guards.h"
+
+typedef bool Watched(const Equations *equations, int contact);
+typedef bool Near(Simulation *sim);
+typedef bool Detect(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                    Problem *problem);
+typedef bool Reset(Simulation *sim, const Event *event, Problem *problem);
+
+/* A row of the table of events. */
+typedef struct {
+    Guard guard;
+    Watched *watched; /* whether the event may occur at a contact */
+    Near *near;       /* whether it may occur in the latest step */
+    bool samples;     /* whether its detection needs the samples of the step */
+    Detect *detect;
+    Reset *reset;     /* the change of state at the event */
+} Transition;
+
+/* The rows are in the order of the kinds, in which events of one time are applied. */
+PRBM const Transition *transition(EventKind kind);
+/* The first event within the latest step, of kind EVENT_NONE without one. */
+PRBM bool first_event(Simulation *sim, Event *first, Problem *problem);
+PRBM bool apply_event(Simulation *sim, const Event *event, Problem *problem);
+
+#endif

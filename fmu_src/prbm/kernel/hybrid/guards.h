@@ -1,0 +1,54 @@
+/* Guards: the scalars whose fall through zero is an event, and where in a step they fall. */
+#ifndef PRBM_GUARDS_H
+#define PRBM_GUARDS_H
+
+#include "hybrid/state.h"
+
+/* A state at which guards are evaluated; lam may be NULL for guards without forces. */
+typedef struct {
+    double time;
+    const double *q, *v;
+    const Complex *e;
+    const double *lam;
+} Instant;
+
+typedef double GuardValue(const Equations *equations, const Instant *at, int contact);
+
+/* The scalar z of a kind of event, positive before it: the event is the fall z > 0 -> z <= 0. */
+typedef struct {
+    const char *event;
+    GuardValue *value;
+    bool forces; /* whether it needs multipliers */
+} Guard;
+
+/* Whether and when a guard falls in the latest step. */
+typedef struct {
+    bool found;
+    double time;
+} Fall;
+
+PRBM double release_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double slip_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double reversal_guard(const Equations *equations, const Instant *at, int contact);
+PRBM double gap_guard(const Equations *equations, const Instant *at, int contact);
+/* The contacts at which events may occur. */
+PRBM bool held_stop(const Equations *equations, int contact);
+PRBM bool sticking_contact(const Equations *equations, int contact);
+PRBM bool slipping_contact(const Equations *equations, int contact);
+PRBM bool open_stop(const Equations *equations, int contact);
+/* Whether events may occur in the latest step at any contact. */
+PRBM bool release_near(Simulation *sim);
+PRBM bool slip_near(Simulation *sim);
+PRBM bool reversal_near(Simulation *sim);
+PRBM bool impact_near(Simulation *sim);
+/* When the guard of a contact falls first in the latest step; a fall that has not been found is
+ * given. */
+PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                     Problem *problem);
+PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
+                        Problem *problem);
+PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
+                       Problem *problem);
+PRBM void sample_arc(Simulation *sim); /* for reversal_time and closing_time */
+
+#endif

@@ -1,0 +1,28 @@
+/* The present moment, and which of the present quantities are up to date. */
+#include "hybrid/guards.h"
+#include "hybrid/present.h"
+#include "hybrid/simulation.h"
+
+PRBM void forget_present(Simulation *sim) {
+    sim->present.fresh = NOTHING;
+}
+
+PRBM void forget_outputs(Simulation *sim) {
+    sim->present.fresh &= FRONT;
+}
+
+PRBM bool moment_at(Simulation *sim, const double *y, Moment *now, Problem *problem) {
+    Present *present = &sim->present;
+    double time = sim->state.time;
+    if (!(present->fresh & RATES)) {
+        if (!rate(&sim->equations, time, y, NULL, &present->rated, present->rates, problem)) {
+            return false;
+        }
+        present->fresh |= RATES;
+    }
+    Instant at = {time, y, y + system_of(sim)->n, present->rated.at.e, present->rated.lam};
+    now->at = at;
+    now->rates = present->rates;
+    now->evaluation = &present->rated;
+    return true;
+}

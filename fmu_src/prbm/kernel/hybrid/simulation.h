@@ -1,0 +1,18 @@
+/* Access to the parts of a simulation, and its start. */
+#ifndef PRBM_HYBRID_SIMULATION_H
+#define PRBM_HYBRID_SIMULATION_H
+
+#include "hybrid/state.h"
+
+PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 */
+PRBM const System *system_of(const Simulation *sim);
+PRBM int contact_count(const Simulation *sim);
+PRBM Complex *directions_at(Simulation *sim, const double *q); /* in working memory */
+PRBM void set_inputs(Simulation *sim); /* the equations of the present contacts and inputs */
+PRBM void set_contacts(Simulation *sim, const ContactMode *modes);
+PRBM void set_mode(Simulation *sim, int contact, ContactMode mode);
+/* Start the motion; the caller keeps a backup for the case of failure. */
+PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, SimulationMode mode,
+                       Problem *problem);
+
+#endif

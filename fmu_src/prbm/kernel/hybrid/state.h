@@ -1,0 +1,152 @@
+/* The parts of a simulation: its configuration, state and working memory. */
+#ifndef PRBM_HYBRID_STATE_H
+#define PRBM_HYBRID_STATE_H
+
+#include "core/dynamics.h"
+#include "core/projection.h"
+#include "core/runge_kutta.h"
+#include "motion.h"
+
+#define TWO_PI 6.283185307179586
+
+/* Units of the motion: the size, the fundamental frequency, one radian against the stiffest spring
+ * and the period. */
+typedef struct {
+    double length, rate, energy, time;
+} Scales;
+
+/* The assembled mechanism; constant between two changes of parameters. */
+typedef struct {
+    const Mechanism *mechanism;
+    System system;
+    double omega; /* of the fundamental mode; 0 without one */
+    Scales scales;
+    bool assembled; /* whether the system is that of the acting values */
+} Configuration;
+
+typedef struct {
+    EventKind kind;
+    int contact;
+    double time;
+} Event;
+
+/* Values of the latest impact at a stop, and sums over all impacts. */
+typedef struct {
+    int count;
+    double time, approach_speed, rebound_speed, impulse, energy_lost, modal_restitution;
+    double impulse_sum; /* of all impulses so far, captures included */
+} Latched;
+
+/* The latest step with its dense output. */
+typedef struct {
+    bool valid;
+    double start, h;
+    double *y, *k; /* (ny,), (STAGES, ny) */
+} Arc;
+
+/* The step sizes and errors that the controller remembers. */
+typedef struct {
+    double h, log_of_error; /* of the next step; of the latest, relative to the allowed one */
+    double growth_max;      /* 1 after a rejected step */
+} StepSizeController;
+
+/* The mode of a simulation, and the height of a bounce that it cannot resolve, of the size. */
+typedef struct {
+    bool exchange; /* model exchange: an importer integrates */
+    double lowest_bounce;
+} SimulationMode;
+
+/* Everything that a simulation continues from. */
+typedef struct {
+    bool started;
+    SimulationMode mode;
+    double time, tolerance, frequency;
+    double step_size, log_of_error; /* of the step size controller */
+    double front_time;
+    bool has_k1;          /* whether k1 holds the rates of the front */
+    Arc arc;
+    Event pending;        /* located, but not yet applied */
+    double window_since;  /* start of the window in which events are counted */
+    int window_count;
+    bool interrupted;     /* the communication step was left before its end */
+    double point;         /* the last communication point; in model exchange the last event */
+    double longest;       /* the recent longest communication step */
+    ContactMode *modes;   /* (s + f,) of the contacts */
+    bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
+    Latched *latched;     /* (s,) */
+    Wall *walls;          /* (s,) */
+    double *numbers;      /* the arrays below, one behind the other */
+    size_t number_count;
+    double *values, *given;               /* as they were set */
+    double *acting_values, *acting_given; /* since the last restart */
+    double *received;                     /* (3 b,): impulses that have acted */
+    double *front, *k1;                   /* (ny,): the end of the last step, its rates */
+    double *floors;                       /* (s,): gaps close this far below zero */
+    double *accepted;                     /* model exchange: (n,) angles of the last step */
+    double *states;                       /* model exchange: as they were set */
+} State;
+
+/* Equations in a contact state that is being tried, and their evaluation. */
+typedef struct {
+    Equations equations;
+    ContactState contacts;
+    Evaluation evaluation;
+} Trial;
+
+/* The state at which a guard is evaluated in the search for its fall. */
+typedef struct {
+    double *y;             /* (ny,) */
+    Complex *e;            /* (n,) */
+    Evaluation evaluation; /* of guards that need forces */
+} Located;
+
+/* Working memory of a step and of the location of events in it. */
+typedef struct {
+    Evaluation evaluation; /* at the last stage */
+    Reference reference;   /* at the start */
+    ForceRange forces;
+    double *end, *error;   /* (ny,) */
+    double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
+    double *sample_y;      /* (2 n,), (n,) of each */
+    Complex *sample_e;
+    Located located;
+    double *reach;         /* (n,) largest changes of the arms */
+} Stepping;
+
+/* Groups of present quantities: outputs, the rates and, in model exchange, the front itself. */
+enum {
+    NOTHING = 0, PLACES = 1, MOTION = 2, BASE = 4, ENERGIES = 8, MOBILITIES = 16, RATES = 32,
+    FRONT = 64
+};
+
+/* The present state, its outputs and rates, as far as they are up to date: read them by
+ * present_outputs and present_moment. */
+typedef struct {
+    double *y;             /* (ny,) */
+    Complex *e;            /* (n,) */
+    Reference reference;
+    Evaluation evaluation; /* of the outputs */
+    double *outputs;
+    double *rates;         /* (ny,) */
+    Evaluation rated;      /* the evaluation that the rates come from */
+    int fresh;             /* the groups that are up to date */
+} Present;
+
+struct Simulation {
+    Configuration configuration;
+    State state;
+    double *backup; /* the state before an attempt, as numbers */
+    Equations equations;
+    double *forces; /* (3 b,) acting inputs */
+    Trial trial;
+    Stepping stepping;
+    Present present;
+    Evaluation at_front;   /* of the present equations at the front, while contacts change there */
+    Correction correction; /* working memory of projections */
+    Scratch scratch;
+    Hear *hear;
+    void *listener;
+    size_t bytes;
+};
+
+#endif

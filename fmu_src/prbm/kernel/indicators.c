@@ -1,0 +1,92 @@
+/* Event indicators of model exchange: the guards of events in units of the motion. */
+#include <math.h>
+
+#include "hybrid/configuration.h"
+#include "hybrid/events.h"
+#include "hybrid/guards.h"
+#include "hybrid/simulation.h"
+#include "hybrid/walls.h"
+#include "indicators.h"
+
+PRBM int exchange_indicators(const Simulation *simulation) {
+    const Mechanism *m = simulation->configuration.mechanism;
+    return STOP_INDICATORS * m->stop_count + m->friction_count;
+}
+
+/* A stop has one indicator for slip and for reversal: it sticks or slips. */
+PRBM int indicator_place(const Simulation *sim, EventKind kind, int contact) {
+    static const int PLACE[EVENT_KINDS] = {
+        [EVENT_RELEASE] = INDICATOR_RELEASE,
+        [EVENT_SLIP] = INDICATOR_SLIP,
+        [EVENT_REVERSAL] = INDICATOR_SLIP,
+        [EVENT_IMPACT] = INDICATOR_IMPACT,
+    };
+    int s = system_of(sim)->s;
+    return contact < s ? STOP_INDICATORS * contact + PLACE[kind]
+                       : STOP_INDICATORS * s + contact - s;
+}
+
+/* The unit of the guard of a kind of event. */
+PRBM double guard_scale(const Simulation *sim, EventKind kind) {
+    const Scales *scales = &sim->configuration.scales;
+    switch (kind) {
+    case EVENT_IMPACT: return scales->length;
+    case EVENT_REVERSAL: return scales->rate * scales->length;
+    default: return scales->energy / scales->length;
+    }
+}
+
+/* A guard, lifted by the value below which its event is due: gaps close a little late, and speeds
+ * within round-off have fallen to zero. */
+PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kind, int contact) {
+    double z = transition(kind)->guard.value(&sim->equations, at, contact);
+    if (kind == EVENT_IMPACT) {
+        return z + sim->state.floors[contact];
+    }
+    return kind == EVENT_REVERSAL ? z + SLIDING_ENDS_FACTOR * zero_speed(&sim->configuration)
+                                 : z;
+}
+
+/* Positive while an open gap stays open.  An opening gap is lifted off zero, so that its indicator
+ * is positive right after an impact, where the gap is zero up to round-off. */
+static double impact_indicator(const Simulation *sim, const Instant *at, int i) {
+    double speed = gap_rate(&sim->equations, i, at->time, at->e, at->v);
+    double ahead = INDICATOR_LEAD_RTOL * sim->configuration.scales.time * greater(speed, 0.0);
+    return (lifted_guard(sim, at, EVENT_IMPACT, i) + ahead) / guard_scale(sim, EVENT_IMPACT);
+}
+
+/* The rate at which a closed stop leaves its wall, whose acceleration is unknown. */
+PRBM double leaving_rate(const Simulation *sim, const Instant *at, int i) {
+    return gap_rate(&sim->equations, i, at->time, at->e, at->v);
+}
+
+/* Positive while a closed stop is pressed and its wall has not changed its velocity by half of what
+ * keeps it closed. */
+PRBM double release_indicator(const Simulation *sim, const Instant *at, int i) {
+    double pressed = lifted_guard(sim, at, EVENT_RELEASE, i) / guard_scale(sim, EVENT_RELEASE);
+    double room = REST_JUMP_FACTOR * jump_allowed(sim, i) - fabs(leaving_rate(sim, at, i));
+    double steady = room / guard_scale(sim, EVENT_REVERSAL);
+    return lesser(pressed, steady);
+}
+
+static double indicator(const Simulation *sim, const Instant *at, EventKind kind, int contact) {
+    switch (kind) {
+    case EVENT_IMPACT: return impact_indicator(sim, at, contact);
+    case EVENT_RELEASE: return release_indicator(sim, at, contact);
+    default: return lifted_guard(sim, at, kind, contact) / guard_scale(sim, kind);
+    }
+}
+
+/* All indicators at a state; 1 where an event is impossible. */
+PRBM void event_indicators(const Simulation *sim, const Instant *at, double *z) {
+    for (int i = 0; i < exchange_indicators(sim); i++) {
+        z[i] = 1.0;
+    }
+    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
+        for (int contact = 0; contact < contact_count(sim); contact++) {
+            if (transition(kind)->watched(&sim->equations, contact)) {
+                z[indicator_place(sim, kind, contact)] = indicator(sim, at, kind, contact);
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+"""Each C file includes what it needs; what others call is in the header of its own file."""
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from c_importer import FOLDERS, WARNINGS
+from kernel_library import KERNEL
+
+UNIT = "prbm_fmu.c"
+ALONE = ("-DPRBM=", "-DSHARED=", "-Wmissing-prototypes", "-Wno-attributes")
+"""Functions that others may call are external: without a prototype in a header they fail."""
+FILES = [
+    path.relative_to(KERNEL).as_posix() for path in sorted(KERNEL.rglob("*.c")) if path.name != UNIT
+]
+
+
+def check(folder, file):
+    """Return the complaints of the compiler about a file by itself."""
+    command = ["cc", "-std=c99", "-fsyntax-only", *ALONE, *WARNINGS, f"-I{folder}", *FOLDERS]
+    return subprocess.run([*command, str(file)], capture_output=True, text=True).stderr
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_a_file_compiles_alone(file):
+    assert check(KERNEL, KERNEL / file) == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ('#include "core/matrix.h"\ndouble f(void) { return 0.0; }', "no previous prototype"),
+        ("double g(const double *x) { return dot(1, x, x); }", "implicit declaration"),
+    ],
+)
+def test_the_compiler_finds_functions_without_a_header(tmp_path, text, complaint):
+    file = tmp_path / "wrong.c"
+    file.write_text(text)
+    assert complaint in check(tmp_path, file)
+
+
+def declared(text):
+    """Return the functions that a text declares for other files."""
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    return set(re.findall(r"\b(?:PRBM|SHARED)\b[^;(){]*?\b(\w+)\s*\([^;{]*\)[^;{]*;", text))
+
+
+def defined(text):
+    """Return the functions that a text defines for other files."""
+    text = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    return set(re.findall(r"\b(?:PRBM|SHARED)\b[^;(){]*?\b(\w+)\s*\([^;{]*\)\s*{", text))
+
+
+@pytest.mark.parametrize("file", [f for f in FILES if not f.startswith("fmi/")])
+def test_functions_are_declared_in_the_header_of_their_file(file):
+    """The public functions of a simulation are in motion.h instead."""
+    path = KERNEL / file
+    own = path.with_suffix(".h")
+    found = declared((KERNEL / "motion.h").read_text())
+    found |= declared(own.read_text()) if own.exists() else set()
+    assert defined(path.read_text()) <= found
+    if own.exists():
+        assert declared(own.read_text()) <= defined(path.read_text())
+
+
+def test_every_file_is_part_of_the_library():
+    included = re.findall(r'#include "(.*\.c)"', (KERNEL / UNIT).read_text())
+    assert sorted(included) == FILES
+    assert all(Path(file).suffix == ".c" for file in included)
