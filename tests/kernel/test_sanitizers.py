@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from c_importer import ANVIL, TWO_STOPS, Job, given, kernel_library, native, needs, run
+from c_importer import ANVIL, TWO_STOPS, Job, described, kernel_library, native, needs, run
 from fuzzing import (
     ENVIRONMENT,
     MODELS,
@@ -30,7 +30,7 @@ VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full")
 
 def changes(model: str) -> dict[int, dict[str, float]]:
     """Return inputs and tunable parameters that change on the way; friction sets in."""
-    guide = given(model)
+    guide = described(model)
     stop, force, friction = (
         parts[0].name for parts in (guide.stops, guide.forces, guide.frictions)
     )
@@ -105,23 +105,23 @@ def test_valgrind_finds_nothing_in_ten_thousand_instances(fmi, kind):
 @pytest.mark.parametrize("model", MODELS)
 def test_arbitrary_calls_neither_crash_nor_leak(tmp_path, model, fmi):
     found = fuzz_calls(tmp_path, model, fmi, sequences=60, seed=0)
-    assert found.status == 0, found.said
+    assert found.status == 0, found.output
 
 
 @pytest.mark.parametrize("seconds", [2, pytest.param(8, marks=pytest.mark.slow)])
 def test_arbitrary_tables_neither_crash_nor_leak(tmp_path, seconds):
     found = fuzz_tables(tmp_path, seconds=seconds, seed=0)
-    assert found.status == 0, found.said[-8000:]
+    assert found.status == 0, found.output[-8000:]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_search_for_calls_that_crash_finds_none(tmp_path, fmi):
     found = search_calls(tmp_path, "PRBDM", fmi, seconds=15, seed=0)
-    assert found.status == 0, found.said[-8000:]
+    assert found.status == 0, found.output[-8000:]
 
 
 @pytest.mark.slow
 def test_a_search_for_tables_that_crash_finds_none(tmp_path):
     found = fuzz_tables(tmp_path, seconds=30, seed=1)
-    assert found.status == 0, found.said[-8000:]
+    assert found.status == 0, found.output[-8000:]

@@ -15,7 +15,7 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Release, Stop
 from prbm.runs.experiment import Experiment, experiment
 from prbm.runs.run import simulate
-from support import COSTLY, mechanism
+from support import COSTLY_MODELS, mechanism
 
 
 def guide(size, model="2R", **section):
@@ -83,7 +83,7 @@ def test_reference_results_are_left_out_where_they_would_take_minutes():
     stiff = guide(0.1, "nR", n=40, axial=True)
     assert reference.reference(stiff, {}, (), experiment(stiff), told.append) == {}
     assert told == ["no reference results: the default experiment takes the Python engine minutes"]
-    for name in ("PRBDM2R", *COSTLY):
+    for name in ("PRBDM2R", *COSTLY_MODELS):
         assert reference.steps(mechanism(name), {}, Experiment()) < reference.STEPS_MAX
 
 
