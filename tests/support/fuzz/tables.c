@@ -20,7 +20,7 @@ enum {
     HEAD = 16,
     SIZE_AT = 8,
     CHECKSUM_AT = 12,
-    COORDINATES_MAX = 24 /* larger mechanisms are not simulated: it takes too long */
+    SIMULATED_COORDINATES_MAX = 24 /* larger mechanisms are not simulated: it takes too long */
 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
@@ -117,7 +117,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         return 0;
     }
     opened++;
-    if (mechanism->coordinate_count <= COORDINATES_MAX) {
+    if (mechanism->coordinate_count <= SIMULATED_COORDINATES_MAX) {
         start(mechanism, false);
         start(mechanism, true);
     }
