@@ -13,7 +13,7 @@ SMOOTH = {"stop.position": 0.05}
 
 
 def path(model, values, span, **options):
-    """Return the states (q, v) at 41 times within a span, read off without stopping there."""
+    """Return the states (q, v) at 41 times within a span; the integrator does not stop there."""
     sim = Simulation(mechanism(model), values, **options)
     states = []
     for t in np.linspace(*span, 41):
@@ -41,12 +41,12 @@ CASES = {
 @pytest.mark.parametrize(
     "case", [c if c.startswith("1R") else pytest.param(c, marks=pytest.mark.slow) for c in CASES]
 )
-def test_observed_order_is_the_claimed_one(case):
+def test_observed_order_of_fixed_steps_is_that_of_the_method(case):
     """Least-squares slope over five halvings, errors over a span of time and some releases.
 
-    At a single time the error depends on where within a step that time and the impact fall.
-    The five halvings fill what lies between steps that are too long for the motion and
-    rounding: the error falls by a factor of 3e7.
+    At a single time the error depends on the positions of that time and of the impact within their
+    steps.  The five halvings cover the range from the longest useful step down to rounding errors:
+    the error falls by a factor of 3e7.
     """
     model, values, span, longest, releases = CASES[case]
     steps = longest / 2.0 ** np.arange(6)
@@ -60,8 +60,8 @@ def test_observed_order_is_the_claimed_one(case):
     assert slope == pytest.approx(PAIR.order, abs=0.1)
 
 
-def test_error_falls_with_the_tolerance_over_four_decades():
-    """Tolerances 1e-6 to 1e-10: the error falls about in proportion, across an impact too."""
+def test_error_is_roughly_proportional_to_the_tolerance():
+    """For tolerances from 1e-6 to 1e-10, over a span with an impact."""
     span = (0.045, 0.06)
     exact = path("PRBDM2R", {}, span, tolerance=1e-13)
     tolerances = 10.0 ** -np.arange(6, 11)
@@ -71,7 +71,7 @@ def test_error_falls_with_the_tolerance_over_four_decades():
     assert errors[0] / errors[-1] > 2e3
 
 
-def test_a_fixed_step_that_is_too_long_is_refused():
+def test_a_fixed_step_that_is_too_long_is_rejected():
     with pytest.raises(SimulationError, match=r"fixed step of 0\.002 s is too long"):
         path("PRBDM2R", {}, (0.05, 0.1), step=2e-3)
 
@@ -87,6 +87,7 @@ def trees(order):
 
 
 def grafted(tree):
+    """Yield the trees with one more leaf."""
     yield tuple(sorted((*tree, ()), key=repr))
     for i, branch in enumerate(tree):
         for new in grafted(branch):
@@ -121,7 +122,7 @@ def test_order_conditions_hold_for_every_rooted_tree(order):
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("theta", [0.2, 0.5, 0.9])
-def test_dense_output_is_of_fourth_order(order, theta):
+def test_dense_output_has_order_four(order, theta):
     """Weights b(theta) . Phi(t) = theta^order / gamma(t) up to order four, for every theta."""
     b = PAIR.dense @ theta ** np.arange(1, 5)
     for tree in trees(order):
@@ -129,8 +130,8 @@ def test_dense_output_is_of_fourth_order(order, theta):
         assert weight == pytest.approx(theta**order / density(tree), abs=1e-13)
 
 
-def test_error_estimate_is_of_fourth_order():
-    """The embedded solution satisfies the conditions up to order four, not five."""
+def test_embedded_solution_has_order_four():
+    """It satisfies the conditions up to order four, not those of order five."""
     embedded = PAIR.weights - PAIR.error
     for order in (1, 2, 3, 4):
         for tree in trees(order):
@@ -140,7 +141,7 @@ def test_error_estimate_is_of_fourth_order():
     assert np.abs(defects).max() > 1e-5
 
 
-def test_interpolation_ends_where_the_step_ends():
+def test_dense_output_equals_the_new_state_at_the_end_of_a_step():
     def rate(t, y):
         return np.array([y[1], -y[0]])
 
@@ -151,7 +152,7 @@ def test_interpolation_ends_where_the_step_ends():
 
 
 @pytest.mark.parametrize("field", ["a", "error", "dense"])
-def test_coefficients_that_contradict_each_other_cannot_be_constructed(field):
+def test_inconsistent_coefficients_are_rejected(field):
     parts = {"a": PAIR.a.copy(), "error": PAIR.error.copy(), "dense": PAIR.dense.copy()}
     parts[field][-1, ...] += 1e-3
     with pytest.raises(ValueError, match=r"must|depend"):
