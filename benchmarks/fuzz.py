@@ -57,7 +57,7 @@ def random_calls(folder: Path, model: str, fmi: int, seconds: float, seed: int) 
         found = fuzz_calls(folder, model, fmi, SEQUENCES, seed + tried)
         tried += SEQUENCES
         if found.status != 0 or time.monotonic() > end:
-            return Found(found.status, f"{found.said}{tried} sequences, seeds {seed} and up\n")
+            return Found(found.status, f"{found.output}{tried} sequences, seeds {seed} and up\n")
 
 
 def main() -> None:
@@ -78,8 +78,8 @@ def main() -> None:
     for name, search in searches(folder, 60 * arguments.minutes, seed):
         found = search()
         if found.status != 0:
-            sys.exit(f"{name}: status {found.status}; inputs in {folder}\n{found.said[-20000:]}")
-        lines = [line for line in found.said.splitlines() if any(t in line for t in SUMMARIES)]
+            sys.exit(f"{name}: status {found.status}; inputs in {folder}\n{found.output[-20000:]}")
+        lines = [line for line in found.output.splitlines() if any(t in line for t in SUMMARIES)]
         print(f"{name}: {'; '.join(line.strip() for line in lines[-2:])}", flush=True)
 
 

@@ -40,7 +40,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
 from speed import octave_cost
 
-from c_importer import Done, Job, compile_c, execute, kernel_library, native, run
+from c_importer import Job, Result, compile_c, execute, kernel_library, native, run
 from prbm.mechanics.assembly import assemble
 from support import ScalarGuide, mechanism
 
@@ -371,7 +371,7 @@ def profile(runs: int) -> None:
             file = Path(folder) / "profile"
             job = Job(native(model, 2), points=POINTS[:101], records=READ, library=library)
             counter = ("valgrind", "--tool=callgrind", f"--callgrind-out-file={file}")
-            done: Done = execute(job, before=counter)
+            done: Result = execute(job, before=counter)
             if done.status:
                 print(done.errors)
                 return

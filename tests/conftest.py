@@ -1,4 +1,4 @@
-"""What several test files need: the shipped mechanisms and their FMUs, built once."""
+"""Fixtures for all tests: the shipped mechanisms and their FMUs, each built once per run."""
 
 from collections.abc import Callable, Hashable, Iterable
 from pathlib import Path
@@ -14,11 +14,11 @@ from prbm.mechanism.description import Mechanism
 from shared import once
 from support import GUIDES, mechanism
 
-collect_ignore = ["support"]  # imported by tests, not collected
+collect_ignore = ["support"]  # Modules that tests import; they contain no tests.
 
 
-class Built(dict[Any, Path]):
-    """FMUs by what they are of: the guides' at once, others when they are asked for."""
+class FmuCache(dict[Any, Path]):
+    """Paths of FMUs by key: the first ones are built at once, the others at the first access."""
 
     def __init__(self, build: Callable[[Any], Path], first: Iterable[Hashable]) -> None:
         super().__init__((key, build(key)) for key in first)
@@ -37,18 +37,18 @@ def mechanisms() -> dict[str, Mechanism]:
 
 @pytest.fixture(scope="session")
 def fmus(mechanisms: dict[str, Mechanism]) -> dict[str, Path]:
-    """Return the Python FMUs by name."""
+    """Return the paths of the Python FMUs by name of the mechanism."""
 
-    def one(name: str) -> Path:
+    def build(name: str) -> Path:
         def make(folder: Path) -> None:
             write(folder / f"{name}.fmu", python_fmu.build(mechanisms[name]))
 
         return once(f"python-{name}", make) / f"{name}.fmu"
 
-    return Built(one, GUIDES)
+    return FmuCache(build, GUIDES)
 
 
 @pytest.fixture(scope="session")
 def native() -> dict[tuple[str, int], Path]:
-    """Return the native FMUs for this machine, by name and version of FMI."""
-    return Built(lambda key: host_fmu(*key), [(name, fmi) for name in GUIDES for fmi in (2, 3)])
+    """Return the paths of the native FMUs for this machine, by name and version of FMI."""
+    return FmuCache(lambda key: host_fmu(*key), [(name, fmi) for name in GUIDES for fmi in (2, 3)])

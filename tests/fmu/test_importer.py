@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from c_importer import NATIVE, TWO_STOPS, Job, execute, given, native, run, unpack
+from c_importer import NATIVE, TWO_STOPS, Job, described, execute, native, run, unpack
 from prbm.fmu.python_fmu import interface
 from prbm.hybrid.simulation import Simulation
 from support import GUIDES, SHIPPED, case, each_shipped, mechanism, record
@@ -29,7 +29,7 @@ def points_of(model: str) -> np.ndarray:
 @cache
 def engine(model: str) -> list[dict]:
     """Return the outputs of the engine at the communication points."""
-    sim = Simulation(given(model))
+    sim = Simulation(described(model))
     rows = []
     for t in points_of(model):
         sim.advance(t)
@@ -39,7 +39,7 @@ def engine(model: str) -> list[dict]:
 
 def nominals(model: str) -> dict[str, float]:
     """Return typical magnitudes of the variables that Python and native FMUs have in common."""
-    return {v.name: v.nominal or 1.0 for v in interface(given(model), {})}
+    return {v.name: v.nominal or 1.0 for v in interface(described(model), {})}
 
 
 def assert_close(rows: np.ndarray, expected: list[dict], model: str, tolerance: float) -> None:
@@ -61,7 +61,7 @@ def test_a_c_importer_reads_the_values_of_the_engine(model, fmi, kind):
     assert (rows["at"] == points).all()
     assert_close(rows, expected, model, ROUND_OFF_RTOL.get(model, 1e-8))
     if model in (*GUIDES, TWO_STOPS):
-        assert sum(rows[f"{stop.name}.contact"][-1] for stop in given(model).stops) == 1.0
+        assert sum(rows[f"{stop.name}.contact"][-1] for stop in described(model).stops) == 1.0
 
 
 @each_shipped

@@ -28,7 +28,7 @@ from prbm.fmu.native_fmu import described
 from prbm.hybrid.simulation import Simulation
 from prbm.interface.structure import dependencies
 from prbm.kernel.sources import TABLES, UNIT, amalgamation, kernel
-from support import COSTLY, GUIDES, SHIPPED, case, each_shipped
+from support import COSTLY_MODELS, GUIDES, SHIPPED, case, each_shipped
 
 SCHEMAS = Path(fmpy.__file__).parent / "schema"
 FLAVOURS = [
@@ -75,7 +75,7 @@ def test_all_xml_passes_the_schemas_of_the_standards(fmu):
 
 
 def test_the_manifest_of_reference_results_follows_the_layered_standard(fmu):
-    if fmu.name in COSTLY:
+    if fmu.name in COSTLY_MODELS:
         pytest.skip("built without reference results, because they take the engine minutes")
     checker = etree.XMLSchema(file=str(SCHEMAS / "fmi3" / "fmi3LayeredStandardManifest.xsd"))
     folder = "extra/org.fmi-standard.fmi-ls-ref"

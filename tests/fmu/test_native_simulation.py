@@ -16,9 +16,9 @@ from prbm.fmu import native_fmu
 from prbm.fmu.native_fmu import described
 from prbm.hybrid.simulation import Simulation
 from support import (
-    COSTLY,
+    COSTLY_MODELS,
     GUIDES,
-    QUICK,
+    QUICK_MODELS,
     SHIPPED,
     case,
     each_shipped,
@@ -253,7 +253,7 @@ def test_model_exchange_with_cvode_equals_co_simulation(native, model, fmi):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("model", selected(lambda name: name not in COSTLY))
+@pytest.mark.parametrize("model", selected(lambda name: name not in COSTLY_MODELS))
 def test_model_exchange_with_fmpys_default_settings_equals_co_simulation(native, model, fmi):
     """Positions agree within 1e-7 m at the tolerance of the default experiment, 1e-8.
 
@@ -849,7 +849,7 @@ def alone(fmu, kind: str) -> list[bytes]:
 
 
 def test_instances_of_all_fmus_in_one_process_do_not_disturb_each_other(native):
-    everything = [(model, fmi, kind) for model in QUICK for fmi, kind in INTERFACES]
+    everything = [(model, fmi, kind) for model in QUICK_MODELS for fmi, kind in INTERFACES]
     expected = {key: alone(native[key[:2]], key[2]) for key in everything}
     instances = [(key, Instance(native[key[:2]], key[2]).initialize()) for key in everything * 2]
     for k, time in enumerate(SHORT):

@@ -1,4 +1,4 @@
-"""What a partner needs to take part in an impact: effective masses, impulses in and out."""
+"""Impacts with a coupled partner: mobilities of walls, impulses as inputs and as outputs."""
 
 import itertools
 import json
@@ -19,13 +19,13 @@ WALL = 3.0  # 1/kg
 
 
 def moved(simulation):
-    """Return the displacement of the first wall."""
+    """Return the displacement of the first wall from its drawn position [m]."""
     drawn = value(simulation.mechanism.stops[0], "position", simulation.values)
     return simulation.inputs.walls[0].motion(simulation.time)[0] - drawn
 
 
 def first_impact(name, **values):
-    """Return a simulation that has just hit its first stop, and the stop's name."""
+    """Return a simulation up to 1 ms after its first impact, and the impact."""
     found = mechanism(name)
     stop = found.stops[0].name
     simulation = Simulation(found, {f"{stop}.{k}": x for k, x in values.items()})
@@ -38,10 +38,10 @@ def first_impact(name, **values):
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 @pytest.mark.parametrize("name", GUIDES)
-def test_an_impact_with_a_wall_that_gives_way_is_one_of_two_masses(name, restitution):
-    """P (W + w) = (1 + eps) u; (1 - eps^2) u^2 / 2 / (W + w) is lost; rates reverse by eps."""
+def test_an_impact_with_a_mobile_wall_is_an_impact_of_two_masses(name, restitution):
+    """P (W + w) = (1 + eps) u; energy lost (1 - eps^2) u^2 / 2 / (W + w); u+ = -eps u-."""
     if name == "ImpactOscillator" and restitution == 0.0:
-        pytest.skip("it is captured, which is no impact")
+        pytest.skip("the hammer is captured: there is no impact")
     simulation, impact = first_impact(name, mobility=WALL, restitution=restitution)
     u, P = impact.latched.approach_speed, impact.latched.impulse
     system = simulation.system
@@ -56,21 +56,22 @@ def test_an_impact_with_a_wall_that_gives_way_is_one_of_two_masses(name, restitu
 
 
 def total(simulation):
+    """Return the energy balance [J], which is constant."""
     out = simulation.outputs()
     kinds = ("kinetic", "elastic", "gravitational", "dissipated")
     return sum(out[f"energy.{kind}"] for kind in kinds) - out["energy.work"]
 
 
 @pytest.mark.parametrize("name", GUIDES)
-def test_energy_is_balanced_with_a_wall_that_gives_way(name):
-    """The work of the wall is that on it by the impulses: its kinetic energy falls by so much."""
+def test_energy_is_balanced_with_a_mobile_wall(name):
+    """The work of the wall equals the loss of its kinetic energy by the impulses."""
     found = mechanism(name)
     stop = found.stops[0].name
     simulation = Simulation(found, {f"{stop}.mobility": WALL})
     start = total(simulation)
     simulation.record = []
     for k in range(1, 101):
-        # a wall of so much mass that goes on as it was pushed
+        # The wall is a free mass that keeps its velocity after each impact.
         rate = simulation.inputs.walls[0].rate
         simulation.set({f"{stop}.displacement": moved(simulation), f"{stop}.velocity": rate})
         simulation.advance(k * 1e-3)
@@ -82,8 +83,8 @@ def test_energy_is_balanced_with_a_wall_that_gives_way(name):
 
 
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R"])
-def test_an_impulse_is_a_strong_and_short_force(name):
-    """The velocities after it are the limit of those after a force of that impulse."""
+def test_an_impulse_is_the_limit_of_a_short_force(name):
+    """The velocities after it are the limit of those after shorter and shorter forces."""
     given = {"stop.position": 1.0, "release.displacement": -5e-3}
     impulse = {"force.impulse.x": 2e-3, "force.impulse.y": 1e-3, "force.impulse.moment": 1e-4}
     struck = Simulation(mechanism(name), given)
@@ -101,7 +102,7 @@ def test_an_impulse_is_a_strong_and_short_force(name):
 
 
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R"])
-def test_the_work_of_an_impulse_is_what_the_energy_gains(name):
+def test_the_work_of_an_impulse_equals_the_change_of_energy(name):
     simulation = Simulation(mechanism(name), {"stop.position": 1.0})
     simulation.advance(0.013)
     before = total(simulation), simulation.outputs()["energy.kinetic"]
@@ -120,8 +121,8 @@ STUCK = {"friction.coefficient": 0.5, "friction.normal_force": 20.0, "stop.posit
 @pytest.mark.parametrize(
     "kind", [Simulation, pytest.param(KernelSimulation, marks=pytest.mark.native)]
 )
-def test_friction_that_sticks_bears_no_impulse(name, kind):
-    """The body leaves with the impulse times its mobility, and slows down by friction from then."""
+def test_sticking_friction_does_not_resist_an_impulse(name, kind):
+    """The velocity after the impulse is the impulse times the mobility; friction then slows it."""
     simulation = kind(mechanism(name), STUCK)
     simulation.advance(0.01)
     before = simulation.outputs()
@@ -130,13 +131,14 @@ def test_friction_that_sticks_bears_no_impulse(name, kind):
     start = total(simulation)
     simulation.advance(0.01 + 1e-9)
     after = simulation.outputs()
-    # the force acts on the centre of mass, level with the hit point
+    # The force acts on the centre of mass, on the line of impact of the stop.
     expected = 1e-3 * after["stop.point.mobility"]
     assert after["shuttle.vx"] == pytest.approx(expected, rel=1e-4)
     assert total(simulation) == pytest.approx(start, abs=1e-9 * after["energy.kinetic"])
 
 
 def resting(name):
+    """Return a simulation that rests on its stop."""
     simulation = Simulation(mechanism(name), {"stop.restitution": 0.5})
     simulation.advance(0.5)
     assert simulation.contacts.modes[0].closed
@@ -144,7 +146,7 @@ def resting(name):
 
 
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R"])
-def test_what_is_thrown_against_its_wall_bounces(name):
+def test_an_impulse_towards_the_wall_makes_a_resting_body_bounce(name):
     simulation = resting(name)
     count, mobility = (
         simulation.latched[0].impact_count,
@@ -155,13 +157,13 @@ def test_what_is_thrown_against_its_wall_bounces(name):
     simulation.advance(simulation.time + 1e-9)
     latched = simulation.latched[0]
     assert latched.impact_count == count + 1
-    # the force acts on the centre of mass, level with the hit point
+    # The force acts on the centre of mass, on the line of impact of the stop.
     assert latched.approach_speed == pytest.approx(1e-3 * mobility, rel=1e-9)
     assert latched.rebound_speed == pytest.approx(0.5e-3 * mobility, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R"])
-def test_what_is_pulled_off_its_wall_leaves(name):
+def test_an_impulse_away_from_the_wall_opens_the_contact_of_a_resting_body(name):
     simulation = resting(name)
     simulation.set({"force.impulse.x": -1e-3})
     simulation.advance(simulation.time + 1e-4)
@@ -170,7 +172,7 @@ def test_what_is_pulled_off_its_wall_leaves(name):
 
 
 @pytest.mark.parametrize("name", GUIDES)
-def test_the_hit_point_is_where_the_wall_is_when_it_touches(name):
+def test_the_gap_is_the_difference_of_the_displacements_of_wall_and_contact_point(name):
     simulation, _ = first_impact(name)
     stop = simulation.mechanism.stops[0].name
     simulation.set({f"{stop}.displacement": 2e-3, f"{stop}.velocity": 0.1})
@@ -201,7 +203,7 @@ def test_a_saved_state_keeps_impulses_and_mobilities(name):
     assert other.outputs() == expected
 
 
-def test_impulses_before_the_start_are_past():
+def test_impulse_inputs_at_the_start_have_no_effect():
     given = {"force.impulse.x": 1.0, "stop.position": 1.0}
     one, other = (Simulation(mechanism("PRBDM"), x) for x in (given, {"stop.position": 1.0}))
     one.advance(0.01)
@@ -214,6 +216,6 @@ def test_impulses_before_the_start_are_past():
     ("mobility", "words"),
     [(-1.0, r"= -1 1/kg must not be negative"), (1e200, r"= 1e\+200 1/kg must be at most 1e\+100")],
 )
-def test_a_mobility_that_is_none_is_refused(twin, mobility, words):
+def test_an_invalid_mobility_is_rejected(twin, mobility, words):
     with pytest.raises((ParameterError, KernelMistake), match=f"stop.mobility {words}"):
         twin(mechanism("PRBDM"), {"stop.mobility": mobility})

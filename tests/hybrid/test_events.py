@@ -1,4 +1,4 @@
-"""Guards, resets and the step size by themselves."""
+"""Guards and resets of events, evaluations and the step size controller."""
 
 import math
 from dataclasses import replace
@@ -24,7 +24,7 @@ RUBBING = {
 
 
 def fixed(t):
-    """Return displacement and velocity of a wall."""
+    """Return displacement [m] and velocity [m/s] of a wall at a time."""
     return 0.0, 0.0
 
 
@@ -64,8 +64,8 @@ def test_of_events_at_one_time_contacts_change_their_modes_before_an_impact(monk
         (EventKind.SLIP, "PRBDM2R", RUBBING, sine),
     ],
 )
-def test_the_guard_of_an_event_is_positive_before_and_falls(monkeypatch, kind, model, values, wall):
-    """The wall is fixed, retreats from the shuttle that it carries, or shakes it."""
+def test_the_guard_of_an_event_falls_to_zero(monkeypatch, kind, model, values, wall):
+    """The wall is fixed, retreats from the shuttle that rests on it, or vibrates."""
     guard = next(row.guard for row in TRANSITIONS if row.kind == kind)
     found, apply = [], events.apply
 
@@ -97,7 +97,7 @@ def test_the_guard_of_an_event_is_positive_before_and_falls(monkeypatch, kind, m
     assert z(1e-6) == pytest.approx(10 * z(1e-7), rel=0.05)
 
 
-def test_an_evaluation_does_not_change_when_another_state_is_evaluated():
+def test_a_later_evaluation_does_not_change_the_arrays_of_an_earlier_one():
     sim = simulation("PRBDM2R")
     q, v = sim.front.q, sim.front.v
     first = sim.equations.evaluate(sim.time, q, v)
@@ -108,7 +108,7 @@ def test_an_evaluation_does_not_change_when_another_state_is_evaluated():
 
 
 def test_any_number_of_stops_can_rest_at_once():
-    """Of stops along one wall, one holds the guide: as one stop would, alone."""
+    """Of many equal stops, one carries the guide; the motion is that with one stop."""
     guide = mechanism("PRBDM")
     stops = tuple(replace(guide.stops[0], name=f"wall{k}") for k in range(24))
     crowded = Simulation(replace(guide, stops=stops), {"release.displacement": 0.0})
@@ -120,7 +120,7 @@ def test_any_number_of_stops_can_rest_at_once():
     assert crowded.outputs()["shuttle.x"] == pytest.approx(alone.outputs()["shuttle.x"], abs=1e-12)
 
 
-def test_the_step_size_changes_within_its_limits():
+def test_changes_of_the_step_size_are_limited():
     controller = StepSizeController(h=1e-3)
     assert controller.next(0.0).h == pytest.approx(
         1e-3 * min(STEP_GROWTH_MAX, 0.85 * 1e-4 ** -(1 / 6 - 0.07))
@@ -131,7 +131,7 @@ def test_the_step_size_changes_within_its_limits():
         assert rejected.next(1e-9).h <= rejected.h
 
 
-def test_contact_modes_know_their_direction():
+def test_contact_modes_have_the_directions_of_their_slip():
     assert [mode.slip for mode in ContactMode] == [0, 0, 0, 1, -1]
     state = ContactState.holding([1], stops=2, points=1).with_mode(2, ContactMode.STICK)
     assert state.held == (1,)

@@ -1,4 +1,4 @@
-"""Events, rest, friction, moving walls, saving and refusing."""
+"""Simulations: impacts, rest, friction, moving walls, saved states and rejected values."""
 
 import dataclasses
 import json
@@ -26,8 +26,8 @@ def guide(values):
 # --- friction point ---------------------------------------------------------------------------
 
 
-def test_coulomb_friction_takes_four_mu_N_off_a_period():
-    """A linear oscillator under Coulomb friction loses 2 mu N/k of amplitude each half period."""
+def test_coulomb_friction_reduces_the_amplitude_linearly():
+    """A linear oscillator loses 2 mu N/k of its amplitude in each half period."""
     mu_N, x0 = 2e-3, -1e-3
     values = QUIET | {
         "release.displacement": x0, "stop.position": 0.01,
@@ -41,12 +41,12 @@ def test_coulomb_friction_takes_four_mu_N_off_a_period():
     for half in range(1, 4):
         amplitude -= 2 * mu_N / stiffness
         sim.advance(half * math.pi / omega)
-        # the softening of the path is a third-order term, (x/r)^2 = 1e-3
+        # The deviation from a linear oscillator is (x/r)^2 = 1e-3.
         assert abs(sim.outputs()["shuttle.x"]) == pytest.approx(amplitude, rel=2e-3)
 
 
-def test_friction_sticks_where_the_spring_is_weaker_and_stays():
-    """It ends stuck, with |k x| <= mu N, and the energy that is left is elastic."""
+def test_friction_sticks_where_it_exceeds_the_spring_force():
+    """The motion ends with |k x| <= mu N; the remaining energy is elastic."""
     values = QUIET | {
         "release.displacement": -1e-3, "stop.position": 0.01,
         "friction.coefficient": 0.5, "friction.normal_force": 0.02,
@@ -63,8 +63,8 @@ def test_friction_sticks_where_the_spring_is_weaker_and_stays():
     )
 
 
-def test_what_stops_sliding_turns_back_though_the_clock_leaves_it_a_speed():
-    """A stiff spring pulls at 1e5 m/s^2: within 1e-13 s, to which events are located, 1e-8 m/s."""
+def test_sliding_reverses_when_residual_speed_is_below_time_resolution():
+    """At 1e5 m/s^2, the time resolution of 1e-13 s leaves a residual speed of 1e-8 m/s."""
     cord = FlexureType("cord", "2R", 1e-4, 1e-2, 1e11, 1e3, axial=True)
     body = Body("body", 0.02, 1e-5, (0.1, 0.0), {"end": (0.1, 0.0)})
     mechanism = Mechanism(
@@ -87,8 +87,8 @@ def test_what_stops_sliding_turns_back_though_the_clock_leaves_it_a_speed():
     assert front.contacts.modes == (ContactMode.SLIP_NEGATIVE,)
 
 
-def test_a_stuck_shuttle_budges_when_the_input_exceeds_friction():
-    """Static friction carries mu N; beyond, it slides with the force that is left."""
+def test_a_sticking_shuttle_slides_when_the_force_exceeds_friction():
+    """Up to mu N the shuttle sticks.  Beyond, the force minus mu N accelerates it."""
     values = QUIET | {
         "release.displacement": 0.0, "stop.position": 0.02,
         "friction.coefficient": 1.0, "friction.normal_force": 0.5,
@@ -104,7 +104,7 @@ def test_a_stuck_shuttle_budges_when_the_input_exceeds_friction():
 
 
 def test_normal_force_grows_towards_the_neutral_position():
-    """N = max(0, N0 + k y): with y <= 0 friction vanishes where the guide has dipped enough."""
+    """N = max(0, N0 + k y): there is no friction where y < -N0/k, far from the neutral position."""
     values = QUIET | {
         "release.displacement": -0.01, "stop.position": 0.05,
         "friction.coefficient": 1.0, "friction.normal_force": 0.01,
@@ -120,8 +120,8 @@ def test_normal_force_grows_towards_the_neutral_position():
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_held_and_stuck_at_once(model):
-    """Friction on while the stop holds: the stop carries all, steadily, to the end."""
+def test_a_stop_carries_the_load_of_a_body_at_rest_with_friction(model):
+    """The stop force is constant, and the friction point of a body at rest is frictionless."""
     values = {"friction.coefficient": 0.3, "friction.normal_force": 0.2}
     sim = simulation(model, values)
     sim.advance(0.6)
@@ -142,8 +142,8 @@ def test_held_and_stuck_at_once(model):
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
-def test_friction_at_the_stop_never_gains_energy(model, restitution):
-    """Impacts away from straight slide along the wall; dissipation only grows."""
+def test_friction_at_the_stop_does_not_gain_energy(model, restitution):
+    """Impacts at a bent shape slide along the wall; the dissipated energy never decreases."""
     values = {
         "stop.position": -0.005, "stop.friction": 0.4, "stop.offset": 0.003,
         "stop.restitution": restitution,
@@ -163,8 +163,8 @@ def test_friction_at_the_stop_never_gains_energy(model, restitution):
         assert impact.latched.energy_lost >= -1e-15
 
 
-def test_sliding_contact_pushes_within_the_cone_of_friction():
-    """A stop that is dragged along its wall carries mu N: the base feels it across."""
+def test_a_sliding_contact_remains_closed():
+    """With friction at a stop that is away from the straight shape."""
     values = {"stop.position": -0.01, "stop.friction": 0.2, "release.displacement": -0.0101}
     sim = simulation("PRBDM2R", values)
     sim.advance(0.5)
@@ -176,8 +176,8 @@ def test_sliding_contact_pushes_within_the_cone_of_friction():
 # --- walls ------------------------------------------------------------------------------------
 
 
-def test_moving_wall_hits_a_resting_shuttle():
-    """Newton in the frame of the wall: v+ = (1 + eps) w; the work of the wall is P w."""
+def test_a_moving_wall_hits_a_shuttle_at_rest_by_newtons_law():
+    """In the frame of the wall: v+ = (1 + eps) w; the work of the wall is P w."""
     values = QUIET | {"release.displacement": 0.0, "stop.position": 1e-4, "stop.restitution": 0.5}
     sim = simulation("PRBDM", values)
     sim.set({"stop.velocity": -0.1})
@@ -197,8 +197,8 @@ def test_moving_wall_hits_a_resting_shuttle():
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_held_shuttle_follows_a_gently_moving_wall(model):
-    """A wall that accelerates less than the shuttle is pressed takes it along and does the work."""
+def test_a_shuttle_at_rest_follows_a_slowly_accelerated_wall(model):
+    """The contact remains closed, without impacts, and the wall does the work."""
     sim = simulation(model)
     for k in range(200):
         sim.advance(0.4 + (k + 1) * 1e-3)
@@ -220,8 +220,8 @@ def test_held_shuttle_follows_a_gently_moving_wall(model):
     assert out["energy.work"] > 0
 
 
-def test_a_wall_that_starts_at_speed_takes_along_what_rests_on_it():
-    """It accelerates within two steps, faster than gravity: no impact, and a short flight."""
+def test_a_wall_that_starts_with_a_velocity_moves_the_body_at_rest_on_it():
+    """It accelerates within two steps, faster than gravity: no impact, then a short flight."""
     sim = simulation("PRBDM", {"damping.beta": 0.0})
     for k in range(100):
         sim.advance(0.3 + (k + 1) * 1e-3)
@@ -238,8 +238,8 @@ def test_a_wall_that_starts_at_speed_takes_along_what_rests_on_it():
     assert out["shuttle.vx"] == pytest.approx(-0.02, rel=1e-9)
 
 
-def test_a_pulled_shuttle_leaves_its_stop():
-    """The contact releases when its force reaches zero, and the gap closes again later."""
+def test_a_contact_opens_when_its_force_is_zero():
+    """A force pulls the shuttle off its stop; without the force, the gap closes again."""
     sim = simulation("PRBDM", {"damping.beta": 0.0})
     sim.advance(0.4)
     weight = sim.outputs()["stop.force"]
@@ -256,10 +256,10 @@ def test_a_pulled_shuttle_leaves_its_stop():
     assert sim.outputs()["stop.contact"]
 
 
-def test_base_acceleration_is_gravity_the_other_way():
-    """-m a adds to gravity; its work is counted as work, that of gravity as potential energy."""
+def test_base_acceleration_acts_like_opposite_gravity():
+    """Its work is part of energy.work, that of gravity is potential energy."""
     values = {"release.displacement": 0.0, "stop.position": 0.05}
-    # the damping and the error scales know only gravity: compare at a tight tolerance
+    # Damping and error scales depend on gravity, not on the base acceleration: small tolerance.
     falls = simulation("PRBDM", values | {"gravity.x": 9.81}, tolerance=1e-12)
     shaken = simulation("PRBDM", values | {"gravity.x": 0.0}, tolerance=1e-12)
     shaken.set({"base.acceleration.x": -9.81})
@@ -271,8 +271,8 @@ def test_base_acceleration_is_gravity_the_other_way():
     assert b["base.force.x"] == pytest.approx(a["base.force.x"], rel=1e-8)
 
 
-def test_base_force_is_the_rate_of_momentum_it_leaves():
-    """Integral of (base force - loads) over a free arc = - change of momentum."""
+def test_impulse_of_the_base_force_equals_the_change_of_momentum():
+    """Integral of (base force - loads) = - change of momentum, without impacts."""
     values = QUIET | {"stop.position": 0.05, "release.displacement": -0.01}
     sim = simulation("PRBDM2R", values, tolerance=1e-11)
     n, times = sim.system.n, np.linspace(0, 0.01, 2001)
@@ -293,7 +293,7 @@ def test_base_force_is_the_rate_of_momentum_it_leaves():
     assert momentum() - start == pytest.approx(-impulse, abs=1e-7 * abs(impulse))
 
 
-# --- what is refused --------------------------------------------------------------------------
+# --- errors -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -313,24 +313,24 @@ def test_base_force_is_the_rate_of_momentum_it_leaves():
         ({"solver.tolerance": 0.0}, "solver.tolerance = 0"),
     ],
 )
-def test_bad_values_are_refused_by_name_value_and_unit(values, words):
+def test_error_about_an_invalid_value_has_its_name_value_and_unit(values, words):
     with pytest.raises(ParameterError) as caught:
         Simulation(mechanism("PRBDM"), values)
     assert words in str(caught.value)
 
 
-def test_links_longer_than_the_flexure_are_refused():
+def test_links_longer_than_the_flexure_are_rejected():
     with pytest.raises(ParameterError, match=r"gamma0 = -0\.04"):
         Simulation(mechanism("PRBDM2R"), {"flexure.gamma1": 0.58})
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_a_release_that_no_equilibrium_reaches_is_refused(model):
+def test_a_displacement_at_release_that_is_out_of_reach_is_rejected(model):
     with pytest.raises(EquilibriumError, match=r"displacement = -0\.05 m cannot be reached"):
         Simulation(mechanism(model), {"release.displacement": -0.05})
 
 
-def test_time_only_runs_on():
+def test_an_earlier_or_invalid_time_is_rejected():
     sim = simulation("PRBDM")
     sim.advance(0.01)
     with pytest.raises(SimulationError, match="time only runs on"):
@@ -341,7 +341,8 @@ def test_time_only_runs_on():
         sim.advance(1e300)
 
 
-def test_fixed_parameters_stay_and_a_refused_change_changes_nothing():
+def test_a_rejected_change_does_not_change_any_value():
+    """A change of a fixed parameter, or of a value to an invalid one, rejects all changes."""
     sim = simulation("PRBDM")
     sim.advance(0.01)
     with pytest.raises(ParameterError, match=r"flexure\.length is fixed"):
@@ -352,8 +353,8 @@ def test_fixed_parameters_stay_and_a_refused_change_changes_nothing():
     assert sim.values["stop.restitution"] == 0.6
 
 
-def test_chatter_that_does_not_end_is_stopped_with_a_message():
-    """Elastic bounces of half a microsecond each under a huge force, for ever."""
+def test_endless_chatter_is_an_error():
+    """Endless elastic bounces of half a microsecond under a huge force."""
     values = QUIET | {
         "release.displacement": -1e-8, "stop.restitution": 1.0, "stop.rest_speed": 0.0,
         "force.x": 17000.0,
@@ -361,12 +362,12 @@ def test_chatter_that_does_not_end_is_stopped_with_a_message():
     sim = simulation("PRBDM", values)
     with pytest.raises(SimulationError, match="chatters"):
         sim.advance(0.01)
-    assert sim.time == 0.0, "the last good state is kept"
+    assert sim.time == 0.0, "the last valid state must be kept"
     assert sim.outputs()["stop.gap"] == pytest.approx(1e-8, rel=1e-6)
 
 
-def test_a_touching_release_rests_at_once():
-    """Released at the wall, pressed: held from the start, no impact."""
+def test_a_release_at_the_wall_starts_in_rest():
+    """Gravity presses the shuttle against the wall; there is no impact."""
     sim = simulation("PRBDM2R", {"release.displacement": 0.0})
     assert sim.outputs()["stop.contact"]
     sim.advance(0.1)
@@ -375,7 +376,7 @@ def test_a_touching_release_rests_at_once():
     assert out["stop.impact_count"] == 0
 
 
-def test_a_touching_release_with_a_velocity_hits_at_once():
+def test_a_release_at_the_wall_with_a_velocity_starts_with_an_impact():
     sim = Simulation(
         mechanism("PRBDM"), {"release.displacement": 0.0, "release.velocity": 0.3} | QUIET
     )
@@ -387,7 +388,7 @@ def test_a_touching_release_with_a_velocity_hits_at_once():
 # --- communication points ---------------------------------------------------------------------
 
 
-def test_the_trajectory_does_not_depend_on_when_it_is_looked_at():
+def test_the_trajectory_does_not_depend_on_the_communication_points():
     coarse, fine = simulation("PRBDM2R"), simulation("PRBDM2R")
     coarse.advance(0.12)
     for t in np.sort(np.random.default_rng(0).uniform(0, 0.12, 400)):
@@ -401,8 +402,8 @@ def test_the_trajectory_does_not_depend_on_when_it_is_looked_at():
     ("model", "time", "end"),
     [("PRBDM", 0.0, 0.4), ("PRBDM", 0.241, 0.4), ("PRBDM2R", 0.0405, 0.12), ("PRBDM", 0.3, 0.4)],
 )
-def test_a_saved_state_continues_to_the_bit(model, time, end):
-    """Also through JSON; the events that follow are the same to the last bit."""
+def test_a_restored_state_continues_bit_by_bit(model, time, end):
+    """The state has been converted to JSON and back."""
     sim = simulation(model, {"stop.friction": 0.1})
     sim.set({"force.x": 0.01})
     sim.advance(time)
@@ -420,7 +421,7 @@ def test_a_saved_state_continues_to_the_bit(model, time, end):
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_a_state_saved_between_a_change_and_its_step_is_complete(model):
-    """What has been set acts from the next step on, after the restore as before it."""
+    """The changes act in the next step, also after the state is restored."""
     sim = simulation(model, {"release.displacement": -0.002})
     sim.advance(0.3)
     before = sim.outputs()
@@ -438,18 +439,18 @@ def test_a_state_saved_between_a_change_and_its_step_is_complete(model):
     assert sim.outputs()["base.force.y"] != before["base.force.y"]
 
 
-def test_a_state_of_another_mechanism_is_refused():
+def test_a_state_of_another_mechanism_is_rejected():
     with pytest.raises(ParameterError, match="another mechanism"):
         simulation("PRBDM").restore(simulation("PRBDM2R").snapshot())
 
 
-def test_a_time_that_steps_cannot_move_is_told():
+def test_a_time_that_is_too_large_to_resolve_a_step_is_an_error():
     sim = simulation("PRBDM", start_time=1e18)
     with pytest.raises(SimulationError, match="nearer to zero"):
         sim.advance(1e18 + 1e3)
 
 
-def test_a_start_time_shifts_everything():
+def test_a_start_time_shifts_the_impacts():
     late = simulation("PRBDM", start_time=5.0)
     early = simulation("PRBDM")
     late.advance(5.2)
@@ -461,7 +462,7 @@ def test_a_start_time_shifts_everything():
 
 
 def linkage(**parts):
-    """Return a bar that swings about a pin and carries a body on another pin: no spring at all."""
+    """Return a bar between two pins that carries a body: a double pendulum without springs."""
     return Mechanism(
         name="Linkage",
         title="A double pendulum without gravity",
@@ -474,8 +475,8 @@ def linkage(**parts):
     )
 
 
-def test_a_linkage_without_springs_coasts():
-    """Kinetic energy and the angular momentum about the pin stay; a stop takes its share."""
+def test_a_linkage_without_springs_keeps_its_energy_and_angular_momentum():
+    """Angular momentum about the pin, up to the first impact; the energy balance also after it."""
     sim = Simulation(linkage(stops=(Stop("stop", "body", (0.1, 0.0), 90.0, 0.02),)))
     assert sim.frequency == 0.0
     before = sim.outputs()["energy.kinetic"]
@@ -499,8 +500,8 @@ def test_a_linkage_without_springs_coasts():
 
 
 @pytest.mark.parametrize("ends", [("clamp", "pin"), ("pin", "clamp")])
-def test_what_swings_without_a_spring_has_no_frequency(ends):
-    """Not 1e-6 Hz, which is what rounding makes of zero, and a period of weeks."""
+def test_a_linkage_without_springs_has_the_frequency_zero(ends):
+    """Exactly zero, not 1e-6 Hz by rounding."""
     parts = linkage()
     flexure = Flexure("bar1", "bar", "ground.pin", "body.pin", ends)
     sim = Simulation(dataclasses.replace(parts, flexures=(flexure,)))
@@ -509,7 +510,7 @@ def test_what_swings_without_a_spring_has_no_frequency(ends):
     assert 1.0 < with_weight.frequency < 2.0
 
 
-def test_a_release_velocity_that_the_loops_forbid_is_refused():
+def test_a_release_velocity_that_the_loops_forbid_is_rejected():
     """A straight guide of rigid links cannot move along its flexures."""
     guide = mechanism("PRBDM")
     upwards = dataclasses.replace(guide, release=dataclasses.replace(guide.release, direction=90.0))
@@ -520,8 +521,8 @@ def test_a_release_velocity_that_the_loops_forbid_is_refused():
         Simulation(upwards, values)
 
 
-def test_discrete_changes_leave_what_is_watched_alone_and_new_geometry_does_not():
-    """A wall is hit at the same place as in a simulation that began with its offset."""
+def test_gap_rows_are_recomputed_for_a_new_offset_but_not_after_an_impact():
+    """They then equal those of a simulation that starts with the offset."""
     sim = simulation("PRBDM2R")
     rows = sim.system.gap_rows
     sim.advance(0.05)
@@ -534,8 +535,8 @@ def test_discrete_changes_leave_what_is_watched_alone_and_new_geometry_does_not(
     assert not np.array_equal(sim.system.gap_rows.B, rows.B)
 
 
-def test_a_step_that_is_far_too_long_for_stretching_links_is_taken_again():
-    """The axial modes of a chain are a thousand times faster than what chooses the first step."""
+def test_a_first_step_that_is_too_long_for_axial_modes_is_rejected_and_repeated():
+    """The axial modes of a chain are a thousand times faster than the mode of the first step."""
     from dataclasses import replace
 
     guide = mechanism("PRBDM2R")

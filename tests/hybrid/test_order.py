@@ -15,7 +15,7 @@ DENSE_ORDER = 5  # of the interpolant
 
 
 def path(model, values, span, **options):
-    """Return the states (q, v) at 41 times within a span, read off without stopping there."""
+    """Return the states (q, v) at 41 times within a span; the integrator does not stop there."""
     sim = Simulation(mechanism(model), values, **options)
     states = []
     for t in np.linspace(*span, 41):
@@ -87,8 +87,8 @@ def test_error_of_a_step_on_a_kepler_orbit(theta, order):
     assert slope == pytest.approx(order + 1, abs=0.3)
 
 
-def test_error_falls_with_the_tolerance_over_four_decades():
-    """Tolerances 1e-6 to 1e-10: the error falls about in proportion, across an impact too."""
+def test_error_is_roughly_proportional_to_the_tolerance():
+    """For tolerances from 1e-6 to 1e-10, over a span with an impact."""
     span = (0.045, 0.06)
     exact = path("PRBDM2R", {}, span, tolerance=1e-13)
     tolerances = 10.0 ** -np.arange(6, 11)
@@ -98,7 +98,7 @@ def test_error_falls_with_the_tolerance_over_four_decades():
     assert errors[0] / errors[-1] > 2e3
 
 
-def test_a_fixed_step_that_is_too_long_is_refused():
+def test_a_fixed_step_that_is_too_long_is_rejected():
     with pytest.raises(SimulationError, match=r"fixed step of 0\.002 s is too long"):
         path("PRBDM2R", {}, (0.05, 0.1), step=2e-3)
 
@@ -114,6 +114,7 @@ def trees(order):
 
 
 def grafted(tree):
+    """Yield the trees with one more leaf."""
     yield tuple(sorted((*tree, ()), key=repr))
     for i, branch in enumerate(tree):
         for new in grafted(branch):
@@ -186,8 +187,8 @@ def test_dense_output_violates_the_conditions_of_order_six_least():
     assert np.linalg.norm(defect) < 1.001 * np.linalg.norm(least)
 
 
-def test_error_estimate_is_of_fifth_order():
-    """The embedded solution satisfies the conditions up to order five, not six."""
+def test_embedded_solution_has_order_five():
+    """It satisfies the conditions up to order five, not those of order six."""
     embedded = PAIR.weights - PAIR.error
     for order in range(1, PAIR.error_order + 1):
         for tree in trees(order):
@@ -198,7 +199,7 @@ def test_error_estimate_is_of_fifth_order():
     assert np.abs(defects).max() > 1e-5
 
 
-def test_interpolation_ends_where_the_step_ends():
+def test_dense_output_equals_the_new_state_at_the_end_of_a_step():
     def rate(t, y):
         return np.array([y[1], -y[0]])
 
@@ -209,7 +210,7 @@ def test_interpolation_ends_where_the_step_ends():
 
 
 @pytest.mark.parametrize("field", ["a", "error", "dense"])
-def test_coefficients_that_contradict_each_other_cannot_be_constructed(field):
+def test_inconsistent_coefficients_are_rejected(field):
     parts = {"a": PAIR.a.copy(), "error": PAIR.error.copy(), "dense": PAIR.dense.copy()}
     parts[field][-1, ...] += 1e-3
     with pytest.raises(ValueError, match=r"must|depend"):

@@ -1,7 +1,7 @@
-"""Laws that hold for every mechanism, tried on random ones: trees, loops, all models and ends.
+"""Laws of all mechanisms, checked on random ones: trees, loops, all flexure models and ends.
 
-The laws are written with positions alone, from the definition of a place, and differences of
-them: the engine's rows, matrices and convective terms are on the other side.
+The expected values are computed from positions and their differences only.  They are compared with
+the rows, matrices and convective terms of the engine.
 """
 
 import math
@@ -34,12 +34,12 @@ from random_mechanisms import inputs, mechanisms, seeded
 from support import energy_balance
 
 SEEDS = st.integers(0, 10**6)
-STEP = np.cbrt(np.finfo(float).eps)  # of first differences, central: error of the order STEP^2
-WIDE = np.finfo(float).eps ** 0.25  # of second differences
+STEP = np.cbrt(np.finfo(float).eps)  # Of central first differences, with an error of STEP^2.
+SECOND_STEP = np.finfo(float).eps ** 0.25  # Of second differences.
 
 
 def laws(count, *, shrink=True):
-    """Return settings: the same examples each time, as slow as simulations are."""
+    """Return settings of hypothesis: reproducible examples, without a time limit."""
     return settings(
         phases=[Phase.generate, Phase.shrink] if shrink else [Phase.generate],
         max_examples=count,
@@ -49,11 +49,11 @@ def laws(count, *, shrink=True):
     )
 
 
-# --- positions, from their definition -----------------------------------------------------------
+# --- definitions of positions -------------------------------------------------------------------
 
 
 def arms(system, q):
-    """Return exp(s + i theta) of every arm; what stands at stretches is not looked at."""
+    """Return exp(s + i theta) of every arm; the entries of stretches are not used."""
     E = np.exp(1j * q)
     for k in system.stretches:
         E[system.arm[k]] *= np.exp(q[k])
@@ -70,7 +70,7 @@ def closures(system, q):
 
 
 def body_point(system, body, drawn, q):
-    """Return where a drawn point of a body is, from its centre of mass and its angle."""
+    """Return the position of a drawn point of a body, from its centre of mass and its angle."""
     if body == GROUND:
         return drawn
     frame = system.bodies[body]
@@ -79,7 +79,7 @@ def body_point(system, body, drawn, q):
 
 
 def seen(system, stop, q):
-    """Return the displacement of a hit point, along u and to its left, as its wall sees it."""
+    """Return the displacement of a contact point along u and to its left, relative to the wall."""
     u = unit(stop.direction)
     drawn = complex(*stop.point) + value(stop, "offset", system.values) * 1j * u
     hit = body_point(system, stop.body, drawn, q)
@@ -120,12 +120,12 @@ def first(f, q):
 
 def second(f, q, v):
     """Return the second derivative of f along q + t v at t = 0."""
-    h = WIDE / np.abs(v).max()
+    h = SECOND_STEP / np.abs(v).max()
     return (f(q + h * v) - 2 * f(q) + f(q - h * v)) / h**2
 
 
 def somewhere(system, seed):
-    """Return coordinates off the straight shape, and rates."""
+    """Return random coordinates away from the straight shape, and rates."""
     rng = np.random.default_rng(seed)
     size = np.where(system.arm == np.arange(system.n), 0.3, 0.05)
     return system.q0 + size * rng.normal(size=system.n), rng.normal(size=system.n)
@@ -136,8 +136,8 @@ def somewhere(system, seed):
 
 @given(mechanisms(), SEEDS)
 @laws(40)
-def test_the_mass_matrix_is_that_of_the_positions(mechanism, seed):
-    """M = Re(T^H m T) + J with T = dz/dq; quadratic velocities: Re(T^H m z'') at constant rates."""
+def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, seed):
+    """M = Re(T^H m T) + J with T = dz/dq; quadratic terms Re(T^H m z'') at constant rates."""
     system = assemble(mechanism, mechanism.values())
     q, v = somewhere(system, seed)
     T = first(lambda q: masses(system, q), q)
@@ -153,10 +153,10 @@ def test_the_mass_matrix_is_that_of_the_positions(mechanism, seed):
 
 @given(mechanisms(), SEEDS)
 @laws(40)
-def test_rows_are_the_derivatives_of_what_they_constrain(mechanism, seed):
-    """Loops, gaps, slides and friction points: values, gradients, rates and convective terms.
+def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
+    """Values, gradients, rates and convective terms of loops, gaps, slides and friction points.
 
-    Walls may be on bodies: what they see is written with the frames of the bodies.
+    Walls may be on bodies.
     """
     system = assemble(mechanism, mechanism.values())
     q, v = somewhere(system, seed)
@@ -185,8 +185,8 @@ def test_rows_are_the_derivatives_of_what_they_constrain(mechanism, seed):
 
 @given(mechanisms(), SEEDS)
 @laws(30)
-def test_what_is_closed_at_the_straight_shape_is_closed_and_clear(mechanism, seed):
-    """Loops are closed as drawn, gaps are their positions, nothing has moved; mass is kept."""
+def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing(mechanism, seed):
+    """Loops are closed, and gaps equal the stops' positions; the mass is at most the total."""
     system = assemble(mechanism, mechanism.values())
     np.testing.assert_allclose(closures(system, system.q0), 0.0, atol=1e-15)
     places = [value(s, "position", system.values) for s in mechanism.stops]
@@ -198,7 +198,7 @@ def test_what_is_closed_at_the_straight_shape_is_closed_and_clear(mechanism, see
 
 
 def leaf_mass(mechanism):
-    """Return the mass of all flexures; what is clamped to the ground, or lumped, weighs less."""
+    """Return the mass of all flexures; the moving mass is less for lumped or clamped ones."""
     total = 0.0
     for flexure in mechanism.flexures:
         kind = next(k for k in mechanism.flexure_types if k.name == flexure.type)
@@ -225,7 +225,7 @@ def potential(sim, q):
 
 @given(mechanisms(starting=True, damping=False, friction=False), SEEDS, st.booleans())
 @laws(30)
-def test_accelerations_obey_lagrange(mechanism, seed, held):
+def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
     """T^H m (T a + z''|_a=0) + J a = -dV/dq + rows^T lam, rows a + (second derivative) = 0."""
     sim = Simulation(mechanism, inputs(mechanism, seed))
     system = sim.system
@@ -252,15 +252,15 @@ def test_accelerations_obey_lagrange(mechanism, seed, held):
 
 @given(mechanisms(starting=True), SEEDS)
 @laws(30)
-def test_a_static_shape_is_where_the_potential_is_stationary(mechanism, seed):
-    """dV/dq = rows^T lam under loads; frequencies are those of its second derivative."""
+def test_the_potential_energy_is_stationary_at_an_equilibrium(mechanism, seed):
+    """dV/dq = rows^T lam under loads; frequencies follow from the second derivative."""
     given = {k: x / 4 for k, x in inputs(mechanism, seed).items() if not k.startswith("base")}
     sim = Simulation(mechanism, given)
     system = sim.system
     try:
         shape = equilibrium(system, loads=given)
     except EquilibriumError:
-        return  # the loads are random, too
+        return  # There may be no equilibrium under random loads.
     q, lam = shape.q, shape.lam
 
     def lagrangian(q):
@@ -278,12 +278,12 @@ def test_a_static_shape_is_where_the_potential_is_stationary(mechanism, seed):
 
 
 SPAN = 4e-3  # s
-RICH = range(10)  # seeds that between them have everything
+FEATURE_SEEDS = range(10)  # Seeds whose mechanisms together have all features.
 
 
 @given(mechanisms(starting=True, damping=False), SEEDS)
 @laws(15, shrink=False)
-def test_energy_is_kept_and_nothing_comes_apart(mechanism, seed):
+def test_energy_is_balanced_and_loops_remain_closed(mechanism, seed):
     keeps_energy(mechanism, seed)
 
 
@@ -320,7 +320,7 @@ def momentum(sim):
 
 @given(mechanisms(starting=True), SEEDS)
 @laws(15, shrink=False)
-def test_the_base_carries_what_the_momentum_does_not(mechanism, seed):
+def test_base_reactions_equal_loads_minus_the_rate_of_momentum(mechanism, seed):
     balances_momentum(mechanism, seed)
 
 
@@ -338,7 +338,7 @@ def balances_momentum(mechanism, seed):
             if time == t:
                 out, y = sim.outputs(), sim.state()
         if any(state != states[0] for state in states):
-            continue  # an event within the difference
+            continue  # There is an event between the times of the difference.
         z = masses(system, y[: system.n]) - system.anchor
         weight = system.m * (system.gravity - sim.inputs.base)
         force, moment = weight.sum(), (z.conj() * weight).imag.sum()
@@ -350,7 +350,7 @@ def balances_momentum(mechanism, seed):
         rates = [(late - early) / (2 * h) for early, late in zip(found[0], found[2], strict=True)]
         size = sum(abs(x) for x in rates) + abs(force) + 1e-3
         reaction = complex(out["base.force.x"], out["base.force.y"])
-        # what differences leave of the fastest vibrations
+        # The tolerance is the error of the differences for the fastest vibrations.
         assert reaction == pytest.approx(force - rates[0], abs=5e-5 * size)
         assert out["base.moment"] == pytest.approx(moment - rates[1], abs=1e-5 * size)
 
@@ -360,14 +360,14 @@ def balances_momentum(mechanism, seed):
 
 @given(mechanisms(starting=True), SEEDS)
 @laws(25, shrink=False)
-def test_an_impact_is_an_impulse_along_the_rows_of_what_touches(mechanism, seed):
+def test_impacts_satisfy_the_balance_of_momentum_and_do_not_gain_energy(mechanism, seed):
     has_lawful_impacts(mechanism, seed)
 
 
 def has_lawful_impacts(mechanism, seed):
     """Check M (v+ - v-) = G^T P + T^T P_t + loops^T Lambda, P >= 0; energy is not gained.
 
-    Alone and without friction: u+ = -eps u-, and -P (u- + u+)/2 is lost.
+    For one stop without friction: u+ = -eps u-, and -P (u- + u+)/2 is lost.
     """
     sim = Simulation(mechanism, inputs(mechanism, seed))
     sim.record = []
@@ -393,7 +393,7 @@ def has_lawful_impacts(mechanism, seed):
         assert u[0] < 0.0
         assert u[1] >= -1e-7 * abs(u[0])
         assert kinetic[1] <= kinetic[0] * (1 + 1e-9)
-        parts = np.abs(G[i]) @ np.abs(impact.before)  # which differences know to eight digits
+        parts = np.abs(G[i]) @ np.abs(impact.before)  # Differences have eight digits of it.
         assert impact.latched.approach_speed == pytest.approx(-u[0], rel=1e-7, abs=1e-8 * parts)
         if len(touching) == 1 and not rubbed:
             assert impact.impulse == pytest.approx(impulses[0], rel=1e-6)
@@ -405,17 +405,17 @@ def has_lawful_impacts(mechanism, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(300))
-def test_the_laws_hold_for_many_more(seed):
+def test_the_laws_hold_for_300_random_mechanisms(seed):
     quiet = seeded(seed, damping=False)
     keeps_energy(quiet, seed)
     balances_momentum(seeded(seed), seed)
     has_lawful_impacts(seeded(seed), seed)
 
 
-def test_the_examples_are_rich():
+def test_the_random_mechanisms_have_all_features():
     """Impacts at walls on the ground and on bodies, alone and with friction, rest, and loops."""
     seen_kinds = set()
-    for seed in RICH:
+    for seed in FEATURE_SEEDS:
         mechanism = seeded(seed)
         sim = Simulation(mechanism, inputs(mechanism, seed))
         sim.record = []
@@ -430,13 +430,13 @@ def test_the_examples_are_rich():
     assert seen_kinds == {"loop", "stretch", "rest", "ground", "body", "friction"}
 
 
-def test_a_seed_makes_the_same_mechanism_again():
+def test_a_random_mechanism_depends_on_its_seed_only():
     assert seeded(3) == seeded(3)
     assert seeded(3) != seeded(4)
 
 
 def free_pair(friction):
-    """Return two bodies on threads so soft and light that they are free while they collide."""
+    """Return two bodies on very soft and light threads: they are free during a collision."""
     thread = FlexureType("thread", "nR", 1e-5, 1e-5, 1e3, 1.0, n=2, axial=True)
     return Mechanism(
         name="Pair",
@@ -458,10 +458,10 @@ def free_pair(friction):
 
 @pytest.mark.parametrize("friction", [0.0, 0.2, 5.0])
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
-def test_a_free_pair_keeps_its_momentum(friction, restitution):
-    """Linear and angular, through a hit off both centres; what the threads weigh is 1e-9 of it.
+def test_an_eccentric_impact_of_two_free_bodies_conserves_momentum(friction, restitution):
+    """Linear and angular momentum; the mass of the threads is 1e-9 of that of the bodies.
 
-    Without friction, the impulse is that of two free bodies: (1 + eps) closing / W with
+    Without friction, the impulse is (1 + eps) closing speed / W with
     W = sum of 1/m + (arm x n)^2/J.
     """
     pair = free_pair(friction)

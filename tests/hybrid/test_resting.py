@@ -1,4 +1,4 @@
-"""What rests: on a wall that begins to move, by friction in several places, through events."""
+"""Bodies at rest: on a wall that starts to move, with friction at two points, in event mode."""
 
 import math
 
@@ -11,9 +11,9 @@ from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from support import energy_balance, mechanism, simulation
 
-AT_REST = {"release.displacement": 0.0}  # on the wall, by its weight
+AT_REST = {"release.displacement": 0.0}  # On the wall, pressed by the weight.
 TWINS = {"engine": Simulation, "kernel": KernelSimulation}
-IMPACTS = 14  # of the guides in their default run
+IMPACTS = 14  # Of the guides in their default experiment.
 WALL = ("stop.displacement", "stop.velocity")
 
 
@@ -29,8 +29,8 @@ def events(test):
 
 @pytest.mark.parametrize("twin", TWINS)
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_a_wall_may_begin_to_move_as_slowly_as_it_likes(model, twin):
-    """Slower than rest_speed it keeps what rests on it, and strikes nothing that would count."""
+def test_a_body_at_rest_follows_a_wall_that_starts_slowly(model, twin):
+    """The wall is slower than rest_speed: the contact remains closed and no impact is counted."""
     speeds = np.geomspace(1e-10, 1e-6, 30)
     for speed in [*speeds, *-speeds]:
         moved = TWINS[twin](mechanism(model), AT_REST)
@@ -46,12 +46,12 @@ def test_a_wall_may_begin_to_move_as_slowly_as_it_likes(model, twin):
 
 @pytest.mark.parametrize("short", [1e-4, 1e-5, 1e-7])
 @pytest.mark.parametrize("twin", TWINS)
-def test_a_short_step_after_a_long_one_does_not_push_the_wall(twin, short):
-    """As masters make them that come to each other's events.
+def test_a_short_step_after_a_long_one_does_not_accelerate_the_wall(twin, short):
+    """Masters make such steps when they return to the events of other FMUs.
 
-    A wall that starts at 3.1 mm/s strikes what rests on it a few times.  In a step of 1 ms its
-    acceleration takes it 0.05 um from where it was thought to go: made good in 0.1 us, that would
-    be 0.5 m/s.
+    A wall that starts at 3.1 mm/s strikes the body at rest on it a few times.  In a step of 1 ms
+    its acceleration moves it 0.05 um away from the extrapolated position.  A correction within
+    0.1 us would need 0.5 m/s.
     """
     wall = sine(1e-4, 10 * math.pi)
     moved = TWINS[twin](mechanism("PRBDM"), AT_REST)
@@ -68,11 +68,11 @@ def test_a_short_step_after_a_long_one_does_not_push_the_wall(twin, short):
     assert energy_balance(out) == pytest.approx(before, abs=1e-9)
 
 
-# -- friction in two places --
+# -- friction at two points --
 
 
 def frictions(rng):
-    """Return the guide at rest on its wall, with friction there and at its friction point."""
+    """Return random values for a guide at rest, with friction at its stop and friction point."""
     values = {
         **AT_REST, "stop.offset": 0.004, "stop.friction": rng.uniform(0.1, 1.5),
         "friction.coefficient": 0.3, "friction.normal_force": rng.uniform(0.02, 1.0),
@@ -83,7 +83,7 @@ def frictions(rng):
 
 
 def obeys_coulomb(settled: Simulation) -> bool:
-    """Tell whether forces and accelerations are what each friction says."""
+    """Return whether friction forces and slip accelerations satisfy Coulomb's law."""
     equations, front, right = settled.equations, settled.front, True
     a, lam, _, _ = equations.evaluate(front.time, front.q, front.v)
     for c, mode in enumerate(settled.contacts.modes):
@@ -119,8 +119,8 @@ def test_friction_in_two_places_obeys_coulombs_law_in_both():
     ("model", "rate", "offset"), [("PRBDM2RAxial", 200, 0.004), ("PRBDM2R", 10, 0.004),
                                   ("PRBDM2R", 200, 0.0)],
 )  # fmt: skip
-def test_a_shaken_base_rubs_in_two_places_without_end(model, rate, offset):
-    """Sticking and slipping on the wall and at a point: no chatter, books balanced."""
+def test_energy_is_balanced_on_a_shaken_base_with_friction_at_two_points(model, rate, offset):
+    """Sticking and slipping at the stop and at the friction point, without chatter."""
     values = {
         "friction.coefficient": 0.3, "friction.normal_force": 0.5, "stop.friction": 1.0,
         "stop.offset": offset, "stop.restitution": 0.0,
@@ -137,27 +137,27 @@ def test_a_shaken_base_rubs_in_two_places_without_end(model, rate, offset):
 
 
 def driven(fmu, kind, place, end, *, values=None, inside=False, impulse=0.0):
-    """Return all values after the wall followed place(t), and the steps that ended early.
+    """Return the final values of a run with a moving wall, and the number of early returns.
 
-    inside: whether the inputs are set in the events, too.  impulse: which comes before each step,
-    in an event of its own.
+    ``place`` returns displacement and velocity of the wall at a time.  If ``inside``, the inputs
+    are also set in event mode.  An ``impulse`` is applied in a separate event before each step.
     """
     steps, early, time, point = round(end / 1e-3), 0, 0.0, 0
     with Instance(fmu, kind).initialize(values=values) as instance:
 
-        def tell():
+        def set_wall():
             assert instance.set(dict(zip(WALL, place(time), strict=True))) == OK
 
         while point < steps:
             if impulse:
                 instance.change({"force.impulse.y": impulse * (point + 1)})
-            tell()
+            set_wall()
             event, _, _, time = instance.fmu.doStep(time, (point + 1) * 1e-3 - time)
             if event:
                 early += 1
                 instance.fmu.enterEventMode()
                 if inside:
-                    tell()
+                    set_wall()
                 instance.update()
             point += time >= (point + 1) * 1e-3 - 1e-12
         return instance.values(), early
@@ -166,8 +166,8 @@ def driven(fmu, kind, place, end, *, values=None, inside=False, impulse=0.0):
 @events
 @pytest.mark.parametrize("inside", [False, True])
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_what_rests_on_a_gently_moving_wall_rests_in_event_mode_too(native, model, inside):
-    """Its velocity changes by 0.1 mm/s a step, a tenth of rest_speed: nothing bounces off."""
+def test_a_body_on_a_slowly_accelerated_wall_remains_at_rest_in_event_mode(native, model, inside):
+    """The velocity of the wall changes by 0.1 mm/s per step, a tenth of rest_speed."""
     wall, end = sine(1e-4, 10 * math.pi), 0.4
     plain, _ = driven(native[model, 3], "cs", wall, end)
     found, early = driven(native[model, 3], "events", wall, end, inside=inside)
@@ -181,8 +181,8 @@ def test_what_rests_on_a_gently_moving_wall_rests_in_event_mode_too(native, mode
 
 @events
 @pytest.mark.parametrize("inside", [False, True])
-def test_a_trembling_wall_does_not_chatter(native, inside):
-    """By a hundredth of a micrometre, of which the rates are a few times what counts as still."""
+def test_a_wall_with_a_tiny_vibration_does_not_cause_chatter(native, inside):
+    """The amplitude is 0.01 um; the velocities are a few times the zero speed."""
     wall = sine(1e-8, 40 * math.pi)
     found, _ = driven(native["PRBDM", 3], "events", wall, 0.4, inside=inside)
     assert found["stop.contact"]
@@ -191,8 +191,8 @@ def test_a_trembling_wall_does_not_chatter(native, inside):
 
 @events
 @pytest.mark.parametrize("impulse", [0.0, 1e-9])
-def test_a_wall_gets_where_it_is_told_whatever_happens_on_the_way(native, impulse):
-    """Events before each step, of impulses that are next to nothing, had left it where it was."""
+def test_a_wall_reaches_its_input_despite_events(native, impulse):
+    """Tiny impulses cause an event before each step, which must not stop the wall."""
     found, _ = driven(native["PRBDM", 3], "events", lambda _: (-0.01, 0.0), 0.03, impulse=impulse)
     assert found["stop.gap"] == pytest.approx(0.01 - found["shuttle.x"] - 0.02, abs=1e-9)
 
@@ -200,8 +200,8 @@ def test_a_wall_gets_where_it_is_told_whatever_happens_on_the_way(native, impuls
 @events
 @pytest.mark.parametrize("order", ["set, update", "set, update, throw, update", "update, set",
                                    "update, set, update"])  # fmt: skip
-def test_what_is_set_around_an_event_does_not_push_the_wall_in_the_rest_of_the_step(native, order):
-    """0.01 mm, made good in the 1 us that are left after the impact, would be 10 m/s."""
+def test_inputs_set_at_an_event_do_not_accelerate_the_wall_in_the_rest_of_the_step(native, order):
+    """To reach 0.01 mm in the remaining 1 us after the impact, the wall would need 10 m/s."""
     with Instance(native["PRBDM", 3], "events").initialize() as instance:
         *_, hit = instance.fmu.doStep(0.0, 0.1)
     with Instance(native["PRBDM", 3], "events").initialize() as instance:
@@ -224,7 +224,7 @@ def test_what_is_set_around_an_event_does_not_push_the_wall_in_the_rest_of_the_s
         assert found["stop.impact_count"] == 1
         assert found["stop.gap_rate"] == pytest.approx(found["stop.rebound_speed"], rel=1e-3)
         end = hit + 1e-6
-        for _ in range(60):  # the wall joins its reference within two recent longest steps
+        for _ in range(60):  # The wall reaches its reference within two of the longest steps.
             event, _, _, end = instance.fmu.doStep(end, 1e-3)
             if event:
                 instance.fmu.enterEventMode()
@@ -234,8 +234,8 @@ def test_what_is_set_around_an_event_does_not_push_the_wall_in_the_rest_of_the_s
 
 
 @pytest.mark.parametrize("twin", TWINS)
-def test_a_wall_that_has_come_to_a_stand_is_not_pushed_either(twin):
-    """It brakes from 10 mm/s; then a step of 0.1 us with no velocity, which would be at 5 m/s."""
+def test_a_short_step_does_not_accelerate_a_wall_that_has_stopped(twin):
+    """The wall brakes from 10 mm/s; a correction within the step of 0.1 us would need 5 m/s."""
     moved = TWINS[twin](mechanism("PRBDM"), AT_REST)
     for k in range(10):
         left = 1.0 - 0.1 * k
@@ -250,8 +250,8 @@ def test_a_wall_that_has_come_to_a_stand_is_not_pushed_either(twin):
 
 @events
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_slips_on_a_moving_wall_leave_the_books_balanced(native, model):
-    """A slip is no impact: what the wall carries keeps its velocity through it."""
+def test_energy_is_balanced_with_slip_events_on_a_moving_wall(native, model):
+    """A slip event is not an impact: it does not change velocities."""
     values = {"stop.friction": 0.2, "stop.rest_speed": 0.01}
     found, early = driven(
         native[model, 3], "events", sine(1e-5, 600.0), 0.35, values=values, inside=True
@@ -263,8 +263,8 @@ def test_slips_on_a_moving_wall_leave_the_books_balanced(native, model):
 
 @events
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_wall_put_deep_into_a_body_is_told_in_model_exchange(native, fmi):
-    """Once: it does not push the body out, and nobody should take the gap for right."""
+def test_a_wall_set_deep_inside_a_body_is_logged_once_in_model_exchange(native, fmi):
+    """The wall does not push the body out: the warning marks the negative gap as invalid."""
     with Instance(native["PRBDM", fmi], "me").initialize() as instance:
         instance.change({"stop.displacement": -0.03})
         (warning,) = (text for status, _, text in instance.log if status == WARNING)

@@ -1,4 +1,4 @@
-"""Several stops, friction and walls together: laws that hold at every impact and in between."""
+"""Combinations of several stops, friction and walls: laws of impacts and of motions."""
 
 import dataclasses
 
@@ -12,7 +12,7 @@ from support import ScalarGuide, energy_balance, mechanism, simulation
 
 
 def watched(guide, values=None, time=0.3, step=1e-3):
-    """Run and hold the energy, the gaps and the forces at every output."""
+    """Run a simulation; check energy balance, gaps and stop forces at every output."""
     sim = Simulation(guide, values)
     sim.record = []
     start = energy_balance(sim.outputs())
@@ -31,8 +31,8 @@ def watched(guide, values=None, time=0.3, step=1e-3):
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 @pytest.mark.parametrize("position", [0.0, -0.006])
-def test_two_stops_end_in_rest_on_the_wall(model, position):
-    """Hit together or in turn, chatter that converges ends in rest; the weight is carried once."""
+def test_converging_bounces_on_two_stops_end_in_rest(model, position):
+    """The sum of the forces of both stops is then nearly constant."""
     guide = two_stops(model, high={"position": position}, low={"position": position})
     sim, out = watched(guide, time=0.45)
     assert out["high.contact"] or out["low.contact"]
@@ -43,8 +43,8 @@ def test_two_stops_end_in_rest_on_the_wall(model, position):
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_two_stops_hit_at_once_balance_momentum_and_each_its_energy(model):
-    """M (v+ - v-) = sum G^T P + Phi_q^T Lambda, -P (u- + u+)/2 at each, whatever the order."""
+def test_energy_lost_at_each_of_two_stops_follows_from_its_impulse(model):
+    """Energy lost = -P (u- + u+)/2; the result does not depend on the order of the stops."""
     eps = {"high": {"restitution": 0.9}, "low": {"restitution": 0.1}}
     guide = two_stops(model, **eps)
     swapped = dataclasses.replace(guide, stops=guide.stops[::-1])
@@ -65,17 +65,17 @@ def test_two_stops_hit_at_once_balance_momentum_and_each_its_energy(model):
                 )
                 assert out[f"{name}.energy_lost"] == pytest.approx(lost / 2, rel=1e-9)
         results.append((y[n : 2 * n], out["energy.dissipated"]))
-    if model == "PRBDM2R":  # one degree of freedom leaves the shares of the impulse open
+    if model == "PRBDM2R":  # With one degree of freedom, the impulses are not unique.
         np.testing.assert_allclose(results[0][0], results[1][0], atol=1e-9)
         assert results[0][1] == pytest.approx(results[1][1], rel=1e-9)
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("lever", [0.01, 0.03])
-def test_a_held_stop_takes_part_in_an_impact_elsewhere(friction, lever):
-    """It receives an impulse or opens, never pulls; its moving wall does the work of its impulse.
+def test_a_closed_stop_takes_part_in_an_impact_at_another_stop(friction, lever):
+    """It receives an impulse P >= 0 or opens; its moving wall does the work of that impulse.
 
-    Struck at a short lever it opens, at a long one it is pressed.
+    With a short lever the closed stop opens, with a long one it receives an impulse.
     """
     guide = two_stops(
         "PRBDM2R",
@@ -89,7 +89,7 @@ def test_a_held_stop_takes_part_in_an_impact_elsewhere(friction, lever):
     assert sim.outputs()["high.contact"]
     start, count = energy_balance(sim.outputs()), sim.outputs()["low.impact_count"]
     while sim.outputs()["low.impact_count"] == count:
-        past = sim.time - 0.5  # the lower wall comes up faster than the one that carries
+        past = sim.time - 0.5  # The wall of the lower stop is faster than that of the closed one.
         sim.set({"high.velocity": -5.0 * past, "high.displacement": -2.5 * past**2})
         sim.set({"low.velocity": -0.2, "low.displacement": -0.2 * past})
         held = sim.outputs()["high.contact"]
@@ -103,10 +103,10 @@ def test_a_held_stop_takes_part_in_an_impact_elsewhere(friction, lever):
     G = -(system.gaps * e).imag
     walls = [wall.motion(impact.time)[1] for wall in sim.inputs.walls]
     rates, before = G @ impact.after + walls, G @ impact.before + walls
-    assert abs(before[0]) < 1e-9, "it was held"
+    assert abs(before[0]) < 1e-9, "the upper stop must be closed before"
     assert rates[0] >= -1e-12
     if friction == 0.0:
-        assert (rates[0] < 1e-9) == (lever == 0.03), "pressed by the hit below"
+        assert (rates[0] < 1e-9) == (lever == 0.03), "it must stay closed with the long lever only"
         assert rates[1] == pytest.approx(0.8 * impact.latched.approach_speed, rel=1e-9)
         rows = np.vstack([-(system.loops * e).imag, G])
         *_, P_high, P_low = np.linalg.lstsq(rows.T, M @ (impact.after - impact.before), rcond=None)[
@@ -124,8 +124,8 @@ def test_a_held_stop_takes_part_in_an_impact_elsewhere(friction, lever):
 
 @pytest.mark.parametrize("rest_speed", [0.0, 1e-5])
 @pytest.mark.parametrize(("position", "offset"), [(0.0, 0.0), (-0.004, 0.003), (0.005, -0.002)])
-def test_zeno_of_the_2r_ends_in_rest(rest_speed, position, offset):
-    """The chatter converges wherever the wall is; no message, no hang."""
+def test_converging_bounces_of_the_2r_guide_end_in_rest(rest_speed, position, offset):
+    """For walls at several positions, without an error."""
     values = {
         "stop.rest_speed": rest_speed, "stop.position": position, "stop.offset": offset,
         "damping.beta": 2e-5,
@@ -135,8 +135,8 @@ def test_zeno_of_the_2r_ends_in_rest(rest_speed, position, offset):
     assert sim.outputs()["stop.contact"]
 
 
-def test_friction_opposes_what_a_wall_pushes():
-    """At constant speed mu N is dissipated over the path, and the wall carries it."""
+def test_a_wall_that_pushes_a_body_with_friction_does_its_work():
+    """At constant speed the stop force grows by mu N, and mu N times the path is dissipated."""
     still = {"damping.beta": 0.0}
     rubbing = still | {"friction.coefficient": 1.0, "friction.normal_force": 0.2}
     ends = []
@@ -144,7 +144,7 @@ def test_friction_opposes_what_a_wall_pushes():
         sim = simulation("PRBDM", values)
         sim.advance(0.6)
         lost = sim.outputs()["energy.dissipated"]
-        for k in range(1000):  # 1 m/s^2 up to 20 mm/s, in steps below the rest speed
+        for k in range(1000):  # Up to 20 mm/s; each change of the speed is below rest_speed.
             speed = min(0.02, k * 5e-4)
             here = sim.inputs.walls[0].motion(sim.time)[0]
             sim.set({"stop.displacement": here, "stop.velocity": -speed})
@@ -157,8 +157,8 @@ def test_friction_opposes_what_a_wall_pushes():
     assert dissipated == pytest.approx(0.2 * abs(y), rel=5e-3)
 
 
-def test_friction_keeps_what_a_retreating_wall_leaves():
-    """Stuck with 5 N against a weight of half a newton: the contact opens, nothing follows."""
+def test_a_sticking_body_does_not_follow_a_retreating_wall():
+    """Friction of 5 N exceeds the weight of 0.5 N: the contact opens."""
     values = {
         "friction.normal_force": 5.0, "friction.coefficient": 1.0, "release.displacement": 0.0,
     }  # fmt: skip
@@ -171,8 +171,8 @@ def test_friction_keeps_what_a_retreating_wall_leaves():
     assert out["stop.gap"] == pytest.approx(0.02 * 0.05, rel=1e-6)
 
 
-def test_a_dragged_contact_pushes_along_its_wall_within_the_cone():
-    """2R held away from straight, pulled along the wall: |tangential| = mu N while it slides."""
+def test_friction_of_a_contact_pulled_along_its_wall_is_within_the_cone():
+    """2R guide at a bent shape: the friction force is mu N while the contact slides."""
     values = {"stop.position": -0.01, "stop.friction": 0.2, "release.displacement": -0.0101}
     sim = simulation("PRBDM2R", values)
     sim.advance(0.4)
@@ -186,7 +186,7 @@ def test_a_dragged_contact_pushes_along_its_wall_within_the_cone():
                 continue
             normal = float(lam[sim.equations.first_hold])
             assert normal > 0.0
-            # what is left of the balance of the shuttle along the wall is friction
+            # The residual of the equations of motion along the wall is friction.
             e, v = np.exp(1j * y[:n]), y[n : 2 * n]
             G, T = (-(B * e).imag for B in (sim.system.gaps[0], sim.system.slides[0]))
             C = -(e.conj()[:, None] * sim.system.H * e).imag
@@ -200,8 +200,8 @@ def test_a_dragged_contact_pushes_along_its_wall_within_the_cone():
                 assert abs(tangential) == pytest.approx(0.2 * normal, rel=1e-5)
 
 
-def test_base_reactions_count_the_inputs():
-    """Integral of the base force and moment = impulse of all loads - change of momentum."""
+def test_impulse_of_base_reactions_includes_that_of_the_inputs():
+    """Integral of base force and moment = impulse of all loads - change of momentum."""
     values = {"gravity.x": 2.0, "gravity.y": -3.0, "stop.position": 0.05}
     sim = simulation("PRBDM2R", values, tolerance=1e-11)
     sim.set({"force.x": 0.3, "force.y": -0.2, "force.moment": 4e-3, "base.acceleration.y": 1.5})
@@ -240,8 +240,8 @@ def test_base_reactions_count_the_inputs():
     assert last[1] - first[1] == pytest.approx(angular, abs=1e-6 * abs(angular) + 1e-12)
 
 
-def test_nothing_happens_in_an_exact_equilibrium_that_touches():
-    """No gravity, no motion: rounding is not counted as an impact."""
+def test_rounding_errors_cause_no_impact_in_an_equilibrium_with_contact():
+    """Without gravity and motion."""
     sim = simulation("PRBDM2R", {"gravity.x": 0.0, "release.displacement": 0.0})
     sim.advance(0.2)
     assert sim.outputs()["stop.impact_count"] == 0
@@ -249,8 +249,8 @@ def test_nothing_happens_in_an_exact_equilibrium_that_touches():
 
 
 @pytest.mark.slow
-def test_a_micrometre_switch_bounces_at_its_own_pace():
-    """Elastic bounces of a MHz device are no chatter: the guard counts in periods."""
+def test_frequent_bounces_of_a_micrometre_switch_are_not_chatter():
+    """Chatter is counted relative to the period of the motion, here 20 us."""
     scale = 1e-4
     values = {
         "flexure.length": 0.04 * scale, "shuttle.width": 0.08 * scale,
@@ -273,28 +273,28 @@ def test_a_micrometre_switch_bounces_at_its_own_pace():
         ({"step": float("nan")}, "step = nan s"),
     ],
 )
-def test_options_that_are_none_are_refused(options, words):
+def test_invalid_options_are_rejected(options, words):
     with pytest.raises(ValueError, match=words):
         Simulation(mechanism("PRBDM"), **options)
 
 
 @pytest.mark.parametrize("bad", ["abc", None, 1j, True])
-def test_inputs_that_are_no_numbers_are_refused(bad):
+def test_inputs_that_are_not_real_numbers_are_rejected(bad):
     sim = simulation("PRBDM")
     with pytest.raises(ValueError, match=r"force\.x = "):
         sim.set({"force.x": bad})
     assert sim.given["force.x"] == 0.0
 
 
-def test_an_absurd_force_is_refused_not_integrated():
+def test_an_absurd_force_is_an_error():
     sim = simulation("PRBDM")
     sim.set({"force.x": 1e300})
     with np.errstate(all="ignore"), pytest.raises(RuntimeError, match="step size fell below"):
         sim.advance(1e-3)
 
 
-def test_two_stops_that_cannot_move_apart_share_a_rocking_load():
-    """2R, straight: it can hardly rotate; a moment takes the weight from one stop to the other."""
+def test_an_alternating_moment_moves_the_load_between_two_stops():
+    """The straight 2R guide can hardly rotate: both gaps remain closed."""
     guide = two_stops("PRBDM2R")
     sim = Simulation(guide, {"release.displacement": 0.0})
     weight = sim.outputs()["high.force"] + sim.outputs()["low.force"]

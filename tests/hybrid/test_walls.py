@@ -1,4 +1,4 @@
-"""The laws of moving walls: each joins its reference along a cubic (prbm.hybrid.walls)."""
+"""Moving walls: each approaches its reference motion along a cubic (prbm.hybrid.walls)."""
 
 import itertools
 import json
@@ -17,16 +17,16 @@ TWINS = {"engine": Simulation, "kernel": KernelSimulation}
 both = pytest.mark.parametrize("twin", TWINS)
 
 AWAY = {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 0.01}
-"""The shuttle at rest, the wall out of reach."""
+"""Values for a shuttle at rest, with the wall out of reach."""
 PRESSED = {"release.displacement": 0.0}
-"""The shuttle at rest on the wall, by its weight."""
+"""Values for a shuttle at rest on the wall, pressed by its weight."""
 AMPLITUDE, RATE = 1e-3, 10 * math.pi
-"""Of the true wall: 0.031 m/s, 0.99 m/s2."""
+"""Amplitude [m] and circular frequency [rad/s] of the true wall: up to 0.031 m/s, 0.99 m/s2."""
 ACCELERATION = AMPLITUDE * RATE**2
 
 
 def sine(t: float) -> tuple[float, float]:
-    """Return displacement and velocity of the true wall."""
+    """Return displacement [m] and velocity [m/s] of the true wall at a time."""
     return AMPLITUDE * math.sin(RATE * t), AMPLITUDE * RATE * math.cos(RATE * t)
 
 
@@ -52,19 +52,20 @@ GRIDS = ("1 ms", "10 ms", "alternating", "random", "short and long")
 
 
 def wall_of(sim) -> tuple[float, float]:
-    """Return displacement and velocity of the wall, from gap and hit point."""
+    """Return displacement and velocity of the simulated wall, from gap and contact point."""
     out = sim.outputs()
     place = out["stop.gap"] + out["stop.point.displacement"]
     return place, out["stop.gap_rate"] + out["stop.point.velocity"]
 
 
 def given(true, t: float, velocities: bool) -> dict[str, float]:
+    """Return the inputs for the true wall at a time, with its velocity or without."""
     d, v = true(t)
     return {"stop.displacement": d} | ({"stop.velocity": v} if velocities else {})
 
 
 @pytest.mark.parametrize(("offset", "excess"), [(1e-3, 0.0), (0.0, 0.2), (-1e-3, 0.3)])
-def test_a_cubic_has_the_velocity_and_acceleration_of_its_position(offset, excess):
+def test_velocity_and_acceleration_of_a_wall_are_derivatives_of_its_position(offset, excess):
     wall = Wall(0.1, -0.3, 2.0, offset, excess, 4e-3)
     for t in (2.0005, 2.002, 2.0039, 2.1):
         _, velocity, acceleration = wall.motion(t)
@@ -80,8 +81,8 @@ def test_a_cubic_has_the_velocity_and_acceleration_of_its_position(offset, exces
 
 @both
 @pytest.mark.parametrize("kind", GRIDS)
-def test_uniform_motion_is_followed_exactly(twin, kind):
-    """Newton in the frame of the wall: the time of the impact does not depend on the steps."""
+def test_a_wall_follows_a_uniform_motion_exactly(twin, kind):
+    """Time and closing speed of the impact do not depend on the communication steps."""
     speed, distance = -0.1, 8e-3
     values = AWAY | {"stop.position": distance, "stop.restitution": 0.5, "stop.velocity": speed}
     sim = TWINS[twin](mechanism("PRBDM"), values)
@@ -96,7 +97,7 @@ def test_uniform_motion_is_followed_exactly(twin, kind):
 
 
 def errors(sim, kind: str, *, velocities: bool) -> float:
-    """Return how far the wall is off the true one, in units of a h^2, after a start."""
+    """Return the largest position error of the wall over a h^2, after the first steps."""
     points, worst = grid(kind, 0.6), 0.0
     longest = max(b - a for a, b in itertools.pairwise(points))
     assert longest <= WALL_LONGEST_RTOL * 0.22
@@ -111,7 +112,8 @@ def errors(sim, kind: str, *, velocities: bool) -> float:
 @both
 @pytest.mark.parametrize("velocities", [True, False])
 @pytest.mark.parametrize("kind", [*GRIDS, "20 ms"])
-def test_a_wall_is_within_twice_the_acceleration_times_the_step_squared(twin, kind, velocities):
+def test_position_error_of_a_wall_is_bounded_by_acceleration_and_step(twin, kind, velocities):
+    """It is below 2 a h^2, or 3 a h^2 without velocities at random steps."""
     sim = TWINS[twin](mechanism("PRBDM"), AWAY)
     bound = 2.0 if velocities or kind != "random" else 3.0
     assert errors(sim, kind, velocities=velocities) < bound
@@ -121,7 +123,7 @@ def test_a_wall_is_within_twice_the_acceleration_times_the_step_squared(twin, ki
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 @pytest.mark.parametrize("kind", ["1 ms", "alternating", "random"])
 def test_a_pressed_body_stays_on_its_wall_without_impacts(twin, model, kind):
-    """Gravity presses it with ten times the acceleration of the wall."""
+    """Gravity is ten times the acceleration of the wall."""
     sim = TWINS[twin](mechanism(model), PRESSED | dict(zip(INPUTS, sine(0.0), strict=True)))
     struck = sim.outputs()["stop.impact_count"]
     before, points = energy_balance(sim.outputs()), grid(kind, 0.1)
@@ -146,7 +148,7 @@ INPUTS = ("stop.displacement", "stop.velocity")
 
 @both
 @pytest.mark.parametrize("kind", ["1 ms", "alternating", "random"])
-def test_a_displacement_that_jumps_is_not_overshot_by_more_than_the_jump(twin, kind):
+def test_position_error_of_a_wall_after_a_jump_is_at_most_the_jump(twin, kind):
     jump = -1e-3
     sim, points = TWINS[twin](mechanism("PRBDM"), AWAY), grid(kind, 0.15)
     off, last = [], 0.0
@@ -160,8 +162,8 @@ def test_a_displacement_that_jumps_is_not_overshot_by_more_than_the_jump(twin, k
 
 
 @both
-def test_a_long_step_after_short_ones_is_not_extrapolated(twin):
-    """Two steps of 1 us give no velocity that lasts for 20 ms."""
+def test_the_motion_of_a_wall_in_short_steps_is_not_extrapolated_over_a_long_step(twin):
+    """The velocity over two steps of 1 us is not kept for 20 ms."""
     sim = TWINS[twin](mechanism("PRBDM"), AWAY)
     for k in range(3):
         sim.set({"stop.displacement": -1e-4 * k})
@@ -172,14 +174,14 @@ def test_a_long_step_after_short_ones_is_not_extrapolated(twin):
 
 
 @both
-def test_a_wall_that_accelerates_presses_with_its_mass_times_acceleration(twin):
-    """The force of a held stop follows the wall's acceleration; released where it vanishes."""
+def test_the_force_of_a_closed_stop_includes_the_acceleration_of_its_wall(twin):
+    """It is the weight plus acceleration over mobility; a retreating wall opens the contact."""
     sim = TWINS[twin](mechanism("PRBDM"), PRESSED)
     sim.advance(1e-3)
     weight, mobility = (sim.outputs()[f"stop.{name}"] for name in ("force", "point.mobility"))
     sim.set({"stop.velocity": -1e-3})
     sim.advance(1e-3 + 1e-9)
-    # 4 u / T at the start of the cubic, T of twice the step of 1 ms
+    # The acceleration at the start of the cubic is 4 u / T; T is two steps of 1 ms.
     expected = weight + 4 * 1e-3 / 2e-3 / mobility
     assert sim.outputs()["stop.force"] == pytest.approx(expected, rel=1e-3)
     sim.set({"stop.velocity": 0.1})
@@ -188,7 +190,7 @@ def test_a_wall_that_accelerates_presses_with_its_mass_times_acceleration(twin):
 
 
 @both
-def test_an_input_that_is_set_to_its_value_changes_nothing(twin):
+def test_setting_an_input_to_its_present_value_has_no_effect(twin):
     runs = [TWINS[twin](mechanism("PRBDM"), {"stop.velocity": -0.02}) for _ in range(2)]
     for k in range(40):
         for sim, again in zip(runs, (False, True), strict=True):
@@ -201,7 +203,10 @@ def test_an_input_that_is_set_to_its_value_changes_nothing(twin):
 
 
 def partner(twin, *, mobility: float, end: float, h: float):
-    """Return a guide after impacts with a free mass as its wall, and the mass' motion."""
+    """Return a guide after impacts with a free mass as wall; position, velocity of the mass.
+
+    The last result is the momentum of the mass minus the received impulses, at each step.
+    """
     sim = TWINS[twin](
         mechanism("PRBDM"),
         {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 2e-3,
@@ -214,7 +219,7 @@ def partner(twin, *, mobility: float, end: float, h: float):
         out = sim.outputs()
         total = out["stop.impulse_sum"]
         if total != received:
-            # the instant of the impact within the step
+            # Time from the impact to the end of the step.
             left = (k + 1) * h - out["stop.impact_time"]
             change = mobility * (total - received)
             x, v, received = x + v * (h - left) + (v + change) * left, v + change, total
@@ -226,8 +231,8 @@ def partner(twin, *, mobility: float, end: float, h: float):
 
 @both
 @pytest.mark.parametrize("h", [1e-3, 3e-4])
-def test_momentum_that_a_partner_receives_is_exact(twin, h):
-    """The wall moves as the partner does: what it is given back equals what it is."""
+def test_a_wall_moves_exactly_as_the_partner_that_receives_its_impulses(twin, h):
+    """The partner is a free mass; it returns its position and velocity as inputs of the wall."""
     sim, x, v, momenta = partner(twin, mobility=5.0, end=0.06, h=h)
     assert sim.outputs()["stop.impact_count"] >= 1
     assert momenta == pytest.approx([momenta[0]] * len(momenta), rel=1e-13)
@@ -236,8 +241,8 @@ def test_momentum_that_a_partner_receives_is_exact(twin, h):
 
 
 @both
-def test_an_impact_moves_the_reference_with_the_wall(twin):
-    """Mobility times impulse is added to both: until the partner answers it goes on alike."""
+def test_an_impact_changes_the_velocity_of_the_reference_with_that_of_the_wall(twin):
+    """Mobility times impulse is added to both; the wall keeps the velocity until new inputs."""
     values = {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 1e-3,
               "stop.mobility": 5.0, "stop.velocity": -0.1, "stop.restitution": 1.0}  # fmt: skip
     sim = TWINS[twin](mechanism("PRBDM"), values)
@@ -251,7 +256,7 @@ def test_an_impact_moves_the_reference_with_the_wall(twin):
 
 
 def test_the_force_of_a_moving_wall_does_its_work():
-    """Energy is balanced while the wall accelerates under a held body, for any steps."""
+    """Energy is balanced while the wall accelerates below a body at rest on it."""
     for kind in ("1 ms", "random"):
         sim = Simulation(mechanism("PRBDM2R"), PRESSED)
         sim.advance(0.01)
@@ -268,7 +273,7 @@ def test_the_force_of_a_moving_wall_does_its_work():
 
 
 def catching_up(twin):
-    """Return a simulation whose wall is on its way to its reference, with events ahead."""
+    """Return a simulation whose wall is approaching its reference, before further events."""
     sim = TWINS[twin](mechanism("PRBDM"), {})
     for k in range(30):
         sim.set({"stop.displacement": sine(k * 1e-3)[0]})
@@ -277,7 +282,7 @@ def catching_up(twin):
 
 
 def goes_on(sim) -> list[dict]:
-    """Return outputs of the 20 steps that follow."""
+    """Advance by 20 steps; return the outputs after each."""
     found = []
     for k in range(30, 50):
         sim.set({"stop.displacement": sine(k * 1e-3)[0], "stop.velocity": 0.01 * (k > 40)})
@@ -307,15 +312,15 @@ def test_a_state_of_the_kernel_restores_to_the_same_bytes():
 
 
 @both
-def test_two_simulations_share_nothing(twin):
+def test_simulations_are_independent_of_each_other(twin):
     one, other = catching_up(twin), catching_up(twin)
     other.set({"stop.displacement": 1e-3})
     other.advance(0.031)
     assert goes_on(one) == goes_on(catching_up(twin))
 
 
-def test_the_engine_and_the_kernel_move_walls_alike():
-    """End to end: random inputs at random points, with impacts, rest and jumps."""
+def test_the_engine_and_the_kernel_agree_on_random_motions_of_the_wall():
+    """Random inputs at random communication points, with impacts, rest and jumps."""
     rng = np.random.default_rng(5)
     twins, t = [kind(mechanism("PRBDM"), {}) for kind in TWINS.values()], 0.0
     for _ in range(150):

@@ -1,6 +1,6 @@
-"""The kernel is compiled once, whole, for each platform; what stands against it is a sentence.
+"""Compilation of the kernel for each platform: cache, choice of the compiler, error messages.
 
-A stub stands in for the kernel where it does not matter what is compiled.
+Most tests compile a short stub instead of the kernel.
 """
 
 import hashlib
@@ -46,7 +46,7 @@ pytestmark = [
 
 @pytest.fixture
 def cache(tmp_path, monkeypatch) -> Path:
-    """Return an empty cache, with the stub for a kernel and no choice of a compiler."""
+    """Return an empty cache; the stub replaces the kernel, and CC is not set."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(compiler, "kernel", lambda: {"prbm_fmu.c": STUB})
@@ -55,15 +55,18 @@ def cache(tmp_path, monkeypatch) -> Path:
 
 
 def entries(cache: Path) -> list[Path]:
+    """Return the libraries in the cache."""
     return [p for p in cache.iterdir() if p.name != "lock"] if cache.is_dir() else []
 
 
 def only(made: dict) -> bytes:
+    """Return the content of the single library."""
     (content,) = made.values()
     return content
 
 
 def script(path: Path, text: str) -> Path:
+    """Write an executable shell script."""
     path.parent.mkdir(exist_ok=True)
     path.write_text(f"#!/bin/sh\n{text}\n")
     path.chmod(0o755)
@@ -74,24 +77,24 @@ def without_ziglang(monkeypatch) -> None:
     monkeypatch.setattr(compiler.importlib.util, "find_spec", lambda name: None)
 
 
-def test_a_second_export_compiles_nothing(cache, monkeypatch):
-    told: list[str] = []
-    first = libraries([HOST], told.append)
-    monkeypatch.setattr(compiler, "_loaded", {})  # as a new process has it
+def test_a_second_export_takes_the_library_from_the_cache(cache, monkeypatch):
+    messages: list[str] = []
+    first = libraries([HOST], messages.append)
+    monkeypatch.setattr(compiler, "_loaded", {})  # As in a new process.
     monkeypatch.setattr(compiler, "compiled", lambda *_: pytest.fail("compiled again"))
-    assert libraries([HOST], told.append) == first
-    assert told == [f"compiling the kernel for {this_platform().name} with cc"]
+    assert libraries([HOST], messages.append) == first
+    assert messages == [f"compiling the kernel for {this_platform().name} with cc"]
     assert len(entries(cache)) == 1
 
 
-def test_another_kernel_is_another_library(cache, monkeypatch):
+def test_a_changed_kernel_is_compiled_again(cache, monkeypatch):
     first = only(libraries([HOST]))
     monkeypatch.setattr(compiler, "kernel", lambda: {"prbm_fmu.c": STUB.replace(b"2.0", b"2.1")})
     assert only(libraries([HOST])) != first
     assert len(entries(cache)) == 2
 
 
-def test_the_same_source_gives_the_same_bytes_and_no_path_gets_into_them(cache, monkeypatch):
+def test_a_library_is_reproducible_and_contains_no_path(cache, monkeypatch):
     first = only(libraries([HOST]))
     shutil.rmtree(cache)
     monkeypatch.setattr(compiler, "_loaded", {})
@@ -100,28 +103,28 @@ def test_the_same_source_gives_the_same_bytes_and_no_path_gets_into_them(cache, 
     assert str(Path.home()).encode() + b"/" not in first
 
 
-def test_without_any_compiler_it_says_what_to_install(cache, monkeypatch):
+def test_error_without_a_compiler_names_the_packages_to_install(cache, monkeypatch):
     monkeypatch.setenv("PATH", "")
     without_ziglang(monkeypatch)
     with pytest.raises(NoCompilerError, match=r"need a C compiler.*gcc.*pip install ziglang"):
         libraries([HOST])
 
 
-def test_ziglang_is_named_where_only_it_can_do(cache, monkeypatch):
+def test_error_for_other_platforms_without_ziglang_names_ziglang(cache, monkeypatch):
     without_ziglang(monkeypatch)
-    for asked in ([ALL], ["x86_64-windows"]):
+    for platforms in ([ALL], ["x86_64-windows"]):
         with pytest.raises(NoCompilerError, match=r"pip install ziglang"):
-            libraries(asked)
+            libraries(platforms)
 
 
 @pytest.mark.parametrize("chosen", ["no-such-compiler", "false", "'unclosed"])
-def test_a_compiler_that_does_not_run_is_named(cache, monkeypatch, chosen):
+def test_error_names_a_compiler_that_does_not_run(cache, monkeypatch, chosen):
     monkeypatch.setenv("CC", chosen)
     with pytest.raises(CompilerError, match=re.escape(f"CC = {chosen!r} is not a working")):
         libraries([HOST])
 
 
-def test_what_a_compiler_complains_about_is_told(cache, tmp_path, monkeypatch):
+def test_error_contains_the_last_lines_of_the_compiler_output(cache, tmp_path, monkeypatch):
     bad = script(
         tmp_path / "bin" / "bad",
         '[ "$1" = --version ] && echo bad 1.0 && exit 0\n'
@@ -135,30 +138,30 @@ def test_what_a_compiler_complains_about_is_told(cache, tmp_path, monkeypatch):
     assert entries(cache) == []
 
 
-def test_a_broken_compiler_gives_way_to_the_next(cache, tmp_path, monkeypatch):
+def test_the_next_compiler_is_used_if_one_fails(cache, tmp_path, monkeypatch):
     folder = script(tmp_path / "bin" / "cc", '[ "$1" = --version ] && exit 0; exit 1').parent
     script(folder / "gcc", f'exec {SYSTEM} "$@"')
     monkeypatch.setenv("PATH", f"{folder}{os.pathsep}{os.environ['PATH']}")
-    told: list[str] = []
-    assert only(libraries([HOST], told.append))
-    assert told[0].endswith("with cc")
-    assert told[1].endswith("with gcc")
+    messages: list[str] = []
+    assert only(libraries([HOST], messages.append))
+    assert messages[0].endswith("with cc")
+    assert messages[1].endswith("with gcc")
 
 
-def test_a_compiler_that_writes_nothing_is_broken(cache, tmp_path, monkeypatch):
+def test_a_compiler_that_writes_no_file_is_an_error(cache, tmp_path, monkeypatch):
     monkeypatch.setenv("CC", str(script(tmp_path / "bin" / "idle", "exit 0")))
     with pytest.raises(CompilerError, match=r"cannot compile .*status 0: no message"):
         libraries([HOST])
 
 
-def test_options_beside_the_compiler_are_taken(cache, monkeypatch):
+def test_options_in_the_variable_cc_are_passed_to_the_compiler(cache, monkeypatch):
     monkeypatch.setenv("CC", f"{SYSTEM} -DEXTRA")
     stub = STUB + b"\n#ifndef EXTRA\n#error\n#endif\n"
     monkeypatch.setattr(compiler, "kernel", lambda: {"prbm_fmu.c": stub})
     assert only(libraries([HOST]))
 
 
-def test_a_function_that_is_missing_is_found_at_once_and_not_by_the_importer(cache, monkeypatch):
+def test_a_missing_function_is_an_error_of_the_compilation(cache, monkeypatch):
     stub = STUB + b"\nextern int missing(void);\nfmi2Status fmi2Reset(fmi2Component c)"
     stub += b"{ return c ? missing() : 0; }"
     monkeypatch.setattr(compiler, "kernel", lambda: {"prbm_fmu.c": stub})
@@ -167,15 +170,15 @@ def test_a_function_that_is_missing_is_found_at_once_and_not_by_the_importer(cac
         libraries([HOST])
 
 
-def test_a_cache_that_cannot_be_written_is_done_without(cache, monkeypatch):
+def test_libraries_are_compiled_without_a_cache_if_it_cannot_be_written(cache, monkeypatch):
     cache.parent.parent.mkdir(exist_ok=True)
     cache.parent.write_text("a file where the folder should be")
-    told: list[str] = []
-    made = libraries([HOST], told.append)
+    messages: list[str] = []
+    made = libraries([HOST], messages.append)
     assert only(made)
-    assert told[1].startswith(f"cannot write to {cache}: ")
-    assert libraries([HOST], told.append) == made  # this process knows it
-    assert len(told) == 2
+    assert messages[1].startswith(f"cannot write to {cache}: ")
+    assert libraries([HOST], messages.append) == made  # From the memory of this process.
+    assert len(messages) == 2
 
 
 def planted(cache: Path, folder: Path, monkeypatch) -> Path:
@@ -257,7 +260,7 @@ def test_an_own_cache_that_others_could_write_is_restricted(cache, monkeypatch):
 
 
 @pytest.mark.parametrize("damage", [b"", b"garbage", "truncated", "flipped"])
-def test_a_damaged_entry_is_made_again(cache, monkeypatch, damage):
+def test_a_damaged_entry_of_the_cache_is_compiled_again(cache, monkeypatch, damage):
     made = libraries([HOST])
     (entry,) = entries(cache)
     good = entry.read_bytes()
@@ -268,7 +271,7 @@ def test_a_damaged_entry_is_made_again(cache, monkeypatch, damage):
     assert entry.read_bytes() == good
 
 
-def test_ctrl_c_leaves_nothing_in_the_cache(cache, monkeypatch):
+def test_an_interrupted_compilation_leaves_no_file_in_the_cache(cache, monkeypatch):
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
@@ -282,10 +285,10 @@ def test_ctrl_c_leaves_nothing_in_the_cache(cache, monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             libraries([HOST])
     assert entries(cache) == []
-    assert only(libraries([HOST]))  # and the lock is free
+    assert only(libraries([HOST]))  # The lock has been released.
 
 
-def test_two_exports_at_a_time_compile_once(cache, tmp_path):
+def test_simultaneous_exports_compile_once(cache, tmp_path):
     log = tmp_path / "log"
     slow = script(
         tmp_path / "bin" / "slow",
@@ -311,7 +314,7 @@ def test_two_exports_at_a_time_compile_once(cache, tmp_path):
     assert log.read_text() == "one\n"
 
 
-def test_a_lock_that_a_dead_process_left_does_not_matter(cache):
+def test_the_lock_of_a_process_that_died_is_released(cache):
     code = (
         "import os, sys\nfrom pathlib import Path\nfrom prbm.kernel import compiler\n"
         "with compiler._locked(Path(sys.argv[1])): os._exit(9)"
@@ -323,13 +326,13 @@ def test_a_lock_that_a_dead_process_left_does_not_matter(cache):
     assert only(libraries([HOST]))
 
 
-def test_headers_that_have_moved_are_a_sentence(cache, tmp_path, monkeypatch):
+def test_error_for_missing_headers_names_the_package_to_install(cache, tmp_path, monkeypatch):
     monkeypatch.setattr(fmpy, "__file__", str(tmp_path / "fmpy" / "__init__.py"))
     with pytest.raises(CompilerError, match=r"headers of FMI.*pip install \"fmpy>=0.3.20,<0.4\""):
         libraries([HOST])
 
 
-def test_a_machine_that_is_none_of_ours_is_told(cache, monkeypatch):
+def test_error_on_an_unsupported_machine_names_the_option_for_all_platforms(cache, monkeypatch):
     monkeypatch.setattr(compiler.platform, "machine", lambda: "riscv64")
     assert this_platform() is None
     with pytest.raises(NoCompilerError, match=r"this machine \(riscv64, .*--platform all"):
@@ -337,8 +340,8 @@ def test_a_machine_that_is_none_of_ours_is_told(cache, monkeypatch):
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads ELF with nm")
-def test_the_library_shows_nothing_but_functions_of_fmi_and_needs_nothing_but_libc(tmp_path):
-    """The kernel itself: all else would get mixed up with other libraries in the process."""
+def test_the_library_exports_only_functions_of_fmi_and_needs_only_libc(tmp_path):
+    """The kernel, not the stub.  Other exported names could clash with other libraries."""
     library = tmp_path / "prbm.so"
     library.write_bytes(only(libraries([HOST])))
     named = subprocess.run(
@@ -365,7 +368,7 @@ MACHINES = {
 
 @pytest.mark.slow
 def test_ziglang_makes_a_library_for_every_platform(native, mechanisms, tmp_path):
-    """Each of its own format and machine; that for Linux needs nothing newer than glibc 2.17."""
+    """Each has the format and machine of its platform; those for Linux need at most glibc 2.17."""
     from prbm.fmu import native_fmu
 
     pytest.importorskip("ziglang")

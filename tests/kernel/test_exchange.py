@@ -24,8 +24,8 @@ FRICTION = {
 
 
 @each_shipped
-def test_the_dependent_coordinates_are_determined_at_every_shape(model):
-    """Their columns of the loops' Jacobian keep a thirtieth of its size, straight to release."""
+def test_the_loops_determine_the_dependent_coordinates_at_every_shape(model):
+    """The conditioning of their columns of the Jacobian is above 1/30, up to the release."""
     guide = mechanism(model)
     system = assemble(guide, guide.values())
     chosen = independent(guide)
@@ -38,9 +38,9 @@ def test_the_dependent_coordinates_are_determined_at_every_shape(model):
 
 
 def discrete_states():
-    """Yield what may hold (0, 1), slide at the stop and rub (-1, 0, 1, 2), by model.
+    """Yield models and states: closed stop (0, 1), sliding at the stop, friction (-1, 0, 1, 2).
 
-    One degree of freedom cannot be held and stuck at once.
+    The 1R guide has one degree of freedom: its stop cannot be closed while friction sticks.
     """
     for rubs in (2, 0, 1, -1):
         for model in GUIDES:
@@ -52,7 +52,7 @@ def discrete_states():
 
 
 def contact_modes(guide, discrete):
-    """Return the modes of the contacts of which some hold, slide and rub."""
+    """Return the modes of all contacts for a discrete state of ``discrete_states``."""
     number, stops = constants(), len(guide.stops)
     names = {0: "STICK", 1: "SLIP_POSITIVE", -1: "SLIP_NEGATIVE", 2: "FRICTIONLESS"}
     holds, marks = discrete[:stops], discrete[stops:]
@@ -61,12 +61,13 @@ def contact_modes(guide, discrete):
 
 
 def put(kernel, time, x, values):
+    """Set inputs and parameters, the time and the states."""
     kernel.set(values)
     kernel.exchange_set(time, x)
 
 
 def moving(guide, parameters, inputs, discrete, rng):
-    """Return a kernel of a mechanism in some discrete state, and states of a random motion."""
+    """Return a kernel in a discrete state, and the states of a random motion."""
     kernel = KernelSimulation(guide, parameters, exchange=True)
     x = kernel.exchange_get()
     count = (len(x) - 2) // 2
@@ -82,10 +83,10 @@ def moving(guide, parameters, inputs, discrete, rng):
 
 
 def assert_directional(guide, parameters, inputs, discrete):
-    """Hold derivatives along random changes of all states and inputs against differences.
+    """Compare directional derivatives with differences, for random changes of states and inputs.
 
-    Differences of fourth order leave 1e-8; what a change of the shape makes of a nearly singular
-    pair of constraints (held and stuck) leaves more.
+    The error of differences of fourth order is 1e-8.  It is larger for a nearly singular pair of
+    constraints (closed stop and sticking friction).
     """
     rng = np.random.default_rng(0)
     kernel, x = moving(guide, parameters, inputs, discrete, rng)
@@ -104,7 +105,7 @@ def assert_directional(guide, parameters, inputs, discrete):
         put(kernel, 0.0, x, dict(zip(input_names(guide), given, strict=True)))
         found = kernel.directional(dx, du)
         error = np.full(len(found), np.inf)
-        for h in (2e-4, 6e-5, 2e-5):  # the best compromise of truncation and rounding
+        for h in (2e-4, 6e-5, 2e-5):  # The smallest sum of truncation and rounding errors counts.
             slope = (8 * (values(h) - values(-h)) - (values(2 * h) - values(-2 * h))) / (12 * h)
             scale = np.abs(slope) + 1e-4 * (1.0 + sizes)
             error = np.minimum(error, np.abs(found - slope) / scale)
@@ -113,12 +114,12 @@ def assert_directional(guide, parameters, inputs, discrete):
 
 
 @pytest.mark.parametrize(("model", "discrete"), [*discrete_states()], ids=str)
-def test_directional_derivatives_are_those_of_differences(model, discrete):
+def test_directional_derivatives_equal_differences(model, discrete):
     assert_directional(mechanism(model), FRICTION, INPUTS, discrete)
 
 
 @each_shipped
-def test_directional_derivatives_of_every_mechanism_in_flight_are_those_of_differences(model):
+def test_directional_derivatives_of_every_mechanism_without_contact_equal_differences(model):
     guide = mechanism(model)
     names = input_names(guide)
     inputs = dict(zip(names, np.linspace(-0.4, 0.3, len(names)), strict=True))
@@ -142,27 +143,29 @@ BLOW = {
 @pytest.mark.parametrize("rubs", [2, 0, 1])
 @pytest.mark.parametrize("slides", [None, 2, 0, 1, -1])
 @pytest.mark.parametrize("side", [0, 1])
-def test_directional_derivatives_of_stretches_and_walls_on_bodies(side, slides, rubs):
-    """A hammer on the stage that carries it, which holds, sticks and slides there."""
+def test_directional_derivatives_with_stretches_and_walls_on_bodies_equal_differences(
+    side, slides, rubs
+):
+    """A hammer and the stage that carries it: open, closed, sticking and sliding."""
     holds = slides is not None
     if side and holds and slides == rubs == 0:
-        pytest.skip("as many constraints as ways to move")
+        pytest.skip("as many constraints as degrees of freedom")
     discrete = (holds, side, slides if holds else 2, 2, rubs)
     assert_directional(anvil(), HAMMER, BLOW, discrete)
 
 
-def test_directional_derivatives_of_a_mechanism_of_many_parts():
+def test_directional_derivatives_of_a_mechanism_with_all_kinds_of_parts_equal_differences():
     guide = elastic()
     inputs = dict.fromkeys(input_names(guide), 0.1) | {"pull.moment": 1e-3, "push.moment": -1e-3}
-    inputs["tap.velocity"] = 0.04  # away from the kink of its indicator
+    inputs["tap.velocity"] = 0.04  # Not at the kink of the event indicator.
     friction = {"rub.coefficient": 0.2, "dry.coefficient": 0.1, "dry.normal_force": 0.3}
     for discrete in ((0, 0, 0, 2, 2, 2, 1, 2), (1, 1, 1, 1, 2, -1, 0, -1)):
         assert_directional(guide, friction, inputs, discrete)
 
 
 @each_shipped
-def test_derivatives_are_those_of_the_motion(model):
-    """What co-simulation moves by in a short time, without any event."""
+def test_derivatives_equal_differences_of_co_simulation(model):
+    """Over a short time without events."""
     exchange = KernelSimulation(mechanism(model), {"release.velocity": 0.2}, exchange=True)
     moving = KernelSimulation(mechanism(model), {"release.velocity": 0.2}, tolerance=1e-12)
     names = [n.removeprefix("der(").removesuffix(")") for n in exchange.slots if "der(link" in n]
@@ -176,7 +179,7 @@ def test_derivatives_are_those_of_the_motion(model):
 
 
 def integrate(kernel, end, h=2e-5, inputs=lambda t: {}):
-    """Integrate with classical steps, bisect to indicators that fall to zero; yield events."""
+    """Integrate by classical Runge-Kutta steps; locate events by bisection; yield each event."""
     t, x = 0.0, kernel.exchange_get()
 
     def f(t, x):
@@ -217,7 +220,7 @@ def integrate(kernel, end, h=2e-5, inputs=lambda t: {}):
             yield t, kernel.indicators()
 
 
-def test_indicators_are_positive_after_every_event_and_impacts_are_those_of_co_simulation():
+def test_indicators_are_positive_after_events_and_impacts_equal_those_of_co_simulation():
     guide, values = mechanism("PRBDM"), {"stop.restitution": 0.4}
     kernel, times = KernelSimulation(guide, values, exchange=True), []
     for t, z in integrate(kernel, 0.2):
@@ -233,7 +236,7 @@ def test_indicators_are_positive_after_every_event_and_impacts_are_those_of_co_s
 
 
 def test_bodies_come_to_rest_on_each_other_in_model_exchange_as_in_co_simulation():
-    """A hammer that is pressed onto the stage that carries it, and rubs there."""
+    """A hammer is pressed onto the stage that carries it, with friction."""
     guide, values = anvil(), {"blow.y": -0.6, "face.restitution": 0.3, "rub.coefficient": 0.0}
     kernel = KernelSimulation(guide, values, exchange=True)
     for _, z in integrate(kernel, 0.03):
@@ -248,10 +251,10 @@ def test_bodies_come_to_rest_on_each_other_in_model_exchange_as_in_co_simulation
         assert kernel.get(name) == pytest.approx(alone.get(name), rel=1e-4, abs=1e-5)
 
 
-def test_a_shape_that_the_states_do_not_determine_is_told_with_a_remedy():
+def test_states_that_do_not_determine_the_shape_are_rejected_with_a_remedy():
     kernel = KernelSimulation(mechanism("PRBDM"), exchange=True)
     x = kernel.exchange_get()
-    x[0] = 0.0  # the links along the shuttle: a parallelogram laid flat
+    x[0] = 0.0  # The links are parallel to the shuttle: a flat parallelogram.
     kernel.exchange_set(0.0, x)
     with pytest.raises(KernelMistake, match=r"do not determine the other angles .* use co-sim"):
         kernel.derivatives()
@@ -260,8 +263,8 @@ def test_a_shape_that_the_states_do_not_determine_is_told_with_a_remedy():
         kernel.derivatives()
 
 
-def test_a_wall_that_strikes_what_rests_on_it_or_leaves_it():
-    """In model exchange as in co-simulation: a change of velocity is an event."""
+def test_a_velocity_step_of_the_wall_strikes_a_resting_body_or_releases_it():
+    """In model exchange as in co-simulation, a change of the wall's velocity is an event."""
     kernel = KernelSimulation(
         mechanism("PRBDM"), {"release.displacement": 0.0, "gravity.x": 9.81}, exchange=True
     )
@@ -285,12 +288,12 @@ def test_a_wall_that_strikes_what_rests_on_it_or_leaves_it():
     assert (other.indicators() > 0.0).all()
 
 
-def test_what_rests_on_a_wall_follows_its_smooth_motion():
-    """The wall's acceleration is below gravity's, so that the shuttle stays on it, unbroken.
+def test_a_body_at_rest_follows_the_smooth_motion_of_its_wall():
+    """The wall's acceleration is below that of gravity, so the shuttle stays on the wall.
 
-    The wall's change of velocity is an event each half of rest_speed; between two of them the
-    shuttle is off the wall by less than that speed times their distance in time.  Energy is kept:
-    the wall's work is what the shuttle gains, up to what those small strikes lose.
+    Each change of the wall's velocity by half of rest_speed is an event.  Between two events the
+    gap is below that speed times the time between them.  The energy balance includes the work of
+    the wall; the strikes at the events lose a small part of it.
     """
     size, omega = 5e-4, 2 * np.pi * 5.0
 
@@ -317,8 +320,8 @@ def test_what_rests_on_a_wall_follows_its_smooth_motion():
     assert 0.0 < kernel.get("energy.dissipated") < 0.05 * work
 
 
-def test_bounces_without_end_end_in_rest_although_gaps_close_late():
-    """Without rest_speed; only bounces lower than 1e-10 of the size may be missing."""
+def test_infinitely_many_bounces_end_in_rest_in_model_exchange():
+    """Without rest_speed; only bounces below 1e-10 of the size of the guide may be missing."""
     values = {"stop.rest_speed": 0.0, "release.displacement": -1e-3}
     kernel = KernelSimulation(mechanism("PRBDM"), values, exchange=True)
     for _, z in integrate(kernel, 0.08, h=1e-4):

@@ -1,4 +1,4 @@
-"""The constants of the C kernel come from Python, and from nowhere else."""
+"""The constants of the C kernel are generated from those of the Python package."""
 
 import ast
 import re
@@ -88,7 +88,7 @@ def test_a_stale_header_fails_the_check(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("file", sources())
-def test_no_number_is_typed_again_in_c(file):
+def test_c_contains_no_literal_of_a_python_constant(file):
     if file not in WHOLE_FILES:
         assert numbers(sources()[file]) <= ALLOWED.get(file, {}).keys()
 
@@ -128,7 +128,7 @@ def test_a_tolerance_is_found_in_python_and_c():
     assert numbers("x = 2.0 * y + 1e-7 + 0.75;") == {"1e-7", "0.75"}
 
 
-def test_no_name_of_the_header_is_defined_again_in_c():
+def test_c_does_not_redefine_names_of_the_generated_header():
     names = "|".join([*re.findall(r"#define (\w+) ", header.header()), *enumerators()])
     again = re.compile(rf"#define ({names})\b|\b({names})\s*=[^=]")
     for file, text in sources().items():
@@ -142,7 +142,7 @@ def enumerators():
     }
 
 
-def test_c_reads_the_integers_of_python():
+def test_integer_constants_of_c_equal_those_of_python():
     found = constants()
     for name, value in enumerators().items():
         assert found[name] == value
@@ -169,7 +169,7 @@ def exported():
     return compiled(text="\n".join(lines)), macros, arrays
 
 
-def test_c_reads_the_bits_of_the_tolerances(exported):
+def test_tolerances_of_c_equal_those_of_python_bit_by_bit(exported):
     library, macros, _ = exported
     for name, value in vars(tolerances).items():
         if name.isupper() and isinstance(value, float):
@@ -177,7 +177,7 @@ def test_c_reads_the_bits_of_the_tolerances(exported):
             assert c_double.in_dll(library, f"value_{name}").value == value
 
 
-def test_c_reads_the_bits_of_the_tableau(exported):
+def test_the_runge_kutta_tableau_of_c_equals_that_of_python_bit_by_bit(exported):
     library, _, arrays = exported
     for name, expected in arrays.items():
         found = (c_double * expected.size).in_dll(library, f"value_{name}")

@@ -1,4 +1,4 @@
-"""The kernel's own functions against multiple precision and NumPy: numbers, matrices, memory."""
+"""Numeric functions of the kernel against multiple precision and NumPy; its working memory."""
 
 import cmath
 import ctypes
@@ -23,21 +23,21 @@ def directions(q, library=None):
     return e
 
 
-def units(found, exact):
+def ulp_error(found, exact):
     """Return an error in units of the last place of the exact result."""
     unit = np.spacing(abs(float(exact)))
     return float(abs(mpmath.mpf(float(found)) - exact) / mpmath.mpf(float(unit)))
 
 
-def worst(function, exact, arguments):
-    return max(units(function(x), exact(mpmath.mpf(float(x)))) for x in arguments)
+def largest_ulp_error(function, exact, arguments):
+    return max(ulp_error(function(x), exact(mpmath.mpf(float(x)))) for x in arguments)
 
 
 # --- exp(i q) -----------------------------------------------------------------------------------
 
 
 def hard_angles():
-    """Return angles of all sizes up to 1e5, and those nearest to multiples of pi/4."""
+    """Return angles of all magnitudes up to 1e5, and the doubles next to multiples of pi/4."""
     k = np.concatenate([np.arange(-40, 41), RNG.integers(-127_000, 127_000, 500)])
     near = k * (np.pi / 4)
     return np.concatenate(
@@ -52,12 +52,12 @@ def hard_angles():
 def test_directions_are_within_one_unit_in_the_last_place():
     q = hard_angles()
     for x, z in zip(q, directions(q), strict=True):
-        assert units(z.real, mpmath.cos(mpmath.mpf(float(x)))) < 1.0
-        assert units(z.imag, mpmath.sin(mpmath.mpf(float(x)))) < 1.0
+        assert ulp_error(z.real, mpmath.cos(mpmath.mpf(float(x)))) < 1.0
+        assert ulp_error(z.imag, mpmath.sin(mpmath.mpf(float(x)))) < 1.0
 
 
-def test_directions_are_exact_where_the_model_is_straight():
-    """exp(0) = 1; at the double next to pi/2 the cosine is what that double lacks of pi/2."""
+def test_directions_are_exact_at_the_angles_of_straight_models():
+    """exp(0) = 1; the cosine of the double next to pi/2 is its difference from pi/2."""
     e = directions([0.0, -0.0, math.pi / 2, math.pi])
     assert e[0] == e[1] == 1.0
     assert e[2] == complex(6.123233995736766e-17, 1.0)
@@ -71,14 +71,14 @@ def test_a_direction_does_not_depend_on_its_neighbours(q):
     assert directions(q).tolist() == alone
 
 
-def test_directions_are_odd_and_even():
+def test_the_direction_of_a_negative_angle_is_the_conjugate():
     q = hard_angles()
     np.testing.assert_array_equal(directions(-q), directions(q).conj())
 
 
 @pytest.mark.parametrize("q", [math.nan, math.inf, -math.inf, 1e5, -1e5, 1e300])
-def test_an_angle_that_means_nothing_gives_no_number(q):
-    """So that a motion that explodes is found, and its neighbours are not touched."""
+def test_the_direction_of_an_invalid_angle_is_nan(q):
+    """A motion that diverges is then detected.  The directions of other angles are not affected."""
     e = directions([0.5, q, 0.5])
     assert math.isnan(e[1].real)
     assert math.isnan(e[1].imag)
@@ -86,7 +86,7 @@ def test_an_angle_that_means_nothing_gives_no_number(q):
 
 
 def sample_bits(library):
-    """Return results of all elementary functions, to be compared bit by bit."""
+    """Return results of all elementary functions as integers, for comparison bit by bit."""
     q = np.random.default_rng(2).uniform(-2e4, 2e4, 4001)
     x = np.exp(q / 40)
     parts = [directions(q, library).view(float), directions(q / 1e4, library).view(float)]
@@ -122,12 +122,12 @@ def test_every_compiler_gives_the_same_bits(how):
 def test_natural_log_is_within_one_unit():
     x = [10.0 ** RNG.uniform(-300, 300, 2000), RNG.uniform(0.5, 2.0, 4000)]
     x += [1.0 + RNG.normal(size=500) * 1e-6, [5e-324, 2.3e-308, 1.7e308, 0.5, 2.0]]
-    assert worst(kernel().natural_log, mpmath.log, np.concatenate(x)) < 1.0
+    assert largest_ulp_error(kernel().natural_log, mpmath.log, np.concatenate(x)) < 1.0
 
 
 def test_exponential_is_within_one_unit():
     x = np.concatenate([RNG.uniform(-700, 709, 2000), RNG.normal(size=4000)])
-    assert worst(kernel().exponential, mpmath.exp, x) < 1.0
+    assert largest_ulp_error(kernel().exponential, mpmath.exp, x) < 1.0
 
 
 def test_limits_of_logarithm_and_exponential():
@@ -144,8 +144,8 @@ def test_limits_of_logarithm_and_exponential():
     assert math.isnan(k.exponential(math.nan))
 
 
-def test_power_loses_what_its_exponent_rounds():
-    """Relative error <= (1 + |y ln x|) 3e-16, which is 4e-16 for the control of the step size."""
+def test_power_error_is_bounded_by_the_rounding_of_its_exponent():
+    """Relative error <= (1 + |y ln x|) 3e-16, which is 4e-16 for the step size control."""
     for x, y in zip(10.0 ** RNG.uniform(-12, 12, 3000), RNG.uniform(-2, 2, 3000), strict=True):
         exact = mpmath.mpf(x) ** mpmath.mpf(y)
         error = abs(mpmath.mpf(kernel().power(x, y)) - exact) / exact
@@ -159,7 +159,7 @@ def test_phase_is_within_two_units_for_vectors_of_any_length():
     for angle in angles:
         z = cmath.rect(10.0 ** RNG.uniform(-3, 3), angle)
         exact = mpmath.atan2(mpmath.mpf(z.imag), mpmath.mpf(z.real))
-        assert units(kernel().phase(z), exact) < 2.0
+        assert ulp_error(kernel().phase(z), exact) < 2.0
 
 
 @pytest.mark.parametrize("z", [1, 1j, -1, -1j, 0, 1 + 1j, 1 - 1j, 3.5, -2e-9j])
@@ -167,18 +167,18 @@ def test_phase_is_exact_on_the_axes(z):
     assert kernel().phase(z) == cmath.phase(z)
 
 
-def test_phase_of_no_number_is_none():
+def test_phase_of_nan_and_infinity_is_nan():
     for z in (math.nan, math.inf, complex(0, math.nan), complex(1, -math.inf)):
         assert math.isnan(kernel().phase(z))
 
 
-def test_finite_numbers_are_told_from_others():
+def test_finite_number_is_false_for_nan_and_infinity():
     assert all(kernel().finite_number(x) for x in (0.0, -1e308, 5e-324))
     assert not any(kernel().finite_number(x) for x in (math.inf, -math.inf, math.nan))
 
 
 @pytest.mark.parametrize("place", [0, 1, 2])
-def test_a_bound_on_the_largest_fails_with_one_that_is_no_number(place):
+def test_no_bound_holds_for_the_largest_entry_if_one_is_not_finite(place):
     x = np.array([3.0, -4.0, 2.0])
     assert kernel().largest(3, x) == 4.0
     for bad in (math.nan, math.inf, -math.inf):
@@ -197,20 +197,21 @@ def test_greater_and_lesser():
 
 
 def rounding(n, *arrays):
-    """Return what some roundings of n terms of the largest entries amount to."""
+    """Return a bound of the rounding error of n terms, from the largest entries of arrays."""
     size = math.prod(float(np.abs(a).max(initial=0.0)) for a in arrays)
     return 20 * n * 2.2e-16 * size
 
 
 def factored(a):
+    """Return whether a matrix is regular, and its LU factors and pivots."""
     n = len(a)
     lu, pivot = a.copy(), np.zeros(n, np.int32)
     return kernel().lu_factor(n, lu, pivot), lu, pivot
 
 
 @pytest.mark.parametrize("n", range(1, 13))
-def test_lu_solves(n):
-    """The residual is a rounding of |a| |x|, for saddle-point matrices too."""
+def test_residual_of_lu_is_a_rounding_error(n):
+    """Also for matrices with zeros on the diagonal, as those of a saddle point."""
     for _ in range(40):
         a, b = RNG.normal(size=(n, n)) * 10.0 ** RNG.uniform(-6, 6), RNG.normal(size=n)
         a[np.arange(n) >= (n + 1) // 2 + 1, -1] = 0.0
@@ -221,7 +222,7 @@ def test_lu_solves(n):
         assert np.abs(a @ x - b).max() <= rounding(n, a, x)
 
 
-def test_lu_refuses_what_is_singular_or_no_number():
+def test_lu_rejects_singular_matrices_and_nan():
     assert not factored(np.zeros((3, 3)))[0]
     assert not factored(np.array([[1.0, 2.0], [2.0, 4.0]]))[0]
     for i in range(3):
@@ -231,8 +232,8 @@ def test_lu_refuses_what_is_singular_or_no_number():
 
 
 @pytest.mark.parametrize("n", range(1, 9))
-def test_cholesky_and_its_solutions(n):
-    """L L^T = M; the upper triangle is not looked at."""
+def test_cholesky_factors_and_solves(n):
+    """L L^T = M; the upper triangle is not read."""
     for _ in range(40):
         L = np.tril(RNG.normal(size=(n, n)))
         np.fill_diagonal(L, RNG.uniform(0.5, 2.0, n))
@@ -250,7 +251,7 @@ def test_cholesky_and_its_solutions(n):
         assert np.abs(found.T @ y - b).max() <= rounding(n, found, y)
 
 
-def test_cholesky_refuses_what_is_not_positive():
+def test_cholesky_rejects_matrices_that_are_not_positive_definite():
     for entry in (1.0, 1.1, np.nan):
         assert not kernel().cholesky(2, np.array([[1.0, 0.0], [entry, 1.0]]))
     assert not kernel().cholesky(2, np.array([[0.0, 0.0], [0.0, 1.0]]))
@@ -268,8 +269,8 @@ SHAPES = [(1, 1), (2, 2), (3, 5), (5, 3), (7, 2), (2, 7), (6, 6), (9, 8)]
 
 
 @pytest.mark.parametrize(("m", "n"), SHAPES)
-def test_least_squares_of_least_norm_as_numpy(m, n):
-    """Of any rank, right sides in the range or not."""
+def test_least_squares_solution_of_least_norm_equals_that_of_numpy(m, n):
+    """For every rank, with right sides in the range or not."""
     for r in range(min(m, n) + 1):
         for _ in range(8):
             a, b, x = of_rank(m, n, r), RNG.normal(size=m), np.full(n, np.nan)
@@ -277,7 +278,7 @@ def test_least_squares_of_least_norm_as_numpy(m, n):
             np.testing.assert_allclose(x, np.linalg.lstsq(a, b, rcond=1e-12)[0], atol=1e-12)
 
 
-def test_small_singular_values_count_or_not_as_rcond_says():
+def test_singular_values_below_rcond_are_taken_as_zero():
     u, v = (np.linalg.qr(RNG.normal(size=(3, 3)))[0] for _ in range(2))
     a, b = u @ np.diag([1.0, 1e-3, 1e-7]) @ v, RNG.normal(size=3)
     for rcond in (1e-9, 1e-5, 1e-2):
@@ -288,13 +289,13 @@ def test_small_singular_values_count_or_not_as_rcond_says():
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8, 13])
-def test_eigenvalues_and_vectors_of_symmetric_matrices(n):
-    """A z = w z, z orthonormal, w rising and NumPy's; for multiple and graded ones too."""
+def test_eigenvalues_and_vectors_of_symmetric_matrices_equal_those_of_numpy(n):
+    """A z = w z, z orthonormal, w ascending; also for multiple and for graded eigenvalues."""
     for kind in range(20):
         a = RNG.normal(size=(n, n))
         a = a + a.T
         if kind % 4 == 1:
-            a = np.outer(a[0], a[0])  # a multiple eigenvalue
+            a = np.outer(a[0], a[0])  # Zero is a multiple eigenvalue.
         if kind % 4 == 2:
             scale = 10.0 ** RNG.uniform(-6, 0, n)
             a = scale[:, None] * a * scale
@@ -311,7 +312,7 @@ def test_eigenvalues_and_vectors_of_symmetric_matrices(n):
 
 
 @pytest.mark.parametrize(("r", "n"), [(0, 1), (0, 4), (1, 2), (2, 3), (2, 7), (6, 7), (3, 9)])
-def test_null_space_is_an_orthonormal_basis_of_what_is_sent_to_zero(r, n):
+def test_null_space_is_an_orthonormal_basis(r, n):
     for _ in range(20):
         rows, z = of_rank(r, n, r) if r else np.zeros((0, n)), np.zeros((n, n - r))
         kernel().null_space(r, n, rows, z)
@@ -335,7 +336,7 @@ def test_sums_and_products_of_vectors():
 # --- memory ---------------------------------------------------------------------------------------
 
 
-def test_places_are_aligned_follow_each_other_and_are_counted_before():
+def test_placed_arrays_are_aligned_and_do_not_overlap_and_their_size_is_counted_without_memory():
     counting, placing = structures()["Memory"](None, 0), structures()["Memory"](4096, 0)
     ends = 4096
     for count, size in ((3, 1), (1, 8), (0, 8), (5, 8), (2, 24)):
@@ -347,7 +348,7 @@ def test_places_are_aligned_follow_each_other_and_are_counted_before():
         assert placing.used == counting.used >= ends - 4096
 
 
-def test_a_block_that_no_memory_holds_counts_as_all_of_it():
+def test_the_size_of_a_block_larger_than_all_memory_saturates():
     memory = structures()["Memory"](None, 0)
     kernel().place(memory, 2**61, 16)
     assert memory.used == 2**64 - 1
@@ -361,8 +362,8 @@ def scratch(size, room):
     return known, block, spare
 
 
-def test_working_memory_that_is_used_up_yields_the_spare_block():
-    """Nothing is overwritten, and what would have been enough is known."""
+def test_exhausted_working_memory_returns_the_spare_block():
+    """Arrays in use are not overwritten, and the required size is recorded."""
     known, block, spare = scratch(10, 8)
     take = kernel().library.take
     take.restype = ctypes.c_void_p
@@ -378,7 +379,7 @@ def test_working_memory_that_is_used_up_yields_the_spare_block():
     assert known.most == 19
 
 
-def test_matrices_complex_numbers_and_integers_are_taken_in_doubles():
+def test_matrices_complex_numbers_and_integers_are_allocated_in_doubles():
     for name, given_, doubles in (
         ("take_matrix", (3, 4), 12),
         ("take_complex", (3, 4), 24),
@@ -391,8 +392,8 @@ def test_matrices_complex_numbers_and_integers_are_taken_in_doubles():
         assert known.used == doubles
 
 
-def test_a_sentence_that_is_too_long_is_cut():
-    """What does not fit is left out; the last byte stays a zero."""
+def test_a_message_that_is_too_long_is_truncated():
+    """The last byte of the buffer remains zero."""
     with pytest.raises(KernelError, match=r"^x = 0.5 m must be positive$"):
         kernel().fail(b"%s = %g m must be positive", b"x", ctypes.c_double(0.5))
     room = structures()["Problem"].text.size

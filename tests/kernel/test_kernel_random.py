@@ -1,4 +1,4 @@
-"""The C kernel moves random mechanisms as the engine does: loops, joints, walls on bodies."""
+"""Random mechanisms with loops, joints and walls on bodies: the C kernel equals the engine."""
 
 import numpy as np
 import pytest
@@ -8,20 +8,20 @@ from prbm.fmu.python_fmu import interface
 from prbm.hybrid.simulation import Simulation
 from random_mechanisms import inputs, seeded
 
-SPAN, LOOKS = 4e-3, 4  # s; hits, rest and sticking come within it
-FEW, MANY = range(12), range(12, 120)
-SAME = 1e-5  # of a nominal; roundings grow on the way, and a hit turns time into speed
+SPAN, COMPARISONS = 4e-3, 4  # s; impacts, rest and sticking occur within it.
+SEEDS, SLOW_SEEDS = range(12), range(12, 120)
+DEVIATION_MAX = 1e-5  # Of a nominal; rounding errors grow, and impacts turn time into speed errors.
 COUNTED = ("impact_count", "contact")
 
 
 def deviations(seed):
-    """Return by how much the two differ, in units of nominals; what is counted is equal."""
+    """Return the largest deviation of each output over its nominal; check that counts are equal."""
     mechanism = seeded(seed)
     values = inputs(mechanism, seed)
     engine, kernel = Simulation(mechanism, values), KernelSimulation(mechanism, values)
     nominal = {v.name: v.nominal or 1.0 for v in interface(mechanism, {})}
     result = {}
-    for t in np.linspace(0.0, SPAN, LOOKS + 1):
+    for t in np.linspace(0.0, SPAN, COMPARISONS + 1):
         engine.advance(t)
         kernel.advance(t)
         expected, found = engine.outputs(), kernel.outputs()
@@ -30,16 +30,16 @@ def deviations(seed):
             if name.endswith(COUNTED):
                 assert found[name] == x, (name, t)
             if name.endswith("modal_restitution") and expected["mode.frequency"] == 0.0:
-                continue  # what swings without a spring has no fundamental mode of its own
+                continue  # A body that swings without a spring has no unique fundamental mode.
             scale = max(nominal[name], abs(x))
             result[name] = max(result.get(name, 0.0), abs(found[name] - x) / scale)
     return result
 
 
 @pytest.mark.parametrize(
-    "seed", [*FEW, *(pytest.param(seed, marks=pytest.mark.slow) for seed in MANY)]
+    "seed", [*SEEDS, *(pytest.param(seed, marks=pytest.mark.slow) for seed in SLOW_SEEDS)]
 )
-def test_the_kernel_moves_a_random_mechanism_as_the_engine_does(seed):
-    off = deviations(seed)
-    worst = max(off, key=off.__getitem__)
-    assert off[worst] <= SAME, (worst, off[worst])
+def test_the_kernel_computes_the_motion_of_a_random_mechanism_as_the_engine_does(seed):
+    found = deviations(seed)
+    worst = max(found, key=found.__getitem__)
+    assert found[worst] <= DEVIATION_MAX, (worst, found[worst])

@@ -1,4 +1,4 @@
-"""The kernel's motion is the engine's, event by event, in every kind of motion that there is."""
+"""Simulations in the kernel and in the engine agree, event by event, in all kinds of motion."""
 
 import ctypes
 from dataclasses import replace
@@ -52,18 +52,18 @@ SCENARIOS = {
     ),
     "pulled off": ({"stop.restitution": 0.2}, {80: {"force.x": -1.5}, 100: {"force.x": 0.0}}),
 }  # fmt: skip
-ENDS = {"thrown at the wall": 0.05}  # from there on the 2R turns 1e-12 into 1e-2
+END_TIMES = {"thrown at the wall": 0.05}  # s; later the 2R guide amplifies 1e-12 to 1e-2.
 
 
 def compared(guide, values, schedule, end=END, step=STEP):
-    """Run both side by side, compare everything at every step, return the last outputs.
+    """Run both engines, compare all outputs at every step, return the last outputs of the kernel.
 
-    Differences grow from rounding by what the motion amplifies (a few hundred for the damped 2R);
-    at rest, the fast modes keep a noise of the size of the tolerance times their frequency.
+    The motion amplifies rounding errors, by a few hundred for the damped 2R guide.  At rest, the
+    fast modes keep a noise of the size of the tolerance times their frequency.
     """
     engine, kernel = Simulation(guide, values), KernelSimulation(guide, values)
     nominal = {v.name: v.nominal or 1.0 for v in interface(guide, {})}
-    counts = [f"{stop.name}.{what}" for stop in guide.stops for what in ("impact_count", "contact")]
+    counts = [f"{stop.name}.{name}" for stop in guide.stops for name in ("impact_count", "contact")]
     for k in range(round(end / step)):
         change = schedule.get(k, {})
         engine.set(change)
@@ -82,14 +82,14 @@ def compared(guide, values, schedule, end=END, step=STEP):
 
 @pytest.mark.parametrize("name", SCENARIOS)
 @pytest.mark.parametrize("model", GUIDES)
-def test_the_kernel_moves_as_the_engine_does(model, name):
+def test_the_motion_of_the_guides_in_the_kernel_equals_that_in_the_engine(model, name):
     values, schedule = SCENARIOS[name]
-    compared(mechanism(model), values, schedule, end=ENDS.get(name, END))
+    compared(mechanism(model), values, schedule, end=END_TIMES.get(name, END))
 
 
 @pytest.mark.parametrize("how", ["default", "driven", "damped"])
 @each_shipped
-def test_the_kernel_moves_every_mechanism_as_the_engine_does(model, how):
+def test_the_motion_of_every_mechanism_in_the_kernel_equals_that_in_the_engine(model, how):
     it = case(model)
     values, schedule = {
         "default": ({}, {}),
@@ -103,7 +103,7 @@ def test_the_kernel_moves_every_mechanism_as_the_engine_does(model, how):
 
 @pytest.mark.parametrize("model", GUIDES)
 @pytest.mark.parametrize("friction", [0.0, 0.2])
-def test_two_stops_in_the_kernel_are_those_of_the_engine(model, friction):
+def test_the_motion_with_two_stops_in_the_kernel_equals_that_in_the_engine(model, friction):
     fields = {"friction": friction, "restitution": 0.5}
     guide = two_stops(model, high=fields | {"position": -3e-3}, low=fields)
     compared(guide, {"release.displacement": -0.01}, {})
@@ -127,15 +127,15 @@ HAMMERED = {
 
 
 @pytest.mark.parametrize("name", HAMMERED)
-def test_bodies_that_hit_and_rest_on_each_other_do_so_in_the_kernel(name):
-    """On flexures that stretch: impacts on a body, rest on it, friction there."""
+def test_impacts_and_rest_between_bodies_in_the_kernel_equal_those_in_the_engine(name):
+    """Impacts on a body, rest on it and friction there, with flexures that stretch."""
     values, schedule = HAMMERED[name]
     found = compared(anvil(), values, schedule, end=0.12)
     assert found["face.impact_count"] + found["face.contact"] > 0.0
 
 
-def test_a_mechanism_of_many_parts_moves_in_the_kernel_as_in_the_engine():
-    """A chain, a free end, bars, joints, walls on bodies: until a few impacts have been."""
+def test_the_motion_with_all_kinds_of_parts_in_the_kernel_equals_that_in_the_engine():
+    """A chain, a free end, bars, joints and walls on bodies, over the first impacts."""
     compared(
         elastic(),
         {"L": 0.05, "solver.tolerance": 1e-10},
@@ -144,13 +144,13 @@ def test_a_mechanism_of_many_parts_moves_in_the_kernel_as_in_the_engine():
     )
 
 
-def test_the_guide_of_the_thesis_appendix_in_the_kernel():
+def test_the_motion_of_the_pmma_guide_in_the_kernel_equals_that_in_the_engine():
     compared(mechanism("PRBDM"), PMMA, {}, end=0.5)
 
 
 @each_shipped
-def test_the_default_run_hits_when_the_engine_says(model):
-    """Every impact to 1e-7 s; and the guides end in rest."""
+def test_impact_times_of_the_default_experiment_equal_those_of_the_engine(model):
+    """Every impact to 1e-7 s; the guides end in rest after 14 impacts."""
     it, kernel = case(model), KernelSimulation(mechanism(model))
     for impact in record(model):
         kernel.advance(impact.time + 1e-6)
@@ -164,7 +164,7 @@ def test_the_default_run_hits_when_the_engine_says(model):
 
 
 @each_shipped
-def test_a_restored_state_goes_on_to_the_bit(model):
+def test_a_restored_state_continues_bit_by_bit(model):
     it = case(model)
     kernel = KernelSimulation(mechanism(model), {f"{it.stop}.friction": 0.1})
     for time in (0.0, 0.1 * it.end, record(model)[0].time + 1e-6, 0.5 * it.end, 0.87 * it.end):
@@ -179,11 +179,11 @@ def test_a_restored_state_goes_on_to_the_bit(model):
         kernel.restore(state)
 
 
-def test_a_damaged_state_is_refused_and_changes_nothing():
+def test_a_damaged_state_is_rejected_and_a_valid_one_can_still_be_restored():
     kernel = KernelSimulation(mechanism("PRBDM2R"))
     kernel.advance(0.05)
     state, rng = kernel.state, np.random.default_rng(0)
-    refused = 0
+    rejected = 0
     for _ in range(300):
         damaged = state.copy()
         damaged[rng.integers(len(state))] = rng.choice([np.nan, np.inf, -1.0, 1e300, 0.5])
@@ -191,15 +191,15 @@ def test_a_damaged_state_is_refused_and_changes_nothing():
             kernel.restore(damaged)
             kernel.advance(max(kernel.get("time"), 0.05) + 1e-3)
         except KernelMistake:
-            refused += 1
+            rejected += 1
         kernel.restore(state)
         assert kernel.state.tobytes() == state.tobytes()
-    assert refused > 30
+    assert rejected > 30
 
 
 @each_shipped
 def test_an_instance_takes_less_than_256_kib(model):
-    """But for what has many coordinates, whose matrices grow with their square."""
+    """With many coordinates the limit is 512 bytes times the square of their number."""
     kernel, guide = KernelSimulation(mechanism(model)), mechanism(model)
     coordinates = assemble(guide, guide.values()).n
     assert library().simulation_bytes(kernel.inner) < max(256 * 1024, 512 * coordinates**2)
@@ -214,15 +214,15 @@ def test_an_instance_takes_less_than_256_kib(model):
         {"flexure.thickness": -1.0},
     ],
 )
-def test_what_the_engine_refuses_the_kernel_refuses_in_the_same_words(values):
-    with pytest.raises(PrbmError) as told:
+def test_the_kernel_rejects_values_with_the_same_message_as_the_engine(values):
+    with pytest.raises(PrbmError) as engine:
         Simulation(mechanism("PRBDM2R"), values)
-    with pytest.raises(KernelMistake) as said:
+    with pytest.raises(KernelMistake) as kernel:
         KernelSimulation(mechanism("PRBDM2R"), values)
-    assert str(said.value) == str(told.value)
+    assert str(kernel.value) == str(engine.value)
 
 
-def test_chatter_without_an_end_is_stopped():
+def test_endless_chatter_is_an_error():
     values = {
         "stop.rest_speed": 0.0, "stop.restitution": 1.0, "release.displacement": -1e-8,
         "gravity.x": 0.0, "damping.beta": 0.0, "force.x": 17000.0,
@@ -234,8 +234,8 @@ def test_chatter_without_an_end_is_stopped():
     assert kernel.state.tobytes() == before.tobytes()
 
 
-def test_a_time_that_has_no_digits_left_for_a_step_is_refused():
-    """Instead of steps that lead nowhere, for ever."""
+def test_a_time_that_is_too_large_to_resolve_a_step_is_an_error():
+    """Steps would otherwise not advance the time, without end."""
     kernel = KernelSimulation(mechanism("PRBDM"), start_time=1e18)
     with pytest.raises(KernelMistake, match="lost in the rounding of the time"):
         kernel.advance(1e18 + 256.0)
@@ -245,8 +245,8 @@ def test_a_time_that_has_no_digits_left_for_a_step_is_refused():
 
 
 @each_shipped
-def test_a_communication_step_in_pieces_is_the_same_step(model):
-    """A moving wall goes on as planned, whether or not the step is left at each internal one."""
+def test_a_communication_step_may_be_left_at_each_internal_step(model):
+    """The motion is the same as without, also with a moving wall."""
     it = case(model)
     values, step = {f"{it.stop}.velocity": -0.05, f"{it.stop}.friction": 0.1}, it.end / 60
     whole, pieces = (KernelSimulation(mechanism(model), values) for _ in range(2))
@@ -279,7 +279,7 @@ def many_stops(count):
 
 @pytest.mark.parametrize("count", [12, 20])
 def test_many_resting_stops_carry_the_weight_together(count):
-    """So many that all sets are tried, and more."""
+    """With 12 stops, and with 20, whose sets are too many to try all."""
     guide = many_stops(count)
     kernel = KernelSimulation(guide, {"release.displacement": -2e-3})
     kernel.advance(0.2)

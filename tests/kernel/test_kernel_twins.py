@@ -59,14 +59,14 @@ TWINS = {}
 
 
 def twin(**pairs):
-    """Say which functions of the kernel a test compares with which of the package."""
+    """Register the pairs of functions of the kernel and of the package that a test compares."""
 
     def decorated(test):
         @functools.wraps(test)
         def checked(*arguments, **keywords):
             kernel().called.clear()
             test(*arguments, **keywords)
-            assert pairs.keys() <= kernel().called, "not called at all"
+            assert pairs.keys() <= kernel().called, "a function was not called"
 
         assert not pairs.keys() & TWINS.keys()
         TWINS.update(pairs)
@@ -76,7 +76,7 @@ def twin(**pairs):
 
 
 def assert_same(found, expected, rel=1e-12, scale=0.0):
-    """Hold arrays or numbers against each other, relative to the largest entry."""
+    """Compare arrays or numbers, relative to the largest entry."""
     found, expected = np.asarray(found), np.asarray(expected)
     assert found.shape == expected.shape
     size = max(float(np.abs(expected).max(initial=0.0)), scale)
@@ -84,14 +84,14 @@ def assert_same(found, expected, rel=1e-12, scale=0.0):
 
 
 def sentence(error, function, *arguments):
-    """Return what an error says."""
+    """Return the message of the error that a function raises."""
     with pytest.raises(error) as caught:
         function(*arguments)
     return str(caught.value)
 
 
 def outcome(function, *arguments):
-    """Return what a function returns, or what it says when it refuses."""
+    """Return the result of a function, or the message of its error."""
     try:
         return function(*arguments)
     except (KernelError, ParameterError) as error:
@@ -99,7 +99,7 @@ def outcome(function, *arguments):
 
 
 def spread(condition):
-    """Return what a solution of such a system has in common: some roundings times its condition."""
+    """Return the relative tolerance of the solution of a system with a condition number."""
     return max(1e-12, 50 * 2.2e-16 * condition)
 
 
@@ -116,7 +116,7 @@ def described(name):
 
 @functools.cache
 def both(name):
-    """Return a mechanism and it in the kernel."""
+    """Return a mechanism and its system in the kernel."""
     guide = described(name)
     system = assembly.assemble(guide, guide.values())
     return guide, KernelSystem(guide, system.n - len(system.loops))
@@ -131,12 +131,12 @@ def varied(guide, rng):
         x = values[p.name] * (1.0 + 0.04 * rng.uniform(-1, 1))
         x += (p.name.endswith("friction") or p.name.endswith("zeta")) * 0.1 * rng.uniform()
         values[p.name] = min(max(x, p.minimum), p.maximum)
-    # the sum of the gammas must not exceed one
+    # The sum of the gammas must not exceed one.
     return guide.values({k: v for k, v in values.items() if ".gamma" not in k or v < 0.9})
 
 
 def systems(name, count=5, seed=0):
-    """Yield the assembled system, the kernel's, and a generator of random numbers."""
+    """Yield the system of the package, that of the kernel, and a generator of random numbers."""
     rng = np.random.default_rng(seed)
     guide, ours = both(name)
     for k in range(count):
@@ -150,7 +150,7 @@ def random_state(system, rng, turn=0.3):
 
 
 def bent(system, rng):
-    """Return angles near a bent shape: straight flexures do not reach further anywhere."""
+    """Return angles near a bent shape, from which the loops can be closed in every direction."""
     x = float(rng.choice([-1.0, 1.0]) * rng.uniform(1e-3, 4e-3))
     return statics.equilibrium(system, x).q + 3e-4 * rng.normal(size=system.n)
 
@@ -168,7 +168,7 @@ each_mechanism = pytest.mark.parametrize("name", [*SHIPPED, *OWN_MECHANISMS])
 
 
 @twin(evaluate=Affine.__call__)
-def test_expressions_have_the_same_values():
+def test_values_of_expressions_are_the_same():
     rng = np.random.default_rng(0)
     for count in range(4):
         x, factors = rng.normal(size=8), rng.normal(size=count)
@@ -180,7 +180,7 @@ def test_expressions_have_the_same_values():
 
 
 @twin(check_parameter=Parameter.check)
-def test_what_a_parameter_may_not_be_is_told_in_the_same_words():
+def test_messages_about_invalid_parameters_are_the_same():
     for name in NAMES:
         guide, ours = both(name)
         kind = structures()["Parameter"]
@@ -194,7 +194,7 @@ def test_what_a_parameter_may_not_be_is_told_in_the_same_words():
 
 
 @twin(check_values=Mechanism.values)
-def test_values_are_checked_with_the_expressions_that_depend_on_them():
+def test_checks_of_values_and_of_dependent_expressions_are_the_same():
     guide, ours = both("Rich")
     names = [p.name for p in guide.parameters]
     for name, x in (("L", 0.05), ("L", 1e9), ("L", 600.0), ("L", 1e-8), ("high.friction", -0.1)):
@@ -207,7 +207,7 @@ def test_values_are_checked_with_the_expressions_that_depend_on_them():
 
 
 @twin(stub=flexure.stub)
-def test_stubs_are_the_same_and_so_is_what_is_too_long():
+def test_stubs_and_messages_about_too_long_links_are_the_same():
     rng = np.random.default_rng(0)
     for count in (1, 2, 3):
         for _ in range(50):
@@ -232,7 +232,7 @@ ENDS = [
 @pytest.mark.parametrize("ends", ENDS)
 @pytest.mark.parametrize("links", [1, 4])
 @pytest.mark.parametrize("name", flexure.MODELS)
-def test_flexures_are_cut_into_the_same_segments(name, links, ends):
+def test_segments_of_flexures_are_the_same(name, links, ends):
     rng = np.random.default_rng(0)
     model = replace(flexure.MODELS[name], links=links if name == "nR" else 0)
     pivots = len(model.gamma)
@@ -305,7 +305,7 @@ def test_the_arrays_of_a_mechanism_are_the_same(name):
         assert not (outside * np.abs(system.H)).any()
 
 
-def test_the_size_is_the_same_where_all_centres_are_at_one_place():
+def test_the_size_of_a_mechanism_with_all_centres_at_one_point_is_the_same():
     guide = mechanism("Cantilever")
     (root,), (tip,) = guide.ground.values(), guide.bodies
     balanced = replace(guide, bodies=(replace(tip, centre=root),))
@@ -324,8 +324,8 @@ def test_the_size_is_the_same_where_all_centres_are_at_one_place():
         {"leaf.gamma1": 0.9, "leaf.gamma2": 0.9},
     ],
 )
-def test_what_cannot_be_assembled_is_told_in_the_same_words(change):
-    """No length, no mass, links too long: of the ends, the tables do not keep the names."""
+def test_messages_about_failures_of_the_assembly_are_the_same(change):
+    """No length, no mass, too long links.  The kernel has no names of the ends of a flexure."""
     guide, ours = both("Rich")
     values = guide.values() | change
     said = sentence(ParameterError, assembly.assemble, guide, values)
@@ -333,8 +333,8 @@ def test_what_cannot_be_assembled_is_told_in_the_same_words(change):
 
 
 def refused(guide, count):
-    """Return what package and kernel say of a mechanism that cannot be assembled."""
-    with pytest.MonkeyPatch.context() as patch:  # which assemble it, too
+    """Return the messages of package and kernel about a mechanism that cannot be assembled."""
+    with pytest.MonkeyPatch.context() as patch:  # These functions would assemble the mechanism.
         patch.setattr(prbm.interface.tables, "check_size", lambda mechanism: None)
         patch.setattr(prbm.interface.tables, "slots", lambda mechanism, independent: {})
         ours = KernelSystem(guide, count)
@@ -342,8 +342,8 @@ def refused(guide, count):
     return said, sentence(KernelError, ours.assemble, guide.values())
 
 
-def test_loops_that_ask_for_the_same_are_named_in_the_same_words():
-    """Two bars beside a leaf that is as long as they are at every shape near the straight one."""
+def test_messages_about_redundant_loops_are_the_same():
+    """Two bars parallel to a flexure of the same length constrain the same motion."""
     guide = mechanism("PRBDM2R")
     one, other = guide.flexures
     bar = replace(one, type="bar", ends=("pin", "pin"))
@@ -355,7 +355,7 @@ def test_loops_that_ask_for_the_same_are_named_in_the_same_words():
     assert "closed by a_fourth, third depend" in ours
 
 
-def test_points_that_a_joint_cannot_join_are_told_in_the_same_words():
+def test_messages_about_points_that_a_joint_cannot_connect_are_the_same():
     guide = elastic()
     hinge, hook = guide.joints
     theirs, ours = refused(replace(guide, joints=(replace(hinge, start="stage.top"), hook)), 15)
@@ -380,7 +380,7 @@ def test_inertia_is_the_same(name):
 
 @twin(motion=system_arrays.System.motion)
 @each_mechanism
-def test_points_move_alike(name):
+def test_displacements_and_velocities_of_points_are_the_same(name):
     kind = structures()["BodyFrame"]
     for system, ours, rng in systems(name):
         q, v = random_state(system, rng, 0.5)
@@ -401,7 +401,7 @@ def test_points_move_alike(name):
     spread=system_arrays.System.spread,
 )  # fmt: skip
 @each_mechanism
-def test_arms_turn_and_stretch_alike(name):
+def test_directions_and_rates_of_arms_are_the_same(name):
     for system, ours, rng in systems(name):
         q, v = random_state(system, rng, 0.5)
         e, w = np.zeros((2, system.n), complex)
@@ -416,7 +416,7 @@ def test_arms_turn_and_stretch_alike(name):
 
 
 class KernelRows:
-    """Rows of the package as ones of the kernel, and the arrays behind them."""
+    """Rows of the package, converted to those of the kernel; the object owns their arrays."""
 
     def __init__(self, ours, rows):
         self.rows, r = rows, len(rows)
@@ -429,7 +429,7 @@ class KernelRows:
 
 
 def assert_same_rows(found, expected, e, v):
-    """Hold the values of rows against each other, and what follows from them."""
+    """Compare values, Jacobians, rates and convective terms of rows."""
     r, n = len(expected), expected.system.n
     size = float(np.abs(expected.B).max(initial=0.0))
     s, rows = np.zeros(r), np.zeros((r, n))
@@ -454,7 +454,7 @@ def assert_same_rows(found, expected, e, v):
 )  # fmt: skip
 @each_mechanism
 def test_scalars_and_their_derivatives_are_the_same(name):
-    """Of all loops, gaps and displacements, some of them seen from a body that moves."""
+    """For loops, gaps, slides and friction points, some with respect to a moving body."""
     for system, ours, rng in systems(name):
         q, v = random_state(system, rng, 0.5)
         e = system.directions(q)
@@ -473,7 +473,7 @@ def random_saddle(rng, n, r):
 
 
 @twin(saddle=constraints.saddle, solve=constraints.solve)
-def test_saddle_point_systems_are_stacked_and_solved_alike():
+def test_saddle_point_systems_and_their_solutions_are_the_same():
     rng = np.random.default_rng(0)
     for n, r in ((1, 0), (3, 2), (7, 2), (7, 5), (9, 4)):
         for _ in range(10):
@@ -489,27 +489,27 @@ def test_saddle_point_systems_are_stacked_and_solved_alike():
             assert_same(x, constraints.solve(expected, right), rel)
 
 
-def test_singular_equations_are_told_in_the_same_words():
+def test_messages_about_singular_equations_are_the_same():
     kkt = np.zeros((3, 3))
     said = sentence(KernelError, kernel().solve, 3, kkt, np.ones(3))
     assert said == sentence(SimulationError, constraints.solve, np.zeros((3, 3)), np.ones(3))
 
 
 def even(x):
-    """Return vectors padded with a zero to an even length, as the kernel keeps them."""
+    """Return vectors padded with a zero to an even length, as the kernel stores them."""
     padded = np.pad(x, [(0, 0)] * (x.ndim - 1) + [(0, x.shape[-1] % 2)])
     return np.ascontiguousarray(padded)
 
 
 def factors_of(M, rows, columns, sizes):
-    """Return the kernel's Factors of a matrix of such blocks, and the arrays behind them."""
+    """Return the kernel's Factors of a matrix with blocks of some sizes, and their arrays."""
     r, n = rows.shape
     L = np.linalg.cholesky(M)
     root = np.diag(L).copy()
     L /= root
     Z, Z_columns = (even(np.linalg.solve(L, part.T).T) for part in (rows, columns))
     if np.array_equal(rows, columns):
-        Z_columns = Z  # by which the kernel knows that they are the same
+        Z_columns = Z  # The kernel compares the pointers.
     starts = np.cumsum([0, *sizes])
     parts = np.concatenate([L[a:b, a:b].ravel() for a, b in itertools.pairwise(starts)])
     blocks = np.array([starts[:-1], sizes], np.int32).T.copy()
@@ -528,8 +528,8 @@ def solved_again(factors, right, n):
 
 @twin(factor_schur=constraints.factor_and_solve, solve_again=constraints.solve_again)
 @pytest.mark.parametrize("sizes", [(1,), (3,), (4, 3), (2, 1, 4), (5, 6)])
-def test_what_is_factored_solves_again_and_again(sizes):
-    """With columns of their own, as for sliding friction, or with the rows."""
+def test_repeated_solutions_with_one_factorization_are_the_same(sizes):
+    """With columns that differ from the rows, as for sliding friction, and with equal ones."""
     rng, n = np.random.default_rng(0), sum(sizes)
     block = np.repeat(range(len(sizes)), sizes)
     for r in range(n):
@@ -549,8 +549,8 @@ def test_what_is_factored_solves_again_and_again(sizes):
 
 
 @pytest.mark.parametrize("scales", [(1e30, 1e30, 1e30, 1e-75), (3e-23, 3e-23, 3e-23, 1e20)])
-def test_rows_of_very_different_sizes_are_factored_as_exactly_as_others(scales):
-    """Of four unit masses, each row asks one for what it then does."""
+def test_factorization_is_exact_for_rows_of_very_different_sizes(scales):
+    """Each row prescribes the acceleration 1 of one of four unit masses, with its own scale."""
     factors, _arrays = factors_of(np.eye(4), np.diag(scales), np.diag(scales), (1, 1, 1, 1))
     assert kernel().factor_schur(factors)
     found = solved_again(factors, np.concatenate([np.zeros(4), scales]), 4)
@@ -564,9 +564,9 @@ def scaled_condition(kkt):
 
 
 def assert_same_turn(found, expected, start, system, M, rows):
-    """Hold angles that were moved onto the same constraints against each other.
+    """Compare angles after projections onto the same constraints.
 
-    The constraints are closed to 1e-14 of the size; solving for the way there has its roundings.
+    The constraints are closed to 1e-14 of the size.  The corrections have rounding errors.
     """
     X = np.linalg.solve(M, rows.T)
     leverage = np.abs(X @ np.linalg.inv(rows @ X)).sum(axis=1).max(initial=0.0)
@@ -581,7 +581,7 @@ def assert_same_turn(found, expected, start, system, M, rows):
     project_velocities=constraints.project_velocities,
 )
 @each_mechanism
-def test_projections_lead_to_the_same_state(name):
+def test_projections_are_the_same(name):
     for system, ours, rng in systems(name):
         q, v = bent(system, rng), rng.normal(size=system.n)
         n, loops = system.n, system.loop_rows
@@ -602,7 +602,7 @@ def test_projections_lead_to_the_same_state(name):
         assert_same(rows.T @ impulses, momentum, rel, scale=np.abs(M).max() * np.abs(v).max())
 
 
-def test_what_cannot_be_closed_is_told_in_the_same_words():
+def test_messages_about_loops_that_cannot_be_closed_are_the_same():
     for system, ours, _ in systems("PRBDM", 1):
         loops, c = system.loop_rows, system.loops_c + 1.0
         mine = KernelRows(ours, loops)
@@ -642,7 +642,7 @@ def test_forces_and_energies_are_the_same(name):
         kernel().generalised(n, w, e, Q)
         assert_same(Q, forces.generalised(w, e))
         found = kernel().gravitational_energy(ours.structure, e)
-        size = float(np.abs(system.S).sum() * abs(system.gravity))  # of what is subtracted
+        size = float(np.abs(system.S).sum() * abs(system.gravity))  # Of the terms of the sum.
         assert_same(found, forces.gravitational_energy(system, e), scale=size)
         for lift in (-1.0, 1.0):
             found = kernel().normal_force(lift, 2.0, 3.0)
@@ -676,7 +676,7 @@ def test_responses_are_the_same():
 @twin(newton=contact.newton)
 @pytest.mark.parametrize("k", [1, 2, 3, 4, 6])
 def test_frictionless_impacts_of_several_stops_are_the_same(k):
-    """Of any rank, down to one; closing, resting, those that get no impulse, and no solution."""
+    """For every rank; closing and resting stops, stops without impulse, and no solution."""
     rng, solved = np.random.default_rng(k), 0
     for _ in range(200):
         rank = int(rng.integers(1, k + 1))
@@ -701,8 +701,8 @@ def test_frictionless_impacts_of_several_stops_are_the_same(k):
     assert solved > 30
 
 
-def test_many_stops_have_impulses_that_satisfy_the_law():
-    """Twenty-four stops at once, of full rank and of less."""
+def test_impulses_of_many_stops_satisfy_the_law_of_impact():
+    """Twenty-four stops at once."""
     rng = np.random.default_rng(0)
     k = 24
     W = mobility(rng, k, 40)
@@ -721,7 +721,7 @@ def test_many_stops_have_impulses_that_satisfy_the_law():
 )  # fmt: skip
 @pytest.mark.parametrize(("k", "m"), [(0, 2), (3, 0), (2, 3), (8, 8)])
 def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
-    """Of full rank; tangents with a limit of their own, and such that a normal bears."""
+    """For full rank; the limits of friction are fixed or proportional to a normal force."""
     rng = np.random.default_rng(10 * k + m)
     for _ in range(50):
         W, u = mobility(rng, k + m, k + m + 2), rng.normal(size=k + m)
@@ -756,15 +756,15 @@ def test_impulses_above_a_least_impulse_are_the_same(k):
         assert (P[:k] >= least).all()
 
 
-def test_a_problem_without_a_solution_has_none_in_either():
+def test_both_find_that_a_complementarity_problem_has_no_solution():
     M, q, z = np.array([[1.0, -1.0], [-1.0, 1.0]]), np.array([-1.0, -1.0]), np.zeros(2)
     assert complementarity.lemke(M, q, np.ones(2)) is None
     assert not kernel().lemke(2, M, q, np.ones(2), z)
 
 
 @twin(stronge=contact.stronge)
-def test_hits_with_friction_are_the_same():
-    """Full rank and one degree of freedom, sliding, sticking and jammed, mu and eps at bounds."""
+def test_impacts_with_friction_are_the_same():
+    """Of rank two and one; sliding, sticking and jammed; also mu and eps at their bounds."""
     rng = np.random.default_rng(0)
     for _ in range(5000):
         W = mobility(rng, 2, int(rng.integers(1, 3)))
@@ -776,7 +776,7 @@ def test_hits_with_friction_are_the_same():
         P_n, P_t = np.zeros(1), np.zeros(1)
         try:
             expected = contact.stronge(W, u, mu, eps)
-        except SimulationError:  # the rates are not those of one degree of freedom
+        except SimulationError:  # For rank one, some random rates are impossible.
             said = sentence(KernelError, kernel().stronge, W, u, mu, eps, 0.0, P_n, P_t)
             assert said == contact.WEDGED
             continue
@@ -786,8 +786,8 @@ def test_hits_with_friction_are_the_same():
 
 @twin(several=contact.several)
 @pytest.mark.parametrize("k", [2, 3])
-def test_several_hits_with_friction_are_the_same(k):
-    """Of the rank of three bodies or more."""
+def test_simultaneous_impacts_with_friction_are_the_same(k):
+    """For full rank."""
     rng = np.random.default_rng(k)
     for _ in range(100):
         W = mobility(rng, 2 * k, 2 * k + 2)
@@ -798,9 +798,9 @@ def test_several_hits_with_friction_are_the_same(k):
         assert_same(P, contact.several(W, u, mu, eps), 1e-10)
 
 
-def test_hits_that_satisfy_no_law_are_told_in_the_same_words():
+def test_messages_about_impacts_without_a_solution_are_the_same():
     W = np.array([[1.0, -1.9], [-1.9, 1.0]])
-    W = np.block([[np.eye(2), W], [W, np.eye(2)]])  # no mobility: not semidefinite
+    W = np.block([[np.eye(2), W], [W, np.eye(2)]])  # Invalid, as it is not semidefinite.
     u, mu, eps, P = np.array([-1.0, -1.0, 1.0, 1.0]), np.full(2, 2.0), np.zeros(2), np.zeros(4)
     said = sentence(KernelError, kernel().several, 2, W, u, mu, eps, 0.0, P)
     assert said == sentence(SimulationError, contact.several, W, u, mu, eps)
@@ -810,13 +810,13 @@ def test_hits_that_satisfy_no_law_are_told_in_the_same_words():
 
 
 def equilibrium_of(system):
-    """Return room for a shape, and what it is made of."""
+    """Return an empty Equilibrium of the kernel, and its arrays."""
     q, lam = np.full(system.n, np.nan), np.full(len(system.loops), np.nan)
     return structures()["Equilibrium"](q.ctypes.data, lam.ctypes.data, math.nan), q, lam
 
 
 def shape_of(expected):
-    """Return a shape of the package as one of the kernel, and the arrays behind it."""
+    """Return an equilibrium of the package as one of the kernel, and its arrays."""
     q, lam = expected.q.copy(), expected.lam.copy()
     return structures()["Equilibrium"](q.ctypes.data, lam.ctypes.data, expected.force), (q, lam)
 
@@ -841,20 +841,20 @@ def stacked_release(system):
 @each_mechanism
 @pytest.mark.parametrize("displacement", [None, 0.0, -4e-3, 3e-3, -0.012])
 def test_equilibria_are_the_same(name, displacement):
-    """Free and held, at once and by continuation."""
+    """Free and held, found directly and by continuation."""
     for system, ours, _ in systems(name):
         expected = statics.equilibrium(system, displacement)
         found, q, lam = equilibrium_of(system)
         held = displacement is not None
         kernel().equilibrium(ours.structure, held, displacement or 0.0, found)
-        size = np.abs(system.K).max() / system.length  # the forces that balance are of this size
+        size = np.abs(system.K).max() / system.length  # Of the forces in balance.
         assert_same(q, expected.q)
         assert_same(lam, expected.lam, scale=size)
         assert_same(found.force, expected.force, scale=size)
 
 
 @pytest.mark.parametrize("displacement", [0.2, -0.06])
-def test_what_cannot_be_reached_is_told_in_the_same_words(displacement):
+def test_messages_about_displacements_out_of_reach_are_the_same(displacement):
     for system, ours, _ in systems("PRBDM2R", 2):
         found, *_arrays = equilibrium_of(system)
         said = sentence(
@@ -863,7 +863,7 @@ def test_what_cannot_be_reached_is_told_in_the_same_words(displacement):
         assert said == sentence(EquilibriumError, statics.equilibrium, system, displacement)
 
 
-def test_what_gravity_buckles_is_told_in_the_same_words():
+def test_messages_about_buckling_under_gravity_are_the_same():
     guide, ours = both("PRBDM2R")
     values = guide.values({"gravity.x": 1e6})
     ours.assemble(values)
@@ -884,10 +884,10 @@ def test_release_velocities_are_the_same(name, speed):
 
 
 def assert_same_modes(frequency, phi, expected, rounding):
-    """Hold modes against each other up to their signs.
+    """Compare modes up to their signs.
 
-    The smallest omega^2 is known to a rounding of the largest, and a mode to that over the
-    distance of its omega^2 from the next one, in LAPACK too.
+    The error of every omega^2 is a rounding of the largest, also with LAPACK.  The error of a mode
+    is that divided by the distance of its omega^2 from the nearest other.
     """
     omega2 = np.sign(expected.frequency) * expected.frequency**2
     size = np.abs(omega2).max()
@@ -920,11 +920,11 @@ def test_fundamental_frequencies_are_the_same(name):
         found = np.zeros(1)
         kernel().fundamental_frequency(ours.structure, found)
         expected = modal.modes(system, statics.equilibrium(system)).frequency
-        rounding = 1e-15 * (expected[-1] / expected[0]) ** 2  # of the largest omega^2
+        rounding = 1e-15 * (expected[-1] / expected[0]) ** 2  # Of the largest omega^2.
         assert_same(found[0], modal.fundamental_frequency(system), max(1e-10, rounding))
 
 
-def test_an_unstable_equilibrium_has_no_frequency_in_either():
+def test_the_fundamental_frequency_of_an_unstable_equilibrium_is_zero_in_both():
     guide, ours = both("PRBDM2R")
     values = guide.values({"gravity.x": 0.0, "gravity.y": -200.0})
     ours.assemble(values)
@@ -960,7 +960,7 @@ def test_simulated_restitutions_are_the_same():
 
 
 class KernelEquations:
-    """The kernel's equations of a system in one contact state, and the arrays behind them."""
+    """The kernel's equations of a system in one contact state; the object owns their arrays."""
 
     def __init__(self, ours, inputs, contacts, omega):
         self.ours, self.structure = ours, structures()["Equations"]()
@@ -1003,14 +1003,14 @@ class KernelEquations:
         return dy
 
     def project_near(self, t, y, reference=None):
-        """Return a state, projected with the factors of its own evaluation."""
+        """Return a state projected with the factors of its evaluation."""
         n, near = (len(y) - 2) // 2, y.copy()
         kernel().factor_equations(self.structure, y[:n], y[n : 2 * n], None, self.evaluation)
         kernel().project_near(self.structure, self.evaluation, reference, t, near, self.correction)
         return near
 
     def stages(self, t, y, h, k):
-        """Fill the stages of which the first is given; return the new state and the force range."""
+        """Compute all stages after the first; return the new state and the range of forces."""
         y1, forces = np.full(len(y), np.nan), np.full((2, 8), np.nan)
         span = structures()["ForceRange"](*(row.ctypes.data for row in forces))
         kernel().stages(
@@ -1020,7 +1020,7 @@ class KernelEquations:
 
 
 def contact_states(system):
-    """Yield states of all kinds that leave the mechanism some motion."""
+    """Yield contact states in which the mechanism can still move."""
     kinds = list(ContactMode)
     stops, points = len(system.gaps), len(system.rubs)
     for first_stop in kinds:
@@ -1033,9 +1033,9 @@ def contact_states(system):
 
 
 def random_inputs(system, e, rng, driven):
-    """Return forces, moments, an acceleration of the base and moving walls, or nothing.
+    """Return random inputs; without ``driven`` they are zero.
 
-    The walls are within a hundredth of a millimetre of where they are touched.
+    The walls are within a hundredth of a millimetre of the stops' contact points.
     """
     F = driven * rng.normal(size=(len(system.mechanism.forces), 3))
     touched = -system.gap_rows.values(e)
@@ -1058,13 +1058,13 @@ def random_inputs(system, e, rng, driven):
 
 
 def repeats(rows):
-    """Tell whether rows nearly repeat each other, so that no simulation constrains them all."""
+    """Return whether rows are nearly dependent; no simulation constrains such rows together."""
     s = np.linalg.svd(rows / np.linalg.norm(rows, axis=1)[:, None], compute_uv=False)
     return len(s) > 0 and s[-1] < 0.05 * s[0]
 
 
 def equations(name, count=2):
-    """Yield the equations of both, a state near the constraints and a generator."""
+    """Yield the equations of package and kernel, a state near the constraints and a generator."""
     for system, ours, rng in systems(name, count):
         for driven in (0.0, 1.0):
             for contacts in contact_states(system):
@@ -1080,7 +1080,7 @@ def equations(name, count=2):
 
 
 def condition(evaluation):
-    """Return the condition of the equations that were solved."""
+    """Return the condition number of the equations of an evaluation."""
     lu, pivots = evaluation.factors
     kkt = (np.tril(lu, -1) + np.eye(len(lu))) @ np.triu(lu)
     for row, pivot in reversed(list(enumerate(pivots))):
@@ -1097,7 +1097,7 @@ def condition(evaluation):
 def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
     for theirs, mine, y, _ in equations(name):
         n, r = theirs.n, len(theirs.rows)
-        t = theirs.inputs.walls[0].since + 3e-4  # on its way to its reference
+        t = theirs.inputs.walls[0].since + 3e-4  # While the wall approaches its reference.
         a, lam = mine.evaluate(t, y[:n], y[n : 2 * n])
         evaluation = theirs.evaluate(t, y[:n], y[n : 2 * n])
         a_expected, lam_expected, M, _ = evaluation
@@ -1108,7 +1108,7 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         dy = mine.rate(t, y)
         expected = theirs.rate(t, y)
         assert_same(dy[: 2 * n], expected[: 2 * n], rel)
-        power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # what the powers add up to
+        power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # Scale of the sum of powers.
         assert_same(dy[2 * n :], expected[2 * n :], rel, scale=power)
         energy = kernel().kinetic_energy_of(mine.structure, mine.evaluation, y[n : 2 * n])
         assert_same(energy, kinetics.kinetic_energy(M, y[n : 2 * n]))
@@ -1141,7 +1141,7 @@ HEAVY = ("density", "youngs_modulus", "shuttle.mass", "shuttle.inertia")
 
 @pytest.mark.parametrize("factor", [1e-60, 1e-33, 1e30, 1e60])
 def test_accelerations_do_not_depend_on_the_size_of_masses_and_stiffnesses(factor):
-    """Although products of eight of them are beyond what doubles hold."""
+    """The range of doubles does not contain products of eight of them."""
     guide, ours = both("PRBDM2R")
     found, rng = [], np.random.default_rng(3)
     values = guide.values({"release.displacement": 0.0})
@@ -1208,7 +1208,7 @@ def test_contact_forces_are_the_same(name):
 @twin(rub_limit=dynamics.Equations.friction_limit)
 @pytest.mark.parametrize("name", NAMES)
 def test_limits_of_friction_are_the_same(name):
-    """Of the guides and of the tests' own mechanisms, which rub."""
+    """For mechanisms with friction points."""
     for theirs, mine, y, _ in equations(name, 3):
         e, points = theirs.system.directions(y[: theirs.n]), range(len(theirs.system.rubs))
         limits = [kernel().rub_limit(mine.structure, i, e) for i in points]
@@ -1217,10 +1217,10 @@ def test_limits_of_friction_are_the_same(name):
 
 @twin(project=dynamics.Equations.project, project_near=dynamics.Equations.project_near)
 @each_mechanism
-def test_states_are_projected_alike(name):
-    """From near, with the factors at hand, and from further."""
+def test_projected_states_are_the_same(name):
+    """From a large distance, and from a small one with the factors of the evaluation."""
     for theirs, mine, y, rng in equations(name):
-        n, t = theirs.n, theirs.inputs.walls[0].since + 1e-4  # of the wall that may hold
+        n, t = theirs.n, theirs.inputs.walls[0].since + 1e-4
         projected, found = theirs.project(t, y), y.copy()
         kernel().project(mine.structure, t, found)
         evaluation = theirs.evaluate(t, projected[:n], projected[n : 2 * n])
@@ -1229,7 +1229,7 @@ def test_states_are_projected_alike(name):
         M = evaluation.M
         assert_same_turn(found[:n], projected[:n], y[:n], theirs.system, M, rows)
         assert_same(found[n:], projected[n:], rel, scale=np.abs(y[n:]).max())
-        for distance in (1e-9, 1e-5):  # one correction is enough, or not
+        for distance in (1e-9, 1e-5):  # One correction is sufficient for the first only.
             start = projected.copy()
             start[: 2 * n] += distance * rng.normal(size=2 * n)
             factors = theirs.evaluate(t, start[:n], start[n : 2 * n]).factors
@@ -1282,10 +1282,10 @@ def test_steps_of_the_integration_are_the_same(name):
             assert_same(middle, runge_kutta.interpolate(PAIR, y, expected, h, theta))
 
 
-# --- what has no twin ----------------------------------------------------------------------------
+# --- functions of the kernel only ----------------------------------------------------------------
 
 
-def test_complex_arithmetic_is_that_of_python():
+def test_complex_arithmetic_equals_that_of_python():
     rng = np.random.default_rng(0)
     for _ in range(50):
         z, w = (complex(*rng.normal(size=2)) for _ in range(2))

@@ -1,4 +1,4 @@
-"""The libraries for other platforms: what they need, what they show, and the bytes they compute."""
+"""Libraries for other platforms: dependencies, exported names, and results bit by bit."""
 
 import re
 from dataclasses import replace
@@ -32,7 +32,7 @@ SYSTEMS = {
     "windows": {"kernel32.dll", "msvcrt.dll"},
     "darwin": {"/usr/lib/libSystem.B.dylib"},
 }
-UNIVERSAL_RUNTIME = re.compile(r"api-ms-win-crt-[a-z]+-l1-1-0\.dll")  # part of Windows since 10
+UNIVERSAL_RUNTIME = re.compile(r"api-ms-win-crt-[a-z]+-l1-1-0\.dll")  # Part of Windows 10.
 OLDEST_GLIBC = (2, 17)
 OLDEST_MACOS = (11, 0)
 MACHINES = {"x86_64": ("X86_64", "AMD64"), "aarch64": ("AARCH64", "ARM64")}
@@ -79,18 +79,18 @@ def dependencies(library) -> set[str]:
 
 
 def exported(library) -> set[str]:
-    """Return the names that a library shows to whoever loads it."""
+    """Return the names that a library exports."""
     if isinstance(library, lief.PE.Binary):
         return {entry.name for entry in library.get_export().entries}
     names = {symbol.name for symbol in library.exported_symbols}
-    if isinstance(library, lief.MachO.Binary):  # the linker's own two, which every one has
+    if isinstance(library, lief.MachO.Binary):  # The linker adds two symbols to every library.
         names = {name.removeprefix("_") for name in names}
         names -= {"__mh_dylib_header", "_mh_dylib_header", "__dso_handle", "___dso_handle"}
     return names
 
 
 @pytest.mark.parametrize("platform", PLATFORMS)
-def test_a_library_is_for_its_platform_and_shows_the_functions_of_fmi_only(library, platform):
+def test_a_library_is_for_its_platform_and_exports_only_functions_of_fmi(library, platform):
     machine, _, system = platform.partition("-")
     found = lief.parse(str(library(3, platform)))
     assert exported(found) == functions_of_the_standards()
@@ -103,7 +103,7 @@ def test_a_library_is_for_its_platform_and_shows_the_functions_of_fmi_only(libra
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_the_linux_library_needs_no_newer_glibc_than_2_17(library, machine):
+def test_the_linux_library_runs_with_glibc_2_17(library, machine):
     found = lief.parse(str(library(3, f"{machine}-linux")))
     versions = [
         symbol.name
@@ -117,8 +117,8 @@ def test_the_linux_library_needs_no_newer_glibc_than_2_17(library, machine):
 
 
 @pytest.mark.parametrize("machine", MACHINES)
-def test_the_macos_library_is_a_dylib_that_macos_11_may_load(library, machine):
-    """ARM64 wants a signature as well; the linker's own, which names nobody, is enough."""
+def test_the_macos_library_is_a_dylib_for_macos_11(library, machine):
+    """On ARM64 it also needs a signature; the linker's anonymous one is sufficient."""
     found = lief.parse(str(library(3, f"{machine}-darwin")))
     assert found.header.file_type == lief.MachO.Header.FILE_TYPE.DYLIB
     assert tuple(found.build_version.minos[:2]) <= OLDEST_MACOS
@@ -127,7 +127,7 @@ def test_the_macos_library_is_a_dylib_that_macos_11_may_load(library, machine):
     assert [item.name.startswith("@rpath/") for item in own] == [True]
 
 
-def test_the_libraries_are_the_same_in_both_versions_of_fmi(library):
+def test_the_libraries_of_both_fmi_versions_are_identical(library):
     for platform in PLATFORMS:
         assert library(2, platform).read_bytes() == library(3, platform).read_bytes()
 
@@ -166,14 +166,14 @@ def test_every_platform_computes_the_same_bytes(host, model, fmi, kind):
 
 @pytest.mark.parametrize("model", ["PRBDM", TWO_STOPS])
 def test_every_compiler_computes_the_same_bytes(model):
-    """The system's compiler and ziglang's."""
+    """The system's compiler and ziglang."""
     host = run(Job(native(model, 2), "cs", POINTS))
     assert output(NATIVE, model, 2, "cs") == host.output
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R", TWO_STOPS])
 def test_a_compiler_without_vectors_computes_the_same_bytes(model):
-    """As others than GCC and Clang compile it: one number at a time."""
+    """Compilers other than GCC and Clang use the code without vectors."""
     job = Job(native(model, 2), "cs", POINTS)
     plain = kernel_library("without-vectors", ("-O2", "-DPRBM_PLAIN"))
     assert run(replace(job, library=plain)).output == run(job).output
@@ -184,7 +184,7 @@ PLACES = ("with spaces", "Prüfstand µ", "a#b+c 100%20 %")
 
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_an_fmu_runs_wherever_it_is_unpacked_on_windows(tmp_path: Path, fmi: int, place: str):
-    """Where paths have wide characters."""
+def test_an_fmu_runs_from_any_folder_on_windows(tmp_path: Path, fmi: int, place: str):
+    """Paths have spaces, characters outside of ASCII, and characters that a URI encodes."""
     folder = unpack(native("PRBDM", fmi, "all").with_suffix(".fmu"), tmp_path / place)
     assert run(Job(folder, host=WINE)).output == run(Job(folder)).output

@@ -1,11 +1,11 @@
-"""The library under sanitizers and valgrind: runs, many instances, nonsense."""
+"""The library under sanitizers and valgrind: runs, many instances, arbitrary calls and tables."""
 
 import dataclasses
 
 import numpy as np
 import pytest
 
-from c_importer import ANVIL, TWO_STOPS, Job, given, kernel_library, native, needs, run
+from c_importer import ANVIL, TWO_STOPS, Job, described, kernel_library, native, needs, run
 from fuzzing import (
     ENVIRONMENT,
     MODELS,
@@ -18,19 +18,19 @@ from fuzzing import (
 
 pytestmark = pytest.mark.native
 
-WAYS = ((2, "cs"), (3, "cs"), (3, "events"), (2, "me"), (3, "me"))
-POINTS = 1e-3 * np.arange(301)  # the default run bounces until 0.243 s, then it rests
-QUICK = [
+INTERFACES = ((2, "cs"), (3, "cs"), (3, "events"), (2, "me"), (3, "me"))
+POINTS = 1e-3 * np.arange(301)  # s; the default experiment bounces until 0.243 s, then rests.
+QUICK_MODELS = [
     model if model in (TWO_STOPS, ANVIL) else pytest.param(model, marks=pytest.mark.slow)
     for model in MODELS
 ]
-"""The tests' own mechanisms have all that the guides have; the guides are checked as slow."""
+"""The models of the tests have all features of the guides; the guides are marked as slow."""
 VALGRIND = ("valgrind", "--quiet", "--error-exitcode=9", "--leak-check=full")
 
 
 def changes(model: str) -> dict[int, dict[str, float]]:
-    """Return inputs and tunable parameters that change on the way; friction sets in."""
-    guide = given(model)
+    """Return changes of inputs and tunable parameters, by number of the communication step."""
+    guide = described(model)
     stop, force, friction = (
         parts[0].name for parts in (guide.stops, guide.forces, guide.frictions)
     )
@@ -43,22 +43,22 @@ def changes(model: str) -> dict[int, dict[str, float]]:
 
 
 def sanitized(job: Job, *words: object) -> bytes:
-    """Run a job with everything sanitized; leaks, too, fail it."""
+    """Run a job with sanitizers in the importer; errors and leaks fail the test."""
     done = run(job, *words, program=sanitized_importer(), environment=ENVIRONMENT)
     assert not done.errors
     return done.output
 
 
-@pytest.mark.parametrize(("fmi", "kind"), WAYS)
-@pytest.mark.parametrize("model", QUICK)
+@pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
+@pytest.mark.parametrize("model", QUICK_MODELS)
 def test_sanitizers_find_nothing_in_a_run_with_changes(model, fmi, kind):
-    """And what they change in the code does not change a byte of what it computes."""
+    """The results with sanitizers equal those without bit by bit."""
     job = Job(native(model, fmi), kind, POINTS, changes=changes(model))
-    watched = dataclasses.replace(job, library=sanitized_library())
-    assert sanitized(watched) == run(job).output
+    checked = dataclasses.replace(job, library=sanitized_library())
+    assert sanitized(checked) == run(job).output
 
 
-@pytest.mark.parametrize(("fmi", "kind"), WAYS)
+@pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 def test_sanitizers_find_nothing_when_states_are_saved_and_restored(fmi, kind):
     job = Job(native("PRBDM", fmi), kind, POINTS[:101], library=sanitized_library())
     for how in ("save", "serialize"):
@@ -81,9 +81,9 @@ def test_sanitizers_find_nothing_in_ten_thousand_instances():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("fmi", "kind"), WAYS)
+@pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 def test_valgrind_finds_nothing(fmi, kind):
-    """A run into the first impact, going back, and a hundred instances."""
+    """A run to the first impact, a restored state, and a hundred instances."""
     needs("valgrind")
     library = kernel_library("plain", ("-g",))
     job = Job(native("PRBDM2R", fmi), kind, POINTS[:61], library=library)
@@ -94,7 +94,7 @@ def test_valgrind_finds_nothing(fmi, kind):
 @pytest.mark.slow
 @pytest.mark.parametrize(("fmi", "kind"), [(2, "cs"), (2, "me"), (3, "cs"), (3, "me")])
 def test_valgrind_finds_nothing_in_ten_thousand_instances(fmi, kind):
-    """Each is instantiated, initialised, steps and is freed."""
+    """Each is instantiated, initialized, advanced by a step and freed."""
     needs("valgrind")
     library = kernel_library("plain", ("-g",))
     job = Job(native("PRBDM", fmi), kind, POINTS[:61], library=library)
@@ -105,23 +105,23 @@ def test_valgrind_finds_nothing_in_ten_thousand_instances(fmi, kind):
 @pytest.mark.parametrize("model", MODELS)
 def test_arbitrary_calls_neither_crash_nor_leak(tmp_path, model, fmi):
     found = fuzz_calls(tmp_path, model, fmi, sequences=60, seed=0)
-    assert found.status == 0, found.said
+    assert found.status == 0, found.output
 
 
 @pytest.mark.parametrize("seconds", [2, pytest.param(8, marks=pytest.mark.slow)])
 def test_arbitrary_tables_neither_crash_nor_leak(tmp_path, seconds):
     found = fuzz_tables(tmp_path, seconds=seconds, seed=0)
-    assert found.status == 0, found.said[-8000:]
+    assert found.status == 0, found.output[-8000:]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_a_search_for_calls_that_crash_finds_none(tmp_path, fmi):
     found = search_calls(tmp_path, "PRBDM", fmi, seconds=15, seed=0)
-    assert found.status == 0, found.said[-8000:]
+    assert found.status == 0, found.output[-8000:]
 
 
 @pytest.mark.slow
 def test_a_search_for_tables_that_crash_finds_none(tmp_path):
     found = fuzz_tables(tmp_path, seconds=30, seed=1)
-    assert found.status == 0, found.said[-8000:]
+    assert found.status == 0, found.output[-8000:]

@@ -16,12 +16,13 @@ def energy_change(W, u, P):
 
 
 def random_mobility(rng, size, rank):
+    """Return a random Delassus matrix of a rank."""
     A = rng.normal(size=(size, rank)) * 10 ** rng.uniform(-2, 2)
     return A @ A.T
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
-def test_single_hit_opens_at_restitution_times_closing(restitution):
+def test_gap_rate_after_a_single_impact_is_restitution_times_closing_rate(restitution):
     """Newton's law, and Carnot's loss: T+ - T- = -(1 - eps^2) m_eff u^2 / 2."""
     W, u = np.array([[2.5]]), np.array([-1.7])
     P = contact.newton(W, u, np.array([restitution]))
@@ -31,12 +32,12 @@ def test_single_hit_opens_at_restitution_times_closing(restitution):
     )
 
 
-def test_several_hits_satisfy_the_complementarity_and_never_gain():
-    """P >= 0, u+ + eps u- >= 0, complementary; the loss is sum P (1 - eps) |u-| / 2."""
+def test_simultaneous_impacts_satisfy_complementarity_and_do_not_gain_energy():
+    """P >= 0, s = u+ + eps u- >= 0 and P s = 0 for each stop."""
     for _ in range(2000):
         k = int(RNG.integers(2, 5))
         W = random_mobility(RNG, k, int(RNG.integers(1, k + 1)))
-        u = W @ RNG.normal(size=k)  # rates that the mechanism can have
+        u = W @ RNG.normal(size=k)  # In the range of W: a motion of the mechanism.
         closing = np.minimum(u, 0.0) < 0
         u, W = u[closing], W[np.ix_(closing, closing)]
         if not len(u):
@@ -51,7 +52,7 @@ def test_several_hits_satisfy_the_complementarity_and_never_gain():
         assert energy_change(W, u, P) <= 1e-9 * size * max(1.0, P.max())
 
 
-def test_two_stops_hit_at_once_need_no_order():
+def test_simultaneous_impacts_do_not_depend_on_the_order_of_the_stops():
     """Exchanging the stops exchanges the impulses."""
     for _ in range(300):
         W = random_mobility(RNG, 2, 2)
@@ -63,26 +64,26 @@ def test_two_stops_hit_at_once_need_no_order():
 
 
 def test_a_bar_that_falls_flat_on_two_stops_rebounds_flat():
-    """A free bar (m = 2, J = 0.5) hits stops at +-1: each gets half of (1 + eps) m v."""
+    """A free bar (m = 2, J = 0.5) hits stops at +-1 with half of (1 + eps) m v each."""
     m, J = 2.0, 0.5
-    G = np.array([[1.0, 1.0], [1.0, -1.0]])  # gap rates from (y', phi')
+    G = np.array([[1.0, 1.0], [1.0, -1.0]])  # Gap rates = G (y', phi').
     W = G @ np.diag([1 / m, 1 / J]) @ G.T
     P = contact.newton(W, np.array([-3.0, -3.0]), np.array([0.5, 0.5]))
     np.testing.assert_allclose(P, (1 + 0.5) * m * 3.0 / 2, rtol=1e-13)
 
 
 def newton_with_coulomb(W, u, mu, eps):
-    """Return what Newton's law with sliding friction says; Kane's paradox lives here."""
+    """Return the impulses by Newton's law with sliding friction, which can gain energy (Kane)."""
     ratio = -mu * np.sign(u[1])
     P_n = -(1 + eps) * u[0] / (W[0, 0] + ratio * W[0, 1])
     u_t = u[1] + (W[1, 0] + ratio * W[1, 1]) * P_n
     if u_t * u[1] >= 0 and P_n > 0:
         return np.array([P_n, ratio * P_n])
-    return np.linalg.solve(W, np.array([-(1 + eps) * u[0], -u[1]]))  # sticks
+    return np.linalg.solve(W, np.array([-(1 + eps) * u[0], -u[1]]))  # Sticking.
 
 
-def test_friction_never_gains_energy_where_newton_with_coulomb_does():
-    """A random search over mobilities and directions; the paradox is among them."""
+def test_stronge_impact_does_not_gain_energy_where_newton_with_coulomb_does():
+    """Random search over mobilities and directions; some of them are cases of Kane's paradox."""
     worst_ours, worst_newton, coulomb = 0.0, 0.0, 0
     for _ in range(20000):
         W = random_mobility(RNG, 2, 2)
@@ -99,11 +100,11 @@ def test_friction_never_gains_energy_where_newton_with_coulomb_does():
         worst_newton = max(worst_newton, energy_change(W, u, R) / before)
         coulomb += after[1] == 0.0
     assert worst_ours <= 1e-12
-    assert worst_newton > 0.5, "the search does reach the paradox"
+    assert worst_newton > 0.5, "the search must include cases of the paradox"
 
 
-def test_work_of_restitution_is_eps_squared_of_compression():
-    """Stronge's hypothesis, by integrating the normal impulse in small increments."""
+def test_work_of_restitution_is_restitution_squared_times_work_of_compression():
+    """Stronge's hypothesis, checked by integration over small increments of the normal impulse."""
     for _ in range(8):
         W = random_mobility(RNG, 2, 5)
         u = np.array([-1.0, RNG.normal()]) * np.sqrt(np.diag(W))
@@ -127,8 +128,10 @@ def test_work_of_restitution_is_eps_squared_of_compression():
     st.floats(-1.5, 1.5), st.floats(0.1, 10), st.floats(0.0, 2.0), st.floats(0.0, 1.0)
 )  # fmt: skip
 @settings(max_examples=300, deadline=None)
-def test_one_degree_of_freedom_with_friction(angle, mobility, mu, eps):
-    """Rank one: normal and sliding rates stay in proportion; jammed if mu >= |a/b|."""
+def test_impact_with_one_degree_of_freedom_and_friction_equals_its_closed_form(
+    angle, mobility, mu, eps
+):
+    """W has rank one: normal and sliding rate are proportional; the contact jams if mu > |a/b|."""
     a, b = np.sqrt(mobility) * np.cos(angle), np.sqrt(mobility) * np.sin(angle)
     W = np.outer([a, b], [a, b])
     u = np.array([a, b]) * (-1.0 / a)
@@ -139,20 +142,20 @@ def test_one_degree_of_freedom_with_friction(angle, mobility, mu, eps):
     if mu * abs(b) > abs(a) * (1 + 1e-6):
         assert after[0] == pytest.approx(0.0, abs=1e-9)
     elif mu * abs(b) < abs(a) * (1 - 1e-6):
-        # the work of restitution against that of compression, friction with and against
+        # Friction acts against the motion in both phases; the works give the closed form.
         gain = abs(b / a) * mu
         assert after[0] == pytest.approx(eps * np.sqrt((1 - gain) / (1 + gain)), rel=1e-6)
 
 
-def test_newton_and_stronge_agree_without_reversal():
-    """A hit that slides on in its direction has u_n+ = -eps u_n-."""
+def test_newton_and_stronge_agree_if_sliding_does_not_reverse():
+    """The gap rate after an impact is u_n+ = -eps u_n- if the sliding keeps its direction."""
     W = np.array([[2.0, 0.3], [0.3, 1.0]])
     P = np.array(contact.stronge(W, np.array([-1.0, 5.0]), 0.2, 0.7))
     assert (np.array([-1.0, 5.0]) + W @ P)[0] == pytest.approx(0.7, rel=1e-12)
 
 
-def test_several_hits_with_friction_do_not_depend_on_their_order_and_never_gain():
-    """Coulomb's cone, no penetration, no gain; exchanging the stops exchanges the impulses."""
+def test_simultaneous_impacts_with_friction_are_symmetric_and_do_not_gain_energy():
+    """Impulses in the friction cone, no penetration; swapping the stops swaps the impulses."""
     for _ in range(150):
         W = random_mobility(RNG, 4, 6)
         u = np.concatenate([-RNG.uniform(0.1, 1, 2), RNG.normal(size=2)])

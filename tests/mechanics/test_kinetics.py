@@ -1,4 +1,4 @@
-"""Equations of motion against SymPy's Lagrange equations, and their own identities."""
+"""Equations of motion against Lagrange equations by SymPy, and their identities."""
 
 import numpy as np
 import pytest
@@ -13,8 +13,8 @@ from support import mechanism
 RNG = np.random.default_rng(3)
 
 
-def test_accelerations_are_those_of_lagrange():
-    """A 2R cantilever with a tip body on a pin: three angles, no loop, every term at once."""
+def test_accelerations_equal_those_of_lagrange_equations():
+    """A 2R cantilever with a body on a pin at its tip: three angles, no loop, all inertia terms."""
     sim = Simulation(cantilever(damping_beta=0.0))
     system = sim.system
     n = system.n
@@ -59,8 +59,8 @@ def test_accelerations_are_those_of_lagrange():
         np.testing.assert_allclose(found, expected, rtol=1e-10, atol=1e-8)
 
 
-def test_centrifugal_terms_do_the_work_that_the_mass_matrix_takes():
-    """v.(M v)' / 2 = v.C v^2: what changes in T at constant rates is inertial power."""
+def test_power_of_centrifugal_terms_is_the_change_of_kinetic_energy_at_constant_rates():
+    """v.(M' v) / 2 = v.C v^2."""
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
     J, h = np.diag(system.J), 1e-6
     for _ in range(20):
@@ -72,8 +72,8 @@ def test_centrifugal_terms_do_the_work_that_the_mass_matrix_takes():
         np.testing.assert_allclose(C, -C.T, atol=1e-18)
 
 
-def test_fused_product_equals_the_separate_equations():
-    """One product with e gives what inertia, jacobian and convective give each for itself."""
+def test_combined_equations_equal_the_separate_functions():
+    """The engine's single product with e equals inertia, jacobian and convective together."""
     from prbm.mechanics import constraints, forces
     from prbm.mechanics.system import convective, jacobian
 
@@ -95,8 +95,8 @@ def test_fused_product_equals_the_separate_equations():
         np.testing.assert_allclose(lam, -x[system.n :], rtol=1e-9, atol=1e-12)
 
 
-def test_constraint_rows_are_the_derivatives_of_the_constraints():
-    """Central differences, and the convective term by differencing the Jacobian."""
+def test_constraint_rows_equal_central_differences_of_the_constraints():
+    """The convective term equals a central difference of the Jacobian."""
     from prbm.mechanics.system import convective, jacobian, values
 
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())

@@ -10,7 +10,7 @@ import random_contacts
 from prbm.mechanics import complementarity
 
 ERRORS = {"newton": 0.0, "stronge": 0.02, "several": 0.02, "rest": 0.02}
-"""Largest shares of errors: walls that move against what friction locks."""
+"""Largest fractions of errors.  They occur if a wall moves against a contact locked by friction."""
 
 
 @pytest.mark.parametrize("engine", ["package", "kernel"])

@@ -22,7 +22,7 @@ def tip_deflection(model, force):
     L, EI = 0.05, 2e11 * 1e-2 * (2e-4) ** 3 / 12
     beam = cantilever(model)
     values = beam.values({"gravity.x": 0.0, "tip.mass": 1.0, "leaf.density": 1.0})
-    # the weight of the tip body is the force: across the beam, at the pin by zero lever
+    # The force is the weight of the body, which hangs on the pin and transmits no moment.
     values |= {"gravity.y": force}
     system = assemble(beam, values)
     shape = equilibrium(system)
@@ -34,8 +34,8 @@ def tip_deflection(model, force):
 
 
 @pytest.mark.parametrize(("model", "error"), [("1R", 0.037), ("2R", 0.0071), ("3R", 0.022)])
-def test_a_cantilever_deflects_as_its_published_coefficients_say(model, error):
-    """Sum of lever^2/K over the pivots, to 1e-4; beam theory, 1/3, to the error of the model."""
+def test_tip_deflection_of_a_cantilever_follows_from_its_published_coefficients(model, error):
+    """The sum of lever^2/K over the pivots, which equals 1/3 of beam theory to the model error."""
     data = MODELS[model]
     gamma, K_theta = ([c.value for c in part] for part in (data.gamma, data.K_theta))
     levers = np.cumsum(gamma[::-1])[::-1]
@@ -46,7 +46,7 @@ def test_a_cantilever_deflects_as_its_published_coefficients_say(model, error):
 
 
 def test_held_shape_is_the_minimum_of_potential_energy():
-    """An independent route: SLSQP on elastic + gravitational energy under the constraints."""
+    """SLSQP minimises elastic + gravitational energy under the constraints."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values())
     shape = equilibrium(system, -0.012)
@@ -65,7 +65,7 @@ def test_held_shape_is_the_minimum_of_potential_energy():
 
 
 def test_holding_force_is_the_derivative_of_the_energy():
-    """F = dV/dx along the path of held shapes."""
+    """F = dV/dx, by a central difference over held shapes."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values())
 
@@ -81,8 +81,7 @@ def test_holding_force_is_the_derivative_of_the_energy():
 
 
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
-def test_free_equilibrium_needs_no_force(model):
-    """Held where it would rest anyway, the holding force vanishes."""
+def test_holding_force_is_zero_at_the_free_equilibrium(model):
     guide = mechanism(model)
     system = assemble(guide, guide.values())
     free = equilibrium(system)
@@ -92,7 +91,7 @@ def test_free_equilibrium_needs_no_force(model):
     assert abs(held.force) < 1e-9
 
 
-def test_modes_are_orthogonal_and_on_the_tangent_of_the_loops():
+def test_modes_are_orthonormal_in_the_mass_matrix_and_satisfy_the_loop_constraints():
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values())
     rest = equilibrium(system)
@@ -102,8 +101,8 @@ def test_modes_are_orthogonal_and_on_the_tangent_of_the_loops():
     assert np.abs(rows @ found.shape).max() < 1e-9
 
 
-def test_frequencies_are_those_of_the_linearised_motion():
-    """The right-hand side, differenced about the equilibrium on the tangent space."""
+def test_frequencies_equal_those_of_the_linearised_equations_of_motion():
+    """Central differences of the accelerations about the equilibrium along each mode."""
     from prbm.hybrid.simulation import Simulation
 
     guide = mechanism("PRBDM2R")
@@ -120,15 +119,15 @@ def test_frequencies_are_those_of_the_linearised_motion():
         assert math.sqrt(stiffness) / (2 * math.pi) == pytest.approx(f, rel=1e-5)
 
 
-def test_unstable_equilibrium_has_no_frequency():
-    """Weight on top of the flexures beyond buckling: omega^2 < 0 is told by a negative sign."""
+def test_frequency_of_an_unstable_equilibrium_is_negative():
+    """A weight beyond the buckling load gives omega^2 < 0, marked by a negative frequency."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values({"gravity.x": 0.0, "gravity.y": -200.0}))
     assert modes(system, equilibrium(system)).frequency[0] < 0
 
 
-def test_release_velocity_is_what_an_impulse_on_the_centre_gives():
-    """M v = impulse along the release + Phi_q^T Lambda: least kinetic energy for its speed."""
+def test_release_velocity_is_that_after_an_impulse_along_the_release():
+    """M v = release_q^T P + Phi_q^T Lambda: the least kinetic energy for that speed."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values())
     q = equilibrium(system, -0.012).q
@@ -141,7 +140,7 @@ def test_release_velocity_is_what_an_impulse_on_the_centre_gives():
     np.testing.assert_allclose(rows.T @ lam, M @ v, atol=1e-14)
 
 
-def test_no_equilibrium_is_said_not_guessed():
+def test_a_displacement_out_of_reach_is_rejected():
     guide = mechanism("PRBDM")
     system = assemble(guide, guide.values())
     with pytest.raises(EquilibriumError, match="beyond"):

@@ -1,4 +1,4 @@
-"""Links that stretch and walls on bodies: SymPy's Lagrange equations, and what is reported."""
+"""Links that stretch and walls on bodies: Lagrange equations by SymPy, and reported velocities."""
 
 from dataclasses import replace
 from functools import cache
@@ -14,8 +14,8 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Release, Stop
 from support import mechanism
 
-EA, EI, ROD = 400.0, 2e-3, 3e-3  # N, N m^2, kg: a soft rubber cord, 0.1 m long
-SPAN = 0.1
+EA, EI, ROD = 400.0, 2e-3, 3e-3  # N, N m^2, kg; a soft rubber cord.
+SPAN = 0.1  # m, its length.
 
 
 def type_of(name, axial):
@@ -26,7 +26,7 @@ def type_of(name, axial):
 
 
 def pendulums():
-    """Return two pendulums, one that stretches; the other one's body hits a wall on the first's.
+    """Return two pendulums: A stretches and has a wall on its body, which the body of B hits.
 
     ::
 
@@ -56,7 +56,7 @@ def pendulums():
 
 @cache
 def lagrange():
-    """Return M, its right side, gap, its gradient and its quadratic term, of (q, v) in numbers.
+    """Return a function of (q, v): M, the right side, the gap, its gradient and quadratic term.
 
     q = (angle and stretch of the cord, angle of A, angle of the bar, angle of B).
     """
@@ -74,16 +74,16 @@ def lagrange():
     centre_a = end_a + turned(q[2], 0.01, -0.01)
     centre_b = end_b + turned(q[4], 0.01, -0.01)
     g = sp.Matrix([0.7, -9.81])
-    # a rod on a line whose ends are fixed and at z: T = m z'^2 / 6, also while it stretches
+    # T = m z'^2 / 6 for a rod from a fixed point to z, also while it stretches.
     T = sum(ROD * rate(z).dot(rate(z)) / 6 for z in (end_a, turned(q[3], SPAN, 0)))
     T += 0.05 * rate(centre_a).dot(rate(centre_a)) / 2 + 4e-5 * v[2] ** 2 / 2
     T += 0.03 * rate(centre_b).dot(rate(centre_b)) / 2 + 3e-5 * v[4] ** 2 / 2
-    V = sum(EI / SPAN * (angle + sp.pi / 2) ** 2 for angle in (q[0], q[3]))  # 2 EI/L at a clamp
+    V = sum(EI / SPAN * (angle + sp.pi / 2) ** 2 for angle in (q[0], q[3]))  # Clamp: 2 EI/L.
     V += EA / SPAN * (SPAN * q[1]) ** 2 / 2
     V -= 0.05 * g.dot(centre_a) + 0.03 * g.dot(centre_b) + ROD * g.dot(end_a + end_b) / 2
     force, moment = sp.Matrix([0.4, -0.3]), 0.01
     V -= force.dot(end_a + turned(q[2], 0.02, -0.02)) + moment * q[2]
-    # the gap, as seen by someone who turns with A
+    # The gap in the frame of body A.
     u = turned(sp.rad(200), 1, 0)
     hit = end_b + turned(q[4], -0.01, -0.02)
     seen = turned(-q[2], *(hit - end_a))
@@ -104,11 +104,11 @@ def state(sim, seed):
 
 
 @pytest.mark.parametrize("holds", [False, True])
-def test_a_stretching_pendulum_with_a_wall_obeys_lagrange(holds):
-    """Accelerations and, while the stop holds, its force: second-kind equations with the gap."""
+def test_a_stretching_pendulum_with_a_wall_satisfies_lagrange_equations(holds):
+    """Accelerations and, while the stop holds, its force: the multiplier of the gap."""
     values = {"force.x": 0.4, "force.y": -0.3, "force.moment": 0.01}
     sim = Simulation(pendulums(), values)
-    # link, its stretch, body; link, body: the order in which the walk from the ground meets them
+    # Order from the ground: cord, its stretch, body A; bar, body B.
     assert sim.system.arm.tolist() == [0, 0, 2, 3, 4]
     contacts = ContactState.holding([0] * holds, 1, 0)
     equations = Equations(sim.system, sim.inputs, contacts, sim.omega)
@@ -129,8 +129,8 @@ def test_a_stretching_pendulum_with_a_wall_obeys_lagrange(holds):
         np.testing.assert_allclose(lam, x[5:], rtol=1e-9)
 
 
-def test_reported_velocities_are_the_rates_of_what_is_reported():
-    """Central differences of displacement, angle and gap, of bodies on stretching links."""
+def test_reported_velocities_equal_central_differences_of_the_reported_positions():
+    """Displacement, angle and gap of bodies on links that stretch."""
     sim = Simulation(pendulums(), {"release.velocity": 0.8}, tolerance=1e-12)
     h = 1e-6
     for t in (0.002, 0.005, 0.011):
@@ -145,12 +145,13 @@ def test_reported_velocities_are_the_rates_of_what_is_reported():
             assert out[1][rate] == pytest.approx(difference, abs=1e-7), place
 
 
-def test_velocities_of_a_guide_are_the_rates_of_its_displacements():
-    """Central differences over 2 us; truncation is h^2 x'''/6 < 1e-5 m/s at modes of 12 kHz."""
+def test_velocities_of_a_guide_equal_central_differences_of_its_displacements():
+    """Differences over 2 us; their truncation is h^2 x'''/6 < 1e-5 m/s at modes of 12 kHz."""
     guide = mechanism("PRBDM2R")
     kinds = tuple(replace(kind, axial=True) for kind in guide.flexure_types)
     guide = replace(guide, flexure_types=kinds)
-    sim = Simulation(guide, {"stop.offset": 4e-3, "stop.position": -5e-3})  # a hit stretches
+    # An impact at an offset stretches the flexures.
+    sim = Simulation(guide, {"stop.offset": 4e-3, "stop.position": -5e-3})
     h = 1e-6
     for t in (0.012, 0.02):
         sim.advance(t - h)

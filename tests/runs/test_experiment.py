@@ -17,7 +17,7 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Release, Stop
 from prbm.runs.experiment import Experiment, experiment
 from prbm.runs.run import simulate
-from support import COSTLY, mechanism
+from support import COSTLY_MODELS, mechanism
 
 
 def guide(size, model="2R", **section):
@@ -94,7 +94,7 @@ def test_reference_results_are_omitted_if_they_take_minutes(links, axial, monkey
 
 
 def test_reference_results_of_shipped_mechanisms_are_not_excluded_by_their_frequencies():
-    for name in ("PRBDM2R", *COSTLY):
+    for name in ("PRBDM2R", *COSTLY_MODELS):
         assert reference.steps(mechanism(name), {}, Experiment()) < reference.STEPS_MAX
 
 

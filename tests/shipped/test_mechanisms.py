@@ -35,7 +35,7 @@ def check_balance(result: Run) -> None:
     system = result.simulation.system
     share = 2e-6 if system.mechanism.name == "Bistable" else 2e-7
     assert result.imbalance < share * elastic_energy(result)
-    assert result.opened < 1e-12 * system.length
+    assert result.loop_error < 1e-12 * system.length
     assert all(math.isfinite(x) for row in result.outputs for x in row.values())
 
 

@@ -1,4 +1,4 @@
-"""The C importer of ``importer/``: compiled where needed, given jobs, its rows read back."""
+"""The C importer of ``importer/``: compile it, write its job files, run it, read its rows."""
 
 import dataclasses
 import os
@@ -42,7 +42,7 @@ TWO_STOPS, ANVIL = "TwoStops", "Anvil"
 
 @dataclass(frozen=True)
 class Host:
-    """Where an importer runs: on this machine, or on another in an emulator."""
+    """The platform of an importer: this machine, or another one in an emulator."""
 
     name: str
     folders: tuple[str, ...]
@@ -56,7 +56,7 @@ class Host:
         return self.suffix == ".dll"
 
     def path(self, path: Path) -> str:
-        """Return how a program there calls a file of this machine."""
+        """Return the path of a file of this machine as the emulated program sees it."""
         return "Z:" + str(path).replace("/", "\\") if self.windows else str(path)
 
     def uri(self, path: Path) -> str:
@@ -88,7 +88,7 @@ PACKAGES = {
 
 
 def needs(*programs: str) -> None:
-    """Skip a test where a program is missing; say which package brings it."""
+    """Skip the test if a program is missing, and name the package that provides it."""
     for program in programs:
         if shutil.which(program) is None:
             pytest.skip(f"{program} is not installed (Debian: {PACKAGES.get(program, program)})")
@@ -99,7 +99,7 @@ def zig(target: str) -> list[str]:
 
 
 def zig_environment() -> dict[str, str]:
-    """Return an environment in which ziglang shares what it builds with the exporter."""
+    """Return an environment in which ziglang uses the exporter's cache for its global files."""
     return os.environ | {
         "ZIG_GLOBAL_CACHE_DIR": str(cache_folder() / "zig"),
         "ZIG_LOCAL_CACHE_DIR": str(shared_folder() / f"zig-{os.getpid()}"),
@@ -113,7 +113,7 @@ def compile_c(
     target: str = "",
     compiler: str = "cc",
 ) -> None:
-    """Compile with the system's compiler or, for a target, ziglang's; warnings are errors."""
+    """Compile with the system's compiler, or with ziglang for a target; warnings are errors."""
     needs(*([] if target else [compiler]))
     command = zig(target) if target else [compiler]
     done = subprocess.run(
@@ -126,7 +126,7 @@ def compile_c(
 
 @cache
 def importer(host: Host = NATIVE, flags: tuple[str, ...] = ()) -> Path:
-    """Return the importer for a host; skip the test if it cannot be made or run."""
+    """Return the importer for a host; skip the test if the compiler or emulator is missing."""
     needs(*host.emulator[:1])
     name = f"importer-{host.name}-{len(flags)}{'.exe' if host.windows else ''}"
     sources, system = sorted(SOURCES.glob("*.c")), () if host.windows else POSIX
@@ -135,7 +135,7 @@ def importer(host: Host = NATIVE, flags: tuple[str, ...] = ()) -> Path:
 
 @dataclass(frozen=True)
 class Job:
-    """What an importer is to do with an FMU that is unpacked.
+    """A simulation of an unpacked FMU by the importer.
 
     Parameters
     ----------
@@ -144,19 +144,23 @@ class Job:
     kind : str
         ``cs``, ``events`` (co-simulation in event mode) or ``me``.
     points : array
-        Communication points, the first of them the start.
+        Communication points [s]; the first is the start time.
     sets : mapping
         Start values by name.
     changes : mapping
-        Values by name that are set at the communication point of an index.
+        Values by name, to be set at the communication point with the index of the key.
     records : sequence of str
-        What is recorded; all variables if empty.
+        Names of the recorded variables; all variables if empty.
+    tolerance : float or None
+        Relative tolerance passed to the FMU; none is passed if None.
     substep : float
         Step of the integration in model exchange [s].
     library : Path or None
-        Another library than the one in the FMU.
+        Library to load instead of that in the FMU.
     resources : str or None
-        Another location of the resources than theirs.
+        Location of the resources to pass instead of the folder in the FMU.
+    host : Host
+        Platform on which the importer runs.
     """
 
     folder: Path
@@ -172,7 +176,7 @@ class Job:
     host: Host = NATIVE
 
     def text(self) -> str:
-        """Return the job file."""
+        """Return the text of the job file."""
         found = read_model_description(str(self.folder))
         variables = {v.name: v for v in found.modelVariables if v.type in TYPES}
         version = int(found.fmiVersion[0])
@@ -212,7 +216,7 @@ class Job:
         pytest.skip(f"the FMU has no library for {self.host.name}")
 
     def names(self) -> list[str]:
-        """Return the names of the columns after the time."""
+        """Return the names of the recorded variables: the columns after the time."""
         found = read_model_description(str(self.folder))
         return [*self.records] or [v.name for v in found.modelVariables if v.type in TYPES]
 
@@ -225,8 +229,8 @@ def _bits(x: float) -> str:
 
 
 @dataclass(frozen=True)
-class Done:
-    """What came of a job."""
+class Result:
+    """The result of a job: exit status, standard output and errors, names of the columns."""
 
     status: int
     output: bytes
@@ -234,7 +238,7 @@ class Done:
     names: Sequence[str]
 
     def rows(self, marks: str = "p") -> np.ndarray:
-        """Return the rows with one of the marks as a structured array, the time in ``at``."""
+        """Return the rows with one of the marks as a structured array; ``at`` is the time."""
         lines = [line.split() for line in self.output.decode().splitlines()]
         numbers = [
             [struct.unpack(">d", bytes.fromhex(word))[0] for word in words[1:]]
@@ -246,7 +250,7 @@ class Done:
 
 
 def unpack(fmu: Path, folder: Path) -> Path:
-    """Unpack an FMU into a folder, whatever its name."""
+    """Unpack an FMU into a folder."""
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(folder)
     return folder
@@ -259,8 +263,8 @@ def execute(
     before: Sequence[str] = (),
     environment: Mapping[str, str] | None = None,
     timeout: float = 600.0,
-) -> Done:
-    """Run the importer with a job; raise nothing, whatever happens there."""
+) -> Result:
+    """Run the importer with a job; a failure is in the status of the result."""
     host = job.host
     program = program or importer(host)
     needs(*host.emulator[:1], *before[:1])
@@ -273,21 +277,22 @@ def execute(
             capture_output=True, check=False, timeout=timeout,
             env=os.environ | own | dict(host.environment) | dict(environment or {}),
         )  # fmt: skip
-    return Done(done.returncode, done.stdout, done.stderr.decode(errors="replace"), job.names())
+    return Result(done.returncode, done.stdout, done.stderr.decode(errors="replace"), job.names())
 
 
-def run(job: Job, *words: Any, **options: Any) -> Done:
-    """Run the importer with a job that must go well."""
+def run(job: Job, *words: Any, **options: Any) -> Result:
+    """Run the importer with a job that must succeed."""
     done = execute(job, *words, **options)
     assert done.status == 0, done.errors
     return done
 
 
 @cache
-def given(model: str) -> Mechanism:
-    """Return a mechanism by name: a shipped one, or one of the tests' own.
+def described(model: str) -> Mechanism:
+    """Return a mechanism by name: a shipped one, or one of two that only the tests use.
 
-    The 2R guide with two stops that rub, and bodies that hit each other on flexures that stretch.
+    ``TWO_STOPS`` is the 2R guide with two stops with friction.  ``ANVIL`` has two bodies that hit
+    each other, on flexures that stretch.
     """
     if model == ANVIL:
         return anvil()
@@ -306,27 +311,24 @@ def given(model: str) -> Mechanism:
 
 @cache
 def host_fmu(model: str, fmi: int) -> Path:
-    """Return the FMU of a mechanism for this machine.
-
-    Mechanisms that take the engine long have no reference results.
-    """
+    """Return the path of the native FMU of a mechanism for this machine."""
 
     def make(folder: Path) -> None:
-        write(folder / f"{model}.fmu", built(given(model), fmi))
+        write(folder / f"{model}.fmu", built(described(model), fmi))
 
     return once(f"fmi{fmi}-{model}", make) / f"{model}.fmu"
 
 
 @cache
 def native(model: str, fmi: int, platform: str = "host") -> Path:
-    """Return a native FMU of a mechanism, unpacked; the FMU itself lies beside it."""
+    """Return the folder of an unpacked native FMU; the FMU is ``with_suffix(".fmu")``."""
     name = f"{model}-{fmi}-{platform}"
 
     def make(path: Path) -> None:
         if platform == "host":
             shutil.copy(host_fmu(model, fmi), path)
         else:
-            write(path, built(given(model), fmi, (platform,)))
+            write(path, built(described(model), fmi, (platform,)))
 
     fmu = once(f"{name}.fmu", make)
     return once(name, lambda path: unpack(fmu, path))
@@ -334,7 +336,7 @@ def native(model: str, fmi: int, platform: str = "host") -> Path:
 
 @cache
 def kernel_library(name: str, flags: tuple[str, ...], compiler: str = "cc") -> Path:
-    """Return the FMUs' library, compiled with flags of one's own; it serves every mechanism."""
+    """Return the library of the native FMUs, compiled with more flags; it fits every mechanism."""
     shared = ("-fPIC", "-shared", "-fvisibility=hidden", *flags, "-lm")
     sources = [KERNEL / "prbm_fmu.c"]
     return once(f"{name}.so", lambda path: compile_c(path, sources, shared, "", compiler))

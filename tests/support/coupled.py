@@ -1,4 +1,4 @@
-"""What the tests about coupling share: FMUs that are known in closed form, and the guides."""
+"""FMUs for tests of coupling: an integrator with a closed-form solution, and the guides."""
 
 from functools import cache
 from pathlib import Path
@@ -49,12 +49,12 @@ class Integrator(Fmi2Slave):
 
 @cache
 def integrator() -> Path:
-    """Return an FMU that integrates, by Euler's explicit steps."""
+    """Return the path of an FMU that integrates its input by explicit Euler steps."""
     source = Path(_folder.name) / "integrator.py"
     source.write_text(INTEGRATOR)
     return Path(_folder.name) / FmuBuilder.build_FMU(source, dest=_folder.name)
 
 
 def guide(fmi: int, model: str = "PRBDM") -> Path:
-    """Return a native FMU of a guide."""
+    """Return the path of the native FMU of a guide."""
     return native(model, fmi).with_suffix(".fmu")

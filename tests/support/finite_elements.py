@@ -1,4 +1,4 @@
-"""The parallel guide of finite elements (ANCF cables) in Exudyn: a route that knows no links."""
+"""The parallel guide as finite elements (ANCF cables) in Exudyn: a model without rigid links."""
 
 import warnings
 from dataclasses import dataclass
@@ -9,14 +9,14 @@ import pytest
 
 @dataclass(frozen=True)
 class ElementGuide:
-    """What finite elements say of the guide.
+    """Static deflection and frequencies of the guide by finite elements.
 
     Parameters
     ----------
     rest : complex
         Displacement of the shuttle's centre of mass under gravity [m].
     frequency : (k,)
-        Of small vibrations about it [Hz].
+        Frequencies of small vibrations about that position [Hz], ascending.
     """
 
     rest: complex
@@ -24,12 +24,12 @@ class ElementGuide:
 
 
 def guide(values, elements: int) -> ElementGuide:
-    """Return rest and modes of the guide with a number of cable elements a flexure.
+    """Return rest position and frequencies of the guide; ``elements`` is their number per flexure.
 
-    The elements bend and stretch, have no rotary inertia of their sections, and are clamped to
-    the ground and to the shuttle.
+    The cable elements bend and stretch and are clamped to the ground and to the shuttle.  Their
+    sections have no rotary inertia.
     """
-    exu = pytest.importorskip("exudyn", reason="the finite elements are Exudyn's: not installed")
+    exu = pytest.importorskip("exudyn", reason="Exudyn, which has the finite elements, is missing")
     from exudyn import itemInterface as item
     from exudyn.beams import GenerateBeamElementsAlongLine
 
@@ -53,7 +53,7 @@ def guide(values, elements: int) -> ElementGuide:
     cable = item.ObjectANCFCable2D(
         massPerLength=rho * b * h, bendingStiffness=E * b * h**3 / 12, axialStiffness=E * b * h
     )
-    # a cable's own frame has its x along the cable: the shuttle's, turned by 90 degrees
+    # The frame of a cable has its x axis along the cable: the shuttle's frame turned by 90 degrees.
     upright = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     for x in (0.0, W):
         line = GenerateBeamElementsAlongLine(
@@ -75,11 +75,11 @@ def guide(values, elements: int) -> ElementGuide:
     settings.staticSolver.verboseMode = 0
     settings.solution.file.write = False
     settings.linearSolver.solverType = exu.LinearSolverType.EigenSparse
-    if any(gravity):  # else its relative tolerance has nothing to refer to
+    if any(gravity):  # Without a load the static solver has no scale for its relative tolerance.
         mbs.SolveStatic(settings, updateInitialValues=True)
     x, y, _ = mbs.GetNodeOutput(node, exu.OutputVariableType.Displacement)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of its own use of SciPy
+        warnings.simplefilter("ignore")  # Exudyn's call of SciPy warns.
         f, _ = mbs.ComputeODE2Eigenvalues(
             settings, useSparseSolver=False, numberOfEigenvalues=6, convert2Frequencies=True,
             useAbsoluteValues=False,

@@ -1,7 +1,7 @@
 """Fuzzing of native FMUs: of their tables, and of sequences of calls.
 
-With clang, libFuzzer looks for inputs that reach new code; without, the same targets mutate and
-choose at random.  Sanitizers watch both.
+With clang, libFuzzer searches for inputs that reach new code.  Without clang, the same targets
+mutate tables and choose calls at random.  Both run with sanitizers.
 """
 
 import os
@@ -34,7 +34,7 @@ from prbm.mechanics.independent import independent
 from shared import once
 
 SANITIZERS = (
-    "-O0",  # which compiles in seconds what takes a minute else
+    "-O0",  # Compiles in seconds; with optimization it takes a minute.
     "-g",
     "-fno-omit-frame-pointer",
     "-fsanitize=address,undefined,float-cast-overflow",
@@ -46,26 +46,29 @@ ENVIRONMENT = {
 }
 FUZZERS = Path(__file__).with_name("fuzz")
 MODELS = ("PRBDM", "PRBDM2R", TWO_STOPS, ANVIL)
-CALLS = 500  # in a sequence
-SEEDS, LONGEST = 20, 4096  # sequences to begin with; bytes that choose one
-SLOW_INPUT = 20  # s; libFuzzer counts a slower input as a failure
-MOST_MEMORY = 2048  # MB
-LIMIT = 120.0  # s beyond the time that was asked for
+CALLS = 500  # Calls per sequence.
+SEED_COUNT = 20  # Initial sequences of libFuzzer.
+SEQUENCE_BYTES_MAX = 4096  # Bytes that choose the calls of one sequence.
+INPUT_SECONDS_MAX = 20  # libFuzzer counts a slower input as a failure.
+MEMORY_MAX = 2048  # MB
+TIMEOUT_MARGIN = 120.0  # s beyond the time of a search, after which it is stopped.
 
 
 @dataclass(frozen=True)
 class Found:
-    """What a fuzzer says; status 0 is well."""
+    """The result of a fuzzer: its exit status (0 for success) and its output."""
 
     status: int
-    said: str
+    output: str
 
 
 def sanitized_library() -> Path:
+    """Return the library of the native FMUs, compiled with sanitizers."""
     return kernel_library("sanitized", SANITIZERS)
 
 
 def sanitized_importer() -> Path:
+    """Return the importer, compiled with sanitizers."""
     return importer(flags=SANITIZERS)
 
 
@@ -75,7 +78,7 @@ def has_libfuzzer() -> bool:
 
 @cache
 def _target(name: str) -> Path:
-    """Compile a fuzz target: for libFuzzer if clang is there, else to mutate by itself."""
+    """Compile a fuzz target: for libFuzzer if there is clang, else with random mutations."""
     sources = [FUZZERS / f"{name}.c"]
     if name == "calls":
         sources += [path for path in sorted(SOURCES.glob("*.c")) if path.name != "main.c"]
@@ -84,7 +87,7 @@ def _target(name: str) -> Path:
     clang = has_libfuzzer()
     flags = [
         *SANITIZERS, "-fsanitize=fuzzer" if clang else "-DSTANDALONE", *POSIX,
-        "-DPRBM=",  # the functions of the kernel are not static
+        "-DPRBM=",  # Makes the functions of the kernel visible instead of static.
         "-I", str(SOURCES),
     ]  # fmt: skip
     compiler = "clang" if clang else "cc"
@@ -95,23 +98,23 @@ def _run(command: Sequence[object], seconds: float, **environment: str) -> Found
     try:
         done = subprocess.run(
             [*map(str, command)], capture_output=True, text=True, check=False, errors="replace",
-            timeout=seconds + LIMIT, env=os.environ | ENVIRONMENT | environment,
+            timeout=seconds + TIMEOUT_MARGIN, env=os.environ | ENVIRONMENT | environment,
         )  # fmt: skip
     except subprocess.TimeoutExpired as error:
-        return Found(-1, f"still running {LIMIT} s after its end: {error.stderr!r}")
+        return Found(-1, f"still running {TIMEOUT_MARGIN} s after its end: {error.stderr!r}")
     return Found(done.returncode, done.stdout + done.stderr)
 
 
 def _libfuzzer(target: Path, corpus: Path, seconds: float, seed: int, longest: int) -> list[object]:
     return [
         target, f"-max_total_time={seconds:.0f}", f"-seed={seed}", f"-max_len={longest}",
-        f"-timeout={SLOW_INPUT}", f"-rss_limit_mb={MOST_MEMORY}", "-print_final_stats=1",
+        f"-timeout={INPUT_SECONDS_MAX}", f"-rss_limit_mb={MEMORY_MAX}", "-print_final_stats=1",
         f"-artifact_prefix={corpus.parent}/", corpus,
     ]  # fmt: skip
 
 
 def fuzz_tables(folder: Path, seconds: float, seed: int) -> Found:
-    """Mutate the tables of the shipped mechanisms for some time."""
+    """Mutate the tables of some mechanisms for a number of seconds."""
     corpus = folder / "tables"
     corpus.mkdir(exist_ok=True)
     seeds = []
@@ -119,7 +122,7 @@ def fuzz_tables(folder: Path, seconds: float, seed: int) -> Found:
         content = (native(model, 3) / "resources" / "mechanism.bin").read_bytes()
         seeds.append(corpus / f"{model}.bin")
         seeds[-1].write_bytes(content)
-    whole = elastic()  # which has a joint, a bar, a chain
+    whole = elastic()  # Has parts that the other models lack: a joint, a bar, a chain.
     seeds.append(corpus / f"{whole.name}.bin")
     seeds[-1].write_bytes(tables(whole, (), "token", independent(whole)))
     target = _target("tables")
@@ -130,7 +133,7 @@ def fuzz_tables(folder: Path, seconds: float, seed: int) -> Found:
 
 
 def fuzz_calls(folder: Path, model: str, fmi: int, sequences: int, seed: int) -> Found:
-    """Call functions in arbitrary sequences, chosen by a generator of random numbers."""
+    """Call functions in random sequences in model exchange or co-simulation."""
     job = Job(native(model, fmi), "me", library=sanitized_library())
     done = execute(
         job, "calls", seed, sequences, CALLS,
@@ -147,9 +150,9 @@ def search_calls(folder: Path, model: str, fmi: int, seconds: float, seed: int) 
     file, corpus = folder / "job.txt", folder / f"calls-{model}-{fmi}"
     file.write_text(Job(native(model, fmi), "me", library=library).text(), encoding="utf-8")
     corpus.mkdir(exist_ok=True)
-    for number in range(SEEDS):
-        content = np.random.default_rng(seed + number).bytes(LONGEST)
+    for number in range(SEED_COUNT):
+        content = np.random.default_rng(seed + number).bytes(SEQUENCE_BYTES_MAX)
         (corpus / f"seed-{number}").write_bytes(content)
-    command = _libfuzzer(_target("calls"), corpus, seconds, seed + 1, LONGEST)
-    command.insert(1, "-len_control=0")  # long sequences from the start
+    command = _libfuzzer(_target("calls"), corpus, seconds, seed + 1, SEQUENCE_BYTES_MAX)
+    command.insert(1, "-len_control=0")  # Long sequences from the start.
     return _run(command, seconds, PRBM_JOB=str(file))

@@ -1,8 +1,8 @@
 """The C kernel as a Python module: every function that kernel.h declares, on NumPy arrays.
 
-The header is the only description there is: its structures become :class:`ctypes.Structure`, its
-prototypes become functions.  Working memory and the place for a sentence are supplied, and what a
-function leaves in the latter is raised; whether it gave back what it took is checked each time.
+Everything is derived from the header: its structures become :class:`ctypes.Structure`, its
+prototypes become functions.  Each call gets working memory and a place for an error message.  A
+message is raised as :class:`KernelError`.  After each call the working memory must be free again.
 """
 
 import ctypes
@@ -25,9 +25,9 @@ from prbm.mechanism.description import Mechanism
 KERNEL = Path(prbm.kernel.__file__).parent
 FLAGS = (
     "-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
-    "-Wl,-Bsymbolic",  # names as common as these must not be found elsewhere in the process
+    "-Wl,-Bsymbolic",  # Calls within the library never resolve to another library's function.
 )  # fmt: skip
-ROOM = 1 << 16  # doubles of working memory
+WORKING_MEMORY = 1 << 16  # Doubles.
 
 SCALARS = {
     "bool": ctypes.c_bool,
@@ -52,7 +52,7 @@ DTYPES |= dict.fromkeys(ENUMERATIONS, np.int32)
 
 
 class KernelError(Exception):
-    """What a function of the kernel says when it returns false."""
+    """The error message of a function of the kernel."""
 
 
 # --- the header -----------------------------------------------------------------------------------
@@ -71,7 +71,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class Prototype:
-    """A function as kernel.h declares it, and the file that it is in."""
+    """A function declared by kernel.h, and the C file that defines it."""
 
     name: str
     result: Declared
@@ -102,7 +102,7 @@ def _declared(text: str) -> list[Declared]:
 
 @cache
 def _header() -> str:
-    """Return all that kernel.h declares, the part of each header below ``@name.c@``."""
+    """Return all declarations of kernel.h; those of each header follow a line ``@name.c@``."""
     included = re.findall(r'#include "core/(\w+)\.h"', (KERNEL / "kernel.h").read_text())
     return _plain((KERNEL / "generated.h").read_text()) + "\n".join(
         f"@{name}.c@\n" + _plain((KERNEL / "core" / f"{name}.h").read_text()) for name in included
@@ -110,7 +110,7 @@ def _header() -> str:
 
 
 def constants() -> dict[str, int]:
-    """Return the numbers that the header names."""
+    """Return the enumeration constants of the header by name."""
     found: dict[str, int] = {}
     for body in re.findall(r"\benum\s*\w*\s*\{(.*?)\}", _header(), re.DOTALL):
         number = -1
@@ -161,7 +161,7 @@ def prototypes() -> dict[str, Prototype]:
 
 
 def unit() -> str:
-    """Return the part of the library's one file that kernel.h declares, as C."""
+    """Return C code that includes the files of the functions declared by kernel.h."""
     includes = re.findall(r'#include "(core/\w+\.c)"', (KERNEL / "prbm_fmu.c").read_text())
     return "".join(f'#include "{name}"\n' for name in ("kernel.h", *includes))
 
@@ -169,7 +169,7 @@ def unit() -> str:
 def compiled(
     flags: Sequence[str] = (), compiler: Sequence[str] = ("cc",), text: str = ""
 ) -> ctypes.CDLL:
-    """Compile the kernel, and more C, with all its functions visible."""
+    """Compile and load the kernel and more C code, with all functions visible."""
     folder = Path(mkdtemp(prefix="prbm-kernel-"))
     try:
         source, library = folder / "kernel.c", folder / "kernel.so"
@@ -182,19 +182,19 @@ def compiled(
 
 
 class Kernel:
-    """The functions of the kernel, called by their names in C.
+    """The functions of the kernel as methods with their names in C.
 
-    Arrays are passed as they are: those that a function may write must be contiguous and of the
-    right type, so that the caller sees what was written.
+    Arrays are passed without a copy.  Arrays that a function writes must be contiguous and of the
+    right type.
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self.library = library
         self.called: set[str] = set()
-        self.memory = np.full(ROOM, np.nan)
-        self.spare = np.full(ROOM, np.nan)
+        self.memory = np.full(WORKING_MEMORY, np.nan)
+        self.spare = np.full(WORKING_MEMORY, np.nan)
         self.scratch = structures()["Scratch"](
-            self.memory.ctypes.data, self.spare.ctypes.data, 0, ROOM, 0, False
+            self.memory.ctypes.data, self.spare.ctypes.data, 0, WORKING_MEMORY, 0, False
         )
         self.problem = structures()["Problem"]()
 
@@ -204,7 +204,7 @@ class Kernel:
         return lambda *given: self.call(prototypes()[name], given)
 
     def call(self, prototype: Prototype, given: tuple[Any, ...]) -> Any:
-        """Call a function; what it says when it fails is raised."""
+        """Call a function; raise its error message, if any."""
         self.called.add(prototype.name)
         function = getattr(self.library, prototype.name)
         function.restype = _result(prototype.result)
@@ -214,9 +214,9 @@ class Kernel:
         rest = list(supplied)
         assert prototype.variadic or not rest, f"{prototype.name}: {len(rest)} arguments too many"
         result = function(*arguments, *rest)
-        assert self.scratch.used == 0, f"{prototype.name} keeps working memory"
+        assert self.scratch.used == 0, f"{prototype.name} does not release its working memory"
         assert not self.scratch.exceeded, f"{prototype.name} needs more working memory"
-        self.memory[: self.scratch.most] = np.nan  # what it leaves there is of no use to others
+        self.memory[: self.scratch.most] = np.nan  # The next call must not rely on old contents.
         if self.problem.text:
             raise KernelError(self.problem.text.decode())
         return complex(result.re, result.im) if hasattr(result, "re") else result
@@ -276,7 +276,10 @@ def array(address: int | None, *shape: int, kind: str = "double") -> np.ndarray:
 
 
 def placed(lay_out: Callable[[ctypes.Structure], Any]) -> np.ndarray:
-    """Return a block in which something is laid out as it asks for."""
+    """Return a new block of memory in which a function of the kernel has placed its arrays.
+
+    The function is called twice: without memory, to count the bytes, and with the block.
+    """
     counting = structures()["Memory"](None, 0)
     lay_out(counting)
     block = np.full(counting.used // 8 + 2, np.nan)
@@ -301,7 +304,7 @@ class KernelSystem:
         )
 
     def assemble(self, values: dict[str, float]) -> None:
-        """Compute the arrays for the values of all parameters."""
+        """Compute the arrays of the system from the values of all parameters."""
         self.values = np.array(list(values.values()))
         self.kernel.assemble(self.structure, self.values)
 
@@ -332,11 +335,11 @@ class KernelSystem:
         }  # fmt: skip
 
     def links(self) -> np.ndarray:
-        """Return the coordinates of the links."""
+        """Return the coordinate of each link."""
         return array(self.mechanism.links, self.mechanism.link_count, kind="int")
 
     def arm(self) -> np.ndarray:
-        """Return whose arm each coordinate turns or stretches."""
+        """Return, for each coordinate, the link whose arm it turns or stretches."""
         return array(self.mechanism.coordinates, self.structure.n, 3, kind="int")[:, 2]
 
     def blocks(self) -> np.ndarray:
@@ -344,9 +347,9 @@ class KernelSystem:
         return array(self.structure.blocks, self.structure.block_count, 2, kind="int")
 
     def frame(self, group: str, i: int) -> tuple[int, complex, complex, np.ndarray]:
-        """Return the coordinate, the constant, the drawn place and the row of a point of a body.
+        """Return the coordinate, constant, drawn position and row of a point fixed to a body.
 
-        The group is one of bodies, pushed, probes.
+        The group is ``bodies``, ``pushed`` or ``probes``.
         """
         kind = structures()["BodyFrame"]
         frame = kind.from_address(getattr(self.structure, group) + i * ctypes.sizeof(kind))

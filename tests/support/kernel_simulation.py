@@ -1,4 +1,4 @@
-"""A simulation in the C kernel, with the interface of the engine's own."""
+"""A simulation in the C kernel, with the interface of the class Simulation of the package."""
 
 import ctypes
 import re
@@ -51,7 +51,7 @@ FUNCTIONS = {
 
 
 class KernelMistake(Exception):
-    """What the kernel refuses, in its words."""
+    """The error message of a function of the kernel."""
 
 
 Changes = tuple[tuple[str, str, str], ...]
@@ -84,12 +84,12 @@ def library(changes: Changes = ()) -> ctypes.CDLL:
 
 
 class KernelSimulation:
-    """A mechanism in motion in the kernel.
+    """A simulation of a mechanism in the kernel.
 
     Parameters
     ----------
     mechanism : Mechanism
-        What moves.
+        The mechanism.
     values : dict
         Parameters and inputs that differ from their defaults.
     exchange : bool
@@ -132,10 +132,10 @@ class KernelSimulation:
             raise KernelMistake(self.sentence.value.decode())
 
     def call(self, name, *arguments) -> None:
-        """Call a function that may fail; raise its sentence."""
+        """Call a function that may fail; raise its error message."""
         self._check(getattr(self.library, name)(self.inner, *arguments, self.sentence))
 
-    # -- as prbm.Simulation --
+    # -- interface of Simulation --
 
     def set(self, changes: dict[str, float]) -> None:
         for name, value in changes.items():

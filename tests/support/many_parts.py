@@ -1,4 +1,4 @@
-"""Mechanisms with some of everything, for tests that compare the kernel with the package."""
+"""Mechanisms with parts of all kinds, for tests that compare the kernel with the package."""
 
 import dataclasses
 
@@ -19,11 +19,12 @@ from support import mechanism
 
 
 def length(name, x):
+    """Return a length [m] as a parameter."""
     return Parameter(name, x, "m", "A length", 1e-9, 1e3)
 
 
 def rich(model="3R"):
-    """Return a mechanism with some of everything: two bodies, pins, 1R beside others, two stops."""
+    """Return a mechanism of two bodies with pins, two flexure models, two stops and friction."""
     return Mechanism(
         name="Rich",
         title="A stage on two leaves, with a pendulum on a third",
@@ -58,10 +59,14 @@ def rich(model="3R"):
 
 
 def elastic():
-    """Return a mechanism of what stretches, hangs, leans on a body and closes two loops.
+    """Return a mechanism with flexures that stretch, joints, stops on bodies and two loops.
 
-    A stage on two leaves, of which one is a chain; a hammer at the free end of a third that hits a
-    wall on the stage; a lever between a bar and a joint; a pendulum on another joint.
+    Its bodies are
+
+    - a stage on two flexures, one of which is a chain;
+    - a hammer at the free end of a third flexure, which hits a wall on the stage;
+    - a lever between a bar and a joint;
+    - a pendulum on another joint.
     """
     return Mechanism(
         name="Elastic",
@@ -117,7 +122,7 @@ def elastic():
 
 
 def anvil():
-    """Return a stage on two leaves that stretch, with a hammer on a third above an anvil on it."""
+    """Return a stage on two flexures that stretch; a hammer on a third falls on the stage."""
     return Mechanism(
         name="Anvil",
         title="A hammer that falls on the stage that carries it",
@@ -165,7 +170,7 @@ def two_stops(model, **changes):
 
 
 def cantilever(model="2R", **parts):
-    """Return a flexure clamped to ground that carries a body at its pinned end: an open chain."""
+    """Return a flexure that is clamped to ground and has a body on its pinned end: no loop."""
     return Mechanism(
         name="cantilever",
         title="A flexure with a pendulum at its end",

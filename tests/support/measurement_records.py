@@ -1,4 +1,4 @@
-"""Measured records with known parameters and the noise of real sensors."""
+"""Synthetic measurement records with known parameters and realistic noise."""
 
 import numpy as np
 
@@ -14,7 +14,11 @@ def write(path, head, *columns):
 
 
 def records(folder):
-    """Write a bent beam of 181.5 GPa, a calibration, a vibration of 4.9 Hz, bounces of 0.6."""
+    """Write four records of measurements to a folder.
+
+    They are a bending test (181.5 GPa), a calibration of a laser (200 V/m, 1.3 V), a free vibration
+    (4.9 Hz), and a bouncing motion (restitution 0.6).
+    """
     rng = np.random.default_rng(0)
     d = 1.5e-3 * (1 - np.cos(np.linspace(0, 10 * np.pi, 3000)))
     stiffness = 181.5e9 * 8e-3 * 0.1e-3**3 / (4 * 40e-3**3)

@@ -1,4 +1,4 @@
-"""An FMU that writes down its runs, and in which things go wrong as its parameters say."""
+"""An FMU that logs its runs and fails as its parameter ``trouble`` selects."""
 
 import os
 import signal
@@ -11,7 +11,7 @@ FINE, RAISES, CRASHES, EXITS, HANGS, CRASHES_ONCE, KILLS_WORKER = range(7)
 
 
 class Mishap(Fmi2Slave):
-    """y = x t, or trouble after the first step; each run adds x to the file MISHAP_LOG."""
+    """y = x t, or a failure in the first step; each run appends x to the file MISHAP_LOG."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
@@ -26,13 +26,13 @@ class Mishap(Fmi2Slave):
         self.register_variable(Real("y", causality=Fmi2Causality.output))
 
     def exit_initialization_mode(self):
-        """Write the run down."""
+        """Append x to the log and wait for the time ``pause`` [s]."""
         with open(os.environ["MISHAP_LOG"], "a") as log:
             log.write(f"{self.x!r}\n")
         time.sleep(self.pause)
 
     def do_step(self, current_time, step_size):
-        """Step, or do what is asked for."""
+        """Make a step, or fail as selected."""
         if self.trouble == RAISES:
             raise ArithmeticError("the spring is broken")
         if self.trouble == CRASHES:

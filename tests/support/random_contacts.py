@@ -14,8 +14,8 @@ from kernel_library import KernelError, kernel
 from prbm.base.errors import SimulationError
 from prbm.mechanics import complementarity, contact
 
-CLOSING_SHARE = 0.2  # Of the draws: walls that move at random.
-RANKS_BELOW = 0.5  # Of the draws: fewer degrees of freedom than rows.
+MOVING_SHARE = 0.2  # Fraction of the draws in which walls move at random.
+SINGULAR_SHARE = 0.5  # Fraction of the draws with fewer degrees of freedom than rows.
 
 
 @dataclass
@@ -33,10 +33,10 @@ class Found:
 
 
 def drawn(rng, rows, normals):
-    """Return W and rates of contacts, of which the normals close, and whether walls move."""
-    rank = int(rng.integers(1, rows + 1)) if rng.uniform() < RANKS_BELOW else rows + 2
+    """Return a Delassus matrix W and contact rates; the first ``normals`` rates are closing."""
+    rank = int(rng.integers(1, rows + 1)) if rng.uniform() < SINGULAR_SHARE else rows + 2
     A = rng.normal(size=(rows, rank)) * 10 ** rng.uniform(-2, 2)
-    moving = rng.uniform() < CLOSING_SHARE
+    moving = rng.uniform() < MOVING_SHARE
     u = A @ rng.normal(size=rank)
     A[:normals] *= -np.sign(u[:normals])[:, None]
     u[:normals] = -np.abs(u[:normals])
@@ -49,7 +49,7 @@ def newton(engine, rng):
     """Return the violation of the laws of a frictionless impact of up to eight stops."""
     k = int(rng.integers(2, 9))
     W, u = drawn(rng, k, k)
-    u[rng.uniform(size=k) < 0.1] *= 1e-14  # held stops
+    u[rng.uniform(size=k) < 0.1] *= 1e-14  # Closed stops, with a rate of round-off.
     eps, P = rng.uniform(0, 1, k), np.zeros(k)
     if engine == "kernel":
         kernel().newton(k, W, u, eps, 0.0, P)
@@ -84,7 +84,7 @@ def several(engine, rng):
 
 
 def rest(engine, rng):
-    """Return the violation of the laws of contacts at rest; some slide in one search of four."""
+    """Return the violation of the laws of contacts at rest, with Coulomb friction."""
     k, m = int(rng.integers(1, 5)), int(rng.integers(1, 5))
     W, u = drawn(rng, k + m, k)
     mu, fixed = rng.uniform(0, 1.5, m), np.zeros(m)
@@ -104,12 +104,12 @@ def rest(engine, rng):
 
 
 def gain(W, u, P):
-    """Return the energy that impulses add, as a speed."""
+    """Return the energy that impulses add, divided by the sum of the impulses [m/s]."""
     return max(float(P @ u + P @ W @ P / 2), 0.0) / max(float(np.abs(P).sum()), 1e-300)
 
 
 def friction_violation(W, u, mu, P):
-    """Return the violation of contact, Coulomb's cone and the balance of energy, as a rate."""
+    """Return the largest violation of contact, friction cone and energy, over the largest rate."""
     k = len(mu)
     after, scale = u + W @ P, np.abs(u).max()
     excess = (np.abs(P[k:]) - mu * P[:k]) * np.diag(W)[k:]

@@ -1,8 +1,8 @@
-"""Random valid mechanisms: trees and loops of all that a mechanism can be made of.
+"""Random valid mechanisms: trees and loops of all kinds of parts.
 
-The structure (what is joined to what, by which model, held how) is drawn by hypothesis, which
-shrinks it, or from a seed; lengths, masses and stiffnesses come from a seed always, so that no
-two points fall together by chance::
+The structure (connections, flexure models, ends) is drawn by hypothesis, which shrinks it, or from
+a seed.  Lengths, masses and stiffnesses always come from a seed, so that no two points coincide by
+chance::
 
     @given(mechanisms())                    # hypothesis
     def test_...(mechanism): ...
@@ -40,18 +40,18 @@ from prbm.mechanism.parts import (
 )
 
 Choose = Callable[[Sequence], object]
-"""Picks one of a sequence; the first is the simplest."""
+"""Function that picks an element of a sequence; the first element is the simplest."""
 
-CELL = 0.06  # m: bodies lie on a lattice of this size, shifted by up to a fifth of it
+CELL = 0.06  # m; bodies lie on a lattice of this size, shifted by up to a fifth of it.
 MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 1), ("nR", 2), ("nR", 4))
 ENDS = ((CLAMP, CLAMP), (CLAMP, PIN), (PIN, CLAMP), (CLAMP, FREE), (FREE, CLAMP), (PIN, PIN))
-RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # stretches at a few hundred Hz
+RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # Axial modes of some hundred Hz.
 STEEL = {"thickness": (2e-4, 3e-4), "modulus": (1e9, 1e10)}
-MOBILE = 1e-2  # share of its mobility that the loops leave to the released body, at least
+MOBILITY_RATIO_MIN = 1e-2  # Mobility of the released body with loops over that without.
 
 
 class _Builder:
-    """Adds part after part to a mechanism; ``choose`` decides what, ``rng`` how much."""
+    """Builder of a mechanism: ``choose`` selects the structure, ``rng`` draws the numbers."""
 
     def __init__(self, choose: Choose, rng: np.random.Generator) -> None:
         self.choose, self.rng = choose, rng
@@ -70,7 +70,7 @@ class _Builder:
 
     def add_type(self) -> None:
         model, n = self.choose(MODELS)
-        axial = self.choose((False, True)) and model != "1R"  # whose cantilevers cannot stretch
+        axial = self.choose((False, True)) and model != "1R"  # A 1R cantilever cannot stretch.
         section = RUBBER if axial or self.choose((False, True)) else STEEL
         self.types.append(
             FlexureType(
@@ -97,7 +97,7 @@ class _Builder:
         return self.centres[body] + self.disc(CELL / 6)
 
     def connect(self, first: str, second: str, *, joint: bool) -> None:
-        """Join a body or the ground to a body."""
+        """Connect a body or the ground to a body, by a joint or a flexure."""
         far = self.near(second)
         if joint:
             pair = [self.point(first, far), self.point(second, far)]
@@ -124,7 +124,10 @@ def build(
     friction: bool = True,
     damping: bool = True,
 ) -> Mechanism:
-    """Return a mechanism of at most so many bodies, loops and stops; it may be over-constrained."""
+    """Return a mechanism with limited numbers of parts; it may be over-constrained.
+
+    ``bodies``, ``loops`` and ``stops`` are the largest numbers.
+    """
     b = _Builder(choose, rng)
     for _ in range(choose((1, 2, 3))):
         b.add_type()
@@ -187,7 +190,7 @@ def build(
 
 
 def inputs(mechanism: Mechanism, seed: int) -> dict[str, float]:
-    """Return forces, moments and a base acceleration for a mechanism, of the size of its weight."""
+    """Return random forces, moments and a base acceleration for a mechanism."""
     rng = np.random.default_rng(seed)
     given = {"base.acceleration.x": rng.uniform(-2, 2), "base.acceleration.y": rng.uniform(-2, 2)}
     for force in mechanism.forces:
@@ -197,7 +200,7 @@ def inputs(mechanism: Mechanism, seed: int) -> dict[str, float]:
 
 
 def assembles(mechanism: Mechanism) -> bool:
-    """Tell whether a mechanism is neither over-constrained nor without motion."""
+    """Return whether a mechanism can be assembled: not over-constrained, and able to move."""
     try:
         assemble(mechanism, mechanism.values())
     except PrbmError:
@@ -206,7 +209,7 @@ def assembles(mechanism: Mechanism) -> bool:
 
 
 def starts(mechanism: Mechanism) -> bool:
-    """Tell whether a mechanism has a shape to start from, clear of its walls, and can move then."""
+    """Return whether a simulation can start, outside of all walls, and the release can move."""
     try:
         sim = Simulation(mechanism)
     except (EquilibriumError, ParameterError):
@@ -218,18 +221,18 @@ def starts(mechanism: Mechanism) -> bool:
     left, free = (
         (rows[-1] @ response(M, held, rows[-1:])).item() for held in (rows[:-1], rows[:0])
     )
-    return left > MOBILE * free
+    return left > MOBILITY_RATIO_MIN * free
 
 
 @st.composite
 def mechanisms(draw, *, starting: bool = False, **most) -> Mechanism:
-    """Draw mechanisms that assemble or, if ``starting``, that can be simulated, too."""
+    """Draw mechanisms that can be assembled and, if ``starting``, also simulated."""
 
     def attempt() -> Mechanism | None:
         rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
         try:
             return build(lambda options: draw(st.sampled_from(options)), rng, **most)
-        except PrbmError:  # no flexure at all, a bar that is free
+        except PrbmError:  # Invalid structure: for example no flexure.
             return None
 
     made = attempt()
@@ -238,7 +241,7 @@ def mechanisms(draw, *, starting: bool = False, **most) -> Mechanism:
 
 
 def seeded(seed: int, *, starting: bool = True, **most) -> Mechanism:
-    """Return a valid mechanism, the same for the same seed."""
+    """Return a valid mechanism that depends on the seed only."""
     rng = np.random.default_rng(seed)
 
     def choose(options: Sequence) -> object:

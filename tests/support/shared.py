@@ -1,4 +1,4 @@
-"""Files that are made once in a run of the tests, for all its processes."""
+"""Files that all processes of a test run share; each file is made once."""
 
 import atexit
 import os
@@ -13,7 +13,7 @@ from prbm.kernel.compiler import _locked
 
 @cache
 def shared_folder() -> Path:
-    """Return the folder of the files; the last process of the run removes it."""
+    """Return the folder of the shared files; the last process of the run removes it."""
     run = os.environ.get("PYTEST_XDIST_TESTRUNUID", f"of-{os.getpid()}")
     path = Path(tempfile.gettempdir()) / f"prbm_tests_{run}"
     users = path / "users"
@@ -24,7 +24,7 @@ def shared_folder() -> Path:
 
 
 def _leave(path: Path) -> None:
-    """Remove the folder if no other process uses it any more."""
+    """Remove the folder unless other processes still use it."""
     users = path / "users"
     (users / str(os.getpid())).unlink()
     if not any(users.iterdir()):
@@ -32,7 +32,7 @@ def _leave(path: Path) -> None:
 
 
 def once(name: str, make: Callable[[Path], object]) -> Path:
-    """Return a file or folder that the first process that needs it makes."""
+    """Return a shared file or folder; the first process that needs it makes it."""
     path = shared_folder() / name
     with _locked(path.with_name(f"{name}.lock")):
         if not path.exists():

@@ -2,8 +2,8 @@
 
 ``python tests/support/sizes.py`` prints the ten largest of each.
 
-The body of a function are the lines below its signature and docstring, to its end; in C, the lines
-between its braces.
+The body of a Python function begins after its signature and docstring.  The body of a C function
+consists of the lines between its braces.
 """
 
 import ast
@@ -17,10 +17,10 @@ FOLDERS = ("fmu_src",)
 GENERATED = ("generated.h",)
 SHOWN = 10
 
-FILE_MAX = 700  # lines
-CLASS_MAX = 30  # methods
-BODY_MAX = 60  # lines
-PAGE_BODY_MAX = 100  # lines of a function that writes a page
+FILE_MAX = 700  # Lines.
+CLASS_MAX = 30  # Methods.
+BODY_MAX = 60  # Lines.
+PAGE_BODY_MAX = 100  # Lines of a function that writes a page.
 PAGES = "fmu_src/prbm/validation/"
 
 C_NOISE = re.compile(
@@ -35,7 +35,7 @@ C_FUNCTION = re.compile(r"([A-Za-z_]\w*)\s*\([^{}]*\)\s*\Z")
 
 
 class Size(NamedTuple):
-    """The size of something, and its place."""
+    """The size of a file, class or function, its name and its position in the source."""
 
     size: int
     name: str
@@ -54,7 +54,7 @@ class Sizes(NamedTuple):
 
 
 def measured(root: Path = ROOT, folders: Iterable[str] = FOLDERS) -> Sizes:
-    """Return the sizes of all that is in the Python and C files of some folders."""
+    """Return the sizes of files, classes and functions in the Python and C files of folders."""
     sizes = Sizes([], [], [])
     paths = (path for folder in folders for path in sorted((root / folder).rglob("*")))
     for path in paths:
@@ -111,7 +111,7 @@ def c_functions(text: str, place: str) -> Iterator[Size]:
 
 
 def violations(sizes: Sizes) -> list[str]:
-    """Return a sentence for everything that is too large."""
+    """Return a message for each file, class or function above its limit."""
     sentences = [f"{x}: {FILE_MAX} lines at most" for x in sizes.files if x.size > FILE_MAX]
     sentences += [f"{x}: {CLASS_MAX} methods at most" for x in sizes.classes if x.size > CLASS_MAX]
     for x in sizes.functions:

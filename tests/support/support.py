@@ -1,4 +1,4 @@
-"""What the tests share: the shipped mechanisms, and the 1R guide as one scalar equation."""
+"""Shared by the tests: the shipped mechanisms, and the 1R guide as one scalar equation."""
 
 import math
 from dataclasses import dataclass, replace
@@ -22,10 +22,10 @@ from prbm.mechanism.description import Mechanism
 from prbm.references import scalar_guide
 
 ROOT = Path(__file__).resolve().parents[2]
-"""The folder of the project."""
+"""Root folder of the project."""
 
 SUPPORT = Path(__file__).resolve().parent
-"""The folder of the modules that several tests import."""
+"""Folder of the modules that the tests import."""
 
 
 @cache
@@ -34,36 +34,40 @@ def mechanism(name: str) -> Mechanism:
 
 
 GUIDES = ("PRBDM", "PRBDM2R")
-"""What has friction on the shuttle and comes to rest on the stop: for tests of that."""
+"""Mechanisms with friction on the shuttle that come to rest on the stop."""
 
-ENDS = {
+IMPACT_END_TIMES = {
     "Bistable": 0.09, "Cantilever": 0.24, "FoldedSuspension": 0.135, "ImpactOscillator": 0.12,
     "PRBDM2RAxial": 0.045, "PRBDM3R": 0.048,
 }  # fmt: skip
-"""Until when [s] something happens, where it is not by 0.3 s that all does."""
+"""Times [s] by which the default experiment has had an impact, if not 0.3 s."""
 
-QUICK = (*GUIDES, "ImpactOscillator")
-"""What is checked by default: the guides, and a stop on a body that moves; the others as slow."""
+QUICK_MODELS = (*GUIDES, "ImpactOscillator")
+"""Mechanisms checked by default: the guides, and one with a stop fixed to a moving body.
 
-COSTLY = ("FoldedSuspension", "PRBDM2RAxial", "PRBDM3R")
-"""What takes the engine 5 to 20 s for the second of the default experiment."""
+Checks of the other mechanisms are marked as slow.
+"""
+
+COSTLY_MODELS = ("FoldedSuspension", "PRBDM2RAxial", "PRBDM3R")
+"""Mechanisms whose default experiment of 1 s takes the engine 5 to 20 s."""
 
 SHIPPED = [
-    name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in shipped()
+    name if name in QUICK_MODELS else pytest.param(name, marks=pytest.mark.slow)
+    for name in shipped()
 ]
-"""The shipped mechanisms as parameters of a check that holds for every one of them."""
+"""Names of the shipped mechanisms, as parameters of a test that runs for each of them."""
 
 each_shipped = pytest.mark.parametrize("model", SHIPPED)
 
 
 def selected(keep) -> list:
-    """Return those of SHIPPED of which something is true, by their names."""
+    """Return the parameters in SHIPPED for whose name ``keep`` is true."""
     return [p for p in SHIPPED if keep(p if isinstance(p, str) else p.values[0])]
 
 
 @dataclass(frozen=True)
 class Case:
-    """What a check that holds for every mechanism needs to know of one of them.
+    """The data of a shipped mechanism for tests that run for each of them.
 
     ``end`` is a time [s] by which the default experiment has had an impact, if it has any.
     """
@@ -73,48 +77,49 @@ class Case:
 
     @property
     def costly(self) -> bool:
-        return self.mechanism.name in COSTLY
+        """Whether a default experiment takes the engine several seconds."""
+        return self.mechanism.name in COSTLY_MODELS
 
     @property
     def body(self) -> str:
-        """The body that is released."""
+        """Name of the released body."""
         return self.mechanism.release.body
 
     @property
     def stop(self) -> str:
-        """The first stop."""
+        """Name of the first stop."""
         return self.mechanism.stops[0].name
 
     @property
     def force(self) -> str:
-        """The first force."""
+        """Name of the first force."""
         return self.mechanism.forces[0].name
 
     @property
     def displacement(self) -> float:
-        """The default displacement at release, along its direction [m]."""
+        """Default displacement at release, along the direction of the release [m]."""
         return float(self.mechanism.values()["release.displacement"])
 
     @property
     def released(self) -> str:
-        """The output that shows it but for its sign."""
+        """Output that equals the displacement at release except for its sign."""
         upright = round(self.mechanism.release.direction) % 180 != 0
         return f"{self.body}.{'y' if upright else 'x'}"
 
-    def outputs(self, *what: str) -> list[str]:
-        """Return outputs of all bodies, such as x and y."""
-        return [f"{body.name}.{name}" for body in self.mechanism.bodies for name in what]
+    def outputs(self, *names: str) -> list[str]:
+        """Return the full names of outputs of all bodies, such as x and y."""
+        return [f"{body.name}.{name}" for body in self.mechanism.bodies for name in names]
 
-    def at_stops(self, *what: str) -> list[str]:
-        """Return outputs of all stops, such as contact."""
-        return [f"{stop.name}.{name}" for stop in self.mechanism.stops for name in what]
+    def at_stops(self, *names: str) -> list[str]:
+        """Return the full names of outputs of all stops, such as contact."""
+        return [f"{stop.name}.{name}" for stop in self.mechanism.stops for name in names]
 
     def starts(self) -> dict[str, float]:
-        """Return start values that differ from the defaults: half the release, and a force."""
+        """Return start values other than the defaults: half the displacement, and a force."""
         return {"release.displacement": 0.5 * self.displacement, f"{self.force}.x": 0.05}
 
     def changes(self) -> dict[int, dict[str, float]]:
-        """Return inputs and tunable parameters that change on the way, by communication step."""
+        """Return changes of inputs and tunable parameters, by number of the communication step."""
         return {
             3: {f"{self.force}.x": 0.3, "base.acceleration.y": 2.0},
             5: {f"{self.stop}.displacement": 1e-3, f"{self.stop}.velocity": 0.0},
@@ -123,32 +128,32 @@ class Case:
         }
 
     def substep(self, largest: float) -> float:
-        """Return a step [s] at which Runge and Kutta's classical steps are stable.
+        """Return a step [s] at which the classical Runge-Kutta method is stable.
 
-        Half the bound of the fastest mode at release, h omega < 2 and h beta omega^2 < 2.
+        It is half of the bounds h omega < 2 and h beta omega^2 < 2 for the fastest mode at release.
         """
         omega, beta = fastest(self.mechanism.name), self.mechanism.damping_beta
         return min(largest, 1.0 / omega, 1.0 / max(beta * omega**2, 1e-300))
 
     def impacts(self, values) -> int:
-        """Return how many impacts there have been at all stops, by values of outputs."""
+        """Return the number of impacts at all stops, from the values of all outputs."""
         return sum(int(values[name]) for name in self.at_stops("impact_count"))
 
 
 @cache
 def case(name: str) -> Case:
-    return Case(mechanism(name), ENDS.get(name, 0.3))
+    return Case(mechanism(name), IMPACT_END_TIMES.get(name, 0.3))
 
 
 def built(guide: Mechanism, fmi: int, platforms=("host",), clock=False) -> bytes:
-    """Return a native FMU; without reference results if they take the engine long."""
-    reference = (lambda *_: {}) if guide.name in COSTLY else native_fmu.reference
+    """Return a native FMU; the costly models are built without reference results."""
+    reference = (lambda *_: {}) if guide.name in COSTLY_MODELS else native_fmu.reference
     with patch.object(native_fmu, "reference", reference):
         return native_fmu.build(guide, fmi=fmi, platforms=platforms, clock=clock)
 
 
 def simulation(name: str, values=None, **options) -> Simulation:
-    """Return a simulation that keeps a record of its impacts."""
+    """Return a simulation that records its impacts."""
     sim = Simulation(mechanism(name), values, **options)
     sim.record = []
     return sim
@@ -165,16 +170,17 @@ def fastest(name: str) -> float:
 
 @cache
 def record(name: str) -> list[Impact]:
-    """Return the impacts that the engine finds in the span of a case."""
+    """Return the impacts that the engine finds up to the end time of a case."""
     sim = simulation(name)
     sim.advance(case(name).end)
     return sim.record
 
 
 def around_first_impact(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return times from 0 until shortly before the first impact, and from there to some more.
+    """Return communication points before the first impact (16 steps) and around it (47 steps).
 
-    Both are communication points, 16 and 47 steps.
+    They meet at 97.5 % of the time of the first impact.  The last point is at four times that time
+    or at the end time of the case.
     """
     first, end = record(name)[0].time, case(name).end
     middle = 0.975 * first
@@ -182,7 +188,7 @@ def around_first_impact(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def energy_balance(out) -> float:
-    """Return kinetic + elastic + gravitational + dissipated - work [J], which is constant."""
+    """Return kinetic + elastic + gravitational + dissipated energy - work [J]; it is constant."""
     kept = ("kinetic", "elastic", "gravitational", "dissipated")
     return sum(out[f"energy.{name}"] for name in kept) - out["energy.work"]
 
@@ -201,7 +207,7 @@ PMMA = {
     "stop.position": 0.15,
     "damping.beta": 0.0,
 }
-"""The PMMA guide of the thesis (A.1), its wall out of reach."""
+"""Parameters of the PMMA guide of the thesis (A.1), with the wall out of reach."""
 
 
 ELASTIC = {"damping.beta": 0.0, "stop.restitution": 0.6, "stop.rest_speed": 1e-3}
@@ -209,10 +215,10 @@ ELASTIC = {"damping.beta": 0.0, "stop.restitution": 0.6, "stop.rest_speed": 1e-3
 
 @dataclass(frozen=True)
 class ScalarGuide(scalar_guide.ScalarGuide):
-    """The 1R guide as a pendulum of one angle phi from straight: x = r sin(phi).
+    """The 1R guide as a pendulum with one angle phi from the straight shape: x = r sin(phi).
 
-    A parallelogram does not rotate its shuttle, so that M r^2 phi'' = -4 k phi + M g r cos(phi)
-    with r = gamma L, k = 2 gamma K_theta EI/L and M the shuttle and two lumped masses.
+    A parallelogram does not rotate its shuttle.  Hence M r^2 phi'' = -4 k phi + M g r cos(phi)
+    with r = gamma L, k = 2 gamma K_theta EI/L and M the mass of the shuttle and two lumped masses.
     """
 
     g: float = 0.0
@@ -223,16 +229,17 @@ class ScalarGuide(scalar_guide.ScalarGuide):
         return replace(super().of(ELASTIC | values, stops), g=g)
 
     def potential(self, phi: float) -> float:
+        """Return the elastic and gravitational energy [J]."""
         return 2 * self.k * phi**2 - self.mass * self.g * self.r * math.sin(phi)
 
     def speed(self, phi: float, energy: float) -> float:
-        """Return |phi'| [rad/s]."""
+        """Return |phi'| at an angle, from the total energy [J], in rad/s."""
         return math.sqrt(max(0.0, 2 * (energy - self.potential(phi)) / self.mass)) / self.r
 
     def time(self, rest: float, to: float) -> float:
         """Return the time from rest at one angle to another [s], by quadrature.
 
-        phi = rest + (to - rest) s^2 takes the root singularity at rest out.
+        The substitution phi = rest + (to - rest) s^2 removes the root singularity at rest.
         """
         energy, span = self.potential(rest), to - rest
 
@@ -245,10 +252,11 @@ class ScalarGuide(scalar_guide.ScalarGuide):
         return quad(integrand, 0.0, 1.0, epsabs=1e-13, epsrel=1e-12, limit=200)[0]
 
     def turning(self, energy: float, low: float, high: float) -> float:
+        """Return the angle between two others at which the speed is zero [rad]."""
         return brentq(lambda phi: self.potential(phi) - energy, low, high, xtol=1e-15)
 
     def bounces(self, x0: float, restitution: float, count: int):
-        """Return times and closing speeds along x of the impacts at the straight shape."""
+        """Return times [s] and closing speeds along x [m/s] of impacts at the straight shape."""
         rest = math.asin(x0 / self.r)
         time, times, speeds = 0.0, [], []
         for _ in range(count):
@@ -262,23 +270,26 @@ class ScalarGuide(scalar_guide.ScalarGuide):
         return np.array(times), np.array(speeds)
 
     def period(self, speed: float) -> float:
-        """Return the period after a start from straight at a speed along x, without gravity."""
+        """Return the period [s] after a start from the straight shape at a speed along x [m/s].
+
+        It is valid without gravity.
+        """
         amplitude = self.turning(0.5 * self.mass * speed**2, 0.0, 1.5)
         return 4 * self.time(amplitude, 0.0)
 
 
 @dataclass(frozen=True)
 class Run:
-    """A default experiment, or its beginning: the simulation, and its outputs at each step.
+    """The result of a simulation: the simulation, and its outputs at each step.
 
-    ``imbalance`` is the largest change of the energy balance [J], ``opened`` the largest distance
-    by which a loop stood open [m].
+    ``imbalance`` is the largest change of the energy balance [J], ``loop_error`` the largest
+    residual of the loop closures [m].
     """
 
     simulation: Simulation
     outputs: list[dict[str, float]]
     imbalance: float
-    opened: float
+    loop_error: float
 
     def column(self, name: str) -> np.ndarray:
         return np.array([row[name] for row in self.outputs])
@@ -287,11 +298,11 @@ class Run:
 def run(
     model: str | Mechanism, values=None, stop_time: float = 1.0, step: float = 1e-3, **options
 ) -> Run:
-    """Simulate a mechanism, its loops and energies looked at on the way."""
+    """Simulate a mechanism; check its loop closures and its energy balance at each step."""
     chosen = mechanism(model) if isinstance(model, str) else model
     sim = Simulation(chosen, values, **options)
     sim.record = []
-    outputs, opened = [sim.outputs()], 0.0
+    outputs, loop_error = [sim.outputs()], 0.0
     for k in range(1, round(stop_time / step) + 1):
         sim.advance(k * step)
         outputs.append(sim.outputs())
@@ -299,17 +310,17 @@ def run(
         if len(system.loops):
             e = system.directions(sim.state()[: system.n])
             phi = (system.loops @ e).real + system.loops_c
-            opened = max(opened, float(np.abs(phi).max()))
+            loop_error = max(loop_error, float(np.abs(phi).max()))
     start = energy_balance(outputs[0])
     imbalance = max(abs(energy_balance(row) - start) for row in outputs)
-    return Run(sim, outputs, imbalance, opened)
+    return Run(sim, outputs, imbalance, loop_error)
 
 
 def guided_rate(v, name: str = "flexure") -> float:
-    """Return the lateral stiffness of a 3R flexure between two clamps [N/m], small deflection.
+    """Return the lateral stiffness [N/m] of a 3R flexure between two clamps for small deflections.
 
-    Its pivots bend by F (x_i - L/2) / K_i, by symmetry, so that F sum (x_i - L/2)^2 / K_i is the
-    deflection.
+    By symmetry each pivot turns by F (x_i - L/2) / K_i.  The deflection is therefore
+    F sum (x_i - L/2)^2 / K_i.
     """
     E = v.get("pmma.youngs_modulus") or v[f"{name}.youngs_modulus"]
     L, EI = v[f"{name}.length"], E * v[f"{name}.width"] * v[f"{name}.thickness"] ** 3 / 12

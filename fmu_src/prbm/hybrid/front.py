@@ -1,4 +1,4 @@
-"""The state at the front of the integration, with the discrete state that holds from there."""
+"""The front: the state up to which the motion is computed, and the discrete state from there."""
 
 from dataclasses import dataclass, replace
 

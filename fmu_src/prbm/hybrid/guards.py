@@ -156,7 +156,7 @@ def closing_time(looks: Looks, guard: Guard, stop: int) -> float | None:
 
     A gap that is opening at the start of an interval closes only after its apex, so that the
     impact that has just been resolved, whose gap is zero up to round-off of either sign, is not
-    found again.  The rates show a dip below zero between two looks.
+    found again.  A gap that dips below zero within an interval is found by the signs of its rates.
     """
     all_gaps, all_rates = looks.gaps_and_rates
     gaps, rates = all_gaps[:, stop], all_rates[:, stop]
@@ -170,21 +170,21 @@ def closing_time(looks: Looks, guard: Guard, stop: int) -> float | None:
 
 
 def _closing_time_between(looks: Looks, guard: Guard, stop: int, j: int) -> float | None:
-    """Return when a gap closes within an interval of the looks that ends or dips below zero."""
+    """Return when a gap closes in an interval at whose end, or within which, it is not positive."""
     z, near = looks.along(guard, stop), looks.scales.touching
     a, b = looks.samples[0][j : j + 2].tolist()
     (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2, stop] for x in looks.gaps_and_rates)
     if abs(rate_a) <= looks.scales.zero_speed and abs(gap_a) <= _round_off(looks):
-        # Released too early: it is pressed again a little later.
+        # The stop was released too early: the bodies are pressed together again soon.
         return fall_time(lambda t: z(t) + near, a, b) if gap_b < -near else None
     if rate_a > 0.0:
         if rate_b >= 0.0:
-            return None  # It still opens from zero.
+            return None  # The gap still opens from zero.
         a = fall_time(looks.along(_gap_rate, stop), a, b)
         if z(a) <= 0.0:
             return a  # The flight is lower than the resolution of a position.
     elif gap_a <= 0.0:
-        # Without a rate of its own it only touches; it may open from a small penetration.
+        # A gap that stays near zero only touches; it may open from a small penetration.
         return a if gap_b < gap_a - near else None
     if rate_a < 0.0 < rate_b:
         b = fall_time(looks.along(_gap_rate, stop, sign=-1.0), a, b)
@@ -194,7 +194,7 @@ def _closing_time_between(looks: Looks, guard: Guard, stop: int, j: int) -> floa
 
 
 def _round_off(looks: Looks) -> float:
-    """Return the gap that a projection leaves of a closed stop [m]."""
+    """Return the largest residual gap of a closed stop after a projection [m]."""
     return CONSTRAINT_RTOL * looks.scales.length
 
 
@@ -208,8 +208,8 @@ def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
 def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float:
     """Return the time at which the projected state closes a gap, from that of the dense output.
 
-    Never before the apex: the gap is opening there, the impact would have no effect and be
-    located forever.
+    The time is never before the apex: the gap is opening there, and an impact without effect would
+    be located again and again.
     """
     equations = looks.equations
     for _ in range(EVENT_CORRECTIONS_MAX):
@@ -227,8 +227,8 @@ def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float
 def reversal_time(looks: Looks, guard: Guard, contact: int) -> float | None:
     """Return when the sliding velocity of a contact falls through zero.
 
-    A contact that begins to slip is at rest, up to round-off of either sign: it slips the other
-    way if it does so at the end of the step.
+    The velocity of a contact that begins to slip is zero up to round-off of either sign.  Such a
+    contact reverses if its velocity has the other sign at the end of the step.
     """
     equations, (times, e, v) = looks.equations, looks.samples
     rows, i = equations.slip_rows(contact)

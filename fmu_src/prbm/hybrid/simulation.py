@@ -1,6 +1,6 @@
 r"""The event loop: integrate, locate the first event, apply it, continue.
 
-A :class:`Simulation` steps past the times at which it is asked and interpolates, so that its
+A :class:`Simulation` steps past the communication points and interpolates, so that its
 trajectory does not depend on them.  It restarts only when an input or a tunable parameter
 changes.  An event is the domain change z > 0 -> z <= 0 of a guard of
 :data:`prbm.hybrid.events.TRANSITIONS`, located on the dense output.  Rest is a discrete state: a
@@ -92,7 +92,7 @@ class Simulation:
         self.time = float(start_time)
         if not math.isfinite(self.time):
             raise ParameterError(f"start_time = {start_time} s must be a finite number")
-        # The parameters that act, and those that a change has prepared for the next restart.
+        # The parameters in use, and the changed ones, which are used from the next restart on.
         self.configuration = Configuration.of(mechanism, known, tolerance, step)
         self.prepared = self.configuration
         self.changed = False
@@ -368,7 +368,7 @@ class Simulation:
         }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Return to a state that :meth:`snapshot` gave; the continuation is the same to the bit.
+        """Restore a state of :meth:`snapshot`; the continuation is the same bit by bit.
 
         Raises
         ------

@@ -30,7 +30,7 @@ def plain_inputs(inputs: Inputs) -> Plain:
 
 
 def inputs_of(plain: Mapping[str, Any]) -> Inputs:
-    """Return the inputs that :func:`plain_inputs` gave."""
+    """Return inputs from plain values, the inverse of :func:`plain_inputs`."""
     return Inputs(
         tuple(complex(*f) for f in plain["forces"]),
         tuple(plain["moments"]),
@@ -52,7 +52,7 @@ def plain_front(front: Front) -> Plain:
 
 
 def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
-    """Return the front that :func:`plain_front` gave, of a mechanism with such parameters."""
+    """Return a front from plain values, the inverse of :func:`plain_front`."""
     modes = tuple(ContactMode(mode) for mode in plain["modes"])
     contacts = ContactState(modes, len(configuration.mechanism.stops))
     return Front(
@@ -78,7 +78,7 @@ def plain_arc(arc: Arc | None) -> Plain | None:
 
 
 def arc_of(plain: Mapping[str, Any] | None) -> Arc | None:
-    """Return the arc that :func:`plain_arc` gave."""
+    """Return an arc from plain values, the inverse of :func:`plain_arc`."""
     if plain is None:
         return None
     start, h, end = plain["start"], plain["h"], plain["end"]
@@ -91,7 +91,7 @@ def plain_event(event: Event | None) -> list[float] | None:
 
 
 def event_of(plain: Any) -> Event | None:
-    """Return the event that :func:`plain_event` gave."""
+    """Return an event from plain values, the inverse of :func:`plain_event`."""
     return None if plain is None else Event(EventKind(plain[0]), plain[1], plain[2])
 
 
@@ -101,5 +101,5 @@ def plain_array(x: Real | None) -> list[float] | None:
 
 
 def array_of(plain: Any) -> Real | None:
-    """Return the array that :func:`plain_array` gave."""
+    """Return an array from a list, the inverse of :func:`plain_array`."""
     return None if plain is None else np.array(plain)

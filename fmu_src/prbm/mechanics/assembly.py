@@ -1,8 +1,8 @@
-"""How the constant arrays of a mechanism are assembled from its description.
+"""Assembly of the constant arrays of a mechanism from its description.
 
-Every flexure becomes a chain of links.  Chains are rooted at the ground or at a body already
-reached; a flexure between two bodies already reached is rooted at its start and closes a loop at
-its end.  So does a joint.
+Every flexure becomes a chain of links.  Chains start at the ground or at a body that has been
+reached before.  A flexure or a joint between two such bodies closes a loop; the chain of that
+flexure begins at its start.
 """
 
 import cmath
@@ -80,7 +80,7 @@ class Hit:
 
 
 class _Assembler:
-    """Collects coordinates, masses, springs and loops while it walks from the ground."""
+    """Collects coordinates, masses, springs and loops, from the ground to each connected body."""
 
     def __init__(self, mechanism: Mechanism, values: Mapping[str, float]) -> None:
         self.mechanism = mechanism
@@ -431,7 +431,7 @@ def calculated(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, f
 
 
 def check_masses(M: Real, J: Sequence[float]) -> None:
-    """Reject a motion that moves no mass.
+    """Reject a mechanism with a motion without mass.
 
     Parameters
     ----------

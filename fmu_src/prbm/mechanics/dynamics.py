@@ -170,7 +170,7 @@ class Equations:
         return self._solve(t, q, v, torques[: self.n])
 
     def torques(self, y: Real) -> Real:
-        """Return the torques that springs and their damping take up, and those of the damping.
+        """Return the torques of springs and their damping, and those of the damping alone.
 
         Parameters
         ----------
@@ -323,7 +323,7 @@ class Equations:
         return result
 
     def project_near(self, t: float, y: Real, factors: constraints.Factors) -> Real:
-        """Return the projection of a state that is as near as a step leaves it.
+        """Return the projection of a state near the constraints, as at the end of a step.
 
         One correction of the positions and one of the velocities are enough there; if they are
         not, the result is that of :meth:`project`.

@@ -63,7 +63,7 @@ def force_row(A: Complex, force: complex) -> Complex:
 def load_rows(system: System, frame: BodyFrame, e: Complex) -> Real:
     """Return the generalised forces of a unit force along x, along y and of a unit moment, (3, n).
 
-    They are the gradients of the point's place [m/rad] and of the angle [rad/rad], too.
+    They are also the gradients of the position of the point [m/rad] and of the angle [rad/rad].
     """
     rows = np.zeros((3, system.n))
     for k, force in enumerate((1.0 + 0.0j, 1.0j)):

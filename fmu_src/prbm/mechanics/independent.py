@@ -1,7 +1,7 @@
 r"""Independent coordinates, which the importer's solver integrates in model exchange.
 
 The loops tie the n coordinates together, Phi(q) = Re(B e) + c = 0.  Of them r are solved from the
-other n - r, so that a solver that knows nothing of constraints stays on them:
+other n - r, so that a solver without constraints satisfies them:
 
     Phi(q_i, q_d) = 0,      v_d = -(dPhi/dq_d)^-1 (dPhi/dq_i) v_i.
 

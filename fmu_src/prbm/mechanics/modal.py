@@ -90,7 +90,7 @@ def modes_at(system: System, q: Real) -> Modes:
     """Return the modes at a shape that is not in equilibrium.
 
     The multipliers are those of the shape held at rest by a force on the released body (Gauss'
-    principle: the accelerations left over are the least ones); at a static shape they are
+    principle: the remaining accelerations are the least possible); at a static shape they are
     exact.  At other shapes the modes depend on the choice of the coordinates.  They may include
     unstable ones, which come first.
     """

@@ -1,4 +1,4 @@
-r"""The constant arrays of a mechanism, and the scalars of its position that they give.
+r"""The constant arrays of a mechanism, and the scalars that they define (gaps, loop closures).
 
 A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, the
 logarithm of its length over the drawn one.  Each link and body has one *arm*,
@@ -359,7 +359,7 @@ class System:
         return e
 
     def turning(self, v: Real) -> Real | Complex:
-        """Return the complex rates w = theta' - i s' of the arms; zero for stretches [1/s].
+        """Return the rates w = theta' - i s' of the arms; the entries of stretches are zero [1/s].
 
         They are the rates v themselves where nothing stretches.
         """

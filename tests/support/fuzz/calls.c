@@ -1,6 +1,6 @@
-/* A target of libFuzzer: its bytes choose which functions of an FMU are called with what.
+/* A target of libFuzzer: the input selects functions of an FMU and their arguments.
  *
- * The environment variable PRBM_JOB names a job of the importer, which says which FMU.
+ * The environment variable PRBM_JOB is the path of a job file of the importer, which names the FMU.
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +19,7 @@ int LLVMFuzzerInitialize(int *count, char ***words) {
     const char *path = getenv("PRBM_JOB");
     (void)count, (void)words;
     if (!path || !job_read(&job, path) || !library_open(&library, job.library, job.version)) {
-        fprintf(stderr, "calls: PRBM_JOB must name a job\n");
+        fprintf(stderr, "calls: set PRBM_JOB to the path of a valid job file\n");
         exit(2);
     }
     return 0;

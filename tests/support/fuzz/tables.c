@@ -1,12 +1,12 @@
-/* Fuzzes what reads a mechanism's tables, and the simulation of what is accepted.
+/* Fuzz the reader of a mechanism's tables, and simulate the tables that it accepts.
  *
- * A target of libFuzzer (clang -fsanitize=fuzzer,...), or with -DSTANDALONE a program that mutates
- * the files it is given by itself:
+ * This is a target of libFuzzer (clang -fsanitize=fuzzer,...).  With -DSTANDALONE it is a program
+ * that mutates files:
  *
  *     tables SECONDS SEED FILE...
  *
- * Mutated tables get their size and checksum put right most of the time: what is behind them is
- * of more interest than they are.
+ * The size and the checksum of mutated tables are mostly corrected, so that the reader goes on to
+ * the content behind them.
  */
 #include <math.h>
 #include <stdio.h>
@@ -20,20 +20,20 @@ enum {
     HEAD = 16,
     SIZE_AT = 8,
     CHECKSUM_AT = 12,
-    MOST_SIMULATED = 24 /* coordinates: larger ones take too long */
+    SIMULATED_COORDINATES_MAX = 24 /* larger mechanisms are not simulated: it takes too long */
 };
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most);
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed);
 
-static unsigned long opened, moved; /* how deep the inputs got */
+static unsigned long opened, started; /* mechanisms that were read; simulations that started */
 
-/* --- what is done with an input --- */
+/* --- test of an input --- */
 
-static void must(bool fact, const char *what) {
+static void must(bool fact, const char *error) {
     if (!fact) {
-        fprintf(stderr, "tables: %s\n", what);
+        fprintf(stderr, "tables: %s\n", error);
         abort();
     }
 }
@@ -47,7 +47,7 @@ static void read_all(Simulation *simulation) {
     }
 }
 
-/* A small part of a period, so that no input takes long. */
+/* A thousandth of the period of the released mode [s], so that every input is fast. */
 static double short_time(Simulation *simulation) {
     const Mechanism *mechanism = simulation_mechanism(simulation);
     Problem problem;
@@ -96,28 +96,28 @@ static void start(const Mechanism *mechanism, bool for_exchange) {
         return;
     }
     if (simulation_start(simulation, 0.0, 0.0, for_exchange, &problem)) {
-        moved++;
+        started++;
         for_exchange ? exchange_some(simulation) : advance(simulation);
     } else {
-        must(problem.text[0], "refused to start without a reason");
+        must(problem.text[0], "the start failed without a message");
     }
     simulation_close(simulation);
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     Problem problem = {{0}};
-    uint8_t *bytes = malloc(size ? size : 1); /* no longer, so that no byte after it is read */
+    uint8_t *bytes = malloc(size ? size : 1); /* of the exact size: sanitizers see reads beyond */
     must(bytes, "no memory");
     memcpy(bytes, data, size);
     Mechanism *mechanism = mechanism_open(bytes, size, &problem);
     free(bytes);
     if (!mechanism) {
         must(problem.text[0] && memchr(problem.text, 0, sizeof problem.text),
-             "refused without a reason");
+             "the tables were rejected without a message");
         return 0;
     }
     opened++;
-    if (mechanism->coordinate_count <= MOST_SIMULATED) {
+    if (mechanism->coordinate_count <= SIMULATED_COORDINATES_MAX) {
         start(mechanism, false);
         start(mechanism, true);
     }
@@ -133,7 +133,7 @@ static void put_u32(uint8_t *at, uint32_t x) {
     }
 }
 
-/* CRC-32 as of zlib, bit by bit. */
+/* The CRC-32 of zlib. */
 static uint32_t crc(const uint8_t *bytes, size_t size) {
     uint32_t c = 0xFFFFFFFFu;
     for (size_t i = 0; i < size; i++) {
@@ -145,7 +145,7 @@ static uint32_t crc(const uint8_t *bytes, size_t size) {
     return ~c;
 }
 
-static void put_right(uint8_t *data, size_t size) {
+static void correct_header(uint8_t *data, size_t size) {
     if (size >= HEAD) {
         memcpy(data, "PRBM\2\0\0", SIZE_AT);
         put_u32(data + SIZE_AT, (uint32_t)size);
@@ -175,7 +175,7 @@ static void overwrite(uint8_t *data, size_t size) {
     }
 }
 
-/* Numbers that are somewhat larger or smaller keep tables valid and lead to other motions. */
+/* Multiply a number by a factor: the tables mostly stay valid, and the motion changes. */
 static void scale(uint8_t *data, size_t size) {
     for (int tries = 0; tries < 64; tries++) {
         size_t place = arbitrary((uint32_t)size);
@@ -230,7 +230,7 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned
     size = arbitrary(2) && size > HEAD ? mutated(data, size, most)
                                        : LLVMFuzzerMutate(data, size, most);
     if (arbitrary(10)) {
-        put_right(data, size);
+        correct_header(data, size);
     }
     return size;
 }
@@ -261,12 +261,12 @@ int main(int count, char **words) {
         fclose(file);
         (void)LLVMFuzzerTestOneInput(files[given], sizes[given]);
     }
-    must(given && moved == 2 * (unsigned long)given, "the files themselves must be accepted");
+    must(given && started == 2 * (unsigned long)given, "an unchanged file was rejected");
     for (; time(NULL) < end; tried++) {
         size_t which = tried % (size_t)given, size = sizes[which];
         memcpy(data, files[which], size);
         size = LLVMFuzzerCustomMutator(data, size, ROOM_FOR_TABLES, seed + (unsigned)tried);
-        if (getenv("KEEP")) { /* what a crash leaves to look at */
+        if (getenv("KEEP")) { /* the last input, for inspection after a crash */
             FILE *file = fopen(getenv("KEEP"), "wb");
             must(file != NULL, "the input cannot be kept");
             fwrite(data, 1, size, file);
@@ -274,7 +274,7 @@ int main(int count, char **words) {
         }
         (void)LLVMFuzzerTestOneInput(data, size);
     }
-    printf("%lu tables, %lu accepted, %lu started\n", tried, opened, moved);
+    printf("%lu tables, %lu accepted, %lu started\n", tried, opened, started);
     return 0;
 }
 

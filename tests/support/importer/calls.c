@@ -1,9 +1,9 @@
-/* Arbitrary calls: mostly what a sensible importer might do next, often not, with good, wrong,
- * missing and absurd arguments.  Nothing is asserted but that the process survives; sanitizers and
- * valgrind watch.
+/* Arbitrary calls.  Most of them are those of a correct importer, the others are random.  Arguments
+ * are valid, invalid, missing or absurd.  The process must survive; it runs under sanitizers or
+ * valgrind.
  *
- * Arrays are as long as the call says they are, so that whoever writes past the end is caught.
- * Never done: what no library can survive (wild pointers, an instance after it was freed).
+ * Arrays have exactly the length that is passed, so that an access beyond the end is detected.
+ * Invalid pointers are never passed, nor an instance that was freed: no library can detect them.
  */
 #include "importer.h"
 
@@ -13,14 +13,14 @@
 
 enum { STATES = 3, LONGEST = 6 };
 
-/* What an importer remembers, which need not be what the FMU thinks. */
+/* The mode as the importer expects it; the mode of the FMU may differ after a rejected call. */
 typedef enum { NEW, INITIALIZING, EVENTS, RUNNING, ENDED } Mode;
 
 typedef struct {
     const Library *library;
     const Job *job;
     Source *source;
-    Instance instance; /* where messages go */
+    Instance instance; /* receives the messages */
     void *component;
     bool exchange, with_events, wild;
     Mode mode;
@@ -48,7 +48,7 @@ static uint64_t bits(Source *source) {
     return result ^ result >> 31;
 }
 
-/* A whole number from 0 to below count; of given bytes one is used. */
+/* A whole number from 0 to count - 1.  If there are bytes, it uses one of them. */
 static unsigned below(Fuzz *fuzz, unsigned count) {
     Source *source = fuzz->source;
     if (source->bytes) {
@@ -65,7 +65,7 @@ static bool spent(const Source *source) {
     return source->bytes && source->used >= source->size;
 }
 
-/* From 0 to 1. */
+/* A number from 0 to 1. */
 static double share(Fuzz *fuzz) {
     return below(fuzz, 251) / 250.0;
 }
@@ -83,7 +83,7 @@ static double absurd(Fuzz *fuzz) {
                                  : NAN;
 }
 
-/* A size around that of the displacements, speeds and forces at hand. */
+/* A number of the magnitude of displacements, speeds and forces of the shipped mechanisms. */
 static double plausible(Fuzz *fuzz) {
     return (share(fuzz) - 0.5) * (once_in(fuzz, 3) ? 1.0 : 0.02);
 }
@@ -106,7 +106,7 @@ static uint32_t reference(Fuzz *fuzz) {
     return once_in(fuzz, 2) ? (uint32_t)bits(fuzz->source) : below(fuzz, 20);
 }
 
-/* Usually that of a variable of a type. */
+/* A value reference, usually of a variable of the type. */
 static uint32_t reference_of(Fuzz *fuzz, char type) {
     for (int tries = 0; tries < 4; tries++) {
         const Item *item = some_item(fuzz);
@@ -123,7 +123,7 @@ static void *component(Fuzz *fuzz) {
     return once_in(fuzz, 80) ? NULL : fuzz->component;
 }
 
-/* An array of count elements; now and then, missing.  Never a bigger one. */
+/* An array of exactly count elements, or sometimes NULL. */
 static void *array(Fuzz *fuzz, size_t count, size_t size) {
     return once_in(fuzz, 60) ? NULL : calloc(count ? count : 1, size);
 }
@@ -155,13 +155,13 @@ static void drop(Values *v) {
     free(v->numbers);
 }
 
-/* The right count, or one beside it. */
+/* The right count, or sometimes a wrong one. */
 static size_t around(Fuzz *fuzz, size_t count) {
     unsigned choice = below(fuzz, 24);
     return choice == 0 ? count + 1 : choice == 1 && count ? count - 1 : choice == 2 ? 0 : count;
 }
 
-/* Numbers that were accepted may make the motion fast beyond all patience: then only tiny steps. */
+/* The steps are tiny if random values were accepted: a very fast motion would take too long. */
 static double step_size(Fuzz *fuzz) {
     if (once_in(fuzz, 25)) {
         static const double choices[] = {0.0, -1e-3, 1e-300, NAN, INFINITY, -INFINITY};
@@ -280,7 +280,7 @@ static double tolerance(Fuzz *fuzz) {
     return once_in(fuzz, 5) ? absurd(fuzz) : 1e-6;
 }
 
-/* A wild tolerance makes steps short as well. */
+/* A very small tolerance makes the simulation slow: the steps are tiny then. */
 static void enter_initialization(Fuzz *fuzz) {
     bool tolerant = once_in(fuzz, 2), stops = once_in(fuzz, 2);
     double wanted = tolerance(fuzz), start = fuzz->time, stop = number(fuzz);
@@ -405,7 +405,7 @@ static void set_reals(Fuzz *fuzz) {
     drop(&v);
 }
 
-/* A start value times a factor near one: the motion stays a sensible one. */
+/* Multiply a value by a factor near one: the motion stays realistic. */
 static void set_near(Fuzz *fuzz) {
     const Item *item = some_item(fuzz);
     double x = 0.0;
@@ -462,7 +462,7 @@ static void status2(Fuzz *fuzz) {
     }
 }
 
-/* --- FMI 3.0: all that has no counterpart --- */
+/* --- FMI 3.0: functions without a counterpart --- */
 
 static void typed3(Fuzz *fuzz) {
     Values v = values(fuzz, once_in(fuzz, 2) ? INTEGER_ITEM : BOOLEAN_ITEM);
@@ -682,7 +682,7 @@ static void serialize(Fuzz *fuzz) {
                : (int)F3->SerializeFMUState(c, state, fuzz->bytes, size));
 }
 
-/* From bytes as they were, or changed in a few places. */
+/* Deserialize a state, sometimes after changes of its bytes. */
 static void deserialize(Fuzz *fuzz) {
     void *c = component(fuzz), **state = fuzz->states + below(fuzz, STATES);
     size_t size = fuzz->bytes ? around(fuzz, fuzz->byte_count) : 0;
@@ -700,7 +700,7 @@ static void deserialize(Fuzz *fuzz) {
             bytes[place] = (uint8_t)below(fuzz, 256);
         }
     }
-    if (*state) { /* whoever asks for a state must not drop another */
+    if (*state) { /* free the previous state, or its memory would leak */
         (void)(fuzz->job->version == 2 ? (int)F2->FreeFMUstate(fuzz->component, state)
                                        : (int)F3->FreeFMUState(fuzz->component, state));
     }
@@ -711,11 +711,11 @@ static void deserialize(Fuzz *fuzz) {
     free(bytes);
 }
 
-/* --- what next --- */
+/* --- choice of the next call --- */
 
 typedef void Call(Fuzz *fuzz);
 
-/* What an importer might well do in a mode; those named more than once more often. */
+/* Choose a call that is valid in the mode.  Repeated entries are more frequent. */
 static Call *sensible(Fuzz *fuzz) {
     static Call *const new_calls[] = {set_near, enter_initialization, enter_initialization};
     static Call *const initializing[] = {set_near, get_reals, exit_initialization,

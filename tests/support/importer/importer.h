@@ -1,9 +1,9 @@
-/* A small importer of FMUs, for the tests: FMI 2.0 and 3.0, co-simulation with and without event
+/* A small importer of FMUs for the tests: FMI 2.0 and 3.0, co-simulation with and without event
  * mode, model exchange.
  *
- * It reads no XML: a job file, written by tests/support/c_importer.py, says which library to load,
- * what to set, at which times to stop and what to record.  Numbers go in and out as the 16 hexadecimal
- * digits of their bits, so that runs can be compared byte for byte, also between platforms.
+ * It reads no XML.  A job file, written by tests/support/c_importer.py, lists the library, the values
+ * to set, the communication points and the variables to record.  Numbers are read and written as the
+ * 16 hexadecimal digits of their bits, so that runs of all platforms can be compared bit by bit.
  */
 #ifndef IMPORTER_H
 #define IMPORTER_H
@@ -25,13 +25,13 @@ typedef struct {
     uint32_t reference;
     char type;
     double value;
-    size_t point; /* before which communication step it is set */
+    size_t point; /* for a change: index of the communication point at which it is set */
 } Item;
 
 typedef enum { CO_SIMULATION, WITH_EVENTS, MODEL_EXCHANGE } Kind;
 
 typedef struct {
-    char *text; /* the file; the strings point into it */
+    char *text; /* content of the file; the strings point into it */
     int version;
     Kind kind;
     const char *library, *resources, *name, *token;
@@ -39,7 +39,7 @@ typedef struct {
     double tolerance, start, stop;
     double substep; /* of the integration in model exchange [s] */
     size_t state_count, indicator_count;
-    Item *sets, *records, *changes; /* before initialization; each time; at communication points */
+    Item *sets, *records, *changes; /* start values; recorded; set at communication points */
     size_t set_count, record_count, change_count;
     double *points;
     size_t point_count;
@@ -66,7 +66,7 @@ uint64_t number_to_bits(double number);
     X(SetRealInputDerivatives) X(GetRealOutputDerivatives) X(DoStep) X(CancelStep)                 \
     X(GetStatus) X(GetRealStatus) X(GetIntegerStatus) X(GetBooleanStatus) X(GetStringStatus)
 
-/* The types whose functions differ in nothing but the type. */
+/* The types whose functions have the same signature except for the type. */
 #define FMI3_TYPES(X)                                                                              \
     X(Float32) X(Float64) X(Int8) X(UInt8) X(Int16) X(UInt16) X(Int32) X(UInt32) X(Int64)          \
     X(UInt64) X(Boolean) X(String)
@@ -111,11 +111,11 @@ typedef struct {
     Functions3 f3;
 } Library;
 
-/* Load a library and all functions of a version of the standard; says which ones are missing. */
+/* Load a library and all functions of a version of FMI.  Missing ones are printed to stderr. */
 bool library_open(Library *library, const char *path, int version);
 void library_close(Library *library);
 
-/* --- instance.c: what both versions can do, under one name ------------------------------------ */
+/* --- instance.c: one interface to both versions ----------------------------------------------- */
 
 enum { MESSAGE_LENGTH = 1024 };
 
@@ -125,16 +125,16 @@ typedef struct {
     void *component;
     fmi2CallbackFunctions callbacks;
     bool failed;
-    char message[MESSAGE_LENGTH]; /* the last that was logged */
+    char message[MESSAGE_LENGTH]; /* the last logged message */
 } Instance;
 
-/* What an update of the discrete states says. */
+/* The result of an update of the discrete states. */
 typedef struct {
     bool again, terminate, next_event_defined;
     double next_event;
 } Update;
 
-/* All return false after a failure, which is reported on the standard error stream. */
+/* All functions print a failure to the standard error stream and return false. */
 bool instance_open(Instance *instance, const Library *library, const Job *job);
 void instance_close(Instance *instance);
 bool instance_initialize(Instance *instance);
@@ -154,14 +154,14 @@ bool instance_completed(Instance *instance, bool *event);
 bool instance_save(Instance *instance, void **state);
 bool instance_restore(Instance *instance, void *state);
 bool instance_forget(Instance *instance, void **state);
-/* The bytes of a state (to be freed), NULL after a failure; and back. */
+/* Return the bytes of a state, to be freed by the caller; NULL after a failure. */
 uint8_t *instance_serialize(Instance *instance, void *state, size_t *size);
 bool instance_deserialize(Instance *instance, const uint8_t *bytes, size_t size, void **state);
 void instance_log(void *instance, const char *message);
 
 /* --- motion.c --------------------------------------------------------------------------------- */
 
-/* What was recorded: each row a mark, a time and a value of each item. */
+/* Recorded rows.  A row has a mark, the time and the value of each item. */
 typedef struct {
     double *numbers;
     size_t width, count, room; /* in rows */
@@ -173,7 +173,7 @@ bool rows_add(Rows *rows, Instance *instance, char mark, double time);
 void rows_print(const Rows *rows);
 void rows_free(Rows *rows);
 
-/* An instance on its way from one communication point to the next. */
+/* The progress of an instance between communication points. */
 typedef struct {
     Instance *instance;
     Rows *rows;
@@ -187,19 +187,19 @@ typedef struct {
 bool motion_open(Motion *motion, Instance *instance, Rows *rows);
 void motion_close(Motion *motion);
 bool motion_start(Motion *motion);
-/* Go on until a communication point is reached. */
+/* Advance to the communication point with an index. */
 bool motion_continue(Motion *motion, size_t point);
 
 /* --- calls.c ---------------------------------------------------------------------------------- */
 
-/* Where arbitrary choices come from: given bytes until they are used up, or else a generator. */
+/* Source of random choices: bytes until they are used up, or a generator if there are none. */
 typedef struct {
     const uint8_t *bytes;
     size_t size, used;
     uint64_t seed;
 } Source;
 
-/* Call functions in an arbitrary order with arbitrary arguments, good and bad ones. */
+/* Call functions in arbitrary order with arbitrary arguments, valid and invalid. */
 void arbitrary_calls(const Library *library, const Job *job, Source *source, size_t count);
 
 #endif

@@ -1,4 +1,4 @@
-/* An instance of an FMU, whatever version of the standard it is of. */
+/* An instance of an FMU of FMI 2.0 or 3.0. */
 #include "importer.h"
 
 #include <stdarg.h>
@@ -6,7 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* --- what the FMU says --- */
+/* --- messages of the FMU --- */
 
 void instance_log(void *environment, const char *message) {
     Instance *instance = environment;
@@ -32,7 +32,7 @@ static void logger3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3
     instance_log(environment, message);
 }
 
-/* A status of either version: 0 is well, 1 a warning. */
+/* Return whether a status of either version is OK (0) or a warning (1); print any other. */
 static bool fine(Instance *instance, int status, const char *call) {
     if (status > 1) {
         instance->failed = true;
@@ -41,14 +41,14 @@ static bool fine(Instance *instance, int status, const char *call) {
     return status <= 1;
 }
 
-/* Call the function of the version at hand; where the names differ, both are given. */
+/* Call the function of the version of the FMU.  SAME is for functions with the same name in both. */
 #define CALL(instance, name2, arguments2, name3, arguments3)                                       \
     ((instance)->library->version == 2                                                             \
          ? fine((instance), (int)(instance)->library->f2.name2 arguments2, "fmi2" #name2)          \
          : fine((instance), (int)(instance)->library->f3.name3 arguments3, "fmi3" #name3))
 #define SAME(instance, name, arguments) CALL(instance, name, arguments, name, arguments)
 
-/* --- life --- */
+/* --- instantiation and initialization --- */
 
 static void *instantiate(Instance *instance) {
     const Job *job = instance->job;
@@ -75,7 +75,7 @@ bool instance_open(Instance *instance, const Library *library, const Job *job) {
     instance->callbacks = callbacks;
     instance->component = instantiate(instance);
     if (!instance->component) {
-        fprintf(stderr, "importer: no instance: %s\n", instance->message);
+        fprintf(stderr, "importer: instantiation failed: %s\n", instance->message);
     }
     return instance->component != NULL;
 }

@@ -1,4 +1,4 @@
-/* Reads job files: a keyword and its arguments a line. */
+/* Reader of job files.  Each line has a keyword and its arguments. */
 #include "importer.h"
 
 #include <stdio.h>
@@ -44,7 +44,7 @@ static char *whole_file(const char *path) {
     return text;
 }
 
-/* Room for one more element of an array whose size is a power of two. */
+/* Return an array with room for one more element.  Its size is doubled when it is full. */
 static void *grown(void *array, size_t count, size_t size) {
     bool full = (count & (count - 1)) == 0;
     void *larger = full ? realloc(array, (count ? 2 * count : 1) * size) : array;
@@ -55,7 +55,7 @@ static void *grown(void *array, size_t count, size_t size) {
     return larger;
 }
 
-/* "reference type [bits]" */
+/* Add an item from its text "reference type [bits]". */
 static void add_item(Item **items, size_t *count, const char *arguments, size_t point) {
     char *rest;
     *items = grown(*items, *count, sizeof **items);
@@ -110,7 +110,7 @@ static bool read_line(Job *job, const char *keyword, const char *rest) {
         job->points = grown(job->points, job->point_count, sizeof *job->points);
         job->points[job->point_count++] = number(rest);
     } else {
-        fprintf(stderr, "importer: what is \"%s\" in the job?\n", keyword);
+        fprintf(stderr, "importer: unknown keyword \"%s\" in the job\n", keyword);
         return false;
     }
     return true;

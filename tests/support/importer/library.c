@@ -1,4 +1,4 @@
-/* Loads shared libraries, on Windows by their wide names. */
+/* Load shared libraries; on Windows their paths are converted from UTF-8 to UTF-16. */
 #include "importer.h"
 
 #include <stdio.h>
@@ -43,7 +43,7 @@ static void *load(const char *path) {
     return handle;
 }
 
-/* Standard C knows no way from void * to a function; their bytes are the same. */
+/* Standard C has no conversion from void * to a function pointer; memcpy copies its bytes. */
 static void find(void *handle, const char *name, void *function, size_t size) {
     void *found = dlsym(handle, name);
     memcpy(function, &found, size);

@@ -1,14 +1,16 @@
 /* The command line:
  *
- *     importer JOB [run]                  run the job and print what it records
- *     importer JOB interrupt K save       run it, go back to communication point K, run on again:
- *     importer JOB interrupt K serialize  the same bytes; serialize: as bytes into a new instance
- *     importer JOB cycles N POINTS        instantiate, run to a communication point, free, N times
- *     importer JOB reload N POINTS        the same, and the library unloaded and loaded each time
- *     importer JOB threads N              N instances at once, each in a thread of its own
- *     importer JOB speed N READINGS       CPU seconds of steps, each with some readings, N times
- *     importer JOB calls SEED N COUNT     arbitrary calls: N sequences of COUNT, from SEED on
- *     importer JOB replay FILE COUNT      the one sequence that the bytes of a file choose
+ *     importer JOB [run]                  run the job and print the recorded rows
+ *     importer JOB interrupt K save       run the job twice from communication point K, from a
+ *                                         saved state; fail if the rows differ
+ *     importer JOB interrupt K serialize  the same, with the state serialized to a new instance
+ *     importer JOB cycles N POINTS        instantiate, run to a communication point, free; N times
+ *     importer JOB reload N POINTS        the same, and load and unload the library each time
+ *     importer JOB threads N              run N instances at once, each in its own thread
+ *     importer JOB speed N READINGS       print the CPU time [s] of all steps, with a number of
+ *                                         readings after each; N times
+ *     importer JOB calls SEED N COUNT     N sequences of COUNT arbitrary calls, from SEED on
+ *     importer JOB replay FILE COUNT      the sequence of calls that the bytes of a file select
  */
 #include "importer.h"
 
@@ -21,7 +23,7 @@
 #include <io.h>
 #include <windows.h>
 
-/* seconds() is CPU time of the process: others that run at the same time do not count. */
+/* The function seconds() returns the CPU time of this process. */
 
 typedef HANDLE Thread;
 #define THREAD_FUNCTION DWORD WINAPI
@@ -124,7 +126,7 @@ static bool reload(const Job *job, long count, size_t point) {
 
 /* --- interrupted runs --- */
 
-/* Put a state into another, new instance, by its bytes; the old instance goes. */
+/* Serialize a state, close its instance and deserialize the state in a new instance. */
 static bool transplant(Instance *from, Instance *to, void **state) {
     size_t size = 0;
     uint8_t *bytes = instance_serialize(from, *state, &size);
@@ -139,12 +141,12 @@ static bool transplant(Instance *from, Instance *to, void **state) {
 static bool same_end(const Rows *rows, size_t first, size_t second) {
     size_t count = second - first, size = count * rows->width * sizeof *rows->numbers;
     if (rows->count - second != count) {
-        fprintf(stderr, "importer: %zu rows, then %zu after going back\n", count,
+        fprintf(stderr, "importer: %zu rows, but %zu from the restored state\n", count,
                 rows->count - second);
         return false;
     }
     if (memcmp(rows->numbers + first * rows->width, rows->numbers + second * rows->width, size)) {
-        fprintf(stderr, "importer: another motion after going back\n");
+        fprintf(stderr, "importer: the rows differ after the state is restored\n");
         return false;
     }
     return true;
@@ -306,32 +308,32 @@ static bool replay(const Library *library, const Job *job, const char *path, siz
 
 static bool execute(const Job *job, int count, char **words) {
     Library library;
-    const char *what = count > 0 ? words[0] : "run";
+    const char *command = count > 0 ? words[0] : "run";
     long number = count > 1 ? strtol(words[1], NULL, 10) : 0;
     size_t size = count > 2 ? strtoul(words[2], NULL, 10) : 0;
-    if (strcmp(what, "reload") == 0) {
+    if (strcmp(command, "reload") == 0) {
         return reload(job, number, size);
     }
     if (!library_open(&library, job->library, job->version)) {
         return false;
     }
     bool good = false;
-    if (strcmp(what, "run") == 0) {
+    if (strcmp(command, "run") == 0) {
         good = run_and_print(&library, job);
-    } else if (strcmp(what, "interrupt") == 0 && count > 2) {
+    } else if (strcmp(command, "interrupt") == 0 && count > 2) {
         good = interrupt(&library, job, (size_t)number, strcmp(words[2], "serialize") == 0);
-    } else if (strcmp(what, "cycles") == 0) {
+    } else if (strcmp(command, "cycles") == 0) {
         good = cycles(&library, job, number, size);
-    } else if (strcmp(what, "threads") == 0) {
+    } else if (strcmp(command, "threads") == 0) {
         good = threads(&library, job, number);
-    } else if (strcmp(what, "speed") == 0) {
+    } else if (strcmp(command, "speed") == 0) {
         good = speed(&library, job, number, size);
-    } else if (strcmp(what, "calls") == 0 && count > 3) {
+    } else if (strcmp(command, "calls") == 0 && count > 3) {
         good = calls(&library, job, (uint64_t)number, (long)size, strtoul(words[3], NULL, 10));
-    } else if (strcmp(what, "replay") == 0 && count > 2) {
+    } else if (strcmp(command, "replay") == 0 && count > 2) {
         good = replay(&library, job, words[1], size);
     } else {
-        fprintf(stderr, "importer: what is \"%s\"?\n", what);
+        fprintf(stderr, "importer: unknown or incomplete command \"%s\"\n", command);
     }
     library_close(&library);
     return good;
@@ -340,7 +342,7 @@ static bool execute(const Job *job, int count, char **words) {
 int main(int count, char **words) {
     Job job;
     if (count < 2) {
-        fprintf(stderr, "importer: give a job\n");
+        fprintf(stderr, "importer: give the path of a job file\n");
         return 2;
     }
     binary_output();

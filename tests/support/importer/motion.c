@@ -1,4 +1,4 @@
-/* Takes an instance from one communication point to the next and records what it shows. */
+/* Advance an instance between communication points and record its variables. */
 #include "importer.h"
 
 #include <math.h>
@@ -8,7 +8,7 @@
 
 enum { STAGES = 4, UPDATES = 100 };
 
-static const double LOCATED = 1e-13; /* s: how long an interval around an event may remain */
+static const double EVENT_TIME_ATOL = 1e-13; /* s: width of the interval around an event */
 
 /* --- rows --- */
 
@@ -56,22 +56,22 @@ void rows_free(Rows *rows) {
 /* --- events --- */
 
 static bool update(Motion *motion) {
-    Update said;
+    Update result;
     for (int count = 0; count < UPDATES; count++) {
-        if (!instance_update(motion->instance, &said)) {
+        if (!instance_update(motion->instance, &result)) {
             return false;
         }
-        if (said.terminate) {
-            fprintf(stderr, "importer: the FMU ends the simulation\n");
+        if (result.terminate) {
+            fprintf(stderr, "importer: the FMU terminated the simulation\n");
             return false;
         }
-        if (!said.again) {
-            motion->next_event_defined = said.next_event_defined;
-            motion->next_event = said.next_event;
+        if (!result.again) {
+            motion->next_event_defined = result.next_event_defined;
+            motion->next_event = result.next_event;
             return true;
         }
     }
-    fprintf(stderr, "importer: the discrete states do not come to rest\n");
+    fprintf(stderr, "importer: the discrete states still change after %d updates\n", UPDATES);
     return false;
 }
 
@@ -85,13 +85,13 @@ static bool leave_event_mode(Motion *motion) {
             instance_indicators(instance, motion->z));
 }
 
-static bool happen(Motion *motion) {
+static bool handle_event(Motion *motion) {
     return rows_add(motion->rows, motion->instance, BEFORE_EVENT, motion->time) &&
            instance_event_mode(motion->instance) && leave_event_mode(motion) &&
            rows_add(motion->rows, motion->instance, AFTER_EVENT, motion->time);
 }
 
-/* Set what changes at a communication point, in model exchange within event mode. */
+/* Set the changes at a communication point, in event mode unless the kind is CO_SIMULATION. */
 static bool apply_changes(Motion *motion) {
     Instance *instance = motion->instance;
     const Job *job = instance->job;
@@ -125,7 +125,7 @@ static bool step_to(Motion *motion, double end) {
             return false;
         }
         motion->time = reached;
-        if (event && !happen(motion)) {
+        if (event && !handle_event(motion)) {
             return false;
         }
     }
@@ -147,7 +147,7 @@ static bool slope(Motion *motion, int stage, double h, double fraction, const do
            instance_derivatives(motion->instance, motion->k + (size_t)stage * n);
 }
 
-/* The classical method of Runge and Kutta: leaves the new states in work and in the FMU. */
+/* Make a step of the classical Runge-Kutta method.  The new states are in work and in the FMU. */
 static bool runge_kutta(Motion *motion, double h) {
     size_t n = motion->instance->job->state_count;
     const double *k = motion->k;
@@ -162,7 +162,7 @@ static bool runge_kutta(Motion *motion, double h) {
     return evaluate_at(motion, motion->time + h, motion->work);
 }
 
-/* Whether an indicator is in another domain (z > 0 or z <= 0) than at the start of the step. */
+/* Find whether an indicator has changed its domain (z > 0 or z <= 0) since the step started. */
 static bool crossed(Motion *motion, bool *yes) {
     const Job *job = motion->instance->job;
     double *now = motion->z + job->indicator_count;
@@ -176,11 +176,11 @@ static bool crossed(Motion *motion, bool *yes) {
     return true;
 }
 
-/* Shorten a step at whose end an indicator has crossed, to just after the crossing. */
+/* Shorten a step in which an indicator crosses zero: it then ends just after the crossing. */
 static bool locate(Motion *motion, double *h) {
     double before = 0.0, after = *h;
     bool yes;
-    while (after - before > LOCATED && motion->time + after > motion->time) {
+    while (after - before > EVENT_TIME_ATOL && motion->time + after > motion->time) {
         double middle = before + 0.5 * (after - before);
         if (!runge_kutta(motion, middle) || !crossed(motion, &yes)) {
             return false;
@@ -210,7 +210,7 @@ static bool integrate_to(Motion *motion, double end) {
             return false;
         }
         if (event || asked || (timed && motion->time >= motion->next_event)) {
-            if (!happen(motion)) {
+            if (!handle_event(motion)) {
                 return false;
             }
         } else if (!instance_indicators(motion->instance, motion->z)) {
