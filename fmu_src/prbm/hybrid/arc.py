@@ -6,7 +6,7 @@ import numpy as np
 
 from ..base.tolerances import GUARD_INTERVALS
 from ..mechanics.arrays import Real
-from .runge_kutta import TSITOURAS_PAPAKOSTAS, interpolate, powers
+from .runge_kutta import TSITOURAS_PAPAKOSTAS, Rate, interpolate, powers, stages
 
 FRACTIONS = np.linspace(0.0, 1.0, GUARD_INTERVALS + 1)
 GRID = powers(TSITOURAS_PAPAKOSTAS, FRACTIONS)
@@ -39,6 +39,22 @@ class Arc:
     def at(self, t: float) -> Real:
         """Return the state at time t, not projected."""
         return interpolate(TSITOURAS_PAPAKOSTAS, self.y, self.k, self.h, (t - self.start) / self.h)
+
+    def cut(self, rate: Rate, t: float) -> tuple["Arc", Real]:
+        """Return the step from the same start to time t, and the state at its end.
+
+        The state is not projected.  It has the order of the method, not that of the dense output.
+
+        Parameters
+        ----------
+        rate : callable
+            Right-hand side of the equations.
+        t : float
+            A time after the start [s].
+        """
+        h = t - self.start
+        k, y = stages(TSITOURAS_PAPAKOSTAS, rate, self.start, self.y, h, self.k[0])
+        return Arc(self.start, h, t, self.y, k), y
 
     def samples(self) -> tuple[Real, Real]:
         """Return the ends of the intervals in which the guards are evaluated.

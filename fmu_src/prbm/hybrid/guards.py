@@ -206,14 +206,15 @@ def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
 
 
 def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float:
-    """Return the time at which the projected state closes a gap, from that of the dense output.
+    """Return the time at which a gap closes, from the time at which the dense output closes it.
 
+    The states are those of steps that end at the time, see :meth:`prbm.hybrid.arc.Arc.cut`.
     The time is never before the apex: the gap is opening there, and an impact without effect would
     be located again and again.
     """
     equations = looks.equations
     for _ in range(EVENT_CORRECTIONS_MAX):
-        y = equations.project(t, looks.arc.at(t))
+        y = equations.project(t, looks.arc.cut(equations.rate, t)[1])
         size, rate = gap(equations, stop, t, y), _gap_rate(equations, stop, t, y)
         if rate >= 0.0 or abs(size) <= EVENT_TIME_ATOL * abs(rate):
             break

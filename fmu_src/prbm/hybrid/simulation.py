@@ -26,7 +26,7 @@ from ..mechanism.description import Mechanism
 from . import contact_modes, events, impacts, snapshot, walls
 from .arc import Arc
 from .configuration import Configuration
-from .events import Event, EventWindow
+from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
 from .guards import Looks
 from .impacts import Impact
@@ -303,8 +303,11 @@ class Simulation:
         else:
             # A step that an event cuts short says little about the next one: keep its size.
             controller = StepSizeController(step.h, controller.last_error)
-            arc = replace(arc, end=event.time)
-            y, self.k1 = equations.project(event.time, arc.at(event.time)), None
+            if event.kind is EventKind.IMPACT and event.time > arc.start:
+                arc, y = arc.cut(equations.rate, event.time)
+            else:
+                arc, y = replace(arc, end=event.time), arc.at(event.time)
+            y, self.k1 = equations.project(event.time, y), None
         self.front = Front(arc.end, y, equations, front.latched)
         self.arc, self.pending, self.controller = arc, event, controller
 

@@ -7,6 +7,18 @@ PRBM void arc_at(const Simulation *sim, double t, double *y) {
     interpolate(state_size(sim), arc->y, arc->k, arc->h, (t - arc->start) / arc->h, y);
 }
 
+PRBM bool arc_cut(Simulation *sim, double t, double *k, double *y, Problem *problem) {
+    const Arc *arc = &sim->state.arc;
+    Stepping *stepping = &sim->stepping;
+    int ny = state_size(sim);
+    if (k != arc->k) {
+        copy(ny, arc->k, k);
+    }
+    return stages(&sim->equations, arc->start, ny, arc->y, t - arc->start, k, y,
+                  &stepping->reference, &stepping->located.evaluation, &stepping->located.forces,
+                  problem);
+}
+
 PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *evaluation,
                     Problem *problem) {
     const State *state = &sim->state;

@@ -264,8 +264,8 @@ static bool polish_impact(const Search *search, double apex, double *time) {
     double t = *time, *y = sim->stepping.located.y;
     Complex *e = sim->stepping.located.e;
     for (int step = 0; step < EVENT_CORRECTIONS_MAX; step++) {
-        arc_at(sim, t, y);
-        if (!project(&sim->equations, t, y, &sim->scratch, search->problem)) {
+        if (!arc_cut(sim, t, sim->stepping.located.k, y, search->problem) ||
+            !project(&sim->equations, t, y, &sim->scratch, search->problem)) {
             return false;
         }
         directions(system_of(sim), y, e);

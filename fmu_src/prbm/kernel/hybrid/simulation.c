@@ -103,6 +103,9 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     stepping->located.y = place(memory, ny, d);
     stepping->located.e = place(memory, n, sizeof(Complex));
     evaluation_place(&stepping->located.evaluation, system, memory);
+    stepping->located.forces.least = place(memory, s, d);
+    stepping->located.forces.largest = place(memory, s, d);
+    stepping->located.k = place(memory, STAGES * ny, d);
     stepping->reach = place(memory, n, d);
 }
 

@@ -98,6 +98,8 @@ typedef struct {
     double *y;             /* (ny,) */
     Complex *e;            /* (n,) */
     Evaluation evaluation; /* of guards that need forces */
+    ForceRange forces;     /* of a step that ends there */
+    double *k;             /* (STAGES, ny) of that step */
 } Located;
 
 /* Working memory of a step and of the location of events in it. */

@@ -131,7 +131,14 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     state->front_time = event->time;
     state->pending = *event;
     state->has_k1 = false;
-    arc_at(sim, event->time, state->front);
+    if (event->kind != EVENT_IMPACT || event->time <= state->arc.start) {
+        arc_at(sim, event->time, state->front);
+    } else {
+        if (!arc_cut(sim, event->time, state->arc.k, state->front, problem)) {
+            return false;
+        }
+        state->arc.h = event->time - state->arc.start;
+    }
     return project(&sim->equations, event->time, state->front, &sim->scratch, problem);
 }
 
