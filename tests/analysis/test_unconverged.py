@@ -71,5 +71,5 @@ def test_a_model_that_wants_updates_without_end_is_rejected(monkeypatch):
     model = Model.__new__(Model)
     model.time = 0.5
     monkeypatch.setattr(Model, "call", lambda *_: (True,), raising=False)
-    with pytest.raises(CouplingError, match=r"at 0\.5 s the model wants more than 1000 updates"):
+    with pytest.raises(CouplingError, match=r"at 0\.5 s the model requests more than 1000 updates"):
         model.update()

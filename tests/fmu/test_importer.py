@@ -211,6 +211,6 @@ def test_the_error_about_missing_resources_names_the_path(tmp_path, fmi):
     place = str(tmp_path) if fmi == 3 else NATIVE.uri(tmp_path)
     done = execute(Job(native("PRBDM", fmi), resources=place))
     assert done.status == 1
-    assert "no instance" in done.errors
+    assert "instantiation failed" in done.errors
     assert "mechanism.bin" in done.errors
     assert str(tmp_path) in done.errors

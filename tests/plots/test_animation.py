@@ -133,7 +133,8 @@ def test_the_hit_point_touches_the_wall_in_the_frame_of_an_impact(
         assert scene.film.times[k] == mark.time
         scene.frame(k)
         hit, line = places(scene.hits["stop"], scene)[0], places(scene.walls["stop"], scene)
-        assert abs(hit.real - line[0].real) < 1e-9
+        # Between two rows the wall is drawn on a line; its cubic deviates by a h^2/8.
+        assert abs(hit.real - line[0].real) < 2e-3 * omega**2 * 1e-3**2 / 8
         assert line[0].imag < hit.imag < line[1].imag or line[1].imag < hit.imag < line[0].imag
         assert scene.flashes["stop"].get_visible()
         assert scene.flashes["stop"].get_alpha() == 1.0

@@ -286,7 +286,8 @@ def start_values(chosen: Sequence[Mechanism], texts: Sequence[str]) -> dict[str,
 
     Examples
     --------
-    >>> start_values([load(shipped()["PRBDM"])], ["stop.restitution=0.5", "stop.position = 1 mm"])
+    >>> guide = read_mechanism(shipped()["PRBDM"])
+    >>> start_values([guide], ["stop.restitution=0.5", "stop.position = 1 mm"])
     {'stop.restitution': 0.5, 'stop.position': 0.001}
     """
     units = {mechanism.name: units_of(mechanism) for mechanism in chosen}

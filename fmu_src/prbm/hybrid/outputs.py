@@ -6,7 +6,7 @@ import numpy as np
 
 from ..mechanics import contact, forces
 from ..mechanics.arrays import Complex, Real
-from ..mechanics.dynamics import Equations
+from ..mechanics.dynamics import Equations, base_reaction
 from ..mechanics.kinetics import kinetic_energy
 from ..mechanics.system import System
 from ..mechanism.parts import value
@@ -37,7 +37,7 @@ def all_outputs(
     a, lam, M, _ = equations.evaluate(t, q, v)
     out: Outputs = {**motions(system, q, v, e)}
     out |= _stops(equations, t, e, v, lam, M)
-    force, moment = equations.base_reaction(q, v, a)
+    force, moment = base_reaction(equations, q, v, a)
     out["base.force.x"], out["base.force.y"] = force.real, force.imag
     out["base.moment"] = moment
     out["energy.kinetic"] = kinetic_energy(M, v)

@@ -54,8 +54,8 @@ class StepSizeController:
     Examples
     --------
     >>> controller = StepSizeController(h=1.0)
-    >>> controller.next(error=2.0**5).h
-    0.45
+    >>> round(controller.next(error=2.0**6).h, 12)
+    0.425
     """
 
     h: float = 0.0

@@ -426,24 +426,23 @@ class Equations:
         lift = float((self.system.lifts[point] @ e).real) + self.system.lifts_c[point]
         return mu * forces.normal_force(lift, preload, stiffness)
 
-    # -- reactions --
 
-    def base_reaction(self, q: Real, v: Real, a: Real) -> tuple[complex, float]:
-        """Return the force [N] and the moment about the first clamp [N m] on the ground.
+def base_reaction(equations: Equations, q: Real, v: Real, a: Real) -> tuple[complex, float]:
+    """Return the force [N] and the moment about the first clamp [N m] on the ground.
 
-        From the balance of momentum of all moving parts: clamps, stops and friction points on the
-        ground balance gravity, inputs and inertia.
-        """
-        system = self.system
-        e = system.directions(q)
-        z = system.A @ e + system.c - system.anchor
-        field = system.gravity - self.inputs.base
-        speed, change = system.turning(v), system.turning(a)
-        load = system.m * (field - mass_accelerations(system.A, e, speed, change))
-        force = complex(load.sum())
-        moment = float((z.conj() * load).imag.sum() - system.J @ a)
-        for f, m, frame in zip(self.inputs.forces, self.inputs.moments, system.pushed, strict=True):
-            place = complex(frame.A @ e) + frame.c - system.anchor
-            force += f
-            moment += (place.conjugate() * f).imag + m
-        return force, moment
+    From the balance of momentum of all moving parts: clamps, stops and friction points on the
+    ground balance gravity, inputs and inertia.
+    """
+    system, inputs = equations.system, equations.inputs
+    e = system.directions(q)
+    z = system.A @ e + system.c - system.anchor
+    field = system.gravity - inputs.base
+    speed, change = system.turning(v), system.turning(a)
+    load = system.m * (field - mass_accelerations(system.A, e, speed, change))
+    force = complex(load.sum())
+    moment = float((z.conj() * load).imag.sum() - system.J @ a)
+    for f, m, frame in zip(inputs.forces, inputs.moments, system.pushed, strict=True):
+        place = complex(frame.A @ e) + frame.c - system.anchor
+        force += f
+        moment += (place.conjugate() * f).imag + m
+    return force, moment

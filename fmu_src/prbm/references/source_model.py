@@ -376,7 +376,7 @@ class Run:
     impact_times : (impacts,)
         Times of the steps at which contact was detected [s].
     finite : bool
-        False if the run ended at a state that was not finite.
+        False if the run ended at a state that was not finite or whose loop could not be closed.
     """
 
     t: Real
@@ -426,7 +426,7 @@ def simulate(
 
     y = np.array([q, v])
     states, impact_times = [y], []
-    behind = False
+    behind, finite = False, True
     with np.errstate(over="ignore", invalid="ignore"):  # The state is checked below.
         for k in range(round(span / step)):
             contact = chain.displacement(chain.hit, y[0]) > wall
@@ -439,9 +439,14 @@ def simulate(
             k3 = rate(y + step / 2 * k2)
             k4 = rate(y + step * k3)
             y = y + step / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-            if not np.isfinite(y).all():
+            finite = bool(np.isfinite(y).all())
+            if finite:
+                try:
+                    y = np.array([chain.project(y[0]), y[1]])
+                except SimulationError:
+                    finite = False
+            if not finite:
                 break
-            y = np.array([chain.project(y[0]), y[1]])
             states.append(y)
         trajectory = np.array(states)
         energy = np.array([chain.energy(*state) for state in states])
@@ -452,5 +457,5 @@ def simulate(
         x=chain.displacement(chain.com, trajectory[:, 0]),
         energy=energy,
         impact_times=np.array(impact_times),
-        finite=bool(np.isfinite(y).all()),
+        finite=finite,
     )
