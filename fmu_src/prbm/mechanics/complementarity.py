@@ -4,9 +4,9 @@ A linear complementarity problem is the search for z with
 
     z >= 0,    w = M z + q >= 0,    z . w = 0.
 
-Lemke's method follows a path of pivots that begins at a ray, which the covering vector defines.  The
-path ends in a solution or in another ray.  It ends in a solution if the rates without forces are
-those of a possible motion [2].  There may be no solution if walls close in on the mechanism, if
+Lemke's method follows a path of pivots that begins at a ray, which the covering vector defines.
+The path ends in a solution or in another ray.  It ends in a solution if the rates without forces
+are those of a possible motion [2].  There may be no solution if walls close in on the mechanism, if
 contacts slide, and for accelerations (Painleve's paradox).  In these cases a path may also end in a
 ray although there is a solution.  The paths of other covering vectors are therefore tried before
 the problem is rejected as unsolvable.
@@ -213,7 +213,7 @@ def violation(W: Real, u: Real, P: Real, limit: Real) -> float:
     rates, share = W @ P + u, P * np.diag(W)
     normal = np.abs(np.minimum(rates[:k], share[:k]))
     excess = np.abs(share[k:]) - limit * np.diag(W)[k:]
-    # Deficit of a sliding contact: its friction must oppose the sliding with the limit.
+    # Deficit of a sliding contact: its friction must oppose the sliding at the limit.
     missing = limit * np.diag(W)[k:] + np.sign(rates[k:]) * share[k:]
     sliding = np.minimum(np.abs(rates[k:]), np.abs(missing))
     return float(max(x.max(initial=0.0) for x in (normal, excess, sliding)))

@@ -5,7 +5,7 @@
 #include "hybrid/state.h"
 
 PRBM void arc_at(const Simulation *sim, double t, double *y);
-/* The state at the present time, on the constraints; near becomes a reference near it, and the
+/* The state y at the present time, on the constraints; near is set to a reference near it, and the
  * evaluation is working memory. */
 PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *evaluation,
                     Problem *problem);
