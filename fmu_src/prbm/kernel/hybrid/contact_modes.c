@@ -138,7 +138,7 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
     }
     holding->found = found.solved;
     if (!found.solved || every.count == 1) {
-        return true; /* a single stop needs no check; the forces of several may depend on each other */
+        return true; /* a single stop needs no check; several may depend on each other */
     }
     equations_holding(sim, holding, q, v);
     return modes_agree(sim, q, v, &every, &rest, &found, &holding->found, problem);
