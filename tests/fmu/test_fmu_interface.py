@@ -240,7 +240,7 @@ def test_the_page_names_every_variable_and_the_limits(mechanisms, model):
         "NumPy",
         "percent-encoded",
         "End moments",
-        "acceleration included",
+        "includes the wall",
     ):
         assert limit in html
     kinds = {kind.model for kind in mechanisms[model].flexure_types}

@@ -1,4 +1,4 @@
-"""The laws of moving walls in FMUs, whichever interface moves them (prbm.hybrid.walls)."""
+"""The laws of moving walls in FMUs, for all interfaces (prbm.hybrid.walls)."""
 
 import itertools
 import math
@@ -79,11 +79,11 @@ def opened(fmus, native):
 
 
 AWAY = {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 0.01}
-"""The shuttle at rest, the wall out of reach."""
+"""Values for a shuttle at rest, with the wall out of reach."""
 
 
 def place(found):
-    """Return how far the wall is from its place without displacement."""
+    """Return the displacement of the wall, up to a constant [m]."""
     return found["stop.gap"] + found["stop.point.displacement"]
 
 
@@ -102,7 +102,7 @@ def test_a_wall_is_within_twice_the_acceleration_times_the_step_squared(opened, 
 
 
 @all_ways
-def test_a_displacement_that_jumps_is_not_overshot_by_more_than_the_jump(opened, fmi, kind):
+def test_position_error_of_a_wall_after_a_jump_is_at_most_the_jump(opened, fmi, kind):
     jump = -1e-3
     with opened("PRBDM", fmi, kind).initialize(values=AWAY) as instance:
         begin = place(instance.values())
@@ -116,7 +116,7 @@ def test_a_displacement_that_jumps_is_not_overshot_by_more_than_the_jump(opened,
 
 
 class Moved(Integrator):
-    """An integrator that gives a wall in uniform motion its place at each evaluation."""
+    """An integrator that sets the position of a uniformly moving wall at each evaluation."""
 
     speed = -0.1
 
@@ -176,8 +176,8 @@ def test_a_pressed_body_stays_on_its_wall(opened, model, fmi, kind):
 
 @pytest.mark.parametrize("inside", [False, True])
 @pytest.mark.parametrize("kind", ["events", "late"])
-def test_inputs_that_are_set_in_events_move_the_wall_no_differently(native, kind, inside):
-    """A velocity that is set in an event is that of the wall from there on."""
+def test_a_pressed_body_stays_on_a_wall_whose_inputs_are_set_in_events(native, kind, inside):
+    """In event mode (inside) a velocity acts at once, else from the beginning of the step."""
     with Instance(native["PRBDM", 3], kind).initialize(values=PRESSED) as instance:
         for k in range(200):
             instance.change(sine(k * 1e-3)) if inside else instance.set(sine(k * 1e-3))
@@ -209,8 +209,8 @@ def test_a_jump_below_rest_speed_keeps_a_stop_closed_and_is_a_capture(native, sp
         assert lost == pytest.approx(mass * speed**2 / 2, rel=1e-6)
 
 
-def goes_on(instance):
-    """Return the bytes of ten steps in which the wall catches up with its displacement alone."""
+def bytes_of_next_steps(instance):
+    """Advance by ten steps, with displacements only; return the bytes of the values after each."""
     rows = []
     for _ in range(10):
         given = sine(instance.time)["stop.displacement"]
@@ -221,44 +221,46 @@ def goes_on(instance):
 
 
 @all_ways
-def test_a_state_saved_while_a_wall_catches_up_restores_to_the_same_bytes(opened, fmi, kind):
+def test_a_state_saved_while_a_wall_joins_its_reference_restores_to_the_same_bytes(
+    opened, fmi, kind
+):
     with opened("PRBDM", fmi, kind).initialize(values={}) as instance:
-        goes_on(instance)
+        bytes_of_next_steps(instance)
         data, time = instance.saved(), instance.time
-        first = goes_on(instance)
-        goes_on(instance)
+        first = bytes_of_next_steps(instance)
+        bytes_of_next_steps(instance)
         instance.restore(data)
         instance.time = time
         assert instance.saved() == data
-        assert goes_on(instance) == first
+        assert bytes_of_next_steps(instance) == first
 
 
 @all_ways
 def test_a_reset_forgets_the_motion_of_a_wall(opened, fmi, kind):
     with opened("PRBDM", fmi, kind).initialize(values={}) as instance:
-        first = goes_on(instance)
+        first = bytes_of_next_steps(instance)
         instance.reset()
         instance.initialize(values={})
-        assert goes_on(instance) == first
+        assert bytes_of_next_steps(instance) == first
 
 
 @all_ways
-def test_walls_of_two_instances_in_one_process_move_on_their_own(opened, fmi, kind):
+def test_walls_of_two_instances_in_one_process_are_independent(opened, fmi, kind):
     with (
         opened("PRBDM", fmi, kind).initialize(values={}) as one,
         opened("PRBDM", fmi, kind).initialize(values={}) as other,
     ):
-        first = goes_on(one)
+        first = bytes_of_next_steps(one)
         assert other.set({"stop.velocity": 0.01}) == OK
         other.advance(0.02)
-        second = goes_on(one)
+        second = bytes_of_next_steps(one)
     with opened("PRBDM", fmi, kind).initialize(values={}) as alone:
-        assert [goes_on(alone), goes_on(alone)] == [first, second]
+        assert [bytes_of_next_steps(alone), bytes_of_next_steps(alone)] == [first, second]
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_in_model_exchange_a_pressed_body_follows_its_wall(native, fmi):
-    """Where the wall is at each moment as the inputs say, with events at changes of its speed."""
+    """The inputs are position and velocity of the wall; changes of its velocity cause events."""
     with Instance(native["PRBDM", fmi], "me", substep=1e-4) as instance:
         instance.initialize(values=PRESSED)
         for k in range(300):
@@ -282,10 +284,11 @@ RESTING = {
 @pytest.mark.parametrize("step", [1e-4, 1e-3, 5e-3])
 @pytest.mark.parametrize("share", [0.33, 0.40])
 def test_a_body_rests_on_a_carrier_of_more_than_eleven_quarters_of_its_mass(native, share, step):
-    """The whole force first acts on the carrier alone, which so accelerates with share times g.
+    """At first the whole force acts on the carrier alone, with the acceleration a = share g.
 
-    After one step h the wall is e = -a h^2/2 and u = -a h behind, so that its cubic begins with
-    -(6 e/T + 4 u)/T = 11 a/4: the body is pressed by g - 11/4 share g.
+    After one step h the wall has the offset e = -a h^2/2 and the excess u = -a h, so that its cubic
+    begins with the acceleration -(6 e/T + 4 u)/T = 11/4 a, T = 2 h.  The body stays while that is
+    less than g.
     """
     fmus = {name: native["PRBDM", 3] for name in ("carrier", "body")}
     mass = simulation("PRBDM").values["shuttle.mass"]

@@ -1,4 +1,4 @@
-"""Searches without a solution end in errors that name the contacts, and change nothing."""
+"""A search without a solution is rejected with the names of the contacts, and changes nothing."""
 
 import ctypes
 import re
@@ -29,7 +29,7 @@ def vice():
 
 @pytest.mark.parametrize("k", [2, 20])
 def test_walls_that_close_in_are_rejected(k):
-    """Opposite walls: the best of infeasible impulses would let one of them penetrate."""
+    """Two opposite walls approach a rigid body: no impulses open both gaps."""
     row = np.resize([1.0, -1.0], k)
     W, u, eps = np.outer(row, row), np.full(k, -1.0), np.full(k, 0.5)
     with pytest.raises(SimulationError, match="the walls close in on the mechanism"):
@@ -39,7 +39,7 @@ def test_walls_that_close_in_are_rejected(k):
 
 
 def test_a_wall_that_pushes_where_friction_locks_is_rejected():
-    """One degree of freedom that slides away from the wall's push: no impulse ends the approach."""
+    """Friction turns the push of the wall into a further approach."""
     W, u = np.array([[1.0, 2.0], [2.0, 4.0]]), np.array([-1.0, 1.0])
     with pytest.raises(SimulationError, match="friction locks; reduce the friction"):
         contact.stronge(W, u, 1.0, 0.5)
@@ -47,14 +47,14 @@ def test_a_wall_that_pushes_where_friction_locks_is_rejected():
         kernel().stronge(W, u, 1.0, 0.5, 0.0, np.zeros(1), np.zeros(1))
 
 
-def test_many_stops_are_hit_at_once_with_the_impulses_of_one():
-    """Forty equal stops share an impulse evenly: sweeps needed not converge."""
+def test_equal_stops_hit_at_once_share_the_impulse_of_one():
+    """Forty equal stops share the impulse evenly."""
     k = 40
     W, u, eps = np.ones((k, k)) / 2.0, np.full(k, -3.0), np.full(k, 0.5)
     np.testing.assert_allclose(contact.newton(W, u, eps), 9.0 / k, rtol=1e-12)
 
 
-def test_an_event_that_cannot_be_located_is_named(monkeypatch):
+def test_an_event_that_cannot_be_located_is_rejected_with_its_name(monkeypatch):
     sim = Simulation(mechanism("PRBDM2R"))
     before = sim.outputs()
 
@@ -68,7 +68,7 @@ def test_an_event_that_cannot_be_located_is_named(monkeypatch):
 
 
 @pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
-def test_a_guide_between_closing_walls_is_left_as_it_was(engine):
+def test_an_impact_between_closing_walls_is_rejected_without_change(engine):
     """The guide rests on the left wall, and the right wall arrives within the step."""
     sim = engine(vice(), {"release.displacement": 0.0})
     sim.set({"right.displacement": -0.05})
@@ -85,7 +85,7 @@ def test_a_guide_between_closing_walls_is_left_as_it_was(engine):
 def rod():
     """Return a guide that rests on its wall with the end of a long arm, and its values.
 
-    Once it slides to one side its friction presses it the more: Painleve's paradox.
+    Sliding to one side, friction increases the normal force: Painleve's paradox.
     """
     guide = mechanism("PRBDM2RAxial")
     (stop,) = guide.stops
@@ -144,10 +144,10 @@ def test_friction_that_jams_is_logged_by_fmus_which_work_after_a_reset(rods, fmi
         assert instance.values()["stop.contact"]
 
 
-# -- crowds --
+# -- many contacts --
 
 
-def crowd():
+def many_contacts():
     """Return a guide with 24 stops along one wall and eight points with friction."""
     guide = mechanism("PRBDM2RAxial")
     stops = tuple(replace(guide.stops[0], name=f"wall{k}") for k in range(24))
@@ -159,9 +159,9 @@ def crowd():
     return replace(guide, name="Crowd", stops=stops, frictions=points), values
 
 
-def test_a_crowd_of_contacts_rests_as_one_does():
-    """Equal rows share one force; what rests moves no more in one engine than in the other."""
-    guide, values = crowd()
+def test_many_contacts_at_rest_bear_the_force_of_one_stop():
+    """In both engines, the stops share the force of one stop, and the body does not slide."""
+    guide, values = many_contacts()
     twins = [engine(guide, values) for engine in (Simulation, KernelSimulation)]
     alone = Simulation(mechanism("PRBDM2RAxial"), {"release.displacement": 0.0})
     for sim in twins:
@@ -175,12 +175,12 @@ def test_a_crowd_of_contacts_rests_as_one_does():
 @pytest.mark.fmu
 @pytest.mark.native
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_a_crowd_of_contacts_rests_in_an_fmu(tmp_path, fmi):
-    guide, values = crowd()
-    (tmp_path / "crowd.fmu").write_bytes(built(guide, fmi=fmi))
+def test_many_contacts_at_rest_bear_the_same_forces_in_an_fmu(tmp_path, fmi):
+    guide, values = many_contacts()
+    (tmp_path / "many_contacts.fmu").write_bytes(built(guide, fmi=fmi))
     expected = KernelSimulation(guide, values)
     expected.advance(1e-2)
-    with Instance(tmp_path / "crowd.fmu").initialize(values=values) as instance:
+    with Instance(tmp_path / "many_contacts.fmu").initialize(values=values) as instance:
         assert instance.step(0.0, 1e-2) == OK
         found = instance.values()
         for k in range(24):
@@ -236,8 +236,8 @@ def test_eigenvalues_without_convergence_are_rejected():
         KernelSimulation(mechanism("PRBDM2R"), changes=(SWEEPS,))
 
 
-def test_a_guard_that_cannot_be_evaluated_is_no_event():
-    """Zero in place of the force of the stop would look like its release."""
+def test_a_guard_that_cannot_be_evaluated_is_an_error():
+    """A force of zero instead of the error would be taken for a release."""
     rubs = {"release.displacement": 0.0, "stop.friction": 0.5}
     sim = KernelSimulation(mechanism("PRBDM2R"), rubs, changes=(SINGULAR,))
     before = sim.outputs()
@@ -246,7 +246,7 @@ def test_a_guard_that_cannot_be_evaluated_is_no_event():
     assert sim.outputs() == before
 
 
-def test_events_without_end_are_rejected_in_model_exchange():
+def test_too_many_events_at_one_time_are_rejected_in_model_exchange():
     sim = KernelSimulation(mechanism("PRBDM"), {"release.displacement": 0.0}, exchange=True,
                            changes=(EVENTS,))  # fmt: skip
     sim.set({"base.acceleration.x": 100.0})

@@ -1,4 +1,4 @@
-"""Moving walls: each approaches its reference motion along a cubic (prbm.hybrid.walls)."""
+"""Moving walls: each joins its reference along a cubic (prbm.hybrid.walls)."""
 
 import itertools
 import json
@@ -113,7 +113,7 @@ def errors(sim, kind: str, *, velocities: bool) -> float:
 @pytest.mark.parametrize("velocities", [True, False])
 @pytest.mark.parametrize("kind", [*GRIDS, "20 ms"])
 def test_position_error_of_a_wall_is_bounded_by_acceleration_and_step(twin, kind, velocities):
-    """It is below 2 a h^2, or 3 a h^2 without velocities at random steps."""
+    """It is below 2 a h^2, or 3 a h^2 at these random steps without velocities."""
     sim = TWINS[twin](mechanism("PRBDM"), AWAY)
     bound = 2.0 if velocities or kind != "random" else 3.0
     assert errors(sim, kind, velocities=velocities) < bound
@@ -163,7 +163,7 @@ def test_position_error_of_a_wall_after_a_jump_is_at_most_the_jump(twin, kind):
 
 @both
 def test_the_motion_of_a_wall_in_short_steps_is_not_extrapolated_over_a_long_step(twin):
-    """The velocity over two steps of 1 us is not kept for 20 ms."""
+    """The mean rate over steps of 1 us is not kept for 20 ms."""
     sim = TWINS[twin](mechanism("PRBDM"), AWAY)
     for k in range(3):
         sim.set({"stop.displacement": -1e-4 * k})
@@ -175,7 +175,7 @@ def test_the_motion_of_a_wall_in_short_steps_is_not_extrapolated_over_a_long_ste
 
 @both
 def test_the_force_of_a_closed_stop_includes_the_acceleration_of_its_wall(twin):
-    """It is the weight plus acceleration over mobility; a retreating wall opens the contact."""
+    """It is the weight plus acceleration over mobility; a fast retreat opens the stop."""
     sim = TWINS[twin](mechanism("PRBDM"), PRESSED)
     sim.advance(1e-3)
     weight, mobility = (sim.outputs()[f"stop.{name}"] for name in ("force", "point.mobility"))
@@ -203,9 +203,10 @@ def test_setting_an_input_to_its_present_value_has_no_effect(twin):
 
 
 def partner(twin, *, mobility: float, end: float, h: float):
-    """Return a guide after impacts with a free mass as wall; position, velocity of the mass.
+    """Return a guide after impacts with a free mass as wall, and the motion of the mass.
 
-    The last result is the momentum of the mass minus the received impulses, at each step.
+    The results are: the simulation of the guide; position and velocity of the mass; after each
+    step, the momentum of the mass minus the impulses that it has received.
     """
     sim = TWINS[twin](
         mechanism("PRBDM"),
@@ -272,8 +273,8 @@ def test_the_force_of_a_moving_wall_does_its_work():
 # --- saved states -----------------------------------------------------------------------------
 
 
-def catching_up(twin):
-    """Return a simulation whose wall is approaching its reference, before further events."""
+def simulation_with_joining_wall(twin):
+    """Return a simulation after 30 steps, while the wall is joining its reference."""
     sim = TWINS[twin](mechanism("PRBDM"), {})
     for k in range(30):
         sim.set({"stop.displacement": sine(k * 1e-3)[0]})
@@ -281,8 +282,8 @@ def catching_up(twin):
     return sim
 
 
-def goes_on(sim) -> list[dict]:
-    """Advance by 20 steps; return the outputs after each."""
+def next_outputs(sim) -> list[dict]:
+    """Advance by 20 steps and return the outputs after each."""
     found = []
     for k in range(30, 50):
         sim.set({"stop.displacement": sine(k * 1e-3)[0], "stop.velocity": 0.01 * (k > 40)})
@@ -291,32 +292,32 @@ def goes_on(sim) -> list[dict]:
     return found
 
 
-def test_a_state_saved_while_a_wall_catches_up_restores_to_the_same_bytes():
-    sim = catching_up("engine")
+def test_a_state_saved_while_a_wall_joins_its_reference_restores_to_the_same_bytes():
+    sim = simulation_with_joining_wall("engine")
     assert any(wall.span for wall in sim.inputs.walls)
     saved = json.dumps(sim.snapshot())
     other = Simulation(mechanism("PRBDM"))
     other.restore(json.loads(saved))
     assert json.dumps(other.snapshot()) == saved
-    assert goes_on(other) == goes_on(sim)
+    assert next_outputs(other) == next_outputs(sim)
 
 
 def test_a_state_of_the_kernel_restores_to_the_same_bytes():
-    sim, other = catching_up("kernel"), catching_up("kernel")
+    sim, other = simulation_with_joining_wall("kernel"), simulation_with_joining_wall("kernel")
     saved = sim.state
-    expected = goes_on(sim)
+    expected = next_outputs(sim)
     other.advance(0.2)
     other.restore(saved)
     assert other.state.tobytes() == saved.tobytes()
-    assert goes_on(other) == expected
+    assert next_outputs(other) == expected
 
 
 @both
 def test_simulations_are_independent_of_each_other(twin):
-    one, other = catching_up(twin), catching_up(twin)
+    one, other = simulation_with_joining_wall(twin), simulation_with_joining_wall(twin)
     other.set({"stop.displacement": 1e-3})
     other.advance(0.031)
-    assert goes_on(one) == goes_on(catching_up(twin))
+    assert next_outputs(one) == next_outputs(simulation_with_joining_wall(twin))
 
 
 def test_the_engine_and_the_kernel_agree_on_random_motions_of_the_wall():

@@ -10,7 +10,7 @@ import random_contacts
 from prbm.mechanics import complementarity
 
 ERRORS = {"newton": 0.0, "stronge": 0.02, "several": 0.02, "rest": 0.02}
-"""Largest fractions of errors.  They occur if a wall moves against a contact locked by friction."""
+"""Largest allowed fractions of rejected problems."""
 
 
 @pytest.mark.parametrize("engine", ["package", "kernel"])
@@ -26,8 +26,8 @@ def test_100_000_random_contacts_satisfy_their_laws_or_are_rejected(kind, engine
     check(random_contacts.search(engine, kind, 100_000, seed=1), ERRORS[kind])
 
 
-def test_contacts_that_are_rejected_have_no_forces():
-    """An independent route: of all combinations of modes, each a linear program, none fits."""
+def test_rejected_problems_have_no_solution_in_any_combination_of_modes():
+    """Each combination of modes is checked independently as a linear program."""
     rng, rejected, second_paths = np.random.default_rng(0), 0, 0
     for _ in range(6000):
         k, m = int(rng.integers(1, 4)), 2
@@ -53,7 +53,7 @@ def one_path(W, u, mu, normal):
 
 
 def combinations(k, m):
-    """Return all modes of k normals (1: closed) and m tangents (0: stick, else the slip)."""
+    """Return all modes of k normals (1: closed) and m tangents (0: stick, or slip sign)."""
     return product(product((0, 1), repeat=k), product((0, 1, -1), repeat=m))
 
 
@@ -75,7 +75,7 @@ def fits(W, u, mu, normal, closed, slips):
         else:
             equal.append((S[k + j], b[k + j]))
             bounds += [(limit - unit[k + j], 0.0), (limit + unit[k + j], 0.0)]
-    # Every a.P + c >= 0 or = 0 may be violated by t, which is minimised.
+    # Minimise the violation t of all laws a.P + c >= 0 and a.P + c = 0.
     rows = [*bounds, *equal, *((-a, -c) for a, c in equal)]
     A = np.array([[*-a, -1.0] for a, _ in rows])
     found = linprog([0.0] * n + [1.0], A, [c for _, c in rows],

@@ -283,6 +283,30 @@ INPUTS_OF_BOTH = (
     "should be the rate of the displacement."
 )
 
+STOP_LIMITS = (
+    "An impact below <code>rest_speed</code> ends in resting contact if the body is "
+    "pressed against the stop. Bouncing then ends earlier by at most "
+    "2 eps v / (a (1 - eps)), with v the rest speed, eps the restitution and a the "
+    "pressing acceleration.",
+    "In co-simulation the inputs of a wall at a communication point t0 define a line, "
+    "r(t) = <code>position + displacement</code> + v (t - t0). Its velocity v is the input "
+    "<code>velocity</code> or, until that has been non-zero, the mean rate of the "
+    "<code>displacement</code>. The wall joins the line within T, twice the recent longest "
+    "communication step (at most a fifth of the period): x = r + e (1 - 3 s<sup>2</sup> + "
+    "2 s<sup>3</sup>) + u T (s - 2 s<sup>2</sup> + s<sup>3</sup>), s = (t - t0)/T &le; 1, "
+    "with e and u its distance and speed ahead of the line at t0. A uniform motion that is "
+    "given with its velocity is exact. After a jump of the displacement by d, the wall is "
+    "never further than d from its target. All impacts within one communication step are "
+    "computed and counted; the latched outputs describe the last one.",
+    "A body rests on a moving wall while the contact force, which includes the wall's "
+    "acceleration, is positive. Then the body leaves, until other forces close the gap "
+    "again. A <code>velocity</code> that is set in event mode acts at once.",
+    "A wall that is part of another model takes part in impacts by its "
+    "<code>mobility</code>, its inverse effective mass. The impulse is that between two "
+    "masses, the wall changes its velocity within the step, and the other model must "
+    "receive <code>impulse_sum</code>. With <code>mobility</code> 0 the wall is immovable.",
+)
+
 
 def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) -> str:
     models = {kind.model for kind in mechanism.flexure_types}
@@ -317,34 +341,7 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
             "single impacts cannot be predicted after a few bounces."
         )
     if mechanism.stops:
-        items.append(
-            "An impact below <code>rest_speed</code> ends in resting contact if the body is "
-            "pressed against the stop. Bouncing then ends earlier by at most "
-            "2 eps v / (a (1 - eps)), with v the rest speed, eps the restitution and a the "
-            "pressing acceleration."
-        )
-        items.append(
-            "In co-simulation the inputs of a wall at a communication point t0 define a line, "
-            "r(t) = <code>position + displacement</code> + v (t - t0), with v its "
-            "<code>velocity</code> once that has been non-zero, else the mean rate of its "
-            "<code>displacement</code>. The wall joins it within T, twice the recent longest "
-            "communication step: x = r + e (1 - 3 s<sup>2</sup> + 2 s<sup>3</sup>) + u T (s - 2 "
-            "s<sup>2</sup> + s<sup>3</sup>), s = (t - t0)/T &le; 1, e and u its distance and speed "
-            "ahead of the line at t0. Uniform motion is exact, and jumps never overshoot by more "
-            "than themselves. Several impacts within one communication step are all computed and "
-            "counted; the latched outputs show the last one."
-        )
-        items.append(
-            "A body rests on a moving wall while its force on it is positive, the wall's "
-            "acceleration included; then it leaves, until what presses it closes the gap again. "
-            "A velocity that is set in event mode is that of the wall at once."
-        )
-        items.append(
-            "A wall that is part of another model takes part in impacts by its "
-            "<code>mobility</code>: the impulse is that between two masses, the wall changes its "
-            "velocity within the step, and <code>impulse_sum</code> is what the other model has to "
-            "receive. With <code>mobility</code> 0 the wall is immovable."
-        )
+        items += STOP_LIMITS
     items.append(inputs)
     return _list("Limits", items)
 

@@ -1,7 +1,7 @@
 """Which stops hold and which contacts stick or slip: the discrete state that follows an event.
 
-All is chosen from the state at the front alone, by the forces and accelerations that the
-candidates have.
+The choice depends only on the state at the front: on the forces and accelerations that the
+candidates would have there.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -62,7 +62,7 @@ def settle(
     configuration : Configuration
         Mechanism and scales.
     front : Front
-        State, and the modes so far: its held stops are candidates.
+        State, and the modes so far; stops held so far are candidates.
     resting : sequence of int
         Open stops that touch and neither close nor open.
     slipped : int or None
@@ -100,7 +100,7 @@ def release_moving(configuration: Configuration, front: Front) -> tuple[Front, i
     Returns
     -------
     front : Front
-        Without the held stops whose gap has a rate.
+        The front; held stops whose gap has a rate are open.
     struck : int or None
         A stop that closes.
     """
@@ -127,7 +127,7 @@ def holding_stops(
     Raises
     ------
     SimulationError
-        If there are none: contacts that slide exclude them by their friction.
+        If the friction of sliding contacts excludes all choices.
     """
     holding = find_holding_stops(configuration, front, candidates)
     if holding is None:
@@ -140,8 +140,9 @@ def find_holding_stops(
 ) -> list[int] | None:
     """Return the stops at rest that hold: pressed together, while the others open.
 
-    Contacts that move slip meanwhile, those at rest are frictionless.  Of stops that can move only
-    together, those hold whose rows are independent.  None if no stops hold in this way.
+    In this choice contacts with a sliding velocity slip, and contacts at rest are frictionless.  Of
+    stops that can move only together, some with independent rows hold.  None if no choice
+    satisfies the laws of contact.
     """
     every, scales = sorted(set(candidates)), configuration.scales
     if not every:
@@ -155,13 +156,13 @@ def find_holding_stops(
     pressing = zip(every, found.normal, strict=True)
     holding = [i for i, press in pressing if press > scales.zero_acceleration]
     contacts = equations_holding(scales, front, holding).contacts
-    # A stop alone is pressed or opens; several may depend on each other.
+    # A single stop needs no check; the forces of several may depend on each other.
     agrees = len(every) == 1 or _agrees(scales, front, contacts, every, {})
     return holding if agrees else None
 
 
 def _jammed(configuration: Configuration, front: Front, contacts: Iterable[int]) -> str:
-    """Return the message that no forces satisfy the laws of contacts."""
+    """Return the message for contacts whose laws no forces satisfy."""
     names = contact_names(configuration.mechanism, contacts)
     return (
         f"no forces satisfy the laws of contact and friction at t = {front.time:.9g} s ({names}): "
@@ -170,7 +171,7 @@ def _jammed(configuration: Configuration, front: Front, contacts: Iterable[int])
 
 
 def equations_holding(scales: Scales, front: Front, stops: Sequence[int]) -> Equations:
-    """Return the equations in which these stops hold and all contacts that move slip."""
+    """Return the equations in which these stops hold and all contacts with a velocity slip."""
     e, v, system, contacts = front.e, front.v, front.equations.system, front.contacts
     speeds = np.concatenate([system.slide_rows.rates(e, v), system.rub_rows.rates(e, v)])
     modes = tuple(
@@ -183,7 +184,7 @@ def equations_holding(scales: Scales, front: Front, stops: Sequence[int]) -> Equ
 
 
 def mobility(M: Real, held: Real, row: Real) -> float:
-    """Return the inverse mass along a row (1, n) while others (r, n) are held [1/kg]."""
+    """Return the inverse mass along a row (1, n) while the rows ``held`` (r, n) rest [1/kg]."""
     return float((row @ contact.response(M, held, row)).item())
 
 
@@ -254,14 +255,13 @@ def _modes_of(
     slipped: int | None,
     slow: Mapping[int, float],
 ) -> ContactState | None:
-    """Return the modes by the forces of some stops and of the contacts with friction.
+    """Return the modes that follow from the forces of ``stops`` and the contacts with friction.
 
-    None without such forces, or if one of the other stops that touch would close.
+    None if no forces satisfy their laws, or if another stop that touches would close.
     """
     contacts, rubbing = front.contacts, _with_coefficients(front.equations, stops)
     modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}
-    # Where the loops and the held stops leave a contact no mobility of its own, they carry all of
-    # the load.
+    # Contacts that cannot move independently are left out: loops and held stops carry their load.
     at_rest = [c for c in rubbing if modes[c] is FRICTIONLESS and _mobile(front, contacts, c)]
     for c in rubbing:
         contacts = contacts.with_mode(c, modes[c]) if contacts.modes[c].closed else contacts
@@ -281,7 +281,7 @@ def _modes_of(
 
 
 def _with_coefficients(equations: Equations, stops: Sequence[int]) -> list[int]:
-    """Return the stops of some, and the friction points, that have friction."""
+    """Return those of ``stops`` and of all friction points that have friction."""
     laws = enumerate(equations.friction_laws, start=equations.contacts.stops)
     rubbing = [i for i in stops if equations.stop_friction[i] > 0.0]
     return rubbing + [c for c, law in laws if law.coefficient > 0.0]
@@ -294,7 +294,7 @@ def _sliding_mode(scales: Scales, front: Front, contact: int, slow: float) -> Co
 
 
 def _mobile(front: Front, contacts: ContactState, contact: int) -> bool:
-    """Return whether a contact has a mobility of its own beside all that holds and sticks."""
+    """Return whether a contact can slide while all other held and sticking contacts rest."""
     e, M, loops = front.equations.mass_and_loops(front.q)
     row = front.equations.slip_row(contact, e)[None]
     others = front.equations.with_contacts(contacts.with_mode(contact, FRICTIONLESS))
@@ -310,10 +310,10 @@ def _sticking_or_slipping(
     found: RestForces,
     slipped: int | None,
 ) -> ContactState:
-    """Return the modes with those of contacts at rest chosen by their forces.
+    """Return the modes, with those of contacts at rest chosen by their forces.
 
-    Of contacts that can stick only together, some stick; the others bear the limit of their
-    friction, or none.
+    Of contacts that can stick only together, some stick; the others have friction at its limit, or
+    none.
     """
     at_limit = np.abs(found.friction) >= found.limit - scales.zero_acceleration / found.mobility
     for j in sorted(range(len(at_rest)), key=lambda j: bool(at_limit[j])):
@@ -343,7 +343,7 @@ def _agrees(
     Parameters
     ----------
     scales : Scales
-        Of the mechanism.
+        Scales of the mechanism.
     front : Front
         State.
     contacts : ContactState
@@ -351,8 +351,8 @@ def _agrees(
     stops : sequence of int
         Stops that touch.
     at_rest : mapping
-        Contacts with friction and without a sliding velocity, with the force that is round-off
-        [N].
+        For each contact with friction and without a sliding velocity, the excess of friction that
+        is round-off [N].
     """
     e, v, equations = front.e, front.v, front.equations.with_contacts(contacts)
     a, lam, _, _ = equations.evaluate(front.time, front.q, v)

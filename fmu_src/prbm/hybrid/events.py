@@ -14,9 +14,10 @@ from .impacts import Impact
 
 
 class EventKind(IntEnum):
-    """The kind of an event, in the order in which events of one time are applied; 0: none.
+    """The kind of an event; the C kernel adds 0 for none.
 
-    Contacts change their modes first, so that an impact acts on the modes that hold at its time.
+    Events of one time are applied in this order: impacts last, so that they act on modes that are
+    valid at that time.
     """
 
     RELEASE = 1
@@ -131,7 +132,7 @@ def apply(configuration: Configuration, front: Front, event: Event) -> tuple[Fro
 
 @dataclass(frozen=True)
 class EventWindow:
-    """The number of events since a time [s], to end a simulation that chatters."""
+    """The number of events since a time [s], by which a simulation that chatters is rejected."""
 
     since: float
     count: int = 0

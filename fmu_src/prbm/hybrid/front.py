@@ -34,7 +34,7 @@ class Front:
     y : (2 n + 2,)
         Angles, rates, dissipated energy and work [rad], [rad/s], [J], [J].
     equations : Equations
-        That hold from here: system, inputs with walls, modes of the contacts.
+        Equations of the motion from here on: system, inputs with walls, modes of the contacts.
     latched : (s,) tuple of Latched
         The last impact of each stop.
     """

@@ -54,7 +54,7 @@ class Impulses:
 
 
 def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front, list[Impact]]:
-    """Resolve the impact of a stop and of all stops that touch with it.
+    """Resolve the impact of a stop, and of all other stops whose gaps close at the same time.
 
     Parameters
     ----------
@@ -68,9 +68,9 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     Returns
     -------
     front : Front
-        State after the impact, with the contact modes that follow.
+        State after the impact, with the contact modes chosen anew.
     impacts : list of Impact
-        One for each stop that was struck; captures do not count.
+        One for each stop that was struck, without captures.
 
     Raises
     ------
@@ -103,8 +103,8 @@ def receive(front: Front, impulses: Real) -> Front:
     """Return the front after impulses from outside at the points of the forces.
 
     Each component P changes the rate u of its point, and its work is P (u- + u+)/2.  The loops
-    take part, stops follow later.  Friction is finite and has no impulse: sticking contacts are
-    free to slip or to stick again.
+    transmit the impulses; impacts at stops follow later, in :func:`.contact_modes.release_moving`.
+    Friction is finite and has no impulse: sticking contacts become free to slip or stick again.
 
     Parameters
     ----------
@@ -128,9 +128,9 @@ def _captured(
 ) -> bool:
     """Return whether a stop that is struck slowly comes to rest.
 
-    It does if, after an impact without restitution, it is pressed, and if it closes below
-    ``rest_speed`` or after a flight shorter than ``SHORTEST_FLIGHT_RTOL`` of the period.  A speed
-    that is round-off is neither counted nor returned.
+    It does if it would be pressed after an impact without restitution, and if it closes more
+    slowly than ``rest_speed`` or would fly for less than ``SHORTEST_FLIGHT_RTOL`` of the period.
+    A speed that is round-off always ends in rest.
     """
     scales = configuration.scales
     if speed <= scales.zero_speed:
@@ -162,9 +162,9 @@ def _impulses(
 ) -> Impulses:
     """Return the impulses of an impact.
 
-    Held stops take part: without friction as partners of the complementarity problem, with
-    friction as constraints that are released if they would pull.  Their own friction, and that
-    of friction points, is finite and has no impulse.
+    Held stops take part.  If the stops that are struck have no friction, they are unknowns of the
+    same complementarity problem; else they are constraints that are released if they would pull.
+    Friction of held stops and of friction points is finite and has no impulse.
     """
     mu = np.array([configuration.stop_value(i, "friction") for i in struck])
     try:
@@ -206,8 +206,8 @@ def _impulses_with_friction(
 ) -> Impulses:
     """Return the impulses of an impact with friction at the stops that are struck.
 
-    If a held stop that has been released would close, the held stops are struck, too, without
-    restitution and friction.
+    If a held stop that has been released would close, all held stops are treated as struck,
+    without restitution and friction.
     """
     v, k, kept, speed = front.v, len(struck), list(held), configuration.scales.speed
     e, M, loops = front.equations.mass_and_loops(front.q)
@@ -254,8 +254,9 @@ def _book(
 ) -> tuple[Front, list[Impact]]:
     """Return the front after an impact, with energies and latched outputs, and the record.
 
-    At each stop -P (u- + u+)/2 is lost, and as much along the wall; the wall does
-    -P (w- + w+)/2, where an impulse changes the velocity w of a wall by its mobility times P.
+    A normal impulse P dissipates -P (u- + u+)/2, with u the rate of the gap; a tangential one the
+    same with the sliding velocity.  The wall does the work -P (w- + w+)/2, and its velocity w
+    changes by its mobility times P.
     """
     e, v, after, normal = front.e, front.v, impulses.after, impulses.normal
     before = front
@@ -298,7 +299,7 @@ def _book(
 
 
 def _with_pushed_walls(front: Front, normal: Mapping[int, float]) -> Front:
-    """Return the front with walls, and their references, that the impulses have pushed."""
+    """Return the front in which impulses have changed the velocities of walls and references."""
     t, walls = front.time, list(front.inputs.walls)
     for i, P in normal.items():
         change = front.inputs.mobilities[i] * P

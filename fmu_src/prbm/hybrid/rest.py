@@ -1,8 +1,8 @@
 """Forces of all contacts at rest together: a complementarity problem on their accelerations.
 
-Stops that touch press or open; contacts without a sliding velocity stick or begin to slip.  While
-nothing slides and no walls close in on the mechanism there are such forces.  The friction of
-contacts that slide may exclude them (Painleve's paradox).
+Each stop that touches is pressed or opens; each contact without a sliding velocity sticks or begins
+to slip.  Such forces exist if no contact slides and no walls close in on the mechanism.  The
+friction of sliding contacts may exclude them (Painleve's paradox).
 """
 
 from collections.abc import Sequence
@@ -48,29 +48,29 @@ def rest_forces(
     slips: Sequence[int],
     at_rest: Sequence[int],
 ) -> RestForces | None:
-    """Return the forces that satisfy the laws of all contacts; None if there are none.
+    """Return the forces that satisfy the laws of all contacts; None without a solution.
 
     Parameters
     ----------
     equations : Equations
-        In which all stops are open, and friction points at rest have no friction.
+        Equations in which all stops are open, and friction points at rest have no friction.
     t : float
-        Time, for the accelerations of walls [s].
+        Time, at which the accelerations of the walls are taken [s].
     q, v : (n,)
         Angles and rates [rad], [rad/s].
     stops : sequence of int
         Stops that touch.
     slips : sequence of int
-        Signs of their sliding velocities; 0: at rest.
+        Signs of the sliding velocities of these stops; 0: at rest.
     at_rest : sequence of int
-        Contacts with friction and without a sliding velocity: some of the stops, and points.
+        Contacts with friction and without a sliding velocity: some of ``stops``, and points.
     """
     e, M, loops = equations.mass_and_loops(q)
     system, is_stop = equations.system, equations.contacts.is_stop
     a, n, k = equations.evaluate(t, q, v).a, equations.n, len(stops)
     G = system.gap_rows.jacobian(e)[list(stops)]
     T = np.reshape([equations.slip_row(c, e) for c in at_rest], (-1, n))
-    # A stop that slides pushes and rubs.
+    # The normal force of a stop that slides acts together with its friction.
     rubs = [
         equations.stop_friction[i] * sign * equations.slip_row(i, e)
         for i, sign in zip(stops, slips, strict=True)

@@ -1,4 +1,4 @@
-"""The parts of a saved state as plain values that JSON keeps exactly, and back."""
+"""Conversion of the parts of a saved state to plain values that JSON keeps exactly, and back."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -64,7 +64,7 @@ def front_of(plain: Mapping[str, Any], configuration: Configuration) -> Front:
 
 
 def course_of(plain: Mapping[str, Any]) -> Course:
-    """Return the course of the walls from plain values."""
+    """Return the past communication steps, on which the walls depend, from plain values."""
     return Course(plain["point"], plain["longest"], tuple(plain["driven"]))
 
 

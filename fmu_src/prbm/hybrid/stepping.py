@@ -45,11 +45,11 @@ class StepSizeController:
     Parameters
     ----------
     h : float
-        Size of the next step [s]; 0: not known yet.
+        Size of the next step [s]; 0: not chosen yet.
     last_error : float
         Error of the last step that was accepted, in units of the tolerance.
     growth : float
-        Largest ratio of the step after the next to the next.
+        Largest factor by which the next step may change the size; 1 after a rejected step.
 
     Examples
     --------
@@ -65,7 +65,8 @@ class StepSizeController:
     def next(self, error: float) -> "StepSizeController":
         """Return the controller after a step with an error in units of the tolerance.
 
-        A step with an error above 1 is to be repeated; the step after it does not grow.
+        A step with an error above 1 must be repeated with the smaller size; the size does not grow
+        after the repeated step.
         """
         if not error <= 1.0:
             optimal = (
@@ -80,7 +81,7 @@ class StepSizeController:
 
 @dataclass(frozen=True)
 class Step:
-    """A step that was computed.
+    """A computed step, not yet accepted.
 
     Parameters
     ----------
@@ -91,11 +92,11 @@ class Step:
     y : (2 n + 2,)
         State at the end, not projected.
     error : float
-        In units of the tolerance.
+        Error in units of the tolerance.
     forces : (stages - 1, r)
-        Constraint forces of the stages but the first [N].
+        Constraint forces of all stages but the first [N].
     factors : Factors
-        Of the equations at the end.
+        Factors of the equations at the end.
     """
 
     h: float
@@ -118,9 +119,9 @@ def take_step(
     front : Front
         State at the start.
     k1 : (2 n + 2,)
-        Rates there.
+        Rates at the start.
     controller : StepSizeController
-        Of this step.
+        Controller with the size of this step.
 
     Raises
     ------
@@ -137,12 +138,12 @@ def take_step(
         check_size(t, controller.h)
         try:
             step = compute_step(configuration, equations, t, y, controller.h, k1)
-        except SimulationError:  # The step is far too long: the equations fail where it leads.
+        except SimulationError:  # The equations fail at a stage: the step is far too long.
             controller = controller.next(math.inf)
             continue
         controller = controller.next(step.error)
         if step.error <= 1.0:
-            # A step that a wall cuts short says little about the next one.
+            # The size of a step that a wall has shortened is no measure for the next one.
             whole = wanted if step.h == h < wanted else 0.0
             return step, replace(controller, h=max(controller.h, whole))
 
@@ -153,7 +154,7 @@ def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
     Raises
     ------
     SimulationError
-        If the error is larger than the state, or nothing can be computed there.
+        If the error is larger than the state, or the equations fail at a stage.
     """
     t = front.time
     h = min(configuration.step or 0.0, step_limit(front.inputs.walls, t))
@@ -173,7 +174,7 @@ def check_size(t: float, h: float) -> None:
     Raises
     ------
     SimulationError
-        If it is below the shortest step, or the time does not resolve it.
+        If it is below ``STEP_MIN_ATOL``, or smaller than the round-off of t.
     """
     if h < STEP_MIN_ATOL:
         raise SimulationError(

@@ -4,10 +4,11 @@ At a communication point t0 the inputs define the reference
 
     r(t) = position + displacement + v (t - t0),
 
-v being ``stop.velocity`` once that input has been non-zero, else the difference quotient of the
-displacement.  From its position and velocity there the wall joins the reference within T = 2 H
-(:class:`prbm.mechanics.inputs.Wall`), H the recent longest communication step, but at most a tenth
-of the period.  So position and velocity are continuous, and the acceleration is finite.
+with v the input ``stop.velocity`` or, until that has been non-zero, the mean rate of the
+displacement.  From its position and velocity at t0, the wall joins the reference within T = 2 H
+(:class:`prbm.mechanics.inputs.Wall`).  H is the recent longest communication step, but at most a
+tenth of the period.  Position and velocity are therefore continuous, and the acceleration is
+finite.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,16 +30,16 @@ from .front import Front
 
 @dataclass(frozen=True)
 class Course:
-    """Earlier communication points, as far as the walls depend on them.
+    """The past communication steps, as far as the walls depend on them.
 
     Parameters
     ----------
     point : float
         The last communication point [s].
     longest : float
-        The recent longest communication step [s].
+        The recent longest communication step, at most a tenth of the period [s].
     driven : (s,) tuple of bool
-        Whether ``stop.velocity`` has ever been non-zero: then nothing is differenced.
+        Whether ``stop.velocity`` has ever been non-zero: then it is the velocity of the reference.
     """
 
     point: float
@@ -49,7 +50,7 @@ class Course:
 def start(
     configuration: Configuration, given: Mapping[str, float], time: float
 ) -> tuple[Course, tuple[Wall, ...]]:
-    """Return the walls at the start: on their references, with the velocities of these [s]."""
+    """Return the walls at a start time [s]: on their references, with the same velocities."""
     walls = tuple(
         _given_reference(configuration, given, i, time)
         for i in range(len(configuration.mechanism.stops))
@@ -82,19 +83,19 @@ def join(
 ) -> tuple[Course, tuple[Wall, ...]]:
     """Return the walls from a communication point on.
 
-    A reference that equals the one before changes nothing.  Before any step the velocity of a
-    wall is that of its reference.
+    A wall whose reference has not changed moves on as before.  Before the first step, the velocity
+    of a wall is that of its reference.
 
     Parameters
     ----------
     acting, configuration : Configuration
-        With the values of the parameters up to now, and from now on.
+        Configurations with the parameter values up to now, and from now on.
     given : mapping
         Values of all inputs.
     course : Course
-        Of the communication points before.
+        Past communication steps.
     walls : (s,) tuple of Wall
-        Their motions up to now.
+        Motions of the walls up to now.
     now, time : float
         This communication point and the next [s].
     """
@@ -117,10 +118,10 @@ def join(
 
 
 def _mean_rate(rate: float, off: float, longest: float, following: float) -> float:
-    """Return the velocity of a reference whose displacement is off it after a step [m/s].
+    """Return the velocity of a new reference, which starts ``off`` ahead of the old one [m/s].
 
-    It is the mean over the recent longest step.  In a step that is longer than that the reference
-    goes less far than the displacement did, so that a jump is not extrapolated.
+    It is the mean rate of the displacement over the recent longest step.  It is reduced if the
+    following step is longer, so that a jump is not extrapolated beyond its own size.
 
     Examples
     --------
@@ -133,7 +134,7 @@ def _mean_rate(rate: float, off: float, longest: float, following: float) -> flo
 
 
 def step_limit(walls: Sequence[Wall], t: float) -> float:
-    """Return the longest step from time t [s]: a fraction of a cubic, and none beyond its end."""
+    """Return the longest step from time t [s]: a fraction of a cubic, and only up to its end."""
     limit = inf
     for wall in walls:
         if wall.span:
@@ -142,7 +143,7 @@ def step_limit(walls: Sequence[Wall], t: float) -> float:
 
 
 def arrived(front: Front) -> Front:
-    """Return the front with the references of the walls whose cubics end there."""
+    """Return the front in which walls whose cubics end at its time are on their references."""
     walls = tuple(
         wall.arrived() if wall.span and wall.end - front.time <= EVENT_TIME_ATOL else wall
         for wall in front.inputs.walls

@@ -14,8 +14,8 @@
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
-/* Continue from the present state with the inputs and parameters that have been set.  follow:
- * whether held stops may follow jumps of their walls. */
+/* Continue from the present state with the walls, inputs and parameters that have been set.
+ * follow: whether held stops may follow jumps of their walls' velocities. */
 static bool restart(Simulation *sim, const Wall *walls, bool follow, Problem *problem) {
     State *state = &sim->state;
     if (!arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem)) {
@@ -60,15 +60,17 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
     return true;
 }
 
-/* Whether the inputs that move walls are those that act. */
+/* Whether the inputs that move walls have not changed since they began to act. */
 static bool same_walls(const Simulation *sim) {
     const InputGroups *from = &sim->configuration.mechanism->input;
     size_t bytes = (size_t)(from->impulses - from->walls) * sizeof(double);
-    return memcmp(sim->state.given + from->walls, sim->state.acting_given + from->walls, bytes) == 0;
+    const double *given = sim->state.given + from->walls;
+    return memcmp(given, sim->state.acting_given + from->walls, bytes) == 0;
 }
 
-/* Begin a communication step: join the walls to their references, and take over changed inputs and
- * parameters.  After an interruption the references go on unless an input of a wall has changed. */
+/* Begin a communication step: join the walls to their references, and let changed inputs and
+ * parameters act.  After an interruption the references do not change, unless an input of a wall or
+ * a parameter has changed. */
 static bool begin_step(Simulation *sim, double time, Problem *problem) {
     State *state = &sim->state;
     Wall joined[STOPS_MAX];
@@ -155,8 +157,7 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* --- event mode ------------------------------------------------------------------------------- */
 
-/* Give the walls the velocities that have been set, and apply the pending event, if any, with the
- * inputs that have been set, and the impulses. */
+/* Let the given walls, the inputs and changed impulses act, and apply the pending event, if any. */
 static bool apply_here(Simulation *sim, const Wall *walls, bool event, bool impulses,
                        Problem *problem) {
     State *state = &sim->state;

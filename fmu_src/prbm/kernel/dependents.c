@@ -1,8 +1,8 @@
 /* The coordinates that the loops determine.
  *
- * The loops tie the n coordinates together; r of them are solved from the other n - r, the states of
- * model exchange, so that a solver without constraints stays on them (mechanics/independent.py
- * chooses them). */
+ * The r loop equations are solved for r of the n coordinates.  The other n - r, which
+ * mechanics/independent.py chooses, are the states of model exchange: so a solver without
+ * constraints stays on the loops. */
 #include <math.h>
 #include <stdio.h>
 
@@ -55,7 +55,7 @@ PRBM bool factor_dependents(const Simulation *sim, Loops *loops) {
         return false;
     }
     for (int i = 0; i < r; i++) {
-        least = lesser(least, 1.0 / fabs(a[i * r + i])); /* its diagonal is inverted */
+        least = lesser(least, 1.0 / fabs(a[i * r + i])); /* lu_factor inverts the diagonal */
     }
     return least > DEPENDENT_PIVOT_RTOL * most;
 }
@@ -70,7 +70,7 @@ PRBM Loops take_loops(Simulation *sim) {
     return loops;
 }
 
-/* Solve the loops for the dependent angles, from those in q. */
+/* Solve the loops for the dependent angles; those in q are the first guess. */
 static bool complete_angles(Simulation *sim, Loops *x, double *q) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
@@ -114,7 +114,7 @@ static void complete_rates(const Simulation *sim, Loops *x, double *v) {
     }
 }
 
-/* Solve the loops for the dependent angles and rates, from the angles of the last step. */
+/* Solve the loops for the dependent angles and rates; the angles in q are the first guess. */
 PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
     size_t mark = sim->scratch.used;
     Loops loops = take_loops(sim);

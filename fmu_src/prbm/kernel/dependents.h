@@ -11,7 +11,7 @@ typedef struct {
 } Loops;
 
 PRBM Loops take_loops(Simulation *sim);
-/* The loops' Jacobian in the dependent coordinates, from all rows. */
+/* Factor the Jacobian of the loops in the dependent coordinates; false if it is singular. */
 PRBM bool factor_dependents(const Simulation *sim, Loops *loops);
 PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem);
 PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem);

@@ -13,7 +13,7 @@ PRBM int exchange_indicators(const Simulation *simulation) {
     return STOP_INDICATORS * m->stop_count + m->friction_count;
 }
 
-/* A stop has one indicator for slip and for reversal: it sticks or slips. */
+/* Slip and reversal share an indicator, because a contact either sticks or slips. */
 PRBM int indicator_place(const Simulation *sim, EventKind kind, int contact) {
     static const int PLACE[EVENT_KINDS] = {
         [EVENT_RELEASE] = INDICATOR_RELEASE,
@@ -36,8 +36,8 @@ PRBM double guard_scale(const Simulation *sim, EventKind kind) {
     }
 }
 
-/* A guard, lifted by the value below which its event is due: gaps close a little late, and speeds
- * within round-off have fallen to zero. */
+/* A guard, raised so that its event is due at zero: gaps close a little below zero, and speeds
+ * within round-off count as zero. */
 PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kind, int contact) {
     double z = transition(kind)->guard.value(&sim->equations, at, contact);
     if (kind == EVENT_IMPACT) {
@@ -47,21 +47,21 @@ PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kin
                                  : z;
 }
 
-/* Positive while an open gap stays open.  An opening gap is lifted off zero, so that its indicator
- * is positive right after an impact, where the gap is zero up to round-off. */
+/* Positive while an open gap stays open.  The rate of an opening gap is added, so that the
+ * indicator is positive directly after an impact, where the gap is zero up to round-off. */
 static double impact_indicator(const Simulation *sim, const Instant *at, int i) {
     double speed = gap_rate(&sim->equations, i, at->time, at->e, at->v);
     double ahead = INDICATOR_LEAD_RTOL * sim->configuration.scales.time * greater(speed, 0.0);
     return (lifted_guard(sim, at, EVENT_IMPACT, i) + ahead) / guard_scale(sim, EVENT_IMPACT);
 }
 
-/* The rate at which a closed stop leaves its wall, whose acceleration is unknown. */
+/* The rate at which a closed stop leaves its wall. */
 PRBM double leaving_rate(const Simulation *sim, const Instant *at, int i) {
     return gap_rate(&sim->equations, i, at->time, at->e, at->v);
 }
 
-/* Positive while a closed stop is pressed and its wall has not changed its velocity by half of what
- * keeps it closed. */
+/* Positive while a closed stop is pressed and the change of its wall's velocity is below half of
+ * the largest jump at which it stays closed. */
 PRBM double release_indicator(const Simulation *sim, const Instant *at, int i) {
     double pressed = lifted_guard(sim, at, EVENT_RELEASE, i) / guard_scale(sim, EVENT_RELEASE);
     double room = REST_JUMP_FACTOR * jump_allowed(sim, i) - fabs(leaving_rate(sim, at, i));

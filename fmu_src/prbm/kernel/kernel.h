@@ -8,7 +8,7 @@
  * fabs, floor, frexp and ldexp, all of which are exact or correctly rounded, so that the same input
  * gives the same bytes on every platform.
  *
- * Matrices are stored row by row.  A function that can fail returns false and leaves a sentence in a
+ * Matrices are stored row by row.  A function that can fail returns false and writes a message to a
  * Problem.  SI units and radians everywhere; docs/conventions.md has the signs and symbols.
  */
 #ifndef PRBM_KERNEL_H

@@ -1,7 +1,7 @@
 /* Model exchange: an importer integrates the independent angles and rates (dependents.c).
  *
- * A stop that is closed is a constraint of the accelerations; its drift by a solver's errors is
- * corrected in events. */
+ * A closed stop is a constraint on accelerations.  Its drift, caused by the errors of the
+ * importer's solver, is corrected in event mode. */
 #include <math.h>
 #include <string.h>
 
@@ -25,7 +25,7 @@ PRBM int exchange_states(const Simulation *simulation) {
     return 2 * simulation->configuration.mechanism->independent_count + 2;
 }
 
-/* The slot of a coordinate: of its angle or strain, of its rate behind it. */
+/* The slot of a coordinate (angle or strain), or of its rate. */
 static int slot_of(const Mechanism *m, int j, bool rate) {
     const Coordinate *coordinate = &m->coordinates[j];
     if (coordinate->arm != j) {
@@ -85,7 +85,7 @@ PRBM bool exchange_moment(Simulation *sim, Moment *now, Problem *problem) {
     return exchange_refresh(sim, problem) && moment_at(sim, sim->state.front, now, problem);
 }
 
-/* Accept the shape of the front: later ones are near it. */
+/* Accept the shape of the front, from which later shapes are computed. */
 static void accept(Simulation *sim) {
     copy(system_of(sim)->n, sim->state.front, sim->state.accepted);
 }
@@ -106,9 +106,9 @@ PRBM void exchange_get(const Simulation *simulation, double *x) {
     copy(exchange_states(simulation), simulation->state.states, x);
 }
 
-/* The next power of ten that is not below: modelDescription.xml has it as nominal value.  A
- * solver's absolute tolerance follows from it; below the scale of the motion it would resolve
- * round-off. */
+/* The least power of ten that is not below a value, as the nominal value in modelDescription.xml.
+ * Solvers derive their absolute tolerance from it: with a nominal value below the scale of the
+ * motion they would resolve round-off. */
 static double next_power_of_ten(double value) {
     double power = 1.0; /* exact to 1e22 */
     if (value <= 1.0) {
@@ -156,8 +156,9 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
 
 /* --- drift ------------------------------------------------------------------------------------ */
 
-/* The drift of a closed stop off its wall, in units of size and speed.  While the wall moves, with
- * an unknown acceleration, the indicator watches the speed. */
+/* The drift of a closed stop off its wall, relative to the scales of length and speed.  While the
+ * wall moves, its acceleration is unknown: the release indicator then watches the speed, and a
+ * larger distance is allowed. */
 static double stop_drift(const Simulation *sim, const Instant *at, int i) {
     double off = fabs(gap(&sim->equations, i, at->time, at->e)) / system_of(sim)->length;
     double speed = fabs(leaving_rate(sim, at, i)) / guard_scale(sim, EVENT_REVERSAL);
@@ -192,16 +193,15 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
 
 /* --- events ----------------------------------------------------------------------------------- */
 
-/* Whether a contact slides no faster than a solver overshoots the end of sliding by its own
- * resolution of time. */
+/* Whether the sliding speed of a contact is within a solver's error at the end of sliding. */
 static bool sliding_ends(const Simulation *sim, const Instant *at, int contact) {
     double speed = sliding_velocity(system_of(sim), contact, at->e, at->v);
     return fabs(speed) <= DRIFT_RTOL * guard_scale(sim, EVENT_REVERSAL);
 }
 
-/* Bring a contact to rest, so that its overshoot does not look like sliding back. */
+/* Bring a contact to rest, so that the solver's error is not taken for sliding back. */
 static void stop_sliding(Simulation *sim, int contact) {
-    Problem ignored; /* Closed and sticking may be one constraint too many: then it stays. */
+    Problem ignored; /* Closed and sticking may be dependent constraints: then nothing changes. */
     size_t mark = sim->scratch.used;
     double *kept = take(&sim->scratch, (size_t)state_size(sim));
     copy(state_size(sim), sim->state.front, kept);
@@ -246,7 +246,7 @@ static Event due_here(const Simulation *sim, const Instant *at, const bool *stru
     return event;
 }
 
-/* After an event: the gaps at which stops close from here on. */
+/* After an event: set the time of the event, and the depths at which gaps close from here on. */
 static void arm(Simulation *sim, const Instant *at) {
     State *state = &sim->state;
     for (int i = 0; i < system_of(sim)->s; i++) {
@@ -275,9 +275,9 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
 
 static bool too_many_events(const Simulation *sim, const Event *event, Problem *problem) {
     return fail(problem,
-                "more than %d events (%s of %s the last) at t = %.9g s: the contact chatters; raise "
-                "rest_speed or damping.beta, lower the restitution, or give the body room between "
-                "its walls",
+                "more than %d events (%s of %s the last) at t = %.9g s: the contact chatters; "
+                "raise rest_speed or damping.beta, lower the restitution, or give the body room "
+                "between its walls",
                 EVENTS_AT_ONCE_MAX * contact_count(sim), transition(event->kind)->guard.event,
                 contact_name(sim->configuration.mechanism, event->contact), sim->state.time);
 }
@@ -330,7 +330,7 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     return attempt(sim, right, problem);
 }
 
-/* The stop that is penetrated most, if more than by a solver's errors; or NULL. */
+/* The stop that is penetrated most, if deeper than a solver's errors explain; else NULL. */
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth) {
     Simulation *sim = simulation;
     const char *found = NULL;

@@ -1,4 +1,4 @@
-/* Model exchange, as the values of a simulation need it. */
+/* The part of model exchange that values.c uses. */
 #ifndef PRBM_MODEL_EXCHANGE_H
 #define PRBM_MODEL_EXCHANGE_H
 

@@ -21,29 +21,29 @@ PRBM Simulation *simulation_open(const Mechanism *mechanism);
 PRBM void simulation_close(Simulation *simulation);
 PRBM void simulation_listen(Simulation *simulation, Hear *hear, void *listener);
 PRBM const Mechanism *simulation_mechanism(const Simulation *simulation);
-PRBM size_t simulation_bytes(const Simulation *simulation); /* of its block, for the record */
-/* As new: start values, not started. */
+PRBM size_t simulation_bytes(const Simulation *simulation); /* size of its block */
+/* Back to the state after simulation_open. */
 PRBM void simulation_reset(Simulation *simulation);
 
-/* The complete state as numbers: a simulation that restores them continues to the bit. */
+/* The complete state as numbers: a simulation that restores them continues bit for bit. */
 PRBM size_t simulation_state_count(const Simulation *simulation);
 PRBM void simulation_save(const Simulation *simulation, double *state);
-/* False and a sentence, and nothing changed, if the numbers are no state of this mechanism. */
+/* Fails and changes nothing if the numbers are not a state of this mechanism. */
 PRBM bool simulation_restore(Simulation *simulation, const double *state, Problem *problem);
 
 /* Parameters and inputs, by their slot; a rejected value changes nothing.  Before the start fixed
  * and tunable parameters may be set, after it inputs and tunable parameters; they act from the
  * present time on. */
 PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *problem);
-/* Any value by its slot, at the present time; before the start: parameters, inputs only. */
+/* Any value by its slot, at the present time; before the start only parameters and inputs. */
 PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *problem);
-/* Back to not started, values kept: so that fixed parameters may be set again. */
+/* Undo the start but keep all values, so that fixed parameters may be set again. */
 PRBM void simulation_unstart(Simulation *simulation);
 PRBM bool simulation_started(const Simulation *simulation);
 PRBM double simulation_time(const Simulation *simulation);
 
-/* Start the motion.  tolerance 0: solver.tolerance.  exchange: model exchange, in which
- * the importer integrates. */
+/* Start the motion.  A tolerance of 0 stands for solver.tolerance; exchange: the importer
+ * integrates (model exchange). */
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
                            bool exchange, Problem *problem);
 
@@ -51,12 +51,12 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
 
 /* Continue to a time, events included. */
 PRBM bool simulation_advance(Simulation *simulation, double time, Problem *problem);
-/* Continue to a time, but stop before the first event (its values still those before it) and,
- * if each is set, after each internal step.  simulation_time returns the time reached; the
- * walls move as planned for the given time.  *event: an event is pending, see simulation_happen. */
+/* Continue to a time, but stop at the first event, before it is applied, and also after an internal
+ * step if each is set.  simulation_time returns the time reached; the walls move as in a step to
+ * the given time.  *event: an event is pending, see simulation_happen. */
 PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, bool *event,
                                   Problem *problem);
-/* Apply the pending event (event mode); without one, do nothing. */
+/* Event mode: apply the pending event, if any, changed impulses and changed velocities of walls. */
 PRBM bool simulation_happen(Simulation *simulation, Problem *problem);
 
 /* --- model exchange --- */
@@ -72,10 +72,12 @@ PRBM void exchange_get(const Simulation *simulation, double *x);
 PRBM void exchange_nominals(const Simulation *simulation, double *x);
 PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *problem);
 PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *problem);
-/* A step was accepted; *event: enter event mode (the contact has drifted, a wall has turned). */
+/* Accept a step of the importer; *event: event mode is needed, because a contact has drifted. */
 PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *problem);
-/* Event mode: apply all events that are due.  *changed: the states have new values. */
+/* Event mode: apply the inputs and all events that are due.  *changed: whether the states have
+ * changed. */
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem);
+/* The stop that is penetrated most, if deeper than a solver's errors explain; else NULL. */
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth);
 /* Derivative of all values (slots.count) along a change of states dx and of inputs du, by exact
  * differentiation, at the present time; zero for discrete and constant values. */

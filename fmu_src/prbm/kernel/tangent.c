@@ -10,9 +10,9 @@
 #include "indicators.h"
 #include "values.h"
 
-/* A change of everything with the states and inputs: dq, dv, da, dlam.  With the complex changes
- * dphi = dtheta - i ds of an arm E, and dw of its rate, dE = i E dphi, d(E w) = E (i dphi w +
- * dw), and so on: the formulas of an angle hold for a stretch, too. */
+/* The changes dq, dv, da, dlam along a change of states and inputs.  They use the complex changes
+ * dphi = dtheta - i ds of an arm E, and dw of its rate: dE = i E dphi, d(E w) = E (i dphi w + dw).
+ * The formulas of an angle therefore hold for a stretch, too. */
 typedef struct {
     Simulation *sim;
     const Equations *q;
@@ -24,7 +24,7 @@ typedef struct {
     Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
     Complex *dE;                    /* (n,) i E dphi */
     Complex *swing, *dswing;        /* (n,) E w */
-    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); at first without the change of w' */
+    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); bend_arms adds the change of w' */
     Complex *pull;                  /* (n,) torques on the arms and, -i times, forces along them */
 } Tangent;
 
@@ -49,8 +49,8 @@ static Arm arm_at(const Tangent *t, int j) {
     return arm;
 }
 
-/* A part of a row as it is seen from where the row is: f B_j E_j, and f z for j = n; false if it
- * has no such part. */
+/* A part of a row relative to the body that the row is fixed to: f B_j E_j, and f z for j = n;
+ * false if the row has no such part. */
 static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
     int n = rows->system->n, on = seen_from(rows, i);
     Complex size = {0.0, 0.0};
@@ -102,7 +102,7 @@ static double rate_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* Of the second derivative, as far as it is not one of the accelerations. */
+/* Change of the second derivative of a row, without the part with the accelerations' changes. */
 static double second_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
@@ -290,7 +290,7 @@ static void rub_change(const Tangent *t) {
     scratch->used = mark;
 }
 
-/* Rows and columns: change of the right side by dR^T lam, -dR a and what convects. */
+/* Rows and columns: change of the right side by dR^T lam, -dR a and the convective terms. */
 static void row_change(const Tangent *t) {
     const Equations *q = t->q;
     Rows walls = slide_rows(q->system);
@@ -305,7 +305,7 @@ static void row_change(const Tangent *t) {
     }
 }
 
-/* The pull on an arm is a torque; -i times it, along a stretch. */
+/* Add the pull to the right side: its real part for an angle, that of -i times it for a stretch. */
 static void apply_pull(const Tangent *t) {
     const System *system = t->q->system;
     for (int j = 0; j < system->n; j++) {
@@ -436,7 +436,7 @@ static void base_changes(const Tangent *t, double *out) {
     out[BASE_MOMENT] = moment;
 }
 
-/* Change of the kinetic energy, Re(d(E w)^H H (E w)) and what the bodies' own inertia adds. */
+/* Change of the kinetic energy, Re(d(E w)^H H (E w)), plus that of the rotary inertias J. */
 static double kinetic_change(const Tangent *t) {
     double sum = 0.0;
     for (int i = 0; i < t->q->system->n; i++) {
@@ -461,7 +461,7 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
     out[ENERGY_WORK] = dx[2 * count + 1];
 }
 
-/* The same arms, which move at the rates x (n,) that do not change. */
+/* The same arms, moving at constant rates x (n,). */
 static Tangent at_rates(const Tangent *t, const double *x) {
     Scratch *scratch = &t->sim->scratch;
     int n = t->q->system->n;
@@ -552,7 +552,7 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
     return sum;
 }
 
-/* Change of |x|; at zero, where it has two, their mean. */
+/* Change of |x|; at zero, the mean of both one-sided derivatives. */
 static double sign_times(double x, double change) {
     return x < 0.0 ? -change : x > 0.0 ? change : 0.0;
 }

@@ -1,4 +1,4 @@
-/* The values of a simulation in either mode: co-simulation or model exchange. */
+/* The values of a simulation, in co-simulation or model exchange. */
 #include <string.h>
 
 #include "core/vectors.h"
@@ -23,7 +23,7 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
     return attempt(sim, right, problem);
 }
 
-/* Bring y and e of the present up to date. */
+/* Compute y and e of the present state. */
 static bool load_present(Simulation *sim, Problem *problem) {
     const System *system = system_of(sim);
     Present *present = &sim->present;
@@ -100,7 +100,8 @@ PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *p
         return true;
     }
     if (!sim->state.started) {
-        return fail(problem, "it is computed when the model is initialized; it has no value before");
+        return fail(problem,
+                    "it is computed when the model is initialized; it has no value before");
     }
     if (slot >= slots->derivatives && slot < slots->indicators) {
         return get_derivative(sim, slot - slots->derivatives, x, problem);

@@ -1,15 +1,15 @@
 r"""Complementarity problems of unilateral contacts: Lemke's method, and Coulomb's law in the plane.
 
-A linear complementarity problem asks for z with
+A linear complementarity problem is the search for z with
 
     z >= 0,    w = M z + q >= 0,    z . w = 0.
 
-Lemke's method follows a path of pivots from a ray, which the covering vector gives.  The path ends
-in a solution or in another ray.  For contacts whose rates without forces are those of a possible
-motion, it ends in a solution [2].  Walls that close in on the mechanism, contacts that slide, and
-accelerations may exclude all solutions (Painleve's paradox).  There, too, a path may end in a ray
-although there is a solution: the paths of other covering vectors are tried before the problem
-counts as unsolvable.
+Lemke's method follows a path of pivots that begins at a ray, which the covering vector defines.
+The path ends in a solution or in another ray.  It ends in a solution if the rates without forces
+are those of a possible motion [2].  There may be no solution if walls close in on the mechanism, if
+contacts slide, and for accelerations (Painleve's paradox).  In these cases a path may also end in a
+ray although there is a solution.  The paths of other covering vectors are therefore tried before
+the problem is rejected as unsolvable.
 
 Sources
 -------
@@ -52,7 +52,7 @@ def lemke(M: Real, q: Real, cover: Real) -> Real | None:
     m, size = len(q), math.ldexp(1.0, math.frexp(float(np.abs(q).max(initial=0.0)))[1])
     if not m or q.min() >= 0.0:
         return np.zeros(m)
-    # Columns of w (m), z (m), the covering variable, and the values.
+    # Columns: w (m), z (m), the covering variable, the constants.
     table = np.hstack([np.eye(m), -M, -cover[:, None], (q / size)[:, None]])
     basis = list(range(m))
     row, entering = _first_row(q / size / cover), 2 * m
@@ -88,8 +88,8 @@ def _exchange(table: Real, row: int, column: int) -> None:
 def _leaving_row(table: Real, basis: list[int], entering: int) -> int | None:
     """Return the row whose variable falls to zero first; None if none falls.
 
-    Of equal ratios, that of the covering variable comes first, else the least in lexicographic
-    order, so that no basis comes back.
+    Of rows with equal ratios, that of the covering variable is chosen, else the least in
+    lexicographic order, so that no basis occurs twice.
     """
     m, column = len(basis), table[:, entering]
     least = PIVOT_RTOL * max(1.0, float(np.abs(column).max()))
@@ -108,7 +108,7 @@ def _leaving_row(table: Real, basis: list[int], entering: int) -> int | None:
 
 
 def _values(table: Real, basis: list[int]) -> Real:
-    """Return z of a basis."""
+    """Return the values of z in a basis."""
     m = len(basis)
     z = np.zeros(2 * m + 1)
     z[basis] = np.maximum(table[:, -1], 0.0)
@@ -171,8 +171,8 @@ def coulomb(W: Real, u: Real, friction: Real, fixed: Real, normal: Integers) -> 
 def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real | None:
     r"""Return impulses of an impact by :func:`coulomb`; None without a solution.
 
-    Without friction there are k normals, else k normals and k tangents.  Where only round-off
-    excludes a solution, it is one of gaps that open by half of the tolerance more.
+    Without friction there are k normals, else k normals and k tangents.  If only round-off excludes
+    a solution, the problem is solved with gap rates that are larger by half of the tolerance.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) ->
     least : (k,)
         Least normal impulses [N s].
     tolerance : float
-        Violation that is round-off [m/s].
+        Largest violation of the laws that is round-off [m/s].
     """
     k, m = len(least), len(friction)
     given = u + W[:, :k] @ least
@@ -213,7 +213,7 @@ def violation(W: Real, u: Real, P: Real, limit: Real) -> float:
     rates, share = W @ P + u, P * np.diag(W)
     normal = np.abs(np.minimum(rates[:k], share[:k]))
     excess = np.abs(share[k:]) - limit * np.diag(W)[k:]
-    # Friction that is less than its limit, or has the direction of sliding.
+    # Deficit of a sliding contact: its friction must oppose the sliding at the limit.
     missing = limit * np.diag(W)[k:] + np.sign(rates[k:]) * share[k:]
     sliding = np.minimum(np.abs(rates[k:]), np.abs(missing))
     return float(max(x.max(initial=0.0) for x in (normal, excess, sliding)))

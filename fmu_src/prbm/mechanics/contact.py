@@ -5,8 +5,8 @@ to unit impulses, W = [G; T] M^-1 [G; T]^T (with M^-1 on the tangent of the loop
 
     u+ = u- + W P,
 
-u the rates of the gaps, walls included.  W is never inverted: for a mechanism of one degree of
-freedom it has rank one.
+with u the rates of the gaps, which include the velocities of walls.  W is never inverted: for a
+mechanism of one degree of freedom it has rank one.
 
 Sources
 -------
@@ -52,7 +52,7 @@ def response(M: Real, held: Real, rows: Real) -> Real:
     M : (n, n)
         Mass matrix [kg m^2].
     held : (r, n)
-        Rows that keep their rate: loops, held stops [m/rad].
+        Rows whose rates do not change: loops, held stops [m/rad].
     rows : (k, n)
         Directions of the impulses [m/rad].
 
@@ -68,19 +68,19 @@ def response(M: Real, held: Real, rows: Real) -> Real:
 
 
 def newton(W: Real, u: Real, restitution: Real, speed: float = 0.0) -> Real:
-    r"""Return the impulses of a frictionless impact of several stops, without an order.
+    r"""Return the impulses of a frictionless, simultaneous impact of several stops.
 
     Solves P >= 0, W P + u + eps u >= 0, complementary, for closing or resting stops (u <= 0):
     each stop that receives an impulse opens at -eps u.  Energy is never gained.  There is a
-    solution unless walls close in on the mechanism; where several stops can share an impulse in
-    more than one way, they share it as evenly as they can (least sum of squares).
+    solution unless walls close in on the mechanism.  If several stops can share an impulse in more
+    than one way, they share it as evenly as possible (least sum of squares).
 
     Parameters
     ----------
     W : (k, k)
         Inverse mass in contact space, symmetric positive semidefinite [1/kg].
     u : (k,)
-        Rates of the gaps before, none positive [m/s].
+        Rates of the gaps before the impact, none positive [m/s].
     restitution : (k,)
         Coefficients of restitution [-].
     speed : float
@@ -114,9 +114,9 @@ def newton(W: Real, u: Real, restitution: Real, speed: float = 0.0) -> Real:
 
 
 def _shared(W: Real, b: Real, members: NDArray[np.int_]) -> Real:
-    """Return the least impulses of stops that open neither sooner nor later than they must.
+    """Return the least impulses (in squares) with which the members open at exactly -eps u.
 
-    Stops that would have to pull receive none.
+    Members that would have to pull are removed and receive none.
     """
     P = np.zeros(len(b))
     while len(members):
@@ -135,10 +135,10 @@ def stronge(
 ) -> tuple[float, float]:
     r"""Return the normal and tangential impulse of one hit with friction (Routh, Stronge).
 
-    The normal impulse p grows; the contact slips (P_t' = -mu sign(u_t)), sticks or slips back
-    as Coulomb's law says at each p.  Compression ends when u_n = 0; restitution ends when its
-    work is eps^2 times the work of compression.  Energy is never gained, and where the contact
-    slips in one direction throughout the result is Newton's.
+    The hit is followed over its growing normal impulse p: at each p the contact slips
+    (P_t' = -mu sign(u_t)), sticks or slips back by Coulomb's law.  Compression ends when u_n = 0;
+    restitution ends when its work is eps^2 times the work of compression.  Energy is never gained.
+    If the contact slips in one direction throughout, the result is Newton's.
 
     Parameters
     ----------
@@ -207,7 +207,7 @@ class _Hit:
             closed = -self.u_n / self.rate_n if self.rate_n > WEDGED_RTOL * nn else math.inf
             step = min(sticking, closed)
             if step == math.inf:
-                break  # Without a mobility: round-off only, see below.
+                break  # The wall is wedged, unless u_n is round-off: checked below.
             work -= self.receive(step)
             self.u_n = 0.0 if step == closed else self.u_n + self.rate_n * step
             self.u_t = 0.0 if step == sticking else self.u_t + self.rate_t * step
@@ -246,7 +246,7 @@ class _Hit:
 
 
 def _restitution_ends(u_n: float, rate_n: float, left: float) -> float:
-    """Return the impulse after which the work of restitution is done, or opening stops."""
+    """Return the impulse at which the work ``left`` is done, or the gap stops opening."""
     root = u_n**2 + 2.0 * rate_n * left
     if root < 0.0:
         return -u_n / rate_n
@@ -264,13 +264,13 @@ def _friction_ratio(nt: float, tt: float, u_t: float, friction: float) -> float:
 
 
 def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 0.0) -> Real:
-    r"""Return the impulses of several hits at once with friction, without an order.
+    r"""Return the impulses of several simultaneous hits with friction.
 
     Compression: P_n >= 0, u_n >= 0, complementary, and Coulomb's law in each contact, which is a
-    linear complementarity problem.  Restitution: at least
-    s eps times each normal impulse again, more where a gap would close, with friction; s in
-    [0, 1] is the largest for which the work of the normal impulses does not exceed eps^2 times
-    that of the compression, and energy is not gained.
+    linear complementarity problem.  Restitution: the same problem, with normal impulses of at least
+    s eps times those of compression, and more where a gap would close.  s is the largest in [0, 1]
+    with which the work of the normal impulses does not exceed eps^2 times that of the compression,
+    and energy is not gained.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
     lost = float(-(P[:k] * (u + after)[:k] / 2) @ restitution**2)
     wanted = restitution * P[:k]
 
-    # The energy that compression takes away; friction, too, may return no more.
+    # The energy that compression dissipates: restitution, with friction, may return no more.
     taken = -float(P @ (u + after)) / 2 + COMPLEMENTARITY_RTOL * abs(float(P @ u))
 
     def rebound(s: float) -> tuple[Real, bool]:

@@ -39,17 +39,17 @@ class Wall:
     Parameters
     ----------
     position : float
-        Of the reference at the time ``since`` [m].
+        Position of the reference at the time ``since`` [m].
     rate : float
         Velocity of the reference [m/s].
     since : float
-        [s].
+        Time at which the wall begins to join its reference [s].
     offset : float
-        How far the wall is ahead of its reference at the time ``since`` [m].
+        Position of the wall relative to its reference at the time ``since`` [m].
     excess : float
-        How much faster than its reference it is then [m/s].
+        Velocity of the wall relative to its reference at the time ``since`` [m/s].
     span : float
-        Time after which it is on its reference [s]; 0: it is.
+        Time in which the wall joins its reference [s]; 0: it is on its reference.
 
     Examples
     --------
@@ -78,8 +78,8 @@ class Wall:
     def motion(self, t: T) -> tuple[T, T, T]:
         """Return position, velocity and acceleration at time t [m], [m/s], [m/s^2].
 
-        The acceleration is that of the cubic to its end, included, and beyond: the wall is to be
-        replaced by its reference there.
+        The acceleration does not fall to zero at the end of the cubic: :meth:`arrived` must replace
+        the wall by its reference there.
         """
         x, zero = self.reference(t), 0.0 * t
         if not self.span:
@@ -92,14 +92,14 @@ class Wall:
         return x, velocity, acceleration
 
     def joining(self, line: "Wall", velocity: float, span: float) -> "Wall":
-        """Return the wall from the beginning of another reference on, with a velocity there.
+        """Return the wall that joins another reference, from its time ``line.since`` on.
 
         Parameters
         ----------
         line : Wall
-            The reference.
+            The other reference.
         velocity : float
-            Of the wall [m/s].
+            Velocity of the wall at that time [m/s].
         span : float
             Time in which it joins the reference [s].
         """
@@ -107,7 +107,7 @@ class Wall:
         return replace(line, offset=x - line.position, excess=velocity - line.rate, span=span)
 
     def pushed(self, t: float, change: float) -> "Wall":
-        """Return the wall after a change of its velocity and that of its reference [m/s]."""
+        """Return the wall after its velocity and its reference's have changed at time t [m/s]."""
         line = Wall(self.reference(t), self.rate + change, t)
         return self.joining(line, float(self.motion(t)[1]) + change, self.span)
 
@@ -131,7 +131,8 @@ class Inputs:
     walls : (s,) tuple of Wall
         The walls of the stops.
     mobilities : (s,) tuple of float
-        Their inverse effective masses, by which impacts move them; 0: immovable [1/kg].
+        Inverse effective masses of the walls, by which impacts change their velocities; 0:
+        immovable [1/kg].
     """
 
     forces: tuple[complex, ...]

@@ -9,7 +9,7 @@
 
 /* --- Lemke's method --------------------------------------------------------------------------- */
 
-/* Columns of w (m), z (m), the covering variable, and the values; the variable of each row. */
+/* Columns of w (m), z (m), the covering variable, and the constants; the variable of each row. */
 typedef struct {
     int m, width;
     double *rows;
@@ -84,8 +84,9 @@ static int least_ratios(const Pivots *pivots, int entry, int column, int count, 
     return kept;
 }
 
-/* The row whose variable falls to zero first, or -1.  Of equal ratios, that of the covering
- * variable comes first, else the least in lexicographic order, so that no basis comes back. */
+/* The row whose variable falls to zero first, or -1.  Of rows with equal ratios, that of the
+ * covering variable is chosen, else the least in lexicographic order, so that no basis occurs
+ * twice. */
 static int leaving_row(const Pivots *pivots, int column, int *rows) {
     int m = pivots->m, count = falling_rows(pivots, column, rows);
     if (count > 1) {
@@ -221,7 +222,7 @@ PRBM double violation(int k, int m, const double *W, const double *u, const doub
             worst = greater(fabs(lesser(rate, share)), worst);
         } else {
             double most = limit[i - k] * mobility;
-            /* friction that is less than its limit, or has the direction of sliding */
+            /* deficit of a sliding contact: friction must oppose the sliding at the limit */
             double missing = rate == 0.0 ? most : most + (rate > 0.0 ? share : -share);
             worst = greater(fabs(share) - most, worst);
             worst = greater(lesser(fabs(rate), fabs(missing)), worst);
@@ -232,7 +233,7 @@ PRBM double violation(int k, int m, const double *W, const double *u, const doub
 
 /* --- impacts ---------------------------------------------------------------------------------- */
 
-/* An attempt: the rates with the least impulses, opened a little; the indices of the normals. */
+/* Solve for the impulses beyond the least ones, with gap rates that are larger by opened. */
 static bool try_impulses(int k, int m, const double *W, const double *given, double opened,
                          const double *friction, const double *least, double *P, double *limit,
                          Scratch *scratch) {
@@ -262,7 +263,7 @@ PRBM bool impulses(int k, int m, const double *W, const double *u, const double 
     for (int i = 0; i < k + m; i++) {
         given[i] = u[i] + dot(k, W + i * (k + m), least);
     }
-    /* where only round-off excludes a solution: that of gaps that open by half of the tolerance */
+    /* if only round-off excludes a solution: gap rates larger by half of the tolerance */
     for (int attempt = 0; !solved && attempt < 2; attempt++) {
         solved = try_impulses(k, m, W, given, attempt * (tolerance / 2), friction, least, P, limit,
                               scratch) &&

@@ -36,8 +36,8 @@ static bool closing_in(Problem *problem) {
                          "them apart, or slow them down");
 }
 
-/* W_ss P_s = -b_s for the members s; *pulling: whether one of them pulls.  Those that do have no
- * impulse and are members no longer. */
+/* Solve W_ss P_s = -b_s for the members s.  Members that pull get no impulse and are removed;
+ * *pulling: whether there are any. */
 static bool share_impulses(int k, int *size, int *members, const double *W, const double *b,
                            double *P, bool *pulling, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -65,8 +65,7 @@ static bool share_impulses(int k, int *size, int *members, const double *W, cons
     return solved;
 }
 
-/* Share the impulses between the stops that open neither sooner nor later than they must, as evenly
- * as they can be shared. */
+/* Share the impulses as evenly as possible between the stops that open at exactly -eps u. */
 static bool share_evenly(int k, const double *W, const double *b, double tolerance, double *P,
                          Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -110,7 +109,7 @@ static double sign_of(double x) {
     return x < 0.0 ? -1.0 : 1.0;
 }
 
-/* The impulse after which the work of restitution is done, or opening stops. */
+/* The impulse at which the work left is done, or the gap stops opening. */
 static double restitution_ends(double u_n, double rate_n, double left) {
     double root = u_n * u_n + 2.0 * rate_n * left;
     if (root < 0.0) {
@@ -155,7 +154,7 @@ static void receive(Hit *hit, double step) {
     hit->p_t += hit->ratio * step;
 }
 
-/* Returns the work of compression. */
+/* Apply the impulses of compression and return their work. */
 static double compress(Hit *hit) {
     double work = 0.0;
     while (hit->u_n < 0.0) {
@@ -163,7 +162,7 @@ static double compress(Hit *hit) {
         double closed = hit->rate_n > WEDGED_RTOL * hit->nn ? -hit->u_n / hit->rate_n : HUGE_VAL;
         double step = lesser(sticking, closed);
         if (step == HUGE_VAL) {
-            break; /* without a mobility: at most round-off is left, see stronge */
+            break; /* wedged, unless u_n is round-off: stronge checks it */
         }
         work -= work_of(hit, step);
         receive(hit, step);
@@ -203,7 +202,7 @@ PRBM bool stronge(const double *W, const double *u, double friction, double rest
         return fail(problem, "the wall pushes the mechanism in a direction that friction locks; "
                              "reduce the friction of the stop, or the velocity of the wall");
     }
-    /* with one degree of freedom both rates vanish together, up to a rounding */
+    /* with one degree of freedom both rates vanish together, up to round-off */
     hit.u_n = hit.u_n > small_n ? hit.u_n : 0.0;
     hit.u_t = fabs(hit.u_t) > small_t ? hit.u_t : 0.0;
     restore(&hit, restitution * restitution * work);
@@ -219,7 +218,8 @@ typedef struct {
     double normal, all;
 } Returned;
 
-/* The impulses R of restitution, at least s wanted, and whether their work is allowed. */
+/* The impulses R of restitution, the normal ones at least s wanted; *allowed: their work does not
+ * exceed its limits. */
 static bool rebound(int k, const double *W, const double *after, const double *friction,
                     const double *wanted, double s, const Returned *most, double tolerance,
                     double *R, bool *allowed, Scratch *scratch) {

@@ -4,10 +4,11 @@
 
 #include "core/memory.h"
 
-/* Changes of velocity X (n, k) by unit impulses along the rows (k, n), while held (r, n) keep. */
+/* Changes of velocity X (n, k) by unit impulses along the rows (k, n), while the rates of the rows
+ * held (r, n) do not change. */
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
                    double *X, Scratch *scratch, Problem *problem);
-/* speed: a scale of speeds, of which violations may be round-off */
+/* speed: a scale of speeds, relative to which violations of the laws are round-off */
 PRBM bool newton(int k, const double *W, const double *u, const double *restitution, double speed,
                  double *P, Scratch *scratch, Problem *problem);
 PRBM bool stronge(const double *W, const double *u, double friction, double restitution,

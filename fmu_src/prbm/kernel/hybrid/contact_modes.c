@@ -17,7 +17,7 @@ static void try_contacts(Simulation *sim, const ContactMode *modes) {
                   sim->configuration.omega);
 }
 
-/* The mode of a closed contact with a sliding velocity, CONTACT_FRICTIONLESS at round-off. */
+/* The mode of a closed contact with a sliding velocity; CONTACT_FRICTIONLESS if it is round-off. */
 static ContactMode slip_mode(const Simulation *sim, double speed) {
     return fabs(speed) <= zero_speed(&sim->configuration) ? CONTACT_FRICTIONLESS
                                                           : slipping_mode(speed);
@@ -29,8 +29,8 @@ static double friction_of(const Simulation *sim, int contact) {
                                     : sim->equations.rub_law[3 * (contact - system->s)];
 }
 
-/* The contact state in which a set of stops is closed and all contacts that move slip, if they have
- * friction. */
+/* The contact state in which a set of stops is closed, and closed contacts and friction points slip
+ * if they have a velocity and friction. */
 static void modes_holding(Simulation *sim, const HoldingSet *holding, const double *q,
                           const double *v, ContactMode *modes) {
     size_t mark = sim->scratch.used;
@@ -102,9 +102,9 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
 
 /* --- stops ------------------------------------------------------------------------------------ */
 
-/* The stops at rest that hold: pressed together, while the others open.  Contacts that move slip
- * meanwhile, those at rest are frictionless.  Of stops that can move only together, those hold
- * whose rows are independent. */
+/* The stops at rest that hold: pressed together, while the others open.  In this choice contacts
+ * with a sliding velocity slip, and contacts at rest are frictionless.  Of stops that can move only
+ * together, some with independent rows hold. */
 PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                              const double *v, HoldingSet *holding, Problem *problem) {
     HoldingSet every = {0, {0}, false}, none = {0, {0}, true};
@@ -138,7 +138,7 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
     }
     holding->found = found.solved;
     if (!found.solved || every.count == 1) {
-        return true; /* a stop alone is pressed or opens; several may depend on each other */
+        return true; /* a single stop needs no check; several may depend on each other */
     }
     equations_holding(sim, holding, q, v);
     return modes_agree(sim, q, v, &every, &rest, &found, &holding->found, problem);
@@ -152,15 +152,15 @@ static bool holding_stops(Simulation *sim, int count, const int *candidates, con
 
 /* --- friction --------------------------------------------------------------------------------- */
 
-/* The contact that an event of friction has, or -1: it slips and cannot stick, or its sliding has
- * ended with no more than a slow speed left. */
+/* The contact of an event of friction, or -1.  It slips and cannot stick, or else its sliding has
+ * ended: speeds up to slow are then round-off. */
 typedef struct {
     int contact;
     bool slips;
     double slow;
 } FrictionEvent;
 
-/* Whether a contact at rest has a mobility of its own beside the closed and sticking ones. */
+/* Whether a contact can slide while all other held and sticking contacts rest. */
 static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bool *result,
                       Problem *problem) {
     size_t mark = sim->scratch.used, bytes = (size_t)contact_count(sim) * sizeof *modes;
@@ -182,7 +182,8 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     return right;
 }
 
-/* The mode of a contact that slides faster than the event leaves; CONTACT_FRICTIONLESS at rest. */
+/* The mode in which a contact slips faster than the round-off of the event; CONTACT_FRICTIONLESS if
+ * it is at rest. */
 static ContactMode sliding_mode(Simulation *sim, int contact, const FrictionEvent *event) {
     size_t mark = sim->scratch.used;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
@@ -192,8 +193,8 @@ static ContactMode sliding_mode(Simulation *sim, int contact, const FrictionEven
     return fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
 }
 
-/* Choose whether a contact at rest begins to slip, sticks, bears the limit of its friction, or
- * none. */
+/* Choose by its force whether a contact at rest begins to slip, sticks, has friction at its limit,
+ * or has none. */
 static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
                            bool at_limit, bool slipped, ContactMode *modes, Problem *problem) {
     bool mobile = false;
@@ -214,9 +215,9 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
     return true;
 }
 
-/* Choose the modes of contacts at rest by their forces: first of those whose friction is below its
- * limit.  Of contacts that can stick only together, some stick; the others bear the limit of their
- * friction, or none. */
+/* Choose the modes of contacts at rest by their forces, first for friction below its limit.  Of
+ * contacts that can stick only together, some stick; the others have friction at its limit, or
+ * none. */
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
                           const FrictionEvent *event, ContactMode *modes, Problem *problem) {
     double zero = zero_acceleration(&sim->configuration);
@@ -235,9 +236,9 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
     return right;
 }
 
-/* Some of the stops that touch, and the contacts with friction at rest that have a mobility of
- * their own beside the loops and the closed stops: else these carry all of the load.  sliding: the
- * modes of those with friction that slide. */
+/* Collect the given stops, and the contacts with friction at rest.  Contacts that cannot move
+ * independently are left out: loops and held stops carry their load.  sliding: the modes of the
+ * contacts with friction that slide. */
 static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
                       const ContactMode *modes, RestContacts *rest,
                       ContactMode *sliding, Problem *problem) {
@@ -277,7 +278,7 @@ static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Pro
 }
 
 /* Choose the modes by the forces of some stops and of the contacts with friction.  *agree is false
- * without such forces, or if one of the other stops that touch would close. */
+ * if no forces satisfy their laws, or if another stop that touches would close. */
 static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const HoldingSet *touching,
                             const FrictionEvent *event, ContactMode *modes, bool *agree,
                             Problem *problem) {
@@ -320,8 +321,8 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
     return modes_agree(sim, q, v, touching, &rest, &found, agree, problem);
 }
 
-/* Choose the modes of all contacts with friction: the stops that hold without friction at rest go
- * on to hold, else all that touch are considered. */
+/* Choose the modes of all contacts with friction: first with the stops that hold if contacts at
+ * rest are frictionless; if that fails, with all stops that touch. */
 static bool settle_friction(Simulation *sim, const HoldingSet *holding, const HoldingSet *touching,
                             const FrictionEvent *event, ContactMode *modes, Problem *problem) {
     ContactMode first[CONTACTS_MAX];
@@ -340,7 +341,7 @@ static bool settle_friction(Simulation *sim, const HoldingSet *holding, const Ho
     return agree || friction_jams(sim, touching, problem);
 }
 
-/* --- all -------------------------------------------------------------------------------------- */
+/* --- all contacts ----------------------------------------------------------------------------- */
 
 /* The spacing of the numbers around x. */
 static double spacing(double x) {
@@ -360,7 +361,8 @@ static bool residual_speed(Simulation *sim, int contact, double *result, Problem
     const System *system = system_of(sim);
     Evaluation *evaluation = &sim->at_front;
     const double *q = sim->state.front, *v = q + system->n;
-    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, NULL, evaluation, problem)) {
+    if (!evaluate_equations(&sim->equations, sim->state.front_time, q, v, NULL, evaluation,
+                            problem)) {
         return false;
     }
     double *row = take(&sim->scratch, (size_t)system->n);
@@ -384,7 +386,7 @@ static bool friction_event(Simulation *sim, const Event *event, FrictionEvent *r
     return result->slips || residual_speed(sim, event->contact, &result->slow, problem);
 }
 
-/* The closed stops, and of the open ones that touch those that are near and do not open. */
+/* The closed stops, and those of the given open stops whose gaps are zero and do not open. */
 static int resting_candidates(Simulation *sim, const int *touching, int touching_count,
                               int *candidates) {
     size_t mark = sim->scratch.used;
@@ -410,9 +412,10 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
     return count;
 }
 
-/* Choose the contact state at the front from its positions and velocities.  touching: open stops
- * that touch without closing or opening; event: a slip or reversal that has just occurred, or
- * NULL. */
+/* Choose the contact state at the front from its positions and velocities.
+ *
+ * touching: open stops that touch and neither close nor open
+ * event: a slip or reversal that has just occurred, or NULL */
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
                  Problem *problem) {
     const System *system = system_of(sim);
@@ -446,9 +449,9 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
                    problem);
 }
 
-/* Open the closed stops whose gaps change, by a wall's velocity or an impulse: a wall that retreats
- * leaves the body; one that advances strikes, as does a body that is thrown against a wall that it
- * touches.  Returns a stop that is struck, or -1. */
+/* Open the closed stops whose gaps have a rate, after a change of a wall's velocity or an impulse.
+ * A wall that retreats leaves the body behind; a wall that advances strikes it, and so does a body
+ * that an impulse throws against a wall that it touches.  Returns a stop that is struck, or -1. */
 static int release_moving(Simulation *sim) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
@@ -473,7 +476,7 @@ static int release_moving(Simulation *sim) {
     return struck;
 }
 
-/* The contact state after changes of wall velocities or impulses. */
+/* Choose the contact state after changes of the walls' velocities or impulses. */
 PRBM bool settle_moved(Simulation *sim, Problem *problem) {
     int struck = release_moving(sim);
     if (struck >= 0) {

@@ -4,7 +4,8 @@
 
 #include "hybrid/state.h"
 
-/* The stops that hold; whether there are any that are pressed while the others open. */
+/* The stops that hold, and whether the search has found a choice that satisfies the laws of
+ * contact. */
 typedef struct {
     int count, stops[STOPS_MAX];
     bool found;
@@ -12,7 +13,7 @@ typedef struct {
 
 PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                              const double *v, HoldingSet *holding, Problem *problem);
-/* The trial equations in which a set of stops is closed and all contacts that move slip. */
+/* The trial equations in which a set of stops is closed and all contacts with a velocity slip. */
 PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *holding,
                                         const double *q, const double *v);
 PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,

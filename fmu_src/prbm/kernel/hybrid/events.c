@@ -1,5 +1,5 @@
-/* Events: the table of guards and resets, the first event of a step, and how often events may
- * occur: the twin of hybrid/events.py. */
+/* Events: the table of guards and resets, the first event of a step, and the limit of the number of
+ * events: the twin of hybrid/events.py. */
 #include "hybrid/contact_modes.h"
 #include "hybrid/events.h"
 #include "hybrid/guards.h"
@@ -41,7 +41,7 @@ PRBM const Transition *transition(EventKind kind) {
 
 /* --- the first event of a step ---------------------------------------------------------------- */
 
-/* Keep the first event of a kind, if it is earlier than one of the kinds before. */
+/* Replace *first by the first event of a kind, if that is earlier. */
 static bool find_events(Simulation *sim, EventKind kind, Event *first, Problem *problem) {
     const Transition *row = transition(kind);
     for (int contact = 0; contact < contact_count(sim); contact++) {
@@ -77,7 +77,7 @@ PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {
 
 /* --- applying events -------------------------------------------------------------------------- */
 
-/* Fail at more events than a motion can have in a short time. */
+/* Count an event; fail if more than EVENTS_MAX occur within a short time. */
 static bool count_event(Simulation *sim, const Event *event, Problem *problem) {
     State *state = &sim->state;
     double window = EVENT_WINDOW_RTOL * sim->configuration.scales.time;
@@ -91,8 +91,8 @@ static bool count_event(Simulation *sim, const Event *event, Problem *problem) {
                     "more than %d events (%s the last) within %.3g s at t = %.9g s: the contact "
                     "chatters; raise rest_speed or damping.beta, lower the restitution, or give "
                     "the body room between its walls",
-                    EVENTS_MAX, transition(event->kind)->guard.event, event->time - state->window_since,
-                    event->time);
+                    EVENTS_MAX, transition(event->kind)->guard.event,
+                    event->time - state->window_since, event->time);
     }
     return true;
 }

@@ -15,7 +15,7 @@ typedef struct {
     Guard guard;
     Watched *watched; /* whether the event may occur at a contact */
     Near *near;       /* whether it may occur in the latest step */
-    bool samples;     /* whether its detection needs the samples of the step */
+    bool samples;     /* whether detect needs sample_arc */
     Detect *detect;
     Reset *reset;     /* the change of state at the event */
 } Transition;

@@ -41,8 +41,8 @@ PRBM bool release_near(Simulation *sim);
 PRBM bool slip_near(Simulation *sim);
 PRBM bool reversal_near(Simulation *sim);
 PRBM bool impact_near(Simulation *sim);
-/* When the guard of a contact falls first in the latest step; a fall that has not been found is
- * given. */
+/* Find when the guard of a contact first falls in the latest step; the caller passes a fall that is
+ * not found.  False on failure. */
 PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                      Problem *problem);
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,

@@ -24,7 +24,7 @@ PRBM Inertia inertia_at(Simulation *sim, const double *q) {
     return at;
 }
 
-/* The inverse mass along a row while the rows of held (r, n) do not move. */
+/* The inverse mass along a row while the rows held (r, n) rest. */
 PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held,
                    const double *row, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -61,7 +61,7 @@ static void add_impulses(int k, int n, const double *v, const double *X, const d
 
 /* --- impulses of an impact -------------------------------------------------------------------- */
 
-/* An impact that is being resolved: the stops struck and held, velocities after, impulses. */
+/* An impact in progress: the stops struck and held, the velocities after it, the impulses. */
 typedef struct {
     int struck_count, held_count, struck[STOPS_MAX], held[STOPS_MAX];
     double restitution[STOPS_MAX];
@@ -77,7 +77,7 @@ typedef struct {
     double rates[STOPS_MAX], friction[STOPS_MAX]; /* of the gaps; of the stops struck */
 } Approach;
 
-/* The a-th of the stops that take part: those that are struck, then those that hold. */
+/* The a-th of the stops that take part: first those that are struck, then those that hold. */
 static int partner(const Hits *hits, int a) {
     return a < hits->struck_count ? hits->struck[a] : hits->held[a - hits->struck_count];
 }
@@ -120,7 +120,7 @@ static bool impulses_without_friction(Simulation *sim, const Approach *approach,
     return true;
 }
 
-/* The impulses along rows (r, n), M (v+ - v-) - GT^T P = rows^T reaction; GT (k, n). */
+/* The reaction impulses along rows (r, n), by M (v+ - v-) - GT^T P = rows^T reaction; GT (k, n). */
 static bool reaction_impulses(Simulation *sim, const Approach *approach, const double *after,
                               int k, const double *GT, const double *P, int r,
                               const double *rows, double *reaction, Problem *problem) {
@@ -249,8 +249,8 @@ static bool rounds_with_friction(Simulation *sim, const Approach *approach, Hits
     return right;
 }
 
-/* If a held stop that has been released would close, the held stops are struck, too, without
- * restitution and friction. */
+/* Impulses with friction.  If a held stop that has been released would close, all held stops are
+ * treated as struck, without restitution and friction. */
 static bool with_released_stops(Simulation *sim, Approach *approach, Hits *hits,
                                 Problem *problem) {
     int kept_count, kept[STOPS_MAX], k = hits->struck_count, held_count = hits->held_count;
@@ -260,7 +260,8 @@ static bool with_released_stops(Simulation *sim, Approach *approach, Hits *hits,
     }
     for (int a = 0; a < held_count; a++) {
         int i = hits->held[a];
-        double rate = gap_rate(&sim->equations, i, sim->state.front_time, approach->at->e, hits->after);
+        double rate = gap_rate(&sim->equations, i, sim->state.front_time, approach->at->e,
+                               hits->after);
         closing = closing || (!has_contact(kept_count, kept, i) &&
                               rate < -zero_speed(&sim->configuration));
     }
@@ -297,9 +298,9 @@ static bool name_partners(const Simulation *sim, const Hits *hits, Problem *prob
 }
 
 /* The velocities after an impact, the normal and the tangential impulses by stop.  Held stops take
- * part: without friction as partners of the complementarity problem, with friction as constraints
- * that are removed if they would pull.  Their own friction, and that of friction points, is finite
- * and has no impulse. */
+ * part.  If the stops that are struck have no friction, they are unknowns of the same
+ * complementarity problem; else they are constraints that are removed if they would pull.  Friction
+ * of held stops and of friction points is finite and has no impulse. */
 static bool impact_impulses(Simulation *sim, const double *q, const double *v, Hits *hits,
                             Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -325,8 +326,8 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
 /* --- captures --------------------------------------------------------------------------------- */
 
 /* Whether a resting stop is pressed so strongly that a bounce would be shorter than
- * SHORTEST_FLIGHT_RTOL or lower than the mode resolves: by closing late, it would gain what it
- * loses by the impact. */
+ * SHORTEST_FLIGHT_RTOL of the period, or lower than the mode resolves: such a bounce might never
+ * decay, because late closing adds as much energy as the impact dissipates. */
 static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting, const double *q,
                             const double *v, double speed, bool *result, Problem *problem) {
     const System *system = system_of(sim);
@@ -350,9 +351,9 @@ static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting
     return true;
 }
 
-/* Whether a stop that is struck slowly comes to rest: after an impact without restitution it is
- * pressed, and its speed is below rest_speed or its bounce vanishes.  A speed that is round-off is
- * neither counted nor returned. */
+/* Whether a stop that is struck slowly comes to rest: it would be pressed after an impact without
+ * restitution, and its speed is below rest_speed or its bounce vanishes.  A speed that is round-off
+ * always ends in rest. */
 static bool captured(Simulation *sim, int stop, const Hits *hits, const double *q,
                      const double *v, double speed, bool *result, Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -408,9 +409,10 @@ typedef struct {
     double before[STOPS_MAX], after[STOPS_MAX], lost[STOPS_MAX];
 } Account;
 
-/* Move the walls, sum up the impulses and add the energies to the state.  At each stop -P (u- +
- * u+)/2 is lost, and as much along the wall; the wall does -P (w- + w+)/2, where an impulse changes
- * the velocity w of a wall by its mobility times P. */
+/* Change the velocities of the walls, sum up the impulses and add the energies to the state.  A
+ * normal impulse P dissipates -P (u- + u+)/2, with u the rate of the gap; a tangential one the same
+ * with the sliding velocity.  The wall does the work -P (w- + w+)/2, and its velocity w changes by
+ * its mobility times P. */
 static void book_energies(Simulation *sim, const Hits *hits, const double *q, const double *v,
                           Account *account) {
     size_t mark = sim->scratch.used;
@@ -515,7 +517,7 @@ static bool choose_restitutions(Simulation *sim, const double *q, const double *
     return right;
 }
 
-/* Open all stops; returns how many of those that took part do not separate. */
+/* Open all stops; return the number of those that took part and do not separate. */
 static int open_all(Simulation *sim, const Hits *hits, int *touching) {
     size_t mark = sim->scratch.used;
     double bound = zero_speed(&sim->configuration), t = sim->state.front_time;
@@ -535,7 +537,7 @@ static int open_all(Simulation *sim, const Hits *hits, int *touching) {
     return count;
 }
 
-/* Resolve the impact of a stop and of all that touch with it. */
+/* Resolve the impact of a stop, and of all other stops whose gaps close at the same time. */
 PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = system_of(sim)->n, touching[STOPS_MAX], touching_count = 0;
@@ -609,9 +611,9 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
     return right;
 }
 
-/* Apply the growth of the impulses since they were received.  The loops take part, stops follow:
- * see settle_walls.  Friction is finite and bears no impulse: a sticking contact becomes free to
- * slide or to stick again. */
+/* Apply the changes of the impulses since they were last received.  The loops transmit them;
+ * impacts at stops follow later, in settle_moved.  Friction is finite and has no impulse: sticking
+ * contacts become free to slip or stick again. */
 PRBM bool receive_impulses(Simulation *sim, Problem *problem) {
     int forces = sim->configuration.mechanism->force_count;
     const double *given = given_impulses(sim);

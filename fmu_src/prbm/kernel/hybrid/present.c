@@ -1,4 +1,4 @@
-/* The present moment, and which of the present quantities are up to date. */
+/* The present moment, and the record of the present quantities that are up to date. */
 #include "hybrid/guards.h"
 #include "hybrid/present.h"
 #include "hybrid/simulation.h"

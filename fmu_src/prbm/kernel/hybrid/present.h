@@ -1,10 +1,10 @@
-/* The present moment, and which of the present quantities are up to date. */
+/* The present moment, and the record of the present quantities that are up to date. */
 #ifndef PRBM_PRESENT_H
 #define PRBM_PRESENT_H
 
 #include "hybrid/guards.h"
 
-/* A state, its rates (ny,) and the evaluation that they come from. */
+/* A state, its rates (ny,) and the evaluation of the equations that gives them. */
 typedef struct {
     Instant at;
     const double *rates;

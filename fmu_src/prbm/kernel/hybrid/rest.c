@@ -6,8 +6,8 @@
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
 
-/* The rows of the gaps and of the slides, and the forces along them: a stop that slides pushes and
- * rubs. */
+/* The rows of the gaps and of the slides, and the directions of the forces: the normal force of a
+ * stop that slides acts together with its friction. */
 static void rest_rows(Simulation *sim, const RestContacts *rest, const Complex *e, double *rows,
                       double *pushes) {
     size_t mark = sim->scratch.used;
@@ -79,7 +79,8 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
     bool right = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL,
                                     &sim->trial.evaluation, problem);
     rest_rows(sim, rest, at.e, rows, pushes);
-    right = right && response(n, system->r, size, at.M, at.loops, pushes, X, &sim->scratch, problem);
+    right = right &&
+            response(n, system->r, size, at.M, at.loops, pushes, X, &sim->scratch, problem);
     found->solved = false;
     if (right) {
         contact_mobility(size, n, rows, X, W);

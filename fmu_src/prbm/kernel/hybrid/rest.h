@@ -7,14 +7,14 @@
 enum { CONTACTS_MAX = 2 * STOPS_MAX, NAMES_LENGTH = PROBLEM_LENGTH / 2 };
 
 /* Stops that touch, with the signs of their sliding velocities; contacts with friction and without
- * a sliding velocity: some of the stops, and points. */
+ * a sliding velocity, which are some of these stops, and friction points. */
 typedef struct {
     int stop_count, stops[STOPS_MAX], slips[STOPS_MAX];
     int count, contacts[CONTACTS_MAX];
 } RestContacts;
 
-/* Their forces and accelerations: the acceleration that each normal force alone gives its gap;
- * friction, its limits, and the accelerations of sliding, also by unit friction. */
+/* Their forces and accelerations: the acceleration that each normal force alone gives its gap; the
+ * friction and its limits; the accelerations of sliding, and those by unit friction (mobility). */
 typedef struct {
     bool solved;
     double normal[STOPS_MAX];
@@ -26,8 +26,8 @@ typedef struct {
     char text[NAMES_LENGTH];
 } ContactNames;
 
-/* The forces that satisfy the laws of all contacts.  In the trial equations all stops are open, and
- * friction points at rest have no friction. */
+/* The forces that satisfy the laws of all contacts; not solved if there are none.  In the trial
+ * equations all stops must be open, and friction points at rest have no friction. */
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem);
 PRBM const char *contact_name(const Mechanism *m, int contact);

@@ -56,7 +56,7 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
 
 /* --- from numbers ----------------------------------------------------------------------------- */
 
-/* A place among the numbers, and whether all so far are ones that simulation_save writes. */
+/* The next number to read, and whether all so far are such as simulation_save writes. */
 typedef struct {
     const double *at;
     bool sound;
@@ -124,7 +124,7 @@ static void get_stop(State *state, int i, StateReader *reader) {
     last->impulse_sum = get_number(reader);
 }
 
-/* Read the state; returns whether its numbers are ones that simulation_save writes.  The states of
+/* Read the state; returns whether its numbers are such as simulation_save writes.  The states of
  * model exchange, which are the last, may be any numbers: an importer's solver has set them. */
 static bool read_state(Simulation *sim, const double *from) {
     State *state = &sim->state;
@@ -164,7 +164,7 @@ static bool consistent(const Simulation *sim) {
 
 /* --- attempts --------------------------------------------------------------------------------- */
 
-/* Bring the configuration and the equations in line with a state that has been read. */
+/* Compute the configuration and the equations from a state that has been read. */
 static bool rebuild(Simulation *sim, Problem *problem) {
     Configuration *configuration = &sim->configuration;
     if (!sim->state.started) {

@@ -1,10 +1,11 @@
-/* The state before an attempt. */
+/* Backup of the state before an attempt, and its restoration after a failure. */
 #ifndef PRBM_SNAPSHOT_H
 #define PRBM_SNAPSHOT_H
 
 #include "hybrid/state.h"
 
 PRBM void keep_backup(Simulation *sim);
-PRBM bool attempt(Simulation *sim, bool right, Problem *problem); /* back to the backup, or right */
+/* End an attempt: return whether it was right, and restore the backup if it was not. */
+PRBM bool attempt(Simulation *sim, bool right, Problem *problem);
 
 #endif

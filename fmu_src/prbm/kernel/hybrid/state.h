@@ -9,8 +9,8 @@
 
 #define TWO_PI 6.283185307179586
 
-/* Units of the motion: the size, the fundamental frequency, one radian against the stiffest spring
- * and the period. */
+/* Units of the motion: the size of the mechanism, the fundamental frequency, the energy of one
+ * radian against the stiffest spring, and the period. */
 typedef struct {
     double length, rate, energy, time;
 } Scales;
@@ -21,7 +21,7 @@ typedef struct {
     System system;
     double omega; /* of the fundamental mode; 0 without one */
     Scales scales;
-    bool assembled; /* whether the system is that of the acting values */
+    bool assembled; /* whether the system has been assembled from the acting values */
 } Configuration;
 
 typedef struct {
@@ -44,33 +44,35 @@ typedef struct {
     double *y, *k; /* (ny,), (STAGES, ny) */
 } Arc;
 
-/* The step sizes and errors that the controller remembers. */
+/* The controller of the step size. */
 typedef struct {
-    double h, log_of_error; /* of the next step; of the latest, relative to the allowed one */
-    double growth_max;      /* 1 after a rejected step */
+    double h;            /* of the next step */
+    double log_of_error; /* of the latest accepted step, relative to the allowed error */
+    double growth_max;   /* of the step size; 1 after a rejected step */
 } StepSizeController;
 
-/* The mode of a simulation, and the height of a bounce that it cannot resolve, of the size. */
+/* The mode of a simulation, and the height, as a fraction of the size, of the lowest bounce that it
+ * resolves. */
 typedef struct {
     bool exchange; /* model exchange: an importer integrates */
     double lowest_bounce;
 } SimulationMode;
 
-/* Everything that a simulation continues from. */
+/* All values from which a simulation continues. */
 typedef struct {
     bool started;
     SimulationMode mode;
     double time, tolerance, frequency;
     double step_size, log_of_error; /* of the step size controller */
     double front_time;
-    bool has_k1;          /* whether k1 holds the rates of the front */
+    bool has_k1;          /* whether k1 has the rates of the front */
     Arc arc;
     Event pending;        /* located, but not yet applied */
     double window_since;  /* start of the window in which events are counted */
     int window_count;
     bool interrupted;     /* the communication step was left before its end */
     double point;         /* the last communication point; in model exchange the last event */
-    double longest;       /* the recent longest communication step */
+    double longest;       /* recent longest communication step, at most a tenth of the period */
     ContactMode *modes;   /* (s + f,) of the contacts */
     bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
     Latched *latched;     /* (s,) */
@@ -81,9 +83,9 @@ typedef struct {
     double *acting_values, *acting_given; /* since the last restart */
     double *received;                     /* (3 b,): impulses that have acted */
     double *front, *k1;                   /* (ny,): the end of the last step, its rates */
-    double *floors;                       /* (s,): gaps close this far below zero */
+    double *floors;                       /* (s,): depth below zero at which gaps close */
     double *accepted;                     /* model exchange: (n,) angles of the last step */
-    double *states;                       /* model exchange: as they were set */
+    double *states;                       /* model exchange: the states as they were set */
 } State;
 
 /* Equations in a contact state that is being tried, and their evaluation. */
@@ -93,7 +95,7 @@ typedef struct {
     Evaluation evaluation;
 } Trial;
 
-/* The state at which a guard is evaluated in the search for its fall. */
+/* The state at which a guard is evaluated while its fall is located. */
 typedef struct {
     double *y;             /* (ny,) */
     Complex *e;            /* (n,) */
@@ -112,7 +114,7 @@ typedef struct {
     double *sample_y;      /* (2 n,), (n,) of each */
     Complex *sample_e;
     Located located;
-    double *reach;         /* (n,) largest changes of the arms */
+    double *reach;         /* (n,) bounds of the changes of the arms */
 } Stepping;
 
 /* Groups of present quantities: outputs, the rates and, in model exchange, the front itself. */
@@ -121,7 +123,7 @@ enum {
     FRONT = 64
 };
 
-/* The present state, its outputs and rates, as far as they are up to date: read them by
+/* The present state, its outputs and rates.  They are valid only if they are fresh: read them by
  * present_outputs and present_moment. */
 typedef struct {
     double *y;             /* (ny,) */
@@ -137,7 +139,7 @@ typedef struct {
 struct Simulation {
     Configuration configuration;
     State state;
-    double *backup; /* the state before an attempt, as numbers */
+    double *backup; /* the state before an attempt, as simulation_save writes it */
     Equations equations;
     double *forces; /* (3 b,) acting inputs */
     Trial trial;

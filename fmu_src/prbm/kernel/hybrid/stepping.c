@@ -12,8 +12,8 @@
 
 /* --- errors ----------------------------------------------------------------------------------- */
 
-/* The sum of the squares of errors x against the sizes of y and y1, which count as no less than the
- * least. */
+/* The sum of the squares of errors x, relative to the larger of y and y1, but at least to a least
+ * size. */
 static double squares_of(int n, const double *x, const double *y, const double *y1, double least) {
     double sum = 0.0;
     for (int i = 0; i < n; i++) {
@@ -23,7 +23,8 @@ static double squares_of(int n, const double *x, const double *y, const double *
     return sum;
 }
 
-/* The root mean square of differences in units of the scales of angles, their rates, energies. */
+/* The root mean square of errors x: of angles [rad], and of rates and energies relative to their
+ * size. */
 static double relative_size(const Simulation *sim, const double *x, const double *y,
                             const double *y1) {
     const Scales *scales = &sim->configuration.scales;
@@ -48,7 +49,7 @@ static double first_step(const Simulation *sim) {
 }
 
 /* Choose the next step size from an error relative to the allowed one; returns whether the step is
- * accepted.  A rejected step is not followed by a longer one (Hairer, IV.2). */
+ * accepted.  The size does not grow after a step that was rejected and repeated (Hairer, IV.2). */
 static bool next(StepSizeController *controller, double error) {
     if (!(error <= 1.0)) {
         double factor = finite_number(error)
@@ -89,8 +90,8 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     const Arc *arc = &sim->state.arc;
     int ny = state_size(sim);
-    if (!stages(&sim->equations, sim->state.front_time, ny, arc->y, h, arc->k, stepping->end, &stepping->reference,
-                &stepping->evaluation, &stepping->forces, problem)) {
+    if (!stages(&sim->equations, sim->state.front_time, ny, arc->y, h, arc->k, stepping->end,
+                &stepping->reference, &stepping->evaluation, &stepping->forces, problem)) {
         return HUGE_VAL;
     }
     error_of(ny, arc->k, h, stepping->error);
@@ -98,7 +99,7 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
            (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
-/* Find a step that keeps the tolerance, no longer than the longest: its stages in the arc, its end
+/* Compute a step within the tolerance, no longer than the longest: its stages in the arc, its end
  * in stepping. */
 static bool find_step(Simulation *sim, double longest, double *h, Problem *problem) {
     State *state = &sim->state;
@@ -115,7 +116,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
         }
     } while (!next(&controller, step_error(sim, *h, problem)));
     state->step_size = controller.h;
-    if (*h == longest && longest < wanted) { /* cut by a wall: it says little about the next step */
+    if (*h == longest && longest < wanted) { /* shortened by a wall: no measure for the next step */
         state->step_size = greater(controller.h, wanted);
     }
     state->log_of_error = controller.log_of_error;
@@ -127,7 +128,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
 /* End the step at an event. */
 static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     State *state = &sim->state;
-    state->step_size = state->arc.h; /* an interrupted step says little about the next one */
+    state->step_size = state->arc.h; /* the time of an event is no measure for the next step */
     state->front_time = event->time;
     state->pending = *event;
     state->has_k1 = false;
@@ -148,8 +149,8 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
     double h = 0.0, longest = sim->equations.walls_join ? follow_cubics(sim) : HUGE_VAL;
-    if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL, &stepping->evaluation,
-                                state->k1, problem)) {
+    if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL,
+                                &stepping->evaluation, state->k1, problem)) {
         return false;
     }
     if (!find_step(sim, longest, &h, problem)) {

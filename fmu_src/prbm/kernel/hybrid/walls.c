@@ -24,7 +24,7 @@ PRBM void start_walls(Simulation *sim) {
     }
 }
 
-/* A wall that joins another reference from the beginning of that on. */
+/* The wall that joins another reference, from the time reference.since on. */
 static Wall joining(const Wall *wall, Wall reference, double velocity, double span) {
     reference.offset = wall_motion(wall, reference.since).x - reference.position;
     reference.excess = velocity - reference.rate;
@@ -32,22 +32,25 @@ static Wall joining(const Wall *wall, Wall reference, double velocity, double sp
     return reference;
 }
 
-/* A wall from a time on, with new velocities of its own and of its reference. */
+/* The wall from a time t on, with new velocities of the wall and of its reference. */
 PRBM Wall turned_wall(const Wall *wall, double t, double velocity, double rate) {
     Wall reference = {reference_at(wall, t), rate, t, 0.0, 0.0, 0.0};
     return joining(wall, reference, velocity, wall->span);
 }
 
-/* The change of stop.position at a communication point, which is not differenced. */
+/* The change of stop.position at a communication point: a jump that gives the wall no velocity. */
 static double shift(const Simulation *sim, int i) {
     Expression position = sim->configuration.mechanism->stops[i].position;
     return evaluate(position, sim->state.values) - evaluate(position, sim->state.acting_values);
 }
 
-/* The walls from a communication point on, to which a step to a time follows; returns whether a
- * reference has changed.  Without stop.velocity its velocity is the mean rate over the recent
- * longest step, but in a step that is longer than that it goes less far than the displacement did.
- * Before any step the velocity of a wall is that of its reference. */
+/* The walls in a communication step from the present time to another; returns whether a reference
+ * has changed.
+ *
+ * Without stop.velocity, the velocity of a reference is the mean rate of the displacement over the
+ * recent longest step.  It is reduced if the following step is longer, so that a jump is not
+ * extrapolated beyond its own size.  Before the first step, the velocity of a wall is that of its
+ * reference. */
 PRBM bool join_walls(Simulation *sim, double time, Wall *joined) {
     State *state = &sim->state;
     double now = state->time, last = now - state->point, following = time - now;
@@ -74,8 +77,8 @@ PRBM bool join_walls(Simulation *sim, double time, Wall *joined) {
     return changed;
 }
 
-/* The walls in event mode: those whose stop.velocity has been set to another value take it, and so
- * do their references.  Returns whether there are any. */
+/* The walls in event mode: a wall whose stop.velocity has changed takes it, and so does its
+ * reference.  Returns whether there is such a wall. */
 PRBM bool turn_walls(const Simulation *sim, Wall *turned) {
     const Mechanism *m = sim->configuration.mechanism;
     const State *state = &sim->state;
@@ -89,18 +92,19 @@ PRBM bool turn_walls(const Simulation *sim, Wall *turned) {
     return any;
 }
 
-/* How far a wall may move in a step. */
+/* An upper bound of the distance that a wall moves in a step h. */
 PRBM double wall_reach(const Wall *wall, double h) {
     return fabs(wall->rate) * h + 2.0 * fabs(wall->offset) + fabs(wall->excess) * wall->span;
 }
 
-/* The longest step from the front: a fraction of a cubic, and none beyond its end.  A wall whose
- * cubic ends at the front is on its reference from there on. */
+/* Put walls whose cubics end at the front on their references; return the longest step from there:
+ * a fraction of a cubic, and only up to its end. */
 PRBM double follow_cubics(Simulation *sim) {
     double longest = HUGE_VAL;
     for (int i = 0; i < system_of(sim)->s; i++) {
         Wall *wall = &sim->state.walls[i];
-        double left = wall->span > 0.0 ? wall->since + wall->span - sim->state.front_time : HUGE_VAL;
+        double end = wall->span > 0.0 ? wall->since + wall->span : HUGE_VAL;
+        double left = end - sim->state.front_time;
         if (left <= EVENT_TIME_ATOL) {
             wall->offset = wall->excess = wall->span = 0.0;
             sim->state.has_k1 = false;
@@ -112,16 +116,16 @@ PRBM double follow_cubics(Simulation *sim) {
     return longest;
 }
 
-/* The jump of a wall's velocity with which a stop that holds keeps holding. */
+/* The largest jump of a wall's velocity at which a held stop stays closed. */
 PRBM double jump_allowed(const Simulation *sim, int i) {
     const Stop *stop = &sim->configuration.mechanism->stops[i];
     return greater(stop_field(sim, stop->rest_speed),
                    REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
 }
 
-/* Keep held stops on walls whose velocities have jumped by less than rest_speed; others open or are
- * struck.  The impulses P on the stops are booked as captures.  They may pull, but no more than the
- * present forces press within a time. */
+/* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
+ * stops open or are struck.  The impulses P on the held stops dissipate energy as captures do.
+ * They may pull, but not more than the present forces press within the given time. */
 PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
