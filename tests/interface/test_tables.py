@@ -348,9 +348,9 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
         ("leaf", 4, 3, "a flexure type with neither pivots nor links, or both"),
         ("leaf", 2, 2, "an index out of range"),
         ("chain", 4, 100000, "an index out of range"),
-        ("chain", 4, 256, "more parts than can be computed with"),
+        ("chain", 4, 256, "more parts than the kernel supports"),
         ("hook", 0, 1, "a part that connects a body with itself"),
-        ("hook", 0, 2, "a body that nothing holds"),
+        ("hook", 0, 2, "a body without a connection to the ground"),
         ("tip", 0, 9, "an index out of range"),
     ],
 )
