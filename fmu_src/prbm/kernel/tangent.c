@@ -10,9 +10,9 @@
 #include "indicators.h"
 #include "values.h"
 
-/* A change of everything with the states and inputs: dq, dv, da, dlam.  With the complex changes
- * dphi = dtheta - i ds of an arm E, and dw of its rate, dE = i E dphi, d(E w) = E (i dphi w +
- * dw), and so on: the formulas of an angle hold for a stretch, too. */
+/* Changes dq, dv, da, dlam along a change of states and inputs.  An arm E has the complex change
+ * dphi = dtheta - i ds, and its rate w the change dw: dE = i E dphi, d(E w) = E (i dphi w + dw).
+ * Therefore links with and without stretch have the same formulas. */
 typedef struct {
     Simulation *sim;
     const Equations *q;
@@ -24,33 +24,33 @@ typedef struct {
     Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
     Complex *dE;                    /* (n,) i E dphi */
     Complex *swing, *dswing;        /* (n,) E w */
-    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); at first without the change of w' */
-    Complex *pull;                  /* (n,) torques on the arms and, -i times, forces along them */
+    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); bend_arms adds the change of w' */
+    Complex *pull;                  /* (n,) change of load: re = torque on an arm, im = force along it */
 } Tangent;
 
 static Complex times_i(Complex z) {
     return complex_of(-z.im, z.re);
 }
 
-/* --- of rows --- */
+/* --- changes of rows --- */
 
-/* A vector that turns, and its motion. */
+/* A complex arm E, its rate w, its acceleration alpha, and the changes of angle and rate. */
 typedef struct {
     Complex E, w, alpha, dphi, dw;
 } Arm;
 
 static Arm arm_at(const Tangent *t, int j) {
     Complex none = {0.0, 0.0}, one = {1.0, 0.0};
-    Arm still_one = {one, none, none, none, none};
+    Arm fixed = {one, none, none, none, none};
     if (j == FIXED) {
-        return still_one;
+        return fixed;
     }
     Arm arm = {t->e[j], t->w[j], t->alpha[j], t->dphi[j], t->dw[j]};
     return arm;
 }
 
-/* A part of a row as it is seen from where the row is: f B_j E_j, and f z for j = n; false if it
- * has no such part. */
+/* Set the term j of a row relative to its body of reference: f B_j E_j, or f z for j = n.  Return
+ * false if the term is zero. */
 static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
     int n = rows->system->n, on = seen_from(rows, i);
     Complex size = {0.0, 0.0};
@@ -102,7 +102,7 @@ static double rate_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* Of the second derivative, as far as it is not one of the accelerations. */
+/* Change of the second derivative of a row, without the change of the accelerations. */
 static double second_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
@@ -112,7 +112,8 @@ static double second_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* A force along a row, whose gradient i f B E turns: the body of the wall bears the reaction. */
+/* Add the change of load due to a force along a row, as its gradient i f B E rotates.  The reaction
+ * acts on the body that carries the wall. */
 static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
     int n = rows->system->n, on = seen_from(rows, i);
     Arm part;
@@ -129,7 +130,7 @@ static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
     }
 }
 
-/* --- of coordinates --- */
+/* --- changes of coordinates --- */
 
 /* The changes of the arms that follow from dq and dv. */
 static void move_arms(const Tangent *t) {
@@ -155,7 +156,7 @@ static void solve_dependents(const Tangent *t, const Loops *loops, double *chang
     }
 }
 
-/* dq and dv from the changes of the independent ones: the loops and their rates do not change. */
+/* Compute dq and dv from the changes of the independent coordinates, with closed loops. */
 static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) {
     Simulation *sim = t->sim;
     const System *system = system_of(sim);
@@ -186,7 +187,7 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
     return true;
 }
 
-/* --- of loads --- */
+/* --- changes of loads --- */
 
 /* (H x)_i over the arms */
 static Complex through_mass(const Tangent *t, int i, const Complex *x) {
@@ -231,7 +232,7 @@ static Complex inertial_change(const Tangent *t, int j) {
     return scaled(-1.0, times_i(change));
 }
 
-/* Loads, inertia and damping in proportion to mass: change of the pull on the arms. */
+/* Compute the change of the loads on the arms: forces, inertia, mass-proportional damping. */
 static void arm_load_change(const Tangent *t, const Complex *dw) {
     const Equations *q = t->q;
     for (int j = 0; j < q->system->n; j++) {
@@ -243,7 +244,7 @@ static void arm_load_change(const Tangent *t, const Complex *dw) {
     }
 }
 
-/* Springs, moments and damping of the bodies' own inertia. */
+/* Add the change of the loads on coordinates: springs, moments, damping of rotary inertia. */
 static void coordinate_load_change(const Tangent *t, const double *dmoment) {
     const Equations *q = t->q;
     const System *system = q->system;
@@ -290,7 +291,8 @@ static void rub_change(const Tangent *t) {
     scratch->used = mark;
 }
 
-/* Rows and columns: change of the right side by dR^T lam, -dR a and what convects. */
+/* Add the changes of constraint and friction forces at constant multipliers to the loads, and set
+ * dlam to the change of the right side of the rows. */
 static void row_change(const Tangent *t) {
     const Equations *q = t->q;
     Rows walls = slide_rows(q->system);
@@ -305,7 +307,7 @@ static void row_change(const Tangent *t) {
     }
 }
 
-/* The pull on an arm is a torque; -i times it, along a stretch. */
+/* Add the pull on arms to the loads of their angles (real part) and stretches (imaginary part). */
 static void apply_pull(const Tangent *t) {
     const System *system = t->q->system;
     for (int j = 0; j < system->n; j++) {
@@ -314,7 +316,7 @@ static void apply_pull(const Tangent *t) {
     }
 }
 
-/* --- their outputs --- */
+/* --- changes of outputs --- */
 
 static void point_changes(const Tangent *t, const BodyFrame *frame, Complex *moved,
                           Complex *speed) {
@@ -394,9 +396,9 @@ static void stop_changes(const Tangent *t, double *out) {
     }
 }
 
-/* dbend, complete with the change of the accelerations. */
+/* Add the change of the accelerations to dbend. */
 static void bend_arms(const Tangent *t) {
-    Complex *dalpha = t->pull; /* which has been applied */
+    Complex *dalpha = t->pull; /* The pull has been applied: reuse its memory. */
     turning(t->q->system, t->dx, dalpha);
     for (int j = 0; j < t->q->system->n; j++) {
         t->dbend[j] = plus(t->dbend[j], times_i(product(t->e[j], dalpha[j])));
@@ -436,7 +438,7 @@ static void base_changes(const Tangent *t, double *out) {
     out[BASE_MOMENT] = moment;
 }
 
-/* Change of the kinetic energy, Re(d(E w)^H H (E w)) and what the bodies' own inertia adds. */
+/* Change of the kinetic energy: Re(d(E w)^H H (E w)) + v^T diag(J) dv. */
 static double kinetic_change(const Tangent *t) {
     double sum = 0.0;
     for (int i = 0; i < t->q->system->n; i++) {
@@ -461,7 +463,7 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
     out[ENERGY_WORK] = dx[2 * count + 1];
 }
 
-/* The same arms, which move at the rates x (n,) that do not change. */
+/* Return a copy of t with constant rates x (n,) in place of v. */
 static Tangent at_rates(const Tangent *t, const double *x) {
     Scratch *scratch = &t->sim->scratch;
     int n = t->q->system->n;
@@ -552,7 +554,7 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
     return sum;
 }
 
-/* Change of |x|; at zero, where it has two, their mean. */
+/* Change of |x|; zero at x = 0, the mean of both one-sided changes. */
 static double sign_times(double x, double change) {
     return x < 0.0 ? -change : x > 0.0 ? change : 0.0;
 }
@@ -634,7 +636,7 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     indicator_changes(t, out + slots->indicators);
 }
 
-/* Room for the changes at a moment. */
+/* Allocate the changes and set the state about which they are computed. */
 static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *du) {
     const System *system = system_of(sim);
     const Evaluation *at = now->evaluation;
