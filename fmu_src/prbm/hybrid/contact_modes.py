@@ -122,12 +122,12 @@ def release_moving(configuration: Configuration, front: Front) -> tuple[Front, i
 def holding_stops(
     configuration: Configuration, front: Front, candidates: Sequence[int]
 ) -> list[int]:
-    """Return the stops at rest that hold: pressed together, while the others open.
+    """Return the stops at rest that stay closed: their forces push, and the other stops open.
 
     Raises
     ------
     SimulationError
-        If there are none: contacts that slide exclude them by their friction.
+        If the friction of sliding contacts excludes every choice of holding stops.
     """
     holding = find_holding_stops(configuration, front, candidates)
     if holding is None:
@@ -138,10 +138,10 @@ def holding_stops(
 def find_holding_stops(
     configuration: Configuration, front: Front, candidates: Sequence[int]
 ) -> list[int] | None:
-    """Return the stops at rest that hold: pressed together, while the others open.
+    """Return the stops at rest that stay closed: their forces push, and the other stops open.
 
-    Contacts that move slip meanwhile, those at rest are frictionless.  Of stops that can move only
-    together, those hold whose rows are independent.  None if no stops hold in this way.
+    Sliding contacts have friction, contacts at rest have none.  Of stops with linearly dependent
+    rows, an independent set holds.  Return None if there is no such choice of stops.
     """
     every, scales = sorted(set(candidates)), configuration.scales
     if not every:

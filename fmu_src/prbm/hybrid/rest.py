@@ -48,12 +48,12 @@ def rest_forces(
     slips: Sequence[int],
     at_rest: Sequence[int],
 ) -> RestForces | None:
-    """Return the forces that satisfy the laws of all contacts; None if there are none.
+    """Return the forces that satisfy the laws of all contacts, or None without a solution.
 
     Parameters
     ----------
     equations : Equations
-        In which all stops are open, and friction points at rest have no friction.
+        Equations with all stops open, and without friction of the friction points at rest.
     t : float
         Time, for the accelerations of walls [s].
     q, v : (n,)
@@ -70,7 +70,7 @@ def rest_forces(
     a, n, k = equations.evaluate(t, q, v).a, equations.n, len(stops)
     G = system.gap_rows.jacobian(e)[list(stops)]
     T = np.reshape([equations.slip_row(c, e) for c in at_rest], (-1, n))
-    # A stop that slides pushes and rubs.
+    # The column of a sliding stop: normal force and friction.
     rubs = [
         equations.stop_friction[i] * sign * equations.slip_row(i, e)
         for i, sign in zip(stops, slips, strict=True)
