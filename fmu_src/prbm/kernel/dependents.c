@@ -1,8 +1,8 @@
 /* The coordinates that the loops determine.
  *
- * The loops tie the n coordinates together; r of them are solved from the other n - r, the states of
- * model exchange, so that a solver without constraints stays on them (mechanics/independent.py
- * chooses them). */
+ * The states of model exchange are n - r independent coordinates, which mechanics/independent.py
+ * chooses.  The r dependent coordinates are solved from the loop equations.  A solver without
+ * constraints therefore keeps the loops closed. */
 #include <math.h>
 #include <stdio.h>
 
