@@ -41,7 +41,7 @@ def unpack(path: Path) -> None:
     ],
 )
 def test_archives_beyond_a_limit_are_rejected(reader, limit, message, tmp_path, monkeypatch):
-    """An archive of 2 MiB is smaller than 10 kB."""
+    """The archive contains 2 MiB, compressed to less than 10 kB."""
     path = tmp_path / "large.fmu"
     path.write_bytes(archive(modelDescription_xml=SIZE, data=SIZE))
     assert path.stat().st_size < 10_000

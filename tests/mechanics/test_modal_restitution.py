@@ -51,13 +51,13 @@ def impact_of_two_modes(share, towards):
 
 @pytest.mark.parametrize("share", [1e-2, 1e-3, 1e-4])
 def test_restitution_is_below_minus_one_if_the_fundamental_mode_moves_away_from_the_wall(share):
-    """Little of it arrives: otherwise the gap would open."""
+    """The share of this mode is small: otherwise the gap would open instead of close."""
     found, expected = impact_of_two_modes(share, towards=False)
     assert found == pytest.approx(expected, rel=1e-6)
     assert -1.0 / math.sqrt(share) <= found < -1.0
 
 
-def test_restitution_is_far_below_minus_one_if_little_of_the_fundamental_mode_arrives():
+def test_restitution_is_far_below_minus_one_if_the_fundamental_mode_has_little_energy():
     assert impact_of_two_modes(1e-4, towards=False)[0] < -20.0
 
 
@@ -69,7 +69,7 @@ def test_restitution_is_above_minus_one_if_the_fundamental_mode_moves_towards_th
 
 
 def test_restitution_is_bounded_by_the_share_of_the_fundamental_mode():
-    """C^2 is at most 1 over its share of the arriving energy: an impact gains no energy."""
+    """With the share s of the energy before the impact, C^2 <= 1/s: an impact gains no energy."""
     sim = Simulation(mechanism("PRBDM3R"), OFFSET)
     sim.record = []
     sim.advance(0.24)
@@ -79,7 +79,7 @@ def test_restitution_is_bounded_by_the_share_of_the_fundamental_mode():
 
 
 def test_restitution_is_that_of_an_unstable_mode_if_the_impact_shape_has_one():
-    """A shape that the guide passes in motion, and at which it would not be stable at rest."""
+    """The guide is in motion at the impact; at rest, this shape would be unstable."""
     sim = Simulation(mechanism("PRBDM3R"))
     sim.record = []
     sim.advance(0.05)
@@ -133,7 +133,7 @@ def fundamental(system, q, M, curved):
 
 @pytest.mark.parametrize("wall", [-5e-3, 10e-3])
 def test_away_from_equilibrium_restitution_depends_on_the_coordinates(wall):
-    """By up to 0.2 % here, and the frequency by up to 5 %; that of the engine uses the angles."""
+    """Restitution changes by up to 0.2 %, frequency by up to 5 %; the engine uses the angles."""
     sim = Simulation(mechanism("PRBDM2R"), OFFSET | {"stop.position": wall})
     sim.record = []
     while not sim.record:

@@ -287,7 +287,7 @@ def test_frequencies_and_rest_position_do_not_depend_on_order_and_direction_of_f
     assert results[1][1] == pytest.approx(results[0][1], rel=1e-9)
 
 
-def test_the_moving_mass_is_that_of_the_parts_less_the_stubs_at_the_ground():
+def test_the_moving_mass_excludes_the_stubs_at_the_ground():
     """Each stub at the ground has a twentieth of the mass of a 2R flexure."""
     system = assemble(GUIDE, GUIDE.values())
     flexure = 7800 * 8e-3 * 1e-4 * 0.04

@@ -22,7 +22,7 @@ from .systems import check_length
 # The default grid has about the proportions of that in the thesis, in round numbers.
 WALL_SHARE = 5 / 9  # Largest default wall position, as a share of the displacement at release.
 OFFSET_SHARE = 1 / 20  # Largest default offset, as a share of the size of the mechanism.
-ROUND_RTOL = 1e-9  # Smaller excesses over a round number are round-off.
+ROUND_RTOL = 1e-9  # A round number may exceed its limit by this share: round-off.
 GRID = (-1.0, -0.5, 0.0, 0.5, 1.0)  # Default positions and offsets, relative to the largest.
 POINTS_MAX = 400  # Points of a map.
 FLEXURE_METHODS = {"algebraic", "simulated", "fitted"}  # Methods that depend on flexure models.

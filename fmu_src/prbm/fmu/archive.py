@@ -9,7 +9,7 @@ from ..base.atomic import FILE_MODE
 TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # Of every file: the earliest time that a zip archive can hold.
 EXECUTABLE_MODE = 0o755
 LIBRARIES = (".so", ".dll", ".dylib")
-UNIX = 3  # System of origin; unpackers apply file permissions from Unix alone.
+UNIX = 3  # System of origin: file permissions are applied only if it is Unix.
 
 
 def zipped(contents: Mapping[str, bytes]) -> bytes:

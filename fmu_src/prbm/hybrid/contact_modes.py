@@ -122,7 +122,7 @@ def release_moving(configuration: Configuration, front: Front) -> tuple[Front, i
 def holding_stops(
     configuration: Configuration, front: Front, candidates: Sequence[int]
 ) -> list[int]:
-    """Return the stops at rest that hold: pressed together, while the others open.
+    """Return the stops at rest that stay closed: their forces push, and the other stops open.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def holding_stops(
 def find_holding_stops(
     configuration: Configuration, front: Front, candidates: Sequence[int]
 ) -> list[int] | None:
-    """Return the stops at rest that hold: pressed together, while the others open.
+    """Return the stops at rest that stay closed: their forces push, and the other stops open.
 
     In this choice contacts with a sliding velocity slip, and contacts at rest are frictionless.  Of
     stops that can move only together, some with independent rows hold.  None if no choice

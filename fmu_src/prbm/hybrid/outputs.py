@@ -23,13 +23,13 @@ def all_outputs(
     Parameters
     ----------
     equations : Equations
-        That hold at the time.
+        Equations of motion at the time.
     latched : (s,) sequence of Latched
         The last impact of each stop.
     t, y : float, (2 n + 2,)
         Time [s] and state.
     others : mapping
-        Outputs that are constant.
+        Values of the constant outputs.
     """
     system, n = equations.system, equations.n
     q, v = y[:n], y[n : 2 * n]

@@ -32,18 +32,18 @@ static Complex times_i(Complex z) {
     return complex_of(-z.im, z.re);
 }
 
-/* --- of rows --- */
+/* --- changes of rows --- */
 
-/* A vector that turns, and its motion. */
+/* A complex arm E, its rate w, its acceleration alpha, and the changes of angle and rate. */
 typedef struct {
     Complex E, w, alpha, dphi, dw;
 } Arm;
 
 static Arm arm_at(const Tangent *t, int j) {
     Complex none = {0.0, 0.0}, one = {1.0, 0.0};
-    Arm still_one = {one, none, none, none, none};
+    Arm fixed = {one, none, none, none, none};
     if (j == FIXED) {
-        return still_one;
+        return fixed;
     }
     Arm arm = {t->e[j], t->w[j], t->alpha[j], t->dphi[j], t->dw[j]};
     return arm;
@@ -112,7 +112,8 @@ static double second_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* A force along a row, whose gradient i f B E turns: the body of the wall bears the reaction. */
+/* Add the change of load due to a force along a row, as its gradient i f B E rotates.  The reaction
+ * acts on the body that carries the wall. */
 static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
     int n = rows->system->n, on = seen_from(rows, i);
     Arm part;
@@ -129,7 +130,7 @@ static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
     }
 }
 
-/* --- of coordinates --- */
+/* --- changes of coordinates --- */
 
 /* The changes of the arms that follow from dq and dv. */
 static void move_arms(const Tangent *t) {
@@ -155,7 +156,7 @@ static void solve_dependents(const Tangent *t, const Loops *loops, double *chang
     }
 }
 
-/* dq and dv from the changes of the independent ones: the loops and their rates do not change. */
+/* Compute dq and dv from the changes of the independent coordinates, with closed loops. */
 static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) {
     Simulation *sim = t->sim;
     const System *system = system_of(sim);
@@ -186,7 +187,7 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
     return true;
 }
 
-/* --- of loads --- */
+/* --- changes of loads --- */
 
 /* (H x)_i over the arms */
 static Complex through_mass(const Tangent *t, int i, const Complex *x) {
@@ -231,7 +232,7 @@ static Complex inertial_change(const Tangent *t, int j) {
     return scaled(-1.0, times_i(change));
 }
 
-/* Loads, inertia and damping in proportion to mass: change of the pull on the arms. */
+/* Compute the change of the loads on the arms: forces, inertia, mass-proportional damping. */
 static void arm_load_change(const Tangent *t, const Complex *dw) {
     const Equations *q = t->q;
     for (int j = 0; j < q->system->n; j++) {
@@ -243,7 +244,7 @@ static void arm_load_change(const Tangent *t, const Complex *dw) {
     }
 }
 
-/* Springs, moments and damping of the bodies' own inertia. */
+/* Add the change of the loads on coordinates: springs, moments, damping of rotary inertia. */
 static void coordinate_load_change(const Tangent *t, const double *dmoment) {
     const Equations *q = t->q;
     const System *system = q->system;
@@ -314,7 +315,7 @@ static void apply_pull(const Tangent *t) {
     }
 }
 
-/* --- their outputs --- */
+/* --- changes of outputs --- */
 
 static void point_changes(const Tangent *t, const BodyFrame *frame, Complex *moved,
                           Complex *speed) {
@@ -394,9 +395,9 @@ static void stop_changes(const Tangent *t, double *out) {
     }
 }
 
-/* dbend, complete with the change of the accelerations. */
+/* Add the change of the accelerations to dbend. */
 static void bend_arms(const Tangent *t) {
-    Complex *dalpha = t->pull; /* which has been applied */
+    Complex *dalpha = t->pull; /* The pull has been applied: reuse its memory. */
     turning(t->q->system, t->dx, dalpha);
     for (int j = 0; j < t->q->system->n; j++) {
         t->dbend[j] = plus(t->dbend[j], times_i(product(t->e[j], dalpha[j])));
@@ -634,7 +635,7 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     indicator_changes(t, out + slots->indicators);
 }
 
-/* Room for the changes at a moment. */
+/* Allocate the changes and set the state about which they are computed. */
 static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *du) {
     const System *system = system_of(sim);
     const Evaluation *at = now->evaluation;

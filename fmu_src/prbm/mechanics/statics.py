@@ -60,8 +60,8 @@ def tangent_stiffness(
 ) -> Real:
     r"""Stiffness about a shape, K + diag(Im(w e) + Re(lam^T B e)) [N m/rad].
 
-    With g = Im(w e) + Re(lam^T B e) and h = Im(lam^T B e) - Re(w e) of a link, its stretch has -g
-    on the diagonal and h beside the link's angle.
+    A link with g = Im(w e) + Re(lam^T B e) and h = Im(lam^T B e) - Re(w e) has the diagonal entries
+    g for its angle and -g for its stretch, and h couples both.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def tangent_stiffness(
     e : (n,) complex
         Directions.
     arm : (n,) int or None
-        The arm that a coordinate turns or stretches; None: each its own.
+        Index of the arm that each coordinate turns or stretches; None: coordinate j turns arm j.
 
     Examples
     --------
@@ -112,8 +112,8 @@ def equilibrium(
     system : System
         The mechanism.
     displacement : float or None
-        Of the released body's centre of mass along the direction of the release [m]; held by a
-        force along that direction.  None: no holding force.
+        Displacement of the released body's centre of mass along the direction of the release [m],
+        held by a force along that direction.  None: no holding force.
     loads : mapping or None
         Forces and moments by the names of the inputs, ``force.x`` and ``force.y`` [N],
         ``force.moment`` [N m] for a :class:`prbm.mechanism.parts.Force` of the name
@@ -135,8 +135,8 @@ def equilibrium(
         B = np.vstack([B, system.release])
         c = np.append(c, system.release_c)
     state = np.concatenate([system.q0, np.zeros(len(c))])
-    # A body that hangs on a pin alone may turn at once.  A jump of any other coordinate leads to
-    # another branch, which slow loading does not reach.
+    # Only bodies without a spring, for instance on a pin, may move far in one load step.  A jump of
+    # another coordinate leads to a branch that slow loading does not reach.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
     done, fraction = 0.0, 1.0
     while done < 1.0:
@@ -173,9 +173,9 @@ def _loads(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
 
 
 def free_displacement(system: System) -> float:
-    """Return where the released body would rest under gravity alone, without a stop [m].
+    """Return the rest position of the released body under gravity, without stops [m].
 
-    The displacement of its centre of mass along the direction of the release, from straight.
+    It is the displacement of the centre of mass from the straight shape along the release.
     """
     e = system.directions(equilibrium(system).q)
     return float((system.release @ e).real) + system.release_c
@@ -283,7 +283,7 @@ def _on_pivot(system: System, name: str) -> bool:
 
 
 def _left_by_loops(system: System, e: Complex, rows: Real) -> float:
-    """Return the largest derivative in rows (k, n) that does not follow from the loops'."""
+    """Return the largest entry of rows (k, n) after projection off the rows of the loops."""
     loops = system.loop_rows.jacobian(e)
     left = rows - (loops.T @ np.linalg.lstsq(loops.T, rows.T)[0]).T
     return float(np.abs(left).max())
@@ -297,7 +297,7 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     q : (n,)
         Angles at release [rad].
     speed : float
-        Of the centre of mass along the direction of the release [m/s].
+        Speed of the centre of mass along the direction of the release [m/s].
 
     Returns
     -------

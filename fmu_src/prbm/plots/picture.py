@@ -26,8 +26,8 @@ MODE_AMPLITUDE = 0.12  # Largest displacement in the picture of a mode, as a sha
 ARROW_LENGTH = 0.14  # Length of the arrows of forces, as a share of the size.
 MODES_MAX = 12  # Largest number of modes in a picture.
 COLUMNS = 3  # Modes per row.
-THIN_BODY = 0.12  # A body lower than this share of the size has its name above it.
-NAME_AT = 0.36  # Place of a flexure's name, as a share of its length: flexures cross in the middle.
+THIN_BODY = 0.12  # Bodies of a lower height, as a share of the size, have their names above.
+NAME_AT = 0.36  # Position of a name along its flexure, off the middle where flexures may cross.
 NAME, NAME_OFFSET = "#303030", 7.0  # Colour; distance of a flexure from its name [points].
 WIDTH, HEIGHT_MIN, HEIGHT_MAX, FRAME = 7.2, 2.4, 6.4, 0.9  # Of the picture [inch].
 
@@ -130,7 +130,7 @@ def moved(shapes: Shapes, E: Complex, found: Modes, k: int) -> Complex:
     E : (n,) complex
         Arms of the shape in equilibrium.
     found : Modes
-        Modes about it.
+        Modes about this equilibrium.
     k : int
         Index of the mode.
     """
@@ -141,8 +141,8 @@ def moved(shapes: Shapes, E: Complex, found: Modes, k: int) -> Complex:
         for new, old in zip(_places(shapes, along), _places(shapes, E), strict=True)
     )
     amplitude = MODE_AMPLITUDE * shapes.size / largest
-    heaviest = shapes.system.mechanism.release.body
-    if (shapes.centre(heaviest, along) - shapes.centre(heaviest, E)).real < 0.0:
+    released = shapes.system.mechanism.release.body
+    if (shapes.centre(released, along) - shapes.centre(released, E)).real < 0.0:
         amplitude = -amplitude
     result: Complex = E * (1 + 1j * amplitude * w)
     return result
@@ -267,7 +267,7 @@ class _Drawing:
             self.text(complex(x + length, y) / self.factor, f" {force.name}", IMPACT, ha="left")
 
     def along(self, start: complex, end: complex, words: str) -> None:
-        """Write along a line, above it in the direction of reading."""
+        """Write words parallel to a line and above it, never upside down."""
         place = (start + NAME_AT * (end - start)) * self.factor
         degrees = math.degrees(cmath.phase(end - start))
         turned = (degrees + 89.0) % 180.0 - 89.0

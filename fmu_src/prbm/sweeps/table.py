@@ -21,8 +21,10 @@ Table = pd.DataFrame | str | Path
 METHODS = ("random", "latin", "sobol")
 SEPARATORS = {";": "semicolons", "\t": "tabs"}  # separators of CSV dialects that are rejected
 WORDS = {"true": 1.0, "false": 0.0}
-PROBABILITY_MIN = 2.0**-53  # Probabilities stay this far from 0 and 1: quantiles may be infinite.
-NAMES_LISTED_MAX = 10  # Longer lists of settable variables are left to "fmpy info".
+PROBABILITY_MIN = (
+    2.0**-53
+)  # Distance of probabilities from 0 and 1, where quantiles may be infinite.
+NAMES_LISTED_MAX = 10  # Messages with more settable variables refer to "fmpy info" instead.
 HINT_LENGTH_MAX = 200  # characters
 RANGES = {"Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31, "Int64": 53,
           "UInt8": 8, "UInt16": 16, "UInt32": 32, "UInt64": 53}  # fmt: skip
@@ -43,7 +45,7 @@ def samples(
         For each parameter a frozen distribution of ``scipy.stats`` (any object with ``ppf``), or
         (low, high) for a uniform distribution; in SI units.
     n : int
-        Number of rows.  Sobol's sequence is balanced only for powers of two, and needs one.
+        Number of rows; a power of two with ``sobol``, whose sequence is balanced only then.
     seed : int
         Seed (default: 0).  The same seed gives the same table.
     method : str

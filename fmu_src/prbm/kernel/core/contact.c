@@ -36,8 +36,8 @@ static bool closing_in(Problem *problem) {
                          "them apart, or slow them down");
 }
 
-/* Solve W_ss P_s = -b_s for the members s.  Members that pull get no impulse and are removed;
- * *pulling: whether there are any. */
+/* Solve W_ss P_s = -b_s for the members s.  Members with a negative impulse get the impulse zero
+ * and are removed; *pulling is true if there are any. */
 static bool share_impulses(int k, int *size, int *members, const double *W, const double *b,
                            double *P, bool *pulling, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -65,7 +65,8 @@ static bool share_impulses(int k, int *size, int *members, const double *W, cons
     return solved;
 }
 
-/* Share the impulses as evenly as possible between the stops that open at exactly -eps u. */
+/* Distribute the impulses as evenly as possible between the stops whose rate after the impact
+ * equals the rate that restitution prescribes. */
 static bool share_evenly(int k, const double *W, const double *b, double tolerance, double *P,
                          Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -109,7 +110,7 @@ static double sign_of(double x) {
     return x < 0.0 ? -1.0 : 1.0;
 }
 
-/* The impulse at which the work left is done, or the gap stops opening. */
+/* Return the normal impulse until the work of restitution is complete or the gap rate is zero. */
 static double restitution_ends(double u_n, double rate_n, double left) {
     double root = u_n * u_n + 2.0 * rate_n * left;
     if (root < 0.0) {
@@ -119,7 +120,7 @@ static double restitution_ends(double u_n, double rate_n, double left) {
     return total > 0.0 ? 2.0 * left / total : HUGE_VAL;
 }
 
-/* dP_t/dP_n by Coulomb's law: slipping, sticking, or starting to slip from rest. */
+/* Return dP_t/dP_n by Coulomb's law for a contact that slips, sticks, or begins to slip. */
 static double friction_ratio(double nt, double tt, double u_t, double friction) {
     if (u_t != 0.0) {
         return -friction * sign_of(u_t);
@@ -130,14 +131,15 @@ static double friction_ratio(double nt, double tt, double u_t, double friction) 
     return -friction * sign_of(nt);
 }
 
-/* A hit in progress: rates, impulses, and how the rates change with the normal impulse. */
+/* State of an impact: rates, impulses, and derivatives of the rates by the normal impulse. */
 typedef struct {
     double nn, nt, tt, friction;
     double u_n, u_t, p_n, p_t;
     double ratio, rate_n, rate_t;
 } Hit;
 
-/* The normal impulse after which sliding stops, with the rates until then. */
+/* Set the derivatives of the rates, which are constant until sliding stops; return the normal
+ * impulse until then. */
 static double stops_sliding(Hit *hit) {
     hit->ratio = friction_ratio(hit->nt, hit->tt, hit->u_t, hit->friction);
     hit->rate_n = hit->nn + hit->ratio * hit->nt;
@@ -154,7 +156,7 @@ static void receive(Hit *hit, double step) {
     hit->p_t += hit->ratio * step;
 }
 
-/* Apply the impulses of compression and return their work. */
+/* Apply the compression; return its work. */
 static double compress(Hit *hit) {
     double work = 0.0;
     while (hit->u_n < 0.0) {
@@ -162,7 +164,7 @@ static double compress(Hit *hit) {
         double closed = hit->rate_n > WEDGED_RTOL * hit->nn ? -hit->u_n / hit->rate_n : HUGE_VAL;
         double step = lesser(sticking, closed);
         if (step == HUGE_VAL) {
-            break; /* wedged, unless u_n is round-off: stronge checks it */
+            break; /* zero mobility: the remaining rate is round-off or an error, see stronge */
         }
         work -= work_of(hit, step);
         receive(hit, step);
@@ -213,13 +215,13 @@ PRBM bool stronge(const double *W, const double *u, double friction, double rest
 
 /* --- several hits with friction --------------------------------------------------------------- */
 
-/* Limits of the work that restitution returns: of the normal impulses, and of all. */
+/* Limits of the work of restitution: of the normal impulses, and of all impulses. */
 typedef struct {
     double normal, all;
 } Returned;
 
-/* The impulses R of restitution, the normal ones at least s wanted; *allowed: their work does not
- * exceed its limits. */
+/* Compute impulses R of restitution of at least s wanted; *allowed: their work is within the limits
+ * most. */
 static bool rebound(int k, const double *W, const double *after, const double *friction,
                     const double *wanted, double s, const Returned *most, double tolerance,
                     double *R, bool *allowed, Scratch *scratch) {
@@ -240,7 +242,7 @@ static bool rebound(int k, const double *W, const double *after, const double *f
     return settled;
 }
 
-/* The rebound with the largest s whose work is allowed. */
+/* Find the rebound with the largest s whose work is within the limits. */
 static bool restitution_of_several(int k, const double *W, const double *after,
                                    const double *friction, const double *wanted,
                                    const Returned *most, double tolerance, double *R,

@@ -31,7 +31,7 @@ PRBM Kinematics place_kinematics(const System *system, Memory *memory) {
     return at;
 }
 
-/* Zero what has been placed since a beginning: the padding of vectors and rows stays zero. */
+/* Zero the memory placed since begin.  The padding of vectors and rows must stay zero. */
 PRBM void zero_placed(const Memory *memory, size_t begin) {
     if (memory->base != NULL) {
         memset(memory->base + begin, 0, memory->used - begin);
@@ -70,7 +70,7 @@ PRBM void set_reference(Reference *reference, const System *system, const double
     stretch(system, reference->angle, reference->e);
 }
 
-/* The arms of links that stretch, and the diagonal of M, of which |E|^2 is a factor. */
+/* Set the arms of links that stretch, and the diagonal of M, which is proportional to |E|^2. */
 RARE void stretch_links(const System *system, Kinematics *at) {
     stretch(system, at->angle, at->e);
     pad_parts(system->even, at->e, at->e_parts);
@@ -82,12 +82,12 @@ RARE void stretch_links(const System *system, Kinematics *at) {
     }
 }
 
-/* The diagonal of M: it depends on the position where links stretch. */
+/* Return the diagonal of M.  It is constant unless links stretch. */
 static const double *own_inertia(const System *system, const Kinematics *at) {
     return system->stretch_count > 0 ? at->own : system->own;
 }
 
-/* The directions at the angles, from those of a reference nearby if there is one. */
+/* Compute the directions at the angles, from those of a nearby reference if possible. */
 SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at) {
     if (near == NULL ||
         !turned_directions(even, at->angle, near->angle, near->e_parts, at->e_parts, at->e)) {
@@ -103,7 +103,7 @@ PRBM void find_directions(const System *system, const Reference *near, Kinematic
     directions_of(system->even, system, near, at);
 }
 
-/* Re(w^2) of the complex rates w = theta' - i s' of arms, for the squares of all rates. */
+/* Replace the squares of the rates by Re(w^2), with the complex rates w = theta' - i s' of arms. */
 RARE void stretch_squares(const System *system, double *squares) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k];
@@ -112,7 +112,7 @@ RARE void stretch_squares(const System *system, double *squares) {
     }
 }
 
-/* a: the loads Re(w e) + moment. */
+/* Set a to the loads Re(w e) + moment, and the squares of the rates. */
 SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
     const double *moment = q->moment, *v = result->at.speed;
     double *x = result->a, *squares = result->at.squares;
@@ -131,14 +131,14 @@ SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
 
 /* --- loads and rows --------------------------------------------------------------------------- */
 
-/* What the rates of stretches add to the accelerations of angles: with Im(w^2) = -2 theta' s', all
- * that w^2 enters is solved for a - Im(w^2) as it is for a without stretches. */
+/* Return Im(w^2) = -2 theta' s' of a link that stretches.  The equations are solved for
+ * a - Im(w^2) with the terms of a link without stretch; add_coriolis then adds Im(w^2). */
 static double coriolis(const System *system, const double *v, int stretch_coordinate) {
     return -2.0 * v[arm_of(system, stretch_coordinate)] * v[stretch_coordinate];
 }
 
-/* What springs and their damping take up: x -= K (q - q0 + beta v), spring by spring, and the
- * power beta v^T K v of the damping. */
+/* Subtract the forces of springs and their damping from the loads, x -= K (q - q0 + beta v), and
+ * compute the power beta v^T K v of the damping. */
 SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
     const System *system = q->system;
     const int n = system->n;
@@ -181,7 +181,7 @@ SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE sq
     }
 }
 
-/* The rows that are seen from a body, and what is left of their convective terms. */
+/* Compute the rows measured relative to a body, and their convective terms without Im(w^2). */
 RARE void carried_rows(const Equations *q, const Kinematics *at, double *rows,
                        double *convective) {
     const System *system = q->system;
@@ -243,8 +243,8 @@ SIZED void damp_mass(int size, double c, const double *ALONE M, const double *AL
     }
 }
 
-/* One block of M, and what its inertia adds to the loads x: Im(diag(e)^H H diag(e)) v^2, as the
- * mass matrix is symmetric and the quadratic velocities are antisymmetric. */
+/* Compute one block of M, and add its quadratic velocity terms Im(diag(e)^H H diag(e)) v^2 to the
+ * loads x.  M is symmetric, the matrix of these terms antisymmetric. */
 SIZED void block_inertia(int size, const Complex *ALONE H, const double *ALONE own, Parts e,
                          const double *ALONE squares, double *ALONE M, double *ALONE x) {
     UNROLLED
@@ -265,7 +265,7 @@ SIZED void block_inertia(int size, const Complex *ALONE H, const double *ALONE o
     }
 }
 
-/* M in its block of the coordinates from start, and what its inertia and damping add to a. */
+/* Compute the block of M that begins at start; add its inertial and damping loads to a. */
 SIZED void block_mass(const Equations *q, Evaluation *result, int size, int start,
                       const Complex *H, double *M) {
     const Kinematics *at = &result->at;
@@ -277,7 +277,7 @@ SIZED void block_mass(const Equations *q, Evaluation *result, int size, int star
     }
 }
 
-/* The block of M in result->block, factored into L, and L^-1 of the loads and rows. */
+/* Factor the block of M in result->block into L, and apply L^-1 to loads and rows. */
 SIZED bool factor_any_block(const Equations *q, Evaluation *result, int size, int start,
                             double *L) {
     const Factors *factors = &result->factors;
@@ -301,7 +301,7 @@ SIZED bool block_motion(const Equations *q, Evaluation *result, int size, int st
     return factor_any_block(q, result, size, start, L);
 }
 
-/* The same of a small block; one of tiny or huge numbers takes the longer way. */
+/* Compute and factor a small block of M.  Blocks of tiny or huge numbers take the general path. */
 SIZED bool small_block_motion(const Equations *q, Evaluation *result, int size, int start,
                               const Complex *H, double *L) {
     const int even = q->system->even, r = q->r;
@@ -403,8 +403,8 @@ static void add_rubs(const Equations *q, Evaluation *result) {
     }
 }
 
-/* A stop that slips pushes along its gap and, by Coulomb's law, along its wall: its column differs
- * from its row. */
+/* Set the columns of slipping stops.  Coulomb's law adds a force along the wall to the normal
+ * force, so that the column of such a stop differs from its row. */
 static void set_columns(const Equations *q, Evaluation *result) {
     const System *system = q->system;
     int n = system->n, even = system->even;
@@ -428,7 +428,7 @@ static void set_columns(const Equations *q, Evaluation *result) {
 
 /* --- accelerations ---------------------------------------------------------------------------- */
 
-/* The factors, and a := L^-1 a, from the rows in Z. */
+/* Compute the factors from the rows in Z, and a := L^-1 a. */
 SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
     result->factors.r = q->r;
     result->factors.block_count = q->system->block_count;

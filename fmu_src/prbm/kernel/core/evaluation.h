@@ -5,14 +5,14 @@
 #include "core/equations.h"
 #include "core/factors.h"
 
-/* Angles and their directions: the directions at angles nearby are turned from these. */
+/* Angles and their directions, from which the directions at nearby angles are computed. */
 typedef struct {
     double *angle; /* (even,) */
     Complex *e;    /* (even,) */
-    Parts e_parts; /* (even,) without stretch */
+    Parts e_parts; /* (even,) unit vectors, without stretch */
 } Reference;
 
-/* Position and velocity of a system; of the coordinates and, behind them, of the ground. */
+/* Position and velocity of a system: entries of the coordinates first, then of the ground. */
 typedef struct {
     double time;                     /* used if the walls of held stops move */
     double *angle, *speed, *squares; /* (even,), (even + 2,), (even,): speed^2 */
@@ -35,11 +35,11 @@ typedef struct {
 PRBM void reference_place(Reference *reference, const System *system, Memory *memory);
 PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory *memory);
 PRBM void set_reference(Reference *reference, const System *system, const double *angle);
-/* Accelerations a (n,) and multipliers lam (r,): loops, closed stops (> 0 pushes), what sticks.
- * near: a reference near q, or NULL. */
+/* Accelerations a (n,) and multipliers lam (r,): loops, closed stops (> 0 pushes),
+ * sticking contacts.  near: a reference near q, or NULL. */
 PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
                              const double *v, const Reference *near, Evaluation *result, Problem *problem);
-/* Only the factors of the equations at a state. */
+/* Compute only the factors of the equations at a state. */
 PRBM bool factor_equations(const Equations *equations, const double *q, const double *v,
                            const Reference *near, Evaluation *result, Problem *problem);
 PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation,

@@ -3,8 +3,8 @@
 #include "core/matrix.h"
 #include "core/vectors.h"
 
-/* M = L D L^T of the lower triangle of M, L with ones on its diagonal, and the inverse of D; false
- * if M is not positive definite. */
+/* Factor M = L D L^T from its lower triangle, with ones on the diagonal of L; inverse is 1/D.
+ * Return false if M is not positive definite. */
 SHARED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     for (int i = 0; i < size; i++) {
         double pivot = M[i * size + i];
@@ -34,12 +34,13 @@ RARE bool factor(int size, const double *M, double *L, double *inverse) {
     return factor_any(size, M, L, inverse);
 }
 
-#define LEAST_MULTIPLE 1e-280 /* below and above, it is near what doubles can hold */
+#define LEAST_MULTIPLE 1e-280 /* smaller and larger multiples may underflow or overflow */
 #define LARGEST_MULTIPLE 1e280
 
-/* The same of a small M without waiting for one division after the other: elimination without
- * divisions leaves w_0 = M_00, w_1 = M_00 D_1, w_2 = w_0 w_1 D_2, ..., and all w_k L_ik.  False,
- * too, where doubles hardly hold these multiples: factor may still succeed, then. */
+/* Factor a small M like factor_any, but with independent divisions at the end, which overlap.
+ * Elimination without divisions gives w_0 = M_00, w_1 = M_00 D_1, w_2 = w_0 w_1 D_2, ..., and all
+ * w_k L_ik.  Also return false if these multiples may underflow or overflow; factor may then
+ * succeed. */
 SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     double w[SMALL][SMALL], multiple = 1.0;
     bool safe;
@@ -80,7 +81,7 @@ SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, doubl
     return safe;
 }
 
-/* Put what belongs to a block, by pairs if it begins at an even place. */
+/* Copy the values of a block to its place in a vector, in pairs if start is even. */
 SHARED void put_block(int size, int start, const double *from, double *to) {
     to += start;
     if (start % PAIR != 0) {
@@ -99,7 +100,7 @@ SHARED void put_block(int size, int start, const double *from, double *to) {
     }
 }
 
-/* b := L^-1 b and b := L^-T b within a block. */
+/* block_forward: b := L^-1 b; block_backward: b := L^-T b, within a block. */
 SHARED void block_forward(int size, const double *ALONE L, double *ALONE b) {
     UNROLLED
     for (int i = 1; i < size; i++) {
@@ -135,7 +136,7 @@ SIZED void block_solve(int size, const double *ALONE L, double *ALONE b, Substit
     }
 }
 
-/* The same with a small block, of the coordinates from start. */
+/* Apply block_solve to the coordinates from start, for a small block. */
 SHARED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
                         Substitution way) {
     double b[SMALL];
@@ -170,7 +171,7 @@ static void backward_all(const Factors *factors, double *x) {
     solve_blocks(factors, x, BACKWARD);
 }
 
-/* The lower triangle of S = Z D^-1 Z^T, and its factor with the inverse of its D behind it. */
+/* Compute the lower triangle of S = Z D^-1 Z^T, and store its factor and 1/D behind S. */
 SIZED bool schur_of_size(int r, int even, Factors *factors) {
     const double *Z = factors->Z, *inverse = factors->inverse;
     double *S = factors->S, *L = S + r * r;
@@ -196,7 +197,7 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
     return small_factor(r, S, L, L + r * r) || factor(r, S, L, L + r * r);
 }
 
-/* A stop that slides has a column that is not its row. */
+/* Compute and factor S if columns differ from rows (a stop slides), or if S is large. */
 static bool factor_unsymmetric(Factors *factors) {
     int even = factors->even, r = factors->r;
     for (int i = 0; i < r; i++) {
@@ -234,7 +235,7 @@ SHARED bool schur_of_length(int even, Factors *factors) {
     return KNOWN(even) ? schur_to_length(even, factors) : factor_schur(factors);
 }
 
-/* The multipliers lam from what the rows ask for. */
+/* Solve S lam = right side of the rows, given in lam. */
 SIZED void multipliers_of_size(int r, const double *S, double *lam) {
     const double *L = S + r * r, *inverse = L + r * r;
     block_forward(r, L, lam);
@@ -263,7 +264,8 @@ SIZED void ask_multipliers(int count, int even, const double *ALONE Z, const dou
     }
 }
 
-/* From x = L^-1 f and what the rows ask for: lam and x := D^-1 (x + Z^T lam). */
+/* Compute lam and x := D^-1 (x + Z^T lam) from x = L^-1 f and the right side of the rows, given in
+ * lam. */
 SIZED void constrain_of_size(int r, int even, const Factors *factors, double *ALONE x,
                              double *ALONE lam) {
     const double *ALONE Z = factors->Z, *ALONE columns = factors->Z_columns;
@@ -288,7 +290,7 @@ SIZED void constrain_of_size(int r, int even, const Factors *factors, double *AL
     }
 }
 
-/* The solution from x = L^-1 f and what the rows ask for. */
+/* Compute the solution from x = L^-1 f and the right side of the rows, given in lam. */
 SIZED void finish_to_length(int even, const Factors *factors, double *x, double *lam) {
     switch (factors->r) {
     case 0: constrain_of_size(0, even, factors, x, lam); break;

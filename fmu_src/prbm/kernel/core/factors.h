@@ -9,21 +9,22 @@
 typedef struct {
     int even, r, block_count;
     const Block *blocks;
-    double *L;                  /* its blocks, one behind the other, below their diagonals */
+    double *L;                  /* lower triangles of the blocks, consecutive */
     double *inverse;            /* (even,) 1/D */
-    double *Z, *Z_columns;      /* (r, even); of the columns as of the rows, or the same array */
-    double *S;                  /* (r, r), and room for its factor */
+    double *Z, *Z_columns;      /* (r, even); L^-1 columns^T, or Z if symmetric */
+    double *S;                  /* (r, r), and memory for its factor */
     int *pivots;                /* (r,) */
-    bool symmetric;             /* S is, and small: its factor is L D L^T, else LU */
+    bool symmetric;             /* S is symmetric and small: factor L D L^T, else LU */
 } Factors;
 
 typedef enum { BACKWARD, FORWARD } Substitution;
 
 /* Compute S from Z and Z_columns, and factor it. */
 PRBM bool factor_schur(Factors *factors);
-/* x (even,) and lam (r,): in, the right side; out, the solution a and the multipliers. */
+/* Solve with existing factors: x (even,) and lam (r,) are the right side at first, the solution
+ * and the multipliers at the end. */
 PRBM void solve_again(const Factors *factors, double *x, double *lam);
-/* For each small size: of blocks, and of the whole. */
+/* Functions that are compiled for each small size of a block or of the system. */
 SHARED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse);
 SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse);
 SHARED void put_block(int size, int start, const double *from, double *to);

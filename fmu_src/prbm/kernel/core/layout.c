@@ -29,9 +29,10 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
         (n > COORDINATES_MAX || r >= n || m->stop_count > STOPS_MAX ||
          m->friction_count > STOPS_MAX || m->force_count > PLACES_MAX ||
          m->probe_count > PLACES_MAX || m->ground_count > GROUND_POINTS_MAX)) {
-        reader->wrong = "more parts than can be computed with, or loops that leave no motion";
+        reader->wrong = "more parts than the kernel supports, or loops that leave no degree of "
+                        "freedom";
     } else if (!reader->wrong && (b < 1 || r < 0)) {
-        reader->wrong = "a body that nothing holds";
+        reader->wrong = "a body without a connection to the ground";
     }
     if (!reader->wrong) {
         m->link_count = (int)links;
@@ -43,7 +44,7 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
     }
 }
 
-/* Where the assembly is: what is held, which parts it has walked along, what it has added. */
+/* State of the assembly: connected bodies, visited parts, coordinates added so far. */
 typedef struct {
     bool *held, *walked;
     Coordinate *coordinates;
@@ -56,7 +57,7 @@ static void add_coordinate(Walk *walk, int link, int body, int arm) {
     walk->coordinates[walk->added++] = coordinate;
 }
 
-/* The angle of a link, and its stretch. */
+/* Add the coordinates of a link: its angle and, if it stretches, its stretch. */
 static void add_link(Walk *walk, bool stretching) {
     int j = walk->added;
     add_coordinate(walk, walk->link_count, 0, j);
@@ -67,7 +68,7 @@ static void add_link(Walk *walk, bool stretching) {
     }
 }
 
-/* A flexure or, behind them all, a joint. */
+/* Return part i: the flexures come first, then the joints. */
 static Step part(const Mechanism *m, int i) {
     Step step = {NULL, NULL, NULL, false, false, 0};
     if (i < m->flexure_count) {
@@ -81,7 +82,7 @@ static Step part(const Mechanism *m, int i) {
     return step;
 }
 
-/* Go along the first part that touches what is held and has not been walked; false if none does. */
+/* Visit the first unvisited part with an end on a connected body; false if there is none. */
 static bool walk_on(const Mechanism *m, Walk *walk, Step *step) {
     for (int i = 0; i < m->flexure_count + m->joint_count; i++) {
         *step = part(m, i);
@@ -110,7 +111,7 @@ static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
     }
 }
 
-/* The order of the assembly, and what each coordinate is. */
+/* Set the order of the assembly, and the link or body of each coordinate. */
 PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     size_t parts = (size_t)m->flexure_count + (size_t)m->joint_count;
     size_t n = (size_t)m->coordinate_count, b = (size_t)m->body_count;
@@ -130,7 +131,7 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
         reached += !steps[i].closes;
     }
     if (reached != b + 1) {
-        reader->wrong = "a body that nothing holds";
+        reader->wrong = "a body without a connection to the ground";
     }
     m->steps = steps;
     m->coordinates = walk.coordinates;
@@ -138,7 +139,7 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     m->stretches = walk.stretches;
 }
 
-/* Where groups begin that follow each other. */
+/* Set the index of the first element of each group, for consecutive groups. */
 static void begin_groups(int groups, const int *counts, int *begins) {
     int next_one = 0;
     for (int i = 0; i < groups; i++) {
@@ -163,7 +164,7 @@ PRBM void lay_out_inputs(Mechanism *m) {
     m->input.base = begins[INPUTS_BASE];
 }
 
-/* Flexure types of which gamma0 is a calculated parameter. */
+/* Return the number of flexure types whose gamma0 is a calculated parameter. */
 static int calculated_count(const Mechanism *m) {
     int count = 0;
     for (int i = 0; i < m->type_count; i++) {
