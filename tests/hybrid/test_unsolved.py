@@ -10,7 +10,7 @@ from fmpy.fmi1 import FMICallException
 
 from kernel_library import KernelError, kernel
 from kernel_simulation import KernelMistake, KernelSimulation
-from native_host import DISCARD, ERROR, OK, WAYS, Instance
+from native_host import DISCARD, ERROR, INTERFACES, OK, Instance
 from prbm.base import tolerances
 from prbm.base.errors import EquilibriumError, SimulationError
 from prbm.hybrid import events, guards
@@ -126,7 +126,7 @@ def rods(tmp_path_factory):
 
 @pytest.mark.fmu
 @pytest.mark.native
-@pytest.mark.parametrize(("fmi", "kind"), WAYS)
+@pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 def test_friction_that_jams_is_logged_by_fmus_which_work_after_a_reset(rods, fmi, kind):
     """A step of co-simulation is discarded; an update of discrete states is an error."""
     _, values = rod()
