@@ -105,7 +105,6 @@ DRIFT_CORRECTED_RTOL = 1e-12  # Of the size: drift that an event leaves uncorrec
 PENETRATION_WARNING_RTOL = 1e-2  # Of the size: penetration that no solver's overshoot explains.
 REST_JUMP_FACTOR = 0.5  # Of the jump of a wall that keeps a stop closed: requests an event.
 SLIDING_ENDS_FACTOR = 0.5  # Of the zero speed: sliding has ended below.
-EVENTS_AT_ONCE_MAX = 16  # Events that one event mode applies one after the other.
 GAP_CLOSED_RTOL = 1e-12  # Of the size: how far below zero a gap closes.
 LOWEST_BOUNCE_RTOL = 1e-10  # Of the size: height of a bounce below which a gap closes late.
 INDICATOR_LEAD_RTOL = 0.01  # Of the period: time by which an opening rate lifts an indicator.
