@@ -169,7 +169,7 @@ def test_many_contacts_at_rest_bear_the_force_of_one_stop():
         out = sim.outputs()
         force = sum(out[f"wall{k}.force"] for k in range(24))
         assert force == pytest.approx(alone.outputs()["stop.force"], rel=1e-3)
-        assert abs(out["shuttle.vy"]) < 1e-9
+        assert abs(out["shuttle.vy"]) < 1e-6
 
 
 @pytest.mark.fmu
@@ -206,7 +206,7 @@ def test_a_search_that_ends_at_its_limit_is_an_error(
     monkeypatch, engine, limit, module, values, message
 ):
     """The limit is lowered until the search needs more."""
-    lowered = {"PIVOTS_FACTOR": 0}.get(limit, 1)
+    lowered = {"PIVOTS_FACTOR": 0, "CONSTRAINT_ITERATIONS_MAX": 0}.get(limit, 1)
     if engine == "package":
         monkeypatch.setattr(module, limit, lowered)
     old = f"enum {{ {limit} = {getattr(tolerances, limit)} }};"
