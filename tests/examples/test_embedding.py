@@ -112,7 +112,7 @@ def test_error_of_the_harvester_without_impacts_halves_with_the_step():
         assert table["impacts"][0] == 0.0
         errors.append(table["power"][0] / exact - 1.0)
     assert abs(errors[0]) < 0.015
-    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.1)
+    assert errors[1] == pytest.approx(errors[0] / 2, rel=0.15)
 
 
 def test_closed_form_of_the_harvester_agrees_with_one_solver():

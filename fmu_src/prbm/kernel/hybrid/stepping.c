@@ -7,7 +7,7 @@
 #include "hybrid/stepping.h"
 #include "hybrid/walls.h"
 
-#define STEP_ERROR_EXPONENT (1.0 / (ERROR_ORDER + 1.0))
+#define STEP_ERROR_EXPONENT (1.0 / ((double)ERROR_ORDER + 1.0))
 #define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - STEP_TREND_FACTOR * STEP_MEMORY_EXPONENT)
 
 /* --- errors ----------------------------------------------------------------------------------- */
