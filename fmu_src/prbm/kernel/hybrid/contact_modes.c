@@ -194,7 +194,7 @@ static ContactMode sliding_mode(Simulation *sim, int contact, const FrictionEven
 }
 
 /* Choose by its force whether a contact at rest begins to slip, sticks, has friction at its limit,
- * or has none. */
+ * or is frictionless. */
 static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int contact,
                            bool at_limit, bool slipped, ContactMode *modes, Problem *problem) {
     bool mobile = false;

@@ -26,7 +26,7 @@ typedef struct {
     char text[NAMES_LENGTH];
 } ContactNames;
 
-/* The forces that satisfy the laws of all contacts; not solved if there are none.  In the trial
+/* The forces that satisfy the laws of all contacts; not solved without such forces.  In the trial
  * equations all stops must be open, and friction points at rest have no friction. */
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem);
