@@ -10,9 +10,8 @@
 #include "indicators.h"
 #include "values.h"
 
-/* The changes dq, dv, da, dlam along a change of states and inputs.  They use the complex changes
- * dphi = dtheta - i ds of an arm E, and dw of its rate: dE = i E dphi, d(E w) = E (i dphi w + dw).
- * The formulas of an angle therefore hold for a stretch, too. */
+/* Changes along a change of states and inputs.  An arm E changes by dphi = dtheta - i ds, its rate by
+ * dw: dE = i E dphi, d(E w) = E (i dphi w + dw).  Angles and stretches share these formulas. */
 typedef struct {
     Simulation *sim;
     const Equations *q;
