@@ -28,6 +28,7 @@ from prbm.fmu import python_fmu
 from prbm.fmu.description import Heading, model_description
 from prbm.kernel import compiler
 from prbm.kernel.sources import kernel
+from signals import interruptible
 from support import ROOT
 
 BUILD = ROOT / "build_fmu.py"
@@ -443,7 +444,7 @@ def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
     )
     with subprocess.Popen(
         [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE, text=True, process_group=0,
+        stderr=subprocess.PIPE, text=True, process_group=0, preexec_fn=interruptible,
         env=os.environ | {"PYTHONPATH": str(ROOT / "fmu_src")},
     ) as process:  # fmt: skip
         process.stdin.write(str(fmu))

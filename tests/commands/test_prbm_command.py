@@ -22,6 +22,7 @@ from prbm.commands import systems
 from prbm.files.mechanism_file import load, shipped
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import free_displacement
+from signals import interruptible
 from support import ROOT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
@@ -727,8 +728,9 @@ def test_ctrl_c_ends_a_simulation_without_a_traceback():
     """The signal is sent after the first line of progress, during the simulation."""
     words = [sys.executable, "-m", "prbm", "simulate", "PRBDM2R", "--stop-time", "1000"]
     with subprocess.Popen(
-        [*words, "--out", "."], stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=environment()
-    ) as process:
+        [*words, "--out", "."], stderr=subprocess.PIPE, stdout=subprocess.PIPE, env=environment(),
+        preexec_fn=interruptible,
+    ) as process:  # fmt: skip
         assert process.stderr is not None
         assert b"% done" in process.stderr.readline()
         process.send_signal(signal.SIGINT)

@@ -29,6 +29,7 @@ from prbm.sweeps import sweep as sweeps
 from prbm.sweeps.results import OWN
 from prbm.sweeps.runs import Job, Output, Runner, parse_output, reduce
 from prbm.sweeps.sweep import SweepError, samples, sweep
+from signals import interruptible
 from support import SUPPORT
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
@@ -242,6 +243,7 @@ def started(fmu: Path, wanted: int) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        preexec_fn=interruptible,
     )
     limit = time.monotonic() + 60.0
     while time.monotonic() < limit and process.poll() is None and on_disk() < wanted:
