@@ -35,7 +35,7 @@ def test_lines_of_long_texts_are_found_in_a_second(text):
     ],
 )  # fmt: skip
 def test_lengths_of_keys_are_found_in_a_second(text, length):
-    """In invalid texts too, because the length is limited before a text is parsed."""
+    """Some texts are invalid TOML: the length of keys is limited before a text is parsed."""
     begin = time.process_time()
     assert key_length(text, 101) == length
     assert time.process_time() - begin < 1.0

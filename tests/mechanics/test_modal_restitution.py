@@ -96,8 +96,9 @@ def fundamental(system, q, M, curved):
     """Return frequency and shape of the fundamental mode at a shape, by differences of energies.
 
     The multipliers are those of Gauss' principle for the shape at rest, held by a force on the
-    released body.  The coordinates are the angles of the links, or the sines of their rotations.
-    Both have the same velocities at the shape, so that modes can be compared.
+    released body.  The coordinates are the angles of the links or, with ``curved``, the sines of
+    their rotations.  The sines are scaled to the same velocities at the shape, so that the modes in
+    both coordinates can be compared.
     """
     B = np.vstack([system.loops, system.release])
     c = np.append(system.loops_c, system.release_c)

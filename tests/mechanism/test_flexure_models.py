@@ -90,7 +90,10 @@ SLOPES = {"1R": 1 / (0.8517 * 2.65), "2R": 1 / 3.4710 + 1 / 2.0682,
 
 @pytest.mark.parametrize("model", SLOPES)
 def test_the_tip_slope_under_an_end_moment_is_the_sum_of_the_compliances(model):
-    """Every spring carries the whole moment: exact for chains, 0.443, 0.772, 1.007 for 1R to 3R."""
+    """Every spring carries the whole moment.
+
+    The slope of chains is exact.  The 1R, 2R and 3R have 0.443, 0.772 and 1.007 of it.
+    """
     models = script()
     system = models.cantilever(model)
     for load in (0.1, -1.0, math.pi):
@@ -115,7 +118,7 @@ def test_a_chain_converges_to_the_elastica_at_second_order():
         assert models.order((5, 10, 20, 40), errors) == pytest.approx(2.0, abs=0.05)
 
 
-FREQUENCY_ERRORS = {  # Largest errors of f1 and f2 [%], over tip bodies without inertia.
+FREQUENCY_ERRORS = {  # Largest errors of f1 and f2 [%] with tip masses (no inertia).
     "1R": (5.9, None), "2R": (1.3, 14.0), "3R": (3.1, 2.1), "10R": (0.5, 1.6), "40R": (0.03, 0.11),
 }  # fmt: skip
 
@@ -142,7 +145,7 @@ def test_frequencies_of_a_chain_converge_to_those_of_the_beam_at_second_order(ti
 
 
 def test_an_axial_force_stretches_a_flexure_by_the_elongation_of_a_bar():
-    """P L/EA under a small force: by one link of the 2R and 3R, by all links of a chain."""
+    """The elongation is P L/EA.  One link of the 2R and 3R stretches, all links of a chain do."""
     models = script()
     EA = models.MODULUS * models.WIDTH * models.THICKNESS
     pull = 1e-4 * EA  # The logarithmic strain is linear in the force: the error is of second order.
@@ -288,7 +291,7 @@ def test_modal_restitution_is_that_of_finite_elements(model, axial, error):
 
 
 def test_an_off_centre_hit_lowers_modal_restitution_only_with_axial_compliance():
-    """Modal restitution 0.596 of rigid links against 0.548, at an offset of 4 mm and eps = 0.6."""
+    """With an offset of 4 mm and eps = 0.6: 0.596 with rigid links, 0.548 with axial compliance."""
     rigid, axial = (script().guide("2R", axial=axial) for axial in (False, True))
     found = []
     for guide in (rigid, axial):

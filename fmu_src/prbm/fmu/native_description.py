@@ -157,7 +157,7 @@ def _fmi3(heading: Heading, mechanism: Mechanism, interface: NativeInterface) ->
         SubElement(structure, element, _unknown("valueReference", name, names, reference))
 
     def add_moving(element: str, name: str) -> None:
-        """Add an unknown that is computed from states and inputs, and so from parameters too."""
+        """Add an unknown.  If it depends on other variables, it depends on all parameters, too."""
         computed = {*known[name]} - {name}
         add(element, name, (*parameters, *known[name]) if computed else known[name])
 

@@ -1,4 +1,4 @@
-/* Event indicators of model exchange: the guards of events in units of the motion. */
+/* Event indicators of model exchange: the guards of events divided by their scales. */
 #include <math.h>
 
 #include "hybrid/configuration.h"
@@ -26,7 +26,7 @@ PRBM int indicator_place(const Simulation *sim, EventKind kind, int contact) {
                        : STOP_INDICATORS * s + contact - s;
 }
 
-/* The unit of the guard of a kind of event. */
+/* The scale of the guard of a kind of event. */
 PRBM double guard_scale(const Simulation *sim, EventKind kind) {
     const Scales *scales = &sim->configuration.scales;
     switch (kind) {
@@ -36,8 +36,8 @@ PRBM double guard_scale(const Simulation *sim, EventKind kind) {
     }
 }
 
-/* A guard, raised so that its event is due at zero: gaps close a little below zero, and speeds
- * within round-off count as zero. */
+/* A guard plus a margin, so that its event occurs when the sum is zero: a gap closes a little below
+ * zero, and sliding ends at a speed within round-off. */
 PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kind, int contact) {
     double z = transition(kind)->guard.value(&sim->equations, at, contact);
     if (kind == EVENT_IMPACT) {
@@ -60,8 +60,8 @@ PRBM double leaving_rate(const Simulation *sim, const Instant *at, int i) {
     return gap_rate(&sim->equations, i, at->time, at->e, at->v);
 }
 
-/* Positive while a closed stop is pressed and the change of its wall's velocity is below half of
- * the largest jump at which it stays closed. */
+/* Positive while a closed stop is pressed and its gap rate is below half of the largest jump at
+ * which it stays closed.  The gap rate is not zero after a change of the wall's velocity. */
 PRBM double release_indicator(const Simulation *sim, const Instant *at, int i) {
     double pressed = lifted_guard(sim, at, EVENT_RELEASE, i) / guard_scale(sim, EVENT_RELEASE);
     double room = REST_JUMP_FACTOR * jump_allowed(sim, i) - fabs(leaving_rate(sim, at, i));

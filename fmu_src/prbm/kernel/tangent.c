@@ -19,12 +19,12 @@ typedef struct {
     const Factors *factors;
     const Instant *at;
     const double *y, *v, *a, *lam, *du;
-    double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,) = da, (r,) */
+    double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,), (r,); dx ends as da */
     Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
     Complex *dE;                    /* (n,) i E dphi */
     Complex *swing, *dswing;        /* (n,) E w */
     Complex *bend, *dbend;          /* (n,) E (i w' - w^2); bend_arms adds the change of w' */
-    Complex *pull;                  /* (n,) torques on the arms and, -i times, forces along them */
+    Complex *pull;                  /* (n,) of the arms: torques, + i times forces along them */
 } Tangent;
 
 static Complex times_i(Complex z) {
@@ -48,8 +48,8 @@ static Arm arm_at(const Tangent *t, int j) {
     return arm;
 }
 
-/* A part of a row relative to the body that the row is fixed to: f B_j E_j, and f z for j = n;
- * false if the row has no such part. */
+/* Term j of a row seen from its body, f = conj(E_body): f B_j E_j for j < n, f z for j = n.  False
+ * if the row has no such term. */
 static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
     int n = rows->system->n, on = seen_from(rows, i);
     Complex size = {0.0, 0.0};
@@ -101,7 +101,7 @@ static double rate_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* Change of the second derivative of a row, without the part with the accelerations' changes. */
+/* Change of the second time derivative of a row at constant accelerations. */
 static double second_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
@@ -111,8 +111,8 @@ static double second_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* Add the change of load due to a force along a row, as its gradient i f B E rotates.  The reaction
- * acts on the body that carries the wall. */
+/* Add the change of the load of a constant force along a row: its gradient i f B E rotates.  The
+ * reaction acts on the body that carries the wall. */
 static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
     int n = rows->system->n, on = seen_from(rows, i);
     Arm part;
@@ -146,7 +146,7 @@ static void move_arms(const Tangent *t) {
     }
 }
 
-/* Solve the loops for the changes of the dependent coordinates, whose residuals are -s. */
+/* Compute the changes of the dependent coordinates from the loops, with the right side s. */
 static void solve_dependents(const Tangent *t, const Loops *loops, double *changes) {
     int r = t->q->system->r;
     lu_solve(r, loops->a, loops->pivot, loops->s);
@@ -194,7 +194,7 @@ static Complex through_mass(const Tangent *t, int i, const Complex *x) {
     return along_arms(n, t->q->system->H + i * n, x);
 }
 
-/* Change of the row of loads of the inputs. */
+/* Change of the loads of the inputs: row dw on the arms, moments on the coordinates. */
 static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     const System *system = t->q->system;
     const Mechanism *m = system->mechanism;
@@ -290,7 +290,7 @@ static void rub_change(const Tangent *t) {
     scratch->used = mark;
 }
 
-/* Rows and columns: change of the right side by dR^T lam, -dR a and the convective terms. */
+/* Add the changes dR^T lam of loads, set those of constraints: -dR a and convective terms. */
 static void row_change(const Tangent *t) {
     const Equations *q = t->q;
     Rows walls = slide_rows(q->system);
@@ -305,7 +305,7 @@ static void row_change(const Tangent *t) {
     }
 }
 
-/* Add the pull to the right side: its real part for an angle, that of -i times it for a stretch. */
+/* Add the pull to the loads: its real part for an angle, its imaginary part for a stretch. */
 static void apply_pull(const Tangent *t) {
     const System *system = t->q->system;
     for (int j = 0; j < system->n; j++) {
@@ -483,8 +483,8 @@ static Tangent at_rates(const Tangent *t, const double *x) {
     return u;
 }
 
-/* Change of the mobility G X of a hit point, M X + R^T mu = G^T, R X = 0 with the rows R of the
- * loops: 2 dG X - X^T dM X - 2 mu^T dR X. */
+/* Change 2 dG X - X^T dM X - 2 mu^T dR X of the mobility G X of a hit point.  Here M X + R^T mu =
+ * G^T and R X = 0, with the gradient G of the gap and the rows R of the loops. */
 static bool mobility_change(const Tangent *t, int i, double *result, Problem *problem) {
     Simulation *sim = t->sim;
     const System *system = system_of(sim);

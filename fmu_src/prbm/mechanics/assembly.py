@@ -1,8 +1,9 @@
 """Assembly of the constant arrays of a mechanism from its description.
 
-Every flexure becomes a chain of links.  Chains start at the ground or at a body that has been
-reached before.  A flexure or a joint between two such bodies closes a loop; the chain of that
-flexure begins at its start.
+Every flexure becomes a chain of links.  A chain starts at the ground or at a body that other chains
+have reached before, and reaches the body at its other end.  If both ends of a flexure or a joint
+have been reached before, it closes a loop; the chain of such a flexure runs from its start to its
+end.
 """
 
 import cmath
@@ -71,7 +72,10 @@ def _some(names: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class Hit:
-    """The gap of a stop, Re(f (B E + z)) + c, as seen from the body that its wall is fixed to."""
+    """The gap of a stop, Re(f (B E + z)) + c, with f = conj(E) of the body ``on`` with its wall.
+
+    A wall on the ground has f = 1.
+    """
 
     B: Complex
     c: float
@@ -114,7 +118,7 @@ class _Assembler:
         return abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
 
     def coordinate(self, start: float, arm: int | None = None) -> int:
-        """Add an angle, or the stretch of an arm."""
+        """Add an angle, or the stretch of the given arm, and return its index."""
         j = len(self.q0)
         self.q0.append(start)
         self.arm.append(j if arm is None else arm)
@@ -126,7 +130,7 @@ class _Assembler:
         return self.origin[body].plus(self.index[body], drawn - self.drawn[body])
 
     def frame(self, name: str, body: str, point: Point | None) -> BodyFrame:
-        """Return where a point of a body is; None: its centre of mass."""
+        """Return the position of a point of a body (default: its centre of mass)."""
         if point is None:
             point = next(b for b in self.mechanism.bodies if b.name == body).centre
         drawn = self.at(point)
@@ -212,7 +216,7 @@ class _Assembler:
         known = far in self.origin
         owners = [owner, *links, self.index[far] if known else self.coordinate(0.0)]
         for i, (length, j) in enumerate(zip(pieces.lengths[:-1], owners[:-1], strict=True)):
-            # links carry their angle in q, bodies are drawn with q = 0
+            # The coordinate of a link is its direction, but that of a body is 0 as drawn.
             vector = length * (1.0 if j in links else direction)
             self.rod(pieces.rods[i], place, j, vector)
             place = place.plus(j, vector)
@@ -223,7 +227,7 @@ class _Assembler:
         if known:
             pivot = self.on(far, z_end - last)
             self.close(flexure.name, place, pivot)
-            place = pivot  # the stub moves with its body: links and body share no mass
+            place = pivot  # The stub depends on the coordinates of its body only, not on the links.
         else:
             self.reach(far, place, z_end - last, owners[-1])
         self.rod(pieces.rods[-1], place, owners[-1], last)
@@ -239,7 +243,7 @@ class _Assembler:
         return j
 
     def rod(self, mass: float, start: Place, j: int | None, vector: complex) -> None:
-        """Add a uniform rod: two points with its mass, centre and moments."""
+        """Add a uniform rod: two equal point masses with its centre and moment of inertia."""
         for fraction in (0.5 - 0.5 / math.sqrt(3), 0.5 + 0.5 / math.sqrt(3)):
             self.mass(start.plus(j, fraction * vector), mass / 2)
 
@@ -266,8 +270,8 @@ class _Assembler:
     def size(self) -> float:
         """Return the size of the mechanism as drawn [m].
 
-        The largest distance between points of the ground and centres of mass, or the length of the
-        longest flexure, where all of these are at one place.
+        It is the largest distance between any two ground points or centres of mass, or the length
+        of the longest flexure if that is larger.
         """
         points = [self.at(p) for p in self.mechanism.ground.values()]
         points += [self.at(body.centre) for body in self.mechanism.bodies]
@@ -282,7 +286,7 @@ class _Assembler:
         arm = np.array(self.arm)
         A = np.array([place.row(n) for place, _ in self.masses])
         m = np.array([mass for _, mass in self.masses])
-        # Directions of arms alone: no place depends on stretches, which are zero here.
+        # The arms are not stretched here.  The rows of places are zero for stretches.
         e0 = np.exp(1j * np.array(self.q0))
         spread = A[:, arm]
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
@@ -375,7 +379,7 @@ class _Assembler:
         return self.frame(probe.name, body_of(probe.point), point)
 
     def hit(self, stop: Stop, e0: Complex) -> "Hit":
-        """Return the gap of a stop, but for its wall's position."""
+        """Return the gap of a stop without the position and displacement of its wall."""
         u = unit(stop.direction)
         drawn = self.at(stop.point) + value(stop, "offset", self.values) * 1j * u
         place, j = self.on(stop.body, drawn), self.index[stop.on]
@@ -431,7 +435,7 @@ def calculated(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, f
 
 
 def check_masses(M: Real, J: Sequence[float]) -> None:
-    """Reject a mechanism with a motion without mass.
+    """Reject a mechanism with massless moving parts.
 
     Parameters
     ----------
@@ -467,12 +471,12 @@ def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
     e : (n,) complex
         Directions of the straight shape.
     names : sequence of str
-        Of the parts that close the k loops.
+        Names of the parts that close the k loops.
 
     Raises
     ------
     MechanismError
-        If the loops' Jacobian has not full rank, or leaves no motion.
+        If the Jacobian of the loops does not have full rank, or if they prevent all motion.
     """
     if not len(loops):
         return

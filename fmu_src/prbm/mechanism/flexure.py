@@ -210,8 +210,9 @@ def segments(
     """Return the rigid segments, springs and masses of a flexure.
 
     The spring rates are K_i = K_theta_i EI/h, or gamma_i K_theta_i EI/h with ``rate_with_gamma``.
-    The 1R has the masses m/4 + (m L^2/12)/(gamma L)^2 at its pivots.  At the radius gamma L they
-    have the kinetic energy of a uniform rod that rotates about its end (eq. 3.3 of the thesis).
+    Each pivot of the 1R has the mass m/4 + (m L^2/12)/(gamma L)^2 (eq. 3.3 of the thesis).  Moving
+    on the radius gamma L, it has the kinetic energy of a uniform rod of the length L whose centre
+    moves on the radius gamma L/2.
     With a free end, or two pinned ends, the 1R consists of rods like the other models.
 
     Parameters

@@ -36,8 +36,8 @@ from .common import (
 from .side_by_side import Drawing, Number, Result
 
 OPTIMISED_SPAN, OPTIMISED_STEP = 1.0, 2 / 2**10  # s; half the span and the step of the thesis
-UNSTABLE_MISFIT = 1e3  # mm; returned if a run has no finite end
-TRIED = (7.889, 8.7614, 12.0)  # K_theta1: published over gamma; thesis; a larger one
+UNSTABLE_MISFIT = 1e3  # mm; the misfit of a run that diverges
+TRIED = (7.889, 8.7614, 12.0)  # K_theta1: published value over gamma, thesis, a larger value
 
 
 def table_1(_: Progress) -> Result:
@@ -188,7 +188,7 @@ def figure_6_2(progress: Progress) -> Result:
 
 @own_style()
 def figure_6_3(progress: Progress) -> Result:
-    """Return the free 2R of the thesis, with and without the right side of its constraint."""
+    """Return the free 2R of the thesis, with and without the right side of the constraint."""
     chain = source_model.guide_2R(True, REFITTED)
     cases = ((-18e-3, False), (-18e-3, True), (-10e-3, False))
     runs = {}

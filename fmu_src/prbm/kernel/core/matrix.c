@@ -110,7 +110,7 @@ PRBM void lu_solve(int n, const double *a, const int *pivot, double *b) {
 
 /* --- Cholesky --------------------------------------------------------------------------------- */
 
-/* L_ij = (a_ij - sum_k L_ik L_jk)/L_jj, L_ii^2 = a_ii - sum_k L_ik^2 */
+/* L_ij = (a_ij - sum_k L_ik L_jk)/L_jj, L_ii^2 = a_ii - sum_k L_ik^2; 1/L_ii is stored for L_ii. */
 PRBM bool cholesky(int n, double *a) {
     for (int i = 0; i < n; i++) {
         double *row = a + i * n;
@@ -207,8 +207,8 @@ static double norm(int n, const double *x) {
     return sqrt(dot(n, x, x));
 }
 
-/* Compute the singular values s (k,) of a = sum s_i u_i v_i^T or its transpose, k = min(m, n).  The
- * rows of g (k, n) are s_i u_i, those of v (k, k), unless NULL, are v_i. */
+/* Compute the singular values s (k,), k = min(m, n), of a.  If m > n, a^T replaces a.  With a^T =
+ * sum s_i u_i v_i^T, row i of g is s_i u_i and row i of v (k, k) is v_i; v may be NULL. */
 static bool singular_values(int m, int n, const double *a, double *s, double *g, double *v) {
     int k = m < n ? m : n, length = m < n ? n : m;
     wide(m, n, a, g);
