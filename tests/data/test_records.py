@@ -59,7 +59,7 @@ ROWS = table().splitlines()
 
 
 def rows(*changed, keep=ROWS):
-    """Return the table with some of its rows replaced, (index, text)."""
+    """Return the table with rows replaced by pairs (index, text); None removes a row."""
     lines = list(keep)
     for i, text in changed:
         lines[i] = text

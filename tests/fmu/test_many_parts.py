@@ -116,7 +116,7 @@ def test_energy_is_conserved_with_impacts_friction_and_stretching_links(expected
 
 
 def test_a_first_step_that_is_too_long_is_shortened():
-    """With strong damping, a step that is short compared with the period gives infinities."""
+    """With strong damping, even a first step far below the period gives infinite values."""
     simulation = Simulation(elastic(), {"damping.beta": 1e-4})
     simulation.advance(1e-7)
     assert 0.0 < simulation.controller.h < 1e-6

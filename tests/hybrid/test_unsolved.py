@@ -1,4 +1,4 @@
-"""A search without a solution is rejected with the names of the contacts, and changes nothing."""
+"""A search that fails raises an error with the names of the contacts; the state is unchanged."""
 
 import ctypes
 import re
@@ -39,7 +39,7 @@ def test_walls_that_close_in_are_rejected(k):
 
 
 def test_a_wall_that_pushes_where_friction_locks_is_rejected():
-    """Friction turns the push of the wall into a further approach."""
+    """The push of the wall and its friction together accelerate the point towards the wall."""
     W, u = np.array([[1.0, 2.0], [2.0, 4.0]]), np.array([-1.0, 1.0])
     with pytest.raises(SimulationError, match="friction locks; reduce the friction"):
         contact.stronge(W, u, 1.0, 0.5)
@@ -83,9 +83,9 @@ def test_an_impact_between_closing_walls_is_rejected_without_change(engine):
 
 
 def rod():
-    """Return a guide that rests on its wall with the end of a long arm, and its values.
+    """Return a guide and its parameters: the end of a long arm rests on the wall.
 
-    Sliding to one side, friction increases the normal force: Painleve's paradox.
+    When the end slides to one side, friction increases the normal force (Painleve's paradox).
     """
     guide = mechanism("PRBDM2RAxial")
     (stop,) = guide.stops
@@ -205,7 +205,7 @@ LIMITS = [
 def test_a_search_that_ends_at_its_limit_is_an_error(
     monkeypatch, engine, limit, module, values, message
 ):
-    """The limit is lowered until the search needs more."""
+    """The limit is lowered below the number of iterations that the search needs."""
     lowered = {"PIVOTS_FACTOR": 0, "CONSTRAINT_ITERATIONS_MAX": 0}.get(limit, 1)
     if engine == "package":
         monkeypatch.setattr(module, limit, lowered)

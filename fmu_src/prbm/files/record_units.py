@@ -86,7 +86,7 @@ def si_unit(text: str) -> str:
 
 
 def in_si(text: str) -> tuple[float, float]:
-    """Return factor and offset of the conversion of a known unit to SI, factor x + offset.
+    """Return the factor and the offset that convert x in a known unit to SI, factor x + offset.
 
     Examples
     --------

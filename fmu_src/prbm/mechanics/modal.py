@@ -21,9 +21,9 @@ class Modes:
     Parameters
     ----------
     frequency : (k,)
-        [Hz]; negative where the shape is unstable, -sqrt(-omega^2)/(2 pi).
+        Frequencies [Hz].  Those of unstable modes (omega^2 < 0) are -sqrt(-omega^2)/(2 pi).
     shape : (n, k)
-        Columns phi with phi^T M phi = 1 and on the tangent of the loops [rad/(kg^.5 m)].
+        Columns phi, velocities that keep the loops closed, with phi^T M phi = 1 [rad/(kg^.5 m)].
     M : (n, n)
         Mass matrix at the shape [kg m^2].
     """
@@ -51,7 +51,7 @@ def modes(system: System, shape: Equilibrium) -> Modes:
 
 
 def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
-    """Solve K_t phi = omega^2 M phi on the tangent space of the loops, w the row of the loads."""
+    """Solve K_t phi = omega^2 M phi tangent to the loops; w is the row of the loads."""
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm)
@@ -89,10 +89,10 @@ def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
 def modes_at(system: System, q: Real) -> Modes:
     """Return the modes at a shape that is not in equilibrium.
 
-    The multipliers are those of the shape held at rest by a force on the released body (Gauss'
-    principle: the remaining accelerations are the least possible); at a static shape they are
-    exact.  At other shapes the modes depend on the choice of the coordinates.  They may include
-    unstable ones, which come first.
+    The multipliers in the tangent stiffness are those of the shape at rest.  A force on the
+    released body holds it such that the remaining accelerations are the least possible (Gauss'
+    principle).  At a static shape these multipliers are exact.  At other shapes the modes depend on
+    the choice of the coordinates, and some may be unstable; unstable modes come first.
     """
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
@@ -108,8 +108,8 @@ def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> floa
     """Return the modal restitution C of an impact, -phi^T M v+ / phi^T M v- [-].
 
     Zero if the velocity of the fundamental mode before the impact is round-off.  Otherwise
-    |C| <= 1/sqrt(s), with s the share of this mode in the kinetic energy before the impact: C is
-    far below -1 or above 1 where s is small.
+    |C| <= 1/sqrt(s), with s the share of this mode in the kinetic energy before the impact: if s is
+    small, C can be far below -1 or above 1.
 
     Examples
     --------
@@ -125,9 +125,9 @@ def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> floa
 
 
 def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution: float) -> float:
-    r"""Return the modal restitution of an arriving pure fundamental mode (algebraic) [-].
+    r"""Return the algebraic modal restitution, of a pure fundamental mode before the impact [-].
 
-    With the effective share of the fundamental mode in the hit,
+    It depends on the share mu_1 of the fundamental mode in the mobility of the hit point:
 
         C = (1 + eps) mu_1 - 1,    mu_1 = G_1^2 / sum_i G_i^2,    G_i = (dg/dq) phi_i.
 

@@ -39,7 +39,7 @@ SPAN = 0.5  # duration of the free vibrations [s]
 def swing_of_elements() -> tuple[Real, Real, float]:
     """Return time, displacement and small-motion frequency of the PMMA guide by elements."""
     fe = FiniteElements(guide("PRBDM"), PMMA, elements=16)
-    run = fe.transient(SPAN, 1e-4, spectral_radius=0.9)  # The motion is smooth.
+    run = fe.transient(SPAN, 1e-4, spectral_radius=0.9)  # Smooth: little damping.
     return run["time"], run["shuttle.x"], float(fe.modes(fe.equilibrium()).frequency[0])
 
 
@@ -286,7 +286,7 @@ def figure_4_4(_: Progress) -> Result:
 
 @own_style()
 def figure_4_5(progress: Progress) -> Result:
-    """Return the free vibration with Coulomb friction, and amplitudes by its work."""
+    """Return the free vibration with Coulomb friction, and the amplitudes from a work balance."""
     one, mu_N = guide("PRBDM"), 0.1  # N
     values = {
         **PMMA,

@@ -19,13 +19,13 @@ class Valley:
     names : tuple of str
         Names of the parameters.
     along : str
-        Name of the given parameter.
+        Name of the parameter with given values.
     points : (n, k)
-        Parameters.
+        Parameters of the best fits, one row per given value.
     misfit : (n,)
         Sum of ((model - data)/u)^2 [-], with u = 1 for unknown uncertainties.
     best : (k,)
-        Parameters of the fit.
+        Parameters of the fit with no value given.
     """
 
     names: tuple[str, ...]
@@ -59,7 +59,8 @@ def valley(
     found : Fit
         A fit of two parameters or more.
     along : str or None
-        Name of the parameter; None: the one with the largest share in the worst direction.
+        Name of the parameter; None: the one that changes most along the combination of parameters
+        that the data determine worst.
     span : pair of float or None
         Range of its values; None: half to twice the best value, within the bounds.
     points : int

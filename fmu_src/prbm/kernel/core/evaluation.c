@@ -131,8 +131,8 @@ SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
 
 /* --- loads and rows --------------------------------------------------------------------------- */
 
-/* Return Im(w^2) = -2 theta' s' of a link that stretches.  The equations are solved for
- * a - Im(w^2) with the terms of a link without stretch; add_coriolis then adds Im(w^2). */
+/* Return Im(w^2) = -2 theta' s' of a link that stretches.  The terms of links without stretch give
+ * its angular acceleration minus Im(w^2); add_coriolis adds Im(w^2) to the solution. */
 static double coriolis(const System *system, const double *v, int stretch_coordinate) {
     return -2.0 * v[arm_of(system, stretch_coordinate)] * v[stretch_coordinate];
 }
@@ -143,7 +143,7 @@ SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
     const System *system = q->system;
     const int n = system->n;
     const double *angle = result->at.angle, *straight = system->straight, *v = result->at.speed;
-    double *turns = result->turns, *x = result->a, sum = 0.0; /* a has room for the ground */
+    double *turns = result->turns, *x = result->a, sum = 0.0; /* Index n is the ground. */
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
         Lanes turn = lanes_at(angle + j) - lanes_at(straight + j);
@@ -161,7 +161,7 @@ SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
     result->spring_loss = q->beta * sum;
 }
 
-/* Rows -Im(B e) and, in lam, their convective terms Re(B e) v^2; B is the conjugate. */
+/* Rows -Im(b e) and, in lam, their convective terms Re(b e) v^2, with the conjugate B of b. */
 SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE squares,
                    double *ALONE rows, double *ALONE lam) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};

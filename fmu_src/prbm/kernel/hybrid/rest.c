@@ -6,8 +6,8 @@
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
 
-/* The rows of the gaps and of the slides, and the directions of the forces: the normal force of a
- * stop that slides acts together with its friction. */
+/* The rows of the gaps and of the slides, and the loads of unit forces on them (pushes).  A row and
+ * its load differ if a stop slides: the normal force then acts together with its friction. */
 static void rest_rows(Simulation *sim, const RestContacts *rest, const Complex *e, double *rows,
                       double *pushes) {
     size_t mark = sim->scratch.used;
@@ -32,7 +32,7 @@ static void rest_rows(Simulation *sim, const RestContacts *rest, const Complex *
     sim->scratch.used = mark;
 }
 
-/* The accelerations without the forces. */
+/* The accelerations of gaps and slides without contact forces. */
 static void rest_accelerations(const Simulation *sim, const RestContacts *rest, const Complex *e,
                                const double *v, const double *rows, double *u) {
     const System *system = system_of(sim);
