@@ -104,7 +104,7 @@ def assert_equal(instance: Instance, expected: dict, listed: dict, tolerance: fl
     model = instance.description.modelName
     found, omega = instance.values(), fastest(model)
     tolerance *= STIFF_FACTOR if model in STIFF_MODELS else 1.0
-    noise, tolerance = 1e-9 * omega**2, tolerance * max(1.0, omega / 1e4)
+    noise, tolerance = 2e-9 * omega**2, tolerance * max(1.0, omega / 1e4)
     compared = set()
     for name, value in found.items():
         compared.add(name)
