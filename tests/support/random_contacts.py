@@ -12,6 +12,7 @@ import numpy as np
 
 from kernel_library import KernelError, kernel
 from prbm.base.errors import SimulationError
+from prbm.base.tolerances import COMPLEMENTARITY_RTOL
 from prbm.mechanics import complementarity, contact
 
 MOVING_SHARE = 0.2  # Fraction of the draws in which walls move at random.
@@ -90,12 +91,12 @@ def rest(engine, rng):
     mu, fixed = rng.uniform(0, 1.5, m), np.zeros(m)
     normal = np.array([j if j < k else -1 for j in range(m)])
     fixed[normal < 0] = rng.uniform(0, 1) * np.abs(u).max() / np.diag(W).max()
-    P = np.zeros(k + m)
+    P, tolerance = np.zeros(k + m), COMPLEMENTARITY_RTOL * np.abs(u).max()
     if engine == "kernel":
-        if not kernel().coulomb(k, m, W, u, mu, fixed, normal, P):
+        if not kernel().coulomb(k, m, W, u, mu, fixed, normal, tolerance, P):
             raise KernelError("no forces")
     else:
-        found = complementarity.coulomb(W, u, mu, fixed, normal)
+        found = complementarity.coulomb(W, u, mu, fixed, normal, tolerance)
         if found is None:
             raise SimulationError("no forces")
         P = found

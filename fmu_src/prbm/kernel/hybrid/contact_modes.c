@@ -170,7 +170,9 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     ContactMode others[CONTACTS_MAX];
     Inertia at = inertia_at(sim, sim->state.front);
     memcpy(others, modes, bytes);
-    others[contact] = CONTACT_FRICTIONLESS;
+    if (others[contact] != CONTACT_OPEN) {
+        others[contact] = CONTACT_FRICTIONLESS;
+    }
     try_contacts(sim, others);
     tangential_row(system, contact, at.e, row);
     double *held = take_matrix(&sim->scratch, q->r, system->n);
@@ -412,41 +414,59 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
     return count;
 }
 
-/* Choose the contact state at the front from its positions and velocities.
- *
- * touching: open stops that touch and neither close nor open
- * event: a slip or reversal that has just occurred, or NULL */
-PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
-                 Problem *problem) {
+/* Choose the modes of all contacts by their forces at the front. */
+static bool choose_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
+                         ContactMode *modes, Problem *problem) {
     const System *system = system_of(sim);
-    const double *front = sim->state.front;
-    FrictionEvent friction;
-    HoldingSet holding, all = {0, {0}, true};
-    int candidates[2 * STOPS_MAX];
-    ContactMode modes[CONTACTS_MAX];
-    if (!friction_event(sim, event, &friction, problem)) {
-        return false;
-    }
-    int count = resting_candidates(sim, touching, touching_count, candidates);
-    if (!holding_stops(sim, count, candidates, front, front + system->n, &holding, problem)) {
+    const double *q = sim->state.front, *v = q + system->n;
+    HoldingSet holding;
+    if (!holding_stops(sim, touching->count, touching->stops, q, v, &holding, problem)) {
         return false;
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool open = is_stop(system, contact) && !has_contact(holding.count, holding.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
-    for (int i = 0; i < system->s; i++) {
+    return settle_friction(sim, &holding, touching, event, modes, problem);
+}
+
+/* Choose the contact state at the front from its positions and velocities.  The projection closes
+ * gaps of round-off, which changes the forces of stiff flexures: the modes are chosen again until
+ * they stay the same.
+ *
+ * touching: open stops that touch and neither close nor open
+ * event: a slip or reversal that has just occurred, or NULL */
+PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
+                 Problem *problem) {
+    FrictionEvent friction;
+    HoldingSet all = {0, {0}, true};
+    int candidates[2 * STOPS_MAX];
+    ContactMode modes[CONTACTS_MAX];
+    size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
+    if (!friction_event(sim, event, &friction, problem)) {
+        return false;
+    }
+    int count = resting_candidates(sim, touching, touching_count, candidates);
+    for (int i = 0; i < system_of(sim)->s; i++) {
         if (has_contact(count, candidates, i)) {
             all.stops[all.count++] = i;
         }
     }
-    if (!settle_friction(sim, &holding, &all, &friction, modes, problem)) {
-        return false;
+    for (int k = 0; k < SETTLE_ITERATIONS_MAX; k++) {
+        if (!choose_modes(sim, &all, &friction, modes, problem)) {
+            return false;
+        }
+        bool same = k > 0 && memcmp(modes, sim->state.modes, bytes) == 0;
+        set_contacts(sim, modes);
+        if (same || sim->equations.held_count == 0) {
+            return true;
+        }
+        if (!project(&sim->equations, sim->state.front_time, sim->state.front, &sim->scratch,
+                     problem)) {
+            return false;
+        }
     }
-    set_contacts(sim, modes);
-    return sim->equations.held_count == 0 ||
-           project(&sim->equations, sim->state.front_time, sim->state.front, &sim->scratch,
-                   problem);
+    return contacts_unsettled(sim, count, candidates, problem);
 }
 
 /* Open the closed stops whose gaps have a rate, after a change of a wall's velocity or an impulse.
