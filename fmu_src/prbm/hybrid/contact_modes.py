@@ -341,11 +341,12 @@ def _sticking_or_slipping(
 ) -> ContactState:
     """Return the modes, with those of contacts at rest chosen by their forces.
 
-    Of contacts that can stick only together, some stick; the others have friction at its limit, or
-    none.
+    Of contacts that can stick only together, those with friction below its limit stick, which are
+    independent of each other; the others have friction at its limit, or none.
     """
-    at_limit = np.abs(found.friction) >= found.limit - scales.zero_acceleration / found.mobility
-    for j in sorted(range(len(at_rest)), key=lambda j: bool(at_limit[j])):
+    slack, size = scales.zero_acceleration / found.mobility, np.abs(found.friction)
+    at_limit = size >= found.limit - slack
+    for j in np.argsort(np.where(at_limit, 2, size <= slack), kind="stable"):
         c, force = at_rest[j], found.friction[j]
         if not contacts.modes[c].closed:
             continue

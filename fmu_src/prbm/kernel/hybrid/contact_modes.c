@@ -217,19 +217,21 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
     return true;
 }
 
-/* Choose the modes of contacts at rest by their forces, first for friction below its limit.  Of
- * contacts that can stick only together, some stick; the others have friction at its limit, or
- * none. */
+/* Choose the modes of contacts at rest by their forces.  Of contacts that can stick only together,
+ * those with friction below its limit stick, which are independent of each other; the others have
+ * friction at its limit, or none. */
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
                           const FrictionEvent *event, ContactMode *modes, Problem *problem) {
+    enum { BELOW_LIMIT, NO_FRICTION, AT_LIMIT };
     double zero = zero_acceleration(&sim->configuration);
     bool right = true;
-    for (int limited = 0; limited < 2; limited++) {
+    for (int turn = BELOW_LIMIT; turn <= AT_LIMIT; turn++) {
         for (int j = 0; right && j < rest->count; j++) {
             int contact = rest->contacts[j];
-            double slack = zero / found->mobility[j];
-            bool at_limit = fabs(found->friction[j]) >= found->limit[j] - slack;
-            if (at_limit == (limited == 1) && modes[contact] != CONTACT_OPEN) {
+            double slack = zero / found->mobility[j], size = fabs(found->friction[j]);
+            bool at_limit = size >= found->limit[j] - slack;
+            int order = at_limit ? AT_LIMIT : size <= slack ? NO_FRICTION : BELOW_LIMIT;
+            if (order == turn && modes[contact] != CONTACT_OPEN) {
                 bool slipped = event->slips && event->contact == contact;
                 right = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, problem);
             }
