@@ -72,16 +72,22 @@ def stronge(engine, rng):
 
 
 def several(engine, rng):
-    """Return the violation of the laws of an impact of several stops with friction."""
+    """Return the violation of the laws of an impact of several stops with friction.
+
+    Without restitution, each stop either opens or receives an impulse, and slides at the limit of
+    friction or sticks.
+    """
     k = int(rng.integers(2, 5))
     W, u = drawn(rng, 2 * k, k)
     mu, eps, P = rng.uniform(0, 2, k), rng.uniform(0, 1, k), np.zeros(2 * k)
     mu[rng.uniform(size=k) < 0.2] = 0.0
+    eps *= rng.uniform() < 0.8
     if engine == "kernel":
         kernel().several(k, W, u, mu, eps, 0.0, P)
     else:
         P = contact.several(W, u, mu, eps)
-    return friction_violation(W, u, mu, P)
+    plastic = 0.0 if eps.any() else complementarity.violation(W, u, P, mu * P[:k])
+    return max(friction_violation(W, u, mu, P), plastic / np.abs(u).max())
 
 
 def rest(engine, rng):
