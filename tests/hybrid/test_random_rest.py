@@ -1,19 +1,18 @@
-"""Random mechanisms at rest with friction at stops and points obey the laws of all contacts."""
+"""Random mechanisms at rest with friction at stops and points obey the laws of all contacts.
+
+At rest nothing slides, so that there always are forces: no draw may raise an error.
+"""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from kernel_simulation import KernelMistake, KernelSimulation
-from prbm.base.errors import SimulationError
+from kernel_simulation import KernelSimulation
 from prbm.base.tolerances import FRICTION_EXCESS_RTOL
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from support import mechanism
-
-JAMMED = 0.0
-"""Largest share of errors: at rest nothing slides, and there always are forces."""
 
 
 def walled():
@@ -36,14 +35,14 @@ def drawn(rng):
     return {name: float(x) for name, x in values.items()}
 
 
-def violations(sim):
-    """Yield the laws that contacts violate."""
-    equations, front, zero = sim.equations, sim.front, sim.configuration.scales.zero_acceleration
+def violations(front, zero):
+    """Yield the laws that contacts violate; accelerations up to ``zero`` are round-off."""
+    equations, contacts = front.equations, front.contacts
     a, lam, _, _ = equations.evaluate(front.time, front.q, front.v)
     opening = equations.gap_accelerations(front.time, front.e, front.v, a)
     forces, rubbing = equations.stop_forces(lam), [*equations.stop_friction, 0.3]
-    for c, mode in enumerate(sim.contacts.modes):
-        if c < 3 and mode.closed and forces[c] < -1e-9:  # N, round-off
+    for c, mode in enumerate(contacts.modes):
+        if c < 3 and mode.closed and not forces[c] > 0.0:
             yield f"wall{c} pulls"
         if not mode.closed and opening[c] < -zero:
             yield f"wall{c} closes"
@@ -57,30 +56,29 @@ def violations(sim):
                 yield f"contact {c} slips against its acceleration"
 
 
-def search(draws, seed, engines=(Simulation, KernelSimulation), compared=True):
-    """Return the numbers of errors of each engine, whose motions may be compared."""
-    rng, guide, errors = np.random.default_rng(seed), walled(), [0] * len(engines)
+def search(draws, seed, compared=True):
+    """Check the laws in both engines, whose motions may be compared."""
+    rng, guide = np.random.default_rng(seed), walled()
     for _ in range(draws):
-        values, ends = drawn(rng), []
-        for k, engine in enumerate(engines):
-            try:
-                sim = engine(guide, values)
-                if engine is Simulation:
-                    assert not [*violations(sim)], values
-                sim.advance(5e-5)
-                ends.append([sim.outputs()[f"shuttle.{name}"] for name in ("vx", "vy", "omega")])
-            except (SimulationError, KernelMistake):
-                errors[k] += 1
-        if compared and len(ends) == 2:
-            assert ends[0] == pytest.approx(ends[1], rel=1e-5, abs=1e-9), values
-    return errors
+        values = drawn(rng)
+        sims = Simulation(guide, values), KernelSimulation(guide, values)
+        front, zero = sims[0].front, sims[0].configuration.scales.zero_acceleration
+        assert not [*violations(front, zero)], values
+        modes = tuple(ContactMode(mode) for mode in sims[1].modes())
+        front = front.with_contacts(replace(front.contacts, modes=modes)).projected()
+        assert not [*violations(front, zero)], values
+        for sim in sims:
+            sim.advance(5e-5)
+        motions = [[sim.outputs()[f"shuttle.{v}"] for v in ("vx", "vy", "omega")] for sim in sims]
+        if compared:
+            assert motions[0] == pytest.approx(motions[1], rel=1e-5, abs=1e-9), values
 
 
 def test_a_random_mechanism_at_rest_obeys_all_laws():
-    assert max(search(40, seed=0)) <= 40 * JAMMED
+    search(40, seed=0)
 
 
 @pytest.mark.slow
 def test_1000_random_mechanisms_at_rest_obey_all_laws():
-    """The three stops share their load in more than one way: in some draws the engines differ."""
-    assert max(search(1000, seed=1, compared=False)) <= 1000 * JAMMED
+    """Three stops share their load in more than one way: motions are not compared."""
+    search(1000, seed=1, compared=False)

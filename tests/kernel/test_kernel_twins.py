@@ -729,12 +729,13 @@ def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
         mu, fixed = rng.uniform(0, 1, m), rng.uniform(0, 1, m)
         normal = np.array([j if j < k and rng.uniform() < 0.7 else -1 for j in range(m)], int)
         P, z = np.full(k + m, np.nan), np.full(k + m, np.nan)
-        assert kernel().coulomb(k, m, W, u, mu, fixed, normal, P)
-        expected = complementarity.coulomb(W, u, mu, fixed, normal)
+        tolerance = 1e-9 * np.abs(u).max()
+        assert kernel().coulomb(k, m, W, u, mu, fixed, normal, tolerance, P)
+        expected = complementarity.coulomb(W, u, mu, fixed, normal, tolerance)
         assert_same(P, expected, 1e-10)
         limit = fixed + mu * np.append(P[:k], 0.0)[normal]
         wrong = complementarity.violation(W, u, P, limit)
-        assert wrong < 1e-9 * np.abs(u).max()
+        assert wrong <= tolerance
         Q = rng.normal(size=k + m)
         wrong = kernel().violation(k, m, W, u, Q, limit)
         assert wrong == pytest.approx(complementarity.violation(W, u, Q, limit), rel=1e-12)

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 import random_contacts
+from prbm.base.tolerances import COMPLEMENTARITY_RTOL
 from prbm.mechanics import complementarity
 
 ERRORS = {"newton": 0.0, "stronge": 0.02, "several": 0.02, "rest": 0.02}
@@ -33,7 +34,8 @@ def test_rejected_problems_have_no_solution_in_any_combination_of_modes():
         k, m = int(rng.integers(1, 4)), 2
         W, u = random_contacts.drawn(rng, k + m, k)
         mu, normal = rng.uniform(0, 2, m), np.array([0, min(1, k - 1)])
-        P = complementarity.coulomb(W, u, mu, np.zeros(m), normal)
+        tolerance = COMPLEMENTARITY_RTOL * np.abs(u).max()
+        P = complementarity.coulomb(W, u, mu, np.zeros(m), normal, tolerance)
         if P is None and rejected < 20:
             rejected += 1
             assert not any(fits(W, u, mu, normal, *modes) for modes in combinations(k, m))
@@ -49,7 +51,9 @@ def one_path(W, u, mu, normal):
     """Return whether the path of the first covering vector alone leads to a solution."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(complementarity, "COVER_FACTOR", 1.0)
-        return complementarity.coulomb(W, u, mu, np.zeros(len(mu)), normal) is not None
+        tolerance = COMPLEMENTARITY_RTOL * np.abs(u).max()
+        zero = np.zeros(len(mu))
+        return complementarity.coulomb(W, u, mu, zero, normal, tolerance) is not None
 
 
 def combinations(k, m):

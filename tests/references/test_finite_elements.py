@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from prbm.base.errors import SimulationError
 from prbm.files.mechanism_file import shipped
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
@@ -374,6 +375,14 @@ def test_first_impact_converges_with_the_step():
     assert found[0].time == pytest.approx(found[1].time, abs=1e-6)
     restitution = [i.latched.modal_restitution for i in found]
     assert restitution[0] == pytest.approx(restitution[1], abs=1e-3)
+
+
+def test_an_impact_that_cannot_be_located_is_rejected_with_its_stop(monkeypatch):
+    """One iteration leaves the gap open by more than its tolerance."""
+    monkeypatch.setattr("prbm.references.finite_elements.transient.LOCATIONS_MAX", 1)
+    message = r"impact at stop could not be located .* 1 iterations left a gap of .* shorten the st"
+    with pytest.raises(SimulationError, match=message):
+        guide(elements=4).transient(0.1, 1e-3, impacts=1)
 
 
 def test_a_failed_step_is_divided_to_locate_an_impact(monkeypatch):

@@ -111,7 +111,7 @@ class KernelSimulation:
         self.library = library(changes)
         self.sentence = ctypes.create_string_buffer(SENTENCE)
         self.inner, self.states_of = None, None
-        self.stops = mechanism.stops
+        self.stops, self.points = mechanism.stops, len(mechanism.frictions)
         chosen = independent(mechanism)
         self.slots = slots(mechanism, chosen)
         data = tables(mechanism, interface(mechanism, {}), "token", chosen)
@@ -163,17 +163,24 @@ class KernelSimulation:
     def restore(self, state: np.ndarray) -> None:
         self.call("simulation_restore", pointer(state))
 
+    def modes(self) -> list[int]:
+        """Return the modes of all contacts."""
+        return [int(mode) for mode in self.state[self._mode_places()]]
+
     def set_modes(self, modes: list[int]) -> None:
         """Set the modes of all contacts."""
+        state = self.state
+        state[self._mode_places()] = modes
+        self.restore(state)
+
+    def _mode_places(self) -> list[int]:
+        """Return the places of the modes in the saved state."""
         text = (KERNEL / "hybrid" / "snapshot.c").read_text()
         scalars, per_stop = (
             int(re.search(rf"\b{name} = (\d+)", text)[1]) for name in ("SCALARS", "PER_STOP_STATE")
         )
-        state, stops = self.state, len(self.stops)
-        state[scalars : scalars + per_stop * stops : per_stop] = modes[:stops]
-        points = scalars + per_stop * stops
-        state[points : points + len(modes) - stops] = modes[stops:]
-        self.restore(state)
+        points = scalars + per_stop * len(self.stops)
+        return [*range(scalars, points, per_stop), *range(points, points + self.points)]
 
     # -- model exchange --
 

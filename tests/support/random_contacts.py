@@ -12,6 +12,7 @@ import numpy as np
 
 from kernel_library import KernelError, kernel
 from prbm.base.errors import SimulationError
+from prbm.base.tolerances import COMPLEMENTARITY_RTOL
 from prbm.mechanics import complementarity, contact
 
 MOVING_SHARE = 0.2  # Fraction of the draws in which walls move at random.
@@ -71,16 +72,22 @@ def stronge(engine, rng):
 
 
 def several(engine, rng):
-    """Return the violation of the laws of an impact of several stops with friction."""
+    """Return the violation of the laws of an impact of several stops with friction.
+
+    Without restitution, each stop either opens or receives an impulse, and slides at the limit of
+    friction or sticks.
+    """
     k = int(rng.integers(2, 5))
     W, u = drawn(rng, 2 * k, k)
     mu, eps, P = rng.uniform(0, 2, k), rng.uniform(0, 1, k), np.zeros(2 * k)
     mu[rng.uniform(size=k) < 0.2] = 0.0
+    eps *= rng.uniform() < 0.8
     if engine == "kernel":
         kernel().several(k, W, u, mu, eps, 0.0, P)
     else:
         P = contact.several(W, u, mu, eps)
-    return friction_violation(W, u, mu, P)
+    plastic = 0.0 if eps.any() else complementarity.violation(W, u, P, mu * P[:k])
+    return max(friction_violation(W, u, mu, P), plastic / np.abs(u).max())
 
 
 def rest(engine, rng):
@@ -90,12 +97,12 @@ def rest(engine, rng):
     mu, fixed = rng.uniform(0, 1.5, m), np.zeros(m)
     normal = np.array([j if j < k else -1 for j in range(m)])
     fixed[normal < 0] = rng.uniform(0, 1) * np.abs(u).max() / np.diag(W).max()
-    P = np.zeros(k + m)
+    P, tolerance = np.zeros(k + m), COMPLEMENTARITY_RTOL * np.abs(u).max()
     if engine == "kernel":
-        if not kernel().coulomb(k, m, W, u, mu, fixed, normal, P):
+        if not kernel().coulomb(k, m, W, u, mu, fixed, normal, tolerance, P):
             raise KernelError("no forces")
     else:
-        found = complementarity.coulomb(W, u, mu, fixed, normal)
+        found = complementarity.coulomb(W, u, mu, fixed, normal, tolerance)
         if found is None:
             raise SimulationError("no forces")
         P = found

@@ -49,6 +49,7 @@ REBOUND_RTOL = 1e-12  # Of the share of the restitution: width at which the bise
 # --- contact modes -----------------------------------------------------------------------------
 TOUCHING_RTOL = 1e-10  # Of the size: gaps below this close together with the one resolved.
 RELEASE_PENETRATION_ATOL = 1e-9  # m; a wall may be penetrated at release by no more than this.
+SETTLE_ITERATIONS_MAX = 10  # Choices of the modes of contacts and projections; two are usual.
 SHORTEST_FLIGHT_RTOL = 5e-7  # Of the period: the arc of a shorter bounce is lost in round-off.
 DEPENDENT_FRICTION_RTOL = 1e-4  # Of a contact's free mobility: below, held stops carry the load.
 ZERO_RATE_RTOL = 1e-9  # Of the velocity scale: a slower rate is round-off.

@@ -17,6 +17,7 @@ from ..base.tolerances import (
     EVENT_TIME_ULPS,
     FRICTION_EXCESS_RTOL,
     RELEASE_PENETRATION_ATOL,
+    SETTLE_ITERATIONS_MAX,
 )
 from ..mechanics import contact
 from ..mechanics.arrays import Real
@@ -78,16 +79,33 @@ def settle(
     slow = {} if reversing is None else {reversing: _residual_speed(front, reversing)}
     gaps, rates = front.gaps_and_rates()
     near = configuration.scales.touching + RELEASE_PENETRATION_ATOL
-    zero, contacts = configuration.scales.zero_speed, front.contacts
-    candidates = list(contacts.held)
+    zero = configuration.scales.zero_speed
+    candidates = list(front.contacts.held)
     candidates += [
         i for i in resting if i not in candidates and gaps[i] <= near and rates[i] <= zero
     ]
+    before = None
+    for _ in range(SETTLE_ITERATIONS_MAX):
+        front = _chosen(configuration, front, candidates, slipped, slow)
+        if front.contacts == before or not front.contacts.held:
+            return front
+        # The projection closes gaps of round-off, which changes the forces of stiff flexures.
+        front, before = front.projected(), front.contacts
+    raise SimulationError(_unsettled(configuration, front, candidates))
+
+
+def _chosen(
+    configuration: Configuration,
+    front: Front,
+    candidates: Sequence[int],
+    slipped: int | None,
+    slow: Mapping[int, float],
+) -> Front:
+    """Return the front with the modes that its forces choose; not projected."""
     holding = holding_stops(configuration, front, candidates)
-    contacts = ContactState.holding(holding, contacts.stops, contacts.points)
+    contacts = ContactState.holding(holding, front.contacts.stops, front.contacts.points)
     front = front.with_contacts(contacts)
-    front = _with_friction(configuration, front, candidates, slipped, slow)
-    return front.projected() if front.contacts.held else front
+    return _with_friction(configuration, front, candidates, slipped, slow)
 
 
 def release_moving(configuration: Configuration, front: Front) -> tuple[Front, int | None]:
@@ -159,6 +177,15 @@ def find_holding_stops(
     # A single stop needs no check; the forces of several may depend on each other.
     agrees = len(every) == 1 or _agrees(scales, front, contacts, every, {})
     return holding if agrees else None
+
+
+def _unsettled(configuration: Configuration, front: Front, contacts: Iterable[int]) -> str:
+    """Return the message for contacts whose modes change with each projection."""
+    names = contact_names(configuration.mechanism, contacts)
+    return (
+        f"the choice of closed contacts does not converge at t = {front.time:.9g} s ({names}): "
+        "the forces of the contacts are round-off; separate the stops, or change the load"
+    )
 
 
 def _jammed(configuration: Configuration, front: Front, contacts: Iterable[int]) -> str:
@@ -297,7 +324,9 @@ def _mobile(front: Front, contacts: ContactState, contact: int) -> bool:
     """Return whether a contact can slide while all other held and sticking contacts rest."""
     e, M, loops = front.equations.mass_and_loops(front.q)
     row = front.equations.slip_row(contact, e)[None]
-    others = front.equations.with_contacts(contacts.with_mode(contact, FRICTIONLESS))
+    if contacts.modes[contact].closed:
+        contacts = contacts.with_mode(contact, FRICTIONLESS)
+    others = front.equations.with_contacts(contacts)
     left = mobility(M, others.rows.jacobian(e), row)
     return left > DEPENDENT_FRICTION_RTOL * mobility(M, loops, row)
 
@@ -312,11 +341,12 @@ def _sticking_or_slipping(
 ) -> ContactState:
     """Return the modes, with those of contacts at rest chosen by their forces.
 
-    Of contacts that can stick only together, some stick; the others have friction at its limit, or
-    none.
+    Of contacts that can stick only together, those with friction below its limit stick, which are
+    independent of each other; the others have friction at its limit, or none.
     """
-    at_limit = np.abs(found.friction) >= found.limit - scales.zero_acceleration / found.mobility
-    for j in sorted(range(len(at_rest)), key=lambda j: bool(at_limit[j])):
+    slack, size = scales.zero_acceleration / found.mobility, np.abs(found.friction)
+    at_limit = size >= found.limit - slack
+    for j in np.argsort(np.where(at_limit, 2, size <= slack), kind="stable"):
         c, force = at_rest[j], found.friction[j]
         if not contacts.modes[c].closed:
             continue

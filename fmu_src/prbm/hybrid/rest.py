@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..base.tolerances import COMPLEMENTARITY_RTOL
 from ..mechanics import contact
 from ..mechanics.arrays import Real
 from ..mechanics.complementarity import coulomb
@@ -82,7 +83,8 @@ def rest_forces(
     friction = np.array([equations.stop_friction[c] if is_stop(c) else 0.0 for c in at_rest])
     fixed = np.array([0.0 if is_stop(c) else equations.friction_limit(c, e) for c in at_rest])
     normal = np.array([list(stops).index(c) if is_stop(c) else -1 for c in at_rest], int)
-    P = coulomb(W, u, friction, fixed, normal)
+    tolerance = COMPLEMENTARITY_RTOL * float(np.abs(u).max(initial=0.0))
+    P = coulomb(W, u, friction, fixed, normal, tolerance)
     if P is None:
         return None
     limit = fixed + friction * np.append(P[:k], 0.0)[normal]

@@ -115,12 +115,18 @@ def _values(table: Real, basis: list[int]) -> Real:
     return z[m : 2 * m]
 
 
-def coulomb(W: Real, u: Real, friction: Real, fixed: Real, normal: Integers) -> Real | None:
+def coulomb(
+    W: Real, u: Real, friction: Real, fixed: Real, normal: Integers, tolerance: float
+) -> Real | None:
     r"""Return normal and tangential forces (or impulses) of contacts; None without a solution.
 
     The rates are W P + u.  Normal ones: P >= 0, rate >= 0, complementary.  Tangential ones:
     abs(P) <= limit, and P = -limit sign(rate) where the rate is not zero; the limit is
     fixed + friction P_n.
+
+    A path of pivots that round-off has led astray ends in forces that violate the laws; the paths
+    of other covering vectors follow.  If only round-off excludes a solution, the problem is solved
+    with normal rates that are larger by half of the tolerance.
 
     Parameters
     ----------
@@ -132,20 +138,22 @@ def coulomb(W: Real, u: Real, friction: Real, fixed: Real, normal: Integers) -> 
         mu [-], and the part of the limit that no normal of the problem bears.
     normal : (m,) int
         The normal on which the limit of each tangent depends; -1: none.
+    tolerance : float
+        Largest violation of the laws that is round-off, as a rate.
 
     Examples
     --------
     A block of 1 kg is pressed by 10 N and pushed by 3 N at mu = 0.5: it sticks.
 
     >>> W, none = np.eye(2), np.zeros(1)
-    >>> coulomb(W, np.array([-10.0, 3.0]), none + 0.5, none, np.array([0])).tolist()
+    >>> coulomb(W, np.array([-10.0, 3.0]), none + 0.5, none, np.array([0]), 1e-9).tolist()
     [10.0, -3.0]
     """
     m = len(fixed)
     k = len(u) - m
     diagonal = np.abs(np.diag(W))
     scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
-    S, b = scale[:, None] * W * scale, scale * u
+    S = scale[:, None] * W * scale
     # z = (P_n, P_t+, P_t-, speed): the last are the speeds of sliding.
     spread = np.zeros((k + m, k + 2 * m))
     spread[:k, :k] = np.eye(k)
@@ -158,21 +166,26 @@ def coulomb(W: Real, u: Real, friction: Real, fixed: Real, normal: Integers) -> 
     for j in range(m):
         if normal[j] >= 0:
             M[size + j, normal[j]] = friction[j] * scale[normal[j]] / scale[k + j]
-    q = np.concatenate([spread.T @ b, fixed / scale[k:]])
-    for heavy in range(-1, k):
-        cover = np.ones(len(q))
-        cover[:k][np.arange(k) == heavy] = COVER_FACTOR
-        z = lemke(M, q, cover)
-        if z is not None:
-            return scale * (spread @ z[:size])
+    for opened in (0.0, tolerance / 2):
+        b = scale * (u + opened * (np.arange(k + m) < k))
+        q = np.concatenate([spread.T @ b, fixed / scale[k:]])
+        for heavy in range(-1, k):
+            cover = np.ones(len(q))
+            cover[:k][np.arange(k) == heavy] = COVER_FACTOR
+            z = lemke(M, q, cover)
+            if z is None:
+                continue
+            P = scale * (spread @ z[:size])
+            limit = fixed + friction * np.append(P[:k], 0.0)[normal]
+            if violation(W, u, P, limit) <= tolerance:
+                return P
     return None
 
 
 def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real | None:
     r"""Return impulses of an impact by :func:`coulomb`; None without a solution.
 
-    Without friction there are k normals, else k normals and k tangents.  If only round-off excludes
-    a solution, the problem is solved with gap rates that are larger by half of the tolerance.
+    Without friction there are k normals, else k normals and k tangents.
 
     Parameters
     ----------
@@ -187,16 +200,10 @@ def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) ->
     """
     k, m = len(least), len(friction)
     given = u + W[:, :k] @ least
-    opened = given.copy()
-    opened[:k] += tolerance / 2
-    for rates in (given, opened):
-        P = coulomb(W, rates, friction, friction * least[:m], np.arange(m))
-        if P is not None:
-            limit = friction * (least + P[:k])[:m]
-            if violation(W, given, P, limit) <= tolerance:
-                P[:k] += least
-                return P
-    return None
+    P = coulomb(W, given, friction, friction * least[:m], np.arange(m), tolerance)
+    if P is not None:
+        P[:k] += least
+    return P
 
 
 def violation(W: Real, u: Real, P: Real, limit: Real) -> float:

@@ -18,10 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from ..base.errors import SimulationError
+
 Real = NDArray[np.float64]
 Force = Callable[[float, float, float, Real], float]
 Rates = Callable[[float, float, float, Real], Sequence[float]]
 IMPACT_TIME_ATOL = 1e-14  # s
+IMPACTS_MAX = 1000  # Most impacts within one step.
 
 
 @dataclass(frozen=True)
@@ -179,8 +182,15 @@ class Monolith:
         return math.copysign(1.0, wall) * self.guide.acceleration(phi, 0.0, force)
 
     def advance(self, end: float) -> None:
-        """Integrate to a time [s]."""
+        """Integrate to a time [s].
+
+        Raises
+        ------
+        SimulationError
+            If more than :data:`IMPACTS_MAX` impacts follow each other within one step.
+        """
         while self.time < end:
+            self._check_impacts()
             if self.held is not None and self._pressed(self.held) <= 0.0:
                 self.held = None
             h = min(self.substep, end - self.time)
@@ -192,6 +202,16 @@ class Monolith:
                 continue
             self._reach(hit[0], h)
             self._impact(hit[0])
+
+    def _check_impacts(self) -> None:
+        """Reject impacts that do not end."""
+        recent = self.impacts[-IMPACTS_MAX:]
+        if len(recent) == IMPACTS_MAX and self.time - recent[0][0] < self.substep:
+            raise SimulationError(
+                f"more than {IMPACTS_MAX} impacts within {self.substep:g} s of t = {self.time:.9g} "
+                f"s: rest_speed = {self.guide.rest_speed:g} m/s is too low for the guide to rest; "
+                "increase it"
+            )
 
     def _reach(self, wall: float, h: float) -> None:
         """Advance to the time within a step [s] at which the gap of a wall closes."""

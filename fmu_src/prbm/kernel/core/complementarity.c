@@ -186,32 +186,6 @@ static void set_problem(int k, int m, const double *W, const double *u, const do
     }
 }
 
-PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *friction,
-                  const double *fixed, const int *normal, double *P, Scratch *scratch) {
-    size_t used = scratch->used;
-    int size = k + 3 * m;
-    double *scale = take(scratch, (size_t)(k + m)), *M = take_matrix(scratch, size, size);
-    double *q = take(scratch, (size_t)size), *z = take(scratch, (size_t)size);
-    double *cover = take(scratch, (size_t)size);
-    bool solved = false;
-    for (int i = 0; i < k + m; i++) {
-        double mobility = fabs(W[i * (k + m) + i]);
-        scale[i] = mobility > 0.0 ? 1.0 / sqrt(mobility) : 1.0;
-    }
-    set_problem(k, m, W, u, friction, fixed, normal, scale, M, q);
-    for (int heavy = -1; !solved && heavy < k; heavy++) {
-        for (int i = 0; i < size; i++) {
-            cover[i] = i == heavy ? COVER_FACTOR : 1.0;
-        }
-        solved = lemke(size, M, q, cover, z, scratch);
-    }
-    for (int i = 0; solved && i < k + m; i++) {
-        P[i] = scale[i] * (i < k ? z[i] : z[i] - z[i + m]);
-    }
-    scratch->used = used;
-    return solved;
-}
-
 PRBM double violation(int k, int m, const double *W, const double *u, const double *P,
                       const double *limit) {
     double worst = 0.0;
@@ -231,44 +205,68 @@ PRBM double violation(int k, int m, const double *W, const double *u, const doub
     return worst;
 }
 
-/* --- impacts ---------------------------------------------------------------------------------- */
-
-/* Solve for the impulses beyond the least ones, with gap rates that are larger by opened. */
-static bool try_impulses(int k, int m, const double *W, const double *given, double opened,
-                         const double *friction, const double *least, double *P, double *limit,
-                         Scratch *scratch) {
+/* Follow the path of one covering vector to forces P; false if it ends in a ray. */
+static bool follow_path(int k, int m, const double *M, const double *q, int heavy,
+                        const double *scale, double *P, Scratch *scratch) {
     size_t used = scratch->used;
-    double *rates = take(scratch, (size_t)(k + m)), *fixed = take(scratch, (size_t)m);
-    int *normal = take_integers(scratch, m);
-    for (int i = 0; i < k + m; i++) {
-        rates[i] = i < k ? given[i] + opened : given[i];
+    int size = k + 3 * m;
+    double *z = take(scratch, (size_t)size), *cover = take(scratch, (size_t)size);
+    for (int i = 0; i < size; i++) {
+        cover[i] = i == heavy ? COVER_FACTOR : 1.0;
     }
-    for (int j = 0; j < m; j++) {
-        fixed[j] = friction[j] * least[j];
-        normal[j] = j;
-    }
-    bool solved = coulomb(k, m, W, rates, friction, fixed, normal, P, scratch);
-    for (int j = 0; solved && j < m; j++) {
-        limit[j] = friction[j] * (least[j] + P[j]);
+    bool solved = lemke(size, M, q, cover, z, scratch);
+    for (int i = 0; solved && i < k + m; i++) {
+        P[i] = scale[i] * (i < k ? z[i] : z[i] - z[i + m]);
     }
     scratch->used = used;
     return solved;
 }
 
+PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *friction,
+                  const double *fixed, const int *normal, double tolerance, double *P,
+                  Scratch *scratch) {
+    size_t used = scratch->used;
+    int size = k + 3 * m;
+    double *scale = take(scratch, (size_t)(k + m)), *M = take_matrix(scratch, size, size);
+    double *q = take(scratch, (size_t)size), *limit = take(scratch, (size_t)m);
+    bool solved = false;
+    for (int i = 0; i < k + m; i++) {
+        double mobility = fabs(W[i * (k + m) + i]);
+        scale[i] = mobility > 0.0 ? 1.0 / sqrt(mobility) : 1.0;
+    }
+    set_problem(k, m, W, u, friction, fixed, normal, scale, M, q);
+    /* If only round-off excludes a solution: normal rates larger by half of the tolerance. */
+    for (int attempt = 0; !solved && attempt < 2; attempt++) {
+        for (int i = 0; i < k; i++) {
+            q[i] = scale[i] * (u[i] + attempt * (tolerance / 2));
+        }
+        for (int heavy = -1; !solved && heavy < k; heavy++) {
+            solved = follow_path(k, m, M, q, heavy, scale, P, scratch);
+            for (int j = 0; solved && j < m; j++) {
+                limit[j] = fixed[j] + (normal[j] < 0 ? 0.0 : friction[j] * P[normal[j]]);
+            }
+            solved = solved && violation(k, m, W, u, P, limit) <= tolerance;
+        }
+    }
+    scratch->used = used;
+    return solved;
+}
+
+/* --- impacts ---------------------------------------------------------------------------------- */
+
 PRBM bool impulses(int k, int m, const double *W, const double *u, const double *friction,
                    const double *least, double tolerance, double *P, Scratch *scratch) {
     size_t used = scratch->used;
-    double *given = take(scratch, (size_t)(k + m)), *limit = take(scratch, (size_t)m);
-    bool solved = false;
+    double *given = take(scratch, (size_t)(k + m)), *fixed = take(scratch, (size_t)m);
+    int *normal = take_integers(scratch, m);
     for (int i = 0; i < k + m; i++) {
         given[i] = u[i] + dot(k, W + i * (k + m), least);
     }
-    /* if only round-off excludes a solution: gap rates larger by half of the tolerance */
-    for (int attempt = 0; !solved && attempt < 2; attempt++) {
-        solved = try_impulses(k, m, W, given, attempt * (tolerance / 2), friction, least, P, limit,
-                              scratch) &&
-                 violation(k, m, W, given, P, limit) <= tolerance;
+    for (int j = 0; j < m; j++) {
+        fixed[j] = friction[j] * least[j];
+        normal[j] = j;
     }
+    bool solved = coulomb(k, m, W, given, friction, fixed, normal, tolerance, P, scratch);
     for (int i = 0; solved && i < k; i++) {
         P[i] += least[i];
     }

@@ -10,12 +10,13 @@ PRBM bool lemke(int m, const double *M, const double *q, const double *cover, do
                 Scratch *scratch);
 /* Forces P (k + m,) of k normals and m tangents that satisfy the laws of contact and of friction,
  * with the rates W P + u; false without a solution.  The limit of each tangent is fixed + friction
- * P_n, with the normal force of the given index; -1: none. */
+ * P_n, with the normal force of the given index; -1: none.  Violations of the laws up to the
+ * tolerance, a rate, are round-off. */
 PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *friction,
-                  const double *fixed, const int *normal, double *P, Scratch *scratch);
+                  const double *fixed, const int *normal, double tolerance, double *P,
+                  Scratch *scratch);
 /* Impulses of an impact by the same laws: m is k, or 0 without friction, and the tangents belong to
- * the normals in order.  No normal impulse is below the least (k,).  Violations below the tolerance
- * are round-off. */
+ * the normals in order.  No normal impulse is below the least (k,). */
 PRBM bool impulses(int k, int m, const double *W, const double *u, const double *friction,
                    const double *least, double tolerance, double *P, Scratch *scratch);
 /* The largest violation of the laws, as a rate; limit (m,) of the tangential forces. */

@@ -170,7 +170,9 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     ContactMode others[CONTACTS_MAX];
     Inertia at = inertia_at(sim, sim->state.front);
     memcpy(others, modes, bytes);
-    others[contact] = CONTACT_FRICTIONLESS;
+    if (others[contact] != CONTACT_OPEN) {
+        others[contact] = CONTACT_FRICTIONLESS;
+    }
     try_contacts(sim, others);
     tangential_row(system, contact, at.e, row);
     double *held = take_matrix(&sim->scratch, q->r, system->n);
@@ -215,19 +217,21 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
     return true;
 }
 
-/* Choose the modes of contacts at rest by their forces, first for friction below its limit.  Of
- * contacts that can stick only together, some stick; the others have friction at its limit, or
- * none. */
+/* Choose the modes of contacts at rest by their forces.  Of contacts that can stick only together,
+ * those with friction below its limit stick, which are independent of each other; the others have
+ * friction at its limit, or none. */
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
                           const FrictionEvent *event, ContactMode *modes, Problem *problem) {
+    enum { BELOW_LIMIT, NO_FRICTION, AT_LIMIT };
     double zero = zero_acceleration(&sim->configuration);
     bool right = true;
-    for (int limited = 0; limited < 2; limited++) {
+    for (int turn = BELOW_LIMIT; turn <= AT_LIMIT; turn++) {
         for (int j = 0; right && j < rest->count; j++) {
             int contact = rest->contacts[j];
-            double slack = zero / found->mobility[j];
-            bool at_limit = fabs(found->friction[j]) >= found->limit[j] - slack;
-            if (at_limit == (limited == 1) && modes[contact] != CONTACT_OPEN) {
+            double slack = zero / found->mobility[j], size = fabs(found->friction[j]);
+            bool at_limit = size >= found->limit[j] - slack;
+            int order = at_limit ? AT_LIMIT : size <= slack ? NO_FRICTION : BELOW_LIMIT;
+            if (order == turn && modes[contact] != CONTACT_OPEN) {
                 bool slipped = event->slips && event->contact == contact;
                 right = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, problem);
             }
@@ -412,41 +416,59 @@ static int resting_candidates(Simulation *sim, const int *touching, int touching
     return count;
 }
 
-/* Choose the contact state at the front from its positions and velocities.
- *
- * touching: open stops that touch and neither close nor open
- * event: a slip or reversal that has just occurred, or NULL */
-PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
-                 Problem *problem) {
+/* Choose the modes of all contacts by their forces at the front. */
+static bool choose_modes(Simulation *sim, const HoldingSet *touching, const FrictionEvent *event,
+                         ContactMode *modes, Problem *problem) {
     const System *system = system_of(sim);
-    const double *front = sim->state.front;
-    FrictionEvent friction;
-    HoldingSet holding, all = {0, {0}, true};
-    int candidates[2 * STOPS_MAX];
-    ContactMode modes[CONTACTS_MAX];
-    if (!friction_event(sim, event, &friction, problem)) {
-        return false;
-    }
-    int count = resting_candidates(sim, touching, touching_count, candidates);
-    if (!holding_stops(sim, count, candidates, front, front + system->n, &holding, problem)) {
+    const double *q = sim->state.front, *v = q + system->n;
+    HoldingSet holding;
+    if (!holding_stops(sim, touching->count, touching->stops, q, v, &holding, problem)) {
         return false;
     }
     for (int contact = 0; contact < contact_count(sim); contact++) {
         bool open = is_stop(system, contact) && !has_contact(holding.count, holding.stops, contact);
         modes[contact] = open ? CONTACT_OPEN : CONTACT_FRICTIONLESS;
     }
-    for (int i = 0; i < system->s; i++) {
+    return settle_friction(sim, &holding, touching, event, modes, problem);
+}
+
+/* Choose the contact state at the front from its positions and velocities.  The projection closes
+ * gaps of round-off, which changes the forces of stiff flexures: the modes are chosen again until
+ * they stay the same.
+ *
+ * touching: open stops that touch and neither close nor open
+ * event: a slip or reversal that has just occurred, or NULL */
+PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const Event *event,
+                 Problem *problem) {
+    FrictionEvent friction;
+    HoldingSet all = {0, {0}, true};
+    int candidates[2 * STOPS_MAX];
+    ContactMode modes[CONTACTS_MAX];
+    size_t bytes = (size_t)contact_count(sim) * sizeof *modes;
+    if (!friction_event(sim, event, &friction, problem)) {
+        return false;
+    }
+    int count = resting_candidates(sim, touching, touching_count, candidates);
+    for (int i = 0; i < system_of(sim)->s; i++) {
         if (has_contact(count, candidates, i)) {
             all.stops[all.count++] = i;
         }
     }
-    if (!settle_friction(sim, &holding, &all, &friction, modes, problem)) {
-        return false;
+    for (int k = 0; k < SETTLE_ITERATIONS_MAX; k++) {
+        if (!choose_modes(sim, &all, &friction, modes, problem)) {
+            return false;
+        }
+        bool same = k > 0 && memcmp(modes, sim->state.modes, bytes) == 0;
+        set_contacts(sim, modes);
+        if (same || sim->equations.held_count == 0) {
+            return true;
+        }
+        if (!project(&sim->equations, sim->state.front_time, sim->state.front, &sim->scratch,
+                     problem)) {
+            return false;
+        }
     }
-    set_contacts(sim, modes);
-    return sim->equations.held_count == 0 ||
-           project(&sim->equations, sim->state.front_time, sim->state.front, &sim->scratch,
-                   problem);
+    return contacts_unsettled(sim, count, candidates, problem);
 }
 
 /* Open the closed stops whose gaps have a rate, after a change of a wall's velocity or an impulse.

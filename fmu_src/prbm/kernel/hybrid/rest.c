@@ -86,7 +86,9 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
         contact_mobility(size, n, rows, X, W);
         rest_accelerations(sim, rest, at.e, v, rows, u);
         rest_laws(sim, rest, at.e, friction, fixed, normal);
-        found->solved = coulomb(k, m, W, u, friction, fixed, normal, P, &sim->scratch);
+        double tolerance = COMPLEMENTARITY_RTOL * largest(size, u);
+        found->solved =
+            coulomb(k, m, W, u, friction, fixed, normal, tolerance, P, &sim->scratch);
     }
     for (int i = 0; found->solved && i < size; i++) {
         int j = i - k;
@@ -143,5 +145,15 @@ PRBM bool contacts_jammed(const Simulation *sim, int count, const int *contacts,
     return fail(problem,
                 "no forces satisfy the laws of contact and friction at t = %.9g s (%s): friction "
                 "jams the mechanism; reduce the coefficients of friction",
+                sim->state.front_time, names.text);
+}
+
+PRBM bool contacts_unsettled(const Simulation *sim, int count, const int *contacts,
+                             Problem *problem) {
+    ContactNames names;
+    list_contacts(sim->configuration.mechanism, count, contacts, &names);
+    return fail(problem,
+                "the choice of closed contacts does not converge at t = %.9g s (%s): the forces of "
+                "the contacts are round-off; separate the stops, or change the load",
                 sim->state.front_time, names.text);
 }

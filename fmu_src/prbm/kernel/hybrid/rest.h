@@ -34,6 +34,10 @@ PRBM const char *contact_name(const Mechanism *m, int contact);
 PRBM bool has_contact(int count, const int *contacts, int contact);
 /* The names of contacts, or as many of them as there is room for. */
 PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, ContactNames *names);
+/* Set the problem of contacts whose laws no forces satisfy; return false. */
 PRBM bool contacts_jammed(const Simulation *sim, int count, const int *contacts, Problem *problem);
+/* Set the problem of contacts whose modes change with each projection; return false. */
+PRBM bool contacts_unsettled(const Simulation *sim, int count, const int *contacts,
+                             Problem *problem);
 
 #endif
