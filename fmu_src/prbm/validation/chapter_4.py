@@ -182,7 +182,8 @@ def k_theta(_: Progress) -> Result:
         numbers,
         "The small-motion frequency, the frequency at 1 m/s and the whole response all give 2.545 "
         "± 0.01. The angle of the 1R guide without gravity is exactly harmonic, so that its "
-        "frequency does not depend on the amplitude; that of the elements hardly does.",
+        "frequency does not depend on the amplitude; the frequency of the elements hardly depends "
+        "on it.",
         """Two effects explain the remaining difference between 2.545 and our 2.551. The beams of
 ANSYS have shear and rotary inertia, the cables of our elements do not. And the least squares of the
 thesis compromise between amplitude and frequency. One K_Θ does not fit both guides: gravity
