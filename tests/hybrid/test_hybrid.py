@@ -164,7 +164,7 @@ def test_friction_at_the_stop_does_not_gain_energy(model, restitution):
 
 
 def test_a_sliding_contact_remains_closed():
-    """With friction at a stop that is away from the straight shape."""
+    """The stop has friction, and is away from the straight shape."""
     values = {"stop.position": -0.01, "stop.friction": 0.2, "release.displacement": -0.0101}
     sim = simulation("PRBDM2R", values)
     sim.advance(0.5)
@@ -221,7 +221,10 @@ def test_a_shuttle_at_rest_follows_a_slowly_accelerated_wall(model):
 
 
 def test_a_wall_that_starts_with_a_velocity_moves_the_body_at_rest_on_it():
-    """It accelerates within two steps, faster than gravity: no impact, then a short flight."""
+    """The wall reaches its velocity within two steps: the body is pushed without an impact.
+
+    The wall decelerates faster than gravity at the end, so that the body flies for a short time.
+    """
     sim = simulation("PRBDM", {"damping.beta": 0.0})
     for k in range(100):
         sim.advance(0.3 + (k + 1) * 1e-3)
@@ -257,7 +260,7 @@ def test_a_contact_opens_when_its_force_is_zero():
 
 
 def test_base_acceleration_acts_like_opposite_gravity():
-    """Its work is part of energy.work, that of gravity is potential energy."""
+    """The work of the base acceleration is part of energy.work, that of gravity is potential."""
     values = {"release.displacement": 0.0, "stop.position": 0.05}
     # Damping and error scales depend on gravity, not on the base acceleration: small tolerance.
     falls = simulation("PRBDM", values | {"gravity.x": 9.81}, tolerance=1e-12)
@@ -476,7 +479,7 @@ def linkage(**parts):
 
 
 def test_a_linkage_without_springs_keeps_its_energy_and_angular_momentum():
-    """Angular momentum about the pin, up to the first impact; the energy balance also after it."""
+    """The angular momentum about the pin is constant up to the first impact, the energy always."""
     sim = Simulation(linkage(stops=(Stop("stop", "body", (0.1, 0.0), 90.0, 0.02),)))
     assert sim.frequency == 0.0
     before = sim.outputs()["energy.kinetic"]
@@ -501,7 +504,7 @@ def test_a_linkage_without_springs_keeps_its_energy_and_angular_momentum():
 
 @pytest.mark.parametrize("ends", [("clamp", "pin"), ("pin", "clamp")])
 def test_a_linkage_without_springs_has_the_frequency_zero(ends):
-    """Exactly zero, not 1e-6 Hz by rounding."""
+    """The frequency is exactly zero, not 1e-6 Hz of round-off."""
     parts = linkage()
     flexure = Flexure("bar1", "bar", "ground.pin", "body.pin", ends)
     sim = Simulation(dataclasses.replace(parts, flexures=(flexure,)))
@@ -522,7 +525,7 @@ def test_a_release_velocity_that_the_loops_forbid_is_rejected():
 
 
 def test_gap_rows_are_recomputed_for_a_new_offset_but_not_after_an_impact():
-    """They then equal those of a simulation that starts with the offset."""
+    """The recomputed rows equal those of a simulation that starts with the offset."""
     sim = simulation("PRBDM2R")
     rows = sim.system.gap_rows
     sim.advance(0.05)

@@ -186,7 +186,10 @@ def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
 @given(mechanisms(), SEEDS)
 @laws(30)
 def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing(mechanism, seed):
-    """Loops are closed, and gaps equal the stops' positions; the mass is at most the total."""
+    """Loops are closed, gaps equal the stops' positions, centres of mass are those of the file.
+
+    The moving mass is at most the mass of all bodies and flexures.
+    """
     system = assemble(mechanism, mechanism.values())
     np.testing.assert_allclose(closures(system, system.q0), 0.0, atol=1e-15)
     places = [value(s, "position", system.values) for s in mechanism.stops]
@@ -198,7 +201,7 @@ def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing
 
 
 def leaf_mass(mechanism):
-    """Return the mass of all flexures; the moving mass is less for lumped or clamped ones."""
+    """Return the mass of all flexures; the moving part is smaller if lumped or next to a clamp."""
     total = 0.0
     for flexure in mechanism.flexures:
         kind = next(k for k in mechanism.flexure_types if k.name == flexure.type)
@@ -393,7 +396,7 @@ def has_lawful_impacts(mechanism, seed):
         assert u[0] < 0.0
         assert u[1] >= -1e-7 * abs(u[0])
         assert kinetic[1] <= kinetic[0] * (1 + 1e-9)
-        parts = np.abs(G[i]) @ np.abs(impact.before)  # Differences have eight digits of it.
+        parts = np.abs(G[i]) @ np.abs(impact.before)  # G is a difference: its error is 1e-8.
         assert impact.latched.approach_speed == pytest.approx(-u[0], rel=1e-7, abs=1e-8 * parts)
         if len(touching) == 1 and not rubbed:
             assert impact.impulse == pytest.approx(impulses[0], rel=1e-6)
@@ -413,7 +416,7 @@ def test_the_laws_hold_for_300_random_mechanisms(seed):
 
 
 def test_the_random_mechanisms_have_all_features():
-    """Impacts at walls on the ground and on bodies, alone and with friction, rest, and loops."""
+    """Loops, stretch, rest, friction, and impacts at walls on the ground and on bodies."""
     seen_kinds = set()
     for seed in FEATURE_SEEDS:
         mechanism = seeded(seed)
@@ -459,7 +462,7 @@ def free_pair(friction):
 @pytest.mark.parametrize("friction", [0.0, 0.2, 5.0])
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 def test_an_eccentric_impact_of_two_free_bodies_conserves_momentum(friction, restitution):
-    """Linear and angular momentum; the mass of the threads is 1e-9 of that of the bodies.
+    """The mass of the threads is 1e-9 of that of the bodies, so that their momentum is negligible.
 
     Without friction, the impulse is (1 + eps) closing speed / W with
     W = sum of 1/m + (arm x n)^2/J.

@@ -13,7 +13,7 @@ from prbm.mechanics.contact_state import ContactMode
 from support import mechanism
 
 JAMMED = 0.0
-"""Largest share of errors: at rest nothing slides, and there always are forces."""
+"""Largest share of errors: no contact slides at rest, so that there is always a solution."""
 
 
 def walled():
@@ -58,7 +58,7 @@ def violations(sim):
 
 
 def search(draws, seed, engines=(Simulation, KernelSimulation), compared=True):
-    """Return the numbers of errors of each engine, whose motions may be compared."""
+    """Return the number of errors of each engine; if ``compared``, their motions must agree."""
     rng, guide, errors = np.random.default_rng(seed), walled(), [0] * len(engines)
     for _ in range(draws):
         values, ends = drawn(rng), []
