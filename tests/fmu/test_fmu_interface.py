@@ -141,7 +141,7 @@ def test_velocities_are_declared_as_derivatives(fmus, model):
 
 
 @each_shipped
-def test_declared_capabilities_and_default_experiment(fmus, model):
+def test_capabilities_and_the_default_experiment_are_declared(fmus, model):
     description = read_model_description(str(fmus[model]))
     cs, experiment = description.coSimulation, description.defaultExperiment
     assert cs.canGetAndSetFMUstate
@@ -154,7 +154,7 @@ def test_declared_capabilities_and_default_experiment(fmus, model):
 
 @each_shipped
 def test_outputs_ignore_inputs_set_at_the_same_communication_point(fmus, model):
-    """ModelStructure declares it; this test changes every input at a communication point."""
+    """ModelStructure declares no dependency of an output on an input; all inputs are changed."""
     guide = case(model).mechanism
     with Instance(fmus[model]).initialize() as instance:
         assert instance.step(0.0, 0.01) == OK

@@ -229,7 +229,7 @@ def test_dependencies_cover_every_output_and_derivative(model, mechanisms):
     assert f"{it.force}.x" not in found[f"{it.body}.vx"]
 
 
-def test_the_source_is_one_file_of_one_version(mechanisms):
+def test_the_source_is_one_file_with_the_functions_of_one_version_of_fmi(mechanisms):
     for fmi, other in ((2, 3), (3, 2)):
         text = amalgamation("X", "*/ title", fmi)
         included = set(re.findall(r'#\s*include\s+"([^"]+)"', text))

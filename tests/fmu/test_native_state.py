@@ -37,7 +37,10 @@ def enter_event_mode(instance: Instance) -> None:
 @interfaces
 @each_shipped
 def test_a_restored_state_gives_identical_results(native, model, fmi, kind):
-    """States before the first and after some impacts; also after a motion with other inputs."""
+    """The states are before the first impact and after several.
+
+    Each is restored twice, the second time after a motion with other inputs.
+    """
     it, (before, after) = case(model), spans(model)
     twice = ((before, after), (np.concatenate([before, after[:20]]), after[20:]))
     substep = it.substep(2e-4)
@@ -350,7 +353,7 @@ def test_a_reset_instance_equals_a_new_one(native, model, fmi, kind):
 
 
 @interfaces
-def test_reset_from_every_state_of_the_state_machine(native, fmi, kind):
+def test_a_reset_works_in_every_state_of_the_state_machine(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind) as instance:
         initial = instance.saved()
         places = [lambda: None, instance.enter, lambda: instance.enter().begin(),
