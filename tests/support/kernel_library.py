@@ -46,7 +46,7 @@ DTYPES = {
 }
 
 
-ENUMERATIONS = ("ContactMode",)  # of which functions and structures have values
+ENUMERATIONS = ("ContactMode",)  # Types of arguments and members.
 SCALARS |= dict.fromkeys(ENUMERATIONS, ctypes.c_int)
 DTYPES |= dict.fromkeys(ENUMERATIONS, np.int32)
 

@@ -109,7 +109,7 @@ def gain(W, u, P):
 
 
 def friction_violation(W, u, mu, P):
-    """Return the largest violation of contact, friction cone and energy, over the largest rate."""
+    """Return the largest violation of contact, cone or energy, divided by the largest rate."""
     k = len(mu)
     after, scale = u + W @ P, np.abs(u).max()
     excess = (np.abs(P[k:]) - mu * P[:k]) * np.diag(W)[k:]

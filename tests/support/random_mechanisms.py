@@ -7,7 +7,7 @@ chance::
     @given(mechanisms())                    # hypothesis
     def test_...(mechanism): ...
 
-    mechanism = seeded(7)                   # the same one each time
+    mechanism = seeded(7)                   # the same mechanism each time
 """
 
 import math
@@ -124,9 +124,9 @@ def build(
     friction: bool = True,
     damping: bool = True,
 ) -> Mechanism:
-    """Return a mechanism with limited numbers of parts; it may be over-constrained.
+    """Return a mechanism, which may be over-constrained.
 
-    ``bodies``, ``loops`` and ``stops`` are the largest numbers.
+    ``bodies``, ``loops`` and ``stops`` are the largest numbers of these parts.
     """
     b = _Builder(choose, rng)
     for _ in range(choose((1, 2, 3))):
@@ -209,7 +209,7 @@ def assembles(mechanism: Mechanism) -> bool:
 
 
 def starts(mechanism: Mechanism) -> bool:
-    """Return whether a simulation can start, outside of all walls, and the release can move."""
+    """Return whether a simulation can start and the released body can move along its release."""
     try:
         sim = Simulation(mechanism)
     except (EquilibriumError, ParameterError):
