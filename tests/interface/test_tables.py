@@ -355,7 +355,7 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
     ],
 )
 def test_tables_of_an_invalid_mechanism_are_rejected(name, places, number, message):
-    """One number after the name of a part is replaced, at an offset of so many numbers."""
+    """A number behind the name of a part is replaced; ``places`` other numbers precede it."""
     guide = elastic()
     written = bytearray(tables(guide, (), TOKEN, independent(guide)))
     at = written.index(struct.pack("<I", len(name)) + name.encode() + b"\0") + 5 + len(name)

@@ -247,8 +247,8 @@ def test_without_a_private_folder_the_library_is_compiled_and_not_stored(cache, 
     assert entries(own) == []
 
 
-def test_an_own_cache_that_others_could_write_is_restricted(cache, monkeypatch):
-    """The mode of a folder made with the umask 002; the compiler's files in it are rebuilt."""
+def test_a_cache_folder_that_others_could_write_is_made_private(cache, monkeypatch):
+    """The folder gets the mode 0700, and the compiler's files in it are removed."""
     cache.mkdir(parents=True)
     (cache / "zig").mkdir()
     (cache / "zig" / "planted.o").write_bytes(b"")
@@ -341,7 +341,7 @@ def test_error_on_an_unsupported_machine_names_the_option_for_all_platforms(cach
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads ELF with nm")
 def test_the_library_exports_only_functions_of_fmi_and_needs_only_libc(tmp_path):
-    """The kernel, not the stub.  Other exported names could clash with other libraries."""
+    """The library is that of the kernel; other exported names could clash with other libraries."""
     library = tmp_path / "prbm.so"
     library.write_bytes(only(libraries([HOST])))
     named = subprocess.run(
