@@ -41,7 +41,7 @@ def bent(rng, samples=600, cycles=1, noise=CELL_NOISE, loss=0.0, largest=3e-3):
 
 
 def test_youngs_modulus_is_recovered_within_a_percent():
-    """Noise of 1 mN on forces up to 17 mN, at a deflection of 3 mm of a flexure of 5.7 N/m."""
+    """The forces of up to 17 mN have a noise of 1 mN; the flexure of 5.7 N/m is bent by 3 mm."""
     d, F = bent(np.random.default_rng(0), 12000, 10)
     found = youngs_modulus(d, F, beam(), window=10)
     assert found.modulus.value == pytest.approx(E, rel=0.01)
@@ -69,7 +69,7 @@ def test_youngs_modulus_is_exact_without_noise():
 
 
 def test_dimensions_in_mm_taken_as_metres_are_noted():
-    """E is proportional to l^3/(b h^3): a thousandth of the true value."""
+    """E is proportional to l^3/(b h^3), so that it is a thousandth of the true value."""
     d, F = bent(np.random.default_rng(0))
     sizes = (Estimate(1e3 * x, 0.0) for x in (LENGTH, WIDTH, THICKNESS))
     found = youngs_modulus(d, F, Beam("1", *sizes))
@@ -85,7 +85,7 @@ def test_a_modulus_outside_the_range_of_solids_is_noted(factor):
 
 
 def test_the_uncertainty_of_the_fit_covers_the_true_modulus():
-    """68.3 % of 200 draws, -+ 3 standard deviations of a count of them: 0.585 to 0.781."""
+    """It does so in 68.3 % of 200 draws, -+ 3 standard deviations of their number."""
     rng = np.random.default_rng(2)
     hits = 0
     for _ in range(200):
