@@ -36,7 +36,7 @@ def is_picture(path: str) -> bool:
 def test_quickstart_frequency_agrees_with_finite_elements_and_experiment(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The model error of the 2R is 0.5 %; the experiment has its standard uncertainty."""
+    """The model error of the 2R is 0.5 %; the limit for the experiment is twice its uncertainty."""
     quickstart = example("quickstart.py")
     quickstart.main([])
     printed = capsys.readouterr().out
@@ -141,7 +141,7 @@ def test_sweep_has_the_standard_deviation_of_first_order_propagation(
 def test_stroke_controller_reaches_its_stroke_and_energies_balance(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Its work equals that of the guide, and the speed of its impacts that of beam theory.
+    """The controller's work equals that on the guide; impacts have the speed of beam theory.
 
     Work and energy balance are exact to the tolerance of the integration.  The speed has the model
     error of the 1R, which is 4 % stiffer than a beam, and that of a delay by one step.
@@ -178,7 +178,7 @@ def test_stroke_controller_rejects_an_invalid_stop_time(
 def test_stroke_controller_reports_too_few_impacts(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A tenth of a second with the 2R model."""
+    """The run is a tenth of a second long."""
     example("stroke_controller/run.py").main(["--stop-time", "0.1", "--model", "PRBDM2R"])
     assert (
         "fewer than two impacts in the second half: increase --stop-time" in capsys.readouterr().out

@@ -74,7 +74,7 @@ def _module(path: Path) -> object:
 EXPRESSIONS = dict(expressions())
 
 
-def test_all_calls_are_found():
+def test_all_calls_of_the_module_re_are_found():
     calls = sum(
         len(re.findall(rf"\bre\.(?:{'|'.join(FUNCTIONS)})\(", path.read_text("utf-8")))
         for path in (PACKAGE / "prbm").rglob("*.py")
@@ -127,8 +127,8 @@ def test_no_regular_expression_takes_more_than_quadratic_time(place):
         signal.signal(signal.SIGVTALRM, previous)
 
 
-def test_the_test_recognizes_cubic_and_exponential_time():
-    """The expressions that this test was made for."""
+def test_cubic_and_exponential_time_are_detected():
+    """Two such expressions are added to the list for the duration of this test."""
     EXPRESSIONS["cubic"] = re.compile(r"\s*((?:'[^']*'|[^='#])+?)\s*=")
     EXPRESSIONS["exponential"] = re.compile(r"(a+)+b")
     try:
