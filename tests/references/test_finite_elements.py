@@ -89,7 +89,7 @@ def test_modes_of_a_cantilever_match_euler_bernoulli_theory():
 
 
 def test_the_rest_position_converges_with_order_two_or_more():
-    """Twice the elements, at most a quarter of the change."""
+    """Twice the elements give at most a quarter of the change."""
     at_rest = []
     for elements in (4, 8, 16, 32):
         fe = guide(elements=elements)
@@ -115,7 +115,7 @@ def test_a_shape_does_not_depend_on_the_start_of_the_iteration():
 
 
 def test_tangents_match_central_differences():
-    """C of the constraints, G of the gap, d(C mu)/dq of the reactions."""
+    """The tangents are C of the constraints, G of the gap and d(C mu)/dq of the reactions."""
     fe = guide({"stop.offset": 3e-3, "stop.position": 0.02}, elements=4)
     shape = fe.equilibrium(-0.01)
     rng, h = np.random.default_rng(0), 1e-6
@@ -262,8 +262,8 @@ def test_without_exudyn_the_error_names_the_installation(monkeypatch):
 # --- reference numbers of the guides ----------------------------------------------------------
 
 
-def test_rest_position_and_frequencies_of_the_steel_guide():
-    """10.720 mm; 4.907, 130.7 and 209.8 Hz with 32 elements per flexure."""
+def test_the_steel_guide_has_the_reference_rest_position_and_frequencies():
+    """They are 10.720 mm and 4.907, 130.7, 209.8 Hz, with 32 elements per flexure."""
     fe = guide(elements=32)
     rest = fe.equilibrium()
     assert fe.displacement(rest.q) == pytest.approx(10.720e-3, abs=2e-6)
@@ -272,7 +272,7 @@ def test_rest_position_and_frequencies_of_the_steel_guide():
     np.testing.assert_allclose(frequency[1:], [130.7, 209.8], atol=0.06)
 
 
-def test_frequency_of_the_straight_steel_guide():
+def test_the_straight_steel_guide_has_the_reference_frequency():
     fe = guide(WEIGHTLESS, elements=32)
     assert fe.modes(fe.equilibrium()).frequency[0] == pytest.approx(4.6405, abs=1e-4)
 
@@ -285,14 +285,14 @@ MODAL_RESTITUTION = {  # by offset [m]; walls at -10, 0, 10 mm; restitution 0.6
 
 
 @pytest.mark.parametrize("offset", MODAL_RESTITUTION)
-def test_modal_restitution_of_the_steel_guide(offset):
+def test_the_steel_guide_has_the_reference_modal_restitution(offset):
     fe = guide(WEIGHTLESS | {"stop.offset": offset})
     found = [fe.modal_restitution(fe.equilibrium(h), 0, 0.6) for h in (-0.01, 0.0, 0.01)]
     np.testing.assert_allclose(found, MODAL_RESTITUTION[offset], atol=3e-4)
 
 
-def test_frequency_and_amplitude_of_the_free_pmma_guide():
-    """Started straight at 1 m/s: 5.6375 Hz between zero crossings, 26.2 to 28.1 mm."""
+def test_the_free_pmma_guide_has_the_reference_frequency_and_amplitude():
+    """It starts straight at 1 m/s; the frequency is measured between zero crossings."""
     response = guide(PMMA, elements=16).transient(0.4, 2e-4)
     t, x = response["time"], response["shuttle.x"]
     upward = (x[:-1] < 0) & (x[1:] >= 0)

@@ -28,7 +28,7 @@ def beam() -> tuple[float, float, float, float]:
     return EI / L**3, v["pmma.density"] * b * h * L, v["shuttle.mass"], v["upper_truss.mass"]
 
 
-def test_it_has_two_trusses_and_eight_flexures() -> None:
+def test_the_suspension_has_two_trusses_and_eight_flexures() -> None:
     assert sorted(f.name for f in FOLDED.flexures) == sorted(SIDES)
     assert [body.name for body in FOLDED.bodies] == ["shuttle", "upper_truss", "lower_truss"]
     assert SYSTEM.n == 8 * (5 + 1) + 3
@@ -88,7 +88,7 @@ def test_trusses_move_half_as_far_and_descend_as_a_guide() -> None:
 
 
 def test_the_path_is_far_straighter_than_that_of_a_parallel_guide() -> None:
-    """Lateral errors at strokes up to 30 mm with flexures of 0.2 m."""
+    """The strokes are up to 30 mm, with flexures of 0.2 m."""
     x, L = EXAMPLE["STROKES"], SYSTEM.values["flexure.length"]
     errors = {name: np.abs(error) for name, error in EXAMPLE["simulate"]().items()}
     guide = 0.6 * x**2 / L

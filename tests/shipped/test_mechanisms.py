@@ -80,7 +80,7 @@ def test_dissipated_energy_never_decreases(name: str) -> None:
 
 
 def test_stiffness_of_the_3r_guide_is_that_of_its_pivots() -> None:
-    """Small deflection: two flexures in parallel, of compliance sum (x_i - L/2)^2 / K_i each.
+    """For small deflections each of its two flexures has the compliance sum (x_i - L/2)^2 / K_i.
 
     The model error against 12 EI/L^3 is -2.2 %.
     """

@@ -1,4 +1,4 @@
-"""The co-simulation master: schemes against closed forms, events against FMPy, error messages."""
+"""The co-simulation master: schemes with closed forms, events as in FMPy, error messages."""
 
 import gc
 import math
@@ -34,7 +34,7 @@ def circle(scheme):
 
 
 def test_jacobi_is_explicit_euler():
-    """(a + i b) -> (1 - i h)(a + i b), so that the circle grows by (1 + h^2)^(n/2)."""
+    """A step multiplies a + i b by 1 - i h, so that the circle grows by (1 + h^2)^(n/2)."""
     time, a, b = circle(JACOBI)
     np.testing.assert_allclose(time, H * np.arange(STEPS + 1), rtol=1e-15)
     np.testing.assert_allclose(a + 1j * b, (1 - 1j * H) ** np.arange(STEPS + 1), rtol=1e-12)
@@ -188,7 +188,10 @@ def test_an_impulse_reaches_the_partner_at_the_time_of_the_impact(scheme):
 
 @pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
 def test_two_unconnected_guides_with_events_move_as_each_does_alone(scheme):
-    """At an event of one the other is restored and repeats the step, to the FMUs' tolerance."""
+    """At an event of one guide the other is restored and steps to the event.
+
+    The times agree to the tolerance of the FMUs.
+    """
     fmus = {"one": guide(3), "other": guide(3)}
     values = {"one.stop.restitution": 0.6, "other.stop.restitution": 0.5}
     record = [f"{name}.{x}" for name in fmus for x in IMPACTS]
@@ -286,7 +289,7 @@ def test_enumerations_are_integers_and_strings_are_strings(tmp_path):
 
 @pytest.mark.parametrize("library", [None, b"damaged"])
 def test_an_fmu_that_cannot_be_loaded_is_reported(library, tmp_path):
-    """Without a library for this platform, or with a damaged one; the working directory is kept."""
+    """The library for this platform is missing or damaged; the working directory is kept."""
     here, path = Path.cwd(), tmp_path / "x.fmu"
     with zipfile.ZipFile(guide(3)) as whole, zipfile.ZipFile(path, "w") as part:
         for name in whole.namelist():

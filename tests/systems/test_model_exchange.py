@@ -42,7 +42,10 @@ def monolith(end, start=START, wall=1e-30, **options):
 @pytest.mark.fmu
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_model_and_partner_move_as_the_scalar_equation(fmi):
-    """Two impacts; the tolerances are the error of the reference, RK4 with steps of 0.05 ms."""
+    """There are two impacts.
+
+    The tolerances are the error of the reference, RK4 with steps of 0.05 ms.
+    """
     found = simulate(guide(fmi), partner, [0.0], END, 1e-3, START, SEEN, RECORD)
     one = monolith(END, substep=5e-5)
     last = found[-1]

@@ -128,7 +128,7 @@ def test_the_amplitude_of_a_1r_is_compared_with_the_closed_form_of_the_same_mode
 
 
 def test_both_modes_of_each_pair_are_on_the_page():
-    """The frequencies of both modes, also of the one that is further from the printed value."""
+    """The mode that is further from the printed value is not left out."""
     found = [float(cells[2]) for cells in rows(parts(PAGE, "figure-6-5")[1])[1:5]]
     assert found == pytest.approx([107.24, 104.96, 202.7, 198.11], abs=0.02)
 
