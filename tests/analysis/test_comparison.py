@@ -141,7 +141,7 @@ def test_without_exudyn_the_error_names_the_installation(monkeypatch):
     ("row", "last"),
     [
         (Row("frequency 1 at rest", "Hz", 5.05, 5.0), "+1.00 %"),
-        (Row("modal restitution, stop", "", 0.5, -0.05), "+0.55"),  # A ratio: not -1100 %.
+        (Row("modal restitution, stop", "", 0.5, -0.05), "+0.55"),
         (Row("modal restitution, stop", "", 0.6, 0.5), "+0.1"),
         (Row("rest position", "m", 3e-6, 1e-6), "+200.00 %"),
         (Row("stiffness, straight", "N/m", 3310.0, 100.0), "+3210 %"),

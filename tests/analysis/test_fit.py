@@ -32,7 +32,7 @@ from prbm.mechanics.statics import equilibrium
 from prbm.plots.fit import force_figure, response_figure, valley_figure
 from support import PMMA, ScalarGuide, mechanism
 
-RATE, NOISE = 750.0, 4e-6  # Hz, m: the laser sensor of the thesis
+RATE, NOISE = 750.0, 4e-6  # Hz, m; of the laser in the thesis
 K = "flexure.K_theta"
 F5 = Frequency(Estimate(5.0, 0.01))
 DROPPED = {"release.displacement": -0.01, "damping.beta": 0.0, K: 2.5449}
@@ -319,7 +319,7 @@ def test_a_fit_to_a_free_response_recovers_the_stiffness():
 
 @pytest.mark.parametrize("restitution", [0.25, 0.6, 0.95])
 def test_a_fit_to_a_bouncing_response_recovers_the_restitution(restitution):
-    """It is within 0.01, from a start at 0.5; the record is computed by another integrator."""
+    """The fit starts at 0.5; another integrator has computed the record."""
     found = fitted_restitution(
         mechanism("PRBDM"), record(restitution, 0.13), DROPPED | {"stop.restitution": 0.5}
     )

@@ -75,7 +75,7 @@ def test_the_closed_form_is_near_the_2r_with_stretching_flexures():
     model = impact_map.algebraic(guide(axial=True), values=WEIGHTLESS)
     np.testing.assert_allclose(closed.restitution, model.restitution, atol=0.0064)
     centre = closed.restitution[2, 2]
-    assert centre == pytest.approx(0.6, abs=1e-6)  # straight and centred: eps itself
+    assert centre == pytest.approx(0.6, abs=1e-6)  # Straight and centred, it is eps.
 
 
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R", "PRBDM2RAxial", "PRBDM3R"])
@@ -92,7 +92,7 @@ def test_the_closed_form_applies_to_every_guide(name):
 @pytest.mark.parametrize(
     ("name", "wall", "offset", "message"),
     [
-        ("Cantilever", 3e-3, 0.0, "tip turns"),  # by 3/2 of its path over its length
+        ("Cantilever", 3e-3, 0.0, "tip turns"),  # The angle is 3/2 of path over length.
         # The shuttle has 200 g; the stages at half its speed add 30 g, the flexures the rest.
         ("FoldedSuspension", 1e-7, 0.0, r"shuttle along its path is 8\d"),
     ],
@@ -129,7 +129,7 @@ def test_the_closed_form_is_rejected_at_a_stop_on_a_moving_body():
 
 
 def test_the_2r_with_stretching_flexures_agrees_with_finite_elements():
-    """They agree to 0.005 at the 25 points of the thesis; an inextensible 2R errs by over 0.03."""
+    """The error at the 25 points of the thesis is below 0.005; without stretch it exceeds 0.03."""
     pytest.importorskip(
         "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
     )
@@ -147,7 +147,7 @@ def test_the_2r_with_stretching_flexures_agrees_with_finite_elements():
     [("1R", 0, 0.014), ("2R", 0, 0.003), ("3R", 0, 0.006), ("nR", 40, 5e-4)],
 )
 def test_errors_of_models_with_stretching_flexures_are_as_documented(model, n, error):
-    """Largest difference from finite elements: 1R 0.013, 2R 0.003, 3R 0.006, 40R 5e-4."""
+    """The largest errors are 0.013 (1R), 0.003 (2R), 0.006 (3R) and 5e-4 (40R)."""
     pytest.importorskip(
         "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
     )

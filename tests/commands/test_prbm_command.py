@@ -115,7 +115,7 @@ def test_the_mode_of_a_1r_guide_moves_along_its_circle(capsys):
 
 
 def test_a_held_1r_guide_is_a_crank_on_torsion_springs(capsys):
-    """F = 4 k Theta/(gamma l cos Theta), x = gamma l sin Theta, y = gamma l (cos Theta - 1)."""
+    """F = 4 k T/(r cos T), x = r sin T, y = r (cos T - 1) with the link angle T and r = gamma l."""
     assert run("equilibrium PRBDM --set gravity.x=0 --from -20mm --to 20mm --out .") == cli.OK
     p = load("PRBDM").values()
     radius = p["flexure.gamma"] * p["flexure.length"]
@@ -217,7 +217,7 @@ def test_several_beams_give_a_table_with_their_mean(tmp_path, capsys):
     E = np.array(table("youngs-modulus.csv")["E [Pa]"], float)
     assert E[0] / E[1] == pytest.approx(1.01, rel=1e-9)
     assert E[2] == pytest.approx((E[0] + E[1]) / 2)
-    assert E[0] == pytest.approx(181.5e9, rel=0.03)  # its uncertainty is 1.7 %
+    assert E[0] == pytest.approx(181.5e9, rel=0.03)  # The uncertainty of E is 1.7 %.
     assert {path.name for path in Path().glob("*.png")} == {
         "bending-bending.png", "other-bending.png"
     }  # fmt: skip

@@ -21,7 +21,7 @@ from prbm.data.uncertainty import Estimate, EvaluationError, line, power_law
 from prbm.plots.measurement import bending_figure
 
 E, LENGTH, WIDTH, THICKNESS = 181.5e9, 40e-3, 8e-3, 0.1e-3  # Steel flexures of the thesis.
-CELL_NOISE = 1e-3  # N, 0.2 % of the range of a load cell for 0 to 0.5 N.
+CELL_NOISE = 1e-3  # N; 0.2 % of the range 0 to 0.5 N of the load cell.
 STIFFNESS = E * WIDTH * THICKNESS**3 / (4 * LENGTH**3)
 
 
@@ -85,7 +85,7 @@ def test_a_modulus_outside_the_range_of_solids_is_noted(factor):
 
 
 def test_the_uncertainty_of_the_fit_covers_the_true_modulus():
-    """It does so in 68.3 % of 200 draws, -+ 3 standard deviations of their number."""
+    """The interval includes E in 68.3 % of 200 draws, -+ 3 standard deviations of the number."""
     rng = np.random.default_rng(2)
     hits = 0
     for _ in range(200):
@@ -140,7 +140,7 @@ def test_dimensions_without_uncertainty_are_noted():
 
 
 def test_the_uncertainty_of_the_sensor_angle_contributes_by_its_tangent():
-    """d(1/cos a)/(1/cos a) = tan a da."""
+    """The force is divided by cos a for a sensor angle a, and d(1/cos a)/(1/cos a) = tan a da."""
     d, F = bent(np.random.default_rng(0), noise=0.0)
     found = youngs_modulus(d, F, beam(), sensor_angle=Estimate(30.0, 1.0))
     expected = math.tan(math.radians(30)) * math.radians(1.0)
@@ -186,7 +186,7 @@ def test_large_deflections_are_noted_with_their_error():
 def test_the_loss_of_a_cycle_is_the_area_of_the_loop():
     """Unloading forces are lower by c (1 - r), r = d/d_max: the loss is c/3 of the work k d^2/2.
 
-    int r c (1 - r) dr over int r dr = (1/6)/(1/2) c.
+    The integral of r c (1 - r) over that of r, both from 0 to 1, is c (1/6)/(1/2).
     """
     for cycles in (1, 4):
         d, F = bent(np.random.default_rng(4), 4000, cycles, noise=0.0, loss=0.3)
@@ -345,7 +345,7 @@ def test_correlated_residuals_increase_the_uncertainty():
 
 
 def test_the_uncertainty_of_a_power_law_is_that_of_random_samples():
-    """Monte Carlo of y = 3 x^2/z with 1e5 draws: standard deviation within 1 %."""
+    """The law is y = 3 x^2/z; the deviation of 1e5 random draws agrees to 1 %."""
     rng = np.random.default_rng(11)
     x, z = Estimate(2.0, 0.02), Estimate(5.0, 0.05)
     y, _ = power_law({"x": (x, 2.0), "z": (z, -1.0)}, 3.0)

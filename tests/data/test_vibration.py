@@ -75,7 +75,7 @@ def test_damping_below_its_uncertainty_is_too_small_to_measure(zeta):
 
 
 def test_uncertainties_cover_the_true_values():
-    """They do so in 68.3 % of 200 draws, -+ 3 standard deviations of their number."""
+    """Each interval includes its true value in 68.3 % of 200 draws, -+ 3 standard deviations."""
     rng = np.random.default_rng(1)
     hits = dict.fromkeys(("frequency", "zeta", "decrement", "its zeta"), 0)
     for _ in range(200):

@@ -106,7 +106,7 @@ def test_harvester_with_impacts_has_the_power_of_one_solver():
 
 @pytest.mark.slow
 def test_error_of_the_harvester_without_impacts_halves_with_the_step():
-    """The delay by half a step shifts the resonance by c w^2 h / 2 K."""
+    """The delay by half a step h shifts the resonance, in proportion to h."""
     run = example("energy_harvester")
     exact, errors = run.monolith([28.0], stops=False)[0], []
     for steps in (64, 128):
@@ -155,7 +155,7 @@ def test_drop_test_speeds_agree_with_the_scalar_equation_and_beam_theory():
 
 
 def test_impulse_of_the_drop_test_is_the_change_of_momentum():
-    """P = (1 + eps) m v for a mass on a circle of radius r, where m = M / cos(phi)^2 along x."""
+    """P = (1 + eps) m v, where m = M/cos(phi)^2 for a mass M at an angle phi on a circle."""
     run = example("drop_test")
     table, body = run.study((0.3,)), run.guide()
     mass = body.mass / (1 - (run.TRAVEL / body.r) ** 2)

@@ -205,7 +205,7 @@ def test_an_angle_is_not_dimensionless():
 
 
 def test_units_of_parameters_are_coherent_and_known_to_the_fmu():
-    """Other units are rejected."""
+    """Units that are not coherent SI units are rejected."""
     assert set(units.COHERENT) <= set(UNITS)
     known = {unit for part in FIELDS.values() for unit, *_ in part.values()}
     assert known <= {"", *units.COHERENT}
@@ -224,7 +224,7 @@ def test_a_parameter_has_the_si_unit_of_its_value(striker):
 
 
 def test_a_material_has_two_parameters_that_flexure_types_refer_to(striker):
-    """steel.youngs_modulus [Pa] and steel.density [kg/m3], with the bounds of the type's fields."""
+    """They are steel.youngs_modulus [Pa] and steel.density [kg/m3], with the bounds of the type."""
     known = {p.name: p for p in striker.parameters}
     for name, value in (("youngs_modulus", 181.5e9), ("density", 7800.0)):
         unit, _, minimum, maximum, nominal, _ = FIELDS[FlexureType][name]
@@ -382,7 +382,7 @@ TWO_LINES = (  # Mistakes of two lines that do not agree.
 
 @pytest.mark.parametrize("mistake", sorted({*CHANGES} - {"thousands of digits"}))
 def test_the_message_gives_a_line_of_the_wrong_part(mistake, tmp_path, capsys):
-    """It is between the table's header and the changed key, or in the other part of a conflict."""
+    """The line is between table header and changed key, or in the other part of a conflict."""
     old, new, _ = CHANGES[mistake]
     path = tmp_path / "mine.toml"
     path.write_text(EXAMPLE.replace(old, new, 1), "utf-8")
@@ -529,7 +529,7 @@ def test_the_command_prints_the_schema(capsys):
 
 
 def test_pint_is_not_imported_for_a_file_without_units(tmp_path):
-    """Its import takes 0.3 s."""
+    """The import of pint takes 0.3 s."""
     text = (ROOT / "tests" / "interface" / "test_tables.py").read_text().split('"""')[3]
     (tmp_path / "plain.toml").write_text(text)
     code = (

@@ -113,7 +113,7 @@ def test_display_unit_factors_follow_from_their_prefixes():
     for name, unit in UNITS.items():
         for display, factor in unit.display.items():
             if display in ("deg", "deg/s", "deg/s2", "g", "g.mm2", "g/cm3"):
-                continue  # These differ from the unit by more than a prefix.
+                continue  # More than a prefix differs.
             by_parts = [
                 prefixes[part[0]] if part != plain else 1.0
                 for part, plain in zip(display.split("/"), name.split("/"), strict=True)

@@ -98,7 +98,7 @@ def test_reference_results_equal_the_python_engine(native):
     simulation.advance(0.1)
     for name, x in simulation.outputs().items():
         if name in rows[0]:
-            # Printed with nine digits; the communication points before affect round-off only.
+            # The file has nine digits; other communication points change round-off only.
             assert float(rows[100][name]) == pytest.approx(float(x), rel=1e-7, abs=1e-9)
 
 

@@ -744,9 +744,9 @@ def python(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
 
 @interfaces
 def test_the_process_survives_thousands_of_invalid_calls(native, fmi, kind):
-    """Ten thousand calls over all interfaces, of every function in random order and every state.
+    """All interfaces together make ten thousand calls, of every function and in every state.
 
-    Arguments are NULL pointers and invalid references, lengths and numbers.
+    The order is random.  Arguments are NULL pointers and invalid references, lengths and numbers.
     """
     done = python(SURVIVAL, native["PRBDM2R", fmi], kind, 10_000 // len(INTERFACES))
     assert done.returncode == 0, done.stderr[-2000:]

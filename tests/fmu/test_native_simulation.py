@@ -430,7 +430,7 @@ def test_the_release_by_a_retreating_wall_is_an_event(native):
             found[kind] = instance.values()
         assert not held[0]  # The wall accelerates by 4 v / T = 40 m/s2 or jumps.
         assert held[-1]
-        assert found[kind]["shuttle.vx"] == pytest.approx(0.02, rel=1e-9)  # Moves with the wall.
+        assert found[kind]["shuttle.vx"] == pytest.approx(0.02, rel=1e-9)  # At the wall's velocity.
     assert found["cs"]["stop.impact_count"] > IMPACTS
     for kind in ("events", "late"):  # The wall starts with a jump of its velocity.
         assert found[kind]["shuttle.x"] == pytest.approx(found["cs"]["shuttle.x"], abs=1e-9)
@@ -564,7 +564,7 @@ def test_directional_derivatives_equal_finite_differences(native, model, fmi, sh
         integrator = Integrator(instance)
         x, u = integrator.x(), np.array(instance.get(*inputs))
         dx, du = rng.standard_normal(len(x)), rng.standard_normal(len(u))
-        du[[name.endswith(".mobility") for name in inputs]] = 0.0  # Mobilities are not negative.
+        du[[name.endswith(".mobility") for name in inputs]] = 0.0  # Mobilities stay positive.
         dx[2 * ((len(x) - 2) // 2) :] = 0.0  # Dissipated energy and work have no effect.
 
         def at(step: float) -> np.ndarray:

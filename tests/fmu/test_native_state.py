@@ -12,7 +12,7 @@ from native_host import DISCARD, ERROR, INTERFACES, OK, Instance, Integrator, st
 from support import around_first_impact, case, each_shipped
 
 STEP = 2.5e-3
-TIMES = STEP * np.arange(1, 49)  # Until 0.12 s, with four impacts; the first is at 0.041 s.
+TIMES = STEP * np.arange(1, 49)  # The end is 0.12 s; there are four impacts, from 0.041 s on.
 BEFORE, AFTER = TIMES[:16], TIMES[16:]
 EVERY = (*INTERFACES, (3, "late"))
 interfaces = pytest.mark.parametrize(("fmi", "kind"), EVERY)

@@ -39,7 +39,10 @@ def first_impact(name, **values):
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 @pytest.mark.parametrize("name", GUIDES)
 def test_an_impact_with_a_mobile_wall_is_an_impact_of_two_masses(name, restitution):
-    """P (W + w) = (1 + eps) u; energy lost (1 - eps^2) u^2 / 2 / (W + w); u+ = -eps u-."""
+    """The impulse is P = (1 + eps) u/(W + w), the energy lost (1 - eps^2) u^2/2/(W + w).
+
+    u is the closing speed, W the mobility of the hit point and w that of the wall.
+    """
     if name == "ImpactOscillator" and restitution == 0.0:
         pytest.skip("the hammer is captured: there is no impact")
     simulation, impact = first_impact(name, mobility=WALL, restitution=restitution)

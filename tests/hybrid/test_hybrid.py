@@ -262,7 +262,7 @@ def test_a_contact_opens_when_its_force_is_zero():
 def test_base_acceleration_acts_like_opposite_gravity():
     """The work of the base acceleration is part of energy.work, that of gravity is potential."""
     values = {"release.displacement": 0.0, "stop.position": 0.05}
-    # Damping and error scales depend on gravity, not on the base acceleration: small tolerance.
+    # Damping and error scales depend on gravity only; a small tolerance hides the difference.
     falls = simulation("PRBDM", values | {"gravity.x": 9.81}, tolerance=1e-12)
     shaken = simulation("PRBDM", values | {"gravity.x": 0.0}, tolerance=1e-12)
     shaken.set({"base.acceleration.x": -9.81})

@@ -89,7 +89,7 @@ def test_error_of_a_step_on_a_kepler_orbit_has_the_claimed_order(theta, order):
 
 
 def test_error_is_roughly_proportional_to_the_tolerance():
-    """For tolerances from 1e-6 to 1e-10, over a span with an impact."""
+    """The tolerances are from 1e-6 to 1e-10; the span of time includes an impact."""
     span = (0.045, 0.06)
     exact = path("PRBDM2R", {}, span, tolerance=1e-13)
     tolerances = 10.0 ** -np.arange(6, 11)
@@ -140,7 +140,11 @@ def elementary(a, tree):
 
 @pytest.mark.parametrize("order", range(1, 8))
 def test_order_conditions_hold_for_every_rooted_tree(order):
-    """B . Phi(t) = 1/gamma(t) [Hairer II.2]; 1, 1, 2, 4, 9, 20, 48 trees."""
+    """The weights b satisfy b . Phi(t) = 1/gamma(t) for each tree t [Hairer II.2].
+
+    Phi are the elementary weights, gamma is the density.  Orders 1 to 7 have 1, 1, 2, 4, 9, 20 and
+    48 trees.
+    """
     found = trees(order)
     assert len(found) == [1, 1, 2, 4, 9, 20, 48][order - 1]
     for tree in found:
@@ -151,7 +155,7 @@ def test_order_conditions_hold_for_every_rooted_tree(order):
 @pytest.mark.parametrize("order", range(1, DENSE_ORDER + 1))
 @pytest.mark.parametrize("theta", [0.2, 0.5, 0.9])
 def test_dense_output_is_of_fifth_order(order, theta):
-    """Weights b(theta) . Phi(t) = theta^order / gamma(t) up to order five, for every theta."""
+    """The weights satisfy b(theta) . Phi(t) = theta^order/gamma(t) for trees t to order five."""
     b = PAIR.dense @ theta ** np.arange(1, PAIR.dense.shape[1] + 1)
     for tree in trees(order):
         weight = float(b @ elementary(PAIR.a, tree))
@@ -159,7 +163,7 @@ def test_dense_output_is_of_fifth_order(order, theta):
 
 
 def test_dense_output_has_the_smallest_defects_of_order_six():
-    """They are compared with all interpolants of order five and continuous slope on its stages."""
+    """The other interpolants use the same stages, have order five and a continuous slope."""
     a, powers = PAIR.a, np.arange(1, PAIR.dense.shape[1] + 1)
     shape = PAIR.dense.shape
     equations = []

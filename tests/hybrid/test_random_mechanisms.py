@@ -34,8 +34,8 @@ from random_mechanisms import inputs, mechanisms, seeded
 from support import energy_balance
 
 SEEDS = st.integers(0, 10**6)
-STEP = np.cbrt(np.finfo(float).eps)  # Of central first differences, with an error of STEP^2.
-SECOND_STEP = np.finfo(float).eps ** 0.25  # Of second differences.
+STEP = np.cbrt(np.finfo(float).eps)  # Step of central first differences; the error is STEP^2.
+SECOND_STEP = np.finfo(float).eps ** 0.25  # Step of second differences.
 
 
 def laws(count, *, shrink=True):
@@ -137,7 +137,10 @@ def somewhere(system, seed):
 @given(mechanisms(), SEEDS)
 @laws(40)
 def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, seed):
-    """M = Re(T^H m T) + J with T = dz/dq; quadratic terms Re(T^H m z'') at constant rates."""
+    """M = Re(T^H m T) + J, T = dz/dq, and the quadratic terms are Re(T^H m z'') at constant rates.
+
+    z are the positions of the mass points m, J the moments of inertia.
+    """
     system = assemble(mechanism, mechanism.values())
     q, v = somewhere(system, seed)
     T = first(lambda q: masses(system, q), q)
@@ -229,7 +232,11 @@ def potential(sim, q):
 @given(mechanisms(starting=True, damping=False, friction=False), SEEDS, st.booleans())
 @laws(30)
 def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
-    """T^H m (T a + z''|_a=0) + J a = -dV/dq + rows^T lam, rows a + (second derivative) = 0."""
+    """T^H m z'' + J a = -dV/dq + R^T lam, and the constraints with rows R have no acceleration.
+
+    z are the positions of the mass points m, T = dz/dq, J the moments of inertia, V is the
+    potential energy.
+    """
     sim = Simulation(mechanism, inputs(mechanism, seed))
     system = sim.system
     q, v = somewhere(system, seed)
@@ -341,7 +348,7 @@ def balances_momentum(mechanism, seed):
             if time == t:
                 out, y = sim.outputs(), sim.state()
         if any(state != states[0] for state in states):
-            continue  # There is an event between the times of the difference.
+            continue  # An event between the three times makes the difference invalid.
         z = masses(system, y[: system.n]) - system.anchor
         weight = system.m * (system.gravity - sim.inputs.base)
         force, moment = weight.sum(), (z.conj() * weight).imag.sum()

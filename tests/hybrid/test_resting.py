@@ -11,9 +11,9 @@ from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from support import energy_balance, mechanism, simulation
 
-AT_REST = {"release.displacement": 0.0}  # On the wall, pressed by the weight.
+AT_REST = {"release.displacement": 0.0}  # The weight presses the body on the wall.
 TWINS = {"engine": Simulation, "kernel": KernelSimulation}
-IMPACTS = 14  # Of the guides in their default experiment.
+IMPACTS = 14  # Impacts of each guide in its default experiment.
 WALL = ("stop.displacement", "stop.velocity")
 
 
@@ -120,7 +120,7 @@ def test_friction_at_stop_and_friction_point_obeys_coulombs_law():
                                   ("PRBDM2R", 200, 0.0)],
 )  # fmt: skip
 def test_energy_is_balanced_on_a_shaken_base_with_friction_at_two_points(model, rate, offset):
-    """Sticking and slipping at the stop and at the friction point, without chatter."""
+    """Stop and friction point stick and slip, without chatter."""
     values = {
         "friction.coefficient": 0.3, "friction.normal_force": 0.5, "stop.friction": 1.0,
         "stop.offset": offset, "stop.restitution": 0.0,

@@ -144,7 +144,7 @@ def test_a_wall_that_pushes_a_body_with_friction_does_its_work():
         sim = simulation("PRBDM", values)
         sim.advance(0.6)
         lost = sim.outputs()["energy.dissipated"]
-        for k in range(1000):  # Up to 20 mm/s; each change of the speed is below rest_speed.
+        for k in range(1000):  # The speed reaches 20 mm/s in changes below rest_speed.
             speed = min(0.02, k * 5e-4)
             here = sim.inputs.walls[0].motion(sim.time)[0]
             sim.set({"stop.displacement": here, "stop.velocity": -speed})

@@ -80,7 +80,7 @@ def without_ziglang(monkeypatch) -> None:
 def test_a_second_export_takes_the_library_from_the_cache(cache, monkeypatch):
     messages: list[str] = []
     first = libraries([HOST], messages.append)
-    monkeypatch.setattr(compiler, "_loaded", {})  # As in a new process.
+    monkeypatch.setattr(compiler, "_loaded", {})  # The memory of a new process is empty.
     monkeypatch.setattr(compiler, "compiled", lambda *_: pytest.fail("compiled again"))
     assert libraries([HOST], messages.append) == first
     assert messages == [f"compiling the kernel for {this_platform().name} with cc"]
@@ -177,7 +177,7 @@ def test_libraries_are_compiled_without_a_cache_if_it_cannot_be_written(cache, m
     made = libraries([HOST], messages.append)
     assert only(made)
     assert messages[1].startswith(f"cannot write to {cache}: ")
-    assert libraries([HOST], messages.append) == made  # From the memory of this process.
+    assert libraries([HOST], messages.append) == made  # It is in the memory of this process.
     assert len(messages) == 2
 
 

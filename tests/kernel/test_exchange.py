@@ -159,7 +159,7 @@ def test_directional_derivatives_with_stretches_and_walls_on_bodies_equal_differ
 def test_directional_derivatives_of_a_mechanism_with_all_kinds_of_parts_equal_differences():
     guide = elastic()
     inputs = dict.fromkeys(input_names(guide), 0.1) | {"pull.moment": 1e-3, "push.moment": -1e-3}
-    inputs["tap.velocity"] = 0.04  # Not at the kink of the event indicator.
+    inputs["tap.velocity"] = 0.04  # Away from the kink of the event indicator.
     friction = {"rub.coefficient": 0.2, "dry.coefficient": 0.1, "dry.normal_force": 0.3}
     for discrete in ((0, 0, 0, 2, 2, 2, 1, 2), (1, 1, 1, 1, 2, -1, 0, -1)):
         assert_directional(guide, friction, inputs, discrete)
@@ -341,7 +341,7 @@ def test_infinitely_many_bounces_end_in_rest_in_model_exchange():
     "model", [anvil(), two_stops("PRBDM"), two_stops("PRBDM2R")], ids=lambda guide: guide.name
 )
 def test_derivatives_after_an_event_with_impulses_are_those_of_the_state_after_it(model):
-    """They are compared with those of a restored state, which keeps no earlier evaluation."""
+    """The expected ones are those of a restored state, which keeps no earlier evaluation."""
     values = {name: 0.0 for name in ("release.displacement",) if name in model.values()}
     kernel = KernelSimulation(model, values, exchange=True)
     before = kernel.derivatives()

@@ -290,7 +290,7 @@ def test_singular_values_below_rcond_are_taken_as_zero():
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8, 13])
 def test_eigenvalues_and_vectors_of_symmetric_matrices_equal_those_of_numpy(n):
-    """A z = w z, z orthonormal, w ascending; also for multiple and for graded eigenvalues."""
+    """A z = w z with orthonormal z and ascending w, also for multiple and graded eigenvalues w."""
     for kind in range(20):
         a = RNG.normal(size=(n, n))
         a = a + a.T

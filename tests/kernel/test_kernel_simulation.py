@@ -52,7 +52,7 @@ SCENARIOS = {
     ),
     "pulled off": ({"stop.restitution": 0.2}, {80: {"force.x": -1.5}, 100: {"force.x": 0.0}}),
 }  # fmt: skip
-END_TIMES = {"thrown at the wall": 0.05}  # s; later the 2R guide amplifies 1e-12 to 1e-2.
+END_TIMES = {"thrown at the wall": 0.05}  # s; afterwards the 2R guide amplifies 1e-12 to 1e-2.
 
 
 def compared(guide, values, schedule, end=END, step=STEP):

@@ -807,7 +807,7 @@ def test_simultaneous_impacts_with_friction_are_the_same(k):
 
 def test_messages_about_impacts_without_a_solution_are_the_same():
     W = np.array([[1.0, -1.9], [-1.9, 1.0]])
-    W = np.block([[np.eye(2), W], [W, np.eye(2)]])  # Invalid, as it is not semidefinite.
+    W = np.block([[np.eye(2), W], [W, np.eye(2)]])  # Invalid: W is not semidefinite.
     u, mu, eps, P = np.array([-1.0, -1.0, 1.0, 1.0]), np.full(2, 2.0), np.zeros(2), np.zeros(4)
     message = message_of(KernelError, kernel().several, 2, W, u, mu, eps, 0.0, P)
     assert message == message_of(SimulationError, contact.several, W, u, mu, eps)
@@ -1104,7 +1104,7 @@ def condition(evaluation):
 def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
     for theirs, mine, y, _ in equations(name):
         n, r = theirs.n, len(theirs.rows)
-        t = theirs.inputs.walls[0].since + 3e-4  # While the wall approaches its reference.
+        t = theirs.inputs.walls[0].since + 3e-4  # The wall has not reached its reference.
         a, lam = mine.evaluate(t, y[:n], y[n : 2 * n])
         evaluation = theirs.evaluate(t, y[:n], y[n : 2 * n])
         a_expected, lam_expected, M, _ = evaluation
@@ -1115,7 +1115,7 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         dy = mine.rate(t, y)
         expected = theirs.rate(t, y)
         assert_same(dy[: 2 * n], expected[: 2 * n], rel)
-        power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # Scale of the sum of powers.
+        power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # Size of the summed powers.
         assert_same(dy[2 * n :], expected[2 * n :], rel, scale=power)
         energy = kernel().kinetic_energy_of(mine.structure, mine.evaluation, y[n : 2 * n])
         assert_same(energy, kinetics.kinetic_energy(M, y[n : 2 * n]))
@@ -1235,7 +1235,7 @@ def test_projected_states_are_the_same(name):
         M = evaluation.M
         assert_same_turn(found[:n], projected[:n], y[:n], theirs.system, M, rows)
         assert_same(found[n:], projected[n:], rel, scale=np.abs(y[n:]).max())
-        for distance in (1e-9, 1e-5):  # One correction is sufficient for the first only.
+        for distance in (1e-9, 1e-5):  # One correction is sufficient for 1e-9 only.
             start = projected.copy()
             start[: 2 * n] += distance * rng.normal(size=2 * n)
             factors = theirs.evaluate(t, start[:n], start[n : 2 * n]).factors
@@ -1264,7 +1264,7 @@ PAIR = runge_kutta.TSITOURAS_PAPAKOSTAS
 @twin(stages=runge_kutta.stages, weights=runge_kutta.powers, interpolate=runge_kutta.interpolate)
 @each_mechanism
 def test_steps_of_the_integration_are_the_same(name):
-    """Stages, new state, error and dense output of one step of the motion."""
+    """Stages, new state, error and dense output of one step are compared."""
     count = constants()["STAGES"]
     for theirs, mine, y, _ in equations(name, 1):
         h, size = 1e-5, len(y)

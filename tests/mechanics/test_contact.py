@@ -33,11 +33,11 @@ def test_gap_rate_after_a_single_impact_is_restitution_times_closing_rate(restit
 
 
 def test_simultaneous_impacts_satisfy_complementarity_and_do_not_gain_energy():
-    """P >= 0, s = u+ + eps u- >= 0 and P s = 0 for each stop."""
+    """Each stop has P >= 0, s = u+ + eps u- >= 0 and P s = 0: impulse P, gap rates u- and u+."""
     for _ in range(2000):
         k = int(RNG.integers(2, 5))
         W = random_mobility(RNG, k, int(RNG.integers(1, k + 1)))
-        u = W @ RNG.normal(size=k)  # In the range of W: a motion of the mechanism.
+        u = W @ RNG.normal(size=k)  # In the range of W, as for every motion.
         closing = np.minimum(u, 0.0) < 0
         u, W = u[closing], W[np.ix_(closing, closing)]
         if not len(u):

@@ -14,7 +14,7 @@ RNG = np.random.default_rng(3)
 
 
 def test_accelerations_equal_those_of_lagrange_equations():
-    """A 2R cantilever with a body on a pin at its tip: three angles, no loop, all inertia terms."""
+    """The mechanism is a 2R cantilever with a body on a pin at its tip: three angles, no loop."""
     sim = Simulation(cantilever(damping_beta=0.0))
     system = sim.system
     n = system.n
@@ -60,7 +60,7 @@ def test_accelerations_equal_those_of_lagrange_equations():
 
 
 def test_power_of_centrifugal_terms_is_the_change_of_kinetic_energy_at_constant_rates():
-    """v.(M' v) / 2 = v.C v^2, with M' the rate of the mass matrix."""
+    """With the mass matrix M, its rate M' and rates v, v.(M' v)/2 = v.C v^2."""
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
     J, h = np.diag(system.J), 1e-6
     for _ in range(20):

@@ -35,7 +35,7 @@ def tip_deflection(model, force):
 
 @pytest.mark.parametrize(("model", "error"), [("1R", 0.037), ("2R", 0.0071), ("3R", 0.022)])
 def test_tip_deflection_of_a_cantilever_follows_from_its_published_coefficients(model, error):
-    """It is the sum of lever^2/K over the pivots, near the 1/3 of beam theory."""
+    """The deflection is the sum of lever^2/K over the pivots, near the 1/3 of beam theory."""
     data = MODELS[model]
     gamma, K_theta = ([c.value for c in part] for part in (data.gamma, data.K_theta))
     levers = np.cumsum(gamma[::-1])[::-1]
@@ -65,7 +65,7 @@ def test_held_shape_is_the_minimum_of_potential_energy():
 
 
 def test_holding_force_is_the_derivative_of_the_energy():
-    """F = dV/dx, by a central difference over held shapes."""
+    """The force dV/dx is computed by a central difference of the energy V over held shapes."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values())
 

@@ -59,7 +59,7 @@ def test_elliptic_integrals_agree_with_a_boundary_value_problem_of_the_elastica(
 
 
 def test_a_beam_with_a_heavy_tip_has_the_frequencies_of_a_massless_beam():
-    """omega^2 -> 3 EI/(m_tip L^3); with inertia, the eigenvalues of a 2 x 2 stiffness matrix."""
+    """It is omega^2 = 3 EI/(m_tip L^3), or with inertia the eigenvalues of a 2 x 2 problem."""
     assert wavenumber(1, 1e6) ** 4 == pytest.approx(3e-6, rel=1e-6)
     stiffness = np.array([[12.0, -6.0], [-6.0, 4.0]])
     omega2 = np.linalg.eigvals(stiffness / np.array([[1e6], [3e5]]))
@@ -74,7 +74,7 @@ FORCE_ERRORS = {"1R": 3.8, "2R": 1.0, "3R": 2.3, "10R": 0.51, "40R": 0.033}  # %
 
 @pytest.mark.parametrize("model", FORCE_ERRORS)
 def test_tip_displacements_under_an_end_force_are_those_of_the_elastica(model):
-    """They agree within the error of the model; the opposite force gives the mirrored shape."""
+    """The limit is the error of the model; the opposite force gives the mirrored shape."""
     models = script()
     system = models.cantilever(model)
     for load in (1e-3, 0.1, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0):
@@ -125,7 +125,7 @@ FREQUENCY_ERRORS = {  # Largest errors of f1 and f2 [%] with tip masses (no iner
 
 @pytest.mark.parametrize("model", FREQUENCY_ERRORS)
 def test_frequencies_with_a_body_at_the_tip_are_those_of_the_beam(model):
-    """They agree within the error of the model."""
+    """The limit of the difference is the error of the model."""
     models = script()
     for tip in ((0.0, 0.0), (0.3, 0.0), (1.0, 0.0), (10.0, 0.0)):
         system = models.cantilever(model, tip)
@@ -161,7 +161,7 @@ def test_an_axial_force_stretches_a_flexure_by_the_elongation_of_a_bar():
 
 
 def test_the_work_of_loads_is_the_change_of_elastic_energy():
-    """dV/dP = P dz/dP (Castigliano), for force and moment together at a large deflection."""
+    """A small increase of force and moment at a large deflection does the work P dz = dV."""
     models = script()
     system = models.cantilever("3R")
     forces = np.array([3.0, -2.0, 0.7]) * models.EI / models.L**2 * np.array([1, 1, models.L])
@@ -225,7 +225,7 @@ HALF_DIGITS = (5e-3, 5e-4, 0.05, 0.05, 5e-4)
 
 @pytest.mark.parametrize("model", GUIDES)
 def test_rest_position_and_frequencies_of_the_steel_guide_are_those_of_other_programs(model):
-    """They agree in all digits given."""
+    """The values agree in all digits given."""
     found = script().guide_figures(model)[[0, 1, 2, 3, 6]]
     for x, expected, half in zip(found, GUIDES[model], HALF_DIGITS, strict=True):
         assert math.isnan(x) if expected is None else abs(x - expected) <= 1.01 * half
@@ -247,7 +247,7 @@ def test_a_chain_guide_converges_at_second_order(axial, ns):
 
 
 def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
-    """They agree to the last digit of the finite elements; bounce and pitch agree to 1.5e-4.
+    """The limit agrees to the last digit of the finite elements; bounce and pitch to 1.5e-4.
 
     The extrapolation from 80 links has an error of 5e-5 in bounce and pitch.
     """
@@ -266,7 +266,7 @@ def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
 
 
 def test_the_finite_element_figures_of_the_page_are_reproduced():
-    """They agree to 1e-4, because the Jacobians of the finite elements are differences."""
+    """The tolerance is 1e-4, because the Jacobians of the finite elements are differences."""
     models = script()
     values = mechanism("PRBDM2R").values()
     found = finite_elements.guide(values, 64)
@@ -286,12 +286,12 @@ def test_the_finite_element_figures_of_the_page_are_reproduced():
     ("2R", False, 0.0485),
 ])  # fmt: skip
 def test_modal_restitution_is_that_of_finite_elements(model, axial, error):
-    """They agree within the error of the model at nine hit points, without tuning."""
+    """The limit at nine hit points is the error of the model, without tuning."""
     assert script().restitution_error(model, axial=axial) < error
 
 
 def test_an_off_centre_hit_lowers_modal_restitution_only_with_axial_compliance():
-    """With an offset of 4 mm and eps = 0.6: 0.596 with rigid links, 0.548 with axial compliance."""
+    """At an offset of 4 mm and eps = 0.6 it falls from 0.596 to 0.548 with axial compliance."""
     rigid, axial = (script().guide("2R", axial=axial) for axial in (False, True))
     found = []
     for guide in (rigid, axial):
@@ -302,7 +302,7 @@ def test_an_off_centre_hit_lowers_modal_restitution_only_with_axial_compliance()
 
 
 def test_axial_compliance_hardly_changes_bounce_and_pitch():
-    """They are 11.4 and 13.0 % below finite elements; without axial compliance 11.3 and 12.8 %."""
+    """The 2R is 11.4 and 13.0 % below finite elements; without axial compliance 11.3 and 12.8 %."""
     models = script()
     for axial, errors in ((True, (-0.1144, -0.1299)), (False, (-0.1127, -0.1285))):
         found = models.guide_figures("2R", axial=axial)

@@ -28,8 +28,8 @@ FUNCTIONS = {
 }
 CLASSES = {r"\s": " ", r"\d": "1", r"\w": "a", r"\S": "a", r"\D": "a", r"\W": " ", ".": "a"}
 LENGTH = 200  # Repetitions in the shorter text.
-QUICK = 3e-3  # s; cubic time takes longer for the shorter text.
-RATIO_MAX = 6.0  # Of the times at twice the length: 4 if quadratic, 8 if cubic.
+QUICK = 3e-3  # s; a cubic expression needs longer for the shorter text.
+RATIO_MAX = 6.0  # Largest ratio of times for twice the length; 4 is quadratic, 8 cubic.
 TIMEOUT = 2.0  # s of processor time for one text.
 
 

@@ -82,7 +82,7 @@ def test_the_refitted_2R_guide_has_the_stiffness_of_the_untuned_1R_guide():
     refitted = guide_2R(stiffness_factor=True, K_theta=REFITTED_K_THETA_2R, gravity=0.0)
     target = stiffness(guide_1R(gravity=0.0))
     assert target / FIXED_GUIDED_PAIR == pytest.approx(K_THETA_1R / (3 * GAMMA_1R), rel=1e-6)
-    assert stiffness(refitted) == pytest.approx(target, rel=0.015)  # fitted at 25 mm, not at 0
+    assert stiffness(refitted) == pytest.approx(target, rel=0.015)  # The thesis fitted at 25 mm.
 
 
 # --- The missing right side of the acceleration constraint ------------------------------------
@@ -139,14 +139,17 @@ def test_projection_closes_the_loop_after_every_step():
 
 @pytest.mark.parametrize("wall", [np.inf, 0.0], ids=["no wall", "wall"])
 def test_the_missing_term_cancels_in_the_1R_parallelogram(wall):
-    """Equal links with opposite directions and equal rates: e_1 v_1^2 + e_3 v_3^2 = 0, v_2 = 0."""
+    """Its equal links 1 and 3 have opposite directions e and equal rates v, and v_2 = 0.
+
+    Hence the missing term e_1 v_1^2 + e_3 v_3^2 is zero.
+    """
     printed, right = (
         released(guide_1R(), -18e-3, 2**-13, convective=convective, wall=wall)
         for convective in (False, True)
     )
     assert len(printed.impact_times) == len(right.impact_times)
     np.testing.assert_allclose(printed.q, right.q, rtol=0, atol=1e-11)  # round-off
-    np.testing.assert_allclose(printed.v, right.v, rtol=0, atol=1e-9)  # of up to 20 rad/s
+    np.testing.assert_allclose(printed.v, right.v, rtol=0, atol=1e-9)  # Rates are up to 20 rad/s.
 
 
 def test_the_missing_term_does_not_cancel_in_a_four_bar_linkage_with_unequal_links():

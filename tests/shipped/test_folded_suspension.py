@@ -46,7 +46,9 @@ def test_stiffness_is_24_ei_over_l3() -> None:
     """Two trusses, each with two pairs of flexures in series; the model error of 3R is -2.2 %."""
     EI_L3, *_ = beam()
     rate = holding_force(SYSTEM, 1e-5) / 1e-5
-    assert rate == pytest.approx(2 * guided_rate(SYSTEM.values), rel=1e-6)  # Higher orders in x/L.
+    assert rate == pytest.approx(
+        2 * guided_rate(SYSTEM.values), rel=1e-6
+    )  # Error of order (x/L)^2.
     assert rate == pytest.approx(24 * EI_L3, rel=0.022)  # Model error.
 
 
@@ -62,7 +64,10 @@ def test_stiffness_rises_by_less_than_a_percent_over_the_stroke() -> None:
 
 
 def test_fundamental_frequency_is_below_rayleighs_quotient() -> None:
-    """Mass M + 2 M_t/4 + 4 m 13/35 / 4 + 4 m (1/4 + 1/4 + 13/140), stiffness 24 EI/L^3.
+    """The quotient has the stiffness 24 EI/L^3 and the following mass.
+
+    M + 2 M_t/4 + 4 m 13/35 / 4 + 4 m (1/4 + 1/4 + 13/140), with the masses M of the shuttle, M_t of
+    a truss and m of a flexure.
 
     The fixed-guided shape 3 s^2 - 2 s^3 has the mean 1/2 and the mean square 13/35.  Rayleigh's
     quotient is an upper bound, here 1.1 % too high: because of their inertia, the trusses move more

@@ -87,7 +87,7 @@ def test_the_gap_is_never_negative(default_run):
 
 
 def test_loops_stay_closed():
-    """They are closed to 1e-12 m and 1e-9 m/s at every output."""
+    """The loop errors are below 1e-12 m and 1e-9 m/s at every output."""
     sim = Simulation(GUIDE)
     n, system = sim.system.n, sim.system
     for t in np.linspace(0, 0.4, 333)[1:]:
@@ -107,8 +107,11 @@ def test_a_change_of_1e_11_m_shifts_the_impacts_by_less_than_a_nanosecond(defaul
     assert max(shifts) < 1e-9
 
 
-def test_momentum_balance_and_energy_loss_at_each_impact(default_run):
-    """M (v+ - v-) = G^T P + Phi_q^T Lambda, energy loss -P (u- + u+)/2, u+ = -eps u-."""
+def test_each_impact_satisfies_the_momentum_balance_and_the_law_of_its_energy_loss(default_run):
+    """M (v+ - v-) = G^T P + Phi_q^T L with the impulses P of the stop and L of the loops.
+
+    The energy loss is -P (u- + u+)/2, and the gap rates are related by u+ = -eps u-.
+    """
     sim, _ = default_run
     system = sim.system
     for impact in sim.record:

@@ -49,7 +49,7 @@ def newton(engine, rng):
     """Return the violation of the laws of a frictionless impact of up to eight stops."""
     k = int(rng.integers(2, 9))
     W, u = drawn(rng, k, k)
-    u[rng.uniform(size=k) < 0.1] *= 1e-14  # Closed stops, with a rate of round-off.
+    u[rng.uniform(size=k) < 0.1] *= 1e-14  # Closed stops: their rate is round-off.
     eps, P = rng.uniform(0, 1, k), np.zeros(k)
     if engine == "kernel":
         kernel().newton(k, W, u, eps, 0.0, P)

@@ -42,7 +42,7 @@ from prbm.mechanism.parts import (
 Choose = Callable[[Sequence], object]
 """Function that picks an element of a sequence; the first element is the simplest."""
 
-CELL = 0.06  # m; bodies lie on a lattice of this size, shifted by up to a fifth of it.
+CELL = 0.06  # m; bodies are within a fifth of this length of the points of a lattice.
 MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 1), ("nR", 2), ("nR", 4))
 ENDS = ((CLAMP, CLAMP), (CLAMP, PIN), (PIN, CLAMP), (CLAMP, FREE), (FREE, CLAMP), (PIN, PIN))
 RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # Axial modes of some hundred Hz.

@@ -148,7 +148,7 @@ def test_reductions_match_a_closed_form():
 
     assert of("x") == of("final(x)") == 0.0
     assert (of("max(x)"), of("min(x)")) == (1.0, 0.0)
-    assert of("mean(x)") == pytest.approx(2 / 3, abs=2e-3**2 / 6)  # the trapezoidal rule's error
+    assert of("mean(x)") == pytest.approx(2 / 3, abs=2e-3**2 / 6)  # error of the trapezoidal rule
     assert of("first(x > 0.75)") == pytest.approx(0.5, abs=1e-3)  # a step is 5e-4 here
     assert of("since(x < 0.75)") == pytest.approx(1.5, abs=2.5e-3)  # a step is 2e-3 here
     assert of("since(x <= 1)") == 0.0

@@ -45,7 +45,7 @@ def test_gauss_seidel_is_symplectic_euler():
     _, a, b = circle(GAUSS_SEIDEL)
     np.testing.assert_allclose(a**2 + b**2 + H * a * b, 1.0, rtol=1e-12)
     assert a[1] == 1.0
-    assert b[1] == -H  # computed with the new a
+    assert b[1] == -H  # It uses the new a.
 
 
 def test_outputs_reach_inputs_in_initialization_mode():
@@ -159,7 +159,7 @@ def test_a_discrete_input_may_be_connected(events):
     expected = pushed["guide.shuttle.vx"][-1]
     assert found["guide.shuttle.vx"][-1] == pytest.approx(
         expected, rel=0.01
-    )  # half a step of 200: 0.5 %
+    )  # The impulse is exchanged in 200 parts.
 
 
 @pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])

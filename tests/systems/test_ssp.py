@@ -53,7 +53,7 @@ def ours() -> np.ndarray:
 
 
 def test_the_description_of_a_package_is_valid(package):
-    """The description matches the schema of SSP 1.0, and its parameter sets match theirs."""
+    """The system structure and the parameter sets match the schemas of SSP 1.0."""
     with zipfile.ZipFile(package) as archive:
         root = etree.fromstring(archive.read("SystemStructure.ssd"))
     etree.XMLSchema(etree.parse(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(
