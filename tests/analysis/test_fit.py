@@ -361,8 +361,8 @@ def test_stated_uncertainty_of_the_restitution_covers_the_truth():
 def test_a_1r_fitted_to_a_2r_has_its_modal_restitution_at_straight_flexures(wall, low, high):
     """For a 2R with stretching flexures the fit is (1 + eps) mu_1 - 1 at straight flexures.
 
-    At -10 mm it is larger: it is one number for all impacts of the record, and the later impacts
-    depend on the energy that the first one left in other modes.
+    At -10 mm the fit is larger.  It is one number for all impacts of the record, and the later
+    impacts depend on the energy that the first impact left in other modes.
     """
     m = mechanism("PRBDM2R")
     kinds = tuple(dataclasses.replace(kind, axial=True) for kind in m.flexure_types)

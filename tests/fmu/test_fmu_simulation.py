@@ -28,7 +28,7 @@ def points(step: float, end: float = END) -> np.ndarray:
 
 
 def uneven(end: float) -> np.ndarray:
-    """Return communication points with steps over three decades, including those compared."""
+    """Return communication points with steps over three decades, and all compared times."""
     rng = np.random.default_rng(0)
     inner = end / END * np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
     return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / COMPARISONS, end)]))
@@ -43,7 +43,7 @@ def grid_of(name: str, end: float) -> np.ndarray:
 
 @cache
 def engine_run(model: str) -> tuple[dict, list[dict]]:
-    """Return the declared variables, and the engine's values of them at the times compared."""
+    """Return the declared variables, and their values in the engine at the compared times."""
     guide, end = case(model).mechanism, case(model).end
     listed = {v.name: v for v in interface(guide, {})}
     simulation = Simulation(guide)

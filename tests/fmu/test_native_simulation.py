@@ -45,7 +45,7 @@ def points(step: float, end: float = END) -> np.ndarray:
 
 
 def uneven(end: float) -> np.ndarray:
-    """Return communication points with steps over three decades, including those compared."""
+    """Return communication points with steps over three decades, and all compared times."""
     rng = np.random.default_rng(0)
     inner = end / END * np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
     return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / COMPARISONS, end)]))

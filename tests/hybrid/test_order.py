@@ -47,10 +47,10 @@ def test_observed_order_is_that_of_the_dense_output(case):
     """The slope of the error over the step length, in logarithms, is about six.
 
     The states are read within steps, where the error is of order six; at the ends of steps it is
-    of order seven.  The error is averaged over a span of time and several releases, because at a
-    single time it depends on the positions of that time and of the impact within their steps.  Over
-    the three halvings the error falls by a factor of 2e5: longer steps do not resolve the motion,
-    and the error of shorter ones is round-off.
+    of order seven.  The error is averaged over a span of time and several releases: at a single
+    time it depends on the positions of that time and of the impact within their steps.  Over the
+    three halvings the error falls by a factor of 2e5.  Longer steps do not resolve the motion, and
+    the error of shorter steps is round-off.
     """
     model, values, span, longest, releases = CASES[case]
     steps = longest / 2.0 ** np.arange(4)

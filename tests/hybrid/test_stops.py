@@ -11,7 +11,7 @@ from prbm.hybrid.simulation import Simulation
 from support import ScalarGuide, energy_balance, mechanism, simulation
 
 
-def watched(guide, values=None, time=0.3, step=1e-3):
+def checked_run(guide, values=None, time=0.3, step=1e-3):
     """Run a simulation; check energy balance, gaps and stop forces at every output."""
     sim = Simulation(guide, values)
     sim.record = []
@@ -34,7 +34,7 @@ def watched(guide, values=None, time=0.3, step=1e-3):
 def test_converging_bounces_on_two_stops_end_in_rest(model, position):
     """At rest the sum of the forces of both stops is nearly constant."""
     guide = two_stops(model, high={"position": position}, low={"position": position})
-    sim, out = watched(guide, time=0.45)
+    sim, out = checked_run(guide, time=0.45)
     assert out["high.contact"] or out["low.contact"]
     carried = out["high.force"] + out["low.force"]
     sim.advance(0.5)

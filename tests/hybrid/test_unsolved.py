@@ -98,7 +98,9 @@ def rod():
 
 
 SIDEWAYS_IMPULSE = {"force.impulse.y": 0.01}
-JAMS = r"no forces satisfy the laws of contact and friction at t = 0 s \(stop\): friction jams"
+JAM_MESSAGE = (
+    r"no forces satisfy the laws of contact and friction at t = 0 s \(stop\): friction jams"
+)
 
 
 @pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
@@ -107,7 +109,7 @@ def test_friction_that_jams_is_rejected(engine):
     before = sim.outputs()
     assert before["stop.force"] > 0.5
     sim.set(SIDEWAYS_IMPULSE)
-    with pytest.raises((SimulationError, KernelMistake), match=JAMS):
+    with pytest.raises((SimulationError, KernelMistake), match=JAM_MESSAGE):
         sim.advance(1e-3)
     assert sim.outputs()["stop.force"] == pytest.approx(before["stop.force"], rel=1e-12)
     sim.set({"force.impulse.y": 0.0})
@@ -138,7 +140,7 @@ def test_friction_that_jams_is_logged_by_fmus_which_work_after_a_reset(rods, fmi
             with pytest.raises(FMICallException) as caught:
                 instance.change(SIDEWAYS_IMPULSE)
             assert caught.value.status in (DISCARD, ERROR)
-        assert any(re.search(JAMS, text) for text in instance.messages)
+        assert any(re.search(JAM_MESSAGE, text) for text in instance.messages)
         instance.reset()
         instance.initialize(values=values).advance(2e-3)
         assert instance.values()["stop.contact"]

@@ -1,4 +1,4 @@
-"""Flexure models against beam theory and finite elements, and the page of the results."""
+"""Flexure models, compared with beam theory and finite elements, and the page of the results."""
 
 import importlib.util
 import math

@@ -1,4 +1,4 @@
-"""The bistable shuttle against the closed form of four struts of axial stiffness EA."""
+"""The bistable shuttle, compared with the closed form of four struts of axial stiffness EA."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The cantilever with a tip mass against Euler-Bernoulli beams."""
+"""The cantilever with a tip mass, compared with an Euler-Bernoulli beam."""
 
 import math
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The folded suspension against beam theory: straightness, stiffness, frequency."""
+"""The folded suspension, compared with beam theory: straightness, stiffness, frequency."""
 
 import runpy
 from dataclasses import replace

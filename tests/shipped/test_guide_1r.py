@@ -1,4 +1,4 @@
-"""The 1R guide against its scalar equation of motion."""
+"""The 1R guide, compared with its scalar equation of motion."""
 
 import math
 
