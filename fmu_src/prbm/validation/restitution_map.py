@@ -120,7 +120,7 @@ def _discussion(maps: Sequence[ImpactMap]) -> str:
         "restitution is not. A guide that has passed its straight shape (h > 0, in the direction "
         "of gravity) rebounds towards it. There the other modes become stiffer and take energy "
         "from the fundamental mode, which lowers the fitted restitution. This is the trend of "
-        'the thesis if its positions count upwards: its "-10 mm" is then +10 mm along gravity, '
+        'the thesis if its positions count upwards. Its "-10 mm" is then +10 mm along gravity, '
         "where the velocity points into the buckling direction of the flexures (its section "
         "8.2.1). If its -10 mm is a wall before the straight shape, the sign is opposite.\n"
         "- *Accuracy.* The first impact of the elements converges as stated in the table. With a "
