@@ -43,7 +43,7 @@ columns are:
 - *difference*: computed less printed value, or less the reference if no value is printed;
 - *verdict*: the claimed limit of the difference, and whether the difference is within it. Numbers
   without a limit are for information. The summary counts the claims that hold. Each section
-  explains those that do not, or says that the cause is unknown.
+  explains claims that do not hold, or says that the cause is unknown.
 
 `prbm validate --out docs` computes every number and figure of this page in a few minutes. The tests
 repeat the computation and compare the numbers.

@@ -107,8 +107,8 @@ def _discussion(maps: Sequence[ImpactMap]) -> str:
     return (
         "The thesis measured three trends: the restitution is highest near the centre of mass, "
         'higher on the side of the base, and much lower at the wall at "-10 mm". The table has '
-        "the last two for each map, as means of C(-d) - C(d) over offsets d and of C(-h) - C(h) "
-        "over walls h:\n\n" + "\n".join(rows) + "\n\n"
+        "the second and the third trend for each map, as means of C(-d) - C(d) over offsets d and "
+        "of C(-h) - C(h) over walls h:\n\n" + "\n".join(rows) + "\n\n"
         "- *Offset.* In every map the restitution is lowest off the centre of mass. The two sides "
         f"differ by {sides:.3f} at most, with either sign. No map shows the trend towards the "
         "base. All maps assume Newton's law of a rigid impact, finite elements included. With a "
