@@ -54,7 +54,7 @@ def test_youngs_modulus_is_recovered_within_a_percent():
 
 
 def test_youngs_modulus_is_exact_without_noise():
-    """Order, window, sign, zero and angle of the sensor change the result by round-off only."""
+    """Order of the samples, fit window, and the sensor's sign, zero and angle have no effect."""
     d, F = bent(np.random.default_rng(0), noise=0.0)
     for options in (
         {}, {"window": 7}, {"fit_range": (0.0, 1.0)}, {"force_gain": Estimate(1.0, 0.01)},
@@ -184,9 +184,9 @@ def test_large_deflections_are_noted_with_their_error():
 
 
 def test_the_loss_of_a_cycle_is_the_area_of_the_loop():
-    """Unloading forces are lower by c (1 - r), r = d/d_max: the loss is c/3 of the work k d^2/2.
+    """The force k d is reduced by the share c (1 - r) in unloading, where r = d/d_max.
 
-    The integral of r c (1 - r) over that of r, both from 0 to 1, is c (1/6)/(1/2).
+    The lost share of the work is c/3: the integrals of r c (1 - r) and r over r are c/6 and 1/2.
     """
     for cycles in (1, 4):
         d, F = bent(np.random.default_rng(4), 4000, cycles, noise=0.0, loss=0.3)
@@ -224,7 +224,7 @@ def test_turning_points_ignore_noise():
 
 
 def test_a_table_of_beams_has_mean_and_scatter():
-    """The mean of n values of deviation s has the uncertainty s/sqrt(n), with n - 1 freedom."""
+    """The mean of n values of deviation s has the uncertainty s/sqrt(n)."""
     rng = np.random.default_rng(6)
     found = [youngs_modulus(*bent(rng, cycles=2, loss=0.3), beam(name=str(i))) for i in range(5)]
     table = beam_table(found)

@@ -12,7 +12,7 @@ from native_host import DISCARD, ERROR, INTERFACES, OK, Instance, Integrator, st
 from support import around_first_impact, case, each_shipped
 
 STEP = 2.5e-3
-TIMES = STEP * np.arange(1, 49)  # The end is 0.12 s; there are four impacts, from 0.041 s on.
+TIMES = STEP * np.arange(1, 49)  # up to 0.12 s; four impacts, the first at 0.041 s
 BEFORE, AFTER = TIMES[:16], TIMES[16:]
 EVERY = (*INTERFACES, (3, "late"))
 interfaces = pytest.mark.parametrize(("fmi", "kind"), EVERY)
@@ -86,7 +86,7 @@ def test_a_state_deserialized_in_another_instance_gives_identical_results(native
         other.time = before[-1]
         assert other.run(after) == expected
         assert other.values()[name] == mass
-    with Instance(native[model, fmi], kind, substep=substep) as fresh:  # Not initialized.
+    with Instance(native[model, fmi], kind, substep=substep) as fresh:  # not initialized
         fresh.restore(data)
         fresh.time = before[-1]
         assert fresh.run(after) == expected

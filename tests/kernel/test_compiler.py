@@ -191,7 +191,7 @@ def planted(cache: Path, folder: Path, monkeypatch) -> Path:
     (folder / entry.name).write_bytes(valid)
     (folder / entry.name).chmod(0o644)
     monkeypatch.setattr(compiler, "_loaded", {})
-    assert only(libraries([HOST])) == content  # It is valid as long as it is private.
+    assert only(libraries([HOST])) == content  # A private entry is valid.
     monkeypatch.setattr(compiler, "_loaded", {})
     return folder / entry.name
 

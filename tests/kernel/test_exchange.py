@@ -25,7 +25,7 @@ FRICTION = {
 
 @each_shipped
 def test_the_loops_determine_the_dependent_coordinates_at_every_shape(model):
-    """The conditioning of their columns of the Jacobian is above 1/30, up to the release."""
+    """Their columns of the Jacobian have a conditioning above 1/30, up to the release shape."""
     guide = mechanism(model)
     system = assemble(guide, guide.values())
     chosen = independent(guide)
@@ -107,7 +107,7 @@ def assert_directional(guide, parameters, inputs, discrete):
         put(kernel, 0.0, x, dict(zip(input_names(guide), given, strict=True)))
         found = kernel.directional(dx, du)
         error = np.full(len(found), np.inf)
-        for h in (2e-4, 6e-5, 2e-5):  # The smallest error over these steps counts.
+        for h in (2e-4, 6e-5, 2e-5):  # The smallest of the three errors is compared.
             slope = (8 * (values(h) - values(-h)) - (values(2 * h) - values(-2 * h))) / (12 * h)
             scale = np.abs(slope) + 1e-4 * (1.0 + sizes)
             error = np.minimum(error, np.abs(found - slope) / scale)
@@ -341,7 +341,7 @@ def test_infinitely_many_bounces_end_in_rest_in_model_exchange():
     "model", [anvil(), two_stops("PRBDM"), two_stops("PRBDM2R")], ids=lambda guide: guide.name
 )
 def test_derivatives_after_an_event_with_impulses_are_those_of_the_state_after_it(model):
-    """The expected ones are those of a restored state, which keeps no earlier evaluation."""
+    """The expected derivatives are those of a restored state, in which nothing is cached."""
     values = {name: 0.0 for name in ("release.displacement",) if name in model.values()}
     kernel = KernelSimulation(model, values, exchange=True)
     before = kernel.derivatives()

@@ -45,7 +45,7 @@ def test_gauss_seidel_is_symplectic_euler():
     _, a, b = circle(GAUSS_SEIDEL)
     np.testing.assert_allclose(a**2 + b**2 + H * a * b, 1.0, rtol=1e-12)
     assert a[1] == 1.0
-    assert b[1] == -H  # It uses the new a.
+    assert b[1] == -H  # The second FMU uses the new output a[1] = 1.
 
 
 def test_outputs_reach_inputs_in_initialization_mode():
@@ -109,7 +109,7 @@ def impacts(found, prefix):
 
 
 def test_all_instances_stop_at_the_time_of_an_event():
-    """The shortened steps add up to the time, and there are rows at the impacts."""
+    """The integral of 1 equals the time; each impact has a row before it and one after it."""
     fmus = {"clock": integrator(), "guide": guide(3)}
     record = ["clock.value", *(f"guide.{name}" for name in IMPACTS)]
     found = simulate(fmus, {}, 0.2, 0.01, {"clock.rate": 1.0}, record, events=True)
@@ -117,7 +117,7 @@ def test_all_instances_stop_at_the_time_of_an_event():
     new = np.flatnonzero(np.diff(found["guide.stop.impact_count"], prepend=0))
     assert len(new) >= 2
     assert (found["time"][new] == found["guide.stop.impact_time"][new]).all()
-    assert (found["time"][new] == found["time"][new - 1]).all()  # one row before, one after
+    assert (found["time"][new] == found["time"][new - 1]).all()
     assert (
         found["guide.stop.impact_count"][new - 1] == found["guide.stop.impact_count"][new] - 1
     ).all()

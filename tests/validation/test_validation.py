@@ -111,7 +111,7 @@ def test_verdicts_of_the_page_follow_from_its_numbers():
                 continue
             limit = float(NUMBER.findall(cells[5])[0])
             off = abs(float(NUMBER.findall(cells[4])[0]))
-            if abs(off / limit - 1) > 0.02:  # Closer to the limit, the digits do not suffice.
+            if abs(off / limit - 1) > 0.02:  # Otherwise rounding may hide the verdict.
                 assert (off < limit) == (not cells[5].startswith("**not**")), cells
         verdict = rows(row)[0][-1]
         expected = "agrees" if kept == len(claims) else f"agrees in {kept} of {len(claims)}"
