@@ -52,6 +52,6 @@ def test_coupling_errors_of_the_page_halve_with_the_step_and_masters_agree(print
     speeds = re.findall(r"^(?:SSP in FMPy|SSP in libcosim|container): (\S+) m/s", printed, re.M)
     assert len(speeds) == 3
     assert len(set(speeds)) == 1
-    assert abs(float(speeds[0])) > 1e-2  # The guide moves: equal speeds of zero prove nothing.
+    assert abs(float(speeds[0])) > 1e-2  # The equal speeds are not zero.
     events = int(re.search(r"^(\d+) events", printed, re.MULTILINE)[1])
     assert events >= 3

@@ -177,7 +177,7 @@ def test_libraries_are_compiled_without_a_cache_if_it_cannot_be_written(cache, m
     made = libraries([HOST], messages.append)
     assert only(made)
     assert messages[1].startswith(f"cannot write to {cache}: ")
-    assert libraries([HOST], messages.append) == made  # It is in the memory of this process.
+    assert libraries([HOST], messages.append) == made  # kept in the process
     assert len(messages) == 2
 
 

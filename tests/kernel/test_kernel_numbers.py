@@ -178,7 +178,7 @@ def test_finite_number_is_false_for_nan_and_infinity():
 
 
 @pytest.mark.parametrize("place", [0, 1, 2])
-def test_no_bound_holds_for_the_largest_entry_if_one_is_not_finite(place):
+def test_the_largest_entry_fails_every_upper_bound_if_an_entry_is_not_finite(place):
     x = np.array([3.0, -4.0, 2.0])
     assert kernel().largest(3, x) == 4.0
     for bad in (math.nan, math.inf, -math.inf):
