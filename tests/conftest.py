@@ -18,7 +18,7 @@ collect_ignore = ["support"]  # Modules that tests import; they contain no tests
 
 
 class FmuCache(dict[Any, Path]):
-    """Paths of FMUs by key: the first ones are built at once, the others at the first access."""
+    """Paths of FMUs by key.  FMUs of the keys in ``first`` are built at once, others on access."""
 
     def __init__(self, build: Callable[[Any], Path], first: Iterable[Hashable]) -> None:
         super().__init__((key, build(key)) for key in first)

@@ -29,7 +29,7 @@ def guide():
 
 
 def test_a_chain_of_40_links_agrees_with_finite_elements():
-    """Every quantity is within 0.9 %, the order of 1/n^2."""
+    """Every quantity is within 0.9 %."""
     pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
     base = mechanism("PRBDM2R")
     kind = replace(base.flexure_types[0], model="nR", n=40, axial=True, coefficients={})
@@ -42,7 +42,7 @@ def test_a_chain_of_40_links_agrees_with_finite_elements():
 
 @pytest.mark.slow
 def test_chains_of_links_converge_with_order_two():
-    """Rest position and fundamental frequency: twice the links, a quarter of the error."""
+    """Twice the links give a quarter of the error of rest position and fundamental frequency."""
     pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
     base, errors = mechanism("PRBDM2R"), []
     for n in (8, 16):
@@ -63,7 +63,7 @@ def test_the_holding_force_of_the_straight_guide_is_the_weight(guide):
 
 
 def test_the_stiffness_of_the_straight_guide_is_that_of_two_beams(guide):
-    """24 EI/L^3; the elements agree to 2e-4 and the 2R to 0.8 %."""
+    """The stiffness is 24 EI/L^3; the elements agree to 2e-4 and the 2R to 0.8 %."""
     exact = 24 * (181.5e9 * 8e-3 * 1e-12 / 12) / 40e-3**3
     assert guide["stiffness, straight"].elements == pytest.approx(exact, rel=2e-4)
     assert guide["stiffness, straight"].model == pytest.approx(exact, rel=0.008)
@@ -99,7 +99,7 @@ def test_a_comparison_can_be_printed_written_and_drawn(guide, tmp_path):
 
 
 def test_an_unmovable_wall_gives_a_note_and_round_off_is_zero():
-    """Without gravity rest position and holding force are 0; the hammer's wall is an expression."""
+    """The wall's position is an expression; without gravity the holding force at rest is 0."""
     pytest.importorskip("exudyn", reason="finite elements need exudyn: pip install exudyn")
     fractions: list[float] = []
     found = compare(mechanism("ImpactOscillator"), elements=2, progress=fractions.append)
@@ -141,7 +141,7 @@ def test_without_exudyn_the_error_names_the_installation(monkeypatch):
     ("row", "last"),
     [
         (Row("frequency 1 at rest", "Hz", 5.05, 5.0), "+1.00 %"),
-        (Row("modal restitution, stop", "", 0.5, -0.05), "+0.55"),  # A ratio: not -1100 %.
+        (Row("modal restitution, stop", "", 0.5, -0.05), "+0.55"),
         (Row("modal restitution, stop", "", 0.6, 0.5), "+0.1"),
         (Row("rest position", "m", 3e-6, 1e-6), "+200.00 %"),
         (Row("stiffness, straight", "N/m", 3310.0, 100.0), "+3210 %"),

@@ -15,7 +15,7 @@ from prbm.mechanics.modal import modes
 from support import ROOT, mechanism
 
 SPEED = 0.3  # m/s
-DAMPING = 0.9749  # (1 + a)/(1 - 0.6 a) = exp(1.6 a): the restitution of a point mass is 0.6.
+DAMPING = 0.9749  # Solution a of (1 + a)/(1 - 0.6 a) = exp(1.6 a), for a restitution of 0.6.
 OFFSET = 4e-3  # m
 GUIDE = with_flexures(mechanism("PRBDM2R"), "2R", axial=True)
 
@@ -56,8 +56,8 @@ def rigid(offset: float) -> float:
     ("stiffness", "duration", "centred", "off"),
     [(6e7, 1.0e-4, 0.596, 0.561), (1e7, 2.3e-4, 0.596, 0.593), (5e6, 3.3e-4, 0.597, 0.603)],
 )
-def test_the_documented_table_is_that_of_the_computation(stiffness, duration, centred, off):
-    """The table of docs/flexure-models.md, section "Losses of a rigid off-centre impact"."""
+def test_the_documented_table_has_the_computed_values(stiffness, duration, centred, off):
+    """The table is in docs/flexure-models.md, "Losses of a rigid off-centre impact"."""
     text = (ROOT / "docs" / "flexure-models.md").read_text("utf-8")
     row = f"| {stiffness / 1e6:g} MN/m | {1e3 * duration:.2f} ms | {centred:.3f} | {off:.3f} |"
     assert row in text

@@ -32,7 +32,7 @@ from prbm.mechanics.statics import equilibrium
 from prbm.plots.fit import force_figure, response_figure, valley_figure
 from support import PMMA, ScalarGuide, mechanism
 
-RATE, NOISE = 750.0, 4e-6  # Hz, m: the laser sensor of the thesis
+RATE, NOISE = 750.0, 4e-6  # Hz, m; of the laser in the thesis
 K = "flexure.K_theta"
 F5 = Frequency(Estimate(5.0, 0.01))
 DROPPED = {"release.displacement": -0.01, "damping.beta": 0.0, K: 2.5449}
@@ -132,7 +132,7 @@ def test_fits_to_frequencies_of_held_shapes_and_higher_modes_recover_the_paramet
 
 @pytest.mark.slow
 def test_stated_uncertainties_of_a_fit_cover_the_truth():
-    """K_theta from 200 noisy frequencies: 68.3 %, -+ 3 standard deviations of a count."""
+    """The interval includes K_theta in 68.3 % of 200 draws, -+ 3 standard deviations."""
     rng = np.random.default_rng(0)
     truth = frequency({K: 2.6})
     hits = 0
@@ -167,7 +167,7 @@ def test_one_frequency_cannot_separate_two_coefficients(ambiguous):
 
 
 def test_the_frequency_is_constant_along_the_valley(ambiguous):
-    """A step of 1e-3 changes the frequency to second order along it, to first order across it."""
+    """A step of 1e-3 has an effect of second order along the valley, of first order across it."""
     direction = np.array(list(ambiguous.valleys[0].shares.values())) * ambiguous.p
     target = ambiguous.problem.targets[0]
 
@@ -205,7 +205,7 @@ def test_the_header_of_a_valley_is_aligned_with_its_columns():
 
 
 def test_three_coefficients_and_one_frequency_have_two_undetermined_directions():
-    """The third direction of the 3R is as accurate as the frequency."""
+    """The third direction is determined as accurately as the frequency."""
     m = mechanism("PRBDM2R")
     kinds = tuple(dataclasses.replace(kind, model="3R") for kind in m.flexure_types)
     m = dataclasses.replace(m, flexure_types=kinds)
@@ -307,7 +307,7 @@ def test_the_title_of_a_fit_is_not_wider_than_its_figure():
 
 
 def test_a_fit_to_a_free_response_recovers_the_stiffness():
-    """By the RMSE over time, as in the thesis; it converges to the noise of the sensor."""
+    """The fit minimises the RMSE over time, as in the thesis, down to the noise of the sensor."""
     series = record(1.0, 0.3, 0.03)  # the wall is out of reach
     values = DROPPED | {"stop.position": 0.03, K: 2.65}
     found = fit(mechanism("PRBDM"), [Free(K, 2.0, 3.2)], Response(series), values)
@@ -319,7 +319,7 @@ def test_a_fit_to_a_free_response_recovers_the_stiffness():
 
 @pytest.mark.parametrize("restitution", [0.25, 0.6, 0.95])
 def test_a_fit_to_a_bouncing_response_recovers_the_restitution(restitution):
-    """Within 0.01 from a start at 0.5; the record is computed by another integrator."""
+    """The fit starts at 0.5; another integrator has computed the record."""
     found = fitted_restitution(
         mechanism("PRBDM"), record(restitution, 0.13), DROPPED | {"stop.restitution": 0.5}
     )
@@ -343,7 +343,7 @@ def test_a_fit_recovers_restitution_wall_and_start_together():
 
 @pytest.mark.slow
 def test_stated_uncertainty_of_the_restitution_covers_the_truth():
-    """68.3 % of 200 draws of the noise, -+ 3 standard deviations of a count: 0.585 to 0.781."""
+    """The interval includes 0.6 in 68.3 % of 200 draws, -+ 3 standard deviations of the number."""
     hits = 0
     clean = record(0.6, 0.1, noise=0.0)
     rng = np.random.default_rng(3)
@@ -361,8 +361,8 @@ def test_stated_uncertainty_of_the_restitution_covers_the_truth():
 def test_a_1r_fitted_to_a_2r_has_its_modal_restitution_at_straight_flexures(wall, low, high):
     """For a 2R with stretching flexures the fit is (1 + eps) mu_1 - 1 at straight flexures.
 
-    At -10 mm it is larger: it is one number for all impacts of the record, and the later impacts
-    depend on the energy that the first one left in other modes.
+    At -10 mm the fit is larger.  It is one number for all impacts of the record, and the later
+    impacts depend on the energy that the first impact left in other modes.
     """
     m = mechanism("PRBDM2R")
     kinds = tuple(dataclasses.replace(kind, axial=True) for kind in m.flexure_types)
@@ -380,11 +380,11 @@ def test_a_1r_fitted_to_a_2r_has_its_modal_restitution_at_straight_flexures(wall
 
 
 def test_all_starts_are_evaluated_and_reported():
-    """Five along the one parameter, and the given one."""
+    """Five starts are spread over the range of the parameter; the sixth is the given value."""
     fractions = []
     found = fit(mechanism("PRBDM"), [K], F5, starts=5, progress=fractions.append)
     assert fractions[:6] == pytest.approx([1 / 12, 2 / 12, 3 / 12, 4 / 12, 5 / 12, 6 / 12])
-    assert fractions == sorted(fractions), "then the minimisation from the best start"
+    assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
     assert found[K].value == pytest.approx(fit(mechanism("PRBDM"), [K], F5)[K].value, rel=1e-8)
 

@@ -75,7 +75,7 @@ def test_the_closed_form_is_near_the_2r_with_stretching_flexures():
     model = impact_map.algebraic(guide(axial=True), values=WEIGHTLESS)
     np.testing.assert_allclose(closed.restitution, model.restitution, atol=0.0064)
     centre = closed.restitution[2, 2]
-    assert centre == pytest.approx(0.6, abs=1e-6)  # straight and centred: eps itself
+    assert centre == pytest.approx(0.6, abs=1e-6)  # Straight and centred, it is eps.
 
 
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R", "PRBDM2RAxial", "PRBDM3R"])
@@ -92,7 +92,7 @@ def test_the_closed_form_applies_to_every_guide(name):
 @pytest.mark.parametrize(
     ("name", "wall", "offset", "message"),
     [
-        ("Cantilever", 3e-3, 0.0, "tip turns"),  # by 3/2 of its path over its length
+        ("Cantilever", 3e-3, 0.0, "tip turns"),  # The angle is 3/2 of path over length.
         # The shuttle has 200 g; the stages at half its speed add 30 g, the flexures the rest.
         ("FoldedSuspension", 1e-7, 0.0, r"shuttle along its path is 8\d"),
     ],
@@ -129,7 +129,7 @@ def test_the_closed_form_is_rejected_at_a_stop_on_a_moving_body():
 
 
 def test_the_2r_with_stretching_flexures_agrees_with_finite_elements():
-    """To 0.005 at the 25 points of the thesis without a fit; 0.03 off without stretching."""
+    """The error at the 25 points of the thesis is below 0.005; without stretch it exceeds 0.03."""
     pytest.importorskip(
         "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
     )
@@ -147,7 +147,7 @@ def test_the_2r_with_stretching_flexures_agrees_with_finite_elements():
     [("1R", 0, 0.014), ("2R", 0, 0.003), ("3R", 0, 0.006), ("nR", 40, 5e-4)],
 )
 def test_errors_of_models_with_stretching_flexures_are_as_documented(model, n, error):
-    """Largest difference from finite elements: 1R 0.013, 2R 0.003, 3R 0.006, 40R 5e-4."""
+    """The largest errors are 0.013 (1R), 0.003 (2R), 0.006 (3R) and 5e-4 (40R)."""
     pytest.importorskip(
         "exudyn", reason="the finite elements are Exudyn's: python -m pip install exudyn"
     )
@@ -157,7 +157,7 @@ def test_errors_of_models_with_stretching_flexures_are_as_documented(model, n, e
 
 
 def test_energies_of_a_simulated_impact_add_up():
-    """The modes have the arriving energy; after the impact the modes and the contact have it."""
+    """Before the impact all energy is in the modes; afterwards a part is lost in the contact."""
     hit = impact_map.simulated(guide(), [-10e-3], [4e-3], WEIGHTLESS).hits[0][0]
     assert (hit.wall, hit.offset) == (-10e-3, 4e-3)
     assert hit.before.sum() == pytest.approx(1.0, rel=1e-12)
@@ -167,8 +167,8 @@ def test_energies_of_a_simulated_impact_add_up():
     assert "contact" in hit.table()
 
 
-def test_modes_at_a_static_shape_are_those_of_the_shape():
-    """At a held shape the multipliers of Gauss' principle are the static ones."""
+def test_modes_by_gauss_principle_equal_the_static_modes_at_a_held_shape():
+    """There the multipliers of Gauss' principle are the static ones."""
     system = assemble(m := guide(axial=True), m.values(WEIGHTLESS))
     shape = impact_shape(system, 0, -5e-3)
     np.testing.assert_allclose(
@@ -177,7 +177,7 @@ def test_modes_at_a_static_shape_are_those_of_the_shape():
 
 
 def test_a_fit_recovers_a_1r_from_its_own_response():
-    """Restitution 0.47 and K_theta 2.7; the map by fits of a 1R is its restitution."""
+    """Restitution and K_theta are found; the fitted map of a 1R has its restitution."""
     truth = {"stop.restitution": 0.47, "flexure.K_theta": 2.7}
     wall = WEIGHTLESS | {"stop.position": -2e-3}
     times = np.linspace(0.0, 0.12, 60)
@@ -191,7 +191,7 @@ def test_a_fit_recovers_a_1r_from_its_own_response():
 
 
 def test_a_response_is_the_displacement_along_the_release():
-    """A cantilever is released upwards: nearly its y, from the displacement of the release."""
+    """For a cantilever that is released upwards it is nearly the output y."""
     leaf = mechanism("Cantilever")
     start = {"release.displacement": 6e-3}
     seen = impact_map.response(leaf, start, np.linspace(0.0, 0.04, 20))
@@ -209,7 +209,7 @@ def test_the_fitted_restitution_agrees_with_the_simulated_one_at_straight_flexur
 
 
 @pytest.mark.slow
-def test_a_rebound_through_the_straight_shape_is_fitted_lower_than_one_outwards():
+def test_the_fitted_restitution_is_lower_if_the_rebound_passes_the_straight_shape():
     """Modes whose frequency rises during the rebound take energy from the fundamental mode."""
     point = {"walls": [-10e-3, 10e-3], "offsets": [0.0], "values": WEIGHTLESS}
     outwards, through = impact_map.fitted(guide(), **point).restitution[0]
@@ -243,7 +243,7 @@ def map_of(walls, offsets, restitution=0.5):
     [np.linspace(-5.56e-7, 5.56e-7, 5), np.linspace(-9e-3, 5e-3, 15), [0.0, 1e-5, 2e-5, 0.01]],
 )
 def test_labels_of_the_axes_do_not_overlap(walls):
-    """Small, many and unequally spaced positions of the wall."""
+    """The positions of the wall are tiny, numerous or unequally spaced."""
     figure = figures.heat_map([map_of(walls, [-1e-3, 0.0, 1e-3])])
     figure.draw_without_rendering()
     boxes = [label.get_window_extent() for label in figure.axes[0].get_xticklabels()]
@@ -321,7 +321,7 @@ def test_coefficients_are_kept_only_for_the_same_model():
 
 
 def test_a_note_compares_stretching_with_inextensible_flexures():
-    """With stretching ones C is near that of a free body, 1.6/(1 + m d^2/J) - 1."""
+    """With stretching flexures C is near that of a free body, 1.6/(1 + m d^2/J) - 1."""
     values = WEIGHTLESS | {"stop.offset": 4e-3, "stop.position": 0.0}
     known = guide().values()
     free = 1.6 / (1 + known["shuttle.mass"] * 4e-3**2 / known["shuttle.inertia"]) - 1
@@ -337,7 +337,7 @@ def test_a_note_compares_stretching_with_inextensible_flexures():
     ("model", "values"),
     [
         (guide(), {}),  # centred
-        (guide(), {"stop.offset": 0.5e-3}),  # nearly
+        (guide(), {"stop.offset": 0.5e-3}),  # nearly centred
         (guide(axial=True), {"stop.offset": 4e-3}),  # stretches already
         (
             mechanism("Cantilever"),

@@ -12,7 +12,7 @@ from support import mechanism
 
 
 def test_amplitudes_and_frequencies_of_known_sines_are_found():
-    """Two sines between the lines of the transform, plus a slope: amplitudes to 15 %."""
+    """The frequencies are between lines of the transform; amplitudes are found to 15 %."""
     t = np.arange(2000) * 5e-4
     f, a = spectrum(
         t, 2.0 * np.sin(2 * np.pi * 40.37 * t) + 0.3 * np.cos(2 * np.pi * 211.6 * t) + 50 * t
@@ -35,7 +35,7 @@ def small_motion():
 
 
 def test_small_motions_ring_at_the_modes_of_the_impact_shape(small_motion):
-    """Each mode has a peak, to 0.2 %; the modes depend on the shape, so it is not exact."""
+    """Each mode has a peak within 0.2 %; the modes vary with the shape during the motion."""
     found = np.concatenate([
         peaks(*spectrum(small_motion.time, getattr(small_motion, name)), share=0.005)
         for name in ("along", "across", "turning")

@@ -22,7 +22,7 @@ def bistable():
     return assemble(guide, guide.values())
 
 
-def test_a_place_of_rest_that_is_not_found_is_rejected(monkeypatch):
+def test_an_equilibrium_that_is_not_found_is_rejected(monkeypatch):
     monkeypatch.setattr(equilibria, "brentq", partial(equilibria.brentq, maxiter=1))
     system = bistable()
     rise = system.values["strut.rise"]
@@ -63,11 +63,11 @@ def test_a_mode_of_a_beam_that_is_not_found_is_rejected():
 
 
 def test_the_fundamental_mode_under_a_large_mass_is_not_missed():
-    """A massless spring: b^4 = 3/mu; the second mode would be 3.93."""
+    """The beam acts as a massless spring, b^4 = 3/mu; its second mode has b = 3.93."""
     assert beams.wavenumber(1, mass=1e15) == pytest.approx((3e-15) ** 0.25, rel=1e-6)
 
 
-def test_a_model_that_wants_updates_without_end_is_rejected(monkeypatch):
+def test_a_model_that_requests_endless_updates_is_rejected(monkeypatch):
     model = Model.__new__(Model)
     model.time = 0.5
     monkeypatch.setattr(Model, "call", lambda *_: (True,), raising=False)

@@ -59,7 +59,7 @@ def test_the_lock_of_a_killed_process_is_free(holder, tmp_path):
     assert (tmp_path / "lock").read_text() == ""
 
 
-def test_waiting_ends_when_the_owner_ends(holder, tmp_path):
+def test_a_wait_for_a_lock_ends_when_its_owner_ends(holder, tmp_path):
     begin = time.monotonic()
     threading.Timer(0.5, holder.kill).start()
     with locked(tmp_path / "lock"):
@@ -75,13 +75,13 @@ def test_threads_and_nested_blocks_lock_each_other_out(tmp_path):
         pytest.fail("the lock was taken twice")
 
 
-def test_a_file_that_cannot_be_opened_is_no_obstacle(tmp_path):
+def test_a_block_runs_without_lock_if_the_file_cannot_be_opened(tmp_path):
     (tmp_path / "file").write_text("")
     with locked(tmp_path / "file" / "lock", wait=False):
         pass
 
 
-def test_a_file_system_without_locks_is_no_obstacle(tmp_path, monkeypatch):
+def test_a_block_runs_without_lock_on_a_file_system_without_locks(tmp_path, monkeypatch):
     def unsupported(handle, wait):
         raise OSError(errno.ENOLCK, "No locks available")
 
@@ -91,7 +91,7 @@ def test_a_file_system_without_locks_is_no_obstacle(tmp_path, monkeypatch):
 
 
 class Msvcrt(types.ModuleType):
-    """Stands in for the module of Windows: one locked byte per file, for one handle."""
+    """Replacement for the module of Windows: one handle at a time may lock the byte of a file."""
 
     LK_NBLCK, LK_UNLCK = 2, 0
 
@@ -110,7 +110,7 @@ class Msvcrt(types.ModuleType):
 
 @pytest.fixture
 def windows(monkeypatch):
-    """Return the module as Windows imports it."""
+    """Return ``prbm.base.lock`` as it is imported on Windows."""
     monkeypatch.setitem(sys.modules, "msvcrt", Msvcrt())
     monkeypatch.setattr(sys, "platform", "win32")
     spec = importlib.util.spec_from_file_location("prbm.base.windows_lock", locks.__file__)

@@ -421,7 +421,7 @@ def test_an_impact_at_the_start_is_counted(mechanisms, tmp_path):
 
 
 def test_an_unstable_equilibrium_is_reported_without_a_rest_position(mechanisms, tmp_path):
-    """A column under the shuttle's weight buckles."""
+    """The flexures buckle under the weight of the shuttle."""
     summary = headline(
         mechanisms, tmp_path, gravity__x=0.0, gravity__y=-200.0, release__displacement=-1e-3
     )

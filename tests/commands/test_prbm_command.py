@@ -102,7 +102,7 @@ def test_list_prints_the_shipped_mechanisms(capsys):
 
 
 def test_the_mode_of_a_1r_guide_moves_along_its_circle(capsys):
-    """The kinetic energies along x and y are as cos^2 and sin^2 of the angle of the links."""
+    """The shares along x and y are proportional to cos^2 and sin^2 of the angle of the links."""
     guide = load("PRBDM")
     system = assemble(guide, guide.values())
     radius = system.values["flexure.gamma"] * system.values["flexure.length"]
@@ -115,7 +115,7 @@ def test_the_mode_of_a_1r_guide_moves_along_its_circle(capsys):
 
 
 def test_a_held_1r_guide_is_a_crank_on_torsion_springs(capsys):
-    """F = 4 k Theta/(gamma l cos Theta), x = gamma l sin Theta, y = gamma l (cos Theta - 1)."""
+    """F = 4 k T/(r cos T), x = r sin T, y = r (cos T - 1) with the link angle T and r = gamma l."""
     assert run("equilibrium PRBDM --set gravity.x=0 --from -20mm --to 20mm --out .") == cli.OK
     p = load("PRBDM").values()
     radius = p["flexure.gamma"] * p["flexure.length"]
@@ -129,7 +129,7 @@ def test_a_held_1r_guide_is_a_crank_on_torsion_springs(capsys):
     np.testing.assert_allclose(found["across [m]"], radius * (np.cos(turned) - 1), atol=1e-12)
     stiffness = 4 * k / radius**2 * (1 / np.cos(turned) ** 2 + turned * np.tan(turned) /
                                      np.cos(turned) ** 2)  # fmt: skip
-    np.testing.assert_allclose(found["stiffness [N/m]"], stiffness, rtol=1e-6)  # h^2
+    np.testing.assert_allclose(found["stiffness [N/m]"], stiffness, rtol=1e-6)  # a difference
     assert "equilibrium at 0 mm: stable" in capsys.readouterr().out
 
 
@@ -217,7 +217,7 @@ def test_several_beams_give_a_table_with_their_mean(tmp_path, capsys):
     E = np.array(table("youngs-modulus.csv")["E [Pa]"], float)
     assert E[0] / E[1] == pytest.approx(1.01, rel=1e-9)
     assert E[2] == pytest.approx((E[0] + E[1]) / 2)
-    assert E[0] == pytest.approx(181.5e9, rel=0.03)  # its uncertainty is 1.7 %
+    assert E[0] == pytest.approx(181.5e9, rel=0.03)  # The uncertainty of E is 1.7 %.
     assert {path.name for path in Path().glob("*.png")} == {
         "bending-bending.png", "other-bending.png"
     }  # fmt: skip
@@ -496,7 +496,7 @@ def test_a_wheel_on_a_cross_pivot_has_an_equilibrium_but_no_stiffness(capsys):
     assert run("equilibrium cross.toml --held 1mm") == cli.FAILED
     failed = capsys.readouterr()
     assert "= 0.001 m: the centre of mass of the body wheel stays where it is" in failed.err
-    assert failed.out == "", "head of a table without rows"
+    assert failed.out == "", "the head of a table without rows must not be printed"
     assert run("simulate cross.toml --set release.velocity=0.1") == cli.MISTAKE
     assert "put the centre of mass off it, or release another body" in capsys.readouterr().err
 

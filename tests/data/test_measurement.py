@@ -21,7 +21,7 @@ from prbm.data.uncertainty import Estimate, EvaluationError, line, power_law
 from prbm.plots.measurement import bending_figure
 
 E, LENGTH, WIDTH, THICKNESS = 181.5e9, 40e-3, 8e-3, 0.1e-3  # Steel flexures of the thesis.
-CELL_NOISE = 1e-3  # N, 0.2 % of the range of a load cell for 0 to 0.5 N.
+CELL_NOISE = 1e-3  # N; 0.2 % of the range 0 to 0.5 N of the load cell.
 STIFFNESS = E * WIDTH * THICKNESS**3 / (4 * LENGTH**3)
 
 
@@ -41,7 +41,7 @@ def bent(rng, samples=600, cycles=1, noise=CELL_NOISE, loss=0.0, largest=3e-3):
 
 
 def test_youngs_modulus_is_recovered_within_a_percent():
-    """Noise of 1 mN on forces up to 17 mN, at a deflection of 3 mm of a flexure of 5.7 N/m."""
+    """The forces of up to 17 mN have a noise of 1 mN; the flexure of 5.7 N/m is bent by 3 mm."""
     d, F = bent(np.random.default_rng(0), 12000, 10)
     found = youngs_modulus(d, F, beam(), window=10)
     assert found.modulus.value == pytest.approx(E, rel=0.01)
@@ -54,7 +54,7 @@ def test_youngs_modulus_is_recovered_within_a_percent():
 
 
 def test_youngs_modulus_is_exact_without_noise():
-    """Order, window, sign, zero and angle of the sensor change the result by round-off only."""
+    """Order of the samples, fit window, and the sensor's sign, zero and angle have no effect."""
     d, F = bent(np.random.default_rng(0), noise=0.0)
     for options in (
         {}, {"window": 7}, {"fit_range": (0.0, 1.0)}, {"force_gain": Estimate(1.0, 0.01)},
@@ -69,7 +69,7 @@ def test_youngs_modulus_is_exact_without_noise():
 
 
 def test_dimensions_in_mm_taken_as_metres_are_noted():
-    """E is proportional to l^3/(b h^3): a thousandth of the true value."""
+    """E is proportional to l^3/(b h^3), so that it is a thousandth of the true value."""
     d, F = bent(np.random.default_rng(0))
     sizes = (Estimate(1e3 * x, 0.0) for x in (LENGTH, WIDTH, THICKNESS))
     found = youngs_modulus(d, F, Beam("1", *sizes))
@@ -85,7 +85,7 @@ def test_a_modulus_outside_the_range_of_solids_is_noted(factor):
 
 
 def test_the_uncertainty_of_the_fit_covers_the_true_modulus():
-    """68.3 % of 200 draws, -+ 3 standard deviations of a count of them: 0.585 to 0.781."""
+    """The interval includes E in 68.3 % of 200 draws, -+ 3 standard deviations of the number."""
     rng = np.random.default_rng(2)
     hits = 0
     for _ in range(200):
@@ -140,7 +140,7 @@ def test_dimensions_without_uncertainty_are_noted():
 
 
 def test_the_uncertainty_of_the_sensor_angle_contributes_by_its_tangent():
-    """d(1/cos a)/(1/cos a) = tan a da."""
+    """The force is divided by cos a for a sensor angle a, and d(1/cos a)/(1/cos a) = tan a da."""
     d, F = bent(np.random.default_rng(0), noise=0.0)
     found = youngs_modulus(d, F, beam(), sensor_angle=Estimate(30.0, 1.0))
     expected = math.tan(math.radians(30)) * math.radians(1.0)
@@ -184,9 +184,9 @@ def test_large_deflections_are_noted_with_their_error():
 
 
 def test_the_loss_of_a_cycle_is_the_area_of_the_loop():
-    """Unloading forces are lower by c (1 - r), r = d/d_max: the loss is c/3 of the work k d^2/2.
+    """The force k d is reduced by the share c (1 - r) in unloading, where r = d/d_max.
 
-    int r c (1 - r) dr over int r dr = (1/6)/(1/2) c.
+    The lost share of the work is c/3: the integrals of r c (1 - r) and r over r are c/6 and 1/2.
     """
     for cycles in (1, 4):
         d, F = bent(np.random.default_rng(4), 4000, cycles, noise=0.0, loss=0.3)
@@ -224,7 +224,7 @@ def test_turning_points_ignore_noise():
 
 
 def test_a_table_of_beams_has_mean_and_scatter():
-    """The mean of n values of deviation s has the uncertainty s/sqrt(n), with n - 1 freedom."""
+    """The mean of n values of deviation s has the uncertainty s/sqrt(n)."""
     rng = np.random.default_rng(6)
     found = [youngs_modulus(*bent(rng, cycles=2, loss=0.3), beam(name=str(i))) for i in range(5)]
     table = beam_table(found)
@@ -345,7 +345,7 @@ def test_correlated_residuals_increase_the_uncertainty():
 
 
 def test_the_uncertainty_of_a_power_law_is_that_of_random_samples():
-    """Monte Carlo of y = 3 x^2/z with 1e5 draws: standard deviation within 1 %."""
+    """The law is y = 3 x^2/z; the deviation of 1e5 random draws agrees to 1 %."""
     rng = np.random.default_rng(11)
     x, z = Estimate(2.0, 0.02), Estimate(5.0, 0.05)
     y, _ = power_law({"x": (x, 2.0), "z": (z, -1.0)}, 3.0)

@@ -1,4 +1,4 @@
-"""Records of people and instruments: layouts, units, and messages for invalid records."""
+"""Records written by hand or by instruments: layouts, units, messages about invalid records."""
 
 import contextlib
 

@@ -57,7 +57,7 @@ def test_a_strongly_damped_motion_has_a_fit_but_no_decrement():
 
 @pytest.mark.parametrize("zeta", [6.88e-9, 0.0])
 def test_damping_below_its_uncertainty_is_too_small_to_measure(zeta):
-    """The 6.88e-9 of the thesis is a tenth of the uncertainty of 10 s of its laser, 8e-8.
+    """The 6.88e-9 of the thesis is a tenth of 8e-8, the uncertainty from 10 s of its laser signal.
 
     The Cramer-Rao bound of the decay of a sine is u = (noise/amplitude) sqrt(2/n) sqrt(12)/T.
     """
@@ -75,7 +75,7 @@ def test_damping_below_its_uncertainty_is_too_small_to_measure(zeta):
 
 
 def test_uncertainties_cover_the_true_values():
-    """68.3 % of 200 draws, -+ 3 standard deviations of a count of them: 0.585 to 0.781."""
+    """Each interval includes its true value in 68.3 % of 200 draws, -+ 3 standard deviations."""
     rng = np.random.default_rng(1)
     hits = dict.fromkeys(("frequency", "zeta", "decrement", "its zeta"), 0)
     for _ in range(200):
@@ -101,7 +101,7 @@ def test_confidence_intervals_of_no_damping_include_zero_at_the_stated_level():
 
 @pytest.mark.parametrize("duration", [2.0, 5.3, 16.7])
 def test_the_spectral_peak_is_within_its_resolution(duration):
-    """The highest line is within half a line distance, the parabola within 2 % of it."""
+    """The error of the highest line is half a line distance, that of the parabola 2 % of it."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         frequency = FREQUENCY + rng.uniform(-0.5, 0.5)
@@ -195,7 +195,7 @@ def bouncing(restitution=0.6, noise=NOISE, height=15e-3, count=5):
 
 
 def test_impact_times_of_a_bouncing_ball_are_found_to_a_sample():
-    """All bounces, down to a speed of 0.07 m/s."""
+    """All bounces are found, down to a speed of 0.07 m/s."""
     when, series = bouncing()
     assert impacts(series) == pytest.approx(when, abs=1.01 / RATE)
 

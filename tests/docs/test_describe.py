@@ -42,7 +42,7 @@ def test_the_pieces_of_the_page_are_a_mechanism_file(tmp_path: Path) -> None:
 
 def test_the_page_gives_the_modal_restitution_with_and_without_stretch(tmp_path: Path) -> None:
     lever = read_mechanism(write_file(tmp_path))
-    match = re.search(r"lever of this page goes from ([\d.]+) to ([\d.]+):", PAGE)
+    match = re.search(r"`axial = true` changes it from ([\d.]+) to ([\d.]*\d)\.", PAGE)
     assert match is not None
     inextensible, stretched = map(float, match.groups())
     (note,) = notes(lever, {})

@@ -38,7 +38,7 @@ def printed(tmp_path, monkeypatch, capsys) -> str:
 
 
 def test_coupling_errors_of_the_page_halve_with_the_step_and_masters_agree(printed):
-    """The limit of the errors is the result of one solver."""
+    """The energies converge to the result of one solver as the step becomes shorter."""
     assert re.search(r"^base\.acceleration\.x \[m/s2\]: ", printed, re.MULTILINE)
     assert re.search(r"^alone: \d+ impacts$", printed, re.MULTILINE)
     pairs = re.findall(r"taken (\S+) mJ, given (\S+) mJ", printed)
@@ -52,6 +52,6 @@ def test_coupling_errors_of_the_page_halve_with_the_step_and_masters_agree(print
     speeds = re.findall(r"^(?:SSP in FMPy|SSP in libcosim|container): (\S+) m/s", printed, re.M)
     assert len(speeds) == 3
     assert len(set(speeds)) == 1
-    assert abs(float(speeds[0])) > 1e-2  # The agreement is not that of rest.
+    assert abs(float(speeds[0])) > 1e-2  # The equal speeds are not zero.
     events = int(re.search(r"^(\d+) events", printed, re.MULTILINE)[1])
     assert events >= 3

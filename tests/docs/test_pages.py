@@ -37,7 +37,7 @@ def links(path: Path) -> list[tuple[Path, str]]:
 
 
 def anchors(path: Path) -> set[str]:
-    """Return the anchors of a page: those of its headings and those in HTML."""
+    """Return the anchors of a page, from its headings and from HTML elements."""
     text = prose(path)
     headings = re.findall(r"^#+ (.*)$", text, re.MULTILINE)
     slugs = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
@@ -63,18 +63,16 @@ def test_every_page_is_reachable_from_the_index():
     assert set(PAGES) - reached == set()
 
 
-def test_the_index_lists_every_page_of_its_folder_itself():
+def test_the_index_links_every_other_page_of_its_folder_directly():
     listed = {target.resolve() for target, _ in links(DOCS / "index.md")}
     assert set(DOCS.glob("*.md")) - listed == {DOCS / "index.md"}
 
 
-WRITTEN = [
-    path for path in PAGES if path.parent == DOCS and path.stem not in ("index", "validation")
-]
-"""Pages of the folder but the index and the page that ``prbm validate`` generates."""
+LINKING = [path for path in PAGES if path.parent == DOCS and path.stem != "index"]
+"""All pages of the folder but the index."""
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", *WRITTEN], ids=lambda path: path.name)
+@pytest.mark.parametrize("page", [ROOT / "README.md", *LINKING], ids=lambda path: path.name)
 def test_pages_link_the_index_and_the_glossary(page):
     linked = {target.resolve() for target, _ in links(page)}
     assert {DOCS / "index.md", DOCS / "glossary.md"} <= linked | {page}
@@ -100,8 +98,8 @@ def test_the_film_of_the_readme_is_small(film):
 
 
 @pytest.mark.slow
-def test_the_command_of_the_film_makes_it(film, tmp_path, monkeypatch):
-    """Same size and number of frames; pixels depend on the version of Matplotlib."""
+def test_the_command_in_the_readme_makes_the_film(film, tmp_path, monkeypatch):
+    """Size and number of frames are equal; the pixels depend on the version of Matplotlib."""
     monkeypatch.chdir(tmp_path)
     (command,) = re.findall(r"`prbm (animate .*?)`", prose(ROOT / "README.md"))
     assert main(shlex.split(command)) == 0

@@ -19,7 +19,7 @@ def blocks(text: str) -> list[str]:
 
 @pytest.fixture
 def _built(fmus, native, tmp_path, monkeypatch) -> None:
-    """Change to a folder with the FMUs that the first command builds."""
+    """Change to a folder with the FMUs of the guides, in the folders of ``prbm-build-fmu``."""
     paths = {("python", name): path for name, path in fmus.items()}
     paths |= {(f"fmi{fmi}", name): path for (name, fmi), path in native.items()}
     for (folder, name), path in paths.items():
@@ -78,8 +78,8 @@ def test_the_readme_prints_the_result_of_its_first_command(tmp_path, monkeypatch
     assert {path.name for path in (tmp_path / "results").iterdir()} == set(files)
 
 
-def test_development_takes_two_commands():
-    """The first installs, builds and simulates; the second runs the tests."""
+def test_two_commands_set_up_the_development():
+    """The first command installs, builds and simulates; the second runs the tests."""
     commands = README.split("<!-- commands -->")[1].split("<!-- end -->")[0]
     lines = [line for line in commands.splitlines() if line and not line.startswith("```")]
     assert len(lines) == 2

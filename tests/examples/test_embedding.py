@@ -1,4 +1,4 @@
-"""The examples of coupled systems against one solver, closed forms and energy balances."""
+"""Examples of coupled systems, compared with one solver, closed forms and energy balances."""
 
 import math
 import runpy
@@ -58,7 +58,7 @@ def test_each_page_has_a_lesson_a_figure_and_a_command(name):
 
 
 def test_voice_coil_impacts_and_rest_agree_with_one_solver(capsys):
-    """The coupling delays by up to a step, and the time of coming to rest by two."""
+    """Times of impacts agree to a tenth of a step, the time of coming to rest to two steps."""
     run = example("voice_coil")
     record, reference = run.simulate(0.2), run.monolith(0.2)
     found, exact = run.impacts(record), np.array(reference.impacts)
@@ -70,7 +70,7 @@ def test_voice_coil_impacts_and_rest_agree_with_one_solver(capsys):
 
 
 def test_energy_error_of_the_voice_coil_is_proportional_to_the_step():
-    """Before any impact, the error is that of the velocity that is constant within a step."""
+    """Before any impact, the cause of the error is a velocity that is constant within a step."""
     run = example("voice_coil")
     records = [run.simulate(0.03, step) for step in (1e-4, 5e-5)]
     longer, shorter = (abs(run.energy_error(record)[-1]) for record in records)
@@ -92,7 +92,10 @@ def test_voice_coil_rejects_an_invalid_stop_time(time, capsys):
 
 
 def test_harvester_with_impacts_has_the_power_of_one_solver():
-    """It hits each stop once per period; load and coil share the power as their resistances."""
+    """The mass hits each stop once per period.
+
+    Load and coil share the power in proportion to their resistances.
+    """
     run = example("energy_harvester")
     table = run.sweep([36.0])
     assert table["power"][0] == pytest.approx(run.monolith([36.0])[0], rel=2e-3)
@@ -103,7 +106,7 @@ def test_harvester_with_impacts_has_the_power_of_one_solver():
 
 @pytest.mark.slow
 def test_error_of_the_harvester_without_impacts_halves_with_the_step():
-    """The delay by half a step shifts the resonance by c w^2 h / 2 K."""
+    """The delay by half a step h shifts the resonance, in proportion to h."""
     run = example("energy_harvester")
     exact, errors = run.monolith([28.0], stops=False)[0], []
     for steps in (64, 128):
@@ -116,14 +119,14 @@ def test_error_of_the_harvester_without_impacts_halves_with_the_step():
 
 
 def test_closed_form_of_the_harvester_agrees_with_one_solver():
-    """Without stops; the tolerance is that of small amplitudes, (x / r)^2 = 4e-4."""
+    """There are no stops; the tolerance is the error of small amplitudes, (x / r)^2 = 4e-4."""
     run = example("energy_harvester")
     assert run.monolith([28.0], stops=False)[0] == pytest.approx(run.linear(28.0), rel=1e-3)
 
 
 @pytest.mark.slow
 def test_power_of_the_harvester_depends_on_the_direction_of_the_sweep():
-    """With rising frequency it hits both stops up to 44 Hz; coming from 50 Hz it does not."""
+    """With rising frequency the mass hits both stops up to 44 Hz; back from 50 Hz it hits none."""
     run = example("energy_harvester")
     table = run.sweep([36.0, 38.0, 40.0, 42.0, 44.0, 50.0, 44.0])
     assert table["impacts"].tolist() == [2.0] * 5 + [0.0, 0.0]
@@ -142,7 +145,7 @@ def test_harvester_prints_and_plots(capsys, monkeypatch):
 
 
 def test_drop_test_speeds_agree_with_the_scalar_equation_and_beam_theory():
-    """An acceleration constant within a step errs by 2e-4; the stiff 1R by 3 % of the speed."""
+    """The held acceleration causes an error of 2e-4, the stiff 1R one of 3 % of the speed."""
     run = example("drop_test")
     heights = (0.01, 0.05, 0.5)
     table = run.study(heights)
@@ -152,7 +155,7 @@ def test_drop_test_speeds_agree_with_the_scalar_equation_and_beam_theory():
 
 
 def test_impulse_of_the_drop_test_is_the_change_of_momentum():
-    """P = (1 + eps) m v for a mass on a circle of radius r, where m = M / cos(phi)^2 along x."""
+    """P = (1 + eps) m v, where m = M/cos(phi)^2 for a mass M at an angle phi on a circle."""
     run = example("drop_test")
     table, body = run.study((0.3,)), run.guide()
     mass = body.mass / (1 - (run.TRAVEL / body.r) ** 2)
@@ -188,7 +191,7 @@ def test_drop_test_rejects_an_invalid_height(capsys):
 
 
 def test_cosimulation_is_of_first_order_and_event_mode_has_no_delay(capsys, monkeypatch):
-    """The order is that before an impact and, with event mode, after two."""
+    """The order is one before an impact and, with event mode, also after two impacts."""
     run = example("model_exchange")
     found = run.study([1e-3, 5e-4, 2.5e-4, 1.25e-4])
     with_events = "Gauss-Seidel, event mode"
@@ -223,7 +226,7 @@ def test_escapement_conserves_momentum_and_converges_to_one_mechanism():
         found.append(run.errors(result, reference))
     time, speed = np.array(found).T
     assert time[2] < 3e-5
-    assert speed[2] < 1e-4  # the wall is up to 2 a h^2 off, and faster or slower meanwhile
+    assert speed[2] < 1e-4  # The wall is up to 2 a h^2 from its reference, at another velocity.
     assert math.log2(time[0] / time[2]) / 2 == pytest.approx(2.0, abs=0.5)
 
 

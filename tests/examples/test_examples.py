@@ -36,7 +36,7 @@ def is_picture(path: str) -> bool:
 def test_quickstart_frequency_agrees_with_finite_elements_and_experiment(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The model error of the 2R is 0.5 %; the experiment has its standard uncertainty."""
+    """The model error of the 2R is 0.5 %; the limit for the experiment is twice its uncertainty."""
     quickstart = example("quickstart.py")
     quickstart.main([])
     printed = capsys.readouterr().out
@@ -58,7 +58,7 @@ def test_quickstart_simulates_until_the_given_time(tmp_path: Path) -> None:
 def test_folding_reduces_the_lateral_error_of_beam_theory(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """The error of two leaves is 3 x^2 / (5 L), within the model error of the 3R."""
+    """The computed error of two leaves is within 1.5 % of that of beam theory, 3 x^2 / (5 L)."""
     example("straight_line.py").main([])
     printed = capsys.readouterr().out
     lines = [line for line in printed.splitlines() if line.endswith(" um")]
@@ -91,7 +91,11 @@ def test_quickstart_writes_a_film_of_a_motion_without_rest(
 
 
 def test_parameter_study_agrees_with_the_scalar_equation() -> None:
-    """Capture ends the bouncing early, by at most 2 eps v_r / (a (1 - eps)) with a about g."""
+    """The model rests earlier than the equation: bounces below the rest speed v_r are left out.
+
+    They last at most 2 eps v_r / (a (1 - eps)), with the restitution eps and the acceleration
+    a > 9 m/s^2 towards the stop.
+    """
     study = example("parameter_study.py")
     restitutions = (0.3, 0.6, 0.8)
     table = study.study(restitutions)
@@ -134,17 +138,17 @@ def test_sweep_has_the_standard_deviation_of_first_order_propagation(
     assert found == pytest.approx(first_order, rel=4 / np.sqrt(2 * 40))
     assert "at rest at the end: 40 of 40" in printed
     assert is_picture("settling.png")
-    main(["--runs", "40"])  # All rows are already done.
+    main(["--runs", "40"])  # All rows are already in the file.
     assert capsys.readouterr().out == printed
 
 
 def test_stroke_controller_reaches_its_stroke_and_energies_balance(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """Its work equals that of the guide, and the speed of its impacts that of beam theory.
+    """The controller's work equals that on the guide; impacts have the speed of beam theory.
 
-    Work and energy balance are exact to the tolerance of the integration.  The speed has the model
-    error of the 1R, which is 4 % stiffer than a beam, and that of a delay by one step.
+    Work and energy balance are exact to the tolerance of the integration.  The speed has two
+    errors: the 1R is 4 % stiffer than a beam, and the controller acts one step late.
     """
     run = example("stroke_controller/run.py")
     record = run.simulate(stop_time=2.0)
@@ -178,7 +182,7 @@ def test_stroke_controller_rejects_an_invalid_stop_time(
 def test_stroke_controller_reports_too_few_impacts(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    """A tenth of a second with the 2R model."""
+    """The run is a tenth of a second long."""
     example("stroke_controller/run.py").main(["--stop-time", "0.1", "--model", "PRBDM2R"])
     assert (
         "fewer than two impacts in the second half: increase --stop-time" in capsys.readouterr().out

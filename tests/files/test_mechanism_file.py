@@ -158,7 +158,7 @@ def test_invalid_lengths_are_rejected(written, words):
     "text", ["12", " 1e-3 ", "+12", "-(3)", "24/2", "2*6", "3 mm + 1", "2*(a + 3 mm) - 0.5"]
 )
 def test_numbers_in_quotes_without_a_unit_are_rejected(text):
-    """They may be meant in another unit than SI."""
+    """The writer may have meant another unit than that of SI."""
     with pytest.raises(MechanismError, match="has no unit: write a unit after each number"):
         units.quantity(text, "m")
 
@@ -179,7 +179,7 @@ HOSTILE_UNITS = (
 
 @pytest.mark.parametrize("unit", HOSTILE_UNITS)
 def test_invalid_units_raise_errors_of_the_package(unit, tmp_path):
-    """In all functions that read units, in a mechanism file, and in the head of a record."""
+    """The units are given to all functions that read units, mechanism files or heads of records."""
     for read_unit in (
         units.check_coherent,
         lambda text: units.converted("1", text, "m"),
@@ -205,7 +205,7 @@ def test_an_angle_is_not_dimensionless():
 
 
 def test_units_of_parameters_are_coherent_and_known_to_the_fmu():
-    """Other units are rejected."""
+    """Units that are not coherent SI units are rejected."""
     assert set(units.COHERENT) <= set(UNITS)
     known = {unit for part in FIELDS.values() for unit, *_ in part.values()}
     assert known <= {"", *units.COHERENT}
@@ -224,7 +224,7 @@ def test_a_parameter_has_the_si_unit_of_its_value(striker):
 
 
 def test_a_material_has_two_parameters_that_flexure_types_refer_to(striker):
-    """steel.youngs_modulus [Pa] and steel.density [kg/m3], with the bounds of the type's fields."""
+    """They are steel.youngs_modulus [Pa] and steel.density [kg/m3], with the bounds of the type."""
     known = {p.name: p for p in striker.parameters}
     for name, value in (("youngs_modulus", 181.5e9), ("density", 7800.0)):
         unit, _, minimum, maximum, nominal, _ = FIELDS[FlexureType][name]
@@ -245,7 +245,7 @@ def test_a_quantity_of_a_material_may_be_an_expression(tmp_path):
     assert leaf.youngs_modulus == "1000000000.0 + 1e9*ratio"
 
 
-def test_a_flexure_with_its_own_section_has_a_type_of_its_name(striker):
+def test_a_flexure_with_its_own_section_has_a_type_with_the_name_of_the_flexure(striker):
     leaf, right, hanger = striker.flexure_types
     assert [f.type for f in striker.flexures] == ["leaf", "right", "hanger"]
     assert (right.model, right.n, right.axial, right.thickness) == ("nR", 8, True, 5e-5)
@@ -382,7 +382,7 @@ TWO_LINES = (  # Mistakes of two lines that do not agree.
 
 @pytest.mark.parametrize("mistake", sorted({*CHANGES} - {"thousands of digits"}))
 def test_the_message_gives_a_line_of_the_wrong_part(mistake, tmp_path, capsys):
-    """Between the header of the table and the changed key, or in the other part of a conflict."""
+    """The line is between table header and changed key, or in the other part of a conflict."""
     old, new, _ = CHANGES[mistake]
     path = tmp_path / "mine.toml"
     path.write_text(EXAMPLE.replace(old, new, 1), "utf-8")
@@ -529,7 +529,7 @@ def test_the_command_prints_the_schema(capsys):
 
 
 def test_pint_is_not_imported_for_a_file_without_units(tmp_path):
-    """The import takes 0.3 s."""
+    """The import of pint takes 0.3 s."""
     text = (ROOT / "tests" / "interface" / "test_tables.py").read_text().split('"""')[3]
     (tmp_path / "plain.toml").write_text(text)
     code = (

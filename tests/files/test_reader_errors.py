@@ -98,7 +98,7 @@ UNIT_TEXTS = [
 
 
 def read(reader: Callable[[Path], object], text: str) -> None:
-    """Read a file with a text, encoded with surrogates as they are."""
+    """Read a file with a text, which may have lone surrogates; allow errors of the package."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "file.txt"
         path.write_bytes(text.encode("utf-8", "surrogatepass"))
@@ -118,19 +118,19 @@ def evaluate(path: Path) -> None:
 
 @settings(max_examples=300, deadline=None)
 @given(changed([EXAMPLE]))
-def test_changed_mechanism_files(text):
+def test_changed_mechanism_files_are_read_or_rejected(text):
     read(read_mechanism, text)
 
 
 @settings(max_examples=300, deadline=None)
 @given(changed([text for text, _ in LAYOUTS.values()]))
-def test_changed_records(text):
+def test_changed_records_are_read_or_rejected(text):
     read(evaluate, text)
 
 
 @settings(max_examples=500, deadline=None)
 @given(changed(UNIT_TEXTS), st.sampled_from(["m", "", "kg.m2", "rad"]))
-def test_changed_quantities(text, unit):
+def test_changed_quantities_are_read_or_rejected(text, unit):
     for reader in (
         lambda: units.quantity(text, unit),
         lambda: units.number(text, unit),
@@ -139,7 +139,7 @@ def test_changed_quantities(text, unit):
         lambda: units.check_coherent(text),
         lambda: units.converted("1", text, unit),
         lambda: quantity(text, unit, "--held"),
-        lambda: quantities(text.split(), unit, "--heights"),
+        lambda: quantities(text.split(), unit, "--offsets"),
     ):
         with contextlib.suppress(PrbmError):
             reader()

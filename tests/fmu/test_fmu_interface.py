@@ -113,7 +113,7 @@ def test_display_unit_factors_follow_from_their_prefixes():
     for name, unit in UNITS.items():
         for display, factor in unit.display.items():
             if display in ("deg", "deg/s", "deg/s2", "g", "g.mm2", "g/cm3"):
-                continue  # These differ from the unit by more than a prefix.
+                continue  # More than a prefix differs.
             by_parts = [
                 prefixes[part[0]] if part != plain else 1.0
                 for part, plain in zip(display.split("/"), name.split("/"), strict=True)
@@ -141,7 +141,7 @@ def test_velocities_are_declared_as_derivatives(fmus, model):
 
 
 @each_shipped
-def test_declared_capabilities_and_default_experiment(fmus, model):
+def test_capabilities_and_the_default_experiment_are_declared(fmus, model):
     description = read_model_description(str(fmus[model]))
     cs, experiment = description.coSimulation, description.defaultExperiment
     assert cs.canGetAndSetFMUstate
@@ -154,7 +154,7 @@ def test_declared_capabilities_and_default_experiment(fmus, model):
 
 @each_shipped
 def test_outputs_ignore_inputs_set_at_the_same_communication_point(fmus, model):
-    """ModelStructure declares it; this test changes every input at a communication point."""
+    """ModelStructure declares no dependency of an output on an input; all inputs are changed."""
     guide = case(model).mechanism
     with Instance(fmus[model]).initialize() as instance:
         assert instance.step(0.0, 0.01) == OK

@@ -94,7 +94,7 @@ def test_a_value_corrected_before_the_start_has_no_effect(fmus):
 
 @pytest.mark.parametrize("name", ["stop.restitution", "shuttle.mass", "stop.position"])
 def test_a_valid_value_after_the_start_corrects_an_invalid_one_before_it(fmus, name):
-    """The motion starts after the correction, also of a wall that was penetrated."""
+    """The motion starts after the correction, also if the wall was first set inside the body."""
     bad = {"stop.position": -0.03}.get(name, -1.0)
     good = {"stop.position": 1e-3}.get(name, 0.5)
     with Instance(fmus["PRBDM"]).initialize(**{name.replace(".", "__"): bad}) as instance:
@@ -146,7 +146,7 @@ WRONG_GETS = {
 
 @pytest.mark.parametrize("getter", WRONG_GETS)
 def test_a_get_of_the_wrong_type_logs_an_error_and_changes_nothing(fmus, getter):
-    """The call is made through ctypes, which raises an exception that was left pending."""
+    """If a getter left an exception pending, ctypes would raise it here."""
     with Instance(fmus["PRBDM"]).initialize() as instance:
         for name in WRONG_GETS[getter]:
             reference = instance.variables[name].valueReference if name else 12345

@@ -28,7 +28,7 @@ def points(step: float, end: float = END) -> np.ndarray:
 
 
 def uneven(end: float) -> np.ndarray:
-    """Return communication points with steps over three decades, including those compared."""
+    """Return communication points with steps over three decades, and all compared times."""
     rng = np.random.default_rng(0)
     inner = end / END * np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
     return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / COMPARISONS, end)]))
@@ -43,7 +43,7 @@ def grid_of(name: str, end: float) -> np.ndarray:
 
 @cache
 def engine_run(model: str) -> tuple[dict, list[dict]]:
-    """Return the declared variables, and the engine's values of them at the times compared."""
+    """Return the declared variables, and their values in the engine at the compared times."""
     guide, end = case(model).mechanism, case(model).end
     listed = {v.name: v for v in interface(guide, {})}
     simulation = Simulation(guide)
@@ -125,7 +125,7 @@ def test_a_retreating_wall_releases_and_recaptures_a_pressed_body(fmus):
     speed, step = 0.02, 1e-3
     with Instance(fmus["PRBDM"]).initialize() as instance:
         assert instance.step(0.0, END) == OK
-        for k in range(80):  # until the long step is forgotten
+        for k in range(80):  # Afterwards the longest of the recent steps is 1 ms.
             assert instance.step(END + k * step, step) == OK
         rested, begin = instance.values(), END + 80 * step
         held = []
@@ -135,7 +135,7 @@ def test_a_retreating_wall_releases_and_recaptures_a_pressed_body(fmus):
             found = instance.values()
             held.append(found["stop.contact"])
     assert rested["stop.contact"]
-    assert not held[0]  # the wall accelerates by 4 v / T = 40 m/s2
+    assert not held[0]  # The wall accelerates by 4 v / T = 40 m/s2, faster than the shuttle can.
     assert held[-1]
     assert found["stop.impact_count"] > rested["stop.impact_count"]
     assert found["shuttle.vx"] == pytest.approx(speed, rel=1e-9)  # Tolerance of the integration.
@@ -218,7 +218,7 @@ def test_two_builds_of_one_model_in_one_process_keep_their_own_content(fmus, mec
 
 
 @pytest.mark.slow
-def test_hundreds_of_consecutive_instances(fmus):
+def test_hundreds_of_consecutive_instances_do_not_crash(fmus):
     """The wrapper library releases one reference too many per instance; the slave adds one."""
     script = f"""
 import sys

@@ -10,7 +10,7 @@ from fmu_host import DISCARD, OK, Instance
 from support import around_first_impact, case, each_shipped
 
 STEP = 2.5e-3
-BEFORE = STEP * np.arange(17)  # The first impact is at 0.041 s, within the next step.
+BEFORE = STEP * np.arange(17)  # The last time is 0.04 s; the first impact is at 0.041 s.
 AFTER = STEP * np.arange(16, 64)  # Six more impacts follow until 0.1575 s.
 
 pytestmark = pytest.mark.fmu

@@ -17,7 +17,10 @@ pytestmark = pytest.mark.native
 ROUND_OFF_RTOL = {
     "PRBDM": 1e-11, "PRBDM2RAxial": 1e-5, "FoldedSuspension": 5e-5, TWO_STOPS: 1e-5,
 }  # fmt: skip
-"""After 14 impacts; with stiff modes (two); after 63 impacts; for others 1e-8."""
+"""Effect of round-off on the values of a mechanism; 1e-8 for all others.
+
+Round-off grows through 14 impacts (PRBDM), 63 impacts (two stops) or by stiff modes (the others).
+"""
 INTERFACES = ((2, "cs"), (3, "cs"), (3, "events"), (2, "me"), (3, "me"))
 END = 0.3  # s; the guides bounce until 0.243 s in the default run, then they rest.
 POINTS = 1e-3 * np.arange(round(END / 1e-3) + 1)
@@ -126,7 +129,10 @@ def test_a_runge_kutta_importer_converges_at_fourth_order_across_impacts():
 @pytest.mark.parametrize("how", ["save", "serialize"])
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 def test_a_restored_state_continues_bit_for_bit(fmi, kind, how):
-    """Bouncing and at rest; in the same instance or, from bytes, in another one."""
+    """The state is saved at the start, in flight and at rest.
+
+    It is restored in the same instance or, from its bytes, in another one.
+    """
     points = 2e-3 * np.arange(141)
     job = Job(native("PRBDM", fmi), kind, points)
     whole = run(job).output
@@ -146,7 +152,7 @@ def test_the_library_can_be_unloaded_and_loaded_again(fmi):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_inputs_and_tunable_parameters_have_the_effect_they_have_in_the_engine(fmi):
+def test_inputs_and_tunable_parameters_have_the_same_effect_as_in_the_engine(fmi):
     points = 2.0 + 0.01 * np.arange(21)
     start = {"release.displacement": -0.01, "stop.position": 2e-3, "force.x": 0.05}
     changes = {

@@ -54,7 +54,7 @@ def by_fmpy() -> list[list[float]]:
 
 
 def by_libcosim() -> list[list[float]]:
-    """Return the same with libcosim's fixed-step algorithm."""
+    """Return the variables READ of both mechanisms after each step, with libcosim as master."""
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
     from libcosimpy.CosimObserver import CosimObserver

@@ -1,4 +1,4 @@
-"""FMUs of mechanisms with parts that the shipped ones lack, such as walls on moving bodies."""
+"""FMUs of mechanisms with parts that no shipped mechanism has, such as walls on moving bodies."""
 
 import io
 import json

@@ -98,7 +98,7 @@ def test_reference_results_equal_the_python_engine(native):
     simulation.advance(0.1)
     for name, x in simulation.outputs().items():
         if name in rows[0]:
-            # Printed with nine digits; the communication points before affect round-off only.
+            # The file has nine digits; other communication points change round-off only.
             assert float(rows[100][name]) == pytest.approx(float(x), rel=1e-7, abs=1e-9)
 
 
@@ -229,7 +229,7 @@ def test_dependencies_cover_every_output_and_derivative(model, mechanisms):
     assert f"{it.force}.x" not in found[f"{it.body}.vx"]
 
 
-def test_the_source_is_one_file_of_one_version(mechanisms):
+def test_the_source_is_one_file_with_the_functions_of_one_version_of_fmi(mechanisms):
     for fmi, other in ((2, 3), (3, 2)):
         text = amalgamation("X", "*/ title", fmi)
         included = set(re.findall(r'#\s*include\s+"([^"]+)"', text))

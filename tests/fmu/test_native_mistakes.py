@@ -124,7 +124,7 @@ def test_a_step_beyond_the_stop_time_is_rejected(native, fmi, kind):
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_round_off_in_the_sum_of_steps_may_exceed_the_stop_time(native, fmi):
-    """The sum of 1e5 steps is 2e-12 s late, 2e-7 of a step."""
+    """A step may end a thousandth of its length after the stop time, here half of that."""
     with Instance(native["PRBDM", fmi], "cs").initialize(stop=0.1) as instance:
         instance.advance(0.1 - 1e-6)
         late = 0.1 - 1e-6 + 1e-10
@@ -182,7 +182,7 @@ CHATTER = {
 
 @pytest.mark.parametrize(("fmi", "kind"), [(2, "cs"), (3, "cs"), (3, "late")])
 def test_a_failed_step_leaves_the_state_unchanged(native, fmi, kind):
-    """Thousands of impacts in a short time fail; the remedy in the message works."""
+    """The step fails because of thousands of impacts; the remedy in its message works."""
     rows = []
     for tried in (True, False):
         with Instance(native["PRBDM", fmi], kind).initialize(values=CHATTER) as instance:
@@ -251,7 +251,7 @@ def test_states_must_be_finite_and_are_set_in_continuous_time_mode(native, fmi):
 
 @versions
 def test_a_singular_shape_is_discarded_with_a_remedy(native, fmi):
-    """The shape is a flat parallelogram; the integrator can repeat the step with a shorter one."""
+    """The shape is a flat parallelogram; an importer's solver can retry with a shorter step."""
     with Instance(native["PRBDM", fmi], "me").initialize() as instance:
         integrator, here = Integrator(instance), instance.bytes()
         x = integrator.x()
@@ -606,7 +606,7 @@ def test_required_intermediate_variables_must_exist(native):
 
 
 def test_an_fmu_with_clocks_requires_event_mode():
-    """As the standard requires; clocks can be read in Event Mode and cannot be set."""
+    """The standard requires it; clocks can be read in Event Mode only and cannot be set."""
     path = clocked("PRBDM")
     (message,) = instantiated(path, "cs")
     assert "instantiate it with eventModeUsed = true" in message
@@ -744,9 +744,9 @@ def python(script: str, *arguments: object) -> subprocess.CompletedProcess[str]:
 
 @interfaces
 def test_the_process_survives_thousands_of_invalid_calls(native, fmi, kind):
-    """Ten thousand calls over all interfaces, of every function in random order and every state.
+    """All interfaces together make ten thousand calls, of every function and in every state.
 
-    Arguments are NULL pointers and invalid references, lengths and numbers.
+    The order is random.  Arguments are NULL pointers and invalid references, lengths and numbers.
     """
     done = python(SURVIVAL, native["PRBDM2R", fmi], kind, 10_000 // len(INTERFACES))
     assert done.returncode == 0, done.stderr[-2000:]

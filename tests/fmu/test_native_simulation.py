@@ -32,7 +32,7 @@ from support import (
 
 END = 0.3  # s; the guides bounce until 0.243 s in the default run, then they rest.
 COMPARISONS = 30  # Times at which all values are compared.
-IMPACTS = 14  # Of the guides in the default run.
+IMPACTS = 14  # Impacts of each guide in the default run.
 interfaces = pytest.mark.parametrize(("fmi", "kind"), INTERFACES)
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]
@@ -45,7 +45,7 @@ def points(step: float, end: float = END) -> np.ndarray:
 
 
 def uneven(end: float) -> np.ndarray:
-    """Return communication points with steps over three decades, including those compared."""
+    """Return communication points with steps over three decades, and all compared times."""
     rng = np.random.default_rng(0)
     inner = end / END * np.cumsum(10 ** rng.uniform(-4.5, -1.8, 400))
     return np.unique(np.concatenate([[0.0], inner[inner < end], points(end / COMPARISONS, end)]))
@@ -230,9 +230,9 @@ def test_the_default_experiment_in_fmpy_conserves_energy(native, model, fmi):
 def test_model_exchange_with_cvode_equals_co_simulation(native, model, fmi):
     """At a relative tolerance of 1e-9, positions agree and the impacts are the same.
 
-    Positions of the guides agree within 1e-6 of the release.  The last bounces are slow (1 mm/s),
-    so an error of 1e-9 m in position is an error of 1e-6 s in time.  FMPy limits CVode to 500 steps
-    per communication step; communication steps are therefore small.
+    Positions of the guides agree within 1e-6 of the displacement at release.  The last bounces are
+    slow (1 mm/s), so an error of 1e-9 m in position is an error of 1e-6 s in time.  FMPy limits
+    CVode to 500 steps per communication step; communication steps are therefore small.
     """
     it = case(model)
     options = {"stop_time": it.end, "output_interval": it.end / 300, "record_events": False}
@@ -247,7 +247,7 @@ def test_model_exchange_with_cvode_equals_co_simulation(native, model, fmi):
     for name in it.outputs("angle"):
         assert worst(found, expected, name) < 1e-6, name  # rad
     for name in it.outputs("vx"):
-        assert worst(found, expected, name) < 5e-6, name  # m/s, of 0.5; from the times of impacts.
+        assert worst(found, expected, name) < 5e-6, name  # m/s; impact times differ.
     for name in it.at_stops("impact_time"):
         assert worst(found, expected, name) < 5e-6, name  # s
     for name in it.at_stops("impact_count"):
@@ -264,9 +264,9 @@ def test_model_exchange_with_cvode_equals_co_simulation(native, model, fmi):
 def test_model_exchange_with_fmpys_default_settings_equals_co_simulation(native, model, fmi):
     """Positions agree within 1e-7 m at the tolerance of the default experiment, 1e-8.
 
-    The release is 18 mm.  The guides come to rest; other mechanisms are simulated for a few
-    impacts, which amplify errors.  Mechanisms with fast modes are left out, because they need more
-    than the 500 steps of CVode that FMPy allows per communication step.
+    The displacement at release is 18 mm.  The guides come to rest; other mechanisms are simulated
+    for a few impacts, which amplify errors.  Mechanisms with fast modes are left out, because they
+    need more than the 500 steps of CVode that FMPy allows per communication step.
     """
     it, path = case(model), str(native[model, fmi])
     span = {} if model in GUIDES else {"stop_time": it.end, "output_interval": it.end / 300}
@@ -301,7 +301,7 @@ def test_model_exchange_with_cvode_records_values_before_and_after_each_impact(n
 
 
 @pytest.mark.parametrize(("model", "h"), [("PRBDM", 2e-5), ("PRBDM2R", 4e-6)])
-def test_model_exchange_with_eulers_steps_converges_to_co_simulation(native, model, h):
+def test_model_exchange_with_euler_steps_converges_to_co_simulation(native, model, h):
     """The order is 1 before the first impact, which is detected up to a step late."""
     outputs = {"output": ["shuttle.x", "stop.impact_count", "stop.impact_time"]}
     expected = simulate_fmu(str(native[model, 2]), stop_time=0.05, output_interval=1e-3, **outputs)
@@ -314,7 +314,7 @@ def test_model_exchange_with_eulers_steps_converges_to_co_simulation(native, mod
         stride = round(1e-3 / step)
         x = found["shuttle.x"][::stride]
         errors.append(np.abs(x[:41] - expected["shuttle.x"][:41]).max())
-        assert np.abs(x - expected["shuttle.x"]).max() < 5e-5  # m, of 18 mm.
+        assert np.abs(x - expected["shuttle.x"]).max() < 5e-5  # m; the motion covers 18 mm.
         assert found["stop.impact_count"][-1] == expected["stop.impact_count"][-1] == 1
         late = found["stop.impact_time"][-1] - expected["stop.impact_time"][-1]
         assert abs(late) < 2 * step
@@ -421,18 +421,18 @@ def test_the_release_by_a_retreating_wall_is_an_event(native):
             instance.advance(END)
             rested, held, begin = instance.values(), [], END + 0.08
             assert rested["stop.contact"]
-            for k in range(80):  # until the long step is forgotten
+            for k in range(80):  # Afterwards the longest of the recent steps is 1 ms.
                 instance.advance(END + (k + 1) * 1e-3)
             for k in range(40):
                 instance.change({"stop.displacement": 2e-5 * k, "stop.velocity": 0.02})
                 instance.advance(begin + (k + 1) * 1e-3)
                 held.append(instance.values()["stop.contact"])
             found[kind] = instance.values()
-        assert not held[0]  # its acceleration is 4 v / T = 40 m/s2
+        assert not held[0]  # The wall accelerates by 4 v / T = 40 m/s2 or jumps.
         assert held[-1]
-        assert found[kind]["shuttle.vx"] == pytest.approx(0.02, rel=1e-9)  # Moves with the wall.
+        assert found[kind]["shuttle.vx"] == pytest.approx(0.02, rel=1e-9)  # At the wall's velocity.
     assert found["cs"]["stop.impact_count"] > IMPACTS
-    for kind in ("events", "late"):  # There, a velocity that is set in event mode is a jump.
+    for kind in ("events", "late"):  # The wall starts with a jump of its velocity.
         assert found[kind]["shuttle.x"] == pytest.approx(found["cs"]["shuttle.x"], abs=1e-9)
 
 
@@ -462,14 +462,14 @@ def watched(native, required, **options):
 
 
 def test_intermediate_updates_give_the_motion_within_a_step(native):
-    """Updates come at increasing times with the values then, and do not change the result."""
+    """Updates come at increasing times, have the values at these times, and change no result."""
     instance, seen = watched(native, ["shuttle.x", "time"])
     with instance.initialize():
         instance.fmu.doStep(0.0, END)
         last = instance.values()
     times = np.array([time for time, *_ in seen])
     assert len(times) > 30
-    assert (np.diff(times) >= 0.0).all()  # Equal at an event.
+    assert (np.diff(times) >= 0.0).all()  # Two updates at an event have the same time.
     assert times[-1] == END
     with Instance(native["PRBDM", 3]).initialize() as plain:
         for time, may_set, may_get, finished, may_return, (x, t) in seen:
@@ -546,7 +546,7 @@ def in_flight_and_at_rest() -> list:
 @pytest.mark.parametrize(("model", "share"), in_flight_and_at_rest())
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_directional_derivatives_equal_finite_differences(native, model, fmi, share):
-    """The unknowns are all outputs and derivatives, the direction is random; in flight, at rest."""
+    """The unknowns are all outputs and derivatives; the direction is random."""
     rng, it = np.random.default_rng(fmi), case(model)
     time = share * it.end
     rubbing = {"friction.coefficient": 0.1, "friction.normal_force": 0.2}
@@ -564,7 +564,7 @@ def test_directional_derivatives_equal_finite_differences(native, model, fmi, sh
         integrator = Integrator(instance)
         x, u = integrator.x(), np.array(instance.get(*inputs))
         dx, du = rng.standard_normal(len(x)), rng.standard_normal(len(u))
-        du[[name.endswith(".mobility") for name in inputs]] = 0.0  # Mobilities are not negative.
+        du[[name.endswith(".mobility") for name in inputs]] = 0.0  # Mobilities stay positive.
         dx[2 * ((len(x) - 2) // 2) :] = 0.0  # Dissipated energy and work have no effect.
 
         def at(step: float) -> np.ndarray:
@@ -626,7 +626,7 @@ def test_declared_dependencies_are_complete(native, model, fmi):
 
 @cache
 def driven(model: str) -> tuple[dict, list[dict]]:
-    """Return the declared variables and the engine's values, with changes of inputs on the way."""
+    """Return the declared variables and the engine's values in a run with changes of inputs."""
     it = case(model)
     listed = {v.name: v for v in described(it.mechanism, {}, 3).variables}
     sim = Simulation(it.mechanism, it.starts(), start_time=2.0, tolerance=1e-9)
@@ -775,7 +775,7 @@ def test_values_are_within_their_declared_bounds_through_a_run(native, model, fm
 
 @each_shipped
 def test_the_clock_ticks_at_impacts_only(model):
-    """It ticks once per impact, in a separate super-dense instant, and not for a capture."""
+    """The clock ticks once per impact, in a super-dense instant of its own, not for a capture."""
     ticked, events, it = [], 0, case(model)
     with Instance(clocked(model), "events").initialize() as instance:
         while instance.time < it.end:
@@ -885,7 +885,7 @@ def test_instances_in_threads_do_not_disturb_each_other(native, fmi, kind):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_hundreds_of_consecutive_and_simultaneous_instances(native, fmi):
+def test_hundreds_of_consecutive_and_simultaneous_instances_run(native, fmi):
     """A hundred instances load and unload the library; then two hundred exist together."""
     for k in range(100):
         kind = "cs" if k % 2 else "me"

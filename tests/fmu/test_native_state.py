@@ -12,7 +12,7 @@ from native_host import DISCARD, ERROR, INTERFACES, OK, Instance, Integrator, st
 from support import around_first_impact, case, each_shipped
 
 STEP = 2.5e-3
-TIMES = STEP * np.arange(1, 49)  # Until 0.12 s, with four impacts; the first is at 0.041 s.
+TIMES = STEP * np.arange(1, 49)  # up to 0.12 s; four impacts, the first at 0.041 s
 BEFORE, AFTER = TIMES[:16], TIMES[16:]
 EVERY = (*INTERFACES, (3, "late"))
 interfaces = pytest.mark.parametrize(("fmi", "kind"), EVERY)
@@ -37,7 +37,10 @@ def enter_event_mode(instance: Instance) -> None:
 @interfaces
 @each_shipped
 def test_a_restored_state_gives_identical_results(native, model, fmi, kind):
-    """States before the first and after some impacts; also after a motion with other inputs."""
+    """The states are before the first impact and after several.
+
+    Each is restored twice, the second time after a motion with other inputs.
+    """
     it, (before, after) = case(model), spans(model)
     twice = ((before, after), (np.concatenate([before, after[:20]]), after[20:]))
     substep = it.substep(2e-4)
@@ -83,7 +86,7 @@ def test_a_state_deserialized_in_another_instance_gives_identical_results(native
         other.time = before[-1]
         assert other.run(after) == expected
         assert other.values()[name] == mass
-    with Instance(native[model, fmi], kind, substep=substep) as fresh:  # Not initialized.
+    with Instance(native[model, fmi], kind, substep=substep) as fresh:  # not initialized
         fresh.restore(data)
         fresh.time = before[-1]
         assert fresh.run(after) == expected
@@ -350,7 +353,7 @@ def test_a_reset_instance_equals_a_new_one(native, model, fmi, kind):
 
 
 @interfaces
-def test_reset_from_every_state_of_the_state_machine(native, fmi, kind):
+def test_a_reset_works_in_every_state_of_the_state_machine(native, fmi, kind):
     with Instance(native["PRBDM", fmi], kind) as instance:
         initial = instance.saved()
         places = [lambda: None, instance.enter, lambda: instance.enter().begin(),

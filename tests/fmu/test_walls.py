@@ -37,7 +37,7 @@ def points(end, longest=2e-2):
 
 
 class Guide(PythonInstance):
-    """A Python FMU with the calls of the native ones."""
+    """An instance of a Python FMU with the methods of a native instance."""
 
     time = 0.0
 

@@ -39,7 +39,10 @@ def first_impact(name, **values):
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 @pytest.mark.parametrize("name", GUIDES)
 def test_an_impact_with_a_mobile_wall_is_an_impact_of_two_masses(name, restitution):
-    """P (W + w) = (1 + eps) u; energy lost (1 - eps^2) u^2 / 2 / (W + w); u+ = -eps u-."""
+    """The impulse is P = (1 + eps) u/(W + w), the energy lost (1 - eps^2) u^2/2/(W + w).
+
+    u is the closing speed, W the mobility of the hit point and w that of the wall.
+    """
     if name == "ImpactOscillator" and restitution == 0.0:
         pytest.skip("the hammer is captured: there is no impact")
     simulation, impact = first_impact(name, mobility=WALL, restitution=restitution)
@@ -84,7 +87,7 @@ def test_energy_is_balanced_with_a_mobile_wall(name):
 
 @pytest.mark.parametrize("name", ["PRBDM", "PRBDM2R"])
 def test_an_impulse_is_the_limit_of_a_short_force(name):
-    """The velocities after it are the limit of those after shorter and shorter forces."""
+    """The velocities after shorter and shorter forces converge to those after the impulse."""
     given = {"stop.position": 1.0, "release.displacement": -5e-3}
     impulse = {"force.impulse.x": 2e-3, "force.impulse.y": 1e-3, "force.impulse.moment": 1e-4}
     struck = Simulation(mechanism(name), given)
@@ -122,7 +125,7 @@ STUCK = {"friction.coefficient": 0.5, "friction.normal_force": 20.0, "stop.posit
     "kind", [Simulation, pytest.param(KernelSimulation, marks=pytest.mark.native)]
 )
 def test_sticking_friction_does_not_resist_an_impulse(name, kind):
-    """The velocity after the impulse is the impulse times the mobility; friction then slows it."""
+    """The velocity after the impulse is impulse times mobility; friction acts afterwards only."""
     simulation = kind(mechanism(name), STUCK)
     simulation.advance(0.01)
     before = simulation.outputs()

@@ -24,7 +24,7 @@ RUBBING = {
 
 
 def fixed(t):
-    """Return displacement [m] and velocity [m/s] of a wall at a time."""
+    """Return displacement [m] and velocity [m/s] of a fixed wall."""
     return 0.0, 0.0
 
 
@@ -40,8 +40,8 @@ def test_each_kind_of_event_has_one_guard_and_one_reset():
     assert [row.kind for row in TRANSITIONS] == list(EventKind)
 
 
-def test_of_events_at_one_time_contacts_change_their_modes_before_an_impact(monkeypatch):
-    """The kinds are in the order of release, slip, reversal, impact, whatever was found first."""
+def test_contact_modes_change_before_an_impact_at_the_same_time(monkeypatch):
+    """The earliest event is first; at one time the order is release, slip, reversal, impact."""
     found = dict.fromkeys(EventKind, 1.0) | {EventKind.SLIP: 0.5}
     rows = [
         replace(row, watched=lambda looks: (0,), detect=lambda *_, kind=row.kind: found[kind])

@@ -16,7 +16,7 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Friction, Release, Stop
 from support import ScalarGuide, energy_balance, mechanism, simulation
 
-QUIET = {"gravity.x": 0.0, "damping.beta": 0.0}
+WEIGHTLESS_UNDAMPED = {"gravity.x": 0.0, "damping.beta": 0.0}
 
 
 def guide(values):
@@ -29,7 +29,7 @@ def guide(values):
 def test_coulomb_friction_reduces_the_amplitude_linearly():
     """A linear oscillator loses 2 mu N/k of its amplitude in each half period."""
     mu_N, x0 = 2e-3, -1e-3
-    values = QUIET | {
+    values = WEIGHTLESS_UNDAMPED | {
         "release.displacement": x0, "stop.position": 0.01,
         "friction.coefficient": 1.0, "friction.normal_force": mu_N,
     }  # fmt: skip
@@ -47,7 +47,7 @@ def test_coulomb_friction_reduces_the_amplitude_linearly():
 
 def test_friction_sticks_where_it_exceeds_the_spring_force():
     """The motion ends with |k x| <= mu N; the remaining energy is elastic."""
-    values = QUIET | {
+    values = WEIGHTLESS_UNDAMPED | {
         "release.displacement": -1e-3, "stop.position": 0.01,
         "friction.coefficient": 0.5, "friction.normal_force": 0.02,
     }  # fmt: skip
@@ -89,7 +89,7 @@ def test_sliding_reverses_when_residual_speed_is_below_time_resolution():
 
 def test_a_sticking_shuttle_slides_when_the_force_exceeds_friction():
     """Up to mu N the shuttle sticks.  Beyond, the force minus mu N accelerates it."""
-    values = QUIET | {
+    values = WEIGHTLESS_UNDAMPED | {
         "release.displacement": 0.0, "stop.position": 0.02,
         "friction.coefficient": 1.0, "friction.normal_force": 0.5,
     }  # fmt: skip
@@ -105,7 +105,7 @@ def test_a_sticking_shuttle_slides_when_the_force_exceeds_friction():
 
 def test_normal_force_grows_towards_the_neutral_position():
     """N = max(0, N0 + k y): there is no friction where y < -N0/k, far from the neutral position."""
-    values = QUIET | {
+    values = WEIGHTLESS_UNDAMPED | {
         "release.displacement": -0.01, "stop.position": 0.05,
         "friction.coefficient": 1.0, "friction.normal_force": 0.01,
         "friction.normal_stiffness": 1e3,
@@ -164,7 +164,7 @@ def test_friction_at_the_stop_does_not_gain_energy(model, restitution):
 
 
 def test_a_sliding_contact_remains_closed():
-    """With friction at a stop that is away from the straight shape."""
+    """The stop has friction, and is away from the straight shape."""
     values = {"stop.position": -0.01, "stop.friction": 0.2, "release.displacement": -0.0101}
     sim = simulation("PRBDM2R", values)
     sim.advance(0.5)
@@ -178,7 +178,11 @@ def test_a_sliding_contact_remains_closed():
 
 def test_a_moving_wall_hits_a_shuttle_at_rest_by_newtons_law():
     """In the frame of the wall: v+ = (1 + eps) w; the work of the wall is P w."""
-    values = QUIET | {"release.displacement": 0.0, "stop.position": 1e-4, "stop.restitution": 0.5}
+    values = WEIGHTLESS_UNDAMPED | {
+        "release.displacement": 0.0,
+        "stop.position": 1e-4,
+        "stop.restitution": 0.5,
+    }
     sim = simulation("PRBDM", values)
     sim.set({"stop.velocity": -0.1})
     t = 0.0
@@ -221,7 +225,10 @@ def test_a_shuttle_at_rest_follows_a_slowly_accelerated_wall(model):
 
 
 def test_a_wall_that_starts_with_a_velocity_moves_the_body_at_rest_on_it():
-    """It accelerates within two steps, faster than gravity: no impact, then a short flight."""
+    """The wall reaches its velocity within two steps: the body is pushed without an impact.
+
+    The wall decelerates faster than gravity at the end, so that the body flies for a short time.
+    """
     sim = simulation("PRBDM", {"damping.beta": 0.0})
     for k in range(100):
         sim.advance(0.3 + (k + 1) * 1e-3)
@@ -257,9 +264,9 @@ def test_a_contact_opens_when_its_force_is_zero():
 
 
 def test_base_acceleration_acts_like_opposite_gravity():
-    """Its work is part of energy.work, that of gravity is potential energy."""
+    """The work of the base acceleration is part of energy.work, that of gravity is potential."""
     values = {"release.displacement": 0.0, "stop.position": 0.05}
-    # Damping and error scales depend on gravity, not on the base acceleration: small tolerance.
+    # Damping and error scales depend on gravity only; a small tolerance hides the difference.
     falls = simulation("PRBDM", values | {"gravity.x": 9.81}, tolerance=1e-12)
     shaken = simulation("PRBDM", values | {"gravity.x": 0.0}, tolerance=1e-12)
     shaken.set({"base.acceleration.x": -9.81})
@@ -273,7 +280,7 @@ def test_base_acceleration_acts_like_opposite_gravity():
 
 def test_impulse_of_the_base_force_equals_the_change_of_momentum():
     """Integral of (base force - loads) = - change of momentum, without impacts."""
-    values = QUIET | {"stop.position": 0.05, "release.displacement": -0.01}
+    values = WEIGHTLESS_UNDAMPED | {"stop.position": 0.05, "release.displacement": -0.01}
     sim = simulation("PRBDM2R", values, tolerance=1e-11)
     n, times = sim.system.n, np.linspace(0, 0.01, 2001)
 
@@ -355,7 +362,7 @@ def test_a_rejected_change_does_not_change_any_value():
 
 def test_endless_chatter_is_an_error():
     """Endless elastic bounces of half a microsecond under a huge force."""
-    values = QUIET | {
+    values = WEIGHTLESS_UNDAMPED | {
         "release.displacement": -1e-8, "stop.restitution": 1.0, "stop.rest_speed": 0.0,
         "force.x": 17000.0,
     }  # fmt: skip
@@ -378,7 +385,8 @@ def test_a_release_at_the_wall_starts_in_rest():
 
 def test_a_release_at_the_wall_with_a_velocity_starts_with_an_impact():
     sim = Simulation(
-        mechanism("PRBDM"), {"release.displacement": 0.0, "release.velocity": 0.3} | QUIET
+        mechanism("PRBDM"),
+        {"release.displacement": 0.0, "release.velocity": 0.3} | WEIGHTLESS_UNDAMPED,
     )
     out = sim.outputs()
     assert out["stop.impact_count"] == 1
@@ -476,7 +484,7 @@ def linkage(**parts):
 
 
 def test_a_linkage_without_springs_keeps_its_energy_and_angular_momentum():
-    """Angular momentum about the pin, up to the first impact; the energy balance also after it."""
+    """The angular momentum about the pin is constant up to the first impact, the energy always."""
     sim = Simulation(linkage(stops=(Stop("stop", "body", (0.1, 0.0), 90.0, 0.02),)))
     assert sim.frequency == 0.0
     before = sim.outputs()["energy.kinetic"]
@@ -501,7 +509,7 @@ def test_a_linkage_without_springs_keeps_its_energy_and_angular_momentum():
 
 @pytest.mark.parametrize("ends", [("clamp", "pin"), ("pin", "clamp")])
 def test_a_linkage_without_springs_has_the_frequency_zero(ends):
-    """Exactly zero, not 1e-6 Hz by rounding."""
+    """The frequency is exactly zero, not 1e-6 Hz of round-off."""
     parts = linkage()
     flexure = Flexure("bar1", "bar", "ground.pin", "body.pin", ends)
     sim = Simulation(dataclasses.replace(parts, flexures=(flexure,)))
@@ -522,7 +530,7 @@ def test_a_release_velocity_that_the_loops_forbid_is_rejected():
 
 
 def test_gap_rows_are_recomputed_for_a_new_offset_but_not_after_an_impact():
-    """They then equal those of a simulation that starts with the offset."""
+    """The recomputed rows equal those of a simulation that starts with the offset."""
     sim = simulation("PRBDM2R")
     rows = sim.system.gap_rows
     sim.advance(0.05)

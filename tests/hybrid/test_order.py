@@ -1,4 +1,4 @@
-"""Orders of convergence: of the pair with fixed steps, of the adaptive one with its tolerance."""
+"""Orders of convergence of the integrator: in a fixed step, and in the tolerance."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from prbm.hybrid.simulation import Simulation
 from support import mechanism
 
 SMOOTH = {"stop.position": 0.05}
-DENSE_ORDER = 5  # of the interpolant
+DENSE_ORDER = 5  # Order of the interpolant.
 
 
 def path(model, values, span, **options):
@@ -44,12 +44,13 @@ CASES = {
     "case", [c if c.startswith("1R") else pytest.param(c, marks=pytest.mark.slow) for c in CASES]
 )
 def test_observed_order_is_that_of_the_dense_output(case):
-    """Least-squares slope over three halvings, errors over a span of time and some releases.
+    """The slope of the error over the step length, in logarithms, is about six.
 
-    The states are read within steps, where the error of a step is of order six; at the ends of
-    steps it is of order seven.  At a single time the error depends on where within a step that time
-    and the impact fall.  The three halvings fill the range between steps that are too long for the
-    motion and rounding: the error falls by a factor of 2e5.
+    The states are read within steps, where the error is of order six; at the ends of steps it is
+    of order seven.  The error is averaged over a span of time and several releases: at a single
+    time it depends on the positions of that time and of the impact within their steps.  Over the
+    three halvings the error falls by a factor of 2e5.  Longer steps do not resolve the motion, and
+    the error of shorter steps is round-off.
     """
     model, values, span, longest, releases = CASES[case]
     steps = longest / 2.0 ** np.arange(4)
@@ -79,8 +80,8 @@ def orbit_error(h, theta):
 
 
 @pytest.mark.parametrize(("theta", "order"), [(1.0, PAIR.order), (0.3, DENSE_ORDER)])
-def test_error_of_a_step_on_a_kepler_orbit(theta, order):
-    """It is h^8 at the end of the step and h^6 within."""
+def test_error_of_a_step_on_a_kepler_orbit_has_the_claimed_order(theta, order):
+    """The error is proportional to h^8 at the end of the step, and to h^6 within it."""
     steps = 0.2 / 2.0 ** np.arange(3)
     errors = [orbit_error(h, theta) for h in steps]
     slope = np.polyfit(np.log(steps), np.log(errors), 1)[0]
@@ -88,7 +89,7 @@ def test_error_of_a_step_on_a_kepler_orbit(theta, order):
 
 
 def test_error_is_roughly_proportional_to_the_tolerance():
-    """For tolerances from 1e-6 to 1e-10, over a span with an impact."""
+    """The tolerances are from 1e-6 to 1e-10; the span of time includes an impact."""
     span = (0.045, 0.06)
     exact = path("PRBDM2R", {}, span, tolerance=1e-13)
     tolerances = 10.0 ** -np.arange(6, 11)
@@ -139,7 +140,11 @@ def elementary(a, tree):
 
 @pytest.mark.parametrize("order", range(1, 8))
 def test_order_conditions_hold_for_every_rooted_tree(order):
-    """B . Phi(t) = 1/gamma(t) [Hairer II.2]; 1, 1, 2, 4, 9, 20, 48 trees."""
+    """The weights b satisfy b . Phi(t) = 1/gamma(t) for each tree t [Hairer II.2].
+
+    Phi are the elementary weights, gamma is the density.  Orders 1 to 7 have 1, 1, 2, 4, 9, 20 and
+    48 trees.
+    """
     found = trees(order)
     assert len(found) == [1, 1, 2, 4, 9, 20, 48][order - 1]
     for tree in found:
@@ -150,15 +155,15 @@ def test_order_conditions_hold_for_every_rooted_tree(order):
 @pytest.mark.parametrize("order", range(1, DENSE_ORDER + 1))
 @pytest.mark.parametrize("theta", [0.2, 0.5, 0.9])
 def test_dense_output_is_of_fifth_order(order, theta):
-    """Weights b(theta) . Phi(t) = theta^order / gamma(t) up to order five, for every theta."""
+    """The weights satisfy b(theta) . Phi(t) = theta^order/gamma(t) for trees t to order five."""
     b = PAIR.dense @ theta ** np.arange(1, PAIR.dense.shape[1] + 1)
     for tree in trees(order):
         weight = float(b @ elementary(PAIR.a, tree))
         assert weight == pytest.approx(theta**order / density(tree), abs=1e-13)
 
 
-def test_dense_output_violates_the_conditions_of_order_six_least():
-    """Of all interpolants with order five and a continuous derivative on these stages."""
+def test_dense_output_has_the_smallest_defects_of_order_six():
+    """The other interpolants use the same stages, have order five and a continuous slope."""
     a, powers = PAIR.a, np.arange(1, PAIR.dense.shape[1] + 1)
     shape = PAIR.dense.shape
     equations = []
@@ -188,7 +193,7 @@ def test_dense_output_violates_the_conditions_of_order_six_least():
 
 
 def test_embedded_solution_has_order_five():
-    """It satisfies the conditions up to order five, not those of order six."""
+    """The embedded weights satisfy the conditions up to order five, but not those of order six."""
     embedded = PAIR.weights - PAIR.error
     for order in range(1, PAIR.error_order + 1):
         for tree in trees(order):

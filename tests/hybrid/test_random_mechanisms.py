@@ -1,4 +1,4 @@
-"""Laws of all mechanisms, checked on random ones: trees, loops, all flexure models and ends.
+"""Laws of mechanisms, checked on random trees and loops of all flexure models and ends.
 
 The expected values are computed from positions and their differences only.  They are compared with
 the rows, matrices and convective terms of the engine.
@@ -34,8 +34,8 @@ from random_mechanisms import inputs, mechanisms, seeded
 from support import energy_balance
 
 SEEDS = st.integers(0, 10**6)
-STEP = np.cbrt(np.finfo(float).eps)  # Of central first differences, with an error of STEP^2.
-SECOND_STEP = np.finfo(float).eps ** 0.25  # Of second differences.
+STEP = np.cbrt(np.finfo(float).eps)  # Step of central first differences; the error is STEP^2.
+SECOND_STEP = np.finfo(float).eps ** 0.25  # Step of second differences.
 
 
 def laws(count, *, shrink=True):
@@ -78,8 +78,8 @@ def body_point(system, body, drawn, q):
     return centre + np.exp(1j * q[frame.j]) * (drawn - frame.drawn)
 
 
-def seen(system, stop, q):
-    """Return the displacement of a contact point along u and to its left, relative to the wall."""
+def relative_displacement(system, stop, q):
+    """Return the displacement of a hit point from its wall: along u, and i times to the left."""
     u = unit(stop.direction)
     drawn = complex(*stop.point) + value(stop, "offset", system.values) * 1j * u
     hit = body_point(system, stop.body, drawn, q)
@@ -91,13 +91,13 @@ def seen(system, stop, q):
 def gaps(system, q):
     """Return the gaps of all stops."""
     return np.array(
-        [value(s, "position", system.values) - seen(system, s, q).real
+        [value(s, "position", system.values) - relative_displacement(system, s, q).real
          for s in system.mechanism.stops]
     )  # fmt: skip
 
 
 def slides(system, q):
-    return np.array([seen(system, s, q).imag for s in system.mechanism.stops])
+    return np.array([relative_displacement(system, s, q).imag for s in system.mechanism.stops])
 
 
 def rubs(system, q):
@@ -124,7 +124,7 @@ def second(f, q, v):
     return (f(q + h * v) - 2 * f(q) + f(q - h * v)) / h**2
 
 
-def somewhere(system, seed):
+def random_state(system, seed):
     """Return random coordinates away from the straight shape, and rates."""
     rng = np.random.default_rng(seed)
     size = np.where(system.arm == np.arange(system.n), 0.3, 0.05)
@@ -137,9 +137,12 @@ def somewhere(system, seed):
 @given(mechanisms(), SEEDS)
 @laws(40)
 def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, seed):
-    """M = Re(T^H m T) + J with T = dz/dq; quadratic terms Re(T^H m z'') at constant rates."""
+    """M = Re(T^H m T) + J, T = dz/dq, and the quadratic terms are Re(T^H m z'') at constant rates.
+
+    z are the positions of the mass points m, J the moments of inertia.
+    """
     system = assemble(mechanism, mechanism.values())
-    q, v = somewhere(system, seed)
+    q, v = random_state(system, seed)
     T = first(lambda q: masses(system, q), q)
     e, w = system.directions(q), system.turning(v)
     M, C = inertia(system.H, np.diag(system.J), e)
@@ -159,7 +162,7 @@ def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
     Walls may be on bodies.
     """
     system = assemble(mechanism, mechanism.values())
-    q, v = somewhere(system, seed)
+    q, v = random_state(system, seed)
     e = system.directions(q)
     places = np.array([value(s, "position", system.values) for s in mechanism.stops])
     scalars = [
@@ -186,7 +189,10 @@ def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
 @given(mechanisms(), SEEDS)
 @laws(30)
 def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing(mechanism, seed):
-    """Loops are closed, and gaps equal the stops' positions; the mass is at most the total."""
+    """Loops are closed, gaps equal the stops' positions, centres of mass are those of the file.
+
+    The moving mass is at most the mass of all bodies and flexures.
+    """
     system = assemble(mechanism, mechanism.values())
     np.testing.assert_allclose(closures(system, system.q0), 0.0, atol=1e-15)
     places = [value(s, "position", system.values) for s in mechanism.stops]
@@ -198,7 +204,7 @@ def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing
 
 
 def leaf_mass(mechanism):
-    """Return the mass of all flexures; the moving mass is less for lumped or clamped ones."""
+    """Return the mass of all flexures; the moving part is smaller if lumped or next to a clamp."""
     total = 0.0
     for flexure in mechanism.flexures:
         kind = next(k for k in mechanism.flexure_types if k.name == flexure.type)
@@ -211,7 +217,7 @@ def leaf_mass(mechanism):
 
 
 def potential(sim, q):
-    """Return springs, gravity, base acceleration and inputs as one potential energy [J]."""
+    """Return the potential energy of springs, gravity, base acceleration and inputs [J]."""
     system, given = sim.system, sim.inputs
     V = 0.5 * (q - system.q0) @ system.K @ (q - system.q0)
     field = system.gravity - given.base
@@ -226,10 +232,14 @@ def potential(sim, q):
 @given(mechanisms(starting=True, damping=False, friction=False), SEEDS, st.booleans())
 @laws(30)
 def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
-    """T^H m (T a + z''|_a=0) + J a = -dV/dq + rows^T lam, rows a + (second derivative) = 0."""
+    """T^H m z'' + J a = -dV/dq + R^T lam, and the constraints with rows R have no acceleration.
+
+    z are the positions of the mass points m, T = dz/dq, J the moments of inertia, V is the
+    potential energy.
+    """
     sim = Simulation(mechanism, inputs(mechanism, seed))
     system = sim.system
-    q, v = somewhere(system, seed)
+    q, v = random_state(system, seed)
     holds = [held and i == 0 for i in range(len(mechanism.stops))]
     contacts = ContactState.holding(np.flatnonzero(holds), len(holds), 0)
     a, lam, _, _ = Equations(system, sim.inputs, contacts, sim.omega).evaluate(sim.time, q, v)
@@ -284,10 +294,10 @@ FEATURE_SEEDS = range(10)  # Seeds whose mechanisms together have all features.
 @given(mechanisms(starting=True, damping=False), SEEDS)
 @laws(15, shrink=False)
 def test_energy_is_balanced_and_loops_remain_closed(mechanism, seed):
-    keeps_energy(mechanism, seed)
+    check_energy(mechanism, seed)
 
 
-def keeps_energy(mechanism, seed):
+def check_energy(mechanism, seed):
     """Check that T + V + dissipated - work is constant, through impacts, rest and friction.
 
     Without friction and with restitution 1, nothing is dissipated either.
@@ -321,10 +331,10 @@ def momentum(sim):
 @given(mechanisms(starting=True), SEEDS)
 @laws(15, shrink=False)
 def test_base_reactions_equal_loads_minus_the_rate_of_momentum(mechanism, seed):
-    balances_momentum(mechanism, seed)
+    check_momentum(mechanism, seed)
 
 
-def balances_momentum(mechanism, seed):
+def check_momentum(mechanism, seed):
     """Check base reaction = weight + inputs - d/dt momentum, linear and angular."""
     given = inputs(mechanism, seed)
     sim = Simulation(mechanism, given, tolerance=1e-10)
@@ -338,7 +348,7 @@ def balances_momentum(mechanism, seed):
             if time == t:
                 out, y = sim.outputs(), sim.state()
         if any(state != states[0] for state in states):
-            continue  # There is an event between the times of the difference.
+            continue  # An event between the three times makes the difference invalid.
         z = masses(system, y[: system.n]) - system.anchor
         weight = system.m * (system.gravity - sim.inputs.base)
         force, moment = weight.sum(), (z.conj() * weight).imag.sum()
@@ -361,10 +371,10 @@ def balances_momentum(mechanism, seed):
 @given(mechanisms(starting=True), SEEDS)
 @laws(25, shrink=False)
 def test_impacts_satisfy_the_balance_of_momentum_and_do_not_gain_energy(mechanism, seed):
-    has_lawful_impacts(mechanism, seed)
+    check_impacts(mechanism, seed)
 
 
-def has_lawful_impacts(mechanism, seed):
+def check_impacts(mechanism, seed):
     """Check M (v+ - v-) = G^T P + T^T P_t + loops^T Lambda, P >= 0; energy is not gained.
 
     For one stop without friction: u+ = -eps u-, and -P (u- + u+)/2 is lost.
@@ -391,7 +401,7 @@ def has_lawful_impacts(mechanism, seed):
         kinetic = [0.5 * v @ M @ v for v in (impact.before, impact.after)]
         assert impact.impulse >= 0.0
         assert u[0] < 0.0
-        parts = np.abs(G[i]) @ np.abs(impact.before)  # Differences have eight digits of it.
+        parts = np.abs(G[i]) @ np.abs(impact.before)  # G is a difference: its error is 1e-8.
         assert u[1] >= -1e-7 * abs(u[0]) - 1e-8 * parts
         assert kinetic[1] <= kinetic[0] * (1 + 1e-9)
         assert impact.latched.approach_speed == pytest.approx(-u[0], rel=1e-7, abs=1e-8 * parts)
@@ -407,13 +417,13 @@ def has_lawful_impacts(mechanism, seed):
 @pytest.mark.parametrize("seed", range(300))
 def test_the_laws_hold_for_300_random_mechanisms(seed):
     quiet = seeded(seed, damping=False)
-    keeps_energy(quiet, seed)
-    balances_momentum(seeded(seed), seed)
-    has_lawful_impacts(seeded(seed), seed)
+    check_energy(quiet, seed)
+    check_momentum(seeded(seed), seed)
+    check_impacts(seeded(seed), seed)
 
 
 def test_the_random_mechanisms_have_all_features():
-    """Impacts at walls on the ground and on bodies, alone and with friction, rest, and loops."""
+    """Loops, stretch, rest, friction, and impacts at walls on the ground and on bodies."""
     seen_kinds = set()
     for seed in FEATURE_SEEDS:
         mechanism = seeded(seed)
@@ -459,7 +469,7 @@ def free_pair(friction):
 @pytest.mark.parametrize("friction", [0.0, 0.2, 5.0])
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 def test_an_eccentric_impact_of_two_free_bodies_conserves_momentum(friction, restitution):
-    """Linear and angular momentum; the mass of the threads is 1e-9 of that of the bodies.
+    """The mass of the threads is 1e-9 of that of the bodies, so that their momentum is negligible.
 
     Without friction, the impulse is (1 + eps) closing speed / W with
     W = sum of 1/m + (arm x n)^2/J.

@@ -11,9 +11,9 @@ from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.contact_state import ContactMode
 from support import energy_balance, mechanism, simulation
 
-AT_REST = {"release.displacement": 0.0}  # On the wall, pressed by the weight.
+AT_REST = {"release.displacement": 0.0}  # The weight presses the body on the wall.
 TWINS = {"engine": Simulation, "kernel": KernelSimulation}
-IMPACTS = 14  # Of the guides in their default experiment.
+IMPACTS = 14  # Impacts of each guide in its default experiment.
 WALL = ("stop.displacement", "stop.velocity")
 
 
@@ -95,8 +95,8 @@ def obeys_coulomb(settled: Simulation) -> bool:
     return right
 
 
-def test_friction_in_two_places_obeys_coulombs_law_in_both():
-    """A stop that would have to pull opens at once."""
+def test_friction_at_stop_and_friction_point_obeys_coulombs_law():
+    """A stop that would have to pull opens in the first step."""
     rng, found = np.random.default_rng(0), 0
     for k in range(150):
         values = frictions(rng)
@@ -120,7 +120,7 @@ def test_friction_in_two_places_obeys_coulombs_law_in_both():
                                   ("PRBDM2R", 200, 0.0)],
 )  # fmt: skip
 def test_energy_is_balanced_on_a_shaken_base_with_friction_at_two_points(model, rate, offset):
-    """Sticking and slipping at the stop and at the friction point, without chatter."""
+    """Stop and friction point stick and slip, without chatter."""
     values = {
         "friction.coefficient": 0.3, "friction.normal_force": 0.5, "stop.friction": 1.0,
         "stop.offset": offset, "stop.restitution": 0.0,
@@ -198,7 +198,7 @@ def test_a_wall_reaches_its_input_despite_events(native, impulse):
 
 
 @events
-@pytest.mark.parametrize("order", ["set, update", "set, update, throw, update", "update, set",
+@pytest.mark.parametrize("order", ["set, update", "set, update, impulse, update", "update, set",
                                    "update, set, update"])  # fmt: skip
 def test_inputs_set_at_an_event_do_not_accelerate_the_wall_in_the_rest_of_the_step(native, order):
     """To reach 0.01 mm in the remaining 1 us after the impact, the wall would need 10 m/s."""
@@ -207,7 +207,7 @@ def test_inputs_set_at_an_event_do_not_accelerate_the_wall_in_the_rest_of_the_st
     with Instance(native["PRBDM", 3], "events").initialize() as instance:
         doing = {
             "set": lambda: instance.set({"stop.displacement": -1e-5}),
-            "throw": lambda: instance.set({"force.impulse.y": 1e-12}),
+            "impulse": lambda: instance.set({"force.impulse.y": 1e-12}),
         }
         *_, time = instance.fmu.doStep(0.0, hit + 1e-6)
         assert time == pytest.approx(hit, abs=1e-12)

@@ -11,7 +11,7 @@ from prbm.hybrid.simulation import Simulation
 from support import ScalarGuide, energy_balance, mechanism, simulation
 
 
-def watched(guide, values=None, time=0.3, step=1e-3):
+def checked_run(guide, values=None, time=0.3, step=1e-3):
     """Run a simulation; check energy balance, gaps and stop forces at every output."""
     sim = Simulation(guide, values)
     sim.record = []
@@ -32,9 +32,9 @@ def watched(guide, values=None, time=0.3, step=1e-3):
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 @pytest.mark.parametrize("position", [0.0, -0.006])
 def test_converging_bounces_on_two_stops_end_in_rest(model, position):
-    """The sum of the forces of both stops is then nearly constant."""
+    """At rest the sum of the forces of both stops is nearly constant."""
     guide = two_stops(model, high={"position": position}, low={"position": position})
-    sim, out = watched(guide, time=0.45)
+    sim, out = checked_run(guide, time=0.45)
     assert out["high.contact"] or out["low.contact"]
     carried = out["high.force"] + out["low.force"]
     sim.advance(0.5)
@@ -73,7 +73,7 @@ def test_energy_lost_at_each_of_two_stops_follows_from_its_impulse(model):
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 @pytest.mark.parametrize("lever", [0.01, 0.03])
 def test_a_closed_stop_takes_part_in_an_impact_at_another_stop(friction, lever):
-    """It receives an impulse P >= 0 or opens; its moving wall does the work of that impulse.
+    """The closed stop receives an impulse P >= 0 or opens; its moving wall does the work of P.
 
     With a short lever the closed stop opens, with a long one it receives an impulse.
     """
@@ -125,7 +125,7 @@ def test_a_closed_stop_takes_part_in_an_impact_at_another_stop(friction, lever):
 @pytest.mark.parametrize("rest_speed", [0.0, 1e-5])
 @pytest.mark.parametrize(("position", "offset"), [(0.0, 0.0), (-0.004, 0.003), (0.005, -0.002)])
 def test_converging_bounces_of_the_2r_guide_end_in_rest(rest_speed, position, offset):
-    """For walls at several positions, without an error."""
+    """The wall is on either side of the straight shape, and the rest speed is tiny or zero."""
     values = {
         "stop.rest_speed": rest_speed, "stop.position": position, "stop.offset": offset,
         "damping.beta": 2e-5,
@@ -144,7 +144,7 @@ def test_a_wall_that_pushes_a_body_with_friction_does_its_work():
         sim = simulation("PRBDM", values)
         sim.advance(0.6)
         lost = sim.outputs()["energy.dissipated"]
-        for k in range(1000):  # Up to 20 mm/s; each change of the speed is below rest_speed.
+        for k in range(1000):  # The speed reaches 20 mm/s in changes below rest_speed.
             speed = min(0.02, k * 5e-4)
             here = sim.inputs.walls[0].motion(sim.time)[0]
             sim.set({"stop.displacement": here, "stop.velocity": -speed})
@@ -241,7 +241,7 @@ def test_impulse_of_base_reactions_includes_that_of_the_inputs():
 
 
 def test_rounding_errors_cause_no_impact_in_an_equilibrium_with_contact():
-    """Without gravity and motion."""
+    """There is neither gravity nor motion."""
     sim = simulation("PRBDM2R", {"gravity.x": 0.0, "release.displacement": 0.0})
     sim.advance(0.2)
     assert sim.outputs()["stop.impact_count"] == 0
@@ -286,7 +286,7 @@ def test_inputs_that_are_not_real_numbers_are_rejected(bad):
     assert sim.given["force.x"] == 0.0
 
 
-def test_an_absurd_force_is_an_error():
+def test_a_force_of_1e300_newtons_is_an_error():
     sim = simulation("PRBDM")
     sim.set({"force.x": 1e300})
     with np.errstate(all="ignore"), pytest.raises(RuntimeError, match="step size fell below"):

@@ -47,8 +47,8 @@ def test_a_wall_that_pushes_where_friction_locks_is_rejected():
         kernel().stronge(W, u, 1.0, 0.5, 0.0, np.zeros(1), np.zeros(1))
 
 
-def test_equal_stops_hit_at_once_share_the_impulse_of_one():
-    """Forty equal stops share the impulse evenly."""
+def test_stops_at_one_place_share_the_impulse_of_a_single_stop_evenly():
+    """Each of forty stops receives a fortieth of the impulse."""
     k = 40
     W, u, eps = np.ones((k, k)) / 2.0, np.full(k, -3.0), np.full(k, 0.5)
     np.testing.assert_allclose(contact.newton(W, u, eps), 9.0 / k, rtol=1e-12)
@@ -97,8 +97,10 @@ def rod():
     return replace(guide, name="Rod", stops=(replace(stop, point=point),)), values
 
 
-THROW = {"force.impulse.y": 0.01}
-JAMS = r"no forces satisfy the laws of contact and friction at t = 0 s \(stop\): friction jams"
+SIDEWAYS_IMPULSE = {"force.impulse.y": 0.01}
+JAM_MESSAGE = (
+    r"no forces satisfy the laws of contact and friction at t = 0 s \(stop\): friction jams"
+)
 
 
 @pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
@@ -106,8 +108,8 @@ def test_friction_that_jams_is_rejected(engine):
     sim = engine(*rod())
     before = sim.outputs()
     assert before["stop.force"] > 0.5
-    sim.set(THROW)
-    with pytest.raises((SimulationError, KernelMistake), match=JAMS):
+    sim.set(SIDEWAYS_IMPULSE)
+    with pytest.raises((SimulationError, KernelMistake), match=JAM_MESSAGE):
         sim.advance(1e-3)
     assert sim.outputs()["stop.force"] == pytest.approx(before["stop.force"], rel=1e-12)
     sim.set({"force.impulse.y": 0.0})
@@ -132,13 +134,13 @@ def test_friction_that_jams_is_logged_by_fmus_which_work_after_a_reset(rods, fmi
     _, values = rod()
     with Instance(rods[fmi], kind).initialize(values=values) as instance:
         if kind == "cs":
-            assert instance.set(THROW) == OK
+            assert instance.set(SIDEWAYS_IMPULSE) == OK
             assert instance.step(0.0, 1e-3) == DISCARD
         else:
             with pytest.raises(FMICallException) as caught:
-                instance.change(THROW)
+                instance.change(SIDEWAYS_IMPULSE)
             assert caught.value.status in (DISCARD, ERROR)
-        assert any(re.search(JAMS, text) for text in instance.messages)
+        assert any(re.search(JAM_MESSAGE, text) for text in instance.messages)
         instance.reset()
         instance.initialize(values=values).advance(2e-3)
         assert instance.values()["stop.contact"]
@@ -237,7 +239,7 @@ def test_eigenvalues_without_convergence_are_rejected():
 
 
 def test_a_guard_that_cannot_be_evaluated_is_an_error():
-    """A force of zero instead of the error would be taken for a release."""
+    """If the guard returned zero instead of an error, the engine would locate a release."""
     rubs = {"release.displacement": 0.0, "stop.friction": 0.5}
     sim = KernelSimulation(mechanism("PRBDM2R"), rubs, changes=(SINGULAR,))
     before = sim.outputs()

@@ -97,7 +97,7 @@ def test_a_wall_follows_a_uniform_motion_exactly(twin, kind):
 
 
 def errors(sim, kind: str, *, velocities: bool) -> float:
-    """Return the largest position error of the wall over a h^2, after the first steps."""
+    """Return the largest position error of the wall divided by a h^2, after the first steps."""
     points, worst = grid(kind, 0.6), 0.0
     longest = max(b - a for a, b in itertools.pairwise(points))
     assert longest <= WALL_LONGEST_RTOL * 0.22
@@ -113,7 +113,7 @@ def errors(sim, kind: str, *, velocities: bool) -> float:
 @pytest.mark.parametrize("velocities", [True, False])
 @pytest.mark.parametrize("kind", [*GRIDS, "20 ms"])
 def test_position_error_of_a_wall_is_bounded_by_acceleration_and_step(twin, kind, velocities):
-    """It is below 2 a h^2, or 3 a h^2 at these random steps without velocities."""
+    """The error is below 2 a h^2, or 3 a h^2 at these random steps without velocities."""
     sim = TWINS[twin](mechanism("PRBDM"), AWAY)
     bound = 2.0 if velocities or kind != "random" else 3.0
     assert errors(sim, kind, velocities=velocities) < bound
@@ -175,7 +175,7 @@ def test_the_motion_of_a_wall_in_short_steps_is_not_extrapolated_over_a_long_ste
 
 @both
 def test_the_force_of_a_closed_stop_includes_the_acceleration_of_its_wall(twin):
-    """It is the weight plus acceleration over mobility; a fast retreat opens the stop."""
+    """The force is weight plus acceleration over mobility; a fast retreat opens the stop."""
     sim = TWINS[twin](mechanism("PRBDM"), PRESSED)
     sim.advance(1e-3)
     weight, mobility = (sim.outputs()[f"stop.{name}"] for name in ("force", "point.mobility"))
@@ -243,7 +243,7 @@ def test_a_wall_moves_exactly_as_the_partner_that_receives_its_impulses(twin, h)
 
 @both
 def test_an_impact_changes_the_velocity_of_the_reference_with_that_of_the_wall(twin):
-    """Mobility times impulse is added to both; the wall keeps the velocity until new inputs."""
+    """Mobility times impulse is added to both; the wall keeps this velocity until new inputs."""
     values = {"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 1e-3,
               "stop.mobility": 5.0, "stop.velocity": -0.1, "stop.restitution": 1.0}  # fmt: skip
     sim = TWINS[twin](mechanism("PRBDM"), values)

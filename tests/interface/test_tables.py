@@ -307,13 +307,13 @@ def test_tables_contain_every_field_of_the_mechanism(mechanism, written):
 
 
 def test_start_values_are_those_of_the_variables(mechanism):
-    """Start values of parameters and inputs are written."""
+    """The start values of a parameter and an input are changed and found in the tables."""
     changes = {"solver.tolerance": 1e-5, "base.acceleration.y": 2.5}
     native = described(mechanism, changes, 2)
     written = tables(mechanism, native.variables, TOKEN, native.independent)
     for name, start in changes.items():
         at = written.index(name.encode() + b"\0") + len(name) + 1
-        at += 5 if name == "solver.tolerance" else 0  # Its unit, an empty text.
+        at += 5 if name == "solver.tolerance" else 0  # Skip the unit, an empty text.
         assert struct.unpack_from("<d", written, at) == (start,)
 
 
@@ -355,7 +355,7 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
     ],
 )
 def test_tables_of_an_invalid_mechanism_are_rejected(name, places, number, message):
-    """One number after the name of a part is replaced, at an offset of so many numbers."""
+    """The number at index ``places`` after the name of a part is replaced."""
     guide = elastic()
     written = bytearray(tables(guide, (), TOKEN, independent(guide)))
     at = written.index(struct.pack("<I", len(name)) + name.encode() + b"\0") + 5 + len(name)

@@ -80,7 +80,7 @@ def without_ziglang(monkeypatch) -> None:
 def test_a_second_export_takes_the_library_from_the_cache(cache, monkeypatch):
     messages: list[str] = []
     first = libraries([HOST], messages.append)
-    monkeypatch.setattr(compiler, "_loaded", {})  # As in a new process.
+    monkeypatch.setattr(compiler, "_loaded", {})  # The memory of a new process is empty.
     monkeypatch.setattr(compiler, "compiled", lambda *_: pytest.fail("compiled again"))
     assert libraries([HOST], messages.append) == first
     assert messages == [f"compiling the kernel for {this_platform().name} with cc"]
@@ -177,7 +177,7 @@ def test_libraries_are_compiled_without_a_cache_if_it_cannot_be_written(cache, m
     made = libraries([HOST], messages.append)
     assert only(made)
     assert messages[1].startswith(f"cannot write to {cache}: ")
-    assert libraries([HOST], messages.append) == made  # From the memory of this process.
+    assert libraries([HOST], messages.append) == made  # kept in the process
     assert len(messages) == 2
 
 
@@ -191,7 +191,7 @@ def planted(cache: Path, folder: Path, monkeypatch) -> Path:
     (folder / entry.name).write_bytes(valid)
     (folder / entry.name).chmod(0o644)
     monkeypatch.setattr(compiler, "_loaded", {})
-    assert only(libraries([HOST])) == content  # It is valid as long as it is private.
+    assert only(libraries([HOST])) == content  # A private entry is valid.
     monkeypatch.setattr(compiler, "_loaded", {})
     return folder / entry.name
 
@@ -247,8 +247,8 @@ def test_without_a_private_folder_the_library_is_compiled_and_not_stored(cache, 
     assert entries(own) == []
 
 
-def test_an_own_cache_that_others_could_write_is_restricted(cache, monkeypatch):
-    """The mode of a folder made with the umask 002; the compiler's files in it are rebuilt."""
+def test_a_cache_folder_that_others_could_write_is_made_private(cache, monkeypatch):
+    """The folder gets the mode 0700, and the compiler's files in it are removed."""
     cache.mkdir(parents=True)
     (cache / "zig").mkdir()
     (cache / "zig" / "planted.o").write_bytes(b"")
@@ -341,7 +341,7 @@ def test_error_on_an_unsupported_machine_names_the_option_for_all_platforms(cach
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads ELF with nm")
 def test_the_library_exports_only_functions_of_fmi_and_needs_only_libc(tmp_path):
-    """The kernel, not the stub.  Other exported names could clash with other libraries."""
+    """The library is that of the kernel; other exported names could clash with other libraries."""
     library = tmp_path / "prbm.so"
     library.write_bytes(only(libraries([HOST])))
     named = subprocess.run(

@@ -25,7 +25,7 @@ FRICTION = {
 
 @each_shipped
 def test_the_loops_determine_the_dependent_coordinates_at_every_shape(model):
-    """The conditioning of their columns of the Jacobian is above 1/30, up to the release."""
+    """Their columns of the Jacobian have a conditioning above 1/30, up to the release shape."""
     guide = mechanism(model)
     system = assemble(guide, guide.values())
     chosen = independent(guide)
@@ -38,9 +38,11 @@ def test_the_loops_determine_the_dependent_coordinates_at_every_shape(model):
 
 
 def discrete_states():
-    """Yield models and states: closed stop (0, 1), sliding at the stop, friction (-1, 0, 1, 2).
+    """Yield models and discrete states (closed, slide, rub).
 
-    The 1R guide has one degree of freedom: its stop cannot be closed while friction sticks.
+    ``closed`` is 1 for a closed stop.  ``slide``, at the stop, and ``rub``, at the friction point,
+    are 0 for stick, 1 or -1 for slip and 2 for a frictionless contact.  The 1R guide has one degree
+    of freedom: its stop cannot be closed while friction sticks.
     """
     for rubs in (2, 0, 1, -1):
         for model in GUIDES:
@@ -105,7 +107,7 @@ def assert_directional(guide, parameters, inputs, discrete):
         put(kernel, 0.0, x, dict(zip(input_names(guide), given, strict=True)))
         found = kernel.directional(dx, du)
         error = np.full(len(found), np.inf)
-        for h in (2e-4, 6e-5, 2e-5):  # The smallest sum of truncation and rounding errors counts.
+        for h in (2e-4, 6e-5, 2e-5):  # The smallest of the three errors is compared.
             slope = (8 * (values(h) - values(-h)) - (values(2 * h) - values(-2 * h))) / (12 * h)
             scale = np.abs(slope) + 1e-4 * (1.0 + sizes)
             error = np.minimum(error, np.abs(found - slope) / scale)
@@ -146,7 +148,7 @@ BLOW = {
 def test_directional_derivatives_with_stretches_and_walls_on_bodies_equal_differences(
     side, slides, rubs
 ):
-    """A hammer and the stage that carries it: open, closed, sticking and sliding."""
+    """The stop between a hammer and its stage is open, frictionless, sticking or sliding."""
     holds = slides is not None
     if side and holds and slides == rubs == 0:
         pytest.skip("as many constraints as degrees of freedom")
@@ -157,7 +159,7 @@ def test_directional_derivatives_with_stretches_and_walls_on_bodies_equal_differ
 def test_directional_derivatives_of_a_mechanism_with_all_kinds_of_parts_equal_differences():
     guide = elastic()
     inputs = dict.fromkeys(input_names(guide), 0.1) | {"pull.moment": 1e-3, "push.moment": -1e-3}
-    inputs["tap.velocity"] = 0.04  # Not at the kink of the event indicator.
+    inputs["tap.velocity"] = 0.04  # Away from the kink of the event indicator.
     friction = {"rub.coefficient": 0.2, "dry.coefficient": 0.1, "dry.normal_force": 0.3}
     for discrete in ((0, 0, 0, 2, 2, 2, 1, 2), (1, 1, 1, 1, 2, -1, 0, -1)):
         assert_directional(guide, friction, inputs, discrete)
@@ -165,7 +167,7 @@ def test_directional_derivatives_of_a_mechanism_with_all_kinds_of_parts_equal_di
 
 @each_shipped
 def test_derivatives_equal_differences_of_co_simulation(model):
-    """Over a short time without events."""
+    """The differences are over a short time without events."""
     exchange = KernelSimulation(mechanism(model), {"release.velocity": 0.2}, exchange=True)
     moving = KernelSimulation(mechanism(model), {"release.velocity": 0.2}, tolerance=1e-12)
     names = [n.removeprefix("der(").removesuffix(")") for n in exchange.slots if "der(link" in n]
@@ -321,7 +323,7 @@ def test_a_body_at_rest_follows_the_smooth_motion_of_its_wall():
 
 
 def test_infinitely_many_bounces_end_in_rest_in_model_exchange():
-    """Without rest_speed; only bounces below 1e-10 of the size of the guide may be missing."""
+    """The rest speed is zero; only bounces below 1e-10 of the guide's size may be missing."""
     values = {"stop.rest_speed": 0.0, "release.displacement": -1e-3}
     kernel = KernelSimulation(mechanism("PRBDM"), values, exchange=True)
     for _, z in integrate(kernel, 0.08, h=1e-4):
@@ -339,7 +341,7 @@ def test_infinitely_many_bounces_end_in_rest_in_model_exchange():
     "model", [anvil(), two_stops("PRBDM"), two_stops("PRBDM2R")], ids=lambda guide: guide.name
 )
 def test_derivatives_after_an_event_with_impulses_are_those_of_the_state_after_it(model):
-    """A restored state knows of no evaluation before it."""
+    """The expected derivatives are those of a restored state, in which nothing is cached."""
     values = {name: 0.0 for name in ("release.displacement",) if name in model.values()}
     kernel = KernelSimulation(model, values, exchange=True)
     before = kernel.derivatives()

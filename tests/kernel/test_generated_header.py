@@ -23,11 +23,11 @@ WHOLE_FILES = {
 ALLOWED = {
     "core/assembly.c": {
         "0.21132486540518708": "1/2 - 1/(2 sqrt 3): points of a rod with its mass and moments",
-        "0.7886751345948129": "1/2 + 1/(2 sqrt 3): the other one",
+        "0.7886751345948129": "1/2 + 1/(2 sqrt 3): the second of these points",
     },
     "core/factors.c": {
         "1e-280": "smallest product of pivots that doubles hold with all digits, with a margin",
-        "1e280": "largest one",
+        "1e280": "largest product of pivots, with a margin",
     },
     "core/matrix.c": {"60": "sweeps of Jacobi's rotations, for which Python calls NumPy"},
     "core/memory.h": {"640": "length of a message"},
@@ -35,7 +35,7 @@ ALLOWED = {
     "core/reader.c": {"32": "bits of a word, and bytes by which a block may be rounded up"},
     "core/tables.c": {
         "32": "bytes of memory for a coordinate, bits of a word",
-        "38": "least bytes of a parameter",
+        "38": "smallest number of bytes of a parameter",
     },
     "fmi/fmu.h": {"31": "all bits of the categories"},
     "fmi/journal.c": {"2048": "length of a message"},
@@ -68,7 +68,7 @@ def sources():
 
 
 def numbers(text):
-    """Return the numbers of a C text that a formula does not explain."""
+    """Return the numbers in a C text, except plain coefficients and small integers."""
     floats = re.findall(r"(?<![\w.])(?:\d+\.\d*(?:[eE][+-]?\d+)?|\d+[eE][+-]?\d+)(?![\w.])", text)
     integers = re.findall(r"(?<![\w.+-])\d+(?![\w.])", re.sub(r"\d[eE][+-]\d+", "", text))
     return {x for x in floats if x not in PLAIN} | {x for x in integers if int(x) > PLAIN_INTEGER}
@@ -113,7 +113,7 @@ def literals(text):
 
 
 @pytest.mark.parametrize("file", ENGINE)
-def test_no_tolerance_is_typed_in_the_engine_but_among_the_tolerances(file):
+def test_the_engine_contains_no_literal_tolerance(file):
     found = literals((KERNEL.parent / file).read_text()) - ENGINE_PLAIN
     assert found <= ENGINE_ALLOWED.get(file, {}).keys() or file in ENGINE_DATA
 
@@ -123,7 +123,7 @@ def test_every_exception_of_the_engine_is_needed():
         assert allowed.keys() <= literals((KERNEL.parent / file).read_text())
 
 
-def test_a_tolerance_is_found_in_python_and_c():
+def test_the_checks_find_a_literal_tolerance_in_python_and_c():
     assert literals("x = 2.0 * y + 1e-7  # 0.3") - ENGINE_PLAIN == {1e-7}
     assert numbers("x = 2.0 * y + 1e-7 + 0.75;") == {"1e-7", "0.75"}
 

@@ -1,4 +1,4 @@
-"""Each C file includes what it needs; what others call is in the header of its own file."""
+"""Each C file includes the headers that it needs, and declares its functions in its own header."""
 
 import re
 import subprocess
@@ -11,14 +11,14 @@ from kernel_library import KERNEL
 
 UNIT = "prbm_fmu.c"
 ALONE = ("-DPRBM=", "-DSHARED=", "-Wmissing-prototypes", "-Wno-attributes")
-"""Functions that others may call are external: without a prototype in a header they fail."""
+"""Options that make functions for other files external; one without a prototype is an error."""
 FILES = [
     path.relative_to(KERNEL).as_posix() for path in sorted(KERNEL.rglob("*.c")) if path.name != UNIT
 ]
 
 
 def check(folder, file):
-    """Return the complaints of the compiler about a file by itself."""
+    """Return the messages of the compiler about a file that is compiled alone."""
     command = ["cc", "-std=c99", "-fsyntax-only", *ALONE, *WARNINGS, f"-I{folder}", *FOLDERS]
     return subprocess.run([*command, str(file)], capture_output=True, text=True).stderr
 

@@ -1,4 +1,4 @@
-"""Numeric functions of the kernel against multiple precision and NumPy; its working memory."""
+"""Numeric functions of the kernel, compared with multiple precision or NumPy; working memory."""
 
 import cmath
 import ctypes
@@ -130,7 +130,7 @@ def test_exponential_is_within_one_unit():
     assert largest_ulp_error(kernel().exponential, mpmath.exp, x) < 1.0
 
 
-def test_limits_of_logarithm_and_exponential():
+def test_limits_of_logarithm_and_exponential_are_exact():
     k = kernel()
     assert k.natural_log(1.0) == 0.0
     assert k.natural_log(0.0) == -math.inf
@@ -178,7 +178,7 @@ def test_finite_number_is_false_for_nan_and_infinity():
 
 
 @pytest.mark.parametrize("place", [0, 1, 2])
-def test_no_bound_holds_for_the_largest_entry_if_one_is_not_finite(place):
+def test_the_largest_entry_fails_every_upper_bound_if_an_entry_is_not_finite(place):
     x = np.array([3.0, -4.0, 2.0])
     assert kernel().largest(3, x) == 4.0
     for bad in (math.nan, math.inf, -math.inf):
@@ -187,7 +187,7 @@ def test_no_bound_holds_for_the_largest_entry_if_one_is_not_finite(place):
     assert kernel().largest(0, x) == 0.0
 
 
-def test_greater_and_lesser():
+def test_greater_and_lesser_return_maximum_and_minimum():
     k = kernel()
     assert (k.greater(1.0, 2.0), k.greater(2.0, 1.0)) == (2.0, 2.0)
     assert (k.lesser(1.0, 2.0), k.lesser(2.0, 1.0)) == (1.0, 1.0)
@@ -211,7 +211,7 @@ def factored(a):
 
 @pytest.mark.parametrize("n", range(1, 13))
 def test_residual_of_lu_is_a_rounding_error(n):
-    """Also for matrices with zeros on the diagonal, as those of a saddle point."""
+    """Some matrices have zeros on the diagonal, like those of a saddle point."""
     for _ in range(40):
         a, b = RNG.normal(size=(n, n)) * 10.0 ** RNG.uniform(-6, 6), RNG.normal(size=n)
         a[np.arange(n) >= (n + 1) // 2 + 1, -1] = 0.0
@@ -270,7 +270,7 @@ SHAPES = [(1, 1), (2, 2), (3, 5), (5, 3), (7, 2), (2, 7), (6, 6), (9, 8)]
 
 @pytest.mark.parametrize(("m", "n"), SHAPES)
 def test_least_squares_solution_of_least_norm_equals_that_of_numpy(m, n):
-    """For every rank, with right sides in the range or not."""
+    """The matrices have every rank; right sides are in their range or not."""
     for r in range(min(m, n) + 1):
         for _ in range(8):
             a, b, x = of_rank(m, n, r), RNG.normal(size=m), np.full(n, np.nan)
@@ -290,7 +290,7 @@ def test_singular_values_below_rcond_are_taken_as_zero():
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5, 8, 13])
 def test_eigenvalues_and_vectors_of_symmetric_matrices_equal_those_of_numpy(n):
-    """A z = w z, z orthonormal, w ascending; also for multiple and for graded eigenvalues."""
+    """A z = w z with orthonormal z and ascending w, also for multiple and graded eigenvalues w."""
     for kind in range(20):
         a = RNG.normal(size=(n, n))
         a = a + a.T
@@ -320,7 +320,7 @@ def test_null_space_is_an_orthonormal_basis(r, n):
         assert np.abs(rows @ z).max(initial=0.0) <= rounding(n, rows)
 
 
-def test_sums_and_products_of_vectors():
+def test_sums_and_products_of_vectors_equal_those_of_numpy():
     a, b = RNG.normal(size=5), np.full(5, np.nan)
     kernel().copy(4, a, b)
     np.testing.assert_array_equal(b[:4], a[:4])

@@ -8,9 +8,9 @@ from prbm.fmu.python_fmu import interface
 from prbm.hybrid.simulation import Simulation
 from random_mechanisms import inputs, seeded
 
-SPAN, COMPARISONS = 4e-3, 4  # s; impacts, rest and sticking occur within it.
+SPAN, COMPARISONS = 4e-3, 4  # Duration [s] and number of comparisons.
 SEEDS, SLOW_SEEDS = range(12), range(12, 120)
-DEVIATION_MAX = 1e-5  # Of a nominal; rounding errors grow, and impacts turn time into speed errors.
+DEVIATION_MAX = 1e-5  # Relative to the nominal value; impacts amplify rounding errors.
 COUNTED = ("impact_count", "contact")
 
 

@@ -52,7 +52,7 @@ SCENARIOS = {
     ),
     "pulled off": ({"stop.restitution": 0.2}, {80: {"force.x": -1.5}, 100: {"force.x": 0.0}}),
 }  # fmt: skip
-END_TIMES = {"thrown at the wall": 0.05}  # s; later the 2R guide amplifies 1e-12 to 1e-2.
+END_TIMES = {"thrown at the wall": 0.05}  # s; afterwards the 2R guide amplifies 1e-12 to 1e-2.
 
 
 def compared(guide, values, schedule, end=END, step=STEP):
@@ -128,7 +128,7 @@ HAMMERED = {
 
 @pytest.mark.parametrize("name", HAMMERED)
 def test_impacts_and_rest_between_bodies_in_the_kernel_equal_those_in_the_engine(name):
-    """Impacts on a body, rest on it and friction there, with flexures that stretch."""
+    """A hammer hits a moving stage, rests and slides on it; the flexures stretch."""
     values, schedule = HAMMERED[name]
     found = compared(anvil(), values, schedule, end=0.12)
     assert found["face.impact_count"] + found["face.contact"] > 0.0
@@ -150,7 +150,7 @@ def test_the_motion_of_the_pmma_guide_in_the_kernel_equals_that_in_the_engine():
 
 @each_shipped
 def test_impact_times_of_the_default_experiment_equal_those_of_the_engine(model):
-    """Every impact to 1e-7 s; the guides end in rest after 14 impacts."""
+    """The times agree to 1e-7 s; the guides end in rest after 14 impacts."""
     it, kernel = case(model), KernelSimulation(mechanism(model))
     for impact in record(model):
         kernel.advance(impact.time + 1e-6)
@@ -235,7 +235,7 @@ def test_endless_chatter_is_an_error():
 
 
 def test_a_time_that_is_too_large_to_resolve_a_step_is_an_error():
-    """Steps would otherwise not advance the time, without end."""
+    """Otherwise a step would not change the time, and the loop would not end."""
     kernel = KernelSimulation(mechanism("PRBDM"), start_time=1e18)
     with pytest.raises(KernelMistake, match="lost in the rounding of the time"):
         kernel.advance(1e18 + 256.0)
@@ -246,7 +246,7 @@ def test_a_time_that_is_too_large_to_resolve_a_step_is_an_error():
 
 @each_shipped
 def test_a_communication_step_may_be_left_at_each_internal_step(model):
-    """The motion is the same as without, also with a moving wall."""
+    """Steps with and without such returns give the same motion, also with a moving wall."""
     it = case(model)
     values, step = {f"{it.stop}.velocity": -0.05, f"{it.stop}.friction": 0.1}, it.end / 60
     whole, pieces = (KernelSimulation(mechanism(model), values) for _ in range(2))
@@ -279,7 +279,7 @@ def many_stops(count):
 
 @pytest.mark.parametrize("count", [12, 20])
 def test_many_resting_stops_carry_the_weight_together(count):
-    """With 12 stops, and with 20, whose sets are too many to try all."""
+    """Twenty stops have too many subsets to try them all."""
     guide = many_stops(count)
     kernel = KernelSimulation(guide, {"release.displacement": -2e-3})
     kernel.advance(0.2)

@@ -1,8 +1,8 @@
 """Functions of the C kernel and of the engine agree on random states and parameters.
 
-Each test names the functions that it compares.  At the end all functions that exist in both under
-one name are found; if one of them is not compared, a test fails.  It reports the pairs.  The
-tolerance is 1e-12 of the largest entry; a comment gives the reason for every other.
+Each test names the functions that it compares.  The last tests find all functions that exist in
+both under one name, print the pairs, and fail if a pair is not compared.  The tolerance is 1e-12 of
+the largest entry; a comment gives the reason for any other tolerance.
 """
 
 import ctypes
@@ -83,7 +83,7 @@ def assert_same(found, expected, rel=1e-12, scale=0.0):
     assert float(np.abs(found - expected).max(initial=0.0)) <= rel * size
 
 
-def sentence(error, function, *arguments):
+def message_of(error, function, *arguments):
     """Return the message of the error that a function raises."""
     with pytest.raises(error) as caught:
         function(*arguments)
@@ -99,7 +99,7 @@ def outcome(function, *arguments):
 
 
 def spread(condition):
-    """Return the relative tolerance of the solution of a system with a condition number."""
+    """Return the relative tolerance of a solution of equations with a condition number."""
     return max(1e-12, 50 * 2.2e-16 * condition)
 
 
@@ -189,8 +189,8 @@ def test_messages_about_invalid_parameters_are_the_same():
             assert kernel().check_parameter(parameter, p.value)
             bad = [p.minimum - abs(p.minimum) - 1.0, 2.0 * p.maximum + 1.0, math.nan, -math.inf]
             for x in bad:
-                said = sentence(KernelError, kernel().check_parameter, parameter, x)
-                assert said == sentence(ParameterError, p.check, x)
+                message = message_of(KernelError, kernel().check_parameter, parameter, x)
+                assert message == message_of(ParameterError, p.check, x)
 
 
 @twin(check_values=Mechanism.values)
@@ -213,9 +213,9 @@ def test_stubs_and_messages_about_too_long_links_are_the_same():
         for _ in range(50):
             gamma, found = rng.uniform(0.0, 2.0 / count, count), np.zeros(1)
             expected = outcome(flexure.stub, gamma.tolist())
-            said = outcome(kernel().stub, count, gamma, found)
+            message = outcome(kernel().stub, count, gamma, found)
             if isinstance(expected, str):
-                assert said == expected
+                assert message == expected
             else:
                 assert_same(found[0], expected, scale=1.0)
 
@@ -258,8 +258,10 @@ def test_segments_of_flexures_are_the_same(name, links, ends):
         assert stretching == [stiffness > 0.0 for stiffness in expected.axial]
     long, rest = np.full(pivots, 1.2), (1.0, 1.0, 1.0, 0.0)
     if pivots and ends != (flexure.PIN, flexure.PIN):
-        said = sentence(KernelError, kernel().segments, kind, long, long, *held, *rest, found)
-        assert said == sentence(ParameterError, flexure.segments, model, long, long, ends, *rest)
+        message = message_of(KernelError, kernel().segments, kind, long, long, *held, *rest, found)
+        assert message == message_of(
+            ParameterError, flexure.segments, model, long, long, ends, *rest
+        )
 
 
 # --- assembly.c ----------------------------------------------------------------------------------
@@ -325,11 +327,16 @@ def test_the_size_of_a_mechanism_with_all_centres_at_one_point_is_the_same():
     ],
 )
 def test_messages_about_failures_of_the_assembly_are_the_same(change):
-    """No length, no mass, too long links.  The kernel has no names of the ends of a flexure."""
+    """A length is tiny, a mass is zero, links are too long.
+
+    The message of the kernel does not name the ends of a flexure.
+    """
     guide, ours = both("Rich")
     values = guide.values() | change
-    said = sentence(ParameterError, assembly.assemble, guide, values)
-    assert sentence(KernelError, ours.assemble, values) == re.sub(" from .* to [^ ]*", "", said)
+    message = message_of(ParameterError, assembly.assemble, guide, values)
+    assert message_of(KernelError, ours.assemble, values) == re.sub(
+        " from .* to [^ ]*", "", message
+    )
 
 
 def refused(guide, count):
@@ -338,8 +345,8 @@ def refused(guide, count):
         patch.setattr(prbm.interface.tables, "check_size", lambda mechanism: None)
         patch.setattr(prbm.interface.tables, "slots", lambda mechanism, independent: {})
         ours = KernelSystem(guide, count)
-    said = sentence(MechanismError, assembly.assemble, guide, guide.values())
-    return said, sentence(KernelError, ours.assemble, guide.values())
+    message = message_of(MechanismError, assembly.assemble, guide, guide.values())
+    return message, message_of(KernelError, ours.assemble, guide.values())
 
 
 def test_messages_about_redundant_loops_are_the_same():
@@ -491,8 +498,8 @@ def test_saddle_point_systems_and_their_solutions_are_the_same():
 
 def test_messages_about_singular_equations_are_the_same():
     kkt = np.zeros((3, 3))
-    said = sentence(KernelError, kernel().solve, 3, kkt, np.ones(3))
-    assert said == sentence(SimulationError, constraints.solve, np.zeros((3, 3)), np.ones(3))
+    message = message_of(KernelError, kernel().solve, 3, kkt, np.ones(3))
+    assert message == message_of(SimulationError, constraints.solve, np.zeros((3, 3)), np.ones(3))
 
 
 def even(x):
@@ -606,14 +613,14 @@ def test_messages_about_loops_that_cannot_be_closed_are_the_same():
     for system, ours, _ in systems("PRBDM", 1):
         loops, c = system.loop_rows, system.loops_c + 1.0
         mine = KernelRows(ours, loops)
-        said = sentence(
+        message = message_of(
             KernelError, kernel().project_positions, ours.structure, mine.structure,
             system.q0.copy(), c, np.zeros(system.n, complex),
         )  # fmt: skip
-        expected = sentence(
+        expected = message_of(
             SimulationError, constraints.project_positions, system, loops, system.q0, c
         )
-        assert said.split("(")[0] == expected.split("(")[0]
+        assert message.split("(")[0] == expected.split("(")[0]
 
 
 @twin(
@@ -642,7 +649,7 @@ def test_forces_and_energies_are_the_same(name):
         kernel().generalised(n, w, e, Q)
         assert_same(Q, forces.generalised(w, e))
         found = kernel().gravitational_energy(ours.structure, e)
-        size = float(np.abs(system.S).sum() * abs(system.gravity))  # Of the terms of the sum.
+        size = float(np.abs(system.S).sum() * abs(system.gravity))  # Size of the summed terms.
         assert_same(found, forces.gravitational_energy(system, e), scale=size)
         for lift in (-1.0, 1.0):
             found = kernel().normal_force(lift, 2.0, 3.0)
@@ -676,7 +683,7 @@ def test_responses_are_the_same():
 @twin(newton=contact.newton)
 @pytest.mark.parametrize("k", [1, 2, 3, 4, 6])
 def test_frictionless_impacts_of_several_stops_are_the_same(k):
-    """For every rank; closing and resting stops, stops without impulse, and no solution."""
+    """W has every rank; stops close, rest or get no impulse; some problems have no solution."""
     rng, solved = np.random.default_rng(k), 0
     for _ in range(200):
         rank = int(rng.integers(1, k + 1))
@@ -689,8 +696,8 @@ def test_frictionless_impacts_of_several_stops_are_the_same(k):
         try:
             expected = contact.newton(W, u, eps)
         except SimulationError:
-            said = sentence(KernelError, kernel().newton, k, W, u, eps, 0.0, P)
-            assert said == contact.CLOSING_IN
+            message = message_of(KernelError, kernel().newton, k, W, u, eps, 0.0, P)
+            assert message == contact.CLOSING_IN
             continue
         kernel().newton(k, W, u, eps, 0.0, P)
         solved += 1
@@ -702,7 +709,7 @@ def test_frictionless_impacts_of_several_stops_are_the_same(k):
 
 
 def test_impulses_of_many_stops_satisfy_the_law_of_impact():
-    """Twenty-four stops at once."""
+    """Twenty-four stops are hit at once."""
     rng = np.random.default_rng(0)
     k = 24
     W = mobility(rng, k, 40)
@@ -721,7 +728,7 @@ def test_impulses_of_many_stops_satisfy_the_law_of_impact():
 )  # fmt: skip
 @pytest.mark.parametrize(("k", "m"), [(0, 2), (3, 0), (2, 3), (8, 8)])
 def test_forces_that_satisfy_the_laws_of_contact_are_the_same(k, m):
-    """For full rank; the limits of friction are fixed or proportional to a normal force."""
+    """W has full rank; the limits of friction are fixed or proportional to a normal force."""
     rng = np.random.default_rng(10 * k + m)
     for _ in range(50):
         W, u = mobility(rng, k + m, k + m + 2), rng.normal(size=k + m)
@@ -765,7 +772,7 @@ def test_both_find_that_a_complementarity_problem_has_no_solution():
 
 @twin(stronge=contact.stronge)
 def test_impacts_with_friction_are_the_same():
-    """Of rank two and one; sliding, sticking and jammed; also mu and eps at their bounds."""
+    """W has rank two or one; contacts slide, stick or jam; mu and eps may be at their bounds."""
     rng = np.random.default_rng(0)
     for _ in range(5000):
         W = mobility(rng, 2, int(rng.integers(1, 3)))
@@ -778,8 +785,8 @@ def test_impacts_with_friction_are_the_same():
         try:
             expected = contact.stronge(W, u, mu, eps)
         except SimulationError:  # For rank one, some random rates are impossible.
-            said = sentence(KernelError, kernel().stronge, W, u, mu, eps, 0.0, P_n, P_t)
-            assert said == contact.WEDGED
+            message = message_of(KernelError, kernel().stronge, W, u, mu, eps, 0.0, P_n, P_t)
+            assert message == contact.WEDGED
             continue
         kernel().stronge(W, u, mu, eps, 0.0, P_n, P_t)
         assert_same([P_n[0], P_t[0]], expected)
@@ -788,7 +795,7 @@ def test_impacts_with_friction_are_the_same():
 @twin(several=contact.several)
 @pytest.mark.parametrize("k", [2, 3])
 def test_simultaneous_impacts_with_friction_are_the_same(k):
-    """For full rank."""
+    """W has full rank."""
     rng = np.random.default_rng(k)
     for _ in range(100):
         W = mobility(rng, 2 * k, 2 * k + 2)
@@ -801,10 +808,10 @@ def test_simultaneous_impacts_with_friction_are_the_same(k):
 
 def test_messages_about_impacts_without_a_solution_are_the_same():
     W = np.array([[1.0, -1.9], [-1.9, 1.0]])
-    W = np.block([[np.eye(2), W], [W, np.eye(2)]])  # Invalid, as it is not semidefinite.
+    W = np.block([[np.eye(2), W], [W, np.eye(2)]])  # Invalid: W is not semidefinite.
     u, mu, eps, P = np.array([-1.0, -1.0, 1.0, 1.0]), np.full(2, 2.0), np.zeros(2), np.zeros(4)
-    said = sentence(KernelError, kernel().several, 2, W, u, mu, eps, 0.0, P)
-    assert said == sentence(SimulationError, contact.several, W, u, mu, eps)
+    message = message_of(KernelError, kernel().several, 2, W, u, mu, eps, 0.0, P)
+    assert message == message_of(SimulationError, contact.several, W, u, mu, eps)
 
 
 # --- statics.c, modal.c --------------------------------------------------------------------------
@@ -842,13 +849,13 @@ def stacked_release(system):
 @each_mechanism
 @pytest.mark.parametrize("displacement", [None, 0.0, -4e-3, 3e-3, -0.012])
 def test_equilibria_are_the_same(name, displacement):
-    """Free and held, found directly and by continuation."""
+    """The shapes are free or held; they are found directly or by continuation."""
     for system, ours, _ in systems(name):
         expected = statics.equilibrium(system, displacement)
         found, q, lam = equilibrium_of(system)
         held = displacement is not None
         kernel().equilibrium(ours.structure, held, displacement or 0.0, found)
-        size = np.abs(system.K).max() / system.length  # Of the forces in balance.
+        size = np.abs(system.K).max() / system.length  # Size of the balanced forces.
         assert_same(q, expected.q)
         assert_same(lam, expected.lam, scale=size)
         assert_same(found.force, expected.force, scale=size)
@@ -858,10 +865,10 @@ def test_equilibria_are_the_same(name, displacement):
 def test_messages_about_displacements_out_of_reach_are_the_same(displacement):
     for system, ours, _ in systems("PRBDM2R", 2):
         found, *_arrays = equilibrium_of(system)
-        said = sentence(
+        message = message_of(
             KernelError, kernel().equilibrium, ours.structure, True, displacement, found
         )
-        assert said == sentence(EquilibriumError, statics.equilibrium, system, displacement)
+        assert message == message_of(EquilibriumError, statics.equilibrium, system, displacement)
 
 
 def test_messages_about_buckling_under_gravity_are_the_same():
@@ -869,8 +876,8 @@ def test_messages_about_buckling_under_gravity_are_the_same():
     values = guide.values({"gravity.x": 1e6})
     ours.assemble(values)
     found, *_arrays = equilibrium_of(system := assembly.assemble(guide, values))
-    said = sentence(KernelError, kernel().equilibrium, ours.structure, False, 0.0, found)
-    assert said == sentence(EquilibriumError, statics.equilibrium, system)
+    message = message_of(KernelError, kernel().equilibrium, ours.structure, False, 0.0, found)
+    assert message == message_of(EquilibriumError, statics.equilibrium, system)
 
 
 @twin(release_velocity=statics.release_velocity)
@@ -887,8 +894,8 @@ def test_release_velocities_are_the_same(name, speed):
 def assert_same_modes(frequency, phi, expected, rounding):
     """Compare modes up to their signs.
 
-    The error of every omega^2 is a rounding of the largest, also with LAPACK.  The error of a mode
-    is that divided by the distance of its omega^2 from the nearest other.
+    The error of every omega^2 is the rounding error of the largest one, also with LAPACK.  The
+    error of a mode is this error divided by the distance of its omega^2 from the nearest other one.
     """
     omega2 = np.sign(expected.frequency) * expected.frequency**2
     size = np.abs(omega2).max()
@@ -921,7 +928,7 @@ def test_fundamental_frequencies_are_the_same(name):
         found = np.zeros(1)
         kernel().fundamental_frequency(ours.structure, found)
         expected = modal.modes(system, statics.equilibrium(system)).frequency
-        rounding = 1e-15 * (expected[-1] / expected[0]) ** 2  # Of the largest omega^2.
+        rounding = 1e-15 * (expected[-1] / expected[0]) ** 2  # Rounding of the largest omega^2.
         assert_same(found[0], modal.fundamental_frequency(system), max(1e-10, rounding))
 
 
@@ -1098,7 +1105,7 @@ def condition(evaluation):
 def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
     for theirs, mine, y, _ in equations(name):
         n, r = theirs.n, len(theirs.rows)
-        t = theirs.inputs.walls[0].since + 3e-4  # While the wall approaches its reference.
+        t = theirs.inputs.walls[0].since + 3e-4  # The wall has not reached its reference.
         a, lam = mine.evaluate(t, y[:n], y[n : 2 * n])
         evaluation = theirs.evaluate(t, y[:n], y[n : 2 * n])
         a_expected, lam_expected, M, _ = evaluation
@@ -1109,7 +1116,7 @@ def test_accelerations_and_rates_are_the_same_in_every_discrete_state(name):
         dy = mine.rate(t, y)
         expected = theirs.rate(t, y)
         assert_same(dy[: 2 * n], expected[: 2 * n], rel)
-        power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # Scale of the sum of powers.
+        power = float(np.abs(M @ a_expected) @ np.abs(y[n : 2 * n]))  # Size of the summed powers.
         assert_same(dy[2 * n :], expected[2 * n :], rel, scale=power)
         energy = kernel().kinetic_energy_of(mine.structure, mine.evaluation, y[n : 2 * n])
         assert_same(energy, kinetics.kinetic_energy(M, y[n : 2 * n]))
@@ -1137,18 +1144,18 @@ def test_a_reference_nearby_changes_evaluations_by_round_off(name):
             assert_same(found, one, rel)
 
 
-HEAVY = ("density", "youngs_modulus", "shuttle.mass", "shuttle.inertia")
+SCALED_PARAMETERS = ("density", "youngs_modulus", "shuttle.mass", "shuttle.inertia")
 
 
 @pytest.mark.parametrize("factor", [1e-60, 1e-33, 1e30, 1e60])
 def test_accelerations_do_not_depend_on_the_size_of_masses_and_stiffnesses(factor):
-    """The range of doubles does not contain products of eight of them."""
+    """Products of eight such masses are outside the range of doubles."""
     guide, ours = both("PRBDM2R")
     found, rng = [], np.random.default_rng(3)
     values = guide.values({"release.displacement": 0.0})
     state = random_state(assembly.assemble(guide, values), rng)
     for s in (1.0, factor):
-        scaled = {k: x * (s if k.endswith(HEAVY) else 1.0) for k, x in values.items()}
+        scaled = {k: x * (s if k.endswith(SCALED_PARAMETERS) else 1.0) for k, x in values.items()}
         ours.assemble(scaled)
         inputs = input_data.Inputs((0j,), (0.0,), 0j, (input_data.Wall(1.0),), (0.0,))
         mine = KernelEquations(ours, inputs, ContactState.free(1, 1), 80.0)
@@ -1190,7 +1197,7 @@ def test_gaps_are_the_same(name):
 )  # fmt: skip
 @pytest.mark.parametrize("name", ["PRBDM2R", "Rich"])
 def test_contact_forces_are_the_same(name):
-    """Of closed stops and of what sticks, for any multipliers."""
+    """The forces of closed stops and sticking contacts are computed from random multipliers."""
     for theirs, mine, y, rng in equations(name, 3):
         e, lam = theirs.system.directions(y[: theirs.n]), rng.normal(size=len(theirs.rows))
         contacts = theirs.contacts
@@ -1209,7 +1216,6 @@ def test_contact_forces_are_the_same(name):
 @twin(rub_limit=dynamics.Equations.friction_limit)
 @pytest.mark.parametrize("name", NAMES)
 def test_limits_of_friction_are_the_same(name):
-    """For mechanisms with friction points."""
     for theirs, mine, y, _ in equations(name, 3):
         e, points = theirs.system.directions(y[: theirs.n]), range(len(theirs.system.rubs))
         limits = [kernel().rub_limit(mine.structure, i, e) for i in points]
@@ -1219,7 +1225,7 @@ def test_limits_of_friction_are_the_same(name):
 @twin(project=dynamics.Equations.project, project_near=dynamics.Equations.project_near)
 @each_mechanism
 def test_projected_states_are_the_same(name):
-    """From a large distance, and from a small one with the factors of the evaluation."""
+    """States are projected from afar, and from nearby with the factors of the evaluation."""
     for theirs, mine, y, rng in equations(name):
         n, t = theirs.n, theirs.inputs.walls[0].since + 1e-4
         projected, found = theirs.project(t, y), y.copy()
@@ -1230,7 +1236,7 @@ def test_projected_states_are_the_same(name):
         M = evaluation.M
         assert_same_turn(found[:n], projected[:n], y[:n], theirs.system, M, rows)
         assert_same(found[n:], projected[n:], rel, scale=np.abs(y[n:]).max())
-        for distance in (1e-9, 1e-5):  # One correction is sufficient for the first only.
+        for distance in (1e-9, 1e-5):  # One correction is sufficient for 1e-9 only.
             start = projected.copy()
             start[: 2 * n] += distance * rng.normal(size=2 * n)
             factors = theirs.evaluate(t, start[:n], start[n : 2 * n]).factors
@@ -1259,7 +1265,7 @@ PAIR = runge_kutta.TSITOURAS_PAPAKOSTAS
 @twin(stages=runge_kutta.stages, weights=runge_kutta.powers, interpolate=runge_kutta.interpolate)
 @each_mechanism
 def test_steps_of_the_integration_are_the_same(name):
-    """Stages, new state, error and dense output of one step of the motion."""
+    """Stages, new state, error and dense output of one step are compared."""
     count = constants()["STAGES"]
     for theirs, mine, y, _ in equations(name, 1):
         h, size = 1e-5, len(y)
@@ -1327,7 +1333,7 @@ OTHERS = {
     "scaled": "of a complex number",
     "reverse": "of a list",
 }
-"""Functions of the kernel that do something else than those of the engine with their name."""
+"""Functions of the kernel that share only their name with a function of the engine."""
 
 
 def public(module):
@@ -1374,7 +1380,7 @@ def report():
 
 
 def test_functions_of_the_same_name_are_compared():
-    """The pairs are found by name, in whatever files; ``pytest -rP`` shows the report."""
+    """The pairs are found by name in all files; ``pytest -rP`` shows the report."""
     print("\n".join(report()))
     assert TWINS.keys() <= prototypes().keys()
     found = namesakes()

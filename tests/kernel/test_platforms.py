@@ -118,7 +118,7 @@ def test_the_linux_library_runs_with_glibc_2_17(library, machine):
 
 @pytest.mark.parametrize("machine", MACHINES)
 def test_the_macos_library_is_a_dylib_for_macos_11(library, machine):
-    """On ARM64 it also needs a signature; the linker's anonymous one is sufficient."""
+    """On ARM64 the library needs a signature; the anonymous one of the linker is sufficient."""
     found = lief.parse(str(library(3, f"{machine}-darwin")))
     assert found.header.file_type == lief.MachO.Header.FILE_TYPE.DYLIB
     assert tuple(found.build_version.minos[:2]) <= OLDEST_MACOS
@@ -166,7 +166,7 @@ def test_every_platform_computes_the_same_bytes(host, model, fmi, kind):
 
 @pytest.mark.parametrize("model", ["PRBDM", TWO_STOPS])
 def test_every_compiler_computes_the_same_bytes(model):
-    """The system's compiler and ziglang."""
+    """The compilers are that of the system and ziglang."""
     host = run(Job(native(model, 2), "cs", POINTS))
     assert output(NATIVE, model, 2, "cs") == host.output
 

@@ -23,7 +23,7 @@ def random_mobility(rng, size, rank):
 
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 def test_gap_rate_after_a_single_impact_is_restitution_times_closing_rate(restitution):
-    """Newton's law, and Carnot's loss: T+ - T- = -(1 - eps^2) m_eff u^2 / 2."""
+    """The energy changes by Carnot's loss, T+ - T- = -(1 - eps^2) m_eff u^2 / 2."""
     W, u = np.array([[2.5]]), np.array([-1.7])
     P = contact.newton(W, u, np.array([restitution]))
     assert (u + W @ P).item() == pytest.approx(-restitution * u.item(), abs=1e-15)
@@ -33,11 +33,11 @@ def test_gap_rate_after_a_single_impact_is_restitution_times_closing_rate(restit
 
 
 def test_simultaneous_impacts_satisfy_complementarity_and_do_not_gain_energy():
-    """P >= 0, s = u+ + eps u- >= 0 and P s = 0 for each stop."""
+    """Each stop has P >= 0, s = u+ + eps u- >= 0 and P s = 0: impulse P, gap rates u- and u+."""
     for _ in range(2000):
         k = int(RNG.integers(2, 5))
         W = random_mobility(RNG, k, int(RNG.integers(1, k + 1)))
-        u = W @ RNG.normal(size=k)  # In the range of W: a motion of the mechanism.
+        u = W @ RNG.normal(size=k)  # In the range of W, as for every motion.
         closing = np.minimum(u, 0.0) < 0
         u, W = u[closing], W[np.ix_(closing, closing)]
         if not len(u):
@@ -64,7 +64,7 @@ def test_simultaneous_impacts_do_not_depend_on_the_order_of_the_stops():
 
 
 def test_a_bar_that_falls_flat_on_two_stops_rebounds_flat():
-    """A free bar (m = 2, J = 0.5) hits stops at +-1 with half of (1 + eps) m v each."""
+    """The impulse at each stop, at +-1 of a free bar (m = 2, J = 0.5), is (1 + eps) m v / 2."""
     m, J = 2.0, 0.5
     G = np.array([[1.0, 1.0], [1.0, -1.0]])  # Gap rates = G (y', phi').
     W = G @ np.diag([1 / m, 1 / J]) @ G.T
@@ -104,7 +104,7 @@ def test_stronge_impact_does_not_gain_energy_where_newton_with_coulomb_does():
 
 
 def test_work_of_restitution_is_restitution_squared_times_work_of_compression():
-    """Stronge's hypothesis, checked by integration over small increments of the normal impulse."""
+    """The works are integrated over small increments of the normal impulse (Stronge's law)."""
     for _ in range(8):
         W = random_mobility(RNG, 2, 5)
         u = np.array([-1.0, RNG.normal()]) * np.sqrt(np.diag(W))
@@ -142,7 +142,7 @@ def test_impact_with_one_degree_of_freedom_and_friction_equals_its_closed_form(
     if mu * abs(b) > abs(a) * (1 + 1e-6):
         assert after[0] == pytest.approx(0.0, abs=1e-9)
     elif mu * abs(b) < abs(a) * (1 - 1e-6):
-        # Friction acts against the motion in both phases; the works give the closed form.
+        # Friction acts against the motion in both phases; Stronge's ratio of works gives this.
         gain = abs(b / a) * mu
         assert after[0] == pytest.approx(eps * np.sqrt((1 - gain) / (1 + gain)), rel=1e-6)
 
@@ -155,7 +155,7 @@ def test_newton_and_stronge_agree_if_sliding_does_not_reverse():
 
 
 def test_simultaneous_impacts_with_friction_are_symmetric_and_do_not_gain_energy():
-    """Impulses in the friction cone, no penetration; swapping the stops swaps the impulses."""
+    """Impulses are in the friction cone, gaps do not close; swapped stops swap their impulses."""
     for _ in range(150):
         W = random_mobility(RNG, 4, 6)
         u = np.concatenate([-RNG.uniform(0.1, 1, 2), RNG.normal(size=2)])

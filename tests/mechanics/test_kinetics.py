@@ -1,4 +1,4 @@
-"""Equations of motion against Lagrange equations by SymPy, and their identities."""
+"""Equations of motion: comparison with Lagrange's equations by SymPy, and identities."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ RNG = np.random.default_rng(3)
 
 
 def test_accelerations_equal_those_of_lagrange_equations():
-    """A 2R cantilever with a body on a pin at its tip: three angles, no loop, all inertia terms."""
+    """The mechanism is a 2R cantilever with a body on a pin at its tip: three angles, no loop."""
     sim = Simulation(cantilever(damping_beta=0.0))
     system = sim.system
     n = system.n
@@ -60,7 +60,7 @@ def test_accelerations_equal_those_of_lagrange_equations():
 
 
 def test_power_of_centrifugal_terms_is_the_change_of_kinetic_energy_at_constant_rates():
-    """v.(M' v) / 2 = v.C v^2."""
+    """With the mass matrix M, its rate M' and rates v, v.(M' v)/2 = v.C v^2."""
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())
     J, h = np.diag(system.J), 1e-6
     for _ in range(20):
@@ -73,7 +73,7 @@ def test_power_of_centrifugal_terms_is_the_change_of_kinetic_energy_at_constant_
 
 
 def test_combined_equations_equal_the_separate_functions():
-    """The engine's single product with e equals inertia, jacobian and convective together."""
+    """The engine evaluates inertia, jacobian and convective in one product with e."""
     from prbm.mechanics import constraints, forces
     from prbm.mechanics.system import convective, jacobian
 
@@ -96,7 +96,7 @@ def test_combined_equations_equal_the_separate_functions():
 
 
 def test_constraint_rows_equal_central_differences_of_the_constraints():
-    """The convective term equals a central difference of the Jacobian."""
+    """The convective term equals a central difference of these rows."""
     from prbm.mechanics.system import convective, jacobian, values
 
     system = assemble(mechanism("PRBDM2R"), mechanism("PRBDM2R").values())

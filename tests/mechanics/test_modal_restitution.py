@@ -30,9 +30,9 @@ STRAIGHT = OFFSET | {
 def impact_of_two_modes(share, towards):
     """Return the modal restitution of an impact of two modes, and its closed form.
 
-    The fundamental mode has the given share of the kinetic energy.  It moves towards the wall or
-    away from it.  The other mode, that of the rotation, moves towards it.  With G_i the derivatives
-    of the gap by the modes and v_i their velocities,
+    The fundamental mode has the given share of the kinetic energy, and moves towards the wall or
+    away from it.  The second mode, a rotation, moves towards the wall.  With G_i the derivatives of
+    the gap by the modes and v_i their velocities,
 
         C = (1 + eps) G_1 (G_1 v_1 + G_2 v_2)/(v_1 sum_i G_i^2) - 1.
     """
@@ -51,7 +51,7 @@ def impact_of_two_modes(share, towards):
 
 @pytest.mark.parametrize("share", [1e-2, 1e-3, 1e-4])
 def test_restitution_is_below_minus_one_if_the_fundamental_mode_moves_away_from_the_wall(share):
-    """The share of this mode is small: otherwise the gap would open instead of close."""
+    """The mode must have a small share of the energy; otherwise the gap would open."""
     found, expected = impact_of_two_modes(share, towards=False)
     assert found == pytest.approx(expected, rel=1e-6)
     assert -1.0 / math.sqrt(share) <= found < -1.0
@@ -79,7 +79,7 @@ def test_restitution_is_bounded_by_the_share_of_the_fundamental_mode():
 
 
 def test_restitution_is_that_of_an_unstable_mode_if_the_impact_shape_has_one():
-    """The guide is in motion at the impact; at rest, this shape would be unstable."""
+    """The guide passes a shape that would be unstable at rest."""
     sim = Simulation(mechanism("PRBDM3R"))
     sim.record = []
     sim.advance(0.05)

@@ -42,13 +42,13 @@ def test_rejected_problems_have_no_solution_in_any_combination_of_modes():
         elif P is not None:
             wrong = complementarity.violation(W, u, P, mu * P[normal])
             assert wrong < 1e-9 * np.abs(u).max()
-            second_paths += not one_path(W, u, mu, normal)
+            second_paths += not first_path_solves(W, u, mu, normal)
     assert rejected > 10
     assert second_paths > 0
 
 
-def one_path(W, u, mu, normal):
-    """Return whether the path of the first covering vector alone leads to a solution."""
+def first_path_solves(W, u, mu, normal):
+    """Return whether Lemke's method succeeds with its first covering vector."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(complementarity, "COVER_FACTOR", 1.0)
         tolerance = COMPLEMENTARITY_RTOL * np.abs(u).max()
@@ -88,5 +88,6 @@ def fits(W, u, mu, normal, closed, slips):
 
 
 def check(found, errors):
+    """Assert that the laws hold to 1e-9 and that at most the given share is rejected."""
     assert found.worst < 1e-9, found
     assert sum(found.errors.values()) <= errors * found.draws, found

@@ -1,4 +1,4 @@
-"""Static shapes and small vibrations against beam theory, minimisation and differences."""
+"""Static shapes and small vibrations, compared with beam theory, minimisation, differences."""
 
 import math
 
@@ -35,7 +35,7 @@ def tip_deflection(model, force):
 
 @pytest.mark.parametrize(("model", "error"), [("1R", 0.037), ("2R", 0.0071), ("3R", 0.022)])
 def test_tip_deflection_of_a_cantilever_follows_from_its_published_coefficients(model, error):
-    """The sum of lever^2/K over the pivots, which equals 1/3 of beam theory to the model error."""
+    """The deflection is the sum of lever^2/K over the pivots, near the 1/3 of beam theory."""
     data = MODELS[model]
     gamma, K_theta = ([c.value for c in part] for part in (data.gamma, data.K_theta))
     levers = np.cumsum(gamma[::-1])[::-1]
@@ -65,7 +65,7 @@ def test_held_shape_is_the_minimum_of_potential_energy():
 
 
 def test_holding_force_is_the_derivative_of_the_energy():
-    """F = dV/dx, by a central difference over held shapes."""
+    """The force dV/dx is computed by a central difference of the energy V over held shapes."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values())
 
@@ -102,7 +102,7 @@ def test_modes_are_orthonormal_in_the_mass_matrix_and_satisfy_the_loop_constrain
 
 
 def test_frequencies_equal_those_of_the_linearised_equations_of_motion():
-    """Central differences of the accelerations about the equilibrium along each mode."""
+    """The equations are linearised by central differences of the accelerations along each mode."""
     from prbm.hybrid.simulation import Simulation
 
     guide = mechanism("PRBDM2R")
@@ -127,7 +127,7 @@ def test_frequency_of_an_unstable_equilibrium_is_negative():
 
 
 def test_release_velocity_is_that_after_an_impulse_along_the_release():
-    """M v = release_q^T P + Phi_q^T Lambda: the least kinetic energy for that speed."""
+    """M v = release_q^T P + Phi_q^T Lambda: v has the least kinetic energy for its speed."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values())
     q = equilibrium(system, -0.012).q

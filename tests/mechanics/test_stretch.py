@@ -14,8 +14,8 @@ from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Release, Stop
 from support import mechanism
 
-EA, EI, ROD = 400.0, 2e-3, 3e-3  # N, N m^2, kg; a soft rubber cord.
-SPAN = 0.1  # m, its length.
+EA, EI, ROD = 400.0, 2e-3, 3e-3  # Stiffnesses [N], [N m^2] and mass [kg] of a rubber cord.
+SPAN = 0.1  # Length of the cord [m].
 
 
 def type_of(name, axial):
@@ -105,7 +105,7 @@ def state(sim, seed):
 
 @pytest.mark.parametrize("holds", [False, True])
 def test_a_stretching_pendulum_with_a_wall_satisfies_lagrange_equations(holds):
-    """Accelerations and, while the stop holds, its force: the multiplier of the gap."""
+    """Accelerations are compared and, for a closed stop, its force: the multiplier of the gap."""
     values = {"force.x": 0.4, "force.y": -0.3, "force.moment": 0.01}
     sim = Simulation(pendulums(), values)
     # Order from the ground: cord, its stretch, body A; bar, body B.
@@ -130,7 +130,7 @@ def test_a_stretching_pendulum_with_a_wall_satisfies_lagrange_equations(holds):
 
 
 def test_reported_velocities_equal_central_differences_of_the_reported_positions():
-    """Displacement, angle and gap of bodies on links that stretch."""
+    """The outputs are displacement, angle and gap of bodies on links that stretch."""
     sim = Simulation(pendulums(), {"release.velocity": 0.8}, tolerance=1e-12)
     h = 1e-6
     for t in (0.002, 0.005, 0.011):

@@ -1,4 +1,4 @@
-"""Flexure models against beam theory and finite elements, and the page of the results."""
+"""Flexure models, compared with beam theory and finite elements, and the page of the results."""
 
 import importlib.util
 import math
@@ -41,7 +41,7 @@ def script():
 
 @pytest.mark.parametrize("load", [0.01, 1.0, -3.0, 8.0])
 def test_elliptic_integrals_agree_with_a_boundary_value_problem_of_the_elastica(load):
-    """Slopes: theta'' = -alpha cos theta, theta(0) = theta'(1) = 0; shape: z' = exp(i theta)."""
+    """The problem is theta'' = -alpha cos theta, theta(0) = theta'(1) = 0, z' = exp(i theta)."""
 
     def rate(s, y):
         return np.array([y[1], -load * np.cos(y[0]), np.cos(y[0]), np.sin(y[0])])
@@ -59,7 +59,7 @@ def test_elliptic_integrals_agree_with_a_boundary_value_problem_of_the_elastica(
 
 
 def test_a_beam_with_a_heavy_tip_has_the_frequencies_of_a_massless_beam():
-    """omega^2 -> 3 EI/(m_tip L^3); with inertia, the eigenvalues of a 2 x 2 stiffness matrix."""
+    """It is omega^2 = 3 EI/(m_tip L^3), or with inertia the eigenvalues of a 2 x 2 problem."""
     assert wavenumber(1, 1e6) ** 4 == pytest.approx(3e-6, rel=1e-6)
     stiffness = np.array([[12.0, -6.0], [-6.0, 4.0]])
     omega2 = np.linalg.eigvals(stiffness / np.array([[1e6], [3e5]]))
@@ -74,7 +74,7 @@ FORCE_ERRORS = {"1R": 3.8, "2R": 1.0, "3R": 2.3, "10R": 0.51, "40R": 0.033}  # %
 
 @pytest.mark.parametrize("model", FORCE_ERRORS)
 def test_tip_displacements_under_an_end_force_are_those_of_the_elastica(model):
-    """Within the error of the model up to P L^2/EI = 8, and mirrored for the opposite force."""
+    """The limit is the error of the model; the opposite force gives the mirrored shape."""
     models = script()
     system = models.cantilever(model)
     for load in (1e-3, 0.1, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0):
@@ -92,7 +92,7 @@ SLOPES = {"1R": 1 / (0.8517 * 2.65), "2R": 1 / 3.4710 + 1 / 2.0682,
 def test_the_tip_slope_under_an_end_moment_is_the_sum_of_the_compliances(model):
     """Every spring carries the whole moment.
 
-    The slope of chains is exact.  The 1R, 2R and 3R have 0.443, 0.772 and 1.007 of it.
+    The slope of chains is exact; those of 1R, 2R and 3R are 0.443, 0.772 and 1.007 times that.
     """
     models = script()
     system = models.cantilever(model)
@@ -107,7 +107,7 @@ def test_the_tip_slope_under_an_end_moment_is_the_sum_of_the_compliances(model):
 
 
 def test_a_chain_converges_to_the_elastica_at_second_order():
-    """Slopes of 2.00 +- 0.05, under a force and under a moment."""
+    """The observed order is 2.00 +- 0.05 under a force and under a moment."""
     models = script()
     for kind, load, exact in (("force", 8.0, end_force), ("moment", math.pi, end_moment)):
         errors = [
@@ -125,7 +125,7 @@ FREQUENCY_ERRORS = {  # Largest errors of f1 and f2 [%] with tip masses (no iner
 
 @pytest.mark.parametrize("model", FREQUENCY_ERRORS)
 def test_frequencies_with_a_body_at_the_tip_are_those_of_the_beam(model):
-    """Within the error of the model."""
+    """The limit of the difference is the error of the model."""
     models = script()
     for tip in ((0.0, 0.0), (0.3, 0.0), (1.0, 0.0), (10.0, 0.0)):
         system = models.cantilever(model, tip)
@@ -161,7 +161,7 @@ def test_an_axial_force_stretches_a_flexure_by_the_elongation_of_a_bar():
 
 
 def test_the_work_of_loads_is_the_change_of_elastic_energy():
-    """dV/dP = P dz/dP (Castigliano), for force and moment together at a large deflection."""
+    """A small increase of force and moment at a large deflection does the work P dz = dV."""
     models = script()
     system = models.cantilever("3R")
     forces = np.array([3.0, -2.0, 0.7]) * models.EI / models.L**2 * np.array([1, 1, models.L])
@@ -178,7 +178,7 @@ def test_the_work_of_loads_is_the_change_of_elastic_energy():
 
 
 def test_gravity_and_an_equal_force_at_the_centre_of_mass_give_one_shape():
-    """Their frequencies agree as well."""
+    """The frequencies about the two shapes agree, too."""
     heavy = script().cantilever("3R", (1e4, 1e3))
     m = heavy.values["tip.mass"]
     g = 8.0 * script().EI / script().L ** 2 / m
@@ -214,7 +214,7 @@ def test_invalid_loads_are_rejected():
 
 # --- the guide ----------------------------------------------------------------------------------
 
-GUIDES = {  # Rest position [mm], f1, f2, f3 there and f1 straight [Hz], computed independently.
+GUIDES = {  # Rest position [mm], f1, f2, f3 at rest, f1 straight [Hz]; by independent programs.
     "1R": (10.42, 4.957, None, None, 4.726),
     "2R": (10.78, 4.889, 115.9, 182.9, 4.624),
     "3R": (10.95, 4.854, 147.7, 233.2, 4.590),
@@ -224,8 +224,8 @@ HALF_DIGITS = (5e-3, 5e-4, 0.05, 0.05, 5e-4)
 
 
 @pytest.mark.parametrize("model", GUIDES)
-def test_rest_position_and_frequencies_of_the_steel_guide(model):
-    """Equal to the results of other programs in all digits given."""
+def test_rest_position_and_frequencies_of_the_steel_guide_are_those_of_other_programs(model):
+    """The values agree in all digits given."""
     found = script().guide_figures(model)[[0, 1, 2, 3, 6]]
     for x, expected, half in zip(found, GUIDES[model], HALF_DIGITS, strict=True):
         assert math.isnan(x) if expected is None else abs(x - expected) <= 1.01 * half
@@ -247,9 +247,9 @@ def test_a_chain_guide_converges_at_second_order(axial, ns):
 
 
 def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
-    """To the last digit of the finite elements; bounce and pitch to 1.5e-4.
+    """The limit agrees to the last digit of the finite elements; bounce and pitch to 1.5e-4.
 
-    Chains of up to 80 links give the limit of bounce and pitch to 5e-5.
+    The extrapolation from 80 links has an error of 5e-5 in bounce and pitch.
     """
     models = script()
     figures = [models.guide_figures(f"{n}R", axial=True) for n in (20, 40, 80)]
@@ -266,7 +266,7 @@ def test_the_limit_of_axially_compliant_chains_is_that_of_finite_elements():
 
 
 def test_the_finite_element_figures_of_the_page_are_reproduced():
-    """To 1e-4, because the Jacobians of the finite elements are finite differences."""
+    """The tolerance is 1e-4, because the Jacobians of the finite elements are differences."""
     models = script()
     values = mechanism("PRBDM2R").values()
     found = finite_elements.guide(values, 64)
@@ -286,12 +286,12 @@ def test_the_finite_element_figures_of_the_page_are_reproduced():
     ("2R", False, 0.0485),
 ])  # fmt: skip
 def test_modal_restitution_is_that_of_finite_elements(model, axial, error):
-    """Within the error of the model at nine hit points, without tuning."""
+    """The limit at nine hit points is the error of the model, without tuning."""
     assert script().restitution_error(model, axial=axial) < error
 
 
 def test_an_off_centre_hit_lowers_modal_restitution_only_with_axial_compliance():
-    """With an offset of 4 mm and eps = 0.6: 0.596 with rigid links, 0.548 with axial compliance."""
+    """At an offset of 4 mm and eps = 0.6 it falls from 0.596 to 0.548 with axial compliance."""
     rigid, axial = (script().guide("2R", axial=axial) for axial in (False, True))
     found = []
     for guide in (rigid, axial):
@@ -302,7 +302,7 @@ def test_an_off_centre_hit_lowers_modal_restitution_only_with_axial_compliance()
 
 
 def test_axial_compliance_hardly_changes_bounce_and_pitch():
-    """11.4 and 13.0 % below finite elements with axial compliance, 11.3 and 12.8 % without."""
+    """The 2R is 11.4 and 13.0 % below finite elements; without axial compliance 11.3 and 12.8 %."""
     models = script()
     for axial, errors in ((True, (-0.1144, -0.1299)), (False, (-0.1127, -0.1285))):
         found = models.guide_figures("2R", axial=axial)
@@ -341,7 +341,7 @@ def unit_of_last_digit(number):
 
 @pytest.mark.parametrize("name", ["end force", "end moment", "frequencies", "guide", "restitution"])
 def test_the_tables_of_the_page_are_reproduced(name):
-    """Numbers to one unit of their last digit."""
+    """Numbers agree to one unit of their last digit."""
     models = script()
     now, page = (cells(t) for t in (models.TABLES[name](), models.shown(PAGE, name)))
     assert [len(row) for row in now] == [len(row) for row in page]

@@ -190,7 +190,7 @@ def test_results_of_fmpy_and_of_the_engine_give_equal_films(
 def test_shapes_at_impacts_known_from_columns_only_are_close(
     mechanisms: dict[str, Mechanism],
 ) -> None:
-    """The shape is interpolated between two rows and moved to the wall: half a pixel of error."""
+    """The shape is interpolated between two rows and moved to the wall; it errs by half a pixel."""
     result = simulate(mechanisms["PRBDM2R"], stop_time=0.06)
     exact, estimated = motion(result), motion(replace(result, impacts=()))
     t = exact.marks[0].time
@@ -204,7 +204,7 @@ def test_shapes_at_impacts_known_from_columns_only_are_close(
 
 
 def test_a_clamped_flexure_is_drawn_as_the_elastic_line() -> None:
-    """Fixed and guided: y = d (3 s^2 - 2 s^3).  At a pin, the curvature is zero."""
+    """If both ends are clamped, y = d (3 s^2 - 2 s^3).  At a pin, the curvature is zero."""
     guided = curve(np.array([0.0, 0.1, 0.9 + 0.05j, 1.0 + 0.05j]), (True, True))
     s = np.linspace(0.0, 1.0, len(guided))
     np.testing.assert_allclose(guided.imag, 0.05 * (3 * s**2 - 2 * s**3), atol=1e-15)
@@ -268,7 +268,7 @@ def test_a_gif_has_a_frame_for_every_time(tmp_path: Path, short: Result) -> None
         frame = np.asarray(image.convert("RGB"))
     expected = next(pictures(scene_of(short, slow=20.0, fps=10.0), [5]))
     assert frame.shape == expected.shape
-    assert np.abs(frame.astype(int) - expected).mean() < 0.5  # Of 255.
+    assert np.abs(frame.astype(int) - expected).mean() < 0.5  # Colours are from 0 to 255.
     assert fractions == sorted(fractions)
     assert fractions[-1] == 1.0
     assert [p.name for p in tmp_path.iterdir()] == ["motion.gif"]

@@ -56,7 +56,7 @@ CRANK = Mechanism(
 
 
 def shapes_of(chosen: Mechanism, displacement: float | None = None) -> tuple[Shapes, np.ndarray]:
-    """Return the shapes of a mechanism and the arms of a held one."""
+    """Return the shapes of a mechanism, and its arms when straight or held at a displacement."""
     system = assemble(chosen, chosen.values())
     shapes = Shapes(system)
     if displacement is None:

@@ -11,7 +11,7 @@ import prbm
 
 ROOT = Path(__file__).parents[2]
 PUBLIC = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate"]
-HEAVY = ("numpy", "scipy", "matplotlib", "pydantic", "pint", "fmpy")
+THIRD_PARTY = ("numpy", "scipy", "matplotlib", "pydantic", "pint", "fmpy")
 
 
 def in_new_process(script: str) -> str:
@@ -26,7 +26,7 @@ def in_new_process(script: str) -> str:
 def test_importing_the_package_imports_nothing_else():
     script = "import prbm; print(*(name for name in sys.modules if name.startswith('prbm')))"
     assert in_new_process(script).split() == ["prbm"]
-    script = f"import prbm; prbm.__version__; print(*({{*sys.modules}} & {{*{HEAVY!r}}}))"
+    script = f"import prbm; prbm.__version__; print(*({{*sys.modules}} & {{*{THIRD_PARTY!r}}}))"
     assert in_new_process(script).split() == []
 
 

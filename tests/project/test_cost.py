@@ -64,7 +64,7 @@ def test_the_cost_grows_with_the_exponents_of_the_page(scaling, exponents):
 @pytest.mark.slow
 @pytest.mark.native
 def test_the_folded_suspension_is_faster_than_real_time(native):
-    """It has eight 3R flexures that stretch, 51 coordinates.
+    """The suspension has eight 3R flexures that stretch, with 51 coordinates.
 
     The CPU time includes FMPy's overhead for a thousand communication steps.
     """

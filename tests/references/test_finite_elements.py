@@ -47,9 +47,10 @@ def beam(ends=("clamp", "free"), mass=1e-9, **options):
 
 @pytest.mark.parametrize("load", [0.5, 2.0, 5.0])
 def test_a_loaded_cantilever_has_the_shape_of_the_elastica(load):
-    """Transverse tip force P with P L^2/EI = load (Bisshopp and Drucker 1945).
+    """The transverse tip force is P = load EI/L^2 (Bisshopp and Drucker 1945).
 
-    L theta' = sqrt(2 load (sin t - sin theta)), t the slope at the tip; theta = t - s^2.
+    The slope theta satisfies L theta' = sqrt(2 load (sin t - sin theta)), with t the slope at the
+    tip.  The substitution theta = t - s^2 removes the singularity.
     """
     from scipy.integrate import quad
     from scipy.optimize import brentq
@@ -81,7 +82,7 @@ def test_a_moment_at_the_tip_bends_a_cantilever_into_a_circle():
 
 
 def test_modes_of_a_cantilever_match_euler_bernoulli_theory():
-    """cos(b) cosh(b) = -1, omega = b^2 sqrt(EI/(rho A L^4))."""
+    """The theory is cos(b) cosh(b) = -1 and omega = b^2 sqrt(EI/(rho A L^4))."""
     found = FiniteElements(beam(), elements=32)
     b = np.array([1.8751040687, 4.6940911330, 7.8547574382])
     wanted = b**2 * math.sqrt(EI / (RHO * WIDTH * THICKNESS * L**4)) / (2 * math.pi)
@@ -90,7 +91,7 @@ def test_modes_of_a_cantilever_match_euler_bernoulli_theory():
 
 
 def test_the_rest_position_converges_with_order_two_or_more():
-    """Twice the elements, at most a quarter of the change."""
+    """Twice the elements give at most a quarter of the change."""
     at_rest = []
     for elements in (4, 8, 16, 32):
         fe = guide(elements=elements)
@@ -116,7 +117,7 @@ def test_a_shape_does_not_depend_on_the_start_of_the_iteration():
 
 
 def test_tangents_match_central_differences():
-    """C of the constraints, G of the gap, d(C mu)/dq of the reactions."""
+    """The tangents are C of the constraints, G of the gap and d(C mu)/dq of the reactions."""
     fe = guide({"stop.offset": 3e-3, "stop.position": 0.02}, elements=4)
     shape = fe.equilibrium(-0.01)
     rng, h = np.random.default_rng(0), 1e-6
@@ -132,7 +133,7 @@ def test_tangents_match_central_differences():
     )
     assert slope(lambda q: fe.gap(0, q)) == pytest.approx(fe.gap_row(0, shape.q) @ d, abs=1e-9)
     reactions = slope(lambda q: equations.constraint_columns(q) @ shape.mu)
-    assert np.abs(reactions).max() > 1e-3  # not trivially zero
+    assert np.abs(reactions).max() > 1e-3  # Reactions of zero would prove nothing.
     stiffness = equations.constraint_stiffness(shape.q, shape.mu)
     np.testing.assert_allclose(-stiffness @ d, reactions, atol=1e-5)
 
@@ -263,8 +264,8 @@ def test_without_exudyn_the_error_names_the_installation(monkeypatch):
 # --- reference numbers of the guides ----------------------------------------------------------
 
 
-def test_rest_position_and_frequencies_of_the_steel_guide():
-    """10.720 mm; 4.907, 130.7 and 209.8 Hz with 32 elements per flexure."""
+def test_the_steel_guide_has_the_reference_rest_position_and_frequencies():
+    """The reference is 10.720 mm and 4.907, 130.7, 209.8 Hz; there are 32 elements per flexure."""
     fe = guide(elements=32)
     rest = fe.equilibrium()
     assert fe.displacement(rest.q) == pytest.approx(10.720e-3, abs=2e-6)
@@ -273,12 +274,12 @@ def test_rest_position_and_frequencies_of_the_steel_guide():
     np.testing.assert_allclose(frequency[1:], [130.7, 209.8], atol=0.06)
 
 
-def test_frequency_of_the_straight_steel_guide():
+def test_the_straight_steel_guide_has_the_reference_frequency():
     fe = guide(WEIGHTLESS, elements=32)
     assert fe.modes(fe.equilibrium()).frequency[0] == pytest.approx(4.6405, abs=1e-4)
 
 
-MODAL_RESTITUTION = {  # by offset [m]; walls at -10, 0, 10 mm; restitution 0.6
+MODAL_RESTITUTION = {  # Key: offset [m].  Values: walls at -10, 0, 10 mm, for restitution 0.6.
     -4e-3: (0.4089, 0.5483, 0.4084),
     0.0: (0.4519, 0.5947, 0.4519),
     4e-3: (0.4104, 0.5482, 0.4108),
@@ -286,14 +287,14 @@ MODAL_RESTITUTION = {  # by offset [m]; walls at -10, 0, 10 mm; restitution 0.6
 
 
 @pytest.mark.parametrize("offset", MODAL_RESTITUTION)
-def test_modal_restitution_of_the_steel_guide(offset):
+def test_the_steel_guide_has_the_reference_modal_restitution(offset):
     fe = guide(WEIGHTLESS | {"stop.offset": offset})
     found = [fe.modal_restitution(fe.equilibrium(h), 0, 0.6) for h in (-0.01, 0.0, 0.01)]
     np.testing.assert_allclose(found, MODAL_RESTITUTION[offset], atol=3e-4)
 
 
-def test_frequency_and_amplitude_of_the_free_pmma_guide():
-    """Started straight at 1 m/s: 5.6375 Hz between zero crossings, 26.2 to 28.1 mm."""
+def test_the_free_pmma_guide_has_the_reference_frequency_and_amplitude():
+    """The guide starts straight at 1 m/s; the frequency is measured between zero crossings."""
     response = guide(PMMA, elements=16).transient(0.4, 2e-4)
     t, x = response["time"], response["shuttle.x"]
     upward = (x[:-1] < 0) & (x[1:] >= 0)
@@ -325,7 +326,7 @@ def default_run():
 
 @pytest.mark.slow
 def test_bounces_of_the_default_run_match_those_of_a_chain_of_links(default_run):
-    """Times and closing speeds of the first five impacts, compared with a chain of 12 links."""
+    """Times and closing speeds of the first five impacts equal those of a chain of 12 links."""
     from dataclasses import replace
 
     base = mechanism("PRBDM2R")
@@ -411,5 +412,5 @@ def test_a_transient_ends_at_its_stop_time(end):
     assert run["time"][-1] == pytest.approx(end, abs=1e-9)
     interrupted = Transient(fe, 1e-4, 0.9)
     q, v = fe.release()
-    t, *_ = interrupted._fly(end * (1 - 1e-13), q, v, end)  # only round-off is left
+    t, *_ = interrupted._fly(end * (1 - 1e-13), q, v, end)  # Only round-off is left.
     assert t == pytest.approx(end, rel=1e-12)

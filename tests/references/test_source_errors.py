@@ -49,8 +49,8 @@ def relative_energy(run: Run) -> np.ndarray:
 # --- The factor gamma in the rates of the 2R pivots -------------------------------------------
 
 
-def test_2R_cantilever_without_the_factor_deflects_a_third():
-    """F h^3/(3 EI) at the tip (Euler-Bernoulli); the published coefficients give 0.3357."""
+def test_2R_cantilever_without_the_factor_has_the_deflection_of_beam_theory():
+    """The tip moves by F h^3/(3 EI); the published coefficients give 0.3357 F h^3/EI."""
     assert cantilever_deflection(stiffness_factor=False) == pytest.approx(0.3357, abs=5e-5)
     assert cantilever_deflection(stiffness_factor=False) == pytest.approx(1 / 3, rel=0.01)
 
@@ -67,7 +67,7 @@ def test_2R_guide_with_the_factor_is_2_26_times_too_soft():
 
 
 def test_the_refitted_coefficients_times_the_factor_are_about_the_published_ones():
-    """gamma_i K_theta_i fitted in the thesis: 3.855 and 1.845; published: 3.471 and 2.068.
+    """The fitted gamma_i K_theta_i are 3.855 and 1.845, the published K_theta_i 3.471 and 2.068.
 
     One is 11 % too high, the other 11 % too low: two rates fitted to one frequency are not unique.
     """
@@ -77,12 +77,12 @@ def test_the_refitted_coefficients_times_the_factor_are_about_the_published_ones
     assert (rates[0] > K_THETA_2R[0]) != (rates[1] > K_THETA_2R[1])
 
 
-def test_the_refitted_2R_guide_is_the_untuned_1R_guide():
+def test_the_refitted_2R_guide_has_the_stiffness_of_the_untuned_1R_guide():
     """The thesis fitted its 2R to its 1R model with K_theta 2.65, which is 3.7 % too stiff."""
     refitted = guide_2R(stiffness_factor=True, K_theta=REFITTED_K_THETA_2R, gravity=0.0)
     target = stiffness(guide_1R(gravity=0.0))
     assert target / FIXED_GUIDED_PAIR == pytest.approx(K_THETA_1R / (3 * GAMMA_1R), rel=1e-6)
-    assert stiffness(refitted) == pytest.approx(target, rel=0.015)  # fitted at 25 mm, not at 0
+    assert stiffness(refitted) == pytest.approx(target, rel=0.015)  # The thesis fitted at 25 mm.
 
 
 # --- The missing right side of the acceleration constraint ------------------------------------
@@ -130,7 +130,7 @@ def test_the_energy_error_with_the_convective_term_vanishes_with_the_step():
 
 
 def test_projection_closes_the_loop_after_every_step():
-    """Loop e = distance, to the tolerance of the thesis."""
+    """The loop equation, loop . e = distance, holds to the tolerance of the thesis."""
     chain = guide_2R()
     run = released(chain, -10e-3, 2**-13)
     gap = np.exp(1j * run.q) @ chain.loop - chain.distance
@@ -138,19 +138,22 @@ def test_projection_closes_the_loop_after_every_step():
 
 
 @pytest.mark.parametrize("wall", [np.inf, 0.0], ids=["no wall", "wall"])
-def test_in_the_1R_parallelogram_the_missing_term_cancels(wall):
-    """Equal links with opposite directions and equal rates: e_1 v_1^2 + e_3 v_3^2 = 0, v_2 = 0."""
+def test_the_missing_term_cancels_in_the_1R_parallelogram(wall):
+    """Its equal links 1 and 3 have opposite directions e and equal rates v, and v_2 = 0.
+
+    Hence the missing term e_1 v_1^2 + e_3 v_3^2 is zero.
+    """
     printed, right = (
         released(guide_1R(), -18e-3, 2**-13, convective=convective, wall=wall)
         for convective in (False, True)
     )
     assert len(printed.impact_times) == len(right.impact_times)
     np.testing.assert_allclose(printed.q, right.q, rtol=0, atol=1e-11)  # round-off
-    np.testing.assert_allclose(printed.v, right.v, rtol=0, atol=1e-9)  # of up to 20 rad/s
+    np.testing.assert_allclose(printed.v, right.v, rtol=0, atol=1e-9)  # Rates are up to 20 rad/s.
 
 
-def test_in_a_four_bar_linkage_with_unequal_links_the_missing_term_does_not_cancel():
-    """Two links of 40 and 30 mm: the shuttle turns, and only the full equation conserves."""
+def test_the_missing_term_does_not_cancel_in_a_four_bar_linkage_with_unequal_links():
+    """The links of 40 and 30 mm turn the shuttle; only the full equation conserves energy."""
     bars = Link(40e-3, 0.0, 40e-3, 0.0, np.pi / 2), Link(30e-3, 0.0, 0.0, 0.0, -np.pi / 2)
     chain = Chain([bars[0], shuttle(stub=0.0), bars[1]], [0.05] * 4, shuttle=1)
     gained = [
@@ -205,7 +208,7 @@ def test_the_guide_of_the_thesis_passes_through_the_wall_after_its_bounces():
 # --- The engine -------------------------------------------------------------------------------
 
 
-def test_our_guide_has_the_stiffness_of_two_beams():
+def test_the_guide_of_the_engine_has_the_stiffness_of_two_beams():
     """dF/dx of the straight guide is 24 EI/L^3: the engine has no factor gamma."""
     guide = mechanism("PRBDM2R")
     system = assemble(guide, guide.values({"gravity.x": 0.0}))
@@ -215,7 +218,7 @@ def test_our_guide_has_the_stiffness_of_two_beams():
 
 @pytest.mark.parametrize("wall", [0.0, 0.05])
 def test_the_energy_of_the_engine_does_not_grow(wall):
-    """The undamped run in which the printed equations gain energy."""
+    """In this undamped run the printed equations gain energy."""
     sim = simulation("PRBDM2R", {"damping.beta": 0.0, "stop.position": wall})
     start, most = energy_balance(sim.outputs()), 0.0
     for t in np.linspace(0, 0.14, 141)[1:]:
@@ -226,9 +229,10 @@ def test_the_energy_of_the_engine_does_not_grow(wall):
 
 
 def test_the_engine_follows_the_corrected_algorithm_of_the_thesis():
-    """Chain and tree of links, unweighted and mass-weighted projection: the same motion.
+    """The thesis has a chain of links and an unweighted projection.
 
-    The thesis omits the mass of the stubs, 0.1 % of the moving mass.
+    The engine has a tree of links and a projection with the mass matrix.  The thesis omits the mass
+    of the stubs, 0.1 % of the moving mass.
     """
     q, _ = held_shape(guide_2R(), -10e-3)
     run = simulate(guide_2R(), q, np.zeros_like(q), 0.1, 2**-14)

@@ -51,7 +51,7 @@ def test_default_experiments_of_shipped_mechanisms_take_one_second(name):
 
 @pytest.mark.parametrize("size", [2e-5, 2e-4, 0.02, 0.2, 20.0])
 def test_default_experiments_have_1_to_25_periods_at_any_size(size):
-    """Experiments other than one second have about ten periods; 40 rows or more per period."""
+    """If an experiment is not one second, it has about ten periods, each of 40 rows or more."""
     scaled = guide(size)
     chosen = experiment(scaled)
     frequency = Simulation(scaled).outputs()["mode.frequency"]

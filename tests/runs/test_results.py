@@ -255,7 +255,7 @@ def test_the_time_axis_ends_shortly_after_the_motion_has_settled(
 def test_a_result_without_motion_is_reported_and_not_plotted(
     mechanisms: dict[str, Mechanism],
 ) -> None:
-    """Released in the straight equilibrium without gravity, with round-off in the columns."""
+    """The guide is released in its equilibrium without gravity; the columns contain round-off."""
     at_rest = {"gravity.x": 0.0, "release.displacement": 0.0, "stop.position": 5e-3}
     still = simulate(mechanisms["PRBDM2R"], at_rest, stop_time=0.05)
     still.columns["shuttle.x"][::2] += 1e-16
@@ -291,7 +291,7 @@ def wall_of(figure: Figure) -> Line2D:
 
 
 def test_the_panel_of_the_displacement_shows_the_wall(mechanisms: dict[str, Mechanism]) -> None:
-    """A fixed wall off the centre of mass, a moving wall, and a wall on another body."""
+    """The wall is fixed and hit off the centre of mass, or it moves, or it is on another body."""
     guide = mechanisms["PRBDM2R"]
     fixed = simulate(guide, {"stop.position": -2e-3, "stop.offset": 4e-3}, stop_time=0.1)
     np.testing.assert_allclose(wall_of(response(fixed)).get_ydata(), -2.0, atol=0.05)

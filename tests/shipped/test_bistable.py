@@ -1,4 +1,4 @@
-"""The bistable shuttle against the closed form of four struts of axial stiffness EA."""
+"""The bistable shuttle, compared with the closed form of four struts of axial stiffness EA."""
 
 import math
 from dataclasses import replace
@@ -47,7 +47,7 @@ def test_holding_force_is_that_of_four_struts() -> None:
 
 
 def test_there_are_two_stable_equilibria_and_an_unstable_one_between_them() -> None:
-    """They are the drawn shape, its mirror image, and the shape with the shortest struts."""
+    """The equilibria are the drawn shape, its mirror image, and that with the shortest struts."""
     found = rests(SYSTEM, np.array([-0.3, 0.4, 1.3, 2.3]) * RISE)
     assert [rest.stable for rest in found] == [True, False, True]
     np.testing.assert_allclose([r.displacement for r in found], [0, RISE, 2 * RISE], atol=1e-12)
@@ -84,7 +84,7 @@ def test_clamping_the_struts_to_the_ground_adds_their_bending_stiffness() -> Non
     assert additional == pytest.approx(across, rel=0.01)
 
 
-def test_after_the_snap_it_comes_to_rest_on_the_far_stop() -> None:
+def test_the_shuttle_comes_to_rest_on_the_far_stop_after_the_snap() -> None:
     result = run(BISTABLE, stop_time=0.5)
     y = result.column("shuttle.y")
     assert y[0] == pytest.approx(-0.0125)
@@ -114,7 +114,7 @@ def test_without_damping_the_elastic_energy_becomes_kinetic() -> None:
         assert abs(row["shuttle.vx"]) < 1e-9
 
 
-def test_released_before_the_unstable_equilibrium_it_returns_to_the_drawn_shape() -> None:
+def test_a_shuttle_released_before_the_unstable_equilibrium_returns_to_the_drawn_shape() -> None:
     result = run(BISTABLE, {"release.displacement": 0.0115, "damping.beta": 2e-3}, stop_time=0.5)
     assert abs(result.outputs[-1]["shuttle.y"]) < 1e-4
     assert result.outputs[-1]["far_stop.impact_count"] == 0

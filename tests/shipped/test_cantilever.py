@@ -1,4 +1,4 @@
-"""The cantilever with a tip mass against Euler-Bernoulli beams."""
+"""The cantilever with a tip mass, compared with an Euler-Bernoulli beam."""
 
 import math
 from dataclasses import replace
@@ -66,13 +66,16 @@ def test_frequencies_of_a_chain_converge_to_the_beam() -> None:
 
 
 def test_the_last_link_belongs_to_the_tip() -> None:
-    """Three links, the last of them rigidly connected to the tip: 3 coordinates and no loop."""
+    """The three links, the last of them fixed to the tip, have three coordinates and no loop."""
     system = assemble(LEAF, V)
     assert (system.n, len(system.loops)) == (3, 0)
 
 
 def test_static_deflection_is_that_of_a_beam() -> None:
-    """Loads at a hundredth of gravity: M g at L + C, and the weight of the leaf; 3R +2.2 %."""
+    """The loads are M g at L + C and the weight of the leaf, at a hundredth of gravity.
+
+    The 3R model is 2.2 % too soft.
+    """
     g = 9.81e-2
     system = assemble(LEAF, LEAF.values({"gravity.y": -g}))
     E = system.directions(equilibrium(system).q)
@@ -84,7 +87,7 @@ def test_static_deflection_is_that_of_a_beam() -> None:
 
 
 def test_force_at_rest_on_the_stop_is_weight_less_bending_force() -> None:
-    """Beam theory for small slopes: (M g - P) compliance + deflection by its own weight = 3 mm.
+    """The deflection is 3 mm: (M g - P) times compliance plus that by the weight of the beam.
 
     The slope of the tip, 4 degrees, which shifts the contact point, and the softer 3R model cause
     a difference of 1.3 %.

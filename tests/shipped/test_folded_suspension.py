@@ -1,4 +1,4 @@
-"""The folded suspension against beam theory: straightness, stiffness, frequency."""
+"""The folded suspension, compared with beam theory: straightness, stiffness, frequency."""
 
 import runpy
 from dataclasses import replace
@@ -28,7 +28,7 @@ def beam() -> tuple[float, float, float, float]:
     return EI / L**3, v["pmma.density"] * b * h * L, v["shuttle.mass"], v["upper_truss.mass"]
 
 
-def test_it_has_two_trusses_and_eight_flexures() -> None:
+def test_the_suspension_has_two_trusses_and_eight_flexures() -> None:
     assert sorted(f.name for f in FOLDED.flexures) == sorted(SIDES)
     assert [body.name for body in FOLDED.bodies] == ["shuttle", "upper_truss", "lower_truss"]
     assert SYSTEM.n == 8 * (5 + 1) + 3
@@ -46,7 +46,9 @@ def test_stiffness_is_24_ei_over_l3() -> None:
     """Two trusses, each with two pairs of flexures in series; the model error of 3R is -2.2 %."""
     EI_L3, *_ = beam()
     rate = holding_force(SYSTEM, 1e-5) / 1e-5
-    assert rate == pytest.approx(2 * guided_rate(SYSTEM.values), rel=1e-6)  # Higher orders in x/L.
+    assert rate == pytest.approx(
+        2 * guided_rate(SYSTEM.values), rel=1e-6
+    )  # Error of order (x/L)^2.
     assert rate == pytest.approx(24 * EI_L3, rel=0.022)  # Model error.
 
 
@@ -62,7 +64,10 @@ def test_stiffness_rises_by_less_than_a_percent_over_the_stroke() -> None:
 
 
 def test_fundamental_frequency_is_below_rayleighs_quotient() -> None:
-    """Mass M + 2 M_t/4 + 4 m 13/35 / 4 + 4 m (1/4 + 1/4 + 13/140), stiffness 24 EI/L^3.
+    """The quotient has the stiffness 24 EI/L^3 and the following mass.
+
+    M + 2 M_t/4 + 4 m 13/35 / 4 + 4 m (1/4 + 1/4 + 13/140), with the masses M of the shuttle, M_t of
+    a truss and m of a flexure.
 
     The fixed-guided shape 3 s^2 - 2 s^3 has the mean 1/2 and the mean square 13/35.  Rayleigh's
     quotient is an upper bound, here 1.1 % too high: because of their inertia, the trusses move more
@@ -88,7 +93,7 @@ def test_trusses_move_half_as_far_and_descend_as_a_guide() -> None:
 
 
 def test_the_path_is_far_straighter_than_that_of_a_parallel_guide() -> None:
-    """Lateral errors at strokes up to 30 mm with flexures of 0.2 m."""
+    """The strokes are up to 30 mm, with flexures of 0.2 m."""
     x, L = EXAMPLE["STROKES"], SYSTEM.values["flexure.length"]
     errors = {name: np.abs(error) for name, error in EXAMPLE["simulate"]().items()}
     guide = 0.6 * x**2 / L

@@ -1,4 +1,4 @@
-"""The 1R guide against its scalar equation of motion."""
+"""The 1R guide, compared with its scalar equation of motion."""
 
 import math
 
@@ -44,7 +44,7 @@ def test_accumulating_bounces_end_in_a_resting_contact(rest_speed, when):
     """The bounces accumulate at 0.18034 s; rest begins up to 2 eps v_r/(a (1 - eps)) earlier."""
     guide = scalar(STEEL)
     times, speeds = guide.bounces(-0.01, 0.6, 16)
-    a = guide.g  # In the straight shape only gravity presses.
+    a = guide.g  # Only gravity presses in the straight shape.
     flights = 2 * 0.6 * speeds[-1] / a / (1 - 0.6)  # The remaining flights are parabolas.
     accumulation = times[-1] + flights
     assert accumulation == pytest.approx(0.18034, abs=1e-5)
@@ -77,7 +77,7 @@ def test_infinitely_many_bounces_end_in_rest_without_a_rest_speed():
     ("K_theta", "frequency", "amplitude"),
     [(2.65, 5.74656, 27.574e-3), (2.5449, 5.63145, 28.132e-3)],
 )
-def test_frequency_and_amplitude_of_the_pmma_guide(K_theta, frequency, amplitude):
+def test_the_pmma_guide_has_its_exact_frequency_and_amplitude(K_theta, frequency, amplitude):
     """The closed form, the value in the thesis and the engine agree after a start at 1 m/s."""
     values = PMMA | {"flexure.K_theta": K_theta}
     guide = scalar(values)

@@ -13,8 +13,8 @@ from support import energy_balance, mechanism, simulation
 GUIDE = mechanism("PRBDM2R")
 
 
-def test_rest_position_and_modes_at_rest():
-    """Reference values of the 2R steel structure, given with four digits."""
+def test_rest_position_and_modes_at_rest_equal_their_reference_values():
+    """The values of the 2R steel structure have four digits."""
     system = assemble(GUIDE, GUIDE.values())
     rest = equilibrium(system)
     frame = system.bodies["shuttle"]
@@ -27,7 +27,7 @@ def test_rest_position_and_modes_at_rest():
 
 
 @pytest.mark.parametrize(("model", "f1"), [("PRBDM", 4.726), ("PRBDM2R", 4.624)])
-def test_fundamental_frequency_straight_without_gravity(model, f1):
+def test_frequency_of_the_straight_guide_without_gravity_equals_its_reference_value(model, f1):
     guide = mechanism(model)
     system = assemble(guide, guide.values({"gravity.x": 0.0}))
     assert modes(system, equilibrium(system)).frequency[0] == pytest.approx(f1, abs=1e-3)
@@ -87,7 +87,7 @@ def test_the_gap_is_never_negative(default_run):
 
 
 def test_loops_stay_closed():
-    """To 1e-12 m and 1e-9 m/s, at every output."""
+    """The loop errors are below 1e-12 m and 1e-9 m/s at every output."""
     sim = Simulation(GUIDE)
     n, system = sim.system.n, sim.system
     for t in np.linspace(0, 0.4, 333)[1:]:
@@ -107,8 +107,11 @@ def test_a_change_of_1e_11_m_shifts_the_impacts_by_less_than_a_nanosecond(defaul
     assert max(shifts) < 1e-9
 
 
-def test_momentum_balance_and_energy_loss_at_each_impact(default_run):
-    """M (v+ - v-) = G^T P + Phi_q^T Lambda, energy loss -P (u- + u+)/2, u+ = -eps u-."""
+def test_each_impact_satisfies_the_momentum_balance_and_the_law_of_its_energy_loss(default_run):
+    """M (v+ - v-) = G^T P + Phi_q^T L with the impulses P of the stop and L of the loops.
+
+    The energy loss is -P (u- + u+)/2, and the gap rates are related by u+ = -eps u-.
+    """
     sim, _ = default_run
     system = sim.system
     for impact in sim.record:
@@ -135,24 +138,24 @@ FE = {  # By offset of the hit point [mm]; columns: wall at -10, 0, 10 mm.
 }
 
 
-def algebraic(model, offset, height):
+def algebraic(model, offset, wall):
     guide = mechanism(model)
     system = assemble(guide, guide.values({"gravity.x": 0.0, "stop.offset": offset}))
-    return modal_restitution(system, equilibrium(system, height), 0, 0.6)
+    return modal_restitution(system, equilibrium(system, wall), 0, 0.6)
 
 
 @pytest.mark.parametrize("offset", FE)
 @pytest.mark.parametrize("column", range(3))
-def test_modal_restitution_against_finite_elements(offset, column):
+def test_modal_restitution_agrees_with_finite_elements_within_the_model_error(offset, column):
     """The model error is 0.048: the shuttle of the straight inextensible 2R cannot rotate."""
     found = algebraic("PRBDM2R", offset * 1e-3, (-10e-3, 0.0, 10e-3)[column])
     assert found == pytest.approx(FE[offset][column], abs=0.05)
 
 
-@pytest.mark.parametrize("height", [-0.01, 0.0, 0.005])
-def test_modal_restitution_of_one_degree_of_freedom_is_the_restitution(height):
+@pytest.mark.parametrize("wall", [-0.01, 0.0, 0.005])
+def test_modal_restitution_of_one_degree_of_freedom_is_the_restitution(wall):
     """There is no other mode that could take up energy."""
-    assert algebraic("PRBDM", 0.003, height) == pytest.approx(0.6, abs=1e-12)
+    assert algebraic("PRBDM", 0.003, wall) == pytest.approx(0.6, abs=1e-12)
 
 
 def test_a_simulated_pure_mode_has_the_algebraic_modal_restitution():

@@ -41,9 +41,10 @@ def motions(simulation: Simulation, q, v) -> list[tuple[complex, complex]]:
 
 
 def test_impacts_obey_newtons_law_and_conserve_momentum(default) -> None:
-    """P = (1 + e) g' / (1/m1 + 1/m2), m_i = M_i / cos(phi_i)^2, sin(phi_i) = x_i / r_i.
+    """The impulse is P = (1 + eps) u/(1/m_1 + 1/m_2), with the closing speed u.
 
     A body on a parallel guide moves along a circle of radius r = gamma L; the impulse is along x.
+    The effective mass is m_i = M_i/cos(phi_i)^2 with sin(phi_i) = x_i/r_i.
     """
     hammer, oscillator = guides(default.simulation.values)
     assert len(default.simulation.record) > 10

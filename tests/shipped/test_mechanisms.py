@@ -65,7 +65,7 @@ def test_long_experiments_are_balanced_through_the_first_impact(name: str) -> No
 
 @pytest.mark.parametrize("name", ["Bistable", "Cantilever", "ImpactOscillator", "PRBDM"])
 def test_the_energy_error_decreases_with_the_tolerance(name: str) -> None:
-    """A tolerance of 1e-11 instead of 1e-8 reduces it by a factor above 100."""
+    """A tolerance of 1e-11 instead of 1e-8 reduces the error by a factor above 100."""
     coarse, fine = (run(name, stop_time=0.1, step=5e-3, tolerance=x) for x in (1e-8, 1e-11))
     assert fine.imbalance < 0.01 * coarse.imbalance
 
@@ -80,7 +80,7 @@ def test_dissipated_energy_never_decreases(name: str) -> None:
 
 
 def test_stiffness_of_the_3r_guide_is_that_of_its_pivots() -> None:
-    """Small deflection: two flexures in parallel, of compliance sum (x_i - L/2)^2 / K_i each.
+    """For small deflections each of its two flexures has the compliance sum (x_i - L/2)^2 / K_i.
 
     The model error against 12 EI/L^3 is -2.2 %.
     """

@@ -321,7 +321,7 @@ def host_fmu(model: str, fmi: int) -> Path:
 
 @cache
 def native(model: str, fmi: int, platform: str = "host") -> Path:
-    """Return the folder of an unpacked native FMU; the FMU is ``with_suffix(".fmu")``."""
+    """Return the folder of an unpacked native FMU; the FMU is beside it, with the suffix .fmu."""
     name = f"{model}-{fmi}-{platform}"
 
     def make(path: Path) -> None:

@@ -15,7 +15,10 @@ from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Intege
 
 
 class Integrator(Fmi2Slave):
-    """value' = gain * rate, the rate being held; value(0) = start + passed * rate."""
+    """value' = gain * rate with the rate at the beginning of each step.
+
+    value(0) = start + passed * rate.  The first ``skipped`` steps, or all if ``off``, do nothing.
+    """
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

@@ -53,7 +53,7 @@ def guide(values, elements: int) -> ElementGuide:
     cable = item.ObjectANCFCable2D(
         massPerLength=rho * b * h, bendingStiffness=E * b * h**3 / 12, axialStiffness=E * b * h
     )
-    # The frame of a cable has its x axis along the cable: the shuttle's frame turned by 90 degrees.
+    # The x axis of a cable is along it: its frame is that of the shuttle, turned by 90 degrees.
     upright = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     for x in (0.0, W):
         line = GenerateBeamElementsAlongLine(

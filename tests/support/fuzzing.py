@@ -34,7 +34,7 @@ from prbm.mechanics.independent import independent
 from shared import once
 
 SANITIZERS = (
-    "-O0",  # Compiles in seconds; with optimization it takes a minute.
+    "-O0",  # The compilation takes seconds; with optimization a minute.
     "-g",
     "-fno-omit-frame-pointer",
     "-fsanitize=address,undefined,float-cast-overflow",
@@ -51,7 +51,7 @@ SEED_COUNT = 20  # Initial sequences of libFuzzer.
 SEQUENCE_BYTES_MAX = 4096  # Bytes that choose the calls of one sequence.
 INPUT_SECONDS_MAX = 20  # libFuzzer counts a slower input as a failure.
 MEMORY_MAX = 2048  # MB
-TIMEOUT_MARGIN = 120.0  # s beyond the time of a search, after which it is stopped.
+TIMEOUT_MARGIN = 120.0  # s; a search that runs this much too long is stopped.
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def fuzz_tables(folder: Path, seconds: float, seed: int) -> Found:
         content = (native(model, 3) / "resources" / "mechanism.bin").read_bytes()
         seeds.append(corpus / f"{model}.bin")
         seeds[-1].write_bytes(content)
-    whole = elastic()  # Has parts that the other models lack: a joint, a bar, a chain.
+    whole = elastic()  # It has parts that the other models lack: a joint, a bar, a chain.
     seeds.append(corpus / f"{whole.name}.bin")
     seeds[-1].write_bytes(tables(whole, (), "token", independent(whole)))
     target = _target("tables")

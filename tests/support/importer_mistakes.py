@@ -16,12 +16,12 @@ AT_START = {
 }
 LATER = {
     "a fixed parameter": ("shuttle.mass", 0.1, "shuttle.mass = 0.1 kg rejected: the parameter is"),
-    "a tunable one": ("stop.restitution", -0.1, "stop.restitution = -0.1 must be at least 0"),
+    "a tunable parameter": ("stop.restitution", -0.1, "stop.restitution = -0.1 must be at least 0"),
     "a NaN input": ("force.x", NAN, "force.x = nan"),
     "an infinite input": ("base.acceleration.x", INF, "base.acceleration.x = inf"),
 }
 STEPS = {
-    "no step": (1e-3, 0.0, "communicationStepSize = 0 s must be positive"),
+    "a step of zero": (1e-3, 0.0, "communicationStepSize = 0 s must be positive"),
     "a step backwards": (1e-3, -1e-3, "communicationStepSize = -0.001 s must be positive"),
     "time running backwards": (0.0, 1e-3, "the last step ended at t = 0.001 s"),
     "a jump forwards": (0.5, 1e-3, "the last step ended at t = 0.001 s"),

@@ -25,7 +25,7 @@ from prbm.mechanism.description import Mechanism
 KERNEL = Path(prbm.kernel.__file__).parent
 FLAGS = (
     "-std=c99", "-O2", "-fPIC", "-shared", "-ffp-contract=off", "-DPRBM=", f"-I{KERNEL}",
-    "-Wl,-Bsymbolic",  # Calls within the library never resolve to another library's function.
+    "-Wl,-Bsymbolic",  # Calls within the library use its own functions.
 )  # fmt: skip
 WORKING_MEMORY = 1 << 16  # Doubles.
 
@@ -46,7 +46,7 @@ DTYPES = {
 }
 
 
-ENUMERATIONS = ("ContactMode",)  # of which functions and structures have values
+ENUMERATIONS = ("ContactMode",)  # Types of arguments and members.
 SCALARS |= dict.fromkeys(ENUMERATIONS, ctypes.c_int)
 DTYPES |= dict.fromkeys(ENUMERATIONS, np.int32)
 

@@ -18,7 +18,7 @@ from prbm.mechanism.description import Mechanism
 from shared import once
 
 DOUBLE, POINTER, BOOL, INT = ctypes.c_double, ctypes.c_void_p, ctypes.c_bool, ctypes.c_int
-SENTENCE = 640
+SENTENCE = 640  # Bytes of an error message.
 FUNCTIONS = {
     "simulation_set": (BOOL, POINTER, INT, DOUBLE, POINTER),
     "simulation_get": (BOOL, POINTER, INT, POINTER, POINTER),
@@ -55,7 +55,7 @@ class KernelMistake(Exception):
 
 
 Changes = tuple[tuple[str, str, str], ...]
-"""Files of the kernel, texts in them, and the texts in their place."""
+"""For each change of the kernel: the file, a text in it, and its replacement."""
 
 
 def _compile(folder: Path, changes: Changes = ()) -> None:
@@ -93,9 +93,9 @@ class KernelSimulation:
     values : dict
         Parameters and inputs that differ from their defaults.
     exchange : bool
-        Whether somebody else integrates.
+        Whether the simulation is for model exchange.
     changes : tuple
-        Of the sources of the kernel.
+        Changes of the sources of the kernel.
     """
 
     def __init__(

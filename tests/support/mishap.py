@@ -11,7 +11,10 @@ FINE, RAISES, CRASHES, EXITS, HANGS, CRASHES_ONCE, KILLS_WORKER = range(7)
 
 
 class Mishap(Fmi2Slave):
-    """y = x t, or a failure in the first step; each run appends x to the file MISHAP_LOG."""
+    """y = x t, or a failure in the first step.
+
+    Each run appends x to the file whose path is in the environment variable MISHAP_LOG.
+    """
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)

@@ -50,7 +50,7 @@ def newton(engine, rng):
     """Return the violation of the laws of a frictionless impact of up to eight stops."""
     k = int(rng.integers(2, 9))
     W, u = drawn(rng, k, k)
-    u[rng.uniform(size=k) < 0.1] *= 1e-14  # Closed stops, with a rate of round-off.
+    u[rng.uniform(size=k) < 0.1] *= 1e-14  # Closed stops: their rate is round-off.
     eps, P = rng.uniform(0, 1, k), np.zeros(k)
     if engine == "kernel":
         kernel().newton(k, W, u, eps, 0.0, P)
@@ -116,7 +116,7 @@ def gain(W, u, P):
 
 
 def friction_violation(W, u, mu, P):
-    """Return the largest violation of contact, friction cone and energy, over the largest rate."""
+    """Return the largest violation of contact, cone or energy, divided by the largest rate."""
     k = len(mu)
     after, scale = u + W @ P, np.abs(u).max()
     excess = (np.abs(P[k:]) - mu * P[:k]) * np.diag(W)[k:]

@@ -7,7 +7,7 @@ chance::
     @given(mechanisms())                    # hypothesis
     def test_...(mechanism): ...
 
-    mechanism = seeded(7)                   # the same one each time
+    mechanism = seeded(7)                   # the same mechanism each time
 """
 
 import math
@@ -42,7 +42,7 @@ from prbm.mechanism.parts import (
 Choose = Callable[[Sequence], object]
 """Function that picks an element of a sequence; the first element is the simplest."""
 
-CELL = 0.06  # m; bodies lie on a lattice of this size, shifted by up to a fifth of it.
+CELL = 0.06  # m; bodies are within a fifth of this length of the points of a lattice.
 MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 1), ("nR", 2), ("nR", 4))
 ENDS = ((CLAMP, CLAMP), (CLAMP, PIN), (PIN, CLAMP), (CLAMP, FREE), (FREE, CLAMP), (PIN, PIN))
 RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # Axial modes of some hundred Hz.
@@ -124,9 +124,9 @@ def build(
     friction: bool = True,
     damping: bool = True,
 ) -> Mechanism:
-    """Return a mechanism with limited numbers of parts; it may be over-constrained.
+    """Return a mechanism, which may be over-constrained.
 
-    ``bodies``, ``loops`` and ``stops`` are the largest numbers.
+    ``bodies``, ``loops`` and ``stops`` are the largest numbers of these parts.
     """
     b = _Builder(choose, rng)
     for _ in range(choose((1, 2, 3))):
@@ -209,7 +209,7 @@ def assembles(mechanism: Mechanism) -> bool:
 
 
 def starts(mechanism: Mechanism) -> bool:
-    """Return whether a simulation can start, outside of all walls, and the release can move."""
+    """Return whether a simulation can start and the released body can move along its release."""
     try:
         sim = Simulation(mechanism)
     except (EquilibriumError, ParameterError):

@@ -71,7 +71,7 @@ def measured(root: Path = ROOT, folders: Iterable[str] = FOLDERS) -> Sizes:
 
 
 def python_classes(text: str, place: str) -> Iterator[Size]:
-    """Yield the classes of a Python file with their numbers of methods."""
+    """Yield the classes of a Python file and the number of methods of each."""
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ClassDef):
             count = sum(isinstance(x, ast.FunctionDef | ast.AsyncFunctionDef) for x in node.body)

@@ -40,7 +40,7 @@ IMPACT_END_TIMES = {
     "Bistable": 0.09, "Cantilever": 0.24, "FoldedSuspension": 0.135, "ImpactOscillator": 0.12,
     "PRBDM2RAxial": 0.045, "PRBDM3R": 0.048,
 }  # fmt: skip
-"""Times [s] by which the default experiment has had an impact, if not 0.3 s."""
+"""Times [s] before which the default experiment has an impact; 0.3 s for other mechanisms."""
 
 QUICK_MODELS = (*GUIDES, "ImpactOscillator")
 """Mechanisms checked by default: the guides, and one with a stop fixed to a moving body.
@@ -69,7 +69,7 @@ def selected(keep) -> list:
 class Case:
     """The data of a shipped mechanism for tests that run for each of them.
 
-    ``end`` is a time [s] by which the default experiment has had an impact, if it has any.
+    ``end`` is a time [s] before which the default experiment has an impact, if it has any.
     """
 
     mechanism: Mechanism
@@ -188,7 +188,7 @@ def around_first_impact(name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def energy_balance(out) -> float:
-    """Return kinetic + elastic + gravitational + dissipated energy - work [J]; it is constant."""
+    """Return kinetic + elastic + gravitational + dissipated energy - work [J], a constant."""
     kept = ("kinetic", "elastic", "gravitational", "dissipated")
     return sum(out[f"energy.{name}"] for name in kept) - out["energy.work"]
 
@@ -270,10 +270,7 @@ class ScalarGuide(scalar_guide.ScalarGuide):
         return np.array(times), np.array(speeds)
 
     def period(self, speed: float) -> float:
-        """Return the period [s] after a start from the straight shape at a speed along x [m/s].
-
-        It is valid without gravity.
-        """
+        """Return the period without gravity [s], from the speed at the straight shape [m/s]."""
         amplitude = self.turning(0.5 * self.mass * speed**2, 0.0, 1.5)
         return 4 * self.time(amplitude, 0.0)
 

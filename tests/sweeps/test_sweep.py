@@ -45,7 +45,7 @@ def _elsewhere(tmp_path, monkeypatch):
 
 @pytest.fixture(scope="session")
 def mishap(tmp_path_factory) -> Path:
-    """Return an FMU that fails, crashes or hangs as its inputs say."""
+    """Return an FMU that fails, crashes or hangs as its parameter ``trouble`` selects."""
     script = SUPPORT / "mishap.py"
     return FmuBuilder.build_FMU(script, dest=tmp_path_factory.mktemp("mishap"))
 
@@ -139,7 +139,7 @@ def test_defaults_without_a_default_experiment_are_one_second_and_all_outputs(mi
 
 
 def test_reductions_match_a_closed_form():
-    """X = t (2 - t) on [0, 2]: maximum 1, mean 2/3, x > 0.75 within (0.5, 1.5)."""
+    """The curve x = t (2 - t) on [0, 2] has maximum 1, mean 2/3, and x > 0.75 in (0.5, 1.5)."""
     t = np.concatenate((np.linspace(0.0, 1.0, 2001), np.linspace(1.0, 2.0, 501)[1:]))
     x = t * (2.0 - t)
 
@@ -148,7 +148,7 @@ def test_reductions_match_a_closed_form():
 
     assert of("x") == of("final(x)") == 0.0
     assert (of("max(x)"), of("min(x)")) == (1.0, 0.0)
-    assert of("mean(x)") == pytest.approx(2 / 3, abs=2e-3**2 / 6)  # the trapezoidal rule's error
+    assert of("mean(x)") == pytest.approx(2 / 3, abs=2e-3**2 / 6)  # error of the trapezoidal rule
     assert of("first(x > 0.75)") == pytest.approx(0.5, abs=1e-3)  # a step is 5e-4 here
     assert of("since(x < 0.75)") == pytest.approx(1.5, abs=2.5e-3)  # a step is 2e-3 here
     assert of("since(x <= 1)") == 0.0
@@ -300,7 +300,7 @@ def test_a_stopped_sweep_reports_the_number_of_stored_runs(mishap, log):
 
 
 def test_a_second_sweep_into_the_same_folder_is_rejected(mishap, log):
-    """It repeats no run, keeps the drafts of the first one and names its process."""
+    """The second sweep repeats no run, keeps drafts of the first, and names the first's process."""
     LONG.to_csv("table.csv", index=False)
     process = started(mishap, 3)
     draft = Path("results.parquet/_part.draft")
@@ -342,7 +342,7 @@ def test_only_added_rows_are_computed(mishap, log):
 
 
 def test_results_of_another_sweep_are_rejected_or_replaced(mishap, log, native):
-    """Another step, output, value, table or FMU; an error leaves the results unchanged."""
+    """The second sweep has another step, output, value, table or FMU; no result is changed."""
     table = pd.DataFrame({"x": [1.0, 2.0]})
     sweep(mishap, table, step=0.5, workers=1)
     for change, message in (
@@ -384,7 +384,7 @@ def test_a_damaged_part_is_reported(mishap, log):
 
 
 def test_a_scheduler_by_address_gives_the_same_results(native, mishap, log):
-    """One worker with two threads; the plugin is removed afterwards."""
+    """The scheduler has a worker with two threads; the plugin is removed afterwards."""
     options = {"outputs": OUTPUTS, "stop_time": 0.05}
     here = sweep(native["PRBDM2R", 2], GRID, "here.parquet", **options)
     with cluster(threads_per_worker=2) as there:
@@ -497,7 +497,7 @@ def test_a_file_name_is_rejected_for_the_folder_of_the_results(native, capsys, n
     assert list(Path().iterdir()) == []
 
 
-def test_integers_are_checked(mishap):
+def test_values_of_an_integer_variable_must_be_whole_numbers(mishap):
     with pytest.raises(ParameterError, match=r"trouble = 0\.5 must be a whole number \(Integer\)"):
         sweep(mishap, pd.DataFrame({"trouble": [0, 0.5]}))
     with pytest.raises(ParameterError, match=r"trouble = 3e\+09 must be a whole number"):

@@ -1,4 +1,4 @@
-"""The co-simulation master: schemes against closed forms, events against FMPy, error messages."""
+"""The co-simulation master: schemes with closed forms, events as in FMPy, error messages."""
 
 import gc
 import math
@@ -34,7 +34,7 @@ def circle(scheme):
 
 
 def test_jacobi_is_explicit_euler():
-    """(a + i b) -> (1 - i h)(a + i b), so that the circle grows by (1 + h^2)^(n/2)."""
+    """A step multiplies a + i b by 1 - i h, so that the circle grows by (1 + h^2)^(n/2)."""
     time, a, b = circle(JACOBI)
     np.testing.assert_allclose(time, H * np.arange(STEPS + 1), rtol=1e-15)
     np.testing.assert_allclose(a + 1j * b, (1 - 1j * H) ** np.arange(STEPS + 1), rtol=1e-12)
@@ -45,7 +45,7 @@ def test_gauss_seidel_is_symplectic_euler():
     _, a, b = circle(GAUSS_SEIDEL)
     np.testing.assert_allclose(a**2 + b**2 + H * a * b, 1.0, rtol=1e-12)
     assert a[1] == 1.0
-    assert b[1] == -H  # computed with the new a
+    assert b[1] == -H  # The second FMU uses the new output a[1] = 1.
 
 
 def test_outputs_reach_inputs_in_initialization_mode():
@@ -109,7 +109,7 @@ def impacts(found, prefix):
 
 
 def test_all_instances_stop_at_the_time_of_an_event():
-    """The shortened steps add up to the time, and there are rows at the impacts."""
+    """The integral of 1 equals the time; each impact has a row before it and one after it."""
     fmus = {"clock": integrator(), "guide": guide(3)}
     record = ["clock.value", *(f"guide.{name}" for name in IMPACTS)]
     found = simulate(fmus, {}, 0.2, 0.01, {"clock.rate": 1.0}, record, events=True)
@@ -117,7 +117,7 @@ def test_all_instances_stop_at_the_time_of_an_event():
     new = np.flatnonzero(np.diff(found["guide.stop.impact_count"], prepend=0))
     assert len(new) >= 2
     assert (found["time"][new] == found["guide.stop.impact_time"][new]).all()
-    assert (found["time"][new] == found["time"][new - 1]).all()  # one row before, one after
+    assert (found["time"][new] == found["time"][new - 1]).all()
     assert (
         found["guide.stop.impact_count"][new - 1] == found["guide.stop.impact_count"][new] - 1
     ).all()
@@ -159,7 +159,7 @@ def test_a_discrete_input_may_be_connected(events):
     expected = pushed["guide.shuttle.vx"][-1]
     assert found["guide.shuttle.vx"][-1] == pytest.approx(
         expected, rel=0.01
-    )  # half a step of 200: 0.5 %
+    )  # The impulse is exchanged in 200 parts.
 
 
 @pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
@@ -188,7 +188,10 @@ def test_an_impulse_reaches_the_partner_at_the_time_of_the_impact(scheme):
 
 @pytest.mark.parametrize("scheme", [GAUSS_SEIDEL, JACOBI])
 def test_two_unconnected_guides_with_events_move_as_each_does_alone(scheme):
-    """At an event of one the other is restored and repeats the step, to the FMUs' tolerance."""
+    """At an event of one guide the other is restored and steps to the event.
+
+    The times agree to the tolerance of the FMUs.
+    """
     fmus = {"one": guide(3), "other": guide(3)}
     values = {"one.stop.restitution": 0.6, "other.stop.restitution": 0.5}
     record = [f"{name}.{x}" for name in fmus for x in IMPACTS]
@@ -286,7 +289,7 @@ def test_enumerations_are_integers_and_strings_are_strings(tmp_path):
 
 @pytest.mark.parametrize("library", [None, b"damaged"])
 def test_an_fmu_that_cannot_be_loaded_is_reported(library, tmp_path):
-    """Without a library for this platform, or with a damaged one; the working directory is kept."""
+    """The library for this platform is missing or damaged; the working directory is kept."""
     here, path = Path.cwd(), tmp_path / "x.fmu"
     with zipfile.ZipFile(guide(3)) as whole, zipfile.ZipFile(path, "w") as part:
         for name in whole.namelist():

@@ -42,7 +42,10 @@ def monolith(end, start=START, wall=1e-30, **options):
 @pytest.mark.fmu
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_model_and_partner_move_as_the_scalar_equation(fmi):
-    """Two impacts; the tolerances are the error of the reference, RK4 with steps of 0.05 ms."""
+    """There are two impacts.
+
+    The tolerances are the error of the reference, RK4 with steps of 0.05 ms.
+    """
     found = simulate(guide(fmi), partner, [0.0], END, 1e-3, START, SEEN, RECORD)
     one = monolith(END, substep=5e-5)
     last = found[-1]
@@ -110,7 +113,7 @@ def test_an_fmu_without_model_exchange_is_rejected():
 
 
 def test_scalar_guide_bounces_at_the_times_found_by_quadrature():
-    """Times and speeds of the steel guide under gravity, from energy and quadrature, to 1e-8."""
+    """Times of impacts of the steel guide under gravity agree to 1e-8, speeds to 1e-7."""
     values = mechanism("PRBDM").values({"damping.beta": 0.0, "release.displacement": -0.01})
     body = ScalarGuide.of(values, [1e-30])
     one = Monolith(body, lambda t, x, v, z: 9.81 * body.mass, x=-0.01, substep=2e-5)
@@ -131,7 +134,7 @@ def test_scalar_guide_converges_with_order_four_across_an_impact():
 
 
 def test_scalar_guide_swings_at_its_frequency():
-    """A small vibration about the straight shape, after a tenth of the period: x = x0 cos(w t)."""
+    """After a tenth of the period of a small vibration, x = x0 cos(w t) with w = 2 pi f."""
     values = mechanism("PRBDM").values({"damping.beta": 0.0})
     body = ScalarGuide.of(values)
     one = Monolith(body, lambda t, x, v, z: 0.0, x=1e-6, substep=1e-4)

@@ -52,8 +52,8 @@ def ours() -> np.ndarray:
     return cosimulation.simulate(fmus(), WIRES, STOP, STEP, VALUES, watched, JACOBI)
 
 
-def test_description_is_valid(package):
-    """The description matches the schema of SSP 1.0, and its parameter sets match theirs."""
+def test_the_description_of_a_package_is_valid(package):
+    """The system structure and the parameter sets match the schemas of SSP 1.0."""
     with zipfile.ZipFile(package) as archive:
         root = etree.fromstring(archive.read("SystemStructure.ssd"))
     etree.XMLSchema(etree.parse(SCHEMAS / "SystemStructureDescription.xsd")).assertValid(
@@ -93,7 +93,7 @@ def test_equal_systems_give_equal_bytes(package, tmp_path):
 
 
 def test_fmpy_runs_the_package_as_our_master_does(package, ours):
-    """Equal to rounding, since FMPy sums its steps."""
+    """The results are equal to rounding: FMPy adds up its steps."""
     found = ssp.simulate(package, STOP, STEP)
     assert ours["follower.stop.impact_count"][-1] >= 2
     np.testing.assert_allclose(found["time"], ours["time"][1:], rtol=1e-12)
@@ -127,7 +127,7 @@ def slow(*values):
 
 @pytest.mark.parametrize(("outer", "inner"), [(2, 2), (3, 3), slow(3, 2), slow(2, 3)])
 def test_container_moves_as_in_our_master(outer, inner, ours, tmp_path):
-    """A valid FMU of either version, with FMUs of either version inside."""
+    """The container is a valid FMU of either version, with FMUs of either version inside."""
     path = tmp_path / "walls.fmu"
     shown = ["follower.shuttle.x", "follower.stop.impact_count"]
     container(path, fmus(inner), WIRES, STEP, VALUES, shown, outer, STOP)
@@ -232,7 +232,7 @@ def test_a_package_of_fmi_3_is_rejected(tmp_path):
 
 
 def test_systems_that_fmpy_would_simulate_wrongly_are_rejected(package, tmp_path):
-    """A shorter last step; instance names of which one begins with the other."""
+    """The last step is shorter, or the name of an instance begins with that of another one."""
     with pytest.raises(CouplingError, match=r"stop_time = 1 s: FMPy needs a multiple of step = 0"):
         ssp.simulate(package, 1.0, 0.3)
     path = tmp_path / "names.ssp"

@@ -111,7 +111,7 @@ def test_verdicts_of_the_page_follow_from_its_numbers():
                 continue
             limit = float(NUMBER.findall(cells[5])[0])
             off = abs(float(NUMBER.findall(cells[4])[0]))
-            if abs(off / limit - 1) > 0.02:  # else the digits do not suffice
+            if abs(off / limit - 1) > 0.02:  # Otherwise rounding may hide the verdict.
                 assert (off < limit) == (not cells[5].startswith("**not**")), cells
         verdict = rows(row)[0][-1]
         expected = "agrees" if kept == len(claims) else f"agrees in {kept} of {len(claims)}"
@@ -128,7 +128,7 @@ def test_the_amplitude_of_a_1r_is_compared_with_the_closed_form_of_the_same_mode
 
 
 def test_both_modes_of_each_pair_are_on_the_page():
-    """The frequencies of both modes, also of the one that is further from the printed value."""
+    """The mode that is further from the printed value is not left out."""
     found = [float(cells[2]) for cells in rows(parts(PAGE, "figure-6-5")[1])[1:5]]
     assert found == pytest.approx([107.24, 104.96, 202.7, 198.11], abs=0.02)
 

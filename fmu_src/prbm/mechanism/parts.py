@@ -235,7 +235,7 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
     },
     Stop: {
         "position": _meta(
-            "m", "Displacement of the hit point from the straight shape at which it touches",
+            "m", "Displacement of the hit point at contact, from the straight shape",
             -LENGTH_MAX, LENGTH_MAX, 1e-2, tunable=True,
         ),
         "offset": _meta(

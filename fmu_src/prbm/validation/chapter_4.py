@@ -125,7 +125,7 @@ def table_4_1(_: Progress) -> Result:
         "Figures 4.1 and 4.2, table 4.1",
         "free vibration of the PMMA guide, K_Θ = 2.65",
         numbers,
-        "The MATLAB row of the table repeats the values of the ANSYS row, but its printed errors "
+        "The MATLAB row of the table repeats the values of the ANSYS row. Its printed errors "
         "belong to other values, which our 1R model meets to 0.6 %. The errors of the two COMSOL "
         "rows are swapped. The frequency of the 1R is 1.9 % above that of both finite-element "
         "programs, since K_Θ = 2.65 holds for an end force without an end moment.",
@@ -182,12 +182,13 @@ def k_theta(_: Progress) -> Result:
         numbers,
         "The small-motion frequency, the frequency at 1 m/s and the whole response all give 2.545 "
         "± 0.01. The angle of the 1R guide without gravity is exactly harmonic, so that its "
-        "frequency does not depend on the amplitude; that of the elements hardly does.",
+        "frequency does not depend on the amplitude; the frequency of the elements hardly depends "
+        "on it.",
         """Two effects explain the remaining difference between 2.545 and our 2.551. The beams of
 ANSYS have shear and rotary inertia, the cables of our elements do not. And the least squares of the
-thesis compromise between amplitude and frequency. One K_Θ does not fit both guides: gravity
-deflects the steel guide by a quarter of its length, which stiffens it more than the 1R, so that the
-steel guide at rest needs 2.586.""",
+thesis compromise between amplitude and frequency. One K_Θ does not fit both guides. Gravity
+deflects the steel guide by a quarter of its length. This stiffens the guide more than its 1R model,
+so that the steel guide at rest needs 2.586.""",
     )
 
 

@@ -327,8 +327,8 @@ def figure_5_6(progress: Progress) -> Result:
         "impact on the centre of mass: the fitted restitution",
         numbers,
         "At straight flexures the fitted restitution is that of the contact, less the share of "
-        "the flexures, which the impact does not stop: 0.59 to 0.60 for a contact with 0.6. The "
-        "synthetic record replaces the experiment: 2R with stretching flexures, 750 Hz, 4 µm.",
+        "the flexures, which the impact does not stop. It is 0.59 to 0.60 for a contact with 0.6. "
+        "The synthetic record replaces the experiment: 2R with stretching flexures, 750 Hz, 4 µm.",
         "",
         (
             Drawing(

@@ -29,6 +29,7 @@ class ValidationError(PrbmError, ValueError):
 # --- the page -----------------------------------------------------------------------------------
 
 HEAD = """# The results of the thesis, reproduced
+[Index](index.md) · [Glossary](glossary.md)
 
 This page compares results of the thesis (S. Boersma, *Modelling and Validation of the Impact
 Response in Compliant Mechanisms*, MSc thesis, TU Delft, 2015) with those of this package. The
@@ -42,15 +43,15 @@ columns are:
 - *difference*: computed less printed value, or less the reference if no value is printed;
 - *verdict*: the claimed limit of the difference, and whether the difference is within it. Numbers
   without a limit are for information. The summary counts the claims that hold. Each section
-  explains those that do not, or says that the cause is unknown.
+  explains claims that do not hold, or says that the cause is unknown.
 
 `prbm validate --out docs` computes every number and figure of this page in a few minutes. The tests
 repeat the computation and compare the numbers.
 
 The measured records of the thesis are not public. Synthetic records with the noise of its sensors
 (laser 4 µm at 750 Hz, load cell 0 to 0.5 N) replace them, and show the accuracy of each evaluation.
-Its curves are available as pictures only; for these the statements of its text are compared. Two
-errors of the thesis are shown with its own algorithm, derived again in
+The curves of the thesis are available as pictures only; the statements of its text are compared
+instead. Two errors of the thesis are shown with its own algorithm, derived again in
 `prbm.references.source_model`: the extra factor γ of the 2R stiffness, and the missing right side
 of the acceleration constraint.
 """

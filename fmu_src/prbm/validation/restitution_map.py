@@ -107,8 +107,8 @@ def _discussion(maps: Sequence[ImpactMap]) -> str:
     return (
         "The thesis measured three trends: the restitution is highest near the centre of mass, "
         'higher on the side of the base, and much lower at the wall at "-10 mm". The table has '
-        "the last two for each map, as means of C(-d) - C(d) over offsets d and of C(-h) - C(h) "
-        "over walls h:\n\n" + "\n".join(rows) + "\n\n"
+        "the second and the third trend for each map, as means of C(-d) - C(d) over offsets d and "
+        "of C(-h) - C(h) over walls h:\n\n" + "\n".join(rows) + "\n\n"
         "- *Offset.* In every map the restitution is lowest off the centre of mass. The two sides "
         f"differ by {sides:.3f} at most, with either sign. No map shows the trend towards the "
         "base. All maps assume Newton's law of a rigid impact, finite elements included. With a "
@@ -116,13 +116,13 @@ def _discussion(maps: Sequence[ImpactMap]) -> str:
         "straight flexures it is smaller than in these maps at 0.1 ms, and vanishes for contacts "
         "longer than 0.2 ms.\n"
         "- *Wall.* The restitution of a pure mode is the same on both sides, because the path is "
-        "symmetric, and that of a first impact nearly so. The fitted restitution is not. A guide "
-        "that has passed its straight shape (h > 0, in the direction of gravity) rebounds towards "
-        "it. There the other modes become stiffer and take energy from the fundamental mode, "
-        "which lowers the fitted restitution. This is the trend of the thesis if its positions "
-        'count upwards: its "-10 mm" is then +10 mm along gravity, where the velocity points into '
-        "the buckling direction of the flexures (its section 8.2.1). If its -10 mm is a wall "
-        "before the straight shape, the sign is opposite.\n"
+        "symmetric. That of a first impact is nearly the same on both sides, the fitted "
+        "restitution is not. A guide that has passed its straight shape (h > 0, in the direction "
+        "of gravity) rebounds towards it. There the other modes become stiffer and take energy "
+        "from the fundamental mode, which lowers the fitted restitution. This is the trend of "
+        'the thesis if its positions count upwards. Its "-10 mm" is then +10 mm along gravity, '
+        "where the velocity points into the buckling direction of the flexures (its section "
+        "8.2.1). If its -10 mm is a wall before the straight shape, the sign is opposite.\n"
         "- *Accuracy.* The first impact of the elements converges as stated in the table. With a "
         "spectral radius of 0.9 instead of 0.5 the waves in the flexures after an impact grow in "
         "some of these runs until the results are wrong. The fits include 50 ms after the first "
@@ -202,7 +202,7 @@ def figure_5_7(progress: Progress) -> Result:
         "1R is constant. A released guide of elements arrives nearly in the fundamental mode. The "
         "other modes of the 2R are 11 % too slow and arrive with another phase, which changes its "
         "restitution by up to 0.05. A 1R fitted to a response estimates a third quantity. It is "
-        "the only one with the asymmetry between the walls that the thesis found. None has the "
+        "the only one with the asymmetry between the walls that the thesis found. No map has the "
         "trend of the thesis towards the base.",
         _discussion(every),
         (

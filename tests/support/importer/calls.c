@@ -22,7 +22,8 @@ typedef struct {
     Source *source;
     Instance instance; /* receives the messages */
     void *component;
-    bool exchange, with_events, wild;
+    bool exchange, with_events;
+    bool wild; /* random values were accepted: the steps are tiny */
     Mode mode;
     double time;
     void *states[STATES];
@@ -161,7 +162,7 @@ static size_t around(Fuzz *fuzz, size_t count) {
     return choice == 0 ? count + 1 : choice == 1 && count ? count - 1 : choice == 2 ? 0 : count;
 }
 
-/* The steps are tiny if random values were accepted: a very fast motion would take too long. */
+/* A step size; tiny if random values were accepted, because the motion may be very fast then. */
 static double step_size(Fuzz *fuzz) {
     if (once_in(fuzz, 25)) {
         static const double choices[] = {0.0, -1e-3, 1e-300, NAN, INFINITY, -INFINITY};
@@ -280,7 +281,7 @@ static double tolerance(Fuzz *fuzz) {
     return once_in(fuzz, 5) ? absurd(fuzz) : 1e-6;
 }
 
-/* A very small tolerance makes the simulation slow: the steps are tiny then. */
+/* With a very small tolerance, the steps are tiny too: the simulation would take too long. */
 static void enter_initialization(Fuzz *fuzz) {
     bool tolerant = once_in(fuzz, 2), stops = once_in(fuzz, 2);
     double wanted = tolerance(fuzz), start = fuzz->time, stop = number(fuzz);
@@ -670,9 +671,9 @@ static void forget(Fuzz *fuzz) {
 
 static void serialize(Fuzz *fuzz) {
     void *c = component(fuzz), *state = fuzz->states[below(fuzz, STATES)];
-    size_t size = 0, *told = once_in(fuzz, 30) ? NULL : &size;
-    (void)(fuzz->job->version == 2 ? (int)F2->SerializedFMUstateSize(c, state, told)
-                                   : (int)F3->SerializedFMUStateSize(c, state, told));
+    size_t size = 0, *address = once_in(fuzz, 30) ? NULL : &size;
+    (void)(fuzz->job->version == 2 ? (int)F2->SerializedFMUstateSize(c, state, address)
+                                   : (int)F3->SerializedFMUStateSize(c, state, address));
     size = around(fuzz, size < 1 << 24 ? size : 0);
     free(fuzz->bytes);
     fuzz->byte_count = size;

@@ -111,7 +111,7 @@ typedef struct {
     Functions3 f3;
 } Library;
 
-/* Load a library and all functions of a version of FMI.  Missing ones are printed to stderr. */
+/* Load a library and all functions of a version of FMI.  Missing functions are printed to stderr. */
 bool library_open(Library *library, const char *path, int version);
 void library_close(Library *library);
 

@@ -23,8 +23,6 @@
 #include <io.h>
 #include <windows.h>
 
-/* The function seconds() returns the CPU time of this process. */
-
 typedef HANDLE Thread;
 #define THREAD_FUNCTION DWORD WINAPI
 #define THREAD_RESULT 0
@@ -39,6 +37,7 @@ static void thread_join(Thread thread) {
     CloseHandle(thread);
 }
 
+/* Return the CPU time of this process [s]. */
 static double seconds(void) {
     FILETIME created, ended, kernel, user;
     GetProcessTimes(GetCurrentProcess(), &created, &ended, &kernel, &user);
@@ -65,6 +64,7 @@ static void thread_join(Thread thread) {
     pthread_join(thread, NULL);
 }
 
+/* Return the CPU time of this process [s]. */
 static double seconds(void) {
     struct timespec now;
     clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
