@@ -232,7 +232,7 @@ SINGULAR = (
 
 
 def test_eigenvalues_without_convergence_are_rejected():
-    with pytest.raises(KernelMistake, match="the eigenvalues of a matrix were not found"):
+    with pytest.raises(KernelMistake, match="the eigenvalues of a matrix did not converge"):
         KernelSimulation(mechanism("PRBDM2R"), changes=(SWEEPS,))
 
 

@@ -1,4 +1,4 @@
-"""Guards: the scalars whose fall through zero is an event, and where in a step they fall.
+"""Guards: scalars whose fall through zero is an event, and the location of their zeros in a step.
 
 A guard z(equations, contact, t, y) is positive before its event.  Each detection function looks
 at a step and returns the time at which the guard of one contact falls through zero, or None.
@@ -47,7 +47,7 @@ def stop_force(equations: Equations, stop: int, t: float, y: Real) -> float:
 
 
 def friction_margin(equations: Equations, contact: int, t: float, y: Real) -> float:
-    """Return the friction that is left before a sticking contact slips [N]."""
+    """Return the limit of friction minus the friction force of a sticking contact [N]."""
     n = equations.n
     e = equations.system.directions(y[:n])
     return _friction_margin(equations, contact, e, equations.evaluate(t, y[:n], y[n : 2 * n]))
@@ -81,13 +81,13 @@ class Looks:
     Parameters
     ----------
     scales : Scales
-        Of the mechanism.
+        Scales of the mechanism.
     equations : Equations
-        That hold in the step.
+        Equations of motion in the step.
     arc : Arc
         The step.
     forces : (stages, r)
-        Constraint forces of its stages but the first [N].
+        Constraint forces of all stages but the first [N].
     """
 
     scales: Scales
@@ -97,13 +97,13 @@ class Looks:
 
     @cached_property
     def samples(self) -> tuple[Real, Complex, Real]:
-        """Times (w + 1,), directions and rates (w + 1, n) at the ends of the intervals."""
+        """Times (w + 1,), directions and rates (w + 1, n) at the samples of the step."""
         n, (times, states) = self.equations.n, self.arc.samples()
         return times, self.equations.system.directions(states[:, :n]), states[:, n : 2 * n]
 
     @cached_property
     def gaps_and_rates(self) -> tuple[Real, Real]:
-        """Gaps and their rates at the ends of the intervals, (w + 1, s) [m], [m/s]."""
+        """Gaps and their rates at the samples, (w + 1, s) [m], [m/s]."""
         times, e, v = self.samples
         return self.equations.gaps(times, e), self.equations.gap_rates(times, e, v)
 
@@ -139,7 +139,7 @@ def sticking_contacts(looks: Looks) -> Sequence[int]:
 
 
 def releasing_stops(looks: Looks) -> Sequence[int]:
-    """Return the held stops if one of the stage forces comes near to zero in the step."""
+    """Return the held stops if a force comes close to zero at a stage of the step, else none."""
     equations = looks.equations
     if not equations.held or equations.sticking:
         return equations.held
@@ -154,9 +154,9 @@ def releasing_stops(looks: Looks) -> Sequence[int]:
 def closing_time(looks: Looks, guard: Guard, stop: int) -> float | None:
     """Return when a gap closes: z > 0 -> z <= 0 at a closing rate.
 
-    A gap that is opening at the start of an interval closes only after its apex, so that the
-    impact that has just been resolved, whose gap is zero up to round-off of either sign, is not
-    found again.  A gap that dips below zero within an interval is found by the signs of its rates.
+    A gap that is opening at the start of an interval can close only after its apex.  Therefore the
+    last impact, after which the gap is round-off of either sign, is not found again.  A gap that
+    dips below zero within an interval is found by the signs of its rates.
     """
     all_gaps, all_rates = looks.gaps_and_rates
     gaps, rates = all_gaps[:, stop], all_rates[:, stop]
@@ -175,16 +175,16 @@ def _closing_time_between(looks: Looks, guard: Guard, stop: int, j: int) -> floa
     a, b = looks.samples[0][j : j + 2].tolist()
     (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2, stop] for x in looks.gaps_and_rates)
     if abs(rate_a) <= looks.scales.zero_speed and abs(gap_a) <= _round_off(looks):
-        # The stop was released too early: the bodies are pressed together again soon.
+        # The stop was released too early, and is pressed again.
         return fall_time(lambda t: z(t) + near, a, b) if gap_b < -near else None
     if rate_a > 0.0:
         if rate_b >= 0.0:
-            return None  # The gap still opens from zero.
+            return None  # The gap opens throughout the interval.
         a = fall_time(looks.along(_gap_rate, stop), a, b)
         if z(a) <= 0.0:
             return a  # The flight is lower than the resolution of a position.
     elif gap_a <= 0.0:
-        # A gap that stays near zero only touches; it may open from a small penetration.
+        # This is an impact only if the penetration increases.
         return a if gap_b < gap_a - near else None
     if rate_a < 0.0 < rate_b:
         b = fall_time(looks.along(_gap_rate, stop, sign=-1.0), a, b)
@@ -206,11 +206,11 @@ def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
 
 
 def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float:
-    """Return the time at which a gap closes, from the time at which the dense output closes it.
+    """Return the time at which a gap closes, from the approximate time t by the dense output.
 
-    The states are those of steps that end at the time, see :meth:`prbm.hybrid.arc.Arc.cut`.
-    The time is never before the apex: the gap is opening there, and an impact without effect would
-    be located again and again.
+    The gap is that of a step that ends at the time, see :meth:`prbm.hybrid.arc.Arc.cut`.
+    The time is never before the apex: the gap is opening there, so that the impact would have no
+    effect and be located again and again.
     """
     equations = looks.equations
     for _ in range(EVENT_CORRECTIONS_MAX):
@@ -220,7 +220,7 @@ def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float
             break
         change = -size / rate
         if abs(change) > EVENT_CORRECTION_RTOL * looks.arc.h:
-            break  # Grazing: the root of the dense output is better.
+            break  # At grazing, the time by the dense output is better.
         t = max(earliest, t + change)
     return t
 
@@ -228,8 +228,8 @@ def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float
 def reversal_time(looks: Looks, guard: Guard, contact: int) -> float | None:
     """Return when the sliding velocity of a contact falls through zero.
 
-    The velocity of a contact that begins to slip is zero up to round-off of either sign.  Such a
-    contact reverses if its velocity has the other sign at the end of the step.
+    When slip begins, the velocity is round-off of either sign.  The contact then reverses only if
+    its velocity at the end of the step is negative in the direction of slip.
     """
     equations, (times, e, v) = looks.equations, looks.samples
     rows, i = equations.slip_rows(contact)
@@ -258,7 +258,7 @@ def slip_time(looks: Looks, guard: Guard, contact: int) -> float | None:
 
 
 def _first_fall(z: Scalar, seen: Sequence[tuple[float, float]]) -> float | None:
-    """Return when z falls through zero first, between times at which its value is known."""
+    """Return when z first falls to zero, from pairs of a time and the value of z there."""
     for (a, before), (b, after) in pairwise(seen):
         if after <= 0.0:
             return fall_time(z, a, b) if before > 0.0 else a
@@ -268,7 +268,7 @@ def _first_fall(z: Scalar, seen: Sequence[tuple[float, float]]) -> float | None:
 def fall_time(z: Scalar, a: float, b: float) -> float:
     """Return when z falls to zero between a, where it is positive, and b, where it is not.
 
-    Where round-off denies one of these signs, the result is the end of the interval there.
+    If round-off has changed the sign at one end of the interval, the result is that end.
 
     Raises
     ------

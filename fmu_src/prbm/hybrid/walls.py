@@ -134,7 +134,7 @@ def _mean_rate(rate: float, off: float, longest: float, following: float) -> flo
 
 
 def step_limit(walls: Sequence[Wall], t: float) -> float:
-    """Return the longest step from time t [s]: a fraction of a cubic, and only up to its end."""
+    """Return the longest step from time t [s]: a fraction of each cubic, at most to its end."""
     limit = inf
     for wall in walls:
         if wall.span:

@@ -115,7 +115,7 @@ def _enumeration(name: str, prefix: str, values: Mapping[str, int | IntEnum]) ->
 
 
 def _kinds() -> dict[str, int]:
-    """Return the kinds of events, that of none and their number."""
+    """Return the kinds of events, with NONE for no event and the number KINDS."""
     return {"NONE": 0} | {kind.name: kind for kind in EventKind} | {"KINDS": len(EventKind) + 1}
 
 
@@ -124,7 +124,7 @@ def _numbers(names: Sequence[str]) -> dict[str, int]:
 
 
 def _counted(names: Sequence[str]) -> dict[str, int]:
-    """Return the places of names, and their number behind them."""
+    """Return the indices of names, followed by their number."""
     return _numbers((*names, "groups"))
 
 
