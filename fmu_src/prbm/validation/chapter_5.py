@@ -160,9 +160,9 @@ def elements_of_steel(_: Progress) -> Result:
         tuple(numbers),
         "Rest position and fundamental frequency of the 2R are within 0.6 % of the elements; its "
         "second and third frequency are 11 to 13 % too low. The measured 4.82 ± 0.06 Hz is 1.8 % "
-        "below the elements, 1.4 times its uncertainty, if 181.5 GPa and 0.1 mm are exact. The "
-        "frequency is proportional to the thickness to the power 1.5, so that a thickness 1.2 µm "
-        "below the nominal 100 µm explains the difference.",
+        "below that of the elements, which is 1.4 times the uncertainty, if 181.5 GPa and 0.1 mm "
+        "are exact. The frequency is proportional to the thickness to the power 1.5, so that a "
+        "thickness 1.2 µm below the nominal 100 µm explains the difference.",
         f"Between 16 and 32 elements no number changes by more than a fraction of {change:.1e}. "
         "The printed 4.8224 Hz of the 1R is neither its frequency at rest nor that of its free "
         "vibration with the printed parameters; the cause is unknown.",
@@ -187,7 +187,7 @@ def figure_5_4(_: Progress) -> Result:
         hits += abs(one.modulus.value - E) < one.modulus.uncertainty
     numbers = (
         Number("E, GPa", 1e-9 * found.modulus.value, "181.5", 1e-9 * E, "true", 0.01, form=".2f"),
-        Number("its standard uncertainty, GPa", 1e-9 * found.modulus.uncertainty, form=".2f"),
+        Number("standard uncertainty of E, GPa", 1e-9 * found.modulus.uncertainty, form=".2f"),
         covered(hits),
     )
     (axes,) = panels(1)
@@ -227,7 +227,7 @@ def figure_5_5(_: Progress) -> Result:
     smallest = tiny.zeta.uncertainty
     numbers = (
         Number("frequency, Hz", tiny.frequency.value, "4.82", 4.82, "true", 0.01, True, ".6f"),
-        Number("its standard uncertainty, Hz", tiny.frequency.uncertainty, form=".1e"),
+        Number("standard uncertainty of the frequency, Hz", tiny.frequency.uncertainty, form=".1e"),
         Number(
             "ζ, record with ζ = 6.88e-9",
             tiny.zeta.value,
@@ -236,7 +236,7 @@ def figure_5_5(_: Progress) -> Result:
             "true",
             form=".1e",
         ),
-        Number("its standard uncertainty", smallest, form=".1e"),
+        Number("standard uncertainty of this ζ", smallest, form=".1e"),
         Number("ζ, record with ζ = 1e-3", some.zeta.value, None, 1e-3, "true", 0.1, form=".4e"),
         replace(covered(hits["frequency"]), name=f"frequency: {covered(0).name}"),
         replace(covered(hits["zeta"]), name=f"ζ: {covered(0).name}"),
@@ -300,7 +300,7 @@ def figure_5_6(progress: Progress) -> Result:
             True,
             ".4f",
         ),
-        Number("its standard uncertainty", found.uncertainty, form=".4f"),
+        Number("standard uncertainty of this restitution", found.uncertainty, form=".4f"),
         Number(
             "restitution of the 1R fitted to a 1R",
             back.value,
@@ -326,8 +326,8 @@ def figure_5_6(progress: Progress) -> Result:
         "Figures 5.6 and 8",
         "impact on the centre of mass: the fitted restitution",
         numbers,
-        "At straight flexures the fitted restitution is that of the contact, less the share of "
-        "the flexures, which the impact does not stop: 0.59 to 0.60 for a contact with 0.6. The "
+        "With straight flexures the fitted restitution is slightly below that of the contact, "
+        "because the impact does not stop the flexures: 0.59 to 0.60 for a contact with 0.6. The "
         "synthetic record replaces the experiment: 2R with stretching flexures, 750 Hz, 4 µm.",
         "",
         (
