@@ -287,7 +287,7 @@ def test_every_method_reports_its_progress():
 
 
 def test_walls_out_of_reach_and_unknown_stops_are_rejected():
-    with pytest.raises(EquilibriumError, match="release further from it"):
+    with pytest.raises(EquilibriumError, match="release further from the wall"):
         impact_map.simulated(
             guide(), [17.9e-3], [0.0], WEIGHTLESS | {"release.displacement": -5e-3}
         )
