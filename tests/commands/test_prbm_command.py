@@ -512,7 +512,7 @@ def test_commands_that_need_a_stop_report_a_missing_one(capsys):
     ):
         assert run(line) == cli.MISTAKE
         sentence = "has no stop wall" if "--stop" in line else "has no stop to hit"
-        assert f"CrossPivot {sentence}: describe one, [[stops]]" in capsys.readouterr().err
+        assert f"CrossPivot {sentence}: describe one in [[stops]]" in capsys.readouterr().err
 
 
 PROPOSALS = {

@@ -299,8 +299,8 @@ STOP_LIMITS = (
     "never further than d from its target. All impacts within one communication step are "
     "computed and counted; the latched outputs describe the last one.",
     "A body rests on a moving wall while the contact force, which includes the wall's "
-    "acceleration, is positive. Then the body leaves, until other forces close the gap "
-    "again. A <code>velocity</code> that is set in event mode acts at once.",
+    "acceleration, is positive. When it becomes zero, the body leaves the wall. Other forces "
+    "may close the gap again. A <code>velocity</code> that is set in event mode acts at once.",
     "A wall that is part of another model takes part in impacts by its "
     "<code>mobility</code>, its inverse effective mass. The impulse is that between two "
     "masses, the wall changes its velocity within the step, and the other model must "
