@@ -345,7 +345,7 @@ def test_a_rejected_change_does_not_change_any_value():
     """A change of a fixed parameter, or of a value to an invalid one, rejects all changes."""
     sim = simulation("PRBDM")
     sim.advance(0.01)
-    with pytest.raises(ParameterError, match=r"flexure\.length is fixed"):
+    with pytest.raises(ParameterError, match=r"flexure\.length is a fixed"):
         sim.set({"stop.restitution": 0.3, "flexure.length": 0.05})
     with pytest.raises(ParameterError, match="at most 1"):
         sim.set({"damping.zeta": 0.1, "stop.restitution": 2.0})
