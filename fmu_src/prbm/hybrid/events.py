@@ -9,7 +9,7 @@ from ..base.tolerances import EVENT_WINDOW_RTOL, EVENTS_MAX
 from . import contact_modes, guards, impacts
 from .configuration import Configuration, Scales, contact_names
 from .front import Front
-from .guards import Guard, Looks
+from .guards import Guard, StepView
 from .impacts import Impact
 
 
@@ -64,8 +64,8 @@ class Transition:
 
     kind: EventKind
     guard: Guard
-    watched: Callable[[Looks], Sequence[int]]
-    detect: Callable[[Looks, Guard, int], float | None]
+    watched: Callable[[StepView], Sequence[int]]
+    detect: Callable[[StepView, Guard, int], float | None]
     reset: Reset
 
 
@@ -96,7 +96,7 @@ TRANSITIONS = (
 _RESETS = {row.kind: row.reset for row in TRANSITIONS}
 
 
-def first_event(looks: Looks) -> Event | None:
+def first_event(view: StepView) -> Event | None:
     """Return the first event within a step, or None.
 
     Raises
@@ -106,22 +106,22 @@ def first_event(looks: Looks) -> Event | None:
     """
     first: Event | None = None
     for row in TRANSITIONS:
-        for contact in row.watched(looks):
-            t = _located(looks, row, contact)
+        for contact in row.watched(view):
+            t = _located(view, row, contact)
             if t is not None and (first is None or t < first.time):
                 first = Event(row.kind, contact, t)
     return first
 
 
-def _located(looks: Looks, row: Transition, contact: int) -> float | None:
+def _located(view: StepView, row: Transition, contact: int) -> float | None:
     """Return when an event of a contact occurs in a step, or None."""
     try:
-        return row.detect(looks, row.guard, contact)
+        return row.detect(view, row.guard, contact)
     except SimulationError as error:
-        mechanism = looks.equations.system.mechanism
+        mechanism = view.equations.system.mechanism
         raise SimulationError(
             f"no {row.kind.name.lower()} of {contact_names(mechanism, [contact])} could be located "
-            f"within {looks.arc.h:.3g} s from t = {looks.arc.start:.9g} s: {error}"
+            f"within {view.arc.h:.3g} s from t = {view.arc.start:.9g} s: {error}"
         ) from None
 
 

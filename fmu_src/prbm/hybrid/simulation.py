@@ -28,7 +28,7 @@ from .arc import Arc
 from .configuration import Configuration
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
-from .guards import Looks
+from .guards import StepView
 from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
 from .release import released
@@ -300,7 +300,7 @@ class Simulation:
             self.k1 = equations.rate(front.time, front.y)
         step, controller = take_step(configuration, front, self.k1, self.controller)
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k)
-        event = events.first_event(Looks(configuration.scales, equations, arc, step.forces))
+        event = events.first_event(StepView(configuration.scales, equations, arc, step.forces))
         if event is None:
             y, self.k1 = equations.project_near(arc.end, step.y, step.factors), step.k[-1]
         else:
