@@ -2,8 +2,8 @@ r"""Impact maps: the modal restitution over positions of the wall and offsets of
 
 The modal restitution is the ratio of the fundamental mode's velocities after and before an impact,
 with the sign reversed.  The default points of a map are those measured in the thesis (S. Boersma,
-*Modelling and Validation of the Impact Response in Compliant Mechanisms*, 2015).  The methods are in
-:mod:`prbm.analysis.impact_map.routes` and :mod:`prbm.analysis.impact_map.free_body`.
+*Modelling and Validation of the Impact Response in Compliant Mechanisms*, 2015).  The methods are
+in :mod:`prbm.analysis.impact_map.routes` and :mod:`prbm.analysis.impact_map.free_body`.
 """
 
 import csv

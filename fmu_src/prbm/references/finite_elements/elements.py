@@ -38,7 +38,7 @@ class FiniteElements:
     model : ElementModel
         The assembled elements.
     equations : Equations
-        Their forces, stiffness, mass and constraints.
+        Forces, stiffness, mass and constraints of the elements.
 
     Raises
     ------
@@ -185,7 +185,7 @@ class FiniteElements:
         stop_time, step : float
             Duration and step size [s].
         spectral_radius : float
-            Of the method, below 1: a smaller one damps unresolved frequencies more strongly.
+            Spectral radius of the method, below 1: smaller values damp unresolved frequencies more.
         impacts : int or None
             Number of impacts after which the run ends; None: no limit.
 

@@ -59,7 +59,7 @@ class Transient:
     step : float
         Step size [s].
     spectral_radius : float
-        Of the generalised-alpha method, below 1.
+        Spectral radius of the generalised-alpha method, below 1.
     """
 
     def __init__(self, fe: "FiniteElements", step: float, spectral_radius: float) -> None:
