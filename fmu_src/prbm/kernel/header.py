@@ -88,7 +88,7 @@ def _tolerances() -> Iterator[str]:
 
 
 def _constant(name: str, value: float | tuple[float, ...]) -> str:
-    """Return a definition: an enumerator for an int, a macro for a float or several.
+    """Return a definition: an enumerator for an int, a macro for a float or a tuple.
 
     Examples
     --------
@@ -173,7 +173,7 @@ def _tableau(tableau: Tableau) -> Iterator[str]:
     yield _array("STAGE_WEIGHTS", tableau.a)
     yield _array("ERROR_WEIGHTS", tableau.error)
     yield _array("DENSE_WEIGHTS", tableau.dense)
-    yield "/* Bounds of the magnitudes of the weights of the dense output at any fraction. */"
+    yield "/* Bounds of the magnitude of each weight of the dense output within a step. */"
     yield _array("LARGEST_WEIGHTS", largest_weights(tableau))
 
 
