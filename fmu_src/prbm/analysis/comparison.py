@@ -109,7 +109,7 @@ class Comparison:
             if row.name == name:
                 return row
         known = ", ".join(row.name for row in self.rows)
-        raise ParameterError(f"{name!r} was not compared; compared are {known}")
+        raise ParameterError(f"{name!r} was not compared; the compared quantities are {known}")
 
     def __str__(self) -> str:
         head = f"{'':<34}{'model':>12}{'elements':>12}{'difference':>12}"
@@ -186,7 +186,7 @@ def _frequencies(found: Modes, where: str) -> Quantities:
 
 
 def _straight(hold: Callable[[float], float], step: float) -> Quantities:
-    """Return holding force and stiffness in the drawn shape; step a displacement [m]."""
+    """Return holding force and stiffness in the drawn shape; ``step`` is a displacement [m]."""
     slope = (hold(step) - hold(-step)) / (2 * step)
     return {"holding force, straight": hold(0.0), "stiffness, straight": slope}
 
@@ -273,7 +273,8 @@ def compare(
     for name in known:
         if name not in model:
             raise ParameterError(
-                f"{name!r} was measured but is not compared; compared are {', '.join(model)}"
+                f"{name!r} was measured but is not compared; the compared quantities are "
+                f"{', '.join(model)}"
             )
     least = ZERO_RTOL * system.length
     small = {"m": least, "N": least * abs(found["stiffness, straight"])}
@@ -309,7 +310,7 @@ def _restitutions(
                 algebraic(mechanism, [place], [d], values, stop=stop.name),
                 by_elements(mechanism, [place], [d], values, stop=stop.name, elements=elements),
             )
-        except (EquilibriumError, ParameterError) as error:  # Or an expression.
+        except (EquilibriumError, ParameterError) as error:  # Out of reach, or an expression.
             notes.append(f"no modal restitution at {stop.name}: {error}")
             continue
         name = f"modal restitution, {stop.name}"

@@ -195,7 +195,7 @@ def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
     steps = np.diff(time)
     if len(time) < SAMPLES_MIN or np.ptp(steps) > STEP_RTOL * abs(float(steps.mean())):
         raise ParameterError(
-            f"a spectrum needs at least {SAMPLES_MIN} samples in equal steps; here are {len(time)}"
+            f"a spectrum needs at least {SAMPLES_MIN} samples in equal steps, not {len(time)}"
         )
     window = hann(len(time), sym=False)
     lines = np.fft.rfft(window * detrend(signal))

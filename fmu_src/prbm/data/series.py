@@ -10,7 +10,7 @@ from ..base.errors import PrbmError
 from ..mechanics.arrays import Real
 
 SAMPLES_MIN = 16  # Samples of a signal over time.
-GAP_FACTOR = 1.8  # Of the usual step: a missing sample gives 2, rounded times at most 1.5.
+GAP_FACTOR = 1.8  # Of the usual step: a missing sample gives 2, rounding of times at most 1.5.
 LONG_STEP_FACTOR = 3.0  # Of the median step: longer steps are left out of the usual step.
 
 

@@ -257,7 +257,7 @@ def _modes_of(
 ) -> ContactState | None:
     """Return the modes that follow from the forces of ``stops`` and the contacts with friction.
 
-    None if no forces satisfy their laws, or if another stop that touches would close.
+    Return None if no forces satisfy their laws, or if another stop that touches would close.
     """
     contacts, rubbing = front.contacts, _with_coefficients(front.equations, stops)
     modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}

@@ -10,7 +10,7 @@ from ..mechanics.inputs import Inputs, Wall
 
 @dataclass(frozen=True)
 class Latched:
-    """Outputs of the last impact at a stop; zeros before the first."""
+    """Outputs of the last impact at a stop; zeros before the first impact."""
 
     impact_count: int = 0
     impact_time: float = 0.0
@@ -20,7 +20,7 @@ class Latched:
     energy_lost: float = 0.0
     modal_restitution: float = 0.0
     impulse_sum: float = 0.0
-    """Sum of all impulses so far, those of captures included."""
+    """Sum of all impulses so far, including those of captures."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Rigid impacts: the stops that take part, their impulses, and the booking of the results."""
+"""Rigid impacts: the stops that take part, their impulses, and the state after the impact."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -92,7 +92,7 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     )
     impulses = _impulses(configuration, front, struck, held, restitution)
     counted = [i for i in struck if i not in soft]
-    front, impacts = _book(configuration, front, counted, impulses)
+    front, impacts = _after_impact(configuration, front, counted, impulses)
     _, rates = front.gaps_and_rates()
     resting = [i for i in (*struck, *held) if rates[i] <= zero]
     front = front.with_contacts(front.contacts.opened())
@@ -246,10 +246,10 @@ def _impulses_with_friction(
     return Impulses(after, normal, dict(zip(struck, P[k:].tolist(), strict=True)))
 
 
-# --- booking ----------------------------------------------------------------------------------
+# --- the state after an impact ----------------------------------------------------------------
 
 
-def _book(
+def _after_impact(
     configuration: Configuration, front: Front, counted: Sequence[int], impulses: Impulses
 ) -> tuple[Front, list[Impact]]:
     """Return the front after an impact, with energies and latched outputs, and the record.

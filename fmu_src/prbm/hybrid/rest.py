@@ -1,4 +1,4 @@
-"""Forces of all contacts at rest together: a complementarity problem on their accelerations.
+"""Forces of all contacts at rest together: a complementarity problem for their accelerations.
 
 Each stop that touches is pressed or opens; each contact without a sliding velocity sticks or begins
 to slip.  Such forces exist if no contact slides and no walls close in on the mechanism.  The

@@ -137,7 +137,7 @@ class _Assembler:
         place, j = self.on(body, drawn), self.index[body]
         return BodyFrame(name, FIXED if j is None else j, place.c, place.row(len(self.q0)), drawn)
 
-    # -- walking --
+    # -- from the ground to all bodies --
 
     def system(self) -> System:
         waiting: list[Flexure | Joint] = [*self.mechanism.flexures, *self.mechanism.joints]
@@ -286,7 +286,7 @@ class _Assembler:
         arm = np.array(self.arm)
         A = np.array([place.row(n) for place, _ in self.masses])
         m = np.array([mass for _, mass in self.masses])
-        # Without stretch e is E.  The rows of places are zero at stretches.
+        # At zero stretch the directions e equal the arms E.  Rows of places are zero at stretches.
         e0 = np.exp(1j * np.array(self.q0))
         spread = A[:, arm]
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}

@@ -6,8 +6,8 @@ A linear complementarity problem is the search for z with
 
 Lemke's method follows a path of pivots that begins at a ray, which the covering vector defines.
 The path ends in a solution or in another ray.  It ends in a solution if the rates without forces
-are those of a possible motion [2].  There may be no solution if walls close in on the mechanism, if
-contacts slide, and for accelerations (Painleve's paradox).  In these cases a path may also end in a
+are those of a possible motion [2].  There may be no solution if walls close in on the mechanism or,
+for accelerations, if contacts slide (Painleve's paradox).  In these cases a path may also end in a
 ray although a solution exists.  Therefore the problem is rejected as unsolvable only after the
 paths of other covering vectors have failed, too.
 

@@ -1,4 +1,4 @@
-r"""Rigid impacts in contact space: Newton's law for any number of stops, Stronge's with friction.
+r"""Rigid impacts in contact space: Newton's law without friction, Stronge's law with friction.
 
 An impact with the impulses P changes the rates u of the gaps and of sliding by
 
@@ -12,8 +12,8 @@ Sources
 -------
 .. [1] F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts, Wiley, 1996.
 .. [2] W. J. Stronge, J. Appl. Mech. 58 (1991) 1049; Impact Mechanics, Cambridge, 2000.
-.. [3] T. R. Kane, D. A. Levinson, Dynamics: Theory and Applications, 1985 (the gain of energy
-   by Newton's law with Coulomb's).
+.. [3] T. R. Kane, D. A. Levinson, Dynamics: Theory and Applications, 1985 (Newton's law together
+   with Coulomb's law can increase the energy).
 """
 
 import math
@@ -322,7 +322,7 @@ def _resolved(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -
     Raises
     ------
     SimulationError
-        If there are none.
+        If there are no such impulses.
     """
     P = impulses(W, u, friction, least, tolerance)
     if P is None:

@@ -35,7 +35,7 @@ class Evaluation(NamedTuple):
     M : (n, n)
         Mass matrix [kg m^2].
     factors : Factors
-        Of the matrix of the equations, for :meth:`Equations.project_near`.
+        Factors of the matrix of the equations, for :meth:`Equations.project_near`.
     """
 
     a: Real
@@ -332,7 +332,7 @@ class Equations:
         Parameters
         ----------
         t : float
-            [s].
+            Time [s].
         y : (2 n + 2,)
             State.
         factors : Factors
@@ -360,7 +360,7 @@ class Equations:
     # -- stops --
 
     def gaps(self, t: float | Real, e: Complex) -> Real:
-        """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row a time t."""
+        """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row per time t."""
         walls = np.array([wall.motion(t)[0] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.values(e) + walls
         return result

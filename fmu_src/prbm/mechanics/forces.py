@@ -1,4 +1,4 @@
-r"""Generalised forces: springs, damping, gravity, inputs, friction.  Positive with q [N m].
+r"""Generalised forces of springs, damping, gravity, inputs and friction, along increasing q [N m].
 
 A force F (complex, [N]) at the point z = c + A E has the generalised force Q = Re(conj(F) i A e),
 with the columns of A repeated for stretches.  All forces together are one complex row

@@ -92,7 +92,7 @@ class Wall:
         return x, velocity, acceleration
 
     def joining(self, line: "Wall", velocity: float, span: float) -> "Wall":
-        """Return the wall that joins another reference, from its time ``line.since`` on.
+        """Return the wall that joins another reference from the time ``line.since`` on.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class Wall:
         return replace(line, offset=x - line.position, excess=velocity - line.rate, span=span)
 
     def pushed(self, t: float, change: float) -> "Wall":
-        """Return the wall after a change of velocity, its own and its reference's, at time t."""
+        """Return the wall after a change of its velocity and that of its reference at time t."""
         line = Wall(self.reference(t), self.rate + change, t)
         return self.joining(line, float(self.motion(t)[1]) + change, self.span)
 

@@ -1,7 +1,7 @@
 r"""The constant arrays of a mechanism, and the scalars that they define (gaps, loop closures).
 
-A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, the
-logarithm of its length over the drawn one.  Each link and body has one *arm*,
+A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, which is
+the logarithm of its length divided by its drawn length.  Each link and body has one *arm*,
 
     E = exp(s + i theta),       E' = i w E,     w = theta' - i s',
 
@@ -162,7 +162,7 @@ class Rows:
         return Rows(self.system, self.B[:r], self.c[:r], z[:r], on[:r])
 
     def values(self, e: Complex, c: Real | None = None) -> Real:
-        """Return x [m], (..., r); e may be a stack (..., n), and c replace the constants."""
+        """Return x [m], (..., r); e may be a stack (..., n); ``c`` replaces the constants."""
         x = e @ self.B.T
         if len(self.carried):
             x[..., self.carried] = self._carried_values(x, e)
@@ -232,7 +232,7 @@ class System:
         Loop closures Phi = Re(loops E) + loops_c [m].
     gaps, gaps_c, gaps_z : (s, n) complex, (s,), (s,) complex
         Gaps of the stops, without the wall's position [m]: gap = wall + Re(f (gaps E + gaps_z)) +
-        gaps_c, with f = 1 for a wall on the ground, conj(E) of the body that it is fixed to.
+        gaps_c, with f = 1 for a wall on the ground, and f = conj(E) for a wall on a body.
     slides, slides_z : (s, n) complex, (s,) complex
         Displacement of the hit points along their walls, to the left of the direction [m].
     on : (s,) int
@@ -244,7 +244,7 @@ class System:
     bodies : dict of BodyFrame
         The bodies by name: their centres of mass.
     pushed : tuple of BodyFrame
-        Where the forces act.
+        The points at which the forces act.
     probes : tuple of BodyFrame
         The points whose motion is reported.
     links : tuple of int

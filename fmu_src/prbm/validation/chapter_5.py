@@ -99,12 +99,12 @@ def figure_5_1(_: Progress) -> Result:
         "modal analysis of the steel structure",
         numbers,
         "With the values of listing B.2.2 (180 GPa, massless flexures, a point mass without "
-        "rotary inertia) our elements have 136 Hz at 10.4 mm. The second frequency falls steeply "
-        'with the deflection. The 136 Hz printed for "10 mm deflected" thus agrees both with a '
-        "guide held at 10 mm and with a guide at rest under gravity. The printed 4.8 Hz is "
+        "rotary inertia) our elements have f2 = 136 Hz at 10.4 mm. The second frequency f2 falls "
+        'steeply with the deflection. The 136 Hz printed for "10 mm deflected" thus agrees both '
+        "with a guide held at 10 mm and with a guide at rest under gravity. The printed 4.8 Hz is "
         "rounded.",
-        "The values of the figure itself are only in a picture; the text quotes these two. The 2R "
-        "underestimates f2 at all deflections.",
+        "The values of the figure itself are only in a picture; the text quotes 4.8 Hz and 136 Hz. "
+        "The 2R underestimates f2 at all deflections.",
     )
 
 
@@ -253,7 +253,7 @@ def figure_5_5(_: Progress) -> Result:
         numbers,
         "A fit of a damped sine determines the frequency a hundred thousand times more accurately "
         "than the ± 0.06 Hz of the spectrum in the thesis. **The printed ζ = 6.88e-9 is too small "
-        f"to be measured**: ten seconds with its laser resolve {smallest:.0e}. For a synthetic "
+        f"to be measured**: ten seconds with this laser resolve {smallest:.0e}. For a synthetic "
         f'record with this ζ the evaluation reports "{tiny.damping}".',
         "With this damping ratio the time constant 1/(ζ ω) would be 55 days. Neither "
         "interpretation of eq. 3.16 makes the number plausible; it is not a default of this "

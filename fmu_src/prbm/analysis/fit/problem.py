@@ -21,7 +21,7 @@ BOUND_RTOL = 1e-6  # A parameter nearer to a bound than this share of the range 
 DEFAULT_RATIO = 10.0  # Default bounds are a tenth and ten times the start.
 RANGE_SHARE = 0.1  # Size of a parameter near zero, as a share of the range of its bounds.
 STEPS_MAX = 50  # Steps of the minimiser.
-MISFIT_RTOL = 1e-9  # For m data it is an error of sqrt(m/1e9) standard uncertainties.
+MISFIT_RTOL = 1e-9  # Change of S(p) that ends the minimiser, as a share of S(p).
 PARAMETER_RTOL, GRADIENT_TOL = 1e-10, 1e-12  # Other conditions that end the minimiser.
 PROGRESS_STEPS = 4.0  # Minimiser steps after which the remaining part of the progress is halved.
 

@@ -79,7 +79,9 @@ def valley(
     if along is None:
         along = problem.names[int(np.argmax(np.abs(found.directions[-1])))]
     if along not in problem.names:
-        raise EvaluationError(f"{along} was not fitted; fitted were {', '.join(problem.names)}")
+        raise EvaluationError(
+            f"{along} was not fitted; the fitted parameters are {', '.join(problem.names)}"
+        )
     i = problem.names.index(along)
     best = float(found.p[i])
     low, high = span or (min(best / 2, best * 2), max(best / 2, best * 2))

@@ -59,7 +59,7 @@ def shares(G: Real, restitution: float) -> tuple[float, Real, float]:
 
     Examples
     --------
-    Two equal modes and a plastic hit share the velocity equally:
+    Two equal modes share the velocity equally after a plastic hit:
 
     >>> C, after, lost = shares(np.array([1.0, 1.0]), 0.0)
     >>> C, after.tolist(), lost

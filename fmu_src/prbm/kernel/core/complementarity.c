@@ -66,7 +66,7 @@ static int falling_rows(const Pivots *pivots, int column, int *rows) {
     return count;
 }
 
-/* Keep the rows with the least ratio of their number in the column entry to that in column. */
+/* Keep the rows whose ratio row[entry] / row[column] is the least. */
 static int least_ratios(const Pivots *pivots, int entry, int column, int count, int *rows) {
     double low = HUGE_VAL;
     int kept = 0;

@@ -1,4 +1,4 @@
-/* Rigid impacts in contact space: Newton's law for any number of stops, Stronge's with friction.
+/* Rigid impacts in contact space: Newton's law without friction, Stronge's law with friction.
  *
  * Sources: as in the twin, mechanics/contact.py.
  */
@@ -37,7 +37,7 @@ static bool closing_in(Problem *problem) {
 }
 
 /* Solve W P = -b for the impulses P of the members only.  Members with a negative impulse get the
- * impulse zero and are removed; *pulling is true if there are any. */
+ * impulse zero and are removed; *pulling: whether a member is removed. */
 static bool share_impulses(int k, int *size, int *members, const double *W, const double *b,
                            double *P, bool *pulling, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;

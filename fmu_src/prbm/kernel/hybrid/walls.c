@@ -98,7 +98,7 @@ PRBM double wall_reach(const Wall *wall, double h) {
 }
 
 /* Put walls whose cubics end at the front on their references.  Return the longest step from there:
- * it is a fraction of each other cubic, and ends at its end at the latest. */
+ * a fraction of each other cubic, not beyond the end of that cubic. */
 PRBM double follow_cubics(Simulation *sim) {
     double longest = HUGE_VAL;
     for (int i = 0; i < system_of(sim)->s; i++) {

@@ -157,7 +157,7 @@ class FiniteElements:
         return row
 
     def modal_restitution(self, shape: Shape, stop: int, restitution: float) -> float:
-        r"""Return the modal restitution of an arriving pure fundamental mode (algebraic) [-].
+        r"""Return the modal restitution if only the fundamental mode moves before the impact [-].
 
         C = (1 + eps) mu_1 - 1,  mu_1 = G_1^2 / sum_i G_i^2 over all modes of the elements,
         G_i = (d gap/dq) phi_i.

@@ -28,7 +28,7 @@ class Shape:
     Parameters
     ----------
     q : (n,)
-        Displacements of all nodes from the drawn shape [m], of slopes [-], of bodies [rad].
+        Changes from the drawn shape: displacements [m], slopes [-], rotations of bodies [rad].
     mu : (r,)
         Multipliers of the constraints [N], [N m].
     force : float
@@ -54,7 +54,7 @@ def equilibrium(
     equations : Equations
         The elements.
     row : (n,)
-        Derivatives of the displacement of the released body by the coordinates.
+        Derivatives of the displacement of the released body with respect to the coordinates.
     turns : sequence of int
         Indices of the rotations of bodies.
     displacement : float or None
