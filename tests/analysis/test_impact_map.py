@@ -94,7 +94,7 @@ def test_the_closed_form_applies_to_every_guide(name):
     [
         ("Cantilever", 3e-3, 0.0, "tip turns"),  # by 3/2 of its path over its length
         # The shuttle has 200 g; the stages at half its speed add 30 g, the flexures the rest.
-        ("FoldedSuspension", 1e-7, 0.0, r"shuttle along its path is 8\d"),
+        ("FoldedSuspension", 1e-7, 0.0, r"shuttle along its path has 8\d"),
     ],
 )
 def test_the_closed_form_is_rejected_if_the_body_turns_or_others_move(name, wall, offset, message):

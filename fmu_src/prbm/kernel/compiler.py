@@ -431,8 +431,8 @@ def _cached(
         if folder is None:
             content = _compile(wanted, compiler, files, progress)
             progress(
-                f"cannot write to {cache_folder()}, or other users can write to it, too: the "
-                "library is not kept; the next export compiles again"
+                f"the folder {cache_folder()} cannot be written, or other users can write to it: "
+                "the library is not kept; the next export compiles again"
             )
         else:
             entry = folder / name
