@@ -47,20 +47,21 @@ TIPS = (
     (1.0, 0.0),
     (10.0, 0.0),
     (1.0, 0.1),
-)  # Mass and inertia at the tip, over those of the beam.
+)  # Mass and inertia of the tip body, in units of m and m L^2 of the beam.
 TIP_MASS_MIN = 1e-8  # Scaled mass of a missing tip body; a body must have a mass.
 
 FE_GUIDE = (10.7206, 4.9065, 130.65, 209.82, 302.05, 327.65)
 """Rest position [mm] and frequencies at rest [Hz] of the steel guide: 64 ANCF cable elements
 per flexure (Exudyn), which stretch and whose sections have no rotary inertia."""
-FE_STRAIGHT = 4.6405  # Straight, without gravity; 32 elements [Hz].
+FE_STRAIGHT = 4.6405  # Fundamental frequency of the straight guide, no gravity, 32 elements [Hz].
 FE_RESTITUTION = {
     -4: (0.4089, 0.5483, 0.4084),
     0: (0.4519, 0.5947, 0.4519),
     4: (0.4104, 0.5482, 0.4108),
 }
-"""Algebraic modal restitution with the same elements for eps = 0.6, without gravity: by offset from
-the centre of mass [mm], for walls at -10, 0 and 10 mm."""
+"""Modal restitution with the same elements and the coefficient 0.6, without gravity, computed
+without a simulation: one row per offset of the hit point from the centre of mass [mm], one column
+per wall at -10, 0 and 10 mm."""
 
 # --- cantilevers --------------------------------------------------------------------------------
 

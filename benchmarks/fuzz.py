@@ -32,7 +32,7 @@ SUMMARIES = ("Done ", "cov:", "tables,", "sequences")  # Parts of lines with the
 
 
 def searches(folder: Path, seconds: float, seed: int) -> Iterator[tuple[str, Callable[[], Found]]]:
-    """Yield the searches with their names; together they take the seconds."""
+    """Yield the searches with their names; all of them together take ``seconds``."""
     yield "tables", lambda: fuzz_tables(folder, seconds / 4, seed)
     pairs = [(model, fmi) for model in MODELS for fmi in VERSIONS]
     for model, fmi in pairs if has_libfuzzer() else []:

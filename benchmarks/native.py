@@ -9,11 +9,11 @@ depends on other work on the machine.
 speed       the C importer of the tests simulates the default second (with its impacts) at steps of
             1 ms, with no, one and five readings per step: speed over real time, and the error of
             shuttle.x against a run at the tolerance 1e-12, for tolerances from 1e-4 to 1e-10
-overhead    FMPy's fmi2DoStep and five fmi2GetReal, for this FMU and for an FMU with the same
-            interface that computes nothing (trivial_fmu.c)
-exudyn      the 1R guide without its wall, and the same guide in Exudyn, of bodies, joints and
-            springs: cost over error, both against the scalar equation
-octave      the algorithm of the thesis (thesis_algorithm.m)
+overhead    time of fmi2DoStep and five fmi2GetReal, called by FMPy, for this FMU and for an FMU
+            with the same interface that computes nothing (trivial_fmu.c)
+exudyn      cost over error of the 1R guide without its wall, for this FMU and for a model of
+            bodies, joints and springs in Exudyn; errors are differences from the scalar equation
+octave      time of the algorithm of the thesis in Octave (thesis_algorithm.m)
 profile     instructions of a right-hand side, counted by valgrind, and the floating-point
             operations that the equations need
 """
@@ -53,7 +53,7 @@ TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 REFERENCE_TOLERANCE = 1e-12
 RIGHT_HAND_SIDE = ("rates_of_motion",)  # Function of the kernel in dynamics.c.
 FREE = {"stop.position": 1.0}  # A wall that is never reached [m].
-EXUDYN_STEPS = (1e-3, 2.5e-4, 1e-4, 2.5e-5, 1e-5)  # A millisecond is a multiple of each [s].
+EXUDYN_STEPS = (1e-3, 2.5e-4, 1e-4, 2.5e-5, 1e-5)  # Each divides a millisecond [s].
 TARGETS = (1e-5, 1e-6, 1e-7)  # Errors at which costs are compared [m].
 
 

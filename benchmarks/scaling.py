@@ -5,10 +5,11 @@
 valgrind counts the instructions of the native right-hand side.  The exponent is the slope of a
 least-squares line through the logarithms, over the upper half of the sizes.
 
-links   the guide with two chains of n links each, 4 to 50: one loop, growing blocks of mass
+links   the guide with two chains of n links each, 4 to 50: one loop, growing blocks of the mass
+        matrix
 axial   the same chains with links that stretch: twice the coordinates
-loops   a shuttle on k 2R flexures that stretch, 2 to 12: k - 1 loops, blocks of mass of constant
-        size (parallel links that do not stretch would be over-constrained)
+loops   a shuttle on k 2R flexures that stretch, 2 to 12: k - 1 loops, blocks of the mass matrix of
+        constant size (parallel links that do not stretch would be over-constrained)
 """
 
 import argparse
@@ -105,7 +106,7 @@ def rows(sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> Iterator[t
         yield size, cost
 
 
-def grows(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> float:
+def print_growth(title: str, sizes: tuple[int, ...], make: Callable[[int], Mechanism]) -> float:
     """Print the costs and the exponent of their growth, and return the exponent."""
     print(f"\n{title}")
     size, cost = np.array([*rows(sizes, make)]).T
@@ -128,9 +129,9 @@ def main() -> None:
     if shutil.which("valgrind") is None:
         sys.exit("valgrind is not installed; it is needed to count instructions")
     sizes = tuple(n for n in LINKS if n <= largest)
-    grows("Links: two chains of n links", sizes, chains)
-    grows("Axial: two chains of n links that stretch", sizes, lambda n: chains(n, axial=True))
-    grows("Loops: k parallel 2R flexures that stretch", LEAVES, leaves)
+    print_growth("Links: two chains of n links", sizes, chains)
+    print_growth("Axial: chains of n links that stretch", sizes, lambda n: chains(n, axial=True))
+    print_growth("Loops: k parallel 2R flexures that stretch", LEAVES, leaves)
 
 
 if __name__ == "__main__":

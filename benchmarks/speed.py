@@ -3,9 +3,9 @@
     python build_fmu.py
     python benchmarks/speed.py --dist dist/python
 
-Of an FMU only the stepping loop is measured: fmi2DoStep and one output after each step, through
-FMPy, over the default run with its impacts, at the tolerance 1e-6.  Of the Octave script only the
-time loop is measured, at the fixed step of the thesis, 2^-15 s, until 8 ms after the first impact.
+For an FMU, only the stepping loop is timed: fmi2DoStep and one output after each step, through
+FMPy, over the default run with its impacts, at the tolerance 1e-6.  For the Octave script, only the
+time loop is timed, at the fixed step of the thesis, 2^-15 s, until 8 ms after the first impact.
 Extraction, loading and initialization are not included.
 """
 

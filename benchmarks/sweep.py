@@ -1,4 +1,4 @@
-"""Overhead of a sweep over its FMU, and speed-up by a second worker.
+"""Overhead of a sweep compared with its FMU alone, and speed-up by a second worker.
 
     python build_fmu.py --model PRBDM2R
     python benchmarks/sweep.py
@@ -10,7 +10,7 @@ a bare loop (reset, start values, initialization, steps, one output after each) 
 ``simulate_fmu``, both in one process and over rows of the same table.
 
 The script prints wall time (for the loops: medians), which depends on other work on the machine,
-and the processor time of all processes of the run, which hardly does.
+and the processor time of all processes of the run, which hardly depends on it.
 """
 
 import argparse

@@ -1,8 +1,8 @@
 /* An FMU without physics, with the interface of FMI 2.0 co-simulation, to measure the overhead of
  * an importer.
  *
- * All variables may be set and read; a step adds up time.  The values are in a table of 1024
- * entries, indexed by the lowest bits of the value reference.  Arguments are not checked.
+ * All variables may be set and read; a step only stores its end time.  The values are in a table of
+ * 1024 entries, indexed by the lowest bits of the value reference.  Arguments are not checked.
  */
 #include <stdlib.h>
 

@@ -4,7 +4,7 @@
     python build_fmu.py --out old            # in the clone of the other version
     python benchmarks/versions.py old new
 
-For every FMU that both folders hold it prints
+For every FMU in both folders, it prints
 
 * the variables whose name, value reference, type, causality or start value differ;
 * the largest difference of the continuous outputs of the default run, per unit, up to the time at
@@ -16,8 +16,8 @@ or a number of impacts differs.
 
     python benchmarks/versions.py old new --time 100 --only fmi2/PRBDM2R.fmu
 
-prints the CPU time of the steps of the default run instead: both FMUs in turn, 100 pairs, and the
-ratios new / old of the medians and of the best.
+prints the CPU time of the steps of the default run instead.  Both FMUs run in turn, 100 times each.
+The ratios are those of the new time to the old time, for the medians and for the shortest times.
 """
 
 import argparse

@@ -4,7 +4,7 @@
     python benchmarks/work_precision.py --orders
 
 Work: a smooth arc of the default 1R and 2R, from just after the first impact (0.043 s) to
-0.1 s, at tolerances 1e-3 to 1e-13.  Every pair has the same loop, the same step size control
+0.1 s, at tolerances 1e-3 to 1e-13.  All pairs use the same loop, the same step size control
 (here without a largest step) and the same projection after each step.
 
 - The work is the number of right-hand sides of accepted and rejected steps, and of the dense
@@ -68,7 +68,7 @@ ARC = (0.043, 0.1)  # Interval of the default runs without an impact [s].
 TOLERANCES = 10.0 ** -np.arange(3.0, 13.25, 0.5)
 TARGETS = (1e-4, 1e-6, 1e-8, 1e-10)
 SAFETY, SHRINK, GROW = 0.9, 0.2, 5.0  # Step size control of the engine.
-LADDER = 4  # Step sizes for one slope: three halvings.
+SIZES_PER_SLOPE = 4  # Step sizes for one slope: three halvings.
 OCTAVE = 2  # Sequences of step sizes per octave.
 
 
@@ -248,9 +248,9 @@ BOGACKI_SHAMPINE_ERROR = """-3817/1959552 0 140181/15491840 -4224731/272937600 8
 BOGACKI_SHAMPINE_NINTH = """; 455/6144 0 10256301/35409920 2307361/17971200 -387/102400
     73/5130 -7267/215040 1/32"""
 
-# The interpolants of order 4 on the eight stages with continuous derivative have two degrees of
-# freedom.  This one violates the conditions of order 5 least over the step (least squares, trees
-# weighted by their symmetry).
+# Interpolants of order 4 with a continuous derivative, built from the eight stages, have two
+# degrees of freedom.  They are chosen here such that the violation of the conditions of order 5
+# over the step is smallest (least squares, with the trees weighted by their symmetry).
 BOGACKI_SHAMPINE = tabulated(
     "Bogacki-Shampine 5(4)",
     (5, 4),
@@ -316,7 +316,7 @@ VERNER_STAGES = """3/50; 519479/27000000 2070721/27000000; 1439/40000 0 4317/400
 VERNER_ERROR = """0.008623404282200852 0 0 -0.019434029953152708 0.028450072588037983
     -2.109711061065291 103.45854289996399 -101.39980461914911 1/30"""
 
-# The quintic has two degrees of freedom, chosen like those of the quartic above.
+# The quintic has two degrees of freedom, chosen as for the Bogacki-Shampine quartic above.
 VERNER_WITH_1 = tabulated(
     "Verner 6(5), 1 further",
     (6, 5),
@@ -749,10 +749,10 @@ def print_orders() -> None:
         for pair in PAIRS[:-1]:
             errors = np.array([_fixed(pair, given, float(h), wanted) for h in steps])
             slopes = []
-            for i in range(len(steps) - OCTAVE * (LADDER - 1)):
-                rungs = i + OCTAVE * np.arange(LADDER)
-                if np.isfinite(errors[rungs]).all():
-                    slopes.append(slope(steps[rungs], errors[rungs]))
+            for i in range(len(steps) - OCTAVE * (SIZES_PER_SLOPE - 1)):
+                halved = i + OCTAVE * np.arange(SIZES_PER_SLOPE)
+                if np.isfinite(errors[halved]).all():
+                    slopes.append(slope(steps[halved], errors[halved]))
             off = np.abs(np.array(slopes) - pair.order)
             closest = slopes[int(off.argmin())] if slopes else math.nan
             print(

@@ -1,15 +1,17 @@
 """Time of coming to rest over the restitution, 1R model.
 
 The result of the FMU is compared with an independent solution.  The 1R guide obeys one scalar
-equation,
+equation for the angle theta of its links, with the moving mass M, the stiffness k of each of its
+four pivots, the flexure length L and the gravity g:
 
     M r^2 theta'' = -4 k theta + M g r cos(theta),      r = gamma L.
 
-A bounce that leaves the wall (theta = 0) at the speed v therefore lasts
+With the potential energy V, a bounce that leaves the wall (theta = 0) at the speed v lasts
 
     T(v) = 2 int_0^theta_max d theta / |theta'|,        M r^2 theta'^2 / 2 = M v^2 / 2 - V(theta),
 
-and the guide rests at t_1 + T(eps v_1) + T(eps^2 v_1) + ...
+and the guide rests at t_1 + T(eps v_1) + T(eps^2 v_1) + ..., where t_1 and v_1 are time and closing
+speed of the first impact and eps is the restitution.
 """
 
 import math

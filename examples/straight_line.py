@@ -20,7 +20,7 @@ from prbm.plots.figures import save
 
 STROKES = np.linspace(0.0, 0.03, 16)  # [m]
 ROUNDING_ERROR_MAX = 1e-12  # Smaller lateral errors are round-off [m].
-THICKNESS_RATIO = 1.05  # Thickness of the one different leaf over that of the others.
+THICKNESS_RATIO = 1.05  # Thickness of the thicker leaf, relative to the others.
 
 
 def lateral(mechanism: Mechanism, strokes: np.ndarray = STROKES) -> np.ndarray:
@@ -29,9 +29,9 @@ def lateral(mechanism: Mechanism, strokes: np.ndarray = STROKES) -> np.ndarray:
     Parameters
     ----------
     mechanism : Mechanism
-        Its released body moves along x.
+        A mechanism whose released body moves along x.
     strokes : (k,)
-        Displacements of its centre of mass along x [m].
+        Displacements of the centre of mass of this body along x [m].
     """
     system = assemble(mechanism, mechanism.values({"gravity.x": 0.0, "gravity.y": 0.0}))
     frame = system.bodies[mechanism.release.body]

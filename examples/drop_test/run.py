@@ -52,8 +52,8 @@ def velocity_change(height: float) -> float:
 def shock(height: float, begin: float, end: float) -> float:
     """Return the mean acceleration of the housing between two times [m/s2].
 
-    The fall is along +x, the acceleration along -x.  The means times their durations add up to the
-    change of velocity:
+    The fall is along +x, the acceleration along -x.  The sum of all means, each multiplied by its
+    duration, is the change of velocity:
 
     >>> times = np.linspace(0.0, 2 * SHOCK_DURATION, 12)
     >>> changes = [shock(0.5, a, b) * (b - a) for a, b in zip(times, times[1:])]

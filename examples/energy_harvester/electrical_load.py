@@ -2,8 +2,9 @@
 
     L di/dt = k v - (R + R_load) i,        force = -k i,        harvested' = R_load i^2
 
-The velocity v is constant within a step.  The current is then an exponential, and the integrals
-over the step are exact.  The output force is the mean over the step.
+L, R and k are inductance, resistance and constant of the coil, and i is the current.  The velocity
+v is constant within a step.  The current is then an exponential, and the integrals over the step
+are exact.  The output force is the mean over the step.
 """
 
 import math

@@ -5,9 +5,9 @@
 
     python examples/energy_harvester/run.py
 
-The frequency rises and then falls in steps; at each, the power is measured after the vibration has
-settled.  Between the stops the resonance bends to higher frequencies, so that the power depends on
-the direction of the sweep.
+The frequency rises and then falls in steps; at each frequency, the power is measured after the
+vibration has settled.  Between the stops the resonance bends to higher frequencies, so that the
+power depends on the direction of the sweep.
 """
 
 import argparse
@@ -90,7 +90,7 @@ def sweep(frequencies: Sequence[float], progress: Progress | None = None) -> np.
 
 
 def shake(coupled: System, frequency: float, periods: int) -> None:
-    """Continue for some periods; within a step the acceleration is that at its middle."""
+    """Continue for some periods; a step uses the acceleration at the middle of the step."""
     begin, h = coupled.time, 1.0 / frequency / STEPS
     for k in range(periods * STEPS):
         angle = 2 * math.pi * (k + 0.5) / STEPS
@@ -109,7 +109,9 @@ def guide() -> ScalarGuide:
 def linear(frequency: float | np.ndarray) -> float | np.ndarray:
     """Return the power of the load without stops, for small vibrations [W].
 
-    With the stiffness K = 4 k / r^2 and the total resistance R, the amplitude X solves
+    M is the mass, K = 4 k / r^2 the stiffness, beta the damping time, k_e the constant of the coil,
+    L its inductance, R the total resistance, a the amplitude of the acceleration and w the angular
+    frequency.  The amplitude X of the shuttle solves
 
         X (K + j w beta K - M w^2 + j w k_e^2 / (R + j w L)) = -M a,
 

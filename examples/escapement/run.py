@@ -84,7 +84,7 @@ def monolith(stop_time: float = STOP_TIME) -> tuple[Impact, ...]:
 
 
 def impacts(result: np.ndarray) -> np.ndarray:
-    """Return the rows just after each impact; the preceding rows are just before it."""
+    """Return the index of the row just after each impact; the row before it precedes the impact."""
     count = result["wheel.tooth.impact_count"]
     return np.flatnonzero(np.diff(count) > 0) + 1
 

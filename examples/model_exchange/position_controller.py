@@ -11,7 +11,7 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 VARIABLES = (
     ("gain", "parameter", "Force per position error [N/m]"),
-    ("damping", "parameter", "Force per velocity, against it [N s/m]"),
+    ("damping", "parameter", "Force against the velocity, per velocity [N s/m]"),
     ("wanted", "parameter", "Set point of the position [m]"),
     ("lag", "parameter", "Time constant of the actuator [s]"),
     ("position", "input", "Measured position [m]"),

@@ -51,7 +51,7 @@ OUTPUTS = ("shuttle.x", "stop.impact_count", "stop.impact_time")
 def controller(
     t: float, outputs: Mapping[str, float], z: np.ndarray
 ) -> tuple[dict[str, float], list[float]]:
-    """Return the input of the guide, the force z[0] of the actuator, and the rate of z."""
+    """Return the input of the guide, which is the force z[0] of the actuator, and the rate of z."""
     error = CONTROLLER["wanted"] - outputs["shuttle.x"]
     command = CONTROLLER["gain"] * error - CONTROLLER["damping"] * outputs["shuttle.vx"]
     return {"force.x": float(z[0])}, [(command - z[0]) / CONTROLLER["lag"]]

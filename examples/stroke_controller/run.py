@@ -157,7 +157,8 @@ def expected_speed(stroke: float) -> float:
     """Return the closing speed of a steady bounce over a stroke by beam theory [m/s].
 
     Over the stroke s the springs and gravity store E = 12 EI s^2 / L^3 + m g s.  The force F adds
-    F s on the way out and again on the way back: eps^2 (E + F s) + F s = E.
+    F s on the way out and again on the way back.  With the restitution eps, the shuttle leaves the
+    stop with the energy eps^2 (E + F s), so that eps^2 (E + F s) + F s = E.
     """
     L, h, b, young, density = 0.04, 1e-4, 8e-3, 181.5e9, 7800.0
     mass = 0.053187 + 2 * 13 / 35 * density * L * h * b

@@ -5,7 +5,7 @@ once per bounce, at the far end, where the stroke is known:
 
     force = integral + gain * (set point - stroke),     0 <= force <= limit
 
-Each time, half of the second term is added to ``integral``.
+At each change, half of gain * (set point - stroke) is added to ``integral``.
 """
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real

@@ -6,8 +6,8 @@ with first-order propagation of uncertainty (GUM, 5.1.2, independent inputs),
 
     s_T^2 = (dT/de)^2 s_e^2 + (dT/dx)^2 s_x^2,
 
-with derivatives from four more runs.  The first order has no skewness, although T grows faster than
-linearly with e.
+where e is the restitution and x the position of the wall, with derivatives from four more runs.
+The first order has no skewness, although T grows faster than linearly with e.
 """
 
 import argparse
@@ -27,8 +27,8 @@ from prbm.base.progress import reporter
 from prbm.fmu.native_fmu import build
 from prbm.sweeps.sweep import samples, sweep
 
-MEAN = {"stop.restitution": 0.6, "stop.position": 0.0}  # -, m.
-SPREAD = {"stop.restitution": 0.03, "stop.position": 0.3e-3}  # Standard deviations, -, m.
+MEAN = {"stop.restitution": 0.6, "stop.position": 0.0}  # Means [-], [m].
+SPREAD = {"stop.restitution": 0.03, "stop.position": 0.3e-3}  # Standard deviations [-], [m].
 OUTPUTS = {"T": "stop.impact_time", "rests": "stop.contact"}
 STOP_TIME = 0.8  # Later than the last impact of every run [s].
 

@@ -121,8 +121,8 @@ def impacts(record: np.ndarray) -> np.ndarray:
 def energy_error(record: np.ndarray) -> np.ndarray:
     """Return the supplied energy less its parts in coil and guide, row by row [J].
 
-    The error is that of the coupling: within a step the coil has the velocity at the beginning of
-    the step, whereas the velocity of the guide changes.
+    The error comes from the coupling: within a step the coil uses the velocity of the guide at the
+    beginning of the step, although this velocity changes.
     """
     parts = ("coil.heat", "coil.magnetic", "guide.energy.kinetic", "guide.energy.elastic",
                "guide.energy.dissipated")  # fmt: skip

@@ -123,7 +123,9 @@ def test_friction_and_mass_proportional_damping_have_no_effect():
 def test_unknown_quantities_are_rejected(guide):
     with pytest.raises(ParameterError, match="'frequency' was measured but is not compared"):
         compare(mechanism("PRBDM"), elements=2, measured={"frequency": Estimate(4.8, 0.1)})
-    with pytest.raises(ParameterError, match="was not compared; compared are rest position"):
+    with pytest.raises(
+        ParameterError, match="was not compared; the compared quantities are rest position"
+    ):
         guide["frequency"]
 
 

@@ -94,7 +94,7 @@ def test_the_closed_form_applies_to_every_guide(name):
     [
         ("Cantilever", 3e-3, 0.0, "tip turns"),  # The angle is 3/2 of path over length.
         # The shuttle has 200 g; the stages at half its speed add 30 g, the flexures the rest.
-        ("FoldedSuspension", 1e-7, 0.0, r"shuttle along its path is 8\d"),
+        ("FoldedSuspension", 1e-7, 0.0, r"shuttle along its path has 8\d"),
     ],
 )
 def test_the_closed_form_is_rejected_if_the_body_turns_or_others_move(name, wall, offset, message):
@@ -287,7 +287,7 @@ def test_every_method_reports_its_progress():
 
 
 def test_walls_out_of_reach_and_unknown_stops_are_rejected():
-    with pytest.raises(EquilibriumError, match="release further from it"):
+    with pytest.raises(EquilibriumError, match="release further from the wall"):
         impact_map.simulated(
             guide(), [17.9e-3], [0.0], WEIGHTLESS | {"release.displacement": -5e-3}
         )

@@ -79,7 +79,7 @@ MALFORMED = {  # name: (content of the file, part of the message)
                       "1 names above 3 columns"),
     "empty name": ((",x [mm]\n" + table()).encode(), "column 1 has no name"),
     "name twice": (("x [s],x [mm]\n" + table()).encode(),
-        "the name 'x' is that of columns 1 and 2"),
+        "columns 1 and 2 have the same name 'x'"),
     "too short": ((HEAD + rows(keep=ROWS[:2])).encode(), "2 rows of numbers are too few"),
     "too few samples": ((HEAD + rows(keep=ROWS[:9])).encode(), "9 samples of x are too few"),
     "a value missing": ((HEAD + rows((6, "0.006"))).encode(),

@@ -340,11 +340,11 @@ def test_a_displacement_at_release_that_is_out_of_reach_is_rejected(model):
 def test_an_earlier_or_invalid_time_is_rejected():
     sim = simulation("PRBDM")
     sim.advance(0.01)
-    with pytest.raises(SimulationError, match="time only runs on"):
+    with pytest.raises(SimulationError, match="not before the present time"):
         sim.advance(0.005)
     with pytest.raises(SimulationError):
         sim.advance(math.nan)
-    with pytest.raises(SimulationError, match="times are in seconds"):
+    with pytest.raises(SimulationError, match="both times are in seconds"):
         sim.advance(1e300)
 
 
@@ -352,7 +352,7 @@ def test_a_rejected_change_does_not_change_any_value():
     """A change of a fixed parameter, or of a value to an invalid one, rejects all changes."""
     sim = simulation("PRBDM")
     sim.advance(0.01)
-    with pytest.raises(ParameterError, match=r"flexure\.length is fixed"):
+    with pytest.raises(ParameterError, match=r"flexure\.length is a fixed"):
         sim.set({"stop.restitution": 0.3, "flexure.length": 0.05})
     with pytest.raises(ParameterError, match="at most 1"):
         sim.set({"damping.zeta": 0.1, "stop.restitution": 2.0})

@@ -142,10 +142,10 @@ def test_incomplete_values_are_rejected():
     values = GUIDE.values()
     del values["gravity.x"]
     with pytest.raises(
-        ParameterError, match=r"lacks values of gravity\.x: .*mechanism\.values\(\)"
+        ParameterError, match=r"values of gravity\.x are missing .*mechanism\.values\(\)"
     ):
         assemble(GUIDE, values)
-    with pytest.raises(ParameterError, match=rf"and {len(values) - 4} more: give"):
+    with pytest.raises(ParameterError, match=rf"and {len(values) - 4} more are missing"):
         assemble(GUIDE, {})
 
 
@@ -179,7 +179,7 @@ def test_a_mechanism_with_unconnected_bodies_is_rejected():
     other = Body("other", 1.0, 1.0, (2.0, 1.0), {"a": (2.0, 1.0)})
     between = Flexure("between", "flexure", "loose.a", "other.a")
     falls = changed(bodies=(BODY, loose, other), flexures=(LEFT, RIGHT, between))
-    with pytest.raises(MechanismError, match="falls apart"):
+    with pytest.raises(MechanismError, match="nothing connects"):
         assemble(falls, falls.values())
     alone = changed(bodies=(BODY, loose))
     with pytest.raises(MechanismError, match="loose is not held"):
@@ -239,7 +239,7 @@ def truss() -> Mechanism:
 
 def test_a_mechanism_without_mobility_is_rejected_with_the_names_of_its_loops():
     held = truss()
-    with pytest.raises(MechanismError, match="closed by second, third leave the mechanism no mot"):
+    with pytest.raises(MechanismError, match="closed by second, third prevent every motion"):
         assemble(held, held.values())
 
 
@@ -259,7 +259,7 @@ def test_a_release_of_a_body_whose_centre_of_mass_is_fixed_is_rejected():
     """The leaf stretches, so that the wheel can turn."""
     leaf = dataclasses.replace(pinned().flexure_types[0], axial=True)
     wheel = dataclasses.replace(pinned(), flexure_types=(leaf,))
-    with pytest.raises(EquilibriumError, match=r"= 0 m: the centre of mass of the body rim stays"):
+    with pytest.raises(EquilibriumError, match=r"= 0 m: the centre of mass of the body rim cannot"):
         Simulation(wheel)
 
 

@@ -25,6 +25,6 @@ STEPS = {
     "a step backwards": (1e-3, -1e-3, "communicationStepSize = -0.001 s must be positive"),
     "time running backwards": (0.0, 1e-3, "the last step ended at t = 0.001 s"),
     "a jump forwards": (0.5, 1e-3, "the last step ended at t = 0.001 s"),
-    "NaN for a time": (NAN, 1e-3, "not finite"),
-    "infinity for a step": (1e-3, INF, "not finite"),
+    "NaN for a time": (NAN, 1e-3, "must be finite numbers"),
+    "infinity for a step": (1e-3, INF, "must be finite numbers"),
 }

@@ -366,7 +366,7 @@ def test_a_folder_with_other_contents_is_rejected_and_unchanged(mishap):
     Path("results.parquet").mkdir()
     Path("results.parquet/letter.txt").write_text("keep me")
     for overwrite in (False, True):
-        with pytest.raises(ParameterError, match=r"results\.parquet exists without a sweep"):
+        with pytest.raises(ParameterError, match=r"results\.parquet exists but contains no sweep"):
             sweep(mishap, pd.DataFrame({"x": [1.0]}), overwrite=overwrite)
     assert Path("results.parquet/letter.txt").read_text() == "keep me"
 
@@ -407,7 +407,7 @@ def test_a_run_that_kills_its_worker_costs_one_row(mishap, log):
     ):
         out = sweep(mishap, table, step=0.5, scheduler=there.scheduler_address)
     assert out["status"].tolist() == ["ok", "ok", "crashed", "ok", "ok"]
-    assert out["message"][2] == "every worker that ran it crashed"
+    assert out["message"][2] == "every worker that ran this row crashed"
     assert out["y"].drop(2).tolist() == [0.0, 1.0, 3.0, 4.0]
 
 

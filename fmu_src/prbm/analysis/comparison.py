@@ -42,16 +42,16 @@ Quantities = dict[str, float]
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity by every route; NaN or None where a route does not give it.
+    """One quantity by every method; NaN or None if a method does not give it.
 
     Parameters
     ----------
     name, unit : str
         Name of the quantity; its SI unit.
     model, elements : float
-        By the pseudo-rigid-body model and by finite elements.
+        Value by the pseudo-rigid-body model, and by finite elements.
     measured : Estimate or None
-        Measured, with its standard uncertainty.
+        Measured value with its standard uncertainty.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Row:
 
     @property
     def relative(self) -> float:
-        """The same over the elements' value [-]; NaN where that is 0."""
+        """Model less elements, divided by the elements' value [-]; NaN if that is 0."""
         return self.error / abs(self.elements) if self.elements else math.nan
 
     @property
@@ -76,7 +76,7 @@ class Row:
         return abs(self.elements) if self.unit else 1.0
 
     def away(self, found: float) -> float:
-        """Return the difference from the measured value in its standard uncertainties [-]."""
+        """Return the difference from the measured value, divided by its standard uncertainty."""
         if self.measured is None or not 0.0 < self.measured.uncertainty < math.inf:
             return math.nan
         return (found - self.measured.value) / self.measured.uncertainty
@@ -109,7 +109,7 @@ class Comparison:
             if row.name == name:
                 return row
         known = ", ".join(row.name for row in self.rows)
-        raise ParameterError(f"{name!r} was not compared; compared are {known}")
+        raise ParameterError(f"{name!r} was not compared; the compared quantities are {known}")
 
     def __str__(self) -> str:
         head = f"{'':<34}{'model':>12}{'elements':>12}{'difference':>12}"
@@ -120,7 +120,7 @@ class Comparison:
         lines += [_line(row, measured) for row in self.rows]
         if measured:
             lines.append(
-                "last two columns: difference from the measured value in its uncertainties"
+                "last two columns: difference from the measured value / its standard uncertainty"
             )
         return "\n".join([*lines, *self.notes])
 
@@ -186,7 +186,7 @@ def _frequencies(found: Modes, where: str) -> Quantities:
 
 
 def _straight(hold: Callable[[float], float], step: float) -> Quantities:
-    """Return holding force and stiffness in the drawn shape; step a displacement [m]."""
+    """Return holding force and stiffness in the drawn shape; ``step`` is a displacement [m]."""
     slope = (hold(step) - hold(-step)) / (2 * step)
     return {"holding force, straight": hold(0.0), "stiffness, straight": slope}
 
@@ -225,7 +225,7 @@ def compare(
     measured: Mapping[str, Estimate] | None = None,
     progress: Progress | None = None,
 ) -> Comparison:
-    """Return a mechanism by its model, by finite elements, and as it was measured.
+    """Compare a mechanism's model with finite elements and with measured values.
 
     Parameters
     ----------
@@ -244,7 +244,8 @@ def compare(
     Returns
     -------
     Comparison
-        Without quantities that the model does not have (a third mode of one degree of freedom).
+        Comparison of the quantities that the model has.  A model with one degree of freedom, for
+        example, has no third frequency.
 
     Raises
     ------
@@ -253,7 +254,7 @@ def compare(
     ParameterError
         If a value is out of bounds, or a measured quantity is not compared.
     EquilibriumError
-        If there is no shape at rest, or none held straight.
+        If there is no equilibrium at rest, or none in the drawn shape.
     """
     report = progress or (lambda _: None)
     given = dict(values or {}) | _without(mechanism)
@@ -272,7 +273,8 @@ def compare(
     for name in known:
         if name not in model:
             raise ParameterError(
-                f"{name!r} was measured but is not compared; compared are {', '.join(model)}"
+                f"{name!r} was measured but is not compared; the compared quantities are "
+                f"{', '.join(model)}"
             )
     least = ZERO_RTOL * system.length
     small = {"m": least, "N": least * abs(found["stiffness, straight"])}
@@ -299,7 +301,7 @@ def _without(mechanism: Mechanism) -> dict[str, float]:
 def _restitutions(
     mechanism: Mechanism, values: Mapping[str, float], elements: int, notes: list[str]
 ) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the modal restitution of each stop by both; add a note if a wall is out of reach."""
+    """Yield each stop's modal restitution by both methods; note walls that are out of reach."""
     known = mechanism.values(values)
     for stop in mechanism.stops:
         place, d = value(stop, "position", known), value(stop, "offset", known)

@@ -17,7 +17,7 @@ from ..mechanics.modal import modes
 from ..mechanics.statics import Equilibrium, equilibrium
 from ..mechanics.system import System
 
-REST_RTOL = 1e-12  # Of the size: tolerance of the displacement of an equilibrium.
+REST_RTOL = 1e-12  # Tolerance of an equilibrium's displacement, relative to the size.
 
 
 @dataclass(frozen=True)
@@ -27,11 +27,11 @@ class Rest:
     Parameters
     ----------
     displacement : float
-        Along the direction of the release, from the drawn shape [m].
+        Displacement along the direction of the release, from the drawn shape [m].
     stable : bool
-        Whether the rest is stable.
+        Whether the equilibrium is stable.
     shape : Equilibrium
-        The shape.
+        Shape at the equilibrium.
     """
 
     displacement: float
@@ -42,7 +42,7 @@ class Rest:
 def holding_force(system: System, displacement: float) -> float:
     """Return the force on the released body that holds it at a displacement [N].
 
-    Both are along the direction of the release, gravity acts.
+    Force and displacement are along the direction of the release; gravity acts.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def rests(
     Raises
     ------
     EquilibriumError
-        If there is no shape with one of the displacements, or a place of rest is not found.
+        If there is no shape with one of the displacements, or an equilibrium is not found.
     """
     if forces is None:
         forces = force_curve(system, displacements)
@@ -88,8 +88,8 @@ def rests(
             )  # fmt: skip
             if not search.converged:
                 raise EquilibriumError(
-                    f"the place of rest between {a:g} and {b:g} m was not found in "
-                    f"{search.iterations} iterations: the holding force jumps there; narrow the "
+                    f"the equilibrium between {a:g} and {b:g} m was not found in "
+                    f"{search.iterations} iterations, because the holding force jumps; narrow the "
                     "range of displacements"
                 )
             shape = equilibrium(system, place)
@@ -124,6 +124,6 @@ def snap(system: System, low: float, high: float) -> tuple[float, float]:
     if not found.success:
         raise EquilibriumError(
             f"the largest holding force between {low:g} and {high:g} m was not found: "
-            f"{found.message} Give places of rest that are closer to each other"
+            f"{found.message} Give equilibria that are closer to each other"
         )
     return float(found.x), holding_force(system, float(found.x))

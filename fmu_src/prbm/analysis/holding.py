@@ -1,7 +1,7 @@
-"""A mechanism held at displacements: force, stiffness, how straight it moves, frequency.
+"""A mechanism held at displacements: force, stiffness, deviation from a straight line, frequency.
 
-The released body is held at its centre of mass, along the direction of the release.  With
-u that direction, z(d) the shape held at the displacement d and F(d) the force,
+The released body is held at its centre of mass, along the direction u of the release.  At the
+displacement d the holding force is F(d) and the position of the centre of mass z(d).  Then
 
     stiffness = dF/dd,    across = Im(conj(u) (z - z_straight)),
 
@@ -43,7 +43,7 @@ class Held:
     across : float
         Displacement of the body to the left of that direction [m].
     angle : float
-        Its rotation, counter-clockwise [rad].
+        Rotation of the body, counter-clockwise [rad].
     frequency : float
         Fundamental frequency of the free body about the shape, with the force as a constant load
         [Hz]; negative if unstable.
@@ -132,7 +132,7 @@ def curve(
     system : System
         The mechanism.
     displacements : (k,)
-        Increasing [m], so close together that the force changes its sign at most once between two.
+        Increasing displacements [m], between two of which the force changes its sign at most once.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
 

@@ -36,7 +36,7 @@ STEP_RTOL = 1e-6  # Largest relative difference between equal steps.
 MODES_SHOWN = 6  # Number of modes in a figure.
 SIGNALS = {
     "along": "velocity along the impact [m/s]",
-    "across": "velocity across it [m/s]",
+    "across": "velocity across the impact [m/s]",
     "turning": "angular velocity [rad/s]",
 }
 
@@ -54,8 +54,8 @@ class AfterImpact:
     time : (m,)
         Time since the impact, in equal steps [s].
     along, across, turning : (m,)
-        Velocity of the body's centre of mass along the direction of the stop and to the left of
-        it [m/s], its angular velocity [rad/s].
+        Velocity of the body's centre of mass along the direction of the stop, and to the left of
+        this direction [m/s]; angular velocity of the body [rad/s].
     modes : (k,)
         Frequencies at the shape of the impact [Hz]; negative ones are unstable.
     """
@@ -176,9 +176,9 @@ def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
     Returns
     -------
     frequency : (m // 2 + 1,)
-        Up to half of the sampling rate [Hz].
+        Frequencies up to half of the sampling rate [Hz].
     amplitude : (m // 2 + 1,)
-        Of the sine at each frequency, in the unit of the signal.
+        Amplitude of the sine at each frequency, in the unit of the signal.
 
     Raises
     ------
@@ -195,7 +195,7 @@ def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
     steps = np.diff(time)
     if len(time) < SAMPLES_MIN or np.ptp(steps) > STEP_RTOL * abs(float(steps.mean())):
         raise ParameterError(
-            f"a spectrum needs at least {SAMPLES_MIN} samples in equal steps; here are {len(time)}"
+            f"a spectrum needs at least {SAMPLES_MIN} samples in equal steps, not {len(time)}"
         )
     window = hann(len(time), sym=False)
     lines = np.fft.rfft(window * detrend(signal))
@@ -210,14 +210,14 @@ def peaks(frequency: Real, amplitude: Real, share: float = 0.02) -> Real:
     Parameters
     ----------
     frequency, amplitude : (m,)
-        As from :func:`spectrum`.
+        Results of :func:`spectrum`.
     share : float
         Least height of a peak, as a share of the largest amplitude.
 
     Returns
     -------
     (p,)
-        Increasing [Hz].
+        Frequencies of the peaks, increasing [Hz].
 
     Examples
     --------

@@ -42,7 +42,7 @@ def restitution(mechanism: Mechanism, values: Mapping[str, float], stop: int) ->
 
 
 def note(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> str | None:
-    """Return a sentence if a stop is off the centre of mass and stretching has an effect there.
+    """Return a note if a stop hits off the centre of mass and stretching changes the impact.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def note(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> str | 
     Returns
     -------
     str or None
-        Also None if a flexure is axial already, or no force reaches the stop.
+        None without such an effect, or if a flexure is axial already or no force reaches the stop.
     """
     if not mechanism.flexures or any(kind.axial for kind in mechanism.flexure_types):
         return None
@@ -69,7 +69,7 @@ def note(mechanism: Mechanism, values: Mapping[str, float], stop: int) -> str | 
         stretched = restitution(stretching(mechanism), values, stop)
     except PrbmError:
         return None
-    if not abs(inextensible - stretched) > DIFFERENCE_MIN:  # Or one is not a number.
+    if not abs(inextensible - stretched) > DIFFERENCE_MIN:  # Or one of them is NaN.
         return None
     place = value(s, "position", system.values)
     return (

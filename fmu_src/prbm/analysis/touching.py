@@ -27,7 +27,7 @@ def stop_index(mechanism: Mechanism, name: str | None) -> int:
     """
     names = [stop.name for stop in mechanism.stops]
     if not names or (name is not None and name not in names):
-        known = f"; it has {', '.join(names)}" if names else ": describe one, [[stops]]"
+        known = f"; it has {', '.join(names)}" if names else ": describe one in [[stops]]"
         raise ParameterError(f"{mechanism.name} has no stop {name or 'to hit'}{known}")
     return 0 if name is None else names.index(name)
 
@@ -39,7 +39,9 @@ def touching(
     size: float,
     near: S | None = None,
 ) -> S:
-    """Return the shape, held by a force on the released body, that touches the wall (secant).
+    """Return the shape, held by a force on the released body, in which a stop touches its wall.
+
+    The displacement of the released body is found by the secant method.
 
     Parameters
     ----------
@@ -85,7 +87,7 @@ def impact_shape(system: System, stop: int, wall: float) -> Equilibrium:
     stop : int
         Index of the stop.
     wall : float
-        Position of its wall [m].
+        Position of the wall [m].
 
     Raises
     ------

@@ -11,8 +11,8 @@ import math
 # --- description -------------------------------------------------------------------------------
 JOINT_DISTANCE_RTOL = 1e-9  # Of the size: largest distance of two points that a joint connects.
 MASSLESS_RTOL = 1e-13  # Smallest eigenvalue of the mass matrix, scaled to a unit diagonal.
-DEPENDENT_LOOP_RTOL = 1e-9  # Of the largest entry: smaller pivots of the loops are round-off.
-STUB_RTOL = 1e-12  # Of a cantilever: excess of the links over its length that is round-off.
+DEPENDENT_LOOP_RTOL = 1e-9  # Of the loop Jacobian's largest entry: smaller pivots are round-off.
+STUB_RTOL = 1e-12  # Of a cantilever's length: excess of the sum of its links that is round-off.
 
 # --- constraints -------------------------------------------------------------------------------
 CONSTRAINT_RTOL = 1e-14  # Of the size: residual of a closed loop, a few roundings of a coordinate.
@@ -25,10 +25,10 @@ STATICS_TURN_MAX = 0.5  # rad per Newton step and load step; a larger turn reach
 STATICS_TURN_MIN = 1e-300  # rad; any positive number, to divide by.
 STATICS_LOAD_STEP_MIN = 1 / 512  # Of the load: smallest continuation step.
 STATICS_CONSTRAINT_RTOL = 1e-13  # Of the size: residual of closed loops at an equilibrium.
-STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring times one radian, or of the load.
-STATICS_STEP_ATOL = 1e-8  # rad; the error after a last step this small is its square.
-RELEASE_ROW_RTOL = 1e-9  # Of the size: a shorter row of the release follows from the loops.
-RELEASE_MOBILITY_RTOL = 1e-12  # Of the free mobility: below, the loops immobilise the body.
+STATICS_FORCE_RTOL = 1e-12  # Of the stiffest spring at one radian, or of the load: residual torque.
+STATICS_STEP_ATOL = 1e-8  # rad; Newton step that ends the iteration: the error is its square.
+RELEASE_ROW_RTOL = 1e-9  # Of the size: if its row is shorter, the loops hold the released body.
+RELEASE_MOBILITY_RTOL = 1e-12  # Of the mobility without loops: if less, the loops hold the body.
 ZERO_FREQUENCY_RTOL = 1e-7  # Of the highest frequency: a lower frequency is round-off.
 ZERO_MODE_RTOL = 1e-12  # Of the momenta before and after: a smaller modal momentum is round-off.
 SPRINGLESS_RATE = 2 * math.pi  # rad/s: rate scale of a linkage without springs.
@@ -43,24 +43,24 @@ COVER_FACTOR = 32.0  # Weight of one normal force in the covering vector of a se
 WEDGED_RTOL = 1e-10  # Of the inverse normal mass: a smaller rate of the approach is round-off.
 ZERO_SPEED_RTOL = 1e-12  # Of the speeds before an impact: round-off of a vanished speed.
 IMPULSE_RANK_RTOL = 1e-13  # Of the largest singular value: rank of the inverse mass in contact.
-REACTION_RANK_RTOL = 1e-12  # The same of the rows of the stops that hold during an impact.
-REBOUND_RTOL = 1e-12  # Of the share of the restitution: width at which the bisection ends.
+REACTION_RANK_RTOL = 1e-12  # Of the largest singular value: rank of the rows of held stops.
+REBOUND_RTOL = 1e-12  # Interval of s, the share of restitution, at which bisection ends.
 
 # --- contact modes -----------------------------------------------------------------------------
-TOUCHING_RTOL = 1e-10  # Of the size: gaps below this close together with the one resolved.
+TOUCHING_RTOL = 1e-10  # Of the size: stops with smaller gaps join an impact at another stop.
 RELEASE_PENETRATION_ATOL = 1e-9  # m; a wall may be penetrated at release by no more than this.
 SETTLE_ITERATIONS_MAX = 10  # Choices of the modes of contacts and projections; two are usual.
-SHORTEST_FLIGHT_RTOL = 5e-7  # Of the period: the arc of a shorter bounce is lost in round-off.
-DEPENDENT_FRICTION_RTOL = 1e-4  # Of a contact's free mobility: below, held stops carry the load.
+SHORTEST_FLIGHT_RTOL = 5e-7  # Of the period: the height of a shorter bounce is round-off.
+DEPENDENT_FRICTION_RTOL = 1e-4  # Of a contact's free mobility: if less, others carry its load.
 ZERO_RATE_RTOL = 1e-9  # Of the velocity scale: a slower rate is round-off.
 FRICTION_EXCESS_RTOL = 1e-6  # Of the friction limit: excess at which a sticking contact slips.
 EVENTS_MAX = 1000  # Events within EVENT_WINDOW_RTOL that end a simulation.
-EVENT_WINDOW_RTOL = 5e-3  # Of the period.
+EVENT_WINDOW_RTOL = 5e-3  # Of the period: time span in which events are counted.
 WALL_PATH_RTOL = 1e-13  # Of the size: a smaller change of a wall's reference is round-off.
-WALL_FADING_FACTOR = 1 / 3  # Of each step, by which the recent longest one is forgotten.
+WALL_FADING_FACTOR = 1 / 3  # Of each communication step: reduction of the remembered longest step.
 WALL_LONGEST_RTOL = 0.1  # Of the period: longest communication step that walls remember.
-WALL_STEP_RTOL = 0.5  # Of the time in which a wall joins its reference: longest step meanwhile.
-REST_SPEED_MIN_FACTOR = 20.0  # Of the zero speed: least jump of a wall that keeps a stop closed.
+WALL_STEP_RTOL = 0.5  # Of the time in which a wall joins its reference: longest integration step.
+REST_SPEED_MIN_FACTOR = 20.0  # Of the zero speed: smaller jumps of a wall's rate open no stop.
 WALL_MOBILITY_MAX = 1e100  # 1/kg; larger mobilities lose impulses to underflow.
 EVENTS_AT_ONCE_MAX = 16  # Events of one contact at one time in model exchange.
 IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
@@ -68,13 +68,13 @@ IMPACT_COUNT_MAX = 2147483647  # Largest Integer of FMI.
 # --- location of events ------------------------------------------------------------------------
 EVENT_TIME_ATOL = 1e-13  # s; events are located to 1e-12 s, of which projection needs a part.
 EVENT_TIME_FACTOR = 2.0  # Of EVENT_TIME_ATOL: error of the time of an event.
-EVENT_TIME_ULPS = 8.0  # The same, of the spacing of the numbers around it.
-RELEASE_WATCH_FACTOR = 0.5  # Of the largest stop force in a step: below, a release is searched.
+EVENT_TIME_ULPS = 8.0  # Of the spacing of floating-point numbers at the time: further error of it.
+RELEASE_WATCH_FACTOR = 0.5  # Of the largest stop force in a step: a lower force starts a search.
 LOCATION_ITERATIONS_MAX = 100  # Iterations of Brent's search; about ten are usual.
 GUARD_INTERVALS = 8  # Intervals of a step in which the guards are evaluated.
 
 EVENT_CORRECTIONS_MAX = 3  # Newton steps of a closing gap on projected states.
-EVENT_CORRECTION_RTOL = 1e-2  # Of the step: a larger correction is that of a grazing contact.
+EVENT_CORRECTION_RTOL = 1e-2  # Of the step: a larger correction indicates grazing; not applied.
 
 # --- step size ---------------------------------------------------------------------------------
 TOLERANCE_MIN = 1e-13  # Smallest relative tolerance of the integration.
@@ -83,16 +83,16 @@ TABLEAU_ATOL = 1e-14  # Error of a sum of Runge-Kutta coefficients that is round
 STEP_SAFETY_FACTOR = 0.85  # Of the optimal step size.
 STEP_SHRINK_MIN = 0.2  # Smallest ratio of successive step sizes.
 STEP_GROWTH_MAX = 5.0  # Largest ratio of successive step sizes.
-STEP_MEMORY_EXPONENT = 0.04  # Of the previous error [Hairer, IV.2].
+STEP_MEMORY_EXPONENT = 0.04  # Exponent of the previous error in the step size [Hairer, IV.2].
 STEP_TREND_FACTOR = 0.75  # Of STEP_MEMORY_EXPONENT: reduction of the exponent of the last error.
 STEP_ERROR_FACTOR = 30.0  # Of the tolerance: error of the embedded solution of lower order.
 STEP_ERROR_MIN = 1e-4  # Of the tolerance: smallest error that the controller remembers.
 STEP_MAX_RTOL = 0.08  # Of the period: longest step.
 STEP_MIN_ATOL = 1e-13  # s; shortest step.
 FIRST_STEP_FACTOR = 0.1  # Of the first step that the tolerance allows [Hairer, II.4].
-FIRST_STEP_EXPONENT = 1 / 6  # Of the tolerance in the first step.
+FIRST_STEP_EXPONENT = 1 / 6  # Exponent of the tolerance in the first step size.
 FIRST_RATE_MIN = 1e-6  # 1/s: smallest relative rate of the state that the first step assumes.
-STEPS_MAX = 1e9  # Longest steps to one communication point; more is a mistake of units.
+STEPS_MAX = 1e9  # Longest steps to one target time; more are a mistake of units.
 
 # --- communication times -----------------------------------------------------------------------
 TIME_SUM_RTOL = 1e-12  # Of a time: round-off of importers that add up steps.
@@ -101,12 +101,12 @@ STOP_TIME_RTOL = 1e-3  # Of a communication step: allowed overshoot of the stop 
 
 # --- model exchange ----------------------------------------------------------------------------
 DRIFT_RTOL = 1e-8  # Of the size: drift of a held contact that requests an event.
-MOVING_DRIFT_FACTOR = 100.0  # Of DRIFT_RTOL: the same while the wall moves.
+MOVING_DRIFT_FACTOR = 100.0  # Of DRIFT_RTOL: drift that requests an event while the wall moves.
 DRIFT_CORRECTED_RTOL = 1e-12  # Of the size: drift that an event leaves uncorrected.
-PENETRATION_WARNING_RTOL = 1e-2  # Of the size: penetration that no solver's overshoot explains.
-REST_JUMP_FACTOR = 0.5  # Of the jump of a wall that keeps a stop closed: requests an event.
-SLIDING_ENDS_FACTOR = 0.5  # Of the zero speed: sliding has ended below.
-GAP_CLOSED_RTOL = 1e-12  # Of the size: how far below zero a gap closes.
-LOWEST_BOUNCE_RTOL = 1e-10  # Of the size: height of a bounce below which a gap closes late.
-INDICATOR_LEAD_RTOL = 0.01  # Of the period: time by which an opening rate lifts an indicator.
+PENETRATION_WARNING_RTOL = 1e-2  # Of the size: a larger penetration is logged as a warning.
+REST_JUMP_FACTOR = 0.5  # Of the largest jump that opens no stop: gap rate that needs an event.
+SLIDING_ENDS_FACTOR = 0.5  # Of the zero speed: sliding ends at a lower speed.
+GAP_CLOSED_RTOL = 1e-12  # Of the size: depth below zero at which a gap closes.
+LOWEST_BOUNCE_RTOL = 1e-10  # Of the size: height of the lowest bounce that is resolved in time.
+INDICATOR_LEAD_RTOL = 0.01  # Of the period: time that multiplies an opening rate in an indicator.
 DEPENDENT_PIVOT_RTOL = 1e-7  # Of the largest pivot: smaller pivots make the states singular.

@@ -12,7 +12,7 @@ from typing import Any
 ANIMATION_USAGE = "[options] (RESULT.csv | MECHANISM | --model NAME | --mechanism FILE) OUT.gif"
 
 INVALID_CHOICE = re.compile(r"invalid choice: '(?P<word>.*?)' \(choose from (?P<choices>.*)\)")
-SIMILARITY_MIN = 0.6  # Of difflib, from 0 to 1, for a word to be proposed.
+SIMILARITY_MIN = 0.6  # Least similarity of a proposed word by difflib, from 0 to 1.
 
 
 class ProposingParser(ArgumentParser):

@@ -30,7 +30,7 @@ import os, signal, sys
 signal.signal(signal.SIGINT, lambda *_: os._exit({INTERRUPTED}))
 from prbm.commands.fmu_report import main
 sys.exit(main(sys.argv[1:]))
-"""  # Ctrl-C during the imports ends it without a traceback.
+"""  # Ctrl-C during the imports ends the process without a traceback.
 
 
 @dataclass(frozen=True)
@@ -340,7 +340,7 @@ def _fmu(plan: BuildPlan, flavour: Flavour, mechanism: Mechanism) -> bytes:
             return python_fmu.build(mechanism, changes, progress)
         return native_fmu.build(mechanism, changes, flavour.fmi, platforms, flavour.clock, progress)
     except CompilerError:
-        raise  # It does not depend on the mechanism.
+        raise  # The error does not depend on the mechanism.
     except PrbmError as error:
         raise UserMistake(f"{mechanism.name}: {error}") from None
 
@@ -383,7 +383,7 @@ def _run(command: Sequence[str], environment: Mapping[str, str]) -> int:
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
-    """Wait for a process to end after Ctrl-C; interrupt, then terminate it after a timeout."""
+    """Wait for a process to end after Ctrl-C; after timeouts, interrupt it, then terminate it."""
     for number in (signal.SIGINT, signal.SIGTERM):
         try:
             process.wait(TERMINATION_TIMEOUT)

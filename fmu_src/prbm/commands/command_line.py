@@ -287,8 +287,8 @@ def _fit(commands: Commands) -> None:
     add = parser.add_argument
     add(
         "--free", action="append", required=True, metavar="NAME[=LOW:HIGH]",
-        help="parameter to fit, with bounds; repeatable.  record.shift [s] and record.zero are "
-        "the time and the reading at which the record begins",
+        help="parameter to fit, with bounds; repeatable.  record.shift [s] is the time since the "
+        "release at time zero of the record, record.zero the reading at zero output",
     )  # fmt: skip
     set_argument(parser)
     targets = parser.add_argument_group("measured data (at least one)")

@@ -100,7 +100,7 @@ def simulate(fmu: Path, progress: Progress) -> Run:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns false after Ctrl-C; a second Ctrl-C raises as usual."""
+    """Yield a function that returns false after Ctrl-C; a second one raises KeyboardInterrupt."""
     interrupted: list[int] = []
 
     def record_signal(number: int, _: object) -> None:

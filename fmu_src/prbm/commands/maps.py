@@ -19,7 +19,7 @@ from ..plots import impact_map as figures
 from .output import Output
 from .systems import check_length
 
-# The default grid has about the proportions of that in the thesis, in round numbers.
+# The default grid has about the proportions of the grid in the thesis, in round numbers.
 WALL_SHARE = 5 / 9  # Largest default wall position, as a share of the displacement at release.
 OFFSET_SHARE = 1 / 20  # Largest default offset, as a share of the size of the mechanism.
 ROUND_RTOL = 1e-9  # A round number may exceed its limit by this share: round-off.

@@ -77,7 +77,7 @@ def _count_times(
         start, step = (float(tags[key][0].replace(",", ".")) for key in ("X0", "Delta_X"))
     except (KeyError, IndexError, ValueError):
         raise RecordError(
-            f"{source}: neither an X column nor X0 and Delta_X: export with an X column"
+            f"{source}: has neither an X column nor X0 and Delta_X: export with an X column"
         ) from None
     for i, row in enumerate(rows):
         row[0] = repr(start + i * step).replace(".", decimal)

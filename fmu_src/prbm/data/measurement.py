@@ -551,7 +551,7 @@ class BeamTable:
 
     @property
     def excess(self) -> float:
-        """Ratio of the scatter to the mean stated uncertainty [-]: 1 if that explains it."""
+        """Scatter / mean stated uncertainty [-]; about 1 if this uncertainty explains it."""
         stated = np.mean([beam.modulus.uncertainty for beam in self.beams])
         return self.scatter / float(stated) if stated > 0.0 else math.inf
 

@@ -60,7 +60,7 @@ def plain_table(
 
 
 def _first_row(lines: list[str], delimiter: str, decimal: str) -> int:
-    """Return the index of the first line with two numbers or more before another such line."""
+    """Return the index of the first line of numbers that precedes another one or ends the file."""
     kept = [i for i, line in enumerate(lines) if line.strip() and not COMMENT.match(line)]
     data = []
     for i in kept:

@@ -108,7 +108,7 @@ class Record:
             return found[0]
         if found:
             raise RecordError(
-                f"{self.source}: the name {name!r} is that of {len(found)} columns; give different "
+                f"{self.source}: {len(found)} columns have the name {name!r}; give different "
                 "names, columns=[...]"
             )
         near = difflib.get_close_matches(name, self.names, n=1, cutoff=0.6)
@@ -290,7 +290,7 @@ def _with_units(
             raise RecordError(f"{source}: column {i} has no name: give names, columns=[...]")
         if name in names[: i - 1]:
             raise RecordError(
-                f"{source}: the name {name!r} is that of columns {names.index(name) + 1} and {i}: "
+                f"{source}: columns {names.index(name) + 1} and {i} have the same name {name!r}: "
                 "give different names, columns=[...]"
             )
     return [(name, units.get(name, unit)) for name, unit in heads]

@@ -10,8 +10,8 @@ from ..base.errors import PrbmError
 from ..mechanics.arrays import Real
 
 SAMPLES_MIN = 16  # Samples of a signal over time.
-GAP_FACTOR = 1.8  # Times the usual step: a missing sample gives 2, rounding up to 1.5.
-LONG_STEP_FACTOR = 3.0  # Times the median step: longer steps are left out of the usual step.
+GAP_FACTOR = 1.8  # Of the usual step: a missing sample gives 2, rounding of times at most 1.5.
+LONG_STEP_FACTOR = 3.0  # Of the median step: longer steps are left out of the usual step.
 
 
 class RecordError(PrbmError, ValueError):
@@ -91,7 +91,7 @@ class Series:
             )
 
     def _check_gaps(self) -> None:
-        """Reject a step that is longer than the usual step by a missing sample."""
+        """Reject a step that is so long that a sample must be missing."""
         steps = np.diff(self.time)
         usual = float(steps[steps <= LONG_STEP_FACTOR * np.median(steps)].mean())
         i = int(np.argmax(steps))

@@ -1,6 +1,6 @@
 r"""Outlines of flexures, bodies, walls and ground in a shape of a mechanism, as complex numbers.
 
-A shape is given by its arms E = exp(s + i theta) (:mod:`prbm.mechanics.assembly`).  All positions
+A shape is given by its arms E = exp(s + i theta) (:mod:`prbm.mechanics.system`).  All positions
 are linear in E, so that E (1 + i a w) is the shape displaced by the amplitude a along a mode w.
 """
 
@@ -20,7 +20,7 @@ CURVE_POINTS = 40  # Points of the drawn curve of a flexure.
 # Shares of the size of the mechanism:
 BODY_THICKNESS_MIN = 0.04  # Drawn thickness of a body without height.
 WALL_LENGTH, GROUND_LENGTH = 0.36, 0.16
-INSIDE_RTOL = 1e-9  # A point nearer to the sides of a hull is regarded as outside.
+INSIDE_RTOL = 1e-9  # A point that is nearer to a side of a hull counts as outside.
 GROUND_SHARE_MAX = 0.4  # Longest ground at the end of a flexure, as a share of its length.
 STROKES = 6  # Strokes of the hatching.
 INCLINED_AREA_MAX = 0.4  # An inclined box must be smaller than this share of the upright box.

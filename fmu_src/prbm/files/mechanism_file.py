@@ -221,7 +221,7 @@ def _place(message: str, data: Mapping[str, Any]) -> tuple[str | int, ...]:
 def _quoted(
     message: str, path: tuple[str | int, ...], data: Mapping[str, Any]
 ) -> tuple[str | int, ...]:
-    """Return the path of the key of a part whose value a message quotes, or of the part."""
+    """Return the path of the key whose value a message quotes, or else that of the part."""
     part: Any = data
     for key in path:
         part = part[key]

@@ -94,7 +94,7 @@ def quantities(texts: Sequence[str], unit: str, option: str) -> list[float]:
 
 
 def without_exponent(text: str) -> str:
-    """Return a quantity without the power of ten of its number, whose e is not a unit.
+    """Return a quantity without the exponent of its number, because the e in 1e-2 is not a unit.
 
     Examples
     --------

@@ -52,7 +52,7 @@ def lines(text: str) -> dict[Path, int]:
 def key_length(text: str, limit: int) -> int:
     """Return the number of parts of the longest dotted key, counted up to a limit.
 
-    It is an upper bound: words and strings joined by dots count wherever they are.
+    It is an upper bound, because words and strings joined by dots count outside keys, too.
 
     Examples
     --------

@@ -47,7 +47,7 @@ watt = joule / second = W
 hertz = 1 / second = Hz
 """
 DEFINITIONS = f"""{MECHANICAL}tera- = 1e12 = T-
-"""  # Pint's own list of units has names that are likely misprints of these.
+"""  # Pint's own list is not used: some of its units are likely misprints of these.
 KNOWN = "m, g, s, N, Nm, Pa, J, W, Hz, rad, deg, with SI prefixes, joined as in kg/m3 or N.m"
 
 _NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # Atomic: 1e3 is not 1 with the unit e3.
@@ -72,8 +72,8 @@ def quantity(written: object, unit: str) -> Quantity:
     Raises
     ------
     MechanismError
-        If it is not one of these, has another dimension, or has no unit although it is in quotes
-        and not dimensionless.
+        If ``written`` is none of these, its unit has another dimension, or a number in quotes has
+        no unit although the quantity has a dimension.
 
     Examples
     --------

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ..base.atomic import FILE_MODE
 
-TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # Of every file: the earliest time that a zip archive can hold.
+TIMESTAMP = (1980, 1, 1, 0, 0, 0)  # Time of every file, the earliest that a zip archive can store.
 EXECUTABLE_MODE = 0o755
 LIBRARIES = (".so", ".dll", ".dylib")
 UNIX = 3  # System of origin: file permissions are applied only if it is Unix.

@@ -290,7 +290,7 @@ STOP_LIMITS = (
     "pressing acceleration.",
     "In co-simulation the inputs of a wall at a communication point t0 define a line, "
     "r(t) = <code>position + displacement</code> + v (t - t0). Its velocity v is the input "
-    "<code>velocity</code> or, until that has been non-zero, the mean rate of the "
+    "<code>velocity</code> or, while this has always been zero, the mean rate of the "
     "<code>displacement</code>. The wall joins the line within T, twice the recent longest "
     "communication step (at most a fifth of the period): x = r + e (1 - 3 s<sup>2</sup> + "
     "2 s<sup>3</sup>) + u T (s - 2 s<sup>2</sup> + s<sup>3</sup>), s = (t - t0)/T &le; 1, "
@@ -299,8 +299,8 @@ STOP_LIMITS = (
     "never further than d from its target. All impacts within one communication step are "
     "computed and counted; the latched outputs describe the last one.",
     "A body rests on a moving wall while the contact force, which includes the wall's "
-    "acceleration, is positive. Then the body leaves, until other forces close the gap "
-    "again. A <code>velocity</code> that is set in event mode acts at once.",
+    "acceleration, is positive. When it becomes zero, the body leaves the wall. Other forces "
+    "may close the gap again. A <code>velocity</code> that is set in event mode acts at once.",
     "A wall that is part of another model takes part in impacts by its "
     "<code>mobility</code>, its inverse effective mass. The impulse is that between two "
     "masses, the wall changes its velocity within the step, and the other model must "
@@ -322,8 +322,8 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
         planar,
         "Links that do not stretch keep a body on parallel, straight flexures from turning, so "
         "that the place of a hit has no effect there. With flexures that stretch, a rigid impact "
-        "off the centre of mass loses more energy of the fundamental mode. The loss of a real one "
-        "depends on the duration of its contact.",
+        "off the centre of mass loses more energy of the fundamental mode. The loss of a real "
+        "impact depends on the duration of the contact.",
     ]
     items = [impact, planar] if _stretches(mechanism) else rigid
     for model in sorted(models & END_MOMENT.keys()):

@@ -38,7 +38,7 @@ SLOW = "the default experiment takes the Python engine more than about half a mi
 DIGITS = 9  # Significant digits; the error of the engine is larger.
 STEPS_MAX = 1e5  # Integration steps that the Python engine takes in about half a minute.
 CACHED_MAX = 32  # Results in memory: FMI 2.0 and 3.0 share them, mechanism by mechanism.
-LARGE = 40  # Mechanisms with more coordinates take fewer steps in that time.
+LARGE = 40  # With more coordinates, the Python engine takes fewer steps in half a minute.
 STABLE_STEP_FACTOR = 3.0  # Largest stable step of an explicit method, in units of 1/omega.
 
 
@@ -101,7 +101,7 @@ def steps(mechanism: Mechanism, changes: Mapping[str, float], experiment: Experi
 
 
 class _Cached:
-    """A mechanism that is hashed by its identity, with a callback that is no part of the hash."""
+    """A mechanism that is hashed by its identity, with a callback that does not enter the hash."""
 
     def __init__(self, mechanism: Mechanism, progress: Callable[[str], None]) -> None:
         self.mechanism, self.progress = mechanism, progress

@@ -33,7 +33,7 @@ def unpacked(fmu: Path | BinaryIO) -> Iterator[Path]:
             return
     raise RuntimeError(
         f"no folder for temporary files has a path of plain ASCII letters (tried {candidates[0]}); "
-        "set the environment variable TMPDIR to one that has"
+        "set the environment variable TMPDIR to a folder with such a path"
     )
 
 

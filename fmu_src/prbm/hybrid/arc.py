@@ -19,11 +19,11 @@ class Arc:
     Parameters
     ----------
     start : float
-        [s].
+        Time at the start of the step [s].
     h : float
         Size of the whole step [s].
     end : float
-        Its end, or the time of the event that ends it [s].
+        End of the step, or the time of the event that ends it [s].
     y : (2 n + 2,)
         State at the start.
     k : (stages, 2 n + 2)
@@ -43,7 +43,8 @@ class Arc:
     def cut(self, rate: Rate, t: float) -> tuple["Arc", Real]:
         """Return the step from the same start to time t, and the state at its end.
 
-        The state is not projected.  It has the order of the method, not that of the dense output.
+        The state is not projected.  Its order of accuracy is that of the method, which is higher
+        than that of the dense output.
 
         Parameters
         ----------
@@ -57,13 +58,13 @@ class Arc:
         return Arc(self.start, h, t, self.y, k), y
 
     def samples(self) -> tuple[Real, Real]:
-        """Return the ends of the intervals in which the guards are evaluated.
+        """Return the times at which guards are evaluated, and the states there.
 
         Returns
         -------
         times : (w + 1,)
-            [s].
+            Ends of w intervals [s].
         states : (w + 1, 2 n + 2)
-            Not projected.
+            States at these times, not projected.
         """
         return self.start + self.h * FRACTIONS, self.y + self.h * (GRID @ self.k)

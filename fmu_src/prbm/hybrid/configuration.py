@@ -1,4 +1,4 @@
-"""Everything about a simulation that the motion does not change, and its scales."""
+"""The constant part of a simulation: mechanism, parameters, tolerances and scales."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -35,10 +35,11 @@ class Scales:
     length : float
         Size of the mechanism [m].
     rate : float
-        Fundamental angular frequency; without one, that of the stiffest spring [rad/s].
+        Fundamental angular frequency; if it is zero, that of the stiffest spring with the largest
+        inertia [rad/s].
     energy : float
-        Of one radian against the stiffest torsion spring; without springs, of one radian in a
-        period [J].
+        Torque of the stiffest torsion spring at one radian; without torsion springs, the largest
+        inertia times the square of the rate [J].
 
     Examples
     --------
@@ -93,7 +94,8 @@ class Scales:
     def of_state(self, y: Real) -> Real:
         """Return the magnitudes against which errors of a state are measured, (2 n + 2,).
 
-        One radian for angles of any size; for rates and energies at least their scales.
+        The magnitude of an angle is one radian.  Those of rates and energies are their absolute
+        values, but at least the scales.
         """
         n = len(y) // 2 - 1
         scale = np.abs(y)
@@ -112,19 +114,19 @@ class Configuration:
     mechanism : Mechanism
         Description.
     values : mapping
-        Values of all its parameters.
+        Values of all parameters.
     system : System
-        Its constant arrays.
+        Constant arrays of the mechanism.
     calculated : mapping
-        Parameters that follow from others.
+        Calculated parameters, such as ``flexure.gamma0``.
     tolerance : float
         Relative tolerance of the integration.
     step : float or None
         Fixed step size [s]; None: adaptive.
     frequency : float
-        Fundamental frequency at the start [Hz]; 0: none.
+        Fundamental frequency at the start [Hz]; 0 if there is none.
     scales : Scales
-        Of lengths, rates and energies.
+        Scales of lengths, rates and energies.
     """
 
     mechanism: Mechanism
@@ -149,7 +151,7 @@ class Configuration:
         Raises
         ------
         ParameterError
-            If a value, the tolerance or the step makes no sense.
+            If a value, the tolerance or the step is invalid.
         """
         system = assemble(mechanism, values)
         known = calculated(mechanism, values)

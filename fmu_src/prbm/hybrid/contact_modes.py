@@ -1,7 +1,7 @@
-"""Which stops hold and which contacts stick or slip: the discrete state that follows an event.
+"""The choice of the contact modes after an event: stops that hold, contacts that stick or slip.
 
-The choice depends only on the state at the front: on the forces and accelerations that the
-candidates would have there.
+The choice depends only on the state at the front: on the forces and accelerations of the contacts
+in the modes that are tried.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -109,18 +109,18 @@ def _chosen(
 
 
 def release_moving(configuration: Configuration, front: Front) -> tuple[Front, int | None]:
-    """Release the held stops that move apart or together, and find one that is struck.
+    """Release the held stops whose gaps have a rate, and find a stop that is struck.
 
-    A wall that retreats leaves the body behind; gravity or another force closes the gap again
-    and, below ``rest_speed``, captures it.  A wall that advances strikes, and so does a body that
-    an impulse throws against a wall that it touches.
+    Gap rates result from changes of a wall's velocity and from impulses.  If a wall retreats, the
+    body leaves it; a force may close the gap again later.  If a wall advances, or an impulse moves
+    a body towards a wall that it touches, the stop is struck.
 
     Returns
     -------
     front : Front
         The front; held stops whose gap has a rate are open.
     struck : int or None
-        A stop that closes.
+        A stop that is struck.
     """
     gaps, rates = front.gaps_and_rates()
     scales, contacts, struck = configuration.scales, front.contacts, None
@@ -158,9 +158,9 @@ def find_holding_stops(
 ) -> list[int] | None:
     """Return the stops at rest that stay closed: their forces push, and the other stops open.
 
-    In this choice contacts with a sliding velocity slip, and contacts at rest are frictionless.  Of
-    stops that can move only together, some with independent rows hold.  None if no choice
-    satisfies the laws of contact.
+    In this choice contacts with a sliding velocity slip, and contacts at rest are frictionless.  If
+    stops can move only together, a subset with independent rows holds.  The result is None if no
+    choice satisfies the laws of contact.
     """
     every, scales = sorted(set(candidates)), configuration.scales
     if not every:
@@ -174,7 +174,7 @@ def find_holding_stops(
     pressing = zip(every, found.normal, strict=True)
     holding = [i for i, press in pressing if press > scales.zero_acceleration]
     contacts = equations_holding(scales, front, holding).contacts
-    # A single stop needs no check; the forces of several may depend on each other.
+    # Only the rows of several stops may be dependent: check these.
     agrees = len(every) == 1 or _agrees(scales, front, contacts, every, {})
     return holding if agrees else None
 
@@ -219,14 +219,14 @@ def mobility(M: Real, held: Real, row: Real) -> float:
 
 
 def slip_mode(scales: Scales, speed: float, slow: float = 0.0) -> ContactMode:
-    """Return the mode of a contact that slides with a speed [m/s]; FRICTIONLESS if at rest."""
+    """Return the slip mode of a sliding speed [m/s]; FRICTIONLESS up to ``slow`` or round-off."""
     if abs(speed) <= slow or abs(speed) <= scales.zero_speed:
         return FRICTIONLESS
     return ContactMode.slipping(speed)
 
 
 def _residual_speed(front: Front, contact: int) -> float:
-    """Return the sliding speed that the resolution of time leaves at a reversal [m/s]."""
+    """Return the sliding speed at a reversal that the error of the event time causes [m/s]."""
     a = front.equations.evaluate(front.time, front.q, front.v).a
     rate = front.equations.slip_acceleration(contact, front.e, front.v, a)
     return abs(rate) * time_resolution(front.time)
@@ -284,7 +284,7 @@ def _modes_of(
 ) -> ContactState | None:
     """Return the modes that follow from the forces of ``stops`` and the contacts with friction.
 
-    None if no forces satisfy their laws, or if another stop that touches would close.
+    Return None if no forces satisfy their laws, or if another stop that touches would close.
     """
     contacts, rubbing = front.contacts, _with_coefficients(front.equations, stops)
     modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}
@@ -315,7 +315,7 @@ def _with_coefficients(equations: Equations, stops: Sequence[int]) -> list[int]:
 
 
 def _sliding_mode(scales: Scales, front: Front, contact: int, slow: float) -> ContactMode:
-    """Return the mode in which a contact slips faster than ``slow``; FRICTIONLESS if at rest."""
+    """Return the slip mode of a contact; FRICTIONLESS if it is not faster than ``slow``."""
     row = front.equations.slip_row(contact, front.e)
     return slip_mode(scales, float(row @ front.v), slow)
 
@@ -341,7 +341,7 @@ def _sticking_or_slipping(
 ) -> ContactState:
     """Return the modes, with those of contacts at rest chosen by their forces.
 
-    Of contacts that can stick only together, those with friction below its limit stick, which are
+    If contacts can stick only together, those with friction below its limit stick, because they are
     independent of each other; the others have friction at its limit, or none.
     """
     slack, size = scales.zero_acceleration / found.mobility, np.abs(found.friction)
@@ -381,8 +381,8 @@ def _agrees(
     stops : sequence of int
         Stops that touch.
     at_rest : mapping
-        For each contact with friction and without a sliding velocity, the excess of friction that
-        is round-off [N].
+        For each contact with friction that does not slide: the excess of its friction force over
+        the limit that is accepted as round-off [N].
     """
     e, v, equations = front.e, front.v, front.equations.with_contacts(contacts)
     a, lam, _, _ = equations.evaluate(front.time, front.q, v)

@@ -9,15 +9,15 @@ from ..base.tolerances import EVENT_WINDOW_RTOL, EVENTS_MAX
 from . import contact_modes, guards, impacts
 from .configuration import Configuration, Scales, contact_names
 from .front import Front
-from .guards import Guard, Looks
+from .guards import Guard, StepView
 from .impacts import Impact
 
 
 class EventKind(IntEnum):
-    """The kind of an event; the C kernel adds 0 for none.
+    """The kind of an event; in the C kernel, 0 is no event.
 
-    Events of one time are applied in this order: impacts last, so that they act on modes that are
-    valid at that time.
+    Events at one time are applied in this order.  Impacts come last, so that the contact modes are
+    valid when they are resolved.
     """
 
     RELEASE = 1
@@ -25,14 +25,14 @@ class EventKind(IntEnum):
     SLIP = 2
     """A sticking contact reaches the limit of friction."""
     REVERSAL = 3
-    """The sliding velocity of a contact falls to zero: it sticks or slips back."""
+    """The sliding velocity of a contact falls to zero: it sticks or slips the other way."""
     IMPACT = 4
     """The gap of an open stop closes: an impact or a capture."""
 
 
 @dataclass(frozen=True)
 class Event:
-    """An event of a contact at a time [s]; contacts are stops first, then friction points."""
+    """An event of a contact at a time [s].  Contacts are the stops, then the friction points."""
 
     kind: EventKind
     contact: int
@@ -46,7 +46,7 @@ Reset = Callable[[Configuration, Front, int], tuple[Front, list[Impact]]]
 class Transition:
     """A row of the table of events.
 
-    The event is the fall of the guard, z > 0 -> z <= 0, at a contact for which it is watched.
+    The event is the fall of the guard, z > 0 -> z <= 0, at one of the contacts that are watched.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ class Transition:
 
     kind: EventKind
     guard: Guard
-    watched: Callable[[Looks], Sequence[int]]
-    detect: Callable[[Looks, Guard, int], float | None]
+    watched: Callable[[StepView], Sequence[int]]
+    detect: Callable[[StepView, Guard, int], float | None]
     reset: Reset
 
 
@@ -96,7 +96,7 @@ TRANSITIONS = (
 _RESETS = {row.kind: row.reset for row in TRANSITIONS}
 
 
-def first_event(looks: Looks) -> Event | None:
+def first_event(view: StepView) -> Event | None:
     """Return the first event within a step, or None.
 
     Raises
@@ -106,22 +106,22 @@ def first_event(looks: Looks) -> Event | None:
     """
     first: Event | None = None
     for row in TRANSITIONS:
-        for contact in row.watched(looks):
-            t = _located(looks, row, contact)
+        for contact in row.watched(view):
+            t = _located(view, row, contact)
             if t is not None and (first is None or t < first.time):
                 first = Event(row.kind, contact, t)
     return first
 
 
-def _located(looks: Looks, row: Transition, contact: int) -> float | None:
+def _located(view: StepView, row: Transition, contact: int) -> float | None:
     """Return when an event of a contact occurs in a step, or None."""
     try:
-        return row.detect(looks, row.guard, contact)
+        return row.detect(view, row.guard, contact)
     except SimulationError as error:
-        mechanism = looks.equations.system.mechanism
+        mechanism = view.equations.system.mechanism
         raise SimulationError(
             f"no {row.kind.name.lower()} of {contact_names(mechanism, [contact])} could be located "
-            f"within {looks.arc.h:.3g} s from t = {looks.arc.start:.9g} s: {error}"
+            f"within {view.arc.h:.3g} s from t = {view.arc.start:.9g} s: {error}"
         ) from None
 
 
@@ -151,7 +151,7 @@ class EventWindow:
         window = EventWindow(window.since, window.count + 1)
         if window.count > EVENTS_MAX:
             raise SimulationError(
-                f"more than {EVENTS_MAX} events ({event.kind.name.lower()} the last) within "
+                f"more than {EVENTS_MAX} events (last: {event.kind.name.lower()}) within "
                 f"{event.time - window.since:.3g} s at t = {event.time:.9g} s: the contact "
                 "chatters; raise rest_speed or damping.beta, lower the restitution, or give the "
                 "body room between its walls"

@@ -1,4 +1,4 @@
-"""The front: the state up to which the motion is computed, and the discrete state from there."""
+"""The front: the state up to which the motion is computed, and the contact modes from there on."""
 
 from dataclasses import dataclass, replace
 
@@ -10,7 +10,7 @@ from ..mechanics.inputs import Inputs, Wall
 
 @dataclass(frozen=True)
 class Latched:
-    """Outputs of the last impact at a stop; zeros before the first."""
+    """Outputs of the last impact at a stop; zeros before the first impact."""
 
     impact_count: int = 0
     impact_time: float = 0.0
@@ -20,7 +20,7 @@ class Latched:
     energy_lost: float = 0.0
     modal_restitution: float = 0.0
     impulse_sum: float = 0.0
-    """Sum of all impulses so far, those of captures included."""
+    """Sum of all impulses so far, including those of captures."""
 
 
 @dataclass(frozen=True)
@@ -30,11 +30,11 @@ class Front:
     Parameters
     ----------
     time : float
-        [s].
+        Time of the state [s].
     y : (2 n + 2,)
         Angles, rates, dissipated energy and work [rad], [rad/s], [J], [J].
     equations : Equations
-        Equations of the motion from here on: system, inputs with walls, modes of the contacts.
+        Equations of the motion from this time on: system, inputs with walls, contact modes.
     latched : (s,) tuple of Latched
         The last impact of each stop.
     """
@@ -93,5 +93,5 @@ class Front:
         return self.equations.gaps(self.time, e), self.equations.gap_rates(self.time, e, self.v)
 
     def projected(self) -> "Front":
-        """Return the front on the constraints."""
+        """Return the front with its state projected onto the constraints."""
         return replace(self, y=self.equations.project(self.time, self.y))

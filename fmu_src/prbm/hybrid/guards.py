@@ -1,4 +1,4 @@
-"""Guards: the scalars whose fall through zero is an event, and where in a step they fall.
+"""Guards: scalars whose fall through zero is an event, and the location of their zeros in a step.
 
 A guard z(equations, contact, t, y) is positive before its event.  Each detection function looks
 at a step and returns the time at which the guard of one contact falls through zero, or None.
@@ -47,7 +47,7 @@ def stop_force(equations: Equations, stop: int, t: float, y: Real) -> float:
 
 
 def friction_margin(equations: Equations, contact: int, t: float, y: Real) -> float:
-    """Return the friction that is left before a sticking contact slips [N]."""
+    """Return the limit of friction minus the friction force of a sticking contact [N]."""
     n = equations.n
     e = equations.system.directions(y[:n])
     return _friction_margin(equations, contact, e, equations.evaluate(t, y[:n], y[n : 2 * n]))
@@ -75,19 +75,19 @@ def _friction_margin(
 
 
 @dataclass(frozen=True)
-class Looks:
+class StepView:
     """The quantities that guards evaluate in a step, each computed once and on demand.
 
     Parameters
     ----------
     scales : Scales
-        Of the mechanism.
+        Scales of the mechanism.
     equations : Equations
-        That hold in the step.
+        Equations of motion in the step.
     arc : Arc
         The step.
     forces : (stages, r)
-        Constraint forces of its stages but the first [N].
+        Constraint forces of all stages but the first [N].
     """
 
     scales: Scales
@@ -97,13 +97,13 @@ class Looks:
 
     @cached_property
     def samples(self) -> tuple[Real, Complex, Real]:
-        """Times (w + 1,), directions and rates (w + 1, n) at the ends of the intervals."""
+        """Times (w + 1,), directions and rates (w + 1, n) at the samples of the step."""
         n, (times, states) = self.equations.n, self.arc.samples()
         return times, self.equations.system.directions(states[:, :n]), states[:, n : 2 * n]
 
     @cached_property
     def gaps_and_rates(self) -> tuple[Real, Real]:
-        """Gaps and their rates at the ends of the intervals, (w + 1, s) [m], [m/s]."""
+        """Gaps and their rates at the samples, (w + 1, s) [m], [m/s]."""
         times, e, v = self.samples
         return self.equations.gaps(times, e), self.equations.gap_rates(times, e, v)
 
@@ -123,27 +123,27 @@ class Looks:
         return lambda t: sign * guard(self.equations, contact, t, self.arc.at(t))
 
 
-def open_stops(looks: Looks) -> Sequence[int]:
+def open_stops(view: StepView) -> Sequence[int]:
     """Return the contacts that are watched for impacts."""
-    return looks.equations.contacts.open_stops
+    return view.equations.contacts.open_stops
 
 
-def slipping_contacts(looks: Looks) -> Sequence[int]:
+def slipping_contacts(view: StepView) -> Sequence[int]:
     """Return the contacts that are watched for reversals."""
-    return looks.equations.slipping_points + looks.equations.slipping_stops
+    return view.equations.slipping_points + view.equations.slipping_stops
 
 
-def sticking_contacts(looks: Looks) -> Sequence[int]:
+def sticking_contacts(view: StepView) -> Sequence[int]:
     """Return the contacts that are watched for slip."""
-    return looks.equations.sticking
+    return view.equations.sticking
 
 
-def releasing_stops(looks: Looks) -> Sequence[int]:
-    """Return the held stops if one of the stage forces comes near to zero in the step."""
-    equations = looks.equations
+def releasing_stops(view: StepView) -> Sequence[int]:
+    """Return the held stops if a force comes close to zero at a stage of the step, else none."""
+    equations = view.equations
     if not equations.held or equations.sticking:
         return equations.held
-    held = looks.forces[:, equations.first_hold :]
+    held = view.forces[:, equations.first_hold :]
     near = held.min(axis=0) <= RELEASE_WATCH_FACTOR * held.max(axis=0)
     return equations.held if bool(near.any()) else ()
 
@@ -151,51 +151,51 @@ def releasing_stops(looks: Looks) -> Sequence[int]:
 # --- detection --------------------------------------------------------------------------------
 
 
-def closing_time(looks: Looks, guard: Guard, stop: int) -> float | None:
+def closing_time(view: StepView, guard: Guard, stop: int) -> float | None:
     """Return when a gap closes: z > 0 -> z <= 0 at a closing rate.
 
-    A gap that is opening at the start of an interval closes only after its apex, so that the
-    impact that has just been resolved, whose gap is zero up to round-off of either sign, is not
-    found again.  A gap that dips below zero within an interval is found by the signs of its rates.
+    A gap that is opening at the start of an interval can close only after its apex.  Therefore the
+    last impact, after which the gap is round-off of either sign, is not found again.  A gap that
+    dips below zero within an interval is found by the signs of its rates.
     """
-    all_gaps, all_rates = looks.gaps_and_rates
+    all_gaps, all_rates = view.gaps_and_rates
     gaps, rates = all_gaps[:, stop], all_rates[:, stop]
     for j in range(GUARD_INTERVALS):
         if gaps[j + 1] > 0.0 and not rates[j] < 0.0 < rates[j + 1]:
             continue
-        t = _closing_time_between(looks, guard, stop, j)
+        t = _closing_time_between(view, guard, stop, j)
         if t is not None:
             return t
     return None
 
 
-def _closing_time_between(looks: Looks, guard: Guard, stop: int, j: int) -> float | None:
+def _closing_time_between(view: StepView, guard: Guard, stop: int, j: int) -> float | None:
     """Return when a gap closes in an interval at whose end, or within which, it is not positive."""
-    z, near = looks.along(guard, stop), looks.scales.touching
-    a, b = looks.samples[0][j : j + 2].tolist()
-    (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2, stop] for x in looks.gaps_and_rates)
-    if abs(rate_a) <= looks.scales.zero_speed and abs(gap_a) <= _round_off(looks):
-        # The stop was released too early: the bodies are pressed together again soon.
+    z, near = view.along(guard, stop), view.scales.touching
+    a, b = view.samples[0][j : j + 2].tolist()
+    (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2, stop] for x in view.gaps_and_rates)
+    if abs(rate_a) <= view.scales.zero_speed and abs(gap_a) <= _round_off(view):
+        # The stop was released too early, and is pressed again.
         return fall_time(lambda t: z(t) + near, a, b) if gap_b < -near else None
     if rate_a > 0.0:
         if rate_b >= 0.0:
-            return None  # The gap still opens from zero.
-        a = fall_time(looks.along(_gap_rate, stop), a, b)
+            return None  # The gap opens throughout the interval.
+        a = fall_time(view.along(_gap_rate, stop), a, b)
         if z(a) <= 0.0:
             return a  # The flight is lower than the resolution of a position.
     elif gap_a <= 0.0:
-        # A gap that stays near zero only touches; it may open from a small penetration.
+        # This is an impact only if the penetration increases.
         return a if gap_b < gap_a - near else None
     if rate_a < 0.0 < rate_b:
-        b = fall_time(looks.along(_gap_rate, stop, sign=-1.0), a, b)
+        b = fall_time(view.along(_gap_rate, stop, sign=-1.0), a, b)
         if z(b) > 0.0:
             return None
-    return _corrected_time(looks, stop, fall_time(z, a, b), earliest=a)
+    return _corrected_time(view, stop, fall_time(z, a, b), earliest=a)
 
 
-def _round_off(looks: Looks) -> float:
+def _round_off(view: StepView) -> float:
     """Return the largest residual gap of a closed stop after a projection [m]."""
-    return CONSTRAINT_RTOL * looks.scales.length
+    return CONSTRAINT_RTOL * view.scales.length
 
 
 def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
@@ -205,60 +205,60 @@ def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
     return float(equations.gap_rates(t, e, y[n : 2 * n])[stop])
 
 
-def _corrected_time(looks: Looks, stop: int, t: float, earliest: float) -> float:
-    """Return the time at which a gap closes, from the time at which the dense output closes it.
+def _corrected_time(view: StepView, stop: int, t: float, earliest: float) -> float:
+    """Return the time at which a gap closes, from the approximate time t by the dense output.
 
-    The states are those of steps that end at the time, see :meth:`prbm.hybrid.arc.Arc.cut`.
-    The time is never before the apex: the gap is opening there, and an impact without effect would
-    be located again and again.
+    The gap is that of a step that ends at the time, see :meth:`prbm.hybrid.arc.Arc.cut`.
+    The time is never before the apex: the gap is opening there, so that the impact would have no
+    effect and be located again and again.
     """
-    equations = looks.equations
+    equations = view.equations
     for _ in range(EVENT_CORRECTIONS_MAX):
-        y = equations.project(t, looks.arc.cut(equations.rate, t)[1])
+        y = equations.project(t, view.arc.cut(equations.rate, t)[1])
         size, rate = gap(equations, stop, t, y), _gap_rate(equations, stop, t, y)
         if rate >= 0.0 or abs(size) <= EVENT_TIME_ATOL * abs(rate):
             break
         change = -size / rate
-        if abs(change) > EVENT_CORRECTION_RTOL * looks.arc.h:
-            break  # Grazing: the root of the dense output is better.
+        if abs(change) > EVENT_CORRECTION_RTOL * view.arc.h:
+            break  # At grazing, the time by the dense output is better.
         t = max(earliest, t + change)
     return t
 
 
-def reversal_time(looks: Looks, guard: Guard, contact: int) -> float | None:
+def reversal_time(view: StepView, guard: Guard, contact: int) -> float | None:
     """Return when the sliding velocity of a contact falls through zero.
 
-    The velocity of a contact that begins to slip is zero up to round-off of either sign.  Such a
-    contact reverses if its velocity has the other sign at the end of the step.
+    When slip begins, the velocity is round-off of either sign.  The contact then reverses only if
+    its velocity at the end of the step is negative in the direction of slip.
     """
-    equations, (times, e, v) = looks.equations, looks.samples
+    equations, (times, e, v) = view.equations, view.samples
     rows, i = equations.slip_rows(contact)
     z = equations.contacts.modes[contact].slip * rows.rates(e, v)[:, i]
-    begins = bool(z[0] <= looks.scales.zero_speed)
+    begins = bool(z[0] <= view.scales.zero_speed)
     for j in range(int(begins), GUARD_INTERVALS):
         if z[j] > 0.0 >= z[j + 1]:
-            return fall_time(looks.along(guard, contact), times[j], times[j + 1])
+            return fall_time(view.along(guard, contact), times[j], times[j + 1])
     return float(times[1]) if begins and z[-1] < 0.0 else None
 
 
-def release_time(looks: Looks, guard: Guard, stop: int) -> float | None:
+def release_time(view: StepView, guard: Guard, stop: int) -> float | None:
     """Return when the force of a held stop falls to zero."""
-    seen = [(t, _stop_force(looks.equations, stop, at)) for t, _, at in looks.evaluations]
-    return _first_fall(looks.along(guard, stop), seen)
+    seen = [(t, _stop_force(view.equations, stop, at)) for t, _, at in view.evaluations]
+    return _first_fall(view.along(guard, stop), seen)
 
 
-def slip_time(looks: Looks, guard: Guard, contact: int) -> float | None:
+def slip_time(view: StepView, guard: Guard, contact: int) -> float | None:
     """Return when a sticking contact reaches the limit of friction."""
-    equations = looks.equations
-    seen = [(t, _friction_margin(equations, contact, e, at)) for t, e, at in looks.evaluations]
-    return _first_fall(looks.along(guard, contact), seen)
+    equations = view.equations
+    seen = [(t, _friction_margin(equations, contact, e, at)) for t, e, at in view.evaluations]
+    return _first_fall(view.along(guard, contact), seen)
 
 
 # --- location ---------------------------------------------------------------------------------
 
 
 def _first_fall(z: Scalar, seen: Sequence[tuple[float, float]]) -> float | None:
-    """Return when z falls through zero first, between times at which its value is known."""
+    """Return when z first falls to zero, from pairs of a time and the value of z there."""
     for (a, before), (b, after) in pairwise(seen):
         if after <= 0.0:
             return fall_time(z, a, b) if before > 0.0 else a
@@ -268,7 +268,7 @@ def _first_fall(z: Scalar, seen: Sequence[tuple[float, float]]) -> float | None:
 def fall_time(z: Scalar, a: float, b: float) -> float:
     """Return when z falls to zero between a, where it is positive, and b, where it is not.
 
-    Where round-off denies one of these signs, the result is the end of the interval there.
+    If round-off has changed the sign at one end of the interval, the result is that end.
 
     Raises
     ------

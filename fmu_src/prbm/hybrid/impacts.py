@@ -1,4 +1,4 @@
-"""Rigid impacts: the stops that take part, their impulses, and the booking of the results."""
+"""Rigid impacts: the stops that take part, their impulses, and the state after the impact."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,11 +24,11 @@ class Impact:
     stop : str
         Name of the stop.
     time : float
-        [s].
+        Time of the impact [s].
     q : (n,)
         Angles [rad].
     before, after : (n,)
-        Rates around the impact [rad/s].
+        Rates before and after the impact [rad/s].
     impulse : float
         Normal impulse, > 0 pushes [N s].
     latched : Latched
@@ -70,7 +70,7 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     front : Front
         State after the impact, with the contact modes chosen anew.
     impacts : list of Impact
-        One for each stop that was struck, without captures.
+        One for each stop that was struck, except for captures.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
     )
     impulses = _impulses(configuration, front, struck, held, restitution)
     counted = [i for i in struck if i not in soft]
-    front, impacts = _book(configuration, front, counted, impulses)
+    front, impacts = _after_impact(configuration, front, counted, impulses)
     _, rates = front.gaps_and_rates()
     resting = [i for i in (*struck, *held) if rates[i] <= zero]
     front = front.with_contacts(front.contacts.opened())
@@ -102,7 +102,7 @@ def impact(configuration: Configuration, front: Front, hit: int) -> tuple[Front,
 def receive(front: Front, impulses: Real) -> Front:
     """Return the front after impulses from outside at the points of the forces.
 
-    Each component P changes the rate u of its point, and its work is P (u- + u+)/2.  The loops
+    The work of a component P is P (u- + u+)/2, with the rate u along it before and after.  Loops
     transmit the impulses; impacts at stops follow later, in :func:`.contact_modes.release_moving`.
     Friction is finite and has no impulse: sticking contacts become free to slip or stick again.
 
@@ -111,7 +111,7 @@ def receive(front: Front, impulses: Real) -> Front:
     front : Front
         State before.
     impulses : (3 b,)
-        Along x and y [N s] and about the point [N m s] of each force.
+        Impulses of each force along x and y [N s] and about its point [N m s].
     """
     equations = front.equations
     e, M, loops = equations.mass_and_loops(front.q)
@@ -128,9 +128,9 @@ def _captured(
 ) -> bool:
     """Return whether a stop that is struck slowly comes to rest.
 
-    It does if it would be pressed after an impact without restitution, and if it closes more
-    slowly than ``rest_speed`` or would fly for less than ``SHORTEST_FLIGHT_RTOL`` of the period.
-    A speed that is round-off always ends in rest.
+    A stop comes to rest if it would be pressed after an impact without restitution, and its speed
+    is below ``rest_speed`` or the next flight would be shorter than ``SHORTEST_FLIGHT_RTOL`` of the
+    period.  A stop whose speed is round-off always comes to rest.
     """
     scales = configuration.scales
     if speed <= scales.zero_speed:
@@ -162,9 +162,9 @@ def _impulses(
 ) -> Impulses:
     """Return the impulses of an impact.
 
-    Held stops take part.  If the stops that are struck have no friction, they are unknowns of the
-    same complementarity problem; else they are constraints that are released if they would pull.
-    Friction of held stops and of friction points is finite and has no impulse.
+    If the struck stops have no friction, the impulses of held stops are unknowns of the same
+    complementarity problem.  Otherwise held stops are constraints, which are removed if they would
+    pull.  The friction of held stops and of friction points is finite and has no impulse.
     """
     mu = np.array([configuration.stop_value(i, "friction") for i in struck])
     try:
@@ -206,8 +206,8 @@ def _impulses_with_friction(
 ) -> Impulses:
     """Return the impulses of an impact with friction at the stops that are struck.
 
-    If a held stop that has been released would close, all held stops are treated as struck,
-    without restitution and friction.
+    If a held stop that was removed would close, all held stops are treated as struck, without
+    restitution and friction.
     """
     v, k, kept, speed = front.v, len(struck), list(held), configuration.scales.speed
     e, M, loops = front.equations.mass_and_loops(front.q)
@@ -246,17 +246,17 @@ def _impulses_with_friction(
     return Impulses(after, normal, dict(zip(struck, P[k:].tolist(), strict=True)))
 
 
-# --- booking ----------------------------------------------------------------------------------
+# --- the state after an impact ----------------------------------------------------------------
 
 
-def _book(
+def _after_impact(
     configuration: Configuration, front: Front, counted: Sequence[int], impulses: Impulses
 ) -> tuple[Front, list[Impact]]:
     """Return the front after an impact, with energies and latched outputs, and the record.
 
-    A normal impulse P dissipates -P (u- + u+)/2, with u the rate of the gap; a tangential one the
-    same with the sliding velocity.  The wall does the work -P (w- + w+)/2, and its velocity w
-    changes by its mobility times P.
+    A normal impulse P dissipates -P (u- + u+)/2, with the rate u of the gap before and after the
+    impact.  For a tangential impulse, u is the sliding velocity.  The wall does the work
+    -P (w- + w+)/2; its velocity w changes by its mobility times P.
     """
     e, v, after, normal = front.e, front.v, impulses.after, impulses.normal
     before = front

@@ -54,7 +54,7 @@ def all_outputs(
 
 
 def motions(system: System, q: Real, v: Real, e: Complex) -> dict[str, float]:
-    """Return the places and motions of bodies and probes, as displacements from straight."""
+    """Return displacements from the straight shape and velocities of bodies and probes."""
     out = {}
     for name, frame in system.bodies.items():
         place, velocity = system.motion(frame, e, v)

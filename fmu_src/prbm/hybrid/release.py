@@ -24,7 +24,7 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
     inputs : Inputs
         Forces, walls and the acceleration of the base.
     time : float
-        [s].
+        Time of the release [s].
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Forces of all contacts at rest together: a complementarity problem on their accelerations.
+"""Forces of all contacts at rest together: a complementarity problem for their accelerations.
 
 Each stop that touches is pressed or opens; each contact without a sliding velocity sticks or begins
 to slip.  Such forces exist if no contact slides and no walls close in on the mechanism.  The
@@ -24,7 +24,7 @@ class RestForces:
     Parameters
     ----------
     normal : (k,)
-        Acceleration that each normal force alone gives its gap [m/s^2].
+        Acceleration of each gap by its normal force alone [m/s^2].
     friction, limit : (m,)
         Friction forces and their limits [N].
     slide : (m,)
@@ -64,7 +64,7 @@ def rest_forces(
     slips : sequence of int
         Signs of the sliding velocities of these stops; 0: at rest.
     at_rest : sequence of int
-        Contacts with friction and without a sliding velocity: some of ``stops``, and points.
+        Contacts with friction that do not slide: those of ``stops`` and of the friction points.
     """
     e, M, loops = equations.mass_and_loops(q)
     system, is_stop = equations.system, equations.contacts.is_stop

@@ -29,16 +29,16 @@ class Tableau:
     error : (s,)
         Weights of the difference between the two solutions; their sum is zero.
     dense : (s, d)
-        y(theta) = y0 + h sum_i k_i sum_j dense_ij theta^(j+1).
+        Weights of the dense output, y(theta) = y0 + h sum_i k_i sum_j dense_ij theta^(j+1).
     order : int
-        Of the solution that is continued.
+        Order of the solution that is continued.
     error_order : int
-        Of the solution that it is compared with.
+        Order of the solution that estimates the error.
 
     Raises
     ------
     ValueError
-        If the coefficients contradict each other.
+        If the coefficients are inconsistent.
     """
 
     a: Real

@@ -2,7 +2,7 @@ r"""The event loop: integrate, locate the first event, apply it, continue.
 
 A :class:`Simulation` steps past the communication points and interpolates, so that its
 trajectory does not depend on them.  It restarts only when an input or a tunable parameter
-changes.  An event is the domain change z > 0 -> z <= 0 of a guard of
+changes.  An event is the change from z > 0 to z <= 0 of a guard z of
 :data:`prbm.hybrid.events.TRANSITIONS`, located on the dense output.  Rest is a discrete state: a
 stop that holds is a constraint, not a spring and not a series of small bounces.
 """
@@ -28,7 +28,7 @@ from .arc import Arc
 from .configuration import Configuration
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
-from .guards import Looks
+from .guards import StepView
 from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
 from .release import released
@@ -45,11 +45,11 @@ class Simulation:
     values : mapping
         Parameters and inputs that differ from their defaults.
     start_time : float
-        [s].
+        Time at the start [s].
     tolerance : float or None
-        Relative tolerance of the integration; None: ``solver.tolerance``.
+        Relative tolerance of the integration (default: ``solver.tolerance``).
     step : float or None
-        Fixed step size for studies of convergence [s]; None: adaptive.
+        Fixed step size for studies of convergence [s] (default: adaptive).
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Simulation:
         self.time = float(start_time)
         if not math.isfinite(self.time):
             raise ParameterError(f"start_time = {start_time} s must be a finite number")
-        # The parameters in use, and the changed ones, which are used from the next restart on.
+        # The parameters in use, and those that are used from the next restart on.
         self.configuration = Configuration.of(mechanism, known, tolerance, step)
         self.prepared = self.configuration
         self.changed = False
@@ -100,7 +100,7 @@ class Simulation:
         self.course, at_start = walls.start(self.configuration, self.given, self.time)
         inputs = Inputs.of(mechanism, self.given, at_start)
         self.front = released(self.configuration, inputs, self.time)
-        # The step that leads to the front, the event at its end, and the rates there.
+        # The step that leads to the front, the event at its end, and the rates at its end.
         self.arc: Arc | None = None
         self.pending: Event | None = None
         self.k1: Real | None = None
@@ -119,7 +119,7 @@ class Simulation:
 
     @property
     def values(self) -> Mapping[str, float]:
-        """Values of all parameters, changes included that act from the next step on."""
+        """Values of all parameters, including changes that act from the next step on."""
         return self.prepared.values
 
     @property
@@ -170,7 +170,7 @@ class Simulation:
         Parameters
         ----------
         changes : mapping
-            Names to values.  None is applied if one of them is rejected.
+            Values by name.  If one of them is rejected, no value is changed.
 
         Raises
         ------
@@ -184,14 +184,14 @@ class Simulation:
                 number = parameters[name].check(x)
                 if not parameters[name].tunable and number != values[name]:
                     raise ParameterError(
-                        f"{name} is fixed once the motion has started; set it before"
+                        f"{name} is a fixed parameter; set it before the motion starts"
                     )
                 values[name] = number
             elif name in given:
                 given[name] = check_input(name, x, given)
             else:
                 raise ParameterError(unknown(name, {**parameters, **given}))
-        # The walls join their references at the next step, and change nothing before.
+        # Inputs of walls act from the next step on, and need no restart.
         moving = {f"{stop.name}.{name}" for stop in self.mechanism.stops for name in WALL_INPUTS}
         others = any(given[name] != x for name, x in self.given.items() if name not in moving)
         self.changed = self.changed or others or values != self.values
@@ -207,27 +207,30 @@ class Simulation:
     def advance(self, time: float) -> None:
         """Continue the motion to a time.
 
-        The present time is a communication point: the walls join the lines that the inputs
-        define here, see :mod:`prbm.hybrid.walls`.  After an error the simulation is as before.
+        The present time is a communication point: the walls join the lines that the inputs define
+        at this time, see :mod:`prbm.hybrid.walls`.  An error leaves the simulation unchanged.
 
         Parameters
         ----------
         time : float
-            Not before the present time [s].
+            Target time, not before the present time [s].
 
         Raises
         ------
         SimulationError
-            If time runs backwards, the step size vanishes or the events do not end.
+            If the target time is invalid, the step size becomes too small, or too many events
+            occur.
         """
         if not math.isfinite(time) or time < self.time:
             raise SimulationError(
-                f"cannot go from t = {self.time:.12g} s to t = {time:.12g} s: time only runs on"
+                f"cannot simulate from t = {self.time:.12g} s to t = {time:.12g} s: the target "
+                "time must be finite and not before the present time"
             )
         if time - self.time > STEPS_MAX * self.configuration.scales.step_max:
             raise SimulationError(
-                f"cannot go from t = {self.time:.12g} s to t = {time:.12g} s at once: that is more "
-                f"than {STEPS_MAX:g} steps; times are in seconds"
+                f"cannot simulate from t = {self.time:.12g} s to t = {time:.12g} s at once: this "
+                f"takes more than {STEPS_MAX:g} internal steps; check that both times are in "
+                "seconds"
             )
         if time == self.time:
             return
@@ -297,11 +300,11 @@ class Simulation:
             self.k1 = equations.rate(front.time, front.y)
         step, controller = take_step(configuration, front, self.k1, self.controller)
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k)
-        event = events.first_event(Looks(configuration.scales, equations, arc, step.forces))
+        event = events.first_event(StepView(configuration.scales, equations, arc, step.forces))
         if event is None:
             y, self.k1 = equations.project_near(arc.end, step.y, step.factors), step.k[-1]
         else:
-            # A step that an event cuts short says little about the next one: keep its size.
+            # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
             if event.kind is EventKind.IMPACT and event.time > arc.start:
                 arc, y = arc.cut(equations.rate, event.time)
@@ -317,20 +320,19 @@ class Simulation:
         """Return y = (q, v, dissipated energy, work) at the present time, on the constraints."""
         if self.arc is None or self.time >= self.front.time:
             return self.front.y
-        # The step beyond the present time was computed with the present equations.
+        # The present equations are those of the step that passes the present time.
         n, y = self.system.n, self.arc.at(self.time)
         evaluation = self.equations.evaluate(self.time, y[:n], y[n : 2 * n])
         return self.equations.project_near(self.time, y, evaluation.factors)
 
     def magnitudes(self) -> tuple[float, float, float]:
-        """Return an angle [rad], and the rate [rad/s] and energy [J] that correspond to it."""
+        """Return the scales of angles [rad], of rates [rad/s] and of energies [J]."""
         return 1.0, self.configuration.scales.rate, self.configuration.scales.energy
 
     def outputs(self) -> Outputs:
         """Return all outputs, locals and calculated parameters at the present time, by name.
 
-        Lengths in m, angles in rad, forces in N, energies in J; displacements and energies from
-        the straight shape.
+        They are in SI units and rad.  Displacements and energies are zero at the straight shape.
         """
         if self._output_cache is None or self._output_cache[0] != self.time:
             constant = {"mode.frequency": self.frequency, **self.configuration.calculated}
@@ -339,9 +341,9 @@ class Simulation:
         return dict(self._output_cache[1])
 
     def motions(self) -> dict[str, float]:
-        """Return the outputs that describe the places and motions of bodies and probes.
+        """Return only the positions and velocities of bodies and probes, by name of the output.
 
-        They cost a third to a half of :meth:`outputs`.
+        This takes a third to a half of the time of :meth:`outputs`.
         """
         n, y = self.system.n, self.state()
         q, v = y[:n], y[n : 2 * n]
@@ -371,7 +373,7 @@ class Simulation:
         }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Restore a state of :meth:`snapshot`; the continuation is the same bit by bit.
+        """Restore a state of :meth:`snapshot`; the motion then continues bit for bit.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Conversion of the parts of a saved state to plain values that JSON keeps exactly, and back."""
+"""Conversion of a state to plain values, which JSON stores exactly, and back."""
 
 from collections.abc import Mapping
 from dataclasses import asdict

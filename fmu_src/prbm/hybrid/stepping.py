@@ -47,7 +47,7 @@ class StepSizeController:
     h : float
         Size of the next step [s]; 0: not chosen yet.
     last_error : float
-        Error of the last step that was accepted, in units of the tolerance.
+        Error of the last accepted step, divided by the allowed error.
     growth : float
         Largest factor by which the next step may change the size; 1 after a rejected step.
 
@@ -63,7 +63,7 @@ class StepSizeController:
     growth: float = STEP_GROWTH_MAX
 
     def next(self, error: float) -> "StepSizeController":
-        """Return the controller after a step with an error in units of the tolerance.
+        """Return the controller after a step with an error relative to the allowed error.
 
         A step with an error above 1 must be repeated with the smaller size; the size does not grow
         after the repeated step.
@@ -92,7 +92,7 @@ class Step:
     y : (2 n + 2,)
         State at the end, not projected.
     error : float
-        Error in units of the tolerance.
+        Error divided by the allowed error.
     forces : (stages - 1, r)
         Constraint forces of all stages but the first [N].
     factors : Factors
@@ -143,7 +143,7 @@ def take_step(
             continue
         controller = controller.next(step.error)
         if step.error <= 1.0:
-            # The size of a step that a wall has shortened is no measure for the next one.
+            # A step that was shortened by a wall does not shorten the next one.
             whole = wanted if step.h == h < wanted else 0.0
             return step, replace(controller, h=max(controller.h, whole))
 
@@ -178,14 +178,14 @@ def check_size(t: float, h: float) -> None:
     """
     if h < STEP_MIN_ATOL:
         raise SimulationError(
-            f"the step size fell below {STEP_MIN_ATOL:g} s at t = {t:.9g} s: the motion "
-            "is too violent for the model, or its links lie flat, where it ends; check the "
-            "inputs and parameters, or add damping.beta"
+            f"the step size fell below {STEP_MIN_ATOL:g} s at t = {t:.9g} s: the motion is too "
+            "fast for the model, or links of a loop form a straight line, beyond which they cannot "
+            "move; check the inputs and parameters, or add damping.beta"
         )
     if t + h == t:
         raise SimulationError(
-            f"at t = {t:.9g} s a step of {h:.3g} s is lost in the rounding of the time: "
-            "start the simulation nearer to zero"
+            f"at t = {t:.9g} s a step of {h:.3g} s is smaller than the rounding error of the time: "
+            "start the simulation at a time nearer to zero"
         )
 
 
@@ -201,7 +201,7 @@ def first_step(configuration: Configuration, y: Real, k1: Real) -> float:
 def compute_step(
     configuration: Configuration, equations: Equations, t: float, y: Real, h: float, k1: Real
 ) -> Step:
-    """Return the step of size h from y at t, with the rates k1 there.
+    """Return the step of size h from the state y with the rates k1 at time t.
 
     Raises
     ------

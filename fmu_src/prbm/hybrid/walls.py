@@ -4,8 +4,8 @@ At a communication point t0 the inputs define the reference
 
     r(t) = position + displacement + v (t - t0),
 
-with v the input ``stop.velocity`` or, until that has been non-zero, the mean rate of the
-displacement.  From its position and velocity at t0, the wall joins the reference within T = 2 H
+where v is the input ``stop.velocity``.  Until this input has been non-zero, v is the mean rate of
+the displacement.  From its position and velocity at t0, the wall joins the reference within T = 2 H
 (:class:`prbm.mechanics.inputs.Wall`).  H is the recent longest communication step, but at most a
 tenth of the period.  Position and velocity are therefore continuous, and the acceleration is
 finite.
@@ -50,7 +50,7 @@ class Course:
 def start(
     configuration: Configuration, given: Mapping[str, float], time: float
 ) -> tuple[Course, tuple[Wall, ...]]:
-    """Return the walls at a start time [s]: on their references, with the same velocities."""
+    """Return the walls at a start time [s]: each has position and velocity of its reference."""
     walls = tuple(
         _given_reference(configuration, given, i, time)
         for i in range(len(configuration.mechanism.stops))
@@ -134,7 +134,7 @@ def _mean_rate(rate: float, off: float, longest: float, following: float) -> flo
 
 
 def step_limit(walls: Sequence[Wall], t: float) -> float:
-    """Return the longest step from time t [s]: a fraction of a cubic, and only up to its end."""
+    """Return the longest step from time t [s]: a fraction of each cubic, not beyond its end."""
     limit = inf
     for wall in walls:
         if wall.span:
@@ -143,7 +143,7 @@ def step_limit(walls: Sequence[Wall], t: float) -> float:
 
 
 def arrived(front: Front) -> Front:
-    """Return the front in which walls whose cubics end at its time are on their references."""
+    """Return the front after replacing each wall whose cubic ends there by its reference."""
     walls = tuple(
         wall.arrived() if wall.span and wall.end - front.time <= EVENT_TIME_ATOL else wall
         for wall in front.inputs.walls

@@ -206,7 +206,7 @@ def check_names(variables: Sequence[Variable]) -> None:
     Raises
     ------
     MechanismError
-        If they are not.
+        If a name is not ASCII, or is used twice, or two value references are equal.
     """
     seen: dict[int, str] = {}
     for variable in variables:
@@ -480,8 +480,8 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     yield last("energy_lost", "J", "Energy lost at the last impact")
     yield last(
         "modal_restitution", "1",
-        "Velocity of the fundamental mode after over before the last impact, with reversed sign; "
-        "far below -1 or above 1 where little of this mode arrives",
+        "Ratio of the velocities of the fundamental mode after and before the last impact, with "
+        "reversed sign; far below -1 or above 1 if this mode has little energy before the impact",
     )  # fmt: skip
     yield last("impulse_sum", "N.s", "Sum of all impulses of the wall, including captures", 0.0)
 

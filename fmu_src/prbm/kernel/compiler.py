@@ -29,7 +29,7 @@ from .sources import UNIT, kernel
 HOST, ALL = "host", "all"
 FLAGS = (
     "-std=c99", "-O3", "-ffp-contract=off", "-fvisibility=hidden", "-g0",
-    # These do not change results.  Loops that are faster with vectors use them explicitly.
+    # The following options do not change results.  Vectors are used explicitly where they help.
     "-fno-math-errno", "-fno-trapping-math", "-fno-tree-vectorize",
 )  # fmt: skip
 LINK = {
@@ -319,7 +319,7 @@ def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -
 
 
 def _zig_folders(folder: Path) -> dict[str, str]:
-    """Return the folders of ziglang, which keeps the libraries that it builds for itself."""
+    """Return environment variables that name the cache folders of ziglang."""
     private = private_cache()
     kept = (private or folder) / "zig"
     with suppress(OSError):
@@ -357,8 +357,8 @@ def cache_folder() -> Path:
 def private_cache() -> Path | None:
     """Return a folder of the cache to which no other user can write; None if there is none.
 
-    The folder is created if necessary.  If the usual one belongs to another user, which is possible
-    where several users share ``XDG_CACHE_HOME``, it is one with the number of this user.
+    The folder is created if necessary.  If several users share ``XDG_CACHE_HOME``, the usual folder
+    may belong to another user; then the number of this user is appended to the folder's name.
     """
     usual = cache_folder()
     if sys.platform == "win32":  # The access control list of the profile protects it.
@@ -431,8 +431,8 @@ def _cached(
         if folder is None:
             content = _compile(wanted, compiler, files, progress)
             progress(
-                f"cannot write to {cache_folder()}: no folder that only this user can write to; "
-                "the next export compiles again"
+                f"the folder {cache_folder()} cannot be written, or other users can write to it: "
+                "the library is not kept; the next export compiles again"
             )
         else:
             entry = folder / name
@@ -447,7 +447,7 @@ def _compile(
     files: Mapping[str, bytes],
     progress: Callable[[str], None],
 ) -> bytes:
-    """Report and compile."""
+    """Report the start of a compilation, and compile."""
     progress(f"compiling the kernel for {wanted.name} with {compiler.name}")
     return compiled(wanted, compiler, files)
 

@@ -14,7 +14,7 @@
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
-/* Continue from the present state with the walls, inputs and parameters that have been set.
+/* Restart the integration from the present state with the present walls, inputs and parameters.
  * follow: whether held stops may follow jumps of their walls' velocities. */
 static bool restart(Simulation *sim, const Wall *walls, bool follow, Problem *problem) {
     State *state = &sim->state;
@@ -48,13 +48,15 @@ static bool apply_pending(Simulation *sim, Problem *problem) {
 static bool check_time(const Simulation *sim, double time, Problem *problem) {
     double now = sim->state.time;
     if (!finite_number(time) || time < now) {
-        return fail(problem, "cannot go from t = %.12g s to t = %.12g s: time only runs on", now,
-                    time);
+        return fail(problem,
+                    "cannot simulate from t = %.12g s to t = %.12g s: the target time must be "
+                    "finite and not before the present time",
+                    now, time);
     }
     if (time - now > STEPS_MAX * longest_step(sim)) {
         return fail(problem,
-                    "cannot go from t = %.12g s to t = %.12g s at once: that is more than %g "
-                    "steps; times are in seconds",
+                    "cannot simulate from t = %.12g s to t = %.12g s at once: this takes more than "
+                    "%g internal steps; check that both times are in seconds",
                     now, time, STEPS_MAX);
     }
     return true;
@@ -68,9 +70,9 @@ static bool same_walls(const Simulation *sim) {
     return memcmp(given, sim->state.acting_given + from->walls, bytes) == 0;
 }
 
-/* Begin a communication step: join the walls to their references, and let changed inputs and
- * parameters act.  After an interruption the references do not change, unless an input of a wall or
- * a parameter has changed. */
+/* Begin a communication step: join the walls to their references, and apply changed inputs and
+ * parameters.  A step that was interrupted at an event keeps its references, unless an input of a
+ * wall or a parameter has changed. */
 static bool begin_step(Simulation *sim, double time, Problem *problem) {
     State *state = &sim->state;
     Wall joined[STOPS_MAX];
@@ -83,7 +85,7 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
     return true;
 }
 
-/* Where to stop before the end of a communication step: after each internal step, before events. */
+/* Whether to return before the end of a communication step: after an internal step, at an event. */
 typedef struct {
     bool steps, events;
 } Stops;
@@ -157,7 +159,7 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* --- event mode ------------------------------------------------------------------------------- */
 
-/* Let the given walls, the inputs and changed impulses act, and apply the pending event, if any. */
+/* Apply the given walls, the inputs, changed impulses, and the pending event, if any. */
 static bool apply_here(Simulation *sim, const Wall *walls, bool event, bool impulses,
                        Problem *problem) {
     State *state = &sim->state;
@@ -172,7 +174,7 @@ static bool apply_here(Simulation *sim, const Wall *walls, bool event, bool impu
            (!impulses || restart(sim, state->walls, false, problem));
 }
 
-PRBM bool simulation_happen(Simulation *simulation, Problem *problem) {
+PRBM bool simulation_handle_event(Simulation *simulation, Problem *problem) {
     Simulation *sim = simulation;
     Wall walls[STOPS_MAX];
     bool event = event_due(&sim->state, sim->state.time), impulses = impulses_changed(sim);

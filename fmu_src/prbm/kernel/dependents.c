@@ -1,15 +1,15 @@
 /* The coordinates that the loops determine.
  *
- * The r loop equations are solved for r of the n coordinates.  The other n - r, which
- * mechanics/independent.py chooses, are the states of model exchange: so a solver without
- * constraints stays on the loops. */
+ * The r loop equations are solved for r of the n coordinates.  The other n - r coordinates, chosen
+ * by mechanics/independent.py, are states of model exchange.  A solver that does not support
+ * constraints can therefore integrate them without opening the loops. */
 #include <math.h>
 #include <stdio.h>
 
 #include "hybrid/simulation.h"
 #include "dependents.h"
 
-/* The coordinates that the loops determine, in rising order. */
+/* List the coordinates that are not independent, in ascending order. */
 static void dependents(const Mechanism *m, int *result) {
     int k = 0, count = 0;
     for (int j = 0; j < m->coordinate_count; j++) {
@@ -35,9 +35,9 @@ static const char *coordinate_name(const Mechanism *m, int j, char *text, size_t
 PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem) {
     char name[80] = "";
     return fail(problem,
-                "the states of model exchange do not determine the other angles (%s and %d more) "
-                "at t = %.9g s: the shape is too far from the one at the start, or the solver has "
-                "left it; shorten its steps, or use co-simulation, which has no such limit",
+                "the states of model exchange do not determine the other coordinates (%s and %d "
+                "more) at t = %.9g s: the shape is too far from the initial shape, or the solver's "
+                "error is too large; shorten the solver's steps, or use co-simulation",
                 coordinate_name(sim->configuration.mechanism, dependent[0], name, sizeof name),
                 system_of(sim)->r - 1, sim->state.time);
 }
@@ -55,7 +55,7 @@ PRBM bool factor_dependents(const Simulation *sim, Loops *loops) {
         return false;
     }
     for (int i = 0; i < r; i++) {
-        least = lesser(least, 1.0 / fabs(a[i * r + i])); /* lu_factor inverts the diagonal */
+        least = lesser(least, 1.0 / fabs(a[i * r + i])); /* lu_factor stores 1/diagonal. */
     }
     return least > DEPENDENT_PIVOT_RTOL * most;
 }
@@ -70,7 +70,7 @@ PRBM Loops take_loops(Simulation *sim) {
     return loops;
 }
 
-/* Solve the loops for the dependent angles; those in q are the first guess. */
+/* Solve the loops for the dependent angles; the angles in q are the first guess. */
 static bool complete_angles(Simulation *sim, Loops *x, double *q) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
@@ -128,7 +128,7 @@ PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
                          : fail(problem, "the states are not finite numbers"));
 }
 
-/* The independent part of y = (q, v, dissipated energy, work). */
+/* Copy the states of model exchange from y = (q, v, dissipated energy, work) to x. */
 PRBM void states_of(const Simulation *sim, const double *y, double *x) {
     const Mechanism *m = sim->configuration.mechanism;
     int n = m->coordinate_count, count = m->independent_count;

@@ -301,7 +301,7 @@ enum { DENSE = 5 };
         {0.0, 1.2761747864796078, -5.955482336904836, 8.29513611211745, -3.573289402142902}, \
         {0.0, -2.0, 10.0, -15.0, 7.0}, \
     }
-/* Bounds of the magnitudes of the weights of the dense output at any fraction. */
+/* Bounds of the magnitude of each weight of the dense output within a step. */
 #define LARGEST_WEIGHTS \
     { \
         0.066, \

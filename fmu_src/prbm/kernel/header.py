@@ -88,7 +88,7 @@ def _tolerances() -> Iterator[str]:
 
 
 def _constant(name: str, value: float | tuple[float, ...]) -> str:
-    """Return a definition: an enumerator for an int, a macro for a float or several.
+    """Return a definition: an enumerator for an int, a macro for a float or a tuple.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def _enumeration(name: str, prefix: str, values: Mapping[str, int | IntEnum]) ->
 
 
 def _kinds() -> dict[str, int]:
-    """Return the kinds of events, that of none and their number."""
+    """Return the kinds of events, with NONE for no event and the number KINDS."""
     return {"NONE": 0} | {kind.name: kind for kind in EventKind} | {"KINDS": len(EventKind) + 1}
 
 
@@ -124,7 +124,7 @@ def _numbers(names: Sequence[str]) -> dict[str, int]:
 
 
 def _counted(names: Sequence[str]) -> dict[str, int]:
-    """Return the places of names, and their number behind them."""
+    """Return the indices of names, followed by their number."""
     return _numbers((*names, "groups"))
 
 
@@ -173,7 +173,7 @@ def _tableau(tableau: Tableau) -> Iterator[str]:
     yield _array("STAGE_WEIGHTS", tableau.a)
     yield _array("ERROR_WEIGHTS", tableau.error)
     yield _array("DENSE_WEIGHTS", tableau.dense)
-    yield "/* Bounds of the magnitudes of the weights of the dense output at any fraction. */"
+    yield "/* Bounds of the magnitude of each weight of the dense output within a step. */"
     yield _array("LARGEST_WEIGHTS", largest_weights(tableau))
 
 

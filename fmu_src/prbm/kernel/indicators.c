@@ -47,8 +47,8 @@ PRBM double lifted_guard(const Simulation *sim, const Instant *at, EventKind kin
                                  : z;
 }
 
-/* Positive while an open gap stays open.  The rate of an opening gap is added, so that the
- * indicator is positive directly after an impact, where the gap is zero up to round-off. */
+/* Compute an indicator that is positive while a gap is open.  The rate of an opening gap is added,
+ * so that the indicator is positive directly after an impact, when the gap is round-off. */
 static double impact_indicator(const Simulation *sim, const Instant *at, int i) {
     double speed = gap_rate(&sim->equations, i, at->time, at->e, at->v);
     double ahead = INDICATOR_LEAD_RTOL * sim->configuration.scales.time * greater(speed, 0.0);
@@ -60,8 +60,9 @@ PRBM double leaving_rate(const Simulation *sim, const Instant *at, int i) {
     return gap_rate(&sim->equations, i, at->time, at->e, at->v);
 }
 
-/* Positive while a closed stop is pressed and its gap rate is below half of the largest jump at
- * which it stays closed.  The gap rate is not zero after a change of the wall's velocity. */
+/* Compute an indicator that is positive while a closed stop is pressed and its gap rate is below
+ * half of the largest jump at which the stop stays closed.  A change of the wall's velocity changes
+ * this gap rate. */
 PRBM double release_indicator(const Simulation *sim, const Instant *at, int i) {
     double pressed = lifted_guard(sim, at, EVENT_RELEASE, i) / guard_scale(sim, EVENT_RELEASE);
     double room = REST_JUMP_FACTOR * jump_allowed(sim, i) - fabs(leaving_rate(sim, at, i));
@@ -77,7 +78,7 @@ static double indicator(const Simulation *sim, const Instant *at, EventKind kind
     }
 }
 
-/* All indicators at a state; 1 where an event is impossible. */
+/* Compute all indicators at a state.  An indicator whose event is impossible is 1. */
 PRBM void event_indicators(const Simulation *sim, const Instant *at, double *z) {
     for (int i = 0; i < exchange_indicators(sim); i++) {
         z[i] = 1.0;

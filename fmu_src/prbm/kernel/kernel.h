@@ -1,12 +1,12 @@
 /* The mechanics in C: the headers of core/.
  *
  * The first comment of a file names its counterpart in Python, if there is one: most are modules of
- * prbm.mechanics.  tests/kernel/test_kernel_twins.py compares functions of both one by one and
- * reports the pairs; all others are compared through the results of whole simulations.
+ * prbm.mechanics.  tests/kernel/test_kernel_twins.py compares pairs of functions with one name one
+ * by one; all others are compared through the results of whole simulations.
  *
- * Plain C99; after a simulation is opened nothing is allocated; no global state; of libm only sqrt,
- * fabs, floor, frexp and ldexp, all of which are exact or correctly rounded, so that the same input
- * gives the same bytes on every platform.
+ * The language is C99.  There is no global state, and no memory is allocated after a simulation has
+ * been opened.  Of libm only sqrt, fabs, floor, frexp and ldexp are called.  They are exact or
+ * correctly rounded, so that the same input gives the same bytes on every platform.
  *
  * Matrices are stored row by row.  A function that can fail returns false and writes a message to a
  * Problem.  SI units and radians everywhere; docs/conventions.md has the signs and symbols.

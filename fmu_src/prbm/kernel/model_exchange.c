@@ -66,7 +66,7 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
     copy(m->input_count, state->given, state->acting_given);
     start_walls(sim);
     set_inputs(sim);
-    copy(n, state->accepted, state->front); /* the shape is near the last one */
+    copy(n, state->accepted, state->front); /* first guess of the loops */
     for (int k = 0; k < count; k++) {
         state->front[m->independent[k]] = state->states[k];
         state->front[n + m->independent[k]] = state->states[count + k];
@@ -80,7 +80,7 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
     return true;
 }
 
-/* The present moment: that of the front. */
+/* Evaluate the equations at the present time, states and inputs. */
 PRBM bool exchange_moment(Simulation *sim, Moment *now, Problem *problem) {
     return exchange_refresh(sim, problem) && moment_at(sim, sim->state.front, now, problem);
 }
@@ -110,7 +110,7 @@ PRBM void exchange_get(const Simulation *simulation, double *x) {
  * Solvers derive their absolute tolerance from it: with a nominal value below the scale of the
  * motion they would resolve round-off. */
 static double next_power_of_ten(double value) {
-    double power = 1.0; /* exact to 1e22 */
+    double power = 1.0; /* Powers of ten are exact up to 1e22. */
     if (value <= 1.0) {
         while (value * power * 10.0 <= 1.0) {
             power *= 10.0;
@@ -157,8 +157,8 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
 /* --- drift ------------------------------------------------------------------------------------ */
 
 /* The drift of a closed stop off its wall, relative to the scales of length and speed.  While the
- * wall moves, its acceleration is unknown: the release indicator then watches the speed, and a
- * larger distance is allowed. */
+ * wall moves, its acceleration is unknown.  A larger distance is then allowed, and the release
+ * indicator limits the speed instead. */
 static double stop_drift(const Simulation *sim, const Instant *at, int i) {
     double off = fabs(gap(&sim->equations, i, at->time, at->e)) / system_of(sim)->length;
     double speed = fabs(leaving_rate(sim, at, i)) / guard_scale(sim, EVENT_REVERSAL);
@@ -193,15 +193,15 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
 
 /* --- events ----------------------------------------------------------------------------------- */
 
-/* Whether the sliding speed of a contact is within a solver's error at the end of sliding. */
+/* Whether the sliding speed of a contact is zero within a solver's error. */
 static bool sliding_ends(const Simulation *sim, const Instant *at, int contact) {
     double speed = sliding_velocity(system_of(sim), contact, at->e, at->v);
     return fabs(speed) <= DRIFT_RTOL * guard_scale(sim, EVENT_REVERSAL);
 }
 
-/* Bring a contact to rest, so that the solver's error is not taken for sliding back. */
+/* Make a contact stick, so that a solver's error does not count as sliding backwards. */
 static void stop_sliding(Simulation *sim, int contact) {
-    Problem ignored; /* Closed and sticking may be dependent constraints: then nothing changes. */
+    Problem ignored; /* If the constraints are dependent, the front does not change. */
     size_t mark = sim->scratch.used;
     double *kept = take(&sim->scratch, (size_t)state_size(sim));
     copy(state_size(sim), sim->state.front, kept);
@@ -212,7 +212,7 @@ static void stop_sliding(Simulation *sim, int contact) {
     sim->scratch.used = mark;
 }
 
-/* Whether the gap of an open stop closes here. */
+/* Whether the gap of an open stop closes at this state. */
 static bool closes_here(const Simulation *sim, const Instant *at, int stop) {
     double distance = gap(&sim->equations, stop, at->time, at->e);
     double speed = gap_rate(&sim->equations, stop, at->time, at->e, at->v);
@@ -221,7 +221,7 @@ static bool closes_here(const Simulation *sim, const Instant *at, int stop) {
            (lifted_guard(sim, at, EVENT_IMPACT, stop) <= 0.0 && speed < 0.0);
 }
 
-/* Whether an event is due here; a stop is struck once at most. */
+/* Whether an event is due at this state.  A stop that has been struck is not struck again. */
 static bool due(const Simulation *sim, const Instant *at, const bool *struck, EventKind kind,
                 int contact) {
     if (!transition(kind)->watched(&sim->equations, contact)) {
@@ -231,7 +231,7 @@ static bool due(const Simulation *sim, const Instant *at, const bool *struck, Ev
                                 : lifted_guard(sim, at, kind, contact) <= 0.0;
 }
 
-/* The first event that is due at a state. */
+/* Return the first event that is due at a state, in the order of TRANSITIONS. */
 static Event due_here(const Simulation *sim, const Instant *at, const bool *struck) {
     Event event = {EVENT_NONE, 0, at->time};
     for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
@@ -246,7 +246,7 @@ static Event due_here(const Simulation *sim, const Instant *at, const bool *stru
     return event;
 }
 
-/* After an event: set the time of the event, and the depths at which gaps close from here on. */
+/* Store the time of the event mode, and the depths at which the gaps close from then on. */
 static void arm(Simulation *sim, const Instant *at) {
     State *state = &sim->state;
     for (int i = 0; i < system_of(sim)->s; i++) {
@@ -275,7 +275,7 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
 
 static bool too_many_events(const Simulation *sim, const Event *event, Problem *problem) {
     return fail(problem,
-                "more than %d events (%s of %s the last) at t = %.9g s: the contact chatters; "
+                "more than %d events (last: %s of %s) at t = %.9g s: the contact chatters; "
                 "raise rest_speed or damping.beta, lower the restitution, or give the body room "
                 "between its walls",
                 EVENTS_AT_ONCE_MAX * contact_count(sim), transition(event->kind)->guard.event,
@@ -330,7 +330,7 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     return attempt(sim, right, problem);
 }
 
-/* The stop that is penetrated most, if deeper than a solver's errors explain; else NULL. */
+/* Return the stop with the deepest penetration if it exceeds a solver's errors, else NULL. */
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth) {
     Simulation *sim = simulation;
     const char *found = NULL;

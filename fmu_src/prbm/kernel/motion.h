@@ -6,23 +6,24 @@
 
 typedef struct Simulation Simulation;
 
-/* An impact, for the log. */
+/* The data of an impact that are logged. */
 typedef struct {
     const char *stop;
     double time, approach_speed, rebound_speed, impulse, energy_lost;
     int count;
 } Impact;
 
-typedef void Hear(void *listener, const Impact *impact);
+typedef void ImpactListener(void *listener, const Impact *impact);
 
-/* Allocate a simulation in one block; NULL if there is no memory.  Its values are the start values
- * of the tables; it has not started. */
+/* Allocate a simulation in one block, with the start values of the tables; NULL if there is no
+ * memory.  simulation_start starts the motion. */
 PRBM Simulation *simulation_open(const Mechanism *mechanism);
 PRBM void simulation_close(Simulation *simulation);
-PRBM void simulation_listen(Simulation *simulation, Hear *hear, void *listener);
+/* Call hear(listener, impact) at each impact. */
+PRBM void simulation_listen(Simulation *simulation, ImpactListener *hear, void *listener);
 PRBM const Mechanism *simulation_mechanism(const Simulation *simulation);
 PRBM size_t simulation_bytes(const Simulation *simulation); /* size of its block */
-/* Back to the state after simulation_open. */
+/* Restore the state after simulation_open. */
 PRBM void simulation_reset(Simulation *simulation);
 
 /* The complete state as numbers: a simulation that restores them continues bit for bit. */
@@ -31,39 +32,39 @@ PRBM void simulation_save(const Simulation *simulation, double *state);
 /* Fails and changes nothing if the numbers are not a state of this mechanism. */
 PRBM bool simulation_restore(Simulation *simulation, const double *state, Problem *problem);
 
-/* Parameters and inputs, by their slot; a rejected value changes nothing.  Before the start fixed
- * and tunable parameters may be set, after it inputs and tunable parameters; they act from the
- * present time on. */
+/* Set a parameter or an input by its slot.  The value acts from the present time on; a rejected
+ * value changes nothing.  After the start, fixed parameters are rejected. */
 PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *problem);
-/* Any value by its slot, at the present time; before the start only parameters and inputs. */
+/* Compute any value by its slot, at the present time.  Before the start only parameters and inputs
+ * have values. */
 PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *problem);
 /* Undo the start but keep all values, so that fixed parameters may be set again. */
 PRBM void simulation_unstart(Simulation *simulation);
 PRBM bool simulation_started(const Simulation *simulation);
 PRBM double simulation_time(const Simulation *simulation);
 
-/* Start the motion.  A tolerance of 0 stands for solver.tolerance; exchange: the importer
- * integrates (model exchange). */
+/* Start the motion.  If the tolerance is 0, solver.tolerance is used.  exchange: true for model
+ * exchange, in which the importer integrates. */
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
                            bool exchange, Problem *problem);
 
 /* --- co-simulation --- */
 
-/* Continue to a time, events included. */
+/* Simulate to a time, and apply the events before it. */
 PRBM bool simulation_advance(Simulation *simulation, double time, Problem *problem);
-/* Continue to a time, but stop at the first event, before it is applied, and also after an internal
- * step if each is set.  simulation_time returns the time reached; the walls move as in a step to
- * the given time.  *event: an event is pending, see simulation_happen. */
+/* Simulate to a time, but return early at the first event, or after an internal step if each is
+ * true.  simulation_time returns the time reached.  *event: whether an event is pending, which
+ * simulation_handle_event applies.  The walls move as in a step to the given time. */
 PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, bool *event,
                                   Problem *problem);
 /* Event mode: apply the pending event, if any, changed impulses and changed velocities of walls. */
-PRBM bool simulation_happen(Simulation *simulation, Problem *problem);
+PRBM bool simulation_handle_event(Simulation *simulation, Problem *problem);
 
 /* --- model exchange --- */
 
 /* Number of states: independent angles, their rates, dissipated energy, work. */
 PRBM int exchange_states(const Simulation *simulation);
-/* The slot, in the vector of all values, of the k-th state. */
+/* The slot of the k-th state in the vector of all values. */
 PRBM int exchange_slot(const Simulation *simulation, int k);
 PRBM int exchange_indicators(const Simulation *simulation);
 PRBM void exchange_set_time(Simulation *simulation, double time);
@@ -72,15 +73,18 @@ PRBM void exchange_get(const Simulation *simulation, double *x);
 PRBM void exchange_nominals(const Simulation *simulation, double *x);
 PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *problem);
 PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *problem);
-/* Accept a step of the importer; *event: event mode is needed, because a contact has drifted. */
+/* Accept a step of the importer.  *event: whether a contact has drifted, so that event mode is
+ * needed. */
 PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *problem);
 /* Event mode: apply the inputs and all events that are due.  *changed: whether the states have
  * changed. */
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem);
-/* The stop that is penetrated most, if deeper than a solver's errors explain; else NULL. */
+/* The stop with the deepest penetration and its depth [m]; NULL if no penetration exceeds a
+ * solver's errors. */
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth);
-/* Derivative of all values (slots.count) along a change of states dx and of inputs du, by exact
- * differentiation, at the present time; zero for discrete and constant values. */
+/* Compute the exact directional derivatives of all values (slots.count,) along the change dx of the
+ * states and du of the inputs, at the present time.  Those of discrete and constant values are
+ * 0. */
 PRBM bool exchange_directional(Simulation *simulation, const double *dx, const double *du,
                                double *dvalues, Problem *problem);
 

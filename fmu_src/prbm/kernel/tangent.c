@@ -10,8 +10,8 @@
 #include "indicators.h"
 #include "values.h"
 
-/* Changes along a change of states and inputs.  An arm E changes by dphi = dtheta - i ds, its rate by
- * dw: dE = i E dphi, d(E w) = E (i dphi w + dw).  Angles and stretches share these formulas. */
+/* Values, and their changes d... along a change of states and inputs.  The change of an arm E =
+ * exp(s + i theta) is dE = i E dphi with dphi = dtheta - i ds; dw is the change of its rate w. */
 typedef struct {
     Simulation *sim;
     const Equations *q;
@@ -33,7 +33,7 @@ static Complex times_i(Complex z) {
 
 /* --- changes of rows --- */
 
-/* A complex arm E, its rate w, its acceleration alpha, and the changes of angle and rate. */
+/* An arm E, its complex rate w and acceleration alpha, and its changes dphi and dw, see Tangent. */
 typedef struct {
     Complex E, w, alpha, dphi, dw;
 } Arm;
@@ -48,8 +48,8 @@ static Arm arm_at(const Tangent *t, int j) {
     return arm;
 }
 
-/* Term j of a row seen from its body, f = conj(E_body): f B_j E_j for j < n, f z for j = n.  False
- * if the row has no such term. */
+/* Compute term j of row i: f B_j E_j for j < n, f z for j = n, with f = conj(E) of the body that
+ * carries the wall, or f = 1 on the ground.  Return false if the term is zero. */
 static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
     int n = rows->system->n, on = seen_from(rows, i);
     Complex size = {0.0, 0.0};
@@ -67,17 +67,17 @@ static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *see
     return size.re != 0.0 || size.im != 0.0;
 }
 
-/* E (i dphi w + dw) */
+/* Change of E w: E (i dphi w + dw) */
 static Complex swing_change(const Arm *arm) {
     return product(arm->E, plus(times_i(product(arm->dphi, arm->w)), arm->dw));
 }
 
-/* i w' - w^2 */
+/* Second derivative of an arm divided by the arm, E''/E = i w' - w^2 */
 static Complex bend_of(const Arm *arm) {
     return minus(times_i(arm->alpha), product(arm->w, arm->w));
 }
 
-/* E (i dphi (i w' - w^2) - 2 w dw) */
+/* Change of E'' at constant w': E (i dphi (i w' - w^2) - 2 w dw) */
 static Complex bend_change(const Arm *arm) {
     Complex turned = times_i(product(arm->dphi, bend_of(arm)));
     return product(arm->E, minus(turned, scaled(2.0, product(arm->w, arm->dw))));
@@ -111,8 +111,8 @@ static double second_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-/* Add the change of the load of a constant force along a row: its gradient i f B E rotates.  The
- * reaction acts on the body that carries the wall. */
+/* Add the change of the load of a constant force along row i, as the gradient of the row turns with
+ * the arms.  The opposite load acts on the body that carries the wall. */
 static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
     int n = rows->system->n, on = seen_from(rows, i);
     Arm part;
@@ -131,7 +131,7 @@ static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
 
 /* --- changes of coordinates --- */
 
-/* The changes of the arms that follow from dq and dv. */
+/* Compute the changes of the arms from dq and dv. */
 static void move_arms(const Tangent *t) {
     const System *system = t->q->system;
     turning(system, t->dq, t->dphi);
@@ -188,13 +188,13 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
 
 /* --- changes of loads --- */
 
-/* (H x)_i over the arms */
+/* Element i of the product H x, for x of the arms */
 static Complex through_mass(const Tangent *t, int i, const Complex *x) {
     int n = t->q->system->n;
     return along_arms(n, t->q->system->H + i * n, x);
 }
 
-/* Change of the loads of the inputs: row dw on the arms, moments on the coordinates. */
+/* Compute the changes of the loads of the inputs: dw on the arms, dmoment on the coordinates. */
 static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     const System *system = t->q->system;
     const Mechanism *m = system->mechanism;
@@ -216,14 +216,14 @@ static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     t->sim->scratch.used = mark;
 }
 
-/* Momentum of an arm, E conj(H (E w)), and its change. */
+/* Change of the momentum E conj(H (E w)) of an arm. */
 static Complex momentum_change(const Tangent *t, int j) {
     Complex momentum = product(t->e[j], conjugate(through_mass(t, j, t->swing)));
     Complex turned = times_i(product(t->dphi[j], momentum));
     return plus(turned, product(t->e[j], conjugate(through_mass(t, j, t->dswing))));
 }
 
-/* Change of the inertial load -i E conj(H bend) of an arm. */
+/* Change of the inertial load -i E conj(H E'') of an arm, without the change of w'. */
 static Complex inertial_change(const Tangent *t, int j) {
     Complex load = product(t->e[j], conjugate(through_mass(t, j, t->bend)));
     Complex turned = times_i(product(t->dphi[j], load));
@@ -269,7 +269,6 @@ static double limit_change(const Tangent *t, int i) {
     return rub_limit(t->q, i, t->e) > 0.0 ? law[0] * law[2] * lift_change(t, i) : 0.0;
 }
 
-/* The sign of the sliding velocity of a contact. */
 static int sliding_sign(const Tangent *t, int contact) {
     return slip_sign(t->q->contacts.modes[contact]);
 }
@@ -290,7 +289,8 @@ static void rub_change(const Tangent *t) {
     scratch->used = mark;
 }
 
-/* Add the changes dR^T lam of loads, set those of constraints: -dR a and convective terms. */
+/* Add the changes of the loads of lam along the active rows.  Set dlam to minus the changes of the
+ * second time derivatives of these rows at constant accelerations. */
 static void row_change(const Tangent *t) {
     const Equations *q = t->q;
     Rows walls = slide_rows(q->system);
@@ -461,7 +461,7 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
     out[ENERGY_WORK] = dx[2 * count + 1];
 }
 
-/* The same arms, moving at constant rates x (n,). */
+/* Return a copy of t whose coordinates have the constant rates x (n,). */
 static Tangent at_rates(const Tangent *t, const double *x) {
     Scratch *scratch = &t->sim->scratch;
     int n = t->q->system->n;
@@ -483,8 +483,8 @@ static Tangent at_rates(const Tangent *t, const double *x) {
     return u;
 }
 
-/* Change 2 dG X - X^T dM X - 2 mu^T dR X of the mobility G X of a hit point.  Here M X + R^T mu =
- * G^T and R X = 0, with the gradient G of the gap and the rows R of the loops. */
+/* Change 2 dG X - X^T dM X - 2 mu^T dR X of the mobility G X of a hit point.  G is the gradient of
+ * the gap and R the Jacobian of the loops; X and mu solve M X + R^T mu = G^T and R X = 0. */
 static bool mobility_change(const Tangent *t, int i, double *result, Problem *problem) {
     Simulation *sim = t->sim;
     const System *system = system_of(sim);
@@ -634,7 +634,7 @@ static void all_changes(const Tangent *t, const double *dx, const Complex *dw,
     indicator_changes(t, out + slots->indicators);
 }
 
-/* Allocate the changes and set the state about which they are computed. */
+/* Allocate the arrays of changes, and store the present state. */
 static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *du) {
     const System *system = system_of(sim);
     const Evaluation *at = now->evaluation;

@@ -63,7 +63,6 @@ PRBM bool present_moment(Simulation *sim, Moment *now, Problem *problem) {
            moment_at(sim, sim->present.y, now, problem);
 }
 
-/* A derivative of a state. */
 static bool get_derivative(Simulation *sim, int k, double *x, Problem *problem) {
     const Mechanism *m = sim->configuration.mechanism;
     int n = m->coordinate_count, count = m->independent_count;
@@ -101,7 +100,7 @@ PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *p
     }
     if (!sim->state.started) {
         return fail(problem,
-                    "it is computed when the model is initialized; it has no value before");
+                    "it has no value before the model is initialized");
     }
     if (slot >= slots->derivatives && slot < slots->indicators) {
         return get_derivative(sim, slot - slots->derivatives, x, problem);

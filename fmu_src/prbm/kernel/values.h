@@ -4,7 +4,7 @@
 
 #include "hybrid/present.h"
 
-/* The vector of outputs with these groups up to date; NULL if they cannot be computed. */
+/* Update the given groups of outputs and return the vector of all outputs; NULL on failure. */
 PRBM const double *present_outputs(Simulation *sim, int groups, Problem *problem);
 PRBM bool present_moment(Simulation *sim, Moment *now, Problem *problem);
 

@@ -1,9 +1,8 @@
 """Assembly of the constant arrays of a mechanism from its description.
 
-Every flexure becomes a chain of links.  A chain starts at the ground or at a body that other chains
-have reached before, and reaches the body at its other end.  If both ends of a flexure or a joint
-have been reached before, it closes a loop; the chain of such a flexure runs from its start to its
-end.
+Every flexure becomes a chain of links.  A chain starts at the ground or at a body that earlier
+parts have reached, and reaches the body at its other end.  A flexure or joint whose two bodies have
+both been reached before closes a loop; the chain of such a flexure begins at the flexure's start.
 """
 
 import cmath
@@ -46,20 +45,21 @@ def assemble(mechanism: Mechanism, values: Mapping[str, float]) -> System:
     mechanism : Mechanism
         Description.
     values : mapping
-        All its parameters, as :meth:`Mechanism.values` gives them.
+        Values of all parameters, as :meth:`Mechanism.values` returns them.
 
     Raises
     ------
     MechanismError
-        If a body is not held by anything, or a loop depends on others.
+        If a body is not connected to the ground, or loops depend on each other.
     ParameterError
-        If a value is missing, a flexure has no length, or its links are longer than itself.
+        If a value is missing, a flexure has no length, or the links of a flexure are longer than
+        the flexure.
     """
     missing = [p.name for p in mechanism.parameters if p.name not in values]
     if missing:
         raise ParameterError(
-            f"{mechanism.name} lacks values of {_some(missing)}: give those of all parameters, as "
-            "mechanism.values() returns them, or mechanism.values(changes) with some changed"
+            f"values of {_some(missing)} are missing for {mechanism.name}: pass mechanism.values() "
+            "for the defaults, or mechanism.values(changes)"
         )
     return _Assembler(mechanism, values).system()
 
@@ -72,9 +72,9 @@ def _some(names: Sequence[str]) -> str:
 
 @dataclass(frozen=True)
 class Hit:
-    """The gap of a stop, Re(f (B E + z)) + c, with f = conj(E) of the body ``on`` with its wall.
+    """Coefficients of the gap Re(f (B E + z)) + c of a stop [m].
 
-    A wall on the ground has f = 1.
+    f is conj(E) of the body ``on`` that carries the wall, or 1 for a wall on the ground.
     """
 
     B: Complex
@@ -110,7 +110,7 @@ class _Assembler:
         return complex(self.number(point[0]), self.number(point[1]))
 
     def end(self, part: Flexure | Joint, reference: str) -> complex:
-        """Return where an end of a part is drawn."""
+        """Return the drawn position of an end of a part [m]."""
         return self.at(self.mechanism.point(reference, part.name))
 
     def length(self, flexure: Flexure) -> float:
@@ -137,7 +137,7 @@ class _Assembler:
         place, j = self.on(body, drawn), self.index[body]
         return BodyFrame(name, FIXED if j is None else j, place.c, place.row(len(self.q0)), drawn)
 
-    # -- walking --
+    # -- from the ground to all bodies --
 
     def system(self) -> System:
         waiting: list[Flexure | Joint] = [*self.mechanism.flexures, *self.mechanism.joints]
@@ -148,7 +148,7 @@ class _Assembler:
             else:
                 names = ", ".join(part.name for part in waiting)
                 raise MechanismError(
-                    f"nothing connects {names} to the ground: the mechanism falls apart"
+                    f"nothing connects {names} to the ground: connect one of their bodies to it"
                 )
             waiting.remove(part)
             if isinstance(part, Joint):
@@ -216,7 +216,7 @@ class _Assembler:
         known = far in self.origin
         owners = [owner, *links, self.index[far] if known else self.coordinate(0.0)]
         for i, (length, j) in enumerate(zip(pieces.lengths[:-1], owners[:-1], strict=True)):
-            # The coordinate of a link is its direction, but that of a body is 0 as drawn.
+            # In the drawing the angle of a body is 0, that of a link its direction.
             vector = length * (1.0 if j in links else direction)
             self.rod(pieces.rods[i], place, j, vector)
             place = place.plus(j, vector)
@@ -227,7 +227,7 @@ class _Assembler:
         if known:
             pivot = self.on(far, z_end - last)
             self.close(flexure.name, place, pivot)
-            place = pivot  # The stub depends on the coordinates of its body only, not on the links.
+            place = pivot  # The last stub is part of the far body.
         else:
             self.reach(far, place, z_end - last, owners[-1])
         self.rod(pieces.rods[-1], place, owners[-1], last)
@@ -286,7 +286,7 @@ class _Assembler:
         arm = np.array(self.arm)
         A = np.array([place.row(n) for place, _ in self.masses])
         m = np.array([mass for _, mass in self.masses])
-        # The arms are not stretched here.  The rows of places are zero for stretches.
+        # At zero stretch the directions e equal the arms E.  Rows of places are zero at stretches.
         e0 = np.exp(1j * np.array(self.q0))
         spread = A[:, arm]
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
@@ -369,7 +369,7 @@ class _Assembler:
     def displaced(
         self, body: str, point: Point | None, direction: float, e0: Complex
     ) -> tuple[Complex, float]:
-        """Return B, c of the displacement of a point from the straight shape [m]."""
+        """Return B, c of the displacement Re(B E) + c of a point along a direction [m]."""
         frame = self.frame(body, body, point)
         B = unit(direction).conjugate() * frame.A
         return B, -float((B @ e0).real)
@@ -493,7 +493,6 @@ def check_loops(loops: Complex, e: Complex, names: Sequence[str]) -> None:
         )
     if len(loops) >= len(e):
         raise MechanismError(
-            f"the loops closed by {', '.join(names)} leave the mechanism no motion: rigid links "
-            "hold every body; take a part away, or let flexures bend (clamp their ends) or stretch "
-            "(axial = true)"
+            f"the loops closed by {', '.join(names)} prevent every motion of the mechanism: remove "
+            "a part, or let flexures bend (clamp their ends) or stretch (axial = true)"
         )

@@ -6,10 +6,10 @@ A linear complementarity problem is the search for z with
 
 Lemke's method follows a path of pivots that begins at a ray, which the covering vector defines.
 The path ends in a solution or in another ray.  It ends in a solution if the rates without forces
-are those of a possible motion [2].  There may be no solution if walls close in on the mechanism, if
-contacts slide, and for accelerations (Painleve's paradox).  In these cases a path may also end in a
-ray although there is a solution.  The paths of other covering vectors are therefore tried before
-the problem is rejected as unsolvable.
+are those of a possible motion [2].  There may be no solution if walls close in on the mechanism or,
+for accelerations, if contacts slide (Painleve's paradox).  In these cases a path may also end in a
+ray although a solution exists.  Therefore the problem is rejected as unsolvable only after the
+paths of other covering vectors have failed, too.
 
 Sources
 -------
@@ -52,7 +52,7 @@ def lemke(M: Real, q: Real, cover: Real) -> Real | None:
     m, size = len(q), math.ldexp(1.0, math.frexp(float(np.abs(q).max(initial=0.0)))[1])
     if not m or q.min() >= 0.0:
         return np.zeros(m)
-    # Columns: w (m), z (m), the covering variable, the constants.
+    # The columns belong to w (m), z (m), the covering variable and the constants.
     table = np.hstack([np.eye(m), -M, -cover[:, None], (q / size)[:, None]])
     basis = list(range(m))
     row, entering = _first_row(q / size / cover), 2 * m
@@ -71,12 +71,12 @@ def lemke(M: Real, q: Real, cover: Real) -> Real | None:
 
 
 def _first_row(values: Real) -> int:
-    """Return the last of the rows with the least value: the least in lexicographic order."""
+    """Return the row with the least value; of equal ones the last, in lexicographic order."""
     return int(len(values) - 1 - np.argmin(values[::-1]))
 
 
 def _exchange(table: Real, row: int, column: int) -> None:
-    """Make a column of the table a unit vector."""
+    """Pivot on a row and a column, so that the column becomes a unit vector."""
     table[row] /= table[row, column]
     factors = table[:, column].copy()
     factors[row] = 0.0
@@ -88,8 +88,8 @@ def _exchange(table: Real, row: int, column: int) -> None:
 def _leaving_row(table: Real, basis: list[int], entering: int) -> int | None:
     """Return the row whose variable falls to zero first; None if none falls.
 
-    Of rows with equal ratios, that of the covering variable is chosen, else the least in
-    lexicographic order, so that no basis occurs twice.
+    Among rows with equal ratios, the row of the covering variable comes first, then the
+    lexicographically least row.  No basis occurs twice.
     """
     m, column = len(basis), table[:, entering]
     least = PIVOT_RTOL * max(1.0, float(np.abs(column).max()))
@@ -120,13 +120,13 @@ def coulomb(
 ) -> Real | None:
     r"""Return normal and tangential forces (or impulses) of contacts; None without a solution.
 
-    The rates are W P + u.  Normal ones: P >= 0, rate >= 0, complementary.  Tangential ones:
-    abs(P) <= limit, and P = -limit sign(rate) where the rate is not zero; the limit is
-    fixed + friction P_n.
+    The rates are W P + u.  For normal forces P >= 0, rate >= 0, and one of both is zero.  For
+    tangential forces abs(P) <= limit, and P = -limit sign(rate) where the rate is not zero.  The
+    limit is fixed + friction P_n, with the normal force P_n of the contact.
 
-    A path of pivots that round-off has led astray ends in forces that violate the laws; the paths
-    of other covering vectors follow.  If only round-off excludes a solution, the problem is solved
-    with normal rates that are larger by half of the tolerance.
+    Round-off on the path of pivots may lead to forces that violate the laws by more than the
+    tolerance.  They are discarded, and the path of the next covering vector is followed.  If there
+    is no solution, the normal rates are increased by half of the tolerance.
 
     Parameters
     ----------
@@ -135,11 +135,11 @@ def coulomb(
     u : (k + m,)
         Rates without the forces.
     friction, fixed : (m,)
-        mu [-], and the part of the limit that no normal of the problem bears.
+        Coefficients mu [-], and the constant parts of the limits [N].
     normal : (m,) int
-        The normal on which the limit of each tangent depends; -1: none.
+        Index of the normal force on which the limit of each tangent depends; -1 if on none.
     tolerance : float
-        Largest violation of the laws that is round-off, as a rate.
+        Largest violation of the laws that is accepted as round-off, as a rate.
 
     Examples
     --------
@@ -154,7 +154,7 @@ def coulomb(
     diagonal = np.abs(np.diag(W))
     scale = np.where(diagonal > 0.0, 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0)), 1.0)
     S = scale[:, None] * W * scale
-    # z = (P_n, P_t+, P_t-, speed): the last are the speeds of sliding.
+    # The unknowns z are (P_n, P_t+, P_t-, sliding speeds), with P_t = P_t+ - P_t-.
     spread = np.zeros((k + m, k + 2 * m))
     spread[:k, :k] = np.eye(k)
     spread[k:, k:] = np.hstack([np.eye(m), -np.eye(m)])
@@ -185,7 +185,7 @@ def coulomb(
 def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real | None:
     r"""Return impulses of an impact by :func:`coulomb`; None without a solution.
 
-    Without friction there are k normals, else k normals and k tangents.
+    There are k normals and, with friction, k tangents.
 
     Parameters
     ----------
@@ -196,7 +196,7 @@ def impulses(W: Real, u: Real, friction: Real, least: Real, tolerance: float) ->
     least : (k,)
         Least normal impulses [N s].
     tolerance : float
-        Largest violation of the laws that is round-off [m/s].
+        Largest violation of the laws that is accepted as round-off [m/s].
     """
     k, m = len(least), len(friction)
     given = u + W[:, :k] @ least
@@ -220,7 +220,7 @@ def violation(W: Real, u: Real, P: Real, limit: Real) -> float:
     rates, share = W @ P + u, P * np.diag(W)
     normal = np.abs(np.minimum(rates[:k], share[:k]))
     excess = np.abs(share[k:]) - limit * np.diag(W)[k:]
-    # Deficit of a sliding contact: its friction must oppose the sliding at the limit.
+    # A contact that slides needs friction at the limit, opposite to the velocity.
     missing = limit * np.diag(W)[k:] + np.sign(rates[k:]) * share[k:]
     sliding = np.minimum(np.abs(rates[k:]), np.abs(missing))
     return float(max(x.max(initial=0.0) for x in (normal, excess, sliding)))

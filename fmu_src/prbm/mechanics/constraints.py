@@ -84,15 +84,15 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
     q : (n,)
         Coordinates near the constraints [rad].
     c : (r,)
-        The constants of the rows now: walls move [m].
+        Constants of the rows at the present time; they change if walls move [m].
 
     Returns
     -------
     q : (n,)
-        On the constraints, to :data:`prbm.base.tolerances.CONSTRAINT_RTOL` times the length
-        where round-off allows.
+        Coordinates on the constraints, with residuals of at most
+        :data:`prbm.base.tolerances.CONSTRAINT_RTOL` times the length, unless round-off is larger.
     e : (n,) complex
-        Its directions.
+        Directions of the coordinates.
 
     Raises
     ------
@@ -114,8 +114,8 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
         right[n:] = -s
         q = q + solve(saddle(inertia(system.H, J, e)[0], G, G), right)[:n]
     raise SimulationError(
-        f"the loops of the mechanism cannot be closed in this shape (gap {best:.3g} m): the parts "
-        "do not reach each other"
+        "the loops of the mechanism cannot be closed in this shape: a distance of "
+        f"{best:.3g} m between parts that are connected remains"
     )
 
 
@@ -129,7 +129,7 @@ def project_velocities(M: Real, rows: Real, rates: Real, v: Real) -> Real:
     rows : (r, n)
         Constraint Jacobian [m/rad].
     rates : (r,)
-        Prescribed part of the rate: of a moving wall, or zero [m/s].
+        Prescribed parts of the rates: velocities of walls, or zero [m/s].
     v : (n,)
         Angular velocities [rad/s].
     """

@@ -1,19 +1,19 @@
-r"""Rigid impacts in contact space: Newton's law for all stops at once, Stronge's with friction.
+r"""Rigid impacts in contact space: Newton's law without friction, Stronge's law with friction.
 
-With the rows G (gaps) and T (slides) of the stops and the response of the constrained mechanism
-to unit impulses, W = [G; T] M^-1 [G; T]^T (with M^-1 on the tangent of the loops), an impact is
+An impact with the impulses P changes the rates u of the gaps and of sliding by
 
-    u+ = u- + W P,
+    u+ = u- + W P,    W = [G; T] M^-1 [G; T]^T,
 
-with u the rates of the gaps, which include the velocities of walls.  W is never inverted: for a
-mechanism of one degree of freedom it has rank one.
+with the Jacobians G of the gaps and T of the displacements along the walls, and M^-1 on the tangent
+space of the loops.  The rates of the gaps include the velocities of walls.  W is never inverted,
+because it has rank one for a mechanism of one degree of freedom.
 
 Sources
 -------
 .. [1] F. Pfeiffer, C. Glocker, Multibody Dynamics with Unilateral Contacts, Wiley, 1996.
 .. [2] W. J. Stronge, J. Appl. Mech. 58 (1991) 1049; Impact Mechanics, Cambridge, 2000.
-.. [3] T. R. Kane, D. A. Levinson, Dynamics: Theory and Applications, 1985 (the gain of energy
-   by Newton's law with Coulomb's).
+.. [3] T. R. Kane, D. A. Levinson, Dynamics: Theory and Applications, 1985 (Newton's law together
+   with Coulomb's law can increase the energy).
 """
 
 import math
@@ -84,7 +84,7 @@ def newton(W: Real, u: Real, restitution: Real, speed: float = 0.0) -> Real:
     restitution : (k,)
         Coefficients of restitution [-].
     speed : float
-        Scale of speeds: violations are round-off below ``COMPLEMENTARITY_RTOL`` of it [m/s].
+        Scale of speeds; violations up to ``COMPLEMENTARITY_RTOL`` times it are round-off [m/s].
 
     Returns
     -------
@@ -114,9 +114,9 @@ def newton(W: Real, u: Real, restitution: Real, speed: float = 0.0) -> Real:
 
 
 def _shared(W: Real, b: Real, members: NDArray[np.int_]) -> Real:
-    """Return the least impulses (in squares) with which the members open at exactly -eps u.
+    """Return the impulses with the least sum of squares with which the members open at -eps u.
 
-    Members that would have to pull are removed and receive none.
+    Members that would have to pull are removed and receive no impulse.
     """
     P = np.zeros(len(b))
     while len(members):
@@ -135,10 +135,10 @@ def stronge(
 ) -> tuple[float, float]:
     r"""Return the normal and tangential impulse of one hit with friction (Routh, Stronge).
 
-    The hit is followed over its growing normal impulse p: at each p the contact slips
-    (P_t' = -mu sign(u_t)), sticks or slips back by Coulomb's law.  Compression ends when u_n = 0;
+    The normal impulse p grows from zero.  At each p the contact slips (dP_t/dp = -mu sign(u_t)),
+    sticks, or slips in the other direction, by Coulomb's law.  Compression ends when u_n = 0;
     restitution ends when its work is eps^2 times the work of compression.  Energy is never gained.
-    If the contact slips in one direction throughout, the result is Newton's.
+    If the contact slips in one direction throughout, the result is that of Newton's law.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ class _Hit:
             self.u_t = 0.0 if step == sticking else self.u_t + self.rate_t * step
         if not self.u_n >= -max(small_n, COMPLEMENTARITY_RTOL * speed):
             raise SimulationError(WEDGED)
-        # With one degree of freedom both rates vanish together, up to round-off.
+        # With one degree of freedom both rates become zero at once, up to round-off.
         self.u_n = self.u_n if self.u_n > small_n else 0.0
         self.u_t = self.u_t if abs(self.u_t) > small_t else 0.0
         return work
@@ -255,7 +255,7 @@ def _restitution_ends(u_n: float, rate_n: float, left: float) -> float:
 
 
 def _friction_ratio(nt: float, tt: float, u_t: float, friction: float) -> float:
-    """Return dP_t/dP_n by Coulomb's law: slipping, sticking, or starting to slip from rest."""
+    """Return dP_t/dP_n by Coulomb's law for a contact that slips, sticks, or begins to slip."""
     if u_t != 0.0:
         return -friction * math.copysign(1.0, u_t)
     if abs(nt) <= friction * tt:
@@ -266,11 +266,11 @@ def _friction_ratio(nt: float, tt: float, u_t: float, friction: float) -> float:
 def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 0.0) -> Real:
     r"""Return the impulses of several simultaneous hits with friction.
 
-    Compression: P_n >= 0, u_n >= 0, complementary, and Coulomb's law in each contact, which is a
-    linear complementarity problem.  Restitution: the same problem, with normal impulses of at least
-    s eps times those of compression, and more where a gap would close.  s is the largest in [0, 1]
-    with which the work of the normal impulses does not exceed eps^2 times that of the compression,
-    and energy is not gained.
+    The impulses of compression are the solution of a linear complementarity problem: P_n >= 0,
+    u_n >= 0, one of both is zero, and Coulomb's law holds in each contact.  The impulses of
+    restitution solve the same problem, but each normal impulse is at least s eps times that of
+    compression.  s is the largest number in [0, 1] for which the work of the normal impulses does
+    not exceed eps^2 times their work in compression, and energy is not gained.
 
     Parameters
     ----------
@@ -300,7 +300,7 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
     lost = float(-(P[:k] * (u + after)[:k] / 2) @ restitution**2)
     wanted = restitution * P[:k]
 
-    # The energy that compression dissipates: restitution, with friction, may return no more.
+    # Restitution may return at most the energy that compression has taken.
     taken = -float(P @ (u + after)) / 2 + COMPLEMENTARITY_RTOL * abs(float(P @ u))
 
     def rebound(s: float) -> tuple[Real, bool]:
@@ -317,12 +317,12 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
 
 
 def _resolved(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real:
-    """Return impulses with P_n >= least, u_n >= 0, complementary, and Coulomb's law.
+    """Return impulses that satisfy the laws of contact and friction, with P_n >= least.
 
     Raises
     ------
     SimulationError
-        If there are none.
+        If there are no such impulses.
     """
     P = impulses(W, u, friction, least, tolerance)
     if P is None:

@@ -13,7 +13,7 @@ class ContactMode(IntEnum):
 
     OPEN = 0
     FRICTIONLESS = 1
-    """Closed without a friction force: no friction, or other contacts carry all of the load."""
+    """Closed without a friction force: it has no friction, or other contacts carry the load."""
     STICK = 2
     SLIP_POSITIVE = 3
     SLIP_NEGATIVE = 4
@@ -50,7 +50,7 @@ class ContactState:
     Parameters
     ----------
     modes : (s + f,) tuple of ContactMode
-        Of the s stops, then of the f friction points.
+        Modes of the s stops, then of the f friction points.
     stops : int
         Number of stops s.
 

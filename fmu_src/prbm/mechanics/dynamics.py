@@ -3,9 +3,10 @@ r"""The equations of motion for one state of the contacts.
     [ M    R^T ] [  a   ]   [ Q - C v^2 ]
     [ R     0  ] [ -lam ] = [ Re(B e) v^2 ]
 
-(w^2 for v^2 where links stretch: see :mod:`prbm.mechanics.system`) with R the rows of the loops,
-of the stops that hold and of the contacts that stick.  A stop that holds and slips pushes along
-its gap and, by Coulomb's law, along its wall: its column differs from its row.
+M is the mass matrix, a the accelerations, lam the multipliers and Q the loads.  R has the rows of
+the loops, of the held stops and of the sticking contacts.  If links stretch, w^2 replaces v^2, see
+:mod:`prbm.mechanics.system`.  The force of a held stop that slips acts along its gap and, by
+Coulomb's law, along its wall; its column in R^T therefore differs from its row in R.
 """
 
 from typing import NamedTuple
@@ -34,7 +35,7 @@ class Evaluation(NamedTuple):
     M : (n, n)
         Mass matrix [kg m^2].
     factors : Factors
-        Of the matrix of the equations, for :meth:`Equations.project_near`.
+        Factors of the matrix of the equations, for :meth:`Equations.project_near`.
     """
 
     a: Real
@@ -189,7 +190,7 @@ class Equations:
     def _solve(self, t: float, q: Real, v: Real, torques: Real) -> Evaluation:
         """Solve the equations for given torques of the springs.
 
-        All that depends on e comes from one product, row by row:
+        One product with e gives all terms that depend on it, row by row:
 
             G = [w e;  diag(e)^H H diag(e);  i B e],
 
@@ -299,7 +300,7 @@ class Equations:
         return c
 
     def project(self, t: float, y: Real) -> Real:
-        """Return the state on the constraints, positions and velocities.
+        """Return the state with positions and velocities projected onto the constraints.
 
         A contact that sticks is constrained by its velocity alone, not by its position.
 
@@ -325,17 +326,17 @@ class Equations:
     def project_near(self, t: float, y: Real, factors: constraints.Factors) -> Real:
         """Return the projection of a state near the constraints, as at the end of a step.
 
-        One correction of the positions and one of the velocities are enough there; if they are
-        not, the result is that of :meth:`project`.
+        One correction of the positions and one of the velocities is usually enough.  Otherwise the
+        result of :meth:`project` is returned.
 
         Parameters
         ----------
         t : float
-            [s].
+            Time [s].
         y : (2 n + 2,)
             State.
         factors : Factors
-            Of the evaluation at the state.
+            Factors of the evaluation at the state.
         """
         if self.slipping_stops:
             return self.project(t, y)
@@ -359,13 +360,13 @@ class Equations:
     # -- stops --
 
     def gaps(self, t: float | Real, e: Complex) -> Real:
-        """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row a time t."""
+        """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row per time t."""
         walls = np.array([wall.motion(t)[0] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.values(e) + walls
         return result
 
     def gap_rates(self, t: float | Real, e: Complex, v: Real) -> Real:
-        """Return the rates of all gaps [m/s]; as for :meth:`gaps`."""
+        """Return the rates of all gaps [m/s]; e and v may be stacks, as for :meth:`gaps`."""
         walls = np.array([wall.motion(t)[1] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.rates(e, v) + walls
         return result
@@ -390,7 +391,7 @@ class Equations:
     # -- friction --
 
     def slip_rows(self, contact: int) -> tuple[Rows, int]:
-        """Return the rows of the displacements along the contacts, and the contact's place."""
+        """Return the rows of displacements that include that of a contact, and its index."""
         stops = self.contacts.stops
         if contact < stops:
             return self.system.slide_rows, contact
@@ -430,8 +431,8 @@ class Equations:
 def base_reaction(equations: Equations, q: Real, v: Real, a: Real) -> tuple[complex, float]:
     """Return the force [N] and the moment about the first clamp [N m] on the ground.
 
-    From the balance of momentum of all moving parts: clamps, stops and friction points on the
-    ground balance gravity, inputs and inertia.
+    They follow from the balance of momentum of all moving parts: the forces of clamps, stops and
+    friction points on the ground balance gravity, inputs and inertia.
     """
     system, inputs = equations.system, equations.inputs
     e = system.directions(q)

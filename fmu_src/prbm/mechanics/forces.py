@@ -1,7 +1,8 @@
-r"""Generalised forces: springs, damping, gravity, inputs, friction.  Positive with q [N m].
+r"""Generalised forces of springs, damping, gravity, inputs and friction, along increasing q [N m].
 
-A force F (complex, [N]) at z = c + A E has the generalised force Re(conj(F) i A e), A spread over
-the stretches: forces enter through one complex row w, Q = Re(w e) with w = i sum conj(F) A.
+A force F (complex, [N]) at the point z = c + A E has the generalised force Q = Re(conj(F) i A e),
+with the columns of A repeated for stretches.  All forces together are one complex row
+w = i sum conj(F) A, with Q = Re(w e).
 """
 
 import numpy as np
@@ -41,7 +42,7 @@ def field_row(S: Complex, acceleration: complex) -> Complex:
     S : (n,) complex
         First mass moments m^T A [kg m].
     acceleration : complex
-        Of gravity, or minus that of the base [m/s^2].
+        Acceleration of gravity, or minus that of the base [m/s^2].
     """
     return 1j * acceleration.conjugate() * S
 

@@ -1,12 +1,13 @@
 r"""Independent coordinates, which the importer's solver integrates in model exchange.
 
-The loops tie the n coordinates together, Phi(q) = Re(B e) + c = 0.  Of them r are solved from the
-other n - r, so that a solver without constraints satisfies them:
+The n coordinates q satisfy the r loop equations Phi(q) = Re(B E) + c = 0.  These determine r of the
+coordinates, q_d, from the other n - r, q_i.  A solver that does not support constraints can
+therefore integrate the independent coordinates q_i and their rates v_i:
 
     Phi(q_i, q_d) = 0,      v_d = -(dPhi/dq_d)^-1 (dPhi/dq_i) v_i.
 
-The choice is good as long as dPhi/dq_d is far from singular, and is made once, for the shapes
-between the straight one and the release.
+The choice of q_i is valid as long as dPhi/dq_d is not close to singular.  It is made once, for
+shapes between the straight shape and the release.
 """
 
 from collections.abc import Iterator
@@ -21,16 +22,16 @@ from .assembly import assemble
 from .statics import equilibrium
 from .system import System
 
-SHAPES = (0.0, 0.5, 1.0)  # Of the displacement at the release.
+SHAPES = (0.0, 0.5, 1.0)  # Fractions of the displacement at the release.
 
 
 def independent(mechanism: Mechanism) -> tuple[int, ...]:
-    """Return the coordinates whose angles and rates are the states, in rising order.
+    """Return the independent coordinates, in ascending order.
 
     Parameters
     ----------
     mechanism : Mechanism
-        With its default parameters.
+        Mechanism, of which the default parameters are used.
 
     Returns
     -------
@@ -68,7 +69,7 @@ def _pivots(jacobian: Real) -> tuple[int, ...]:
 
 
 def conditioning(jacobian: Real, dependent: tuple[int, ...]) -> float:
-    """Return the ratio of the least singular value of some columns to the largest of all, 0 to 1.
+    """Return the least singular value of the dependent columns, divided by the largest of all.
 
     Examples
     --------

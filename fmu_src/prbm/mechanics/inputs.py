@@ -14,7 +14,7 @@ from ..mechanism.parameters import finite
 from .arrays import Real
 
 LOADS = {"x": "N", "y": "N", "moment": "N.m"}
-"""Components of a force and their units; times s, those of an impulse."""
+"""Components of a force and their units.  The units of an impulse are these times s."""
 MOBILITY = "mobility"
 """The input of a stop that is the inverse mass of its wall."""
 WALL_INPUTS = {"displacement": "m", "velocity": "m/s"}
@@ -49,7 +49,7 @@ class Wall:
     excess : float
         Velocity of the wall relative to its reference at the time ``since`` [m/s].
     span : float
-        Time in which the wall joins its reference [s]; 0: it is on its reference.
+        Time in which the wall joins its reference [s]; 0 for a wall on its reference.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class Wall:
         return x, velocity, acceleration
 
     def joining(self, line: "Wall", velocity: float, span: float) -> "Wall":
-        """Return the wall that joins another reference, from its time ``line.since`` on.
+        """Return the wall that joins another reference from the time ``line.since`` on.
 
         Parameters
         ----------
@@ -101,13 +101,13 @@ class Wall:
         velocity : float
             Velocity of the wall at that time [m/s].
         span : float
-            Time in which it joins the reference [s].
+            Time in which the wall joins the reference [s].
         """
         x = float(self.motion(line.since)[0])
         return replace(line, offset=x - line.position, excess=velocity - line.rate, span=span)
 
     def pushed(self, t: float, change: float) -> "Wall":
-        """Return the wall after its velocity and its reference's have changed at time t [m/s]."""
+        """Return the wall after a change of its velocity and that of its reference at time t."""
         line = Wall(self.reference(t), self.rate + change, t)
         return self.joining(line, float(self.motion(t)[1]) + change, self.span)
 
@@ -131,8 +131,8 @@ class Inputs:
     walls : (s,) tuple of Wall
         The walls of the stops.
     mobilities : (s,) tuple of float
-        Inverse effective masses of the walls, by which impacts change their velocities; 0:
-        immovable [1/kg].
+        Inverse effective masses of the walls [1/kg].  An impulse on a wall changes its velocity
+        by this factor; 0 for a wall that impacts do not move.
     """
 
     forces: tuple[complex, ...]
@@ -174,7 +174,7 @@ def input_names(mechanism: Mechanism) -> tuple[str, ...]:
 
 
 def impulse_names(mechanism: Mechanism) -> list[str]:
-    """Return the names of the inputs that are impulses: an increase acts at once."""
+    """Return the names of the inputs that are impulses.  An increase acts as a sudden impulse."""
     return list(_impulse_units(mechanism))
 
 

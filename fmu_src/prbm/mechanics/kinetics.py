@@ -1,9 +1,9 @@
 r"""Mass matrix, quadratic velocities, kinetic energy and momentum.
 
-The TMT method (Newton-Euler in generalised coordinates) for absolute angles and stretches: with
-the positions z = c + A E (see :mod:`prbm.mechanics.assembly`), the projection
-T = dz/dq = i A diag(e), where A is spread over the stretches, gives M = Re(T^H diag(m) T) + J, and
-H = A^H diag(m) A is constant.
+This is the TMT method (Newton-Euler in generalised coordinates) for absolute angles and stretches.
+The positions are z = c + A E (see :mod:`prbm.mechanics.system`), and their Jacobian is
+T = dz/dq = i A diag(e), with the columns of A repeated for stretches.  Then the mass matrix is
+M = Re(T^H diag(m) T) + J, in which H = A^H diag(m) A is constant.
 
 Sources
 -------
@@ -20,9 +20,9 @@ def inertia(H: Complex, J: Real, e: Complex) -> tuple[Real, Real]:
 
         M = Re Hq + diag(J),    C = -Im Hq,
 
-    so one Hermitian product yields both.  C multiplies the *squares* v^2: with absolute angles
-    there are no cross products v_i v_j.  With stretches the quadratic velocities are
-    -Im(Hq w^2), w the complex rates of the arms.
+    so that one Hermitian product gives both.  C multiplies the *squares* v^2: with absolute angles
+    there are no cross products v_i v_j.  With stretches the quadratic velocity terms are
+    -Im(Hq w^2), with the complex rates w of the arms.
 
     Parameters
     ----------

@@ -34,14 +34,16 @@ class Modes:
 
 
 def modes(system: System, shape: Equilibrium) -> Modes:
-    """Return the modes about a static shape; its loads and holding force stay as dead loads.
+    """Return the modes about a static shape.
+
+    The loads and the holding force of the shape are dead loads: they keep directions and sizes.
 
     Parameters
     ----------
     system : System
         The mechanism.
     shape : Equilibrium
-        As :func:`prbm.mechanics.statics.equilibrium` gives it.
+        Static shape, as :func:`prbm.mechanics.statics.equilibrium` returns it.
     """
     B, lam = system.loops, shape.lam
     if shape.force != 0.0:
@@ -51,7 +53,10 @@ def modes(system: System, shape: Equilibrium) -> Modes:
 
 
 def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
-    """Solve K_t phi = omega^2 M phi tangent to the loops; w is the row of the loads."""
+    """Solve K_t phi = omega^2 M phi for phi on the tangent space of the loops.
+
+    The tangent stiffness K_t is that of the loads Re(w e) and of the multipliers lam along B.
+    """
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
     K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm)
@@ -65,7 +70,7 @@ def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
 def fundamental_frequency(system: System) -> float:
     """Return the fundamental frequency about the equilibrium under gravity [Hz].
 
-    Zero if that equilibrium is unstable, or if a motion without a spring is possible.
+    It is zero if that equilibrium is unstable, or if a motion deforms no spring.
     """
     frequency = modes(system, equilibrium(system)).frequency
     lowest = float(frequency[0])
@@ -73,7 +78,7 @@ def fundamental_frequency(system: System) -> float:
 
 
 def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
-    """Return the fundamental mode at a shape that is not in equilibrium, and M there.
+    """Return the fundamental mode and the mass matrix at a shape that is not in equilibrium.
 
     Returns
     -------
@@ -89,8 +94,8 @@ def fundamental_at(system: System, q: Real) -> tuple[Real, Real]:
 def modes_at(system: System, q: Real) -> Modes:
     """Return the modes at a shape that is not in equilibrium.
 
-    The multipliers in the tangent stiffness are those of the shape at rest.  A force on the
-    released body holds it such that the remaining accelerations are the least possible (Gauss'
+    The multipliers in the tangent stiffness are those of the shape held at rest by a force on the
+    released body.  This force makes the accelerations that remain as small as possible (Gauss'
     principle).  At a static shape these multipliers are exact.  At other shapes the modes depend on
     the choice of the coordinates, and some may be unstable; unstable modes come first.
     """
@@ -107,9 +112,9 @@ def modes_at(system: System, q: Real) -> Modes:
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:
     """Return the modal restitution C of an impact, -phi^T M v+ / phi^T M v- [-].
 
-    Zero if the velocity of the fundamental mode before the impact is round-off.  Otherwise
-    |C| <= 1/sqrt(s), with s the share of this mode in the kinetic energy before the impact: if s is
-    small, C can be far below -1 or above 1.
+    C is zero if the velocity of the fundamental mode before the impact is round-off.  Otherwise
+    |C| <= 1/sqrt(s), with the share s of this mode in the kinetic energy before the impact.  If s
+    is small, C can be far below -1 or above 1.
 
     Examples
     --------
@@ -125,11 +130,13 @@ def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> floa
 
 
 def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution: float) -> float:
-    r"""Return the algebraic modal restitution, of a pure fundamental mode before the impact [-].
+    r"""Return the modal restitution C of an impact before which only the fundamental mode moves.
 
-    It depends on the share mu_1 of the fundamental mode in the mobility of the hit point:
+    C depends on the share mu_1 of the fundamental mode in the mobility of the hit point:
 
-        C = (1 + eps) mu_1 - 1,    mu_1 = G_1^2 / sum_i G_i^2,    G_i = (dg/dq) phi_i.
+        C = (1 + eps) mu_1 - 1,    mu_1 = G_1^2 / sum_i G_i^2,    G_i = (dg/dq) phi_i,
+
+    with the gap g and the mass-normalised modes phi_i.
 
     Parameters
     ----------

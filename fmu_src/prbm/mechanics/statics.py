@@ -1,9 +1,13 @@
 r"""Static equilibrium under gravity, loads and a holding force, and the tangent stiffness there.
 
-At rest the torques balance: K (q - q0) - Re(w e) - Q - J^T lam - r^T F = 0 with w the row of
-gravity and the forces, Q the moments, J the Jacobian of the loops, r that of the held displacement
-and F the holding force.  Second derivatives couple at most an angle and the stretch of the same
-link, because every position is linear in the arms.
+At rest the torques balance,
+
+    K (q - q0) - Re(w e) - Q - J^T lam - r^T F = 0,
+
+with the springs K, the row w of gravity and the forces, the moments Q, the Jacobian J of the loops
+and their forces lam, the Jacobian r of the held displacement and the holding force F.  Second
+derivatives couple at most an angle and the stretch of the same link, because every position is
+linear in the arms.
 """
 
 import math
@@ -117,26 +121,26 @@ def equilibrium(
     loads : mapping or None
         Forces and moments by the names of the inputs, ``force.x`` and ``force.y`` [N],
         ``force.moment`` [N m] for a :class:`prbm.mechanism.parts.Force` of the name
-        ``force``; they keep their directions.  Others are zero.
+        ``force``.  They keep their directions; those that are not given are zero.
 
     Raises
     ------
     ParameterError
         If a load is unknown, or not a finite number.
     EquilibriumError
-        If there is no such shape, or the loading does not lead there.
+        If there is no such shape, or slow loading does not reach it.
     """
     B, c = system.loops, system.loops_c
     w, moment = _loads(system, loads or {})
     if displacement is not None:
         moved = displacement != 0.0 or np.any(w) or np.any(moment)
-        if moved and held_by_loops(system):  # The matrix of the balance is singular.
+        if moved and held_by_loops(system):  # The matrix of the balance would be singular.
             raise EquilibriumError(f"release.displacement = {displacement:g} m: {immobile(system)}")
         B = np.vstack([B, system.release])
         c = np.append(c, system.release_c)
     state = np.concatenate([system.q0, np.zeros(len(c))])
-    # Only bodies without a spring, for instance on a pin, may move far in one load step.  A jump of
-    # another coordinate leads to a branch that slow loading does not reach.
+    # Only bodies without a spring, for instance on a pin, may turn far in one load step.  If
+    # another coordinate jumps, slow loading does not reach the shape.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
     done, fraction = 0.0, 1.0
     while done < 1.0:
@@ -189,7 +193,7 @@ def _newton(
     load: tuple[Complex, Real],
     start: Real,
 ) -> Real | None:
-    """Solve the balance under a load, its row and its moments; None if it does not converge."""
+    """Find the equilibrium under a load (row w, moments); None without convergence."""
     n = system.n
     w, moment = load
     shift = np.zeros(len(c))
@@ -263,8 +267,8 @@ def immobile(system: System) -> str:
     name = system.mechanism.release.body
     if _on_pivot(system, name):
         return (
-            f"the centre of mass of the body {name} stays where it is, on the pivot that the body "
-            "turns about; put the centre of mass off it, or release another body"
+            f"the centre of mass of the body {name} cannot move, because it lies on the pivot that "
+            "the body turns about; move the centre of mass, or release another body"
         )
     return (
         f"the body {name} cannot move along the direction of the release; choose another "
@@ -283,7 +287,7 @@ def _on_pivot(system: System, name: str) -> bool:
 
 
 def _left_by_loops(system: System, e: Complex, rows: Real) -> float:
-    """Return the largest entry of rows (k, n) after projection off the rows of the loops."""
+    """Return the largest entry of rows (k, n) without their components along the loops' rows."""
     loops = system.loop_rows.jacobian(e)
     left = rows - (loops.T @ np.linalg.lstsq(loops.T, rows.T)[0]).T
     return float(np.abs(left).max())
@@ -302,7 +306,7 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     Returns
     -------
     v : (n,)
-        The rates after an impulse on the centre of mass along that direction [rad/s].
+        Rates of the coordinates, as after an impulse on the centre of mass [rad/s].
 
     Raises
     ------

@@ -1,23 +1,23 @@
 r"""The constant arrays of a mechanism, and the scalars that they define (gaps, loop closures).
 
-A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, the
-logarithm of its length over the drawn one.  Each link and body has one *arm*,
+A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, which is
+the logarithm of its length divided by its drawn length.  Each link and body has one *arm*,
 
     E = exp(s + i theta),       E' = i w E,     w = theta' - i s',
 
-(s = 0 where nothing stretches), and every position is z = c + A E with constant c, A.  Every
-scalar that is constrained, watched or reported (loop closures, gaps, displacements) is therefore
-of one form,
+with s = 0 for arms that do not stretch.  Every position is z = c + A E with constant c, A.  Every
+scalar that is constrained, watched or reported (loop closures, gaps, displacements) therefore has
+one form,
 
     x = Re(B E) + c,      x' = -Im(B E w),      x'' = -Im(B E w') - Re(B E w^2).
 
-Seen from a body that moves, as the gap to a wall on a body is, it is
+A scalar that is measured relative to a moving body, for example a gap to a wall on a body, is
 
     x = Re(f (B E + z)) + c,    f = conj(E of that body).
 
-Arrays have a column for every coordinate.  The vector e has, for the angle of an arm, E, and for
-its stretch -i E, so that dE/dq = i e for both; the columns of A and B at stretches are zero.
-:meth:`System.spread` repeats there the column of the arm: then dx/dq = -Im(spread(B) e).
+Arrays have a column for every coordinate.  The vector e contains E for the angle of an arm and
+-i E for its stretch, so that dE/dq = i e for both.  The columns of A and B at stretches are zero;
+:meth:`System.spread` replaces them by the columns of the arms.  Then dx/dq = -Im(spread(B) e).
 """
 
 import cmath
@@ -77,13 +77,13 @@ class BodyFrame:
     Parameters
     ----------
     name : str
-        Of the body, the force or the probe.
+        Name of the body, the force or the probe.
     j : int
         The body's coordinate; :data:`FIXED`: the ground.
     c, A : complex, (n,) complex
-        Its place z = c + A E [m].
+        Position z = c + A E of the point [m].
     drawn : complex
-        Its place in the straight shape [m].
+        Position of the point in the straight shape [m].
     """
 
     name: str
@@ -121,7 +121,7 @@ def convective(B: Complex, e: Complex, w: Real | Complex) -> Real:
 
 
 class Rows:
-    """Scalars x = Re(f (B E + z)) + c of a mechanism, some of them seen from a body that moves.
+    """Scalars x = Re(f (B E + z)) + c of a mechanism, relative to the ground or to moving bodies.
 
     Parameters
     ----------
@@ -130,8 +130,8 @@ class Rows:
     B, c : (r, n) complex, (r,)
         Coefficients of the arms, constants [m].
     z, on : (r,) complex, (r,) int, or None
-        Fixed part [m] and coordinate of the body that a row is seen from; :data:`FIXED` or None:
-        seen from the ground, f = 1, z = 0.
+        Fixed part [m] and coordinate of the body that a row is relative to.  With :data:`FIXED` or
+        None it is relative to the ground, with f = 1 and z = 0.
     """
 
     def __init__(
@@ -162,7 +162,7 @@ class Rows:
         return Rows(self.system, self.B[:r], self.c[:r], z[:r], on[:r])
 
     def values(self, e: Complex, c: Real | None = None) -> Real:
-        """Return x [m], (..., r); e may be a stack (..., n), and c replace the constants."""
+        """Return x [m], (..., r); e may be a stack (..., n); ``c`` replaces the constants."""
         x = e @ self.B.T
         if len(self.carried):
             x[..., self.carried] = self._carried_values(x, e)
@@ -219,7 +219,7 @@ class System:
         Coordinates of the straight shape: absolute angles, counter-clockwise from +x [rad], and
         stretches, which are zero there [-].
     arm : (n,) int
-        The arm that a coordinate turns or stretches: its own, or that of a link.
+        Index of the arm that a coordinate turns or stretches.
     H : (n, n) complex
         A^H diag(m) A with the columns of A spread, Hermitian [kg m^2].
     J : (n,)
@@ -232,7 +232,7 @@ class System:
         Loop closures Phi = Re(loops E) + loops_c [m].
     gaps, gaps_c, gaps_z : (s, n) complex, (s,), (s,) complex
         Gaps of the stops, without the wall's position [m]: gap = wall + Re(f (gaps E + gaps_z)) +
-        gaps_c, with f = 1 for a wall on the ground, conj(E) of the body that it is fixed to.
+        gaps_c, with f = 1 for a wall on the ground, and f = conj(E) for a wall on a body.
     slides, slides_z : (s, n) complex, (s,) complex
         Displacement of the hit points along their walls, to the left of the direction [m].
     on : (s,) int
@@ -244,7 +244,7 @@ class System:
     bodies : dict of BodyFrame
         The bodies by name: their centres of mass.
     pushed : tuple of BodyFrame
-        Where the forces act.
+        The points at which the forces act.
     probes : tuple of BodyFrame
         The points whose motion is reported.
     links : tuple of int
@@ -327,12 +327,12 @@ class System:
 
     @cached_property
     def stretched(self) -> Whole:
-        """The links that they stretch."""
+        """The arms that stretch, in the order of :attr:`stretches`."""
         result: Whole = self.arm[self.stretches]
         return result
 
     def directions(self, q: Real) -> Complex:
-        """Return e: the arms exp(s + i theta), and -i times that for stretches.
+        """Return e: the arms exp(s + i theta) for angles, and -i times the arms for stretches.
 
         Parameters
         ----------
@@ -361,7 +361,7 @@ class System:
     def turning(self, v: Real) -> Real | Complex:
         """Return the rates w = theta' - i s' of the arms; the entries of stretches are zero [1/s].
 
-        They are the rates v themselves where nothing stretches.
+        Without stretches the result is v.
         """
         if not len(self.stretches):
             return v

@@ -40,7 +40,7 @@ class Motion:
     system : System
         The moving mechanism.
     time : (m,)
-        Increasing [s].
+        Increasing times [s].
     q : (m, n)
         Angles of links and bodies [rad].
     walls : (m, s)
@@ -124,7 +124,7 @@ def motion(
     Raises
     ------
     ResultError
-        If the mechanism is not given, columns are missing, or the shapes do not fit to it.
+        If the mechanism is not given, columns are missing, or the shapes do not fit it.
     """
     if isinstance(result, Result):
         columns, mechanism, values = result.columns, result.mechanism, result.values

@@ -29,7 +29,7 @@ COLUMNS = 3  # Modes per row.
 THIN_BODY = 0.12  # Bodies of a lower height, as a share of the size, have their names above.
 NAME_AT = 0.36  # Position of a name along its flexure, off the middle where flexures may cross.
 NAME, NAME_OFFSET = "#303030", 7.0  # Colour; distance of a flexure from its name [points].
-WIDTH, HEIGHT_MIN, HEIGHT_MAX, FRAME = 7.2, 2.4, 6.4, 0.9  # Of the picture [inch].
+WIDTH, HEIGHT_MIN, HEIGHT_MAX, FRAME = 7.2, 2.4, 6.4, 0.9  # Sizes of the picture [inch].
 
 
 @own_style()

@@ -48,7 +48,7 @@ COLOURS = (
     "#ffffff",
     "#000000",
 )
-MARGIN = 0.06  # Around the motion, as a share of the size of the mechanism.
+MARGIN = 0.06  # Margin around the motion, as a share of the size of the mechanism.
 FLASH = 0.28  # Time of the film in which a flash fades [s].
 FLASH_MIN, FLASH_MAX = 8.0, 34.0  # Sizes of flashes [points].
 SIZE, DPI = (8.0, 6.4), 100  # Inches; video codecs need even numbers of pixels.

@@ -1,7 +1,7 @@
 """The integration of the thesis for comparison: RK4 at a fixed step, projection, late impacts.
 
 After each step of the classical Runge-Kutta method the state is projected onto the loops.  If a
-wall is penetrated then, Newton's impact law is applied at once, up to a step late; the next impact
+wall is now penetrated, Newton's impact law is applied at once, up to a step late; the next impact
 follows only after the body has left the wall.  The equations of motion are those of this package.
 
 Source: S. Boersma, Modelling and Validation of the Impact Response in Compliant Mechanisms, MSc

@@ -14,12 +14,13 @@ clamp, where the loop is closed::
 The chain begins and ends at the pivots next to the clamps; the rigid stubs there only shift the
 positions.  Time advances by a fixed step of Runge and Kutta's fourth-order method.  After each step
 the positions, not the velocities, are projected onto the closed loop (unweighted).  Contact is
-checked between steps, so that an impact is up to a step late.  As long as the body remains behind
-the wall after it, no further impact is applied.
+checked between steps, so that an impact is up to a step late.  While the body remains behind the
+wall after an impact, no further impact is applied.
 
-Two errors of the thesis are switches: `stiffness_factor` (an extra factor gamma in the rates of the
-2R pivots) and `convective` (whether the acceleration constraint has its right side).  One feature
-is not reproduced: in the thesis, time does not advance during the steps behind the wall.
+Two parameters reproduce errors of the thesis: `stiffness_factor` = True multiplies the rates of the
+2R pivots by an extra factor gamma, and `convective` = False omits the right side of the
+acceleration constraint.  One feature is not reproduced: in the thesis, time does not advance during
+the steps behind the wall.
 
 Source: S. Boersma, Modelling and Validation of the Impact Response in Compliant Mechanisms, MSc
 thesis, TU Delft 2015, appendix A.
@@ -115,8 +116,8 @@ class Link:
 class Chain:
     r"""Constant arrays of a chain of links with springs between them and at both clamps.
 
-    With e = exp(i q), every position is linear in e: the loop's gap is loop e - distance, the
-    shuttle's centre of mass is com e, its hit point hit e.
+    With e = exp(i q), where q are the angles of the links, every position is linear in e: the gap
+    of the loop is loop e - distance, the shuttle's centre of mass is com e, its hit point is hit e.
 
     Parameters
     ----------
@@ -313,8 +314,9 @@ def cantilever_deflection(stiffness_factor: bool) -> float:
 def held_shape(chain: Chain, displacement: float) -> tuple[Real, float]:
     r"""Shape and horizontal force that hold the shuttle's centre of mass at rest.
 
-    Newton's method on Q = W^T lam, W the gradients of the loop's gap and of the centre of mass,
-    in stages of at most 2 mm of `displacement`.
+    Newton's method solves Q = W^T lam: Q are the generalised forces, the rows of W are the
+    gradients of the loop's gap and of the centre of mass, and lam are the constraint forces.  The
+    `displacement` is applied in stages of at most 2 mm.
 
     Returns
     -------
@@ -346,7 +348,7 @@ def held_shape(chain: Chain, displacement: float) -> tuple[Real, float]:
             tangent = chain.K + np.diag((chain.weight * e - lam @ points).real)
             turn = np.linalg.solve(bordered(tangent, W), residual)
             q, lam = q + turn[:n], lam + turn[n:]
-            if np.abs(turn[:n]).max() < 1e-12:  # rad; the remaining error is of its square
+            if np.abs(turn[:n]).max() < 1e-12:  # rad; the error is the square of this step
                 break
         else:
             raise ArithmeticError(f"no shape found that holds the shuttle at x = {x} m")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..hybrid.simulation import Simulation
 from ..mechanism.description import Mechanism
 
-PERIODS_MAX = 25.0  # Most fundamental periods in one second: 40 communication steps in each.
+PERIODS_MAX = 25.0  # Largest number of fundamental periods in one second: 40 steps in each.
 PERIODS = 10.0  # Approximate number of periods if one second has fewer than one or too many.
 STEPS = 1000  # Communication steps of the default experiment.
 

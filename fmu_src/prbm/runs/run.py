@@ -1,4 +1,4 @@
-"""Simulation of a mechanism without an FMU, with the columns that FMPy returns for one."""
+"""Simulation of a mechanism without an FMU; the columns are those that FMPy returns for an FMU."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -53,14 +53,14 @@ def simulate(
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
     steps_max : float or None
-        Most integration steps of the simulation; it is already abandoned if it takes more than a
+        Largest number of integration steps; the simulation ends early if it takes more than a
         proportional part of them.  None: no limit.
 
     Returns
     -------
     Result
-        The columns have one row per communication point.  The row of an input is the time from
-        which it acts.
+        The columns have one row per communication point.  The input of a row acts from the time of
+        this row.
 
     Raises
     ------

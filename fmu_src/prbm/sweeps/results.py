@@ -82,7 +82,7 @@ class Results:
             return
         if not (self.folder.is_dir() and {p.name for p in self.folder.iterdir()} <= {LOCK}):
             raise ParameterError(
-                f"{self.folder} exists without a sweep in it; give another name for the results"
+                f"{self.folder} exists but contains no sweep; give another name for the results"
             )
 
     def begin(self, overwrite: bool = False) -> None:
@@ -157,11 +157,11 @@ class Results:
             except (OSError, ValueError, pa.ArrowException) as error:
                 reason = str(error).splitlines()[0]
                 raise ParameterError(
-                    f"{part} cannot be read ({reason}); remove it, and its runs are repeated"
+                    f"{part} cannot be read ({reason}); remove it to repeat its runs"
                 ) from None
 
     def sort(self) -> None:
-        """Replace all parts by one part with the rows in order, so that any reader gets them so.
+        """Replace all parts by one part with ordered rows, so that every reader gets them in order.
 
         A kill leaves the new part beside old ones; :meth:`read` drops the duplicate rows.
         """

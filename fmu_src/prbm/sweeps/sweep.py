@@ -57,7 +57,7 @@ Outputs = Sequence[str] | Mapping[str, str]
 
 
 class SweepError(PrbmError, RuntimeError):
-    """The sweep cannot run with any table."""
+    """The sweep cannot run, for a reason that does not depend on its table."""
 
 
 def sweep(
@@ -88,8 +88,8 @@ def sweep(
         One column per variable, with its name, and one row per run; or a CSV or Parquet file of
         such a table.  The units are those of the FMU: SI for the FMUs of this project.
     out : str or Path
-        Folder of the results, a Parquet dataset.  If it has runs of the same sweep, only the others
-        are computed.  Rows may have been added to the table.
+        Folder of the results, a Parquet dataset.  If it has runs of the same sweep, only the
+        missing runs are computed; rows may have been added to the table since then.
     outputs : sequence of str, or mapping of str to str
         Recorded outputs of a run:
 
@@ -224,7 +224,7 @@ def _make_plan(
     for name, x in fixed.items():
         check_settable(name, variables)
         if name in frame:
-            raise ParameterError(f"{name} is in the table and among the values; leave one out")
+            raise ParameterError(f"{name} is in the table and among the values; remove one of them")
         if not math.isfinite(x):
             raise ParameterError(f"{name} = {x:g} among the values must be finite")
     kept = _outputs(outputs, variables)
@@ -259,7 +259,7 @@ def read_fmu(path: Path) -> tuple[bytes, Any]:
     if not description.fmiVersion.startswith(("2", "3")) or description.coSimulation is None:
         raise SweepError(
             f"{path} (FMI {description.fmiVersion}): must have co-simulation of FMI 2.0 or 3.0; "
-            "export it so"
+            "export such an FMU"
         )
     return data, description
 
@@ -509,7 +509,7 @@ class _Sweep:
         for row in rows:
             crashes[row] = crashes.get(row, -1) + 1
         if crashes[rows[0]] > retries:
-            return [Outcome(CRASHED, "every worker that ran it crashed")]
+            return [Outcome(CRASHED, "every worker that ran this row crashed")]
         suspects.extend(rows)
         return []
 
@@ -568,5 +568,5 @@ def summary(results: "pd.DataFrame", out: str | os.PathLike[str]) -> str:
     for row, status, message in results.loc[~good, ["row", "status", "message"]].head(3).values:
         lines.append(f"row {row} {status}: {message}")
     if (~good).sum() > 3:
-        lines.append("the others are in the columns status and message")
+        lines.append("see the columns status and message for the other failed runs")
     return "\n".join(lines)

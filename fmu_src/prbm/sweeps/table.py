@@ -23,7 +23,7 @@ SEPARATORS = {";": "semicolons", "\t": "tabs"}  # separators of CSV dialects tha
 WORDS = {"true": 1.0, "false": 0.0}
 PROBABILITY_MIN = (
     2.0**-53
-)  # Distance of probabilities from 0 and 1, where quantiles may be infinite.
+)  # Smallest distance of probabilities from 0 and 1, where quantiles may be infinite.
 NAMES_LISTED_MAX = 10  # Messages with more settable variables refer to "fmpy info" instead.
 HINT_LENGTH_MAX = 200  # characters
 RANGES = {"Int8": 7, "Int16": 15, "Int32": 31, "Integer": 31, "Enumeration": 31, "Int64": 53,

@@ -36,7 +36,7 @@ CLASSES = {
 TEXTS = {
     "String": str,
     "Binary": bytes,
-}  # Python's types of FMI's non-numeric ones
+}  # Python's types for the non-numeric types of FMI
 ENUMERATED = {2: "Integer", 3: "Int64"}  # type of an enumeration's values, by FMI version
 DESCRIBED = {CO_SIMULATION: "coSimulation", MODEL_EXCHANGE: "modelExchange"}
 

@@ -1,4 +1,4 @@
-"""Containers: a system of FMUs inside one FMU, by FMPy's container, for tools that load one FMU."""
+"""Containers: a system of FMUs inside one FMU, made by FMPy, for tools that load only one FMU."""
 
 import shutil
 import tempfile
@@ -53,7 +53,7 @@ def container(
     shown : sequence of str
         Further variables of the container, ``name.variable``.
     fmi : {2, 3}
-        FMI version of the container (default: 3); the inner FMUs may have the other one.
+        FMI version of the container (default: 3); the inner FMUs may have the other version.
     stop_time : float
         Stop time of the default experiment [s] (default: 1).
 
@@ -65,7 +65,7 @@ def container(
     Raises
     ------
     CouplingError
-        If an FMU cannot be read, or a name or a causality does not fit.
+        If an FMU cannot be read, a name is unknown, or a variable has the wrong causality.
     """
     values = dict(values or {})
     with tempfile.TemporaryDirectory(prefix="prbm_container_") as temporary:

@@ -9,9 +9,9 @@ Values are exchanged at communication points only.  The scheme determines the in
 
     jacobi          every FMU uses the outputs at the beginning of the step
     gauss-seidel    the FMUs step one after the other, in the order of the mapping; each uses the
-                    outputs at the end of the step of the FMUs before it
+                    outputs that the FMUs before it have at the end of the step
 
-The error of both is of first order in the step.
+The error of both schemes is of first order in the step.
 
 With ``events=True``, FMUs of FMI 3.0 that have event mode end a step early at their events:
 
@@ -326,7 +326,7 @@ class System:
     # -- steps --
 
     def steps(self, end: float) -> Iterator[None]:
-        """Go to a communication point [s]; yield there and before and after each event."""
+        """Advance to a communication point [s]; yield there, and before and after each event."""
         stuck = 0
         while True:
             begin, event = self.time, self.advance(end)

@@ -24,7 +24,7 @@ Real = NDArray[np.float64]
 Partner = Callable[[float, Mapping[str, Value], Real], tuple[Mapping[str, float], Sequence[float]]]
 EVENT_TIME_ATOL = 1e-14  # s
 UPDATES_MAX = 1000  # Updates of discrete states at one time.
-STATE_ATOL_FACTOR = 1e-3  # Absolute tolerance over (relative tolerance times nominal value).
+STATE_ATOL_FACTOR = 1e-3  # Absolute tolerance / (relative tolerance * nominal value).
 NAMES2 = {
     "updateDiscreteStates": "newDiscreteStates",
     "getContinuousStateDerivatives": "getDerivatives",

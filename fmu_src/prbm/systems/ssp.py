@@ -31,7 +31,7 @@ EPOCH = (
 )  # Date of all files: equal systems give equal bytes.
 KINDS = {"Real": "Real", "Float64": "Real", "Integer": "Integer", "Int32": "Integer",
          "Boolean": "Boolean"}  # fmt: skip
-"""Types of SSP by those of FMI 2.0 and 3.0."""
+"""Types of SSP by the types of FMI 2.0 and 3.0."""
 
 
 def package(
@@ -62,8 +62,8 @@ def package(
     Raises
     ------
     CouplingError
-        If an FMU cannot be read, a name is unknown, a causality does not fit, or a type has no
-        counterpart in SSP.
+        If an FMU cannot be read, a name is unknown, a variable has the wrong causality, or a type
+        has no counterpart in SSP.
     """
     path, values = Path(path), dict(values or {})
     variables = {
@@ -176,7 +176,7 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
     -------
     structured array
         ``time`` and the connected variables, ``name.variable``, one row at the end of each step.
-        An input has its value for the next step.
+        The value of an input is the one that acts in the next step.
 
     Notes
     -----
@@ -212,7 +212,7 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
                     if parameter.type == "Boolean":  # FMPy reads any text as true, "false" too.
                         parameter.value = parameter.value in ("true", "1")
                     every.parameters.append(parameter)
-    # Half a step less: FMPy sums its steps, and rounding could add one.
+    # The end is half a step early: FMPy sums its steps, and rounding could add another step.
     end = times[-2] + step / 2
     try:
         result: Columns = simulate_ssp(
@@ -220,7 +220,8 @@ def simulate(path: str | Path, stop_time: float, step: float) -> Columns:
         )
     except Exception as error:
         _fail(path, error)
-    result["time"] = np.minimum(result["time"] + step, stop_time)  # FMPy records the begins.
+    # FMPy records the time at the start of a step; return the time at its end.
+    result["time"] = np.minimum(result["time"] + step, stop_time)
     return result
 
 

@@ -50,9 +50,10 @@ def swing(K_theta: float) -> tuple[Real, Real]:
 
 
 def harmonic_amplitude(frequency: float) -> float:
-    """Return the amplitude of the 1R of the PMMA guide, released straight at 1 m/s [m].
+    """Return the amplitude of the 1R model of the PMMA guide, released straight at 1 m/s [m].
 
-    The angle of a 1R guide without gravity is harmonic with the amplitude v/(r omega).
+    The angle of a 1R guide without gravity is harmonic with the amplitude v/(r omega), for the
+    initial velocity v of the shuttle and the length r of the links.
     """
     r = source_model.GAMMA_1R * source_model.PMMA.length
     return r * math.sin(PMMA["release.velocity"] / (r * 2 * math.pi * frequency))
@@ -125,14 +126,16 @@ def table_4_1(_: Progress) -> Result:
         "Figures 4.1 and 4.2, table 4.1",
         "free vibration of the PMMA guide, K_Θ = 2.65",
         numbers,
-        "The MATLAB row of the table repeats the values of the ANSYS row. Its printed errors "
-        "belong to other values, which our 1R model meets to 0.6 %. The errors of the two COMSOL "
+        "The MATLAB row of the table repeats the values of the ANSYS row, but its printed errors "
+        "are those of other values, with which our 1R model agrees to 0.6 %. The errors of the two "
+        "COMSOL "
         "rows are swapped. The frequency of the 1R is 1.9 % above that of both finite-element "
         "programs, since K_Θ = 2.65 holds for an end force without an end moment.",
         f"""The amplitude depends mostly on the initial velocities. If only the shuttle starts at
 1 m/s, the finite elements reach {1e3 * a_fe:.2f} mm. The flexures of a 1R model always move with
-the shuttle. Its angle is then harmonic, and its amplitude is r sin(v/(r ω)) with the length r of
-its links (the exact value in the table). At the frequency of the elements this is {in_mode:.2f} mm.
+the shuttle. The angle of the links is then harmonic, and the amplitude of the shuttle is
+r sin(v/(r ω)) with the length r of the links (the exact value in the table). At the frequency of
+the elements this is {in_mode:.2f} mm.
 The initial velocities thus explain most of the printed 8 %, and K_Θ does not.""",
         (
             Drawing(
@@ -164,13 +167,13 @@ def k_theta(_: Progress) -> Result:
 
     numbers = (
         near(f"K_Θ fitted to FE's small-motion frequency, {small:.4f} Hz", fitted(small)),
-        near(f"to the frequency of FE's vibration at 1 m/s, {free:.4f} Hz", fitted(free)),
-        near("to the printed ANSYS frequency, 5.6348 Hz", fitted(5.6348)),
-        near("to FE's vibration over 0.5 s, least squares", whole.values[K]),
-        Number("for comparison: small deflections, 3 γ", 3 * 0.8517, form=".4f"),
+        near(f"K_Θ fitted to FE's frequency after a start at 1 m/s, {free:.4f} Hz", fitted(free)),
+        near("K_Θ fitted to the printed ANSYS frequency, 5.6348 Hz", fitted(5.6348)),
+        near("K_Θ fitted to FE's vibration over 0.5 s by least squares", whole.values[K]),
+        Number("K_Θ of small deflections, 3 γ", 3 * 0.8517, form=".4f"),
         Number("frequency with K_Θ = 2.5449, Hz", f_source, "5.6348", free, within=0.001),
         Number(
-            f"steel guide at rest, to FE's {steel:.4f} Hz",
+            f"K_Θ of the steel guide fitted to FE's frequency at rest, {steel:.4f} Hz",
             fit(one, [K], Frequency(Estimate(steel, 5e-4)))[K].value,
             form=".4f",
         ),
@@ -182,13 +185,13 @@ def k_theta(_: Progress) -> Result:
         numbers,
         "The small-motion frequency, the frequency at 1 m/s and the whole response all give 2.545 "
         "± 0.01. The angle of the 1R guide without gravity is exactly harmonic, so that its "
-        "frequency does not depend on the amplitude; the frequency of the elements hardly depends "
-        "on it.",
-        """Two effects explain the remaining difference between 2.545 and our 2.551. The beams of
-ANSYS have shear and rotary inertia, the cables of our elements do not. And the least squares of the
-thesis compromise between amplitude and frequency. One K_Θ does not fit both guides. Gravity
-deflects the steel guide by a quarter of its length. This stiffens the guide more than its 1R model,
-so that the steel guide at rest needs 2.586.""",
+        "frequency does not depend on the amplitude. The frequency of the elements depends on the "
+        "amplitude only slightly.",
+        """Two effects explain the remaining difference between 2.545 and our 2.551. First, the
+beams of ANSYS have shear and rotary inertia, and our cable elements do not. Second, the
+least-squares fit of the thesis is a compromise between amplitude and frequency. One K_Θ does not
+fit both guides: gravity deflects the steel guide by a quarter of its length. This stiffens the
+elements more than the 1R model, so that the steel guide at rest needs 2.586.""",
     )
 
 

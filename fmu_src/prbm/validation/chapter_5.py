@@ -99,12 +99,12 @@ def figure_5_1(_: Progress) -> Result:
         "modal analysis of the steel structure",
         numbers,
         "With the values of listing B.2.2 (180 GPa, massless flexures, a point mass without "
-        "rotary inertia) our elements have 136 Hz at 10.4 mm. The second frequency falls steeply "
-        'with the deflection. The 136 Hz printed for "10 mm deflected" thus agrees both with a '
-        "guide held at 10 mm and with a guide at rest under gravity. The printed 4.8 Hz is "
+        "rotary inertia) our elements have f2 = 136 Hz at 10.4 mm. The second frequency f2 falls "
+        'steeply with the deflection. The 136 Hz printed for "10 mm deflected" thus agrees both '
+        "with a guide held at 10 mm and with a guide at rest under gravity. The printed 4.8 Hz is "
         "rounded.",
-        "The values of the figure itself are only in a picture; the text quotes these two. The 2R "
-        "underestimates f2 at all deflections.",
+        "The values of the figure itself are only in a picture; the text quotes 4.8 Hz and 136 Hz. "
+        "The 2R underestimates f2 at all deflections.",
     )
 
 
@@ -160,9 +160,9 @@ def elements_of_steel(_: Progress) -> Result:
         tuple(numbers),
         "Rest position and fundamental frequency of the 2R are within 0.6 % of the elements; its "
         "second and third frequency are 11 to 13 % too low. The measured 4.82 ± 0.06 Hz is 1.8 % "
-        "below the elements, 1.4 times its uncertainty, if 181.5 GPa and 0.1 mm are exact. The "
-        "frequency is proportional to the thickness to the power 1.5, so that a thickness 1.2 µm "
-        "below the nominal 100 µm explains the difference.",
+        "below that of the elements, which is 1.4 times the uncertainty, if 181.5 GPa and 0.1 mm "
+        "are exact. The frequency is proportional to the thickness to the power 1.5, so that a "
+        "thickness 1.2 µm below the nominal 100 µm explains the difference.",
         f"Between 16 and 32 elements no number changes by more than a fraction of {change:.1e}. "
         "The printed 4.8224 Hz of the 1R is neither its frequency at rest nor that of its free "
         "vibration with the printed parameters; the cause is unknown.",
@@ -187,7 +187,7 @@ def figure_5_4(_: Progress) -> Result:
         hits += abs(one.modulus.value - E) < one.modulus.uncertainty
     numbers = (
         Number("E, GPa", 1e-9 * found.modulus.value, "181.5", 1e-9 * E, "true", 0.01, form=".2f"),
-        Number("its standard uncertainty, GPa", 1e-9 * found.modulus.uncertainty, form=".2f"),
+        Number("standard uncertainty of E, GPa", 1e-9 * found.modulus.uncertainty, form=".2f"),
         covered(hits),
     )
     (axes,) = panels(1)
@@ -227,7 +227,7 @@ def figure_5_5(_: Progress) -> Result:
     smallest = tiny.zeta.uncertainty
     numbers = (
         Number("frequency, Hz", tiny.frequency.value, "4.82", 4.82, "true", 0.01, True, ".6f"),
-        Number("its standard uncertainty, Hz", tiny.frequency.uncertainty, form=".1e"),
+        Number("standard uncertainty of the frequency, Hz", tiny.frequency.uncertainty, form=".1e"),
         Number(
             "ζ, record with ζ = 6.88e-9",
             tiny.zeta.value,
@@ -236,7 +236,7 @@ def figure_5_5(_: Progress) -> Result:
             "true",
             form=".1e",
         ),
-        Number("its standard uncertainty", smallest, form=".1e"),
+        Number("standard uncertainty of this ζ", smallest, form=".1e"),
         Number("ζ, record with ζ = 1e-3", some.zeta.value, None, 1e-3, "true", 0.1, form=".4e"),
         replace(covered(hits["frequency"]), name=f"frequency: {covered(0).name}"),
         replace(covered(hits["zeta"]), name=f"ζ: {covered(0).name}"),
@@ -253,7 +253,7 @@ def figure_5_5(_: Progress) -> Result:
         numbers,
         "A fit of a damped sine determines the frequency a hundred thousand times more accurately "
         "than the ± 0.06 Hz of the spectrum in the thesis. **The printed ζ = 6.88e-9 is too small "
-        f"to be measured**: ten seconds with its laser resolve {smallest:.0e}. For a synthetic "
+        f"to be measured**: ten seconds with this laser resolve {smallest:.0e}. For a synthetic "
         f'record with this ζ the evaluation reports "{tiny.damping}".',
         "With this damping ratio the time constant 1/(ζ ω) would be 55 days. Neither "
         "interpretation of eq. 3.16 makes the number plausible; it is not a default of this "
@@ -300,7 +300,7 @@ def figure_5_6(progress: Progress) -> Result:
             True,
             ".4f",
         ),
-        Number("its standard uncertainty", found.uncertainty, form=".4f"),
+        Number("standard uncertainty of this restitution", found.uncertainty, form=".4f"),
         Number(
             "restitution of the 1R fitted to a 1R",
             back.value,
@@ -326,9 +326,9 @@ def figure_5_6(progress: Progress) -> Result:
         "Figures 5.6 and 8",
         "impact on the centre of mass: the fitted restitution",
         numbers,
-        "At straight flexures the fitted restitution is that of the contact, less the share of "
-        "the flexures, which the impact does not stop. It is 0.59 to 0.60 for a contact with 0.6. "
-        "The synthetic record replaces the experiment: 2R with stretching flexures, 750 Hz, 4 µm.",
+        "With straight flexures the fitted restitution is slightly below that of the contact, "
+        "because the impact does not stop the flexures: 0.59 to 0.60 for a contact with 0.6. The "
+        "synthetic record replaces the experiment: 2R with stretching flexures, 750 Hz, 4 µm.",
         "",
         (
             Drawing(

@@ -35,8 +35,8 @@ from .common import (
 )
 from .side_by_side import Drawing, Number, Result
 
-OPTIMISED_SPAN, OPTIMISED_STEP = 1.0, 2 / 2**10  # s; half the span and the step of the thesis
-UNSTABLE_MISFIT = 1e3  # mm; the misfit of a run that diverges
+OPTIMISED_SPAN, OPTIMISED_STEP = 1.0, 2 / 2**10  # s; half of the span of the thesis, and its step
+UNSTABLE_MISFIT = 1e3  # mm; misfit that is assigned to a run that diverges
 TRIED = (7.889, 8.7614, 12.0)  # K_theta1: published value over gamma, thesis, a larger value
 
 
@@ -146,9 +146,9 @@ def figure_6_2(progress: Progress) -> Result:
             0.02,
         ),
         Number("K_Θ2 that fits with the printed K_Θ1", valley[1][1], "4.0104", within=0.05),
-        Number("misfit there, mm", valley[1][2], form=".2f"),
+        Number("misfit with this pair, mm", valley[1][2], form=".2f"),
         *(
-            Number(f"K_Θ2 that fits as well with K_Θ1 = {first:g}; misfit {rms:.2f} mm", second)
+            Number(f"K_Θ2 that fits with K_Θ1 = {first:g}, with a misfit of {rms:.2f} mm", second)
             for first, second, rms in (valley[0], valley[2])
         ),
     )
@@ -206,7 +206,7 @@ def figure_6_3(progress: Progress) -> Result:
     kept = runs[-18e-3, True].energy
     numbers = (
         Number(
-            "with the right side, from -18 mm: largest energy over the first",
+            "with the right side, from -18 mm: largest energy / energy at release",
             float((kept / kept[0]).max()),
             None,
             1.0,
@@ -215,7 +215,7 @@ def figure_6_3(progress: Progress) -> Result:
             form=".6f",
         ),
         Number(
-            "with the right side: smallest energy over the first",
+            "with the right side, from -18 mm: smallest energy / energy at release",
             float((kept / kept[0]).min()),
             None,
             1.0,
@@ -224,15 +224,19 @@ def figure_6_3(progress: Progress) -> Result:
             form=".6f",
         ),
         Number(
-            "as printed, from -18 mm: energy 10 % above the first at, s", grown(-18e-3), form=".3f"
+            "as printed, from -18 mm: time at which the energy has grown by 10 %, s",
+            grown(-18e-3),
+            form=".3f",
         ),
         Number(
-            "as printed, from -18 mm: last finite state at, s",
+            "as printed, from -18 mm: time of the last finite state, s",
             float(runs[-18e-3, False].t[-1]),
             form=".3f",
         ),
         Number(
-            "as printed, from -10 mm: energy 10 % above the first at, s", grown(-10e-3), form=".3f"
+            "as printed, from -10 mm: time at which the energy has grown by 10 %, s",
+            grown(-10e-3),
+            form=".3f",
         ),
     )
     left, right = panels(1, 2, (8.0, 3.0))
@@ -259,8 +263,8 @@ def figure_6_3(progress: Progress) -> Result:
         "The acceleration constraint needs the right side -(dΦ_q/dt) v; the printed equations "
         "have zeros. In the 1R parallelogram the terms cancel, in the 2R they do not. Released "
         "from -18 mm, the printed 2R gains energy without being driven, until its state is no "
-        "longer finite. The smooth curve in the thesis is probably of a smaller motion: at the "
-        "15 mm of the PMMA guide (a thirteenth of its length) the error stays small.",
+        "longer finite. The smooth curve in the thesis probably shows a smaller motion: at 15 mm, "
+        "a thirteenth of the length of the PMMA guide, the error stays small.",
         "The thesis attributes the problems of its 2R to the impact law, the one-sided contact "
         "condition and the integrator (sections 6.5 and 8.3). The missing term is their cause.",
         (
@@ -292,7 +296,7 @@ def figure_6_4(progress: Progress) -> Result:
             form=".4f",
         ),
         Number(
-            "energy in the other modes after it, share of the arriving energy",
+            "energy in the other modes after this impact, share of the arriving energy",
             higher[0],
             None,
             higher[1],
@@ -308,7 +312,7 @@ def figure_6_4(progress: Progress) -> Result:
             within=0.01,
         ),
         Number(
-            "its modal restitution",
+            "modal restitution of this first impact",
             ours.impacts[0].latched.modal_restitution,
             None,
             fe.impacts[0].latched.modal_restitution,
@@ -317,7 +321,12 @@ def figure_6_4(progress: Progress) -> Result:
             form=".4f",
         ),
         Number(
-            "time at which it rests on the wall, s", rest[0], None, rest[1], within=0.02, form=".3f"
+            "time at which the guide rests on the wall, s",
+            rest[0],
+            None,
+            rest[1],
+            within=0.02,
+            form=".3f",
         ),
     )
     (axes,) = panels(1)
@@ -333,8 +342,8 @@ def figure_6_4(progress: Progress) -> Result:
         numbers,
         "Nearly all of the remaining energy returns to the fundamental mode. The flexures have 1 "
         "% of the moving mass; the impact does not stop them, and they keep up to 1 % of the "
-        "energy. The bounces decay and the guide rests on the wall. With the printed algorithm it "
-        "passes through the wall instead.",
+        "energy. The bounces decay and the guide rests on the wall. With the printed algorithm "
+        "the guide passes through the wall instead.",
         "",
         (
             Drawing(
@@ -389,7 +398,7 @@ def figure_6_5(_: Progress) -> Result:
             form=".4f",
         ),
         Number(
-            "energy in the other modes after it, share of the arriving energy",
+            "energy in the other modes after this impact, share of the arriving energy",
             float(hits[0].after[1:].sum()),
             None,
             float(hits[1].after[1:].sum()),

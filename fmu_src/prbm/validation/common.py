@@ -77,7 +77,7 @@ def crossings(t: Real, x: Real) -> Crossings:
     """Return the mean frequency between rising zeros [Hz] and the maximum of a free vibration."""
     rising, below = [0.0], False
     for i in range(len(x) - 1):
-        below = below or x[i] < -0.1 * x.max()  # Count a zero only after a swing, not in noise.
+        below = below or x[i] < -0.1 * x.max()  # Noise is not a swing.
         if below and x[i + 1] >= 0.0:
             rising.append(float(t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i])))
             below = False

@@ -50,8 +50,8 @@ repeat the computation and compare the numbers.
 
 The measured records of the thesis are not public. Synthetic records with the noise of its sensors
 (laser 4 µm at 750 Hz, load cell 0 to 0.5 N) replace them, and show the accuracy of each evaluation.
-The curves of the thesis are available as pictures only; the statements of its text are compared
-instead. Two errors of the thesis are shown with its own algorithm, derived again in
+The curves of the thesis are available as pictures only; instead, statements of its text are
+compared. Two errors of the thesis are shown with its own algorithm, derived again in
 `prbm.references.source_model`: the extra factor γ of the 2R stiffness, and the missing right side
 of the acceleration constraint.
 """

@@ -85,7 +85,7 @@ def transients(progress: Progress) -> tuple[ImpactMap, ImpactMap]:
 
 
 def trend(one: ImpactMap) -> tuple[float, float]:
-    """Return the asymmetry of a map: over offsets, then over walls.
+    """Return the asymmetries of a map of restitutions C(h, d): over offsets d, then over walls h.
 
     These are the mean of C(-d) - C(d) over d = 2, 4 mm and all walls, and the mean of C(-h) - C(h)
     over h = 5, 10 mm and all offsets.
@@ -116,13 +116,13 @@ def _discussion(maps: Sequence[ImpactMap]) -> str:
         "straight flexures it is smaller than in these maps at 0.1 ms, and vanishes for contacts "
         "longer than 0.2 ms.\n"
         "- *Wall.* The restitution of a pure mode is the same on both sides, because the path is "
-        "symmetric. That of a first impact is nearly the same on both sides, the fitted "
-        "restitution is not. A guide that has passed its straight shape (h > 0, in the direction "
-        "of gravity) rebounds towards it. There the other modes become stiffer and take energy "
-        "from the fundamental mode, which lowers the fitted restitution. This is the trend of "
-        'the thesis if its positions count upwards. Its "-10 mm" is then +10 mm along gravity, '
-        "where the velocity points into the buckling direction of the flexures (its section "
-        "8.2.1). If its -10 mm is a wall before the straight shape, the sign is opposite.\n"
+        "symmetric. That of a first impact is nearly symmetric, and the fitted one is not. A guide "
+        "that has passed its straight shape (h > 0, in the direction of gravity) rebounds towards "
+        "it. There the other modes become stiffer and take energy from the fundamental mode, "
+        "which lowers the fitted restitution. This is the trend of the thesis if its positions "
+        'count upwards: its "-10 mm" is then +10 mm along gravity, where the velocity points into '
+        "the buckling direction of the flexures (its section 8.2.1). If its -10 mm is a wall "
+        "before the straight shape, the sign is opposite.\n"
         "- *Accuracy.* The first impact of the elements converges as stated in the table. With a "
         "spectral radius of 0.9 instead of 0.5 the waves in the flexures after an impact grow in "
         "some of these runs until the results are wrong. The fits include 50 ms after the first "
@@ -169,11 +169,11 @@ def figure_5_7(progress: Progress) -> Result:
             True,
             ".4f",
         ),
-        largest("closed form on the path of the 2R, from FE", off(exact, fe), 0.0064),
-        largest("closed form on the path of the 1R, from FE", off(on_1r, fe)),
-        largest("inextensible 2R, from FE", off(rigid, fe)),
+        largest("closed form, path of the 2R, largest difference from FE", off(exact, fe), 0.0064),
+        largest("closed form, path of the 1R, largest difference from FE", off(on_1r, fe)),
+        largest("inextensible 2R, largest difference from FE", off(rigid, fe)),
         Number(
-            "inextensible 1R, largest less smallest",
+            "inextensible 1R, largest value less smallest value",
             float(np.ptp(flat.restitution)),
             None,
             0.0,
@@ -182,13 +182,19 @@ def figure_5_7(progress: Progress) -> Result:
             True,
             ".1e",
         ),
-        largest("FE, first impact after a release, from FE, pure mode", off(released, fe)),
-        largest("2R, first impact after a release, from that of FE", off(ours, released)),
         largest(
-            "FE, first impact: 8 elements, 0.1 ms from 16 elements, 0.05 ms, three points",
+            "FE, first impact after a release, largest difference from a pure mode",
+            off(released, fe),
+        ),
+        largest(
+            "2R, first impact after a release, largest difference from FE", off(ours, released)
+        ),
+        largest(
+            "FE, first impact, 8 elements and 0.1 ms, largest difference from 16 elements and "
+            "0.05 ms at three points",
             converged,
         ),
-        largest("1R fitted to FE, from the first impact of FE", off(fits, released)),
+        largest("1R fitted to FE, largest difference from FE's first impact", off(fits, released)),
     )
     every = (exact, model, fe, ours, released, fits)
     return Result(
@@ -198,12 +204,12 @@ def figure_5_7(progress: Progress) -> Result:
         numbers,
         "For an arriving pure mode the 2R with stretching flexures, finite elements and the "
         "closed form on the path of the 2R agree without any fit. The path of the 1R is less "
-        "accurate: the closed form on it is up to 0.011 off. The restitution of the inextensible "
-        "1R is constant. A released guide of elements arrives nearly in the fundamental mode. The "
-        "other modes of the 2R are 11 % too slow and arrive with another phase, which changes its "
-        "restitution by up to 0.05. A 1R fitted to a response estimates a third quantity. It is "
-        "the only one with the asymmetry between the walls that the thesis found. No map has the "
-        "trend of the thesis towards the base.",
+        "accurate: the closed form on that path is up to 0.011 off. The restitution of the "
+        "inextensible 1R is constant. A released guide of elements arrives nearly in the "
+        "fundamental mode. The other modes of the 2R are 11 % too slow and arrive with another "
+        "phase, which changes its restitution by up to 0.05. A 1R fitted to a response estimates "
+        "a third quantity. It is the only one with the asymmetry between the walls that the thesis "
+        "found. None has the trend of the thesis towards the base.",
         _discussion(every),
         (
             Drawing(

@@ -63,7 +63,7 @@ static void advance(Simulation *simulation) {
     read_all(simulation);
     if (simulation_advance(simulation, time, &problem) &&
         simulation_advance_some(simulation, 2 * time, false, &event, &problem) && event) {
-        (void)simulation_happen(simulation, &problem);
+        (void)simulation_handle_event(simulation, &problem);
     }
     read_all(simulation);
 }

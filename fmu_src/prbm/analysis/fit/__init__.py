@@ -6,9 +6,9 @@ and the position of a stop, damping, a mass.  The sum of squares
     S(p) = sum ((model(p) - data)/u)^2
 
 is minimised within bounds.  The covariance is (J^T J)^-1, with J the derivatives of the residuals.
-The columns of J are scaled by the sizes of the parameters.  Its singular values s_k are then the
-information in the data: along the k-th direction the parameters have the relative standard
-uncertainty 1/s_k.  Where it is too large, the fit reports the direction of the valley.
+The columns of J are scaled by the sizes of the parameters.  Its singular values s_k then measure
+the information in the data: along the k-th singular direction the parameters have the relative
+standard uncertainty 1/s_k.  If this is too large, the fit reports the direction as a valley.
 """
 
 from .problem import Free, Problem

@@ -21,9 +21,9 @@ BOUND_RTOL = 1e-6  # A parameter nearer to a bound than this share of the range 
 DEFAULT_RATIO = 10.0  # Default bounds are a tenth and ten times the start.
 RANGE_SHARE = 0.1  # Size of a parameter near zero, as a share of the range of its bounds.
 STEPS_MAX = 50  # Steps of the minimiser.
-MISFIT_RTOL = 1e-9  # With m data, sqrt(m/1e9) of a standard uncertainty away from the least misfit.
+MISFIT_RTOL = 1e-9  # Change of S(p) that ends the minimiser, as a share of S(p).
 PARAMETER_RTOL, GRADIENT_TOL = 1e-10, 1e-12  # Other conditions that end the minimiser.
-PROGRESS_STEPS = 4.0  # Steps of the minimiser in which the reported rest of the work is halved.
+PROGRESS_STEPS = 4.0  # Minimiser steps after which the remaining part of the progress is halved.
 
 
 @dataclass(frozen=True)
@@ -85,8 +85,8 @@ class Problem:
         Raises
         ------
         EvaluationError
-            If a motion or shape does not exist; the message names the parameters.  Or if the model
-            of a target returns another number of values than the target has.
+            If a motion or shape does not exist (the message names the parameters), or if the model
+            of a target returns a wrong number of values.
         """
         values = self.values(p)
         try:
@@ -125,7 +125,7 @@ class Problem:
         return result
 
     def jacobian(self, p: Real, scale: Real, moved: Whole) -> Real:
-        """Return the derivatives of the residuals by some p/scale, (m, j), central differences."""
+        """Return central differences of the residuals by p/scale of the moved p, (m, j)."""
         columns = []
         for i in moved:
             ahead, behind = p.copy(), p.copy()
@@ -138,7 +138,7 @@ class Problem:
     def minimised(
         self, start: Real, moved: Whole, progress: Progress | None = None
     ) -> tuple[Real, int, bool]:
-        """Return the parameters of least misfit, the model evaluations, and the convergence.
+        """Return the best parameters, the number of model evaluations, and whether it converged.
 
         Parameters
         ----------

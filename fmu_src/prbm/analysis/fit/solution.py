@@ -17,11 +17,11 @@ from ...mechanism.description import Mechanism
 from .problem import STEPS_MAX, Free, Problem, stated_problem
 from .targets import RECORD_UNITS, Response, Target, of_mechanism
 
-UNCERTAINTY_MAX = 0.5  # Relative standard uncertainty of a direction that the data determine.
+UNCERTAINTY_MAX = 0.5  # Largest relative uncertainty of a direction that counts as determined.
 MODEL_RTOL = 1e-9  # Computation error of a model, relative to the data.
 SINGULAR_RTOL = 1e-6  # Singular values below this fraction of the largest are round-off.
 SHARE_MIN = 0.1  # Least share of a direction at which a parameter takes part in it.
-REDUCED_MAX = 3.0  # Residual over stated uncertainty; above it the model is wrong.
+REDUCED_MAX = 3.0  # Largest ratio of residuals to stated uncertainties without a note.
 STARTS = {1: 9, 2: 5}  # Starts along each of k parameters of a response with several valleys.
 STARTS_MAX = 400
 START_PROGRESS = 0.5  # Share of the starts in the reported progress.
@@ -36,7 +36,7 @@ class Direction:
     shares : dict
         Relative change of each parameter, a vector of length 1 [-].
     uncertainty : float
-        Relative standard uncertainty along it [-]; infinite without any information.
+        Relative standard uncertainty along the direction [-]; infinite without any information.
     """
 
     shares: dict[str, float]
@@ -148,7 +148,7 @@ class Fit:
 
     @property
     def correlation(self) -> Real:
-        """Correlation of the parameters, (k, k) [-]; not a number where not determined."""
+        """Correlation of the parameters, (k, k) [-]; NaN for those that are not determined."""
         u = np.sqrt(np.diag(self.covariance))
         with np.errstate(invalid="ignore"):
             result: Real = self.covariance / np.outer(u, u)
@@ -345,16 +345,17 @@ def fitted_restitution(
     """Fit the restitution of a stop to a bouncing response.
 
     The 1R guide has only the fundamental mode, so that its fitted restitution estimates the modal
-    restitution, as in the thesis.  It is one number for all impacts of the record.  If an impact
-    leaves much energy in other modes, the following impacts depend on it, and the number differs
-    from that of the first one (:func:`prbm.mechanics.modal.modal_restitution`).
+    restitution, as in the thesis.  The fitted number applies to all impacts of the record.  If an
+    impact leaves much energy in other modes, the following impacts depend on these modes, and the
+    fitted number differs from the modal restitution of the first impact
+    (:func:`prbm.mechanics.modal.modal_restitution`).
 
     Parameters
     ----------
     mechanism : Mechanism
         The 1R guide, or another mechanism with a stop.
     series : Series
-        The record, since the release at t = 0.
+        The record, with times since the release.
     values : mapping
         Parameters that differ from those of the mechanism: release, position of the stop,
         stiffness.
@@ -373,7 +374,7 @@ def fitted_restitution(
     Raises
     ------
     EvaluationError
-        If there is no impact in the record, or as :func:`fit` does.
+        If there is no impact in the record, or :func:`fit` raises it.
     """
     impacts(series)
     name = f"{stop}.restitution"

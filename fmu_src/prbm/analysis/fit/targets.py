@@ -20,7 +20,7 @@ from ...mechanism.description import Mechanism
 
 RECORD_SHIFT, RECORD_ZERO = "record.shift", "record.zero"
 RECORD_UNITS = {RECORD_SHIFT: "s", RECORD_ZERO: "m"}  # Parameters of a record, not of a mechanism.
-DISPLACEMENT = "displacement"  # Of the released body along the direction of its release.
+DISPLACEMENT = "displacement"  # Output: displacement of the released body along its release.
 
 
 class Target(Protocol):
@@ -77,8 +77,8 @@ class Frequency:
             )
         if not 0.0 < self.frequency.uncertainty < math.inf or self.frequency.value <= 0.0:
             raise EvaluationError(
-                f"frequency {self.frequency}: give a positive value and its standard uncertainty; "
-                "half of the last digit for a computed frequency"
+                f"frequency {self.frequency}: give a positive value and its standard uncertainty, "
+                "for a computed frequency half of its last digit"
             )
         if self.mode < 1:
             raise EvaluationError(f"mode = {self.mode}: the fundamental is 1")
@@ -124,7 +124,7 @@ class Response:
     uncertainty : float or None
         Standard uncertainty of a sample; None: estimated from the residuals.
     tolerance : float or None
-        Of the integration; None: ``solver.tolerance``.
+        Relative tolerance of the integration (default: ``solver.tolerance``).
     """
 
     series: Series
@@ -187,7 +187,7 @@ class ForceDeflection:
     Parameters
     ----------
     displacement, force : (m,)
-        From the straight shape [m]; positive in the direction of the displacement [N].
+        Displacements from the straight shape [m]; forces, positive along the displacement [N].
     uncertainty : float or None
         Standard uncertainty of a force [N]; None: estimated from the residuals.
     """
@@ -224,7 +224,7 @@ def of_mechanism(values: Mapping[str, float]) -> dict[str, float]:
 
 
 def check_shape(target: Target, found: Real) -> None:
-    """Reject values that NumPy would broadcast to the shape of the data."""
+    """Reject values of a model that do not have the shape of the data."""
     if np.shape(found) != np.shape(target.data):
         raise EvaluationError(
             f"{target.label}: its model returns {_counted(found)}, its data are "

@@ -52,17 +52,17 @@ def valley(
     points: int = 11,
     progress: Progress | None = None,
 ) -> Valley:
-    """Return the profile of a fit along one of its parameters, all others fitted again.
+    """Return the best fits for several values of one parameter; the others are fitted again.
 
     Parameters
     ----------
     found : Fit
         A fit of two parameters or more.
     along : str or None
-        Name of the parameter; None: the one that changes most along the combination of parameters
+        Name of the parameter.  By default it is the one with the largest share in the direction
         that the data determine worst.
     span : pair of float or None
-        Range of its values; None: half to twice the best value, within the bounds.
+        Range of its values, within the bounds (default: half to twice the best value).
     points : int
         Number of values.
     progress : callable or None
@@ -79,13 +79,18 @@ def valley(
     if along is None:
         along = problem.names[int(np.argmax(np.abs(found.directions[-1])))]
     if along not in problem.names:
-        raise EvaluationError(f"{along} was not fitted; fitted were {', '.join(problem.names)}")
+        raise EvaluationError(
+            f"{along} was not fitted; the fitted parameters are {', '.join(problem.names)}"
+        )
     i = problem.names.index(along)
     best = float(found.p[i])
     low, high = span or (min(best / 2, best * 2), max(best / 2, best * 2))
     low, high = max(low, float(problem.lower[i])), min(high, float(problem.upper[i]))
     if not low < high or points < 2:
-        raise EvaluationError(f"span = {span}, points = {points}: give two values and two points")
+        raise EvaluationError(
+            f"span = {span}, points = {points}: give a span (low, high) with low < high within the "
+            "bounds, and at least 2 points"
+        )
     values = np.unique(np.append(np.linspace(low, high, points), np.clip(best, low, high)))
     centre = int(np.argmin(np.abs(values - best)))
     others = np.delete(np.arange(len(found.p)), i)

@@ -1,12 +1,12 @@
 r"""Closed form of the modal restitution of a body on a path.
 
-A free body follows the path y(x) of a guide without turning.  An impact at the distance d from the
-centre of mass then has the modal restitution
+A free body of mass m and inertia J follows the path y(x) of a guide without turning.  An impact
+with the restitution eps, at the distance d from the centre of mass, has the modal restitution
 
     C = (1 + eps) / ((1 + y'^2) (1 + m d^2/J)) - 1.
 
-The formula is rejected for a body that turns on its path, and for a body without nearly all of the
-kinetic energy of the fundamental mode.
+The formula is rejected for a body that turns on its path, and for a body that has less than
+:data:`ENERGY_SHARE_MIN` of the kinetic energy of the fundamental mode.
 """
 
 import math
@@ -29,7 +29,7 @@ PATH_RTOL = 1e-9  # A path shorter than this fraction of the step is round-off.
 PATH_STEP = 1e-4  # Half of the step along the path of a body, as a share of the size.
 TURNING_MAX = 0.02  # Largest motion by turning at the hit point, as a share of the path.
 ENERGY_SHARE_MIN = 0.95  # Least share of the body in the kinetic energy of the fundamental mode.
-_UNFIT = "the closed form is that of"
+_UNFIT = "the closed form applies only to"
 _OTHER_METHODS = "choose another method: algebraic, simulated or elements"
 
 
@@ -102,16 +102,16 @@ def _path(system: System, body: str, shape: Equilibrium) -> tuple[complex, float
 def _check_alone(
     system: System, body: str, shape: Equilibrium, path: complex, turns: float, wall: float
 ) -> None:
-    """Reject a body that turns on its path, or with too little of the fundamental's energy.
+    """Reject a body that turns on its path, or has too little of the fundamental mode's energy.
 
-    ``turns`` is the motion by turning at the hit point, over the path [-].
+    ``turns`` is the motion of the hit point by rotation, divided by the path [-].
     """
     where = f"with the wall at {1e3 * wall:g} mm"
     if abs(turns) > TURNING_MAX:
         raise ParameterError(
-            f"{_UNFIT} a body that does not turn, but {where} {body} turns: where it is hit, or at "
-            f"its radius of gyration, by {100 * abs(turns):.3g} % of its path (at most "
-            f"{100 * TURNING_MAX:g} %); {_OTHER_METHODS}"
+            f"{_UNFIT} a body that does not turn, but {where} {body} turns: this moves the hit "
+            f"point, or a point at the radius of gyration, by {100 * abs(turns):.3g} % of the path "
+            f"(at most {100 * TURNING_MAX:g} %); {_OTHER_METHODS}"
         )
     _, velocity = system.motion(
         system.bodies[body], system.directions(shape.q), modes(system, shape).shape[:, 0]
@@ -120,8 +120,8 @@ def _check_alone(
     share = mass * (velocity * path.conjugate()).real ** 2  # Modes have the mass 1.
     if share < ENERGY_SHARE_MIN:
         raise ParameterError(
-            f"{_UNFIT} a body that moves alone, but {where} the motion of {body} along its path is "
-            f"{100 * share:.3g} % of the fundamental's kinetic energy (at least "
+            f"{_UNFIT} a body that moves alone, but {where} the motion of {body} along its path "
+            f"has {100 * share:.3g} % of the fundamental mode's kinetic energy (at least "
             f"{100 * ENERGY_SHARE_MIN:g} %): other bodies or the flexures move with it; "
             f"{_OTHER_METHODS}"
         )

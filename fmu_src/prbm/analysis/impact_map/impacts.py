@@ -32,7 +32,7 @@ def first_impact(simulation: Simulation, stop: int) -> Impact:
     raise EquilibriumError(
         f"the wall of {name} is not reached in {PERIODS_MAX:g} periods from "
         f"release.displacement = {simulation.values.get('release.displacement', 0.0):g} m: release "
-        "further from it"
+        "further from the wall"
     )
 
 

@@ -1,9 +1,9 @@
 r"""Impact maps: the modal restitution over positions of the wall and offsets of the hit.
 
 The modal restitution is the ratio of the fundamental mode's velocities after and before an impact,
-with the sign reversed.  Its default points are those measured in the thesis (S. Boersma, *Modelling
-and Validation of the Impact Response in Compliant Mechanisms*, TU Delft 2015).  The methods are in
-:mod:`prbm.analysis.impact_map.routes` and :mod:`prbm.analysis.impact_map.free_body`.
+with the sign reversed.  The default points of a map are those measured in the thesis (S. Boersma,
+*Modelling and Validation of the Impact Response in Compliant Mechanisms*, 2015).  The methods are
+in :mod:`prbm.analysis.impact_map.routes` and :mod:`prbm.analysis.impact_map.free_body`.
 """
 
 import csv
@@ -127,14 +127,14 @@ def grouped(after: Real) -> list[float]:
 
 @dataclass(frozen=True)
 class MovedStop:
-    """The stop of a map, whose position and offset are moved.
+    """The stop of a map, whose position and offset are varied.
 
     Parameters
     ----------
     index : int
         Index of the stop.
     name : str
-        Its name.
+        Name of the stop.
     """
 
     index: int
@@ -155,7 +155,7 @@ class MovedStop:
             if f"{found.name}.{quantity}" not in mechanism.values():
                 raise ParameterError(
                     f"{mechanism.name}: the {quantity} of {found.name} is an expression in other "
-                    f"parameters, and a map moves it: write a number there"
+                    "parameters, but a map varies it: replace the expression by a number"
                 )
         return found
 

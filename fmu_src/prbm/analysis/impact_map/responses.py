@@ -9,7 +9,7 @@ from ...mechanics.arrays import Real
 from ...mechanism.description import Mechanism
 from ..fit import DISPLACEMENT, Fit, Response, fit
 
-SIMULATION_RTOL = 1e-7  # Tolerance of simulations for a fit, whose differences are about 1e-4.
+SIMULATION_RTOL = 1e-7  # Tolerance in a fit, whose finite differences are about 1e-4.
 
 
 def response(
@@ -39,7 +39,7 @@ def fit_response(
     names : sequence of str
         Parameters to fit.
     times : (m,)
-        Increasing, since the release [s].
+        Increasing times since the release [s].
     wanted : (m,)
         Displacement of the released body along the direction of its release [m].
     values : mapping

@@ -55,11 +55,11 @@ def shares(G: Real, restitution: float) -> tuple[float, Real, float]:
     Returns
     -------
     C, after, lost : float, (k,), float
-        Energies in units of the arriving one; their sum is 1 [-].
+        C, and energies in units of the arriving energy; their sum is 1 [-].
 
     Examples
     --------
-    Two equal modes and a plastic hit share the velocity equally:
+    Two equal modes share the velocity equally after a plastic hit:
 
     >>> C, after, lost = shares(np.array([1.0, 1.0]), 0.0)
     >>> C, after.tolist(), lost
@@ -221,14 +221,15 @@ def fitted(
 ) -> ImpactMap:
     """Return the restitution of an inextensible 1R model fitted to simulated responses.
 
-    The thesis evaluates its measurements in this way.  The 1R model has the same wall and release,
-    a centred hit, and one restitution in place of the modal one.  Its stiffness is fitted too,
-    because its period differs.  The response is the motion of the released body from the release to
-    :data:`REBOUND_PERIODS` periods after the first impact, with further impacts.  A 1R model cannot
-    move through the wall, so that the fit of a negative modal restitution is 0.
+    The thesis evaluates its measurements in this way.  The 1R model has the same wall and release
+    and a centred hit; its fitted restitution replaces the modal restitution.  The stiffness of the
+    1R model is fitted, too, because its period differs.  The response is the motion of the released
+    body from the release to :data:`REBOUND_PERIODS` periods after the first impact, with further
+    impacts.  A 1R model cannot move through the wall, so that the fit of a negative modal
+    restitution is 0.
 
-    The fit depends on the whole rebound, not on the impact alone.  Where the frequencies of the
-    excited modes change during the rebound, their energies change too.  A guide that rebounds
+    The fit depends on the whole rebound, not on the impact alone.  If the frequencies of the
+    excited modes change during the rebound, their energies change, too.  A guide that rebounds
     towards its straight shape, where these frequencies rise, loses some of its motion; a guide that
     rebounds outwards gains some.  This alone makes the map of fits asymmetric.
 

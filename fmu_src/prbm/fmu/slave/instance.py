@@ -47,7 +47,7 @@ class Instance:
     given : dict of str to float
         Parameters and inputs.
     waiting : dict of str to float
-        Those that were set since the last step.
+        Parameters and inputs that were set since the last step.
     refused : dict of str to str
         The error message of each rejected value; a valid value removes it.
     failure : str or None
@@ -103,7 +103,7 @@ class Instance:
             self.running = True
 
     def _start(self) -> None:
-        """Make the simulation from the present values, unless there is one."""
+        """Create the simulation from the present values, unless it exists."""
         if self.simulation is not None or self.failure or self.refused:
             return
         try:
@@ -149,7 +149,10 @@ class Instance:
         if self.refused:
             return "; ".join(self.refused.values())
         if not (math.isfinite(time) and math.isfinite(size)):
-            return f"cannot step from t = {time} s by {size} s: not finite numbers"
+            return (
+                f"currentCommunicationPoint = {time} s and communicationStepSize = {size} s must "
+                "be finite numbers"
+            )
         if size <= 0.0:
             return f"communicationStepSize = {size:.9g} s must be positive"
         slack = STEP_SUM_RTOL * size + TIME_SUM_RTOL * abs(self.clock)

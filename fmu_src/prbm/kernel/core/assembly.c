@@ -17,7 +17,7 @@ static Complex at_point(const System *system, Point point) {
     return complex_of(evaluate(point.x, system->values), evaluate(point.y, system->values));
 }
 
-/* Move a place by a vector that turns with coordinate j. */
+/* Add a vector that turns with coordinate j to a place. */
 static void extend(Place *spot, int j, Complex vector) {
     if (j == FIXED) {
         spot->c = plus(spot->c, vector);
@@ -213,7 +213,7 @@ static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Pro
     }
     int last_one = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
     for (int i = 0; i <= pieces.n; i++) {
-        /* The direction of a link is in its coordinate q; a body is drawn with q = 0. */
+        /* In the drawing the angle of a body is 0, that of a link its direction. */
         Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
                                 : complex_of(pieces.lengths[i], 0.0);
         add_rod(system, pieces.rods[i], &spot, owners[i], vector, &spare);
@@ -225,7 +225,7 @@ static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Pro
     if (step->closes) {
         on_body(system, span.far, minus(span.z_end, last), &spare);
         close_loop(system, &spot, &spare);
-        copy_place(n, &spot, &spare); /* The stub then moves with its body only, not with links. */
+        copy_place(n, &spot, &spare); /* The last stub is part of the far body. */
     } else {
         reach(system, span.far, &spot, minus(span.z_end, last), last_one);
     }
@@ -288,7 +288,7 @@ static void add_pushed_and_probes(System *system, Scratch *scratch) {
 
 /* --- arrays ----------------------------------------------------------------------------------- */
 
-/* Set B and return c of the displacement of a place from the straight shape along u. */
+/* Set B and return c such that Re(B E) + c is the displacement of a place along u [m]. */
 static double along(int n, Complex u, const Complex *A, const Complex *e0, Complex *B) {
     double c = 0.0;
     for (int j = 0; j < n; j++) {
@@ -348,7 +348,8 @@ static void add_frictions(System *system, const Complex *e0, Scratch *scratch) {
     scratch->used = mark;
 }
 
-/* Return the end of a block of the mass matrix: no coordinate from there on shares mass with it. */
+/* Return the end of the block of the mass matrix that begins at start.  The coordinates from this
+ * end on share no mass with the block. */
 static int end_of_block(const System *system, int start) {
     int n = system->n, end = start + 1;
     for (int j = start; j < end; j++) {
@@ -370,7 +371,7 @@ static void find_blocks(System *system) {
     }
 }
 
-/* Copy the arrays that the equations of motion read often, in the order in which they are read. */
+/* Copy the arrays that the equations of motion read often, in the order of reading. */
 static void pack_blocks(System *system) {
     int n = system->n;
     Complex *next = system->coupling;
@@ -481,8 +482,8 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
     return true;
 }
 
-/* Exchange row k with the longest row from k on, with the numbers of their loops; return its
- * length. */
+/* Find the longest of the rows k to r - 1, exchange it with row k, and return its length.  The loop
+ * numbers of both rows are exchanged, too. */
 static double choose_row(int k, int r, int n, double *rows, int *loop) {
     int best = k;
     double most = dot(n, rows + k * n, rows + k * n);

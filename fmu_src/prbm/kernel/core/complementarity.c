@@ -9,7 +9,8 @@
 
 /* --- Lemke's method --------------------------------------------------------------------------- */
 
-/* Columns of w (m), z (m), the covering variable, and the constants; the variable of each row. */
+/* The tableau.  Its columns belong to w (m), z (m), the covering variable and the constants; basis
+ * (m,) contains the variable of each row. */
 typedef struct {
     int m, width;
     double *rows;
@@ -34,7 +35,7 @@ static Pivots first_pivots(int m, const double *M, const double *q, const double
     return pivots;
 }
 
-/* Make a column a unit vector. */
+/* Pivot on a row and a column, so that the column becomes a unit vector. */
 static void pivot_at(Pivots *pivots, int row, int column) {
     int width = pivots->width;
     double *own = pivots->rows + row * width, pivot = own[column];
@@ -50,7 +51,7 @@ static void pivot_at(Pivots *pivots, int row, int column) {
     }
 }
 
-/* The rows of a column that are positive. */
+/* List the rows in which a column is positive; return their number. */
 static int falling_rows(const Pivots *pivots, int column, int *rows) {
     double top = 1.0;
     int count = 0;
@@ -65,7 +66,7 @@ static int falling_rows(const Pivots *pivots, int column, int *rows) {
     return count;
 }
 
-/* Keep the rows in which an entry has the least ratio to that of a column. */
+/* Keep the rows whose ratio row[entry] / row[column] is the least. */
 static int least_ratios(const Pivots *pivots, int entry, int column, int count, int *rows) {
     double low = HUGE_VAL;
     int kept = 0;
@@ -84,8 +85,8 @@ static int least_ratios(const Pivots *pivots, int entry, int column, int count, 
     return kept;
 }
 
-/* The row whose variable falls to zero first, or -1.  Of rows with equal ratios, that of the
- * covering variable is chosen, else the least in lexicographic order, so that no basis occurs
+/* Return the row whose variable falls to zero first, or -1.  Among rows with equal ratios, the row
+ * of the covering variable comes first, then the lexicographically least row.  No basis occurs
  * twice. */
 static int leaving_row(const Pivots *pivots, int column, int *rows) {
     int m = pivots->m, count = falling_rows(pivots, column, rows);
@@ -114,7 +115,7 @@ static void values_of(const Pivots *pivots, double size, double *z) {
     }
 }
 
-/* Follow the path of pivots until the covering variable leaves. */
+/* Pivot until the covering variable leaves the basis; return false if no row can leave. */
 static bool follow_pivots(Pivots *pivots, int row, int *rows) {
     int m = pivots->m, entering = 2 * m;
     for (int step = 0; row >= 0 && step < PIVOTS_FACTOR * m; step++) {
@@ -136,7 +137,7 @@ PRBM bool lemke(int m, const double *M, const double *q, const double *cover, do
     int last = 0, exponent;
     zeros(m, z);
     for (int i = 0; i < m; i++) {
-        last = q[i] / cover[i] <= q[last] / cover[last] ? i : last; /* in lexicographic order */
+        last = q[i] / cover[i] <= q[last] / cover[last] ? i : last; /* lexicographic order */
     }
     if (m == 0 || q[last] >= 0.0) {
         return true;
@@ -154,13 +155,13 @@ PRBM bool lemke(int m, const double *M, const double *q, const double *cover, do
 
 /* --- Coulomb's law ---------------------------------------------------------------------------- */
 
-/* The place of the a-th of the forces (P_n, P_t+, P_t-) in P, and its sign. */
+/* Return the index in P = (P_n, P_t) of the a-th force of (P_n, P_t+, P_t-), and set its sign. */
 static int force_at(int k, int m, int a, double *sign) {
     *sign = a < k + m ? 1.0 : -1.0;
     return a < k + m ? a : a - m;
 }
 
-/* The problem for z = (P_n, P_t+, P_t-, speeds of sliding), scaled. */
+/* Set the scaled problem for z = (P_n, P_t+, P_t-, sliding speeds), with P_t = P_t+ - P_t-. */
 static void set_problem(int k, int m, const double *W, const double *u, const double *friction,
                         const double *fixed, const int *normal, const double *scale, double *M,
                         double *q) {
@@ -196,7 +197,7 @@ PRBM double violation(int k, int m, const double *W, const double *u, const doub
             worst = greater(fabs(lesser(rate, share)), worst);
         } else {
             double most = limit[i - k] * mobility;
-            /* deficit of a sliding contact: friction must oppose the sliding at the limit */
+            /* A contact that slides needs friction at the limit, opposite to the velocity. */
             double missing = rate == 0.0 ? most : most + (rate > 0.0 ? share : -share);
             worst = greater(fabs(share) - most, worst);
             worst = greater(lesser(fabs(rate), fabs(missing)), worst);

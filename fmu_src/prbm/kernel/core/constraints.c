@@ -33,7 +33,7 @@ PRBM int seen_from(const Rows *rows, int i) {
     return rows->on == NULL ? FIXED : rows->on[i];
 }
 
-/* Return f (B E + z) of a row that is measured relative to a body. */
+/* Return f (B E + z) of row i, which is measured relative to a body. */
 PRBM Complex seen_value(const Rows *rows, int i, const Complex *e) {
     int n = rows->system->n;
     const Complex *B = rows->B + i * n;
@@ -57,7 +57,7 @@ PRBM double row_value(const Rows *rows, int i, const Complex *e) {
     return sum;
 }
 
-/* Return B E w, with the rates w of the arms. */
+/* Return B E w of row i, with the complex rates w of the arms. */
 PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
     const System *system = rows->system;
     const Complex *B = rows->B + i * system->n;
@@ -98,7 +98,8 @@ PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row) {
     }
 }
 
-/* Return Re(f (B E (w - w_b)^2 + z w_b^2)), with w_b the rate of the body of reference. */
+/* Return the convective term Re(f (B E (w - w_b)^2 + z w_b^2)) of row i, with the rate w_b of the
+ * body that the row is measured relative to. */
 PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v) {
     const System *system = rows->system;
     const Complex *B = rows->B + i * system->n;
@@ -192,8 +193,8 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
     scratch->used = mark;
     if (right_way && !closed) {
         return fail(problem,
-                    "the loops of the mechanism cannot be closed in this shape (gap %.3g m): the "
-                    "parts do not reach each other",
+                    "the loops of the mechanism cannot be closed in this shape: a distance of "
+                    "%.3g m between parts that are connected remains",
                     best);
     }
     return right_way;

@@ -4,7 +4,8 @@
 
 #include "core/system.h"
 
-/* Scalar functions s = Re(f (B E + z)) + c, with f = 1, or f = conj(E) of a body of reference. */
+/* Scalar functions s = Re(f (B E + z)) + c [m].  f is conj(E) of the body that a row is measured
+ * relative to, or 1 for the ground. */
 typedef struct {
     const System *system;
     int count;
@@ -14,7 +15,7 @@ typedef struct {
     const int *on;          /* (count,) coordinates of the bodies; FIXED: f = 1; NULL: all FIXED */
 } Rows;
 
-/* The message where the equations have no unique solution. */
+/* The message for equations without a unique solution. */
 #define SINGULAR \
     "the equations of motion are singular in this shape: two constraints are linearly dependent, " \
     "or a part that can move has no mass"
@@ -33,10 +34,11 @@ PRBM void saddle(int n, int r, const double *M, const double *columns, const dou
                  double *kkt);
 /* Solve a saddle-point system by LU; right (n + r,) is replaced by the solution. */
 PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem *problem);
-/* Project q (n,) onto the rows with the constants c (count,); e becomes its directions. */
+/* Project q (n,) onto the rows with the constants c (count,), and set e to the directions of q. */
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
                             Complex *e, Scratch *scratch, Problem *problem);
-/* v (n,) moves onto rows v + rates = 0 by impulses (r,) along the rows, which may be NULL. */
+/* Project v (n,) onto rows v + rates = 0.  impulses (r,) along the rows, which may be NULL, is set
+ * to those that change v. */
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, double *impulses, Scratch *scratch,
                              Problem *problem);

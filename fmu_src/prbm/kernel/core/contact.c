@@ -1,4 +1,4 @@
-/* Rigid impacts in contact space: Newton's law for all stops at once, Stronge's with friction.
+/* Rigid impacts in contact space: Newton's law without friction, Stronge's law with friction.
  *
  * Sources: as in the twin, mechanics/contact.py.
  */
@@ -36,8 +36,8 @@ static bool closing_in(Problem *problem) {
                          "them apart, or slow them down");
 }
 
-/* Solve W_ss P_s = -b_s for the members s.  Members with a negative impulse get the impulse zero
- * and are removed; *pulling is true if there are any. */
+/* Solve W P = -b for the impulses P of the members only.  Members with a negative impulse get the
+ * impulse zero and are removed; *pulling: whether a member is removed. */
 static bool share_impulses(int k, int *size, int *members, const double *W, const double *b,
                            double *P, bool *pulling, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -110,7 +110,7 @@ static double sign_of(double x) {
     return x < 0.0 ? -1.0 : 1.0;
 }
 
-/* Return the normal impulse until the work of restitution is complete or the gap rate is zero. */
+/* Return the normal impulse after which the work of restitution is done or the gap rate is zero. */
 static double restitution_ends(double u_n, double rate_n, double left) {
     double root = u_n * u_n + 2.0 * rate_n * left;
     if (root < 0.0) {
@@ -131,15 +131,16 @@ static double friction_ratio(double nt, double tt, double u_t, double friction) 
     return -friction * sign_of(nt);
 }
 
-/* State of an impact: rates, impulses, and derivatives of the rates by the normal impulse. */
+/* State of an impact: mobilities nn, nt, tt, rates u, impulses p, the ratio dP_t/dP_n, and the
+ * derivatives of the rates u_n and u_t by the normal impulse. */
 typedef struct {
     double nn, nt, tt, friction;
     double u_n, u_t, p_n, p_t;
     double ratio, rate_n, rate_t;
 } Hit;
 
-/* Set the derivatives of the rates, which are constant until sliding stops; return the normal
- * impulse until then. */
+/* Set the derivatives of the rates by the normal impulse.  They are constant until sliding stops;
+ * return the normal impulse at which it stops. */
 static double stops_sliding(Hit *hit) {
     hit->ratio = friction_ratio(hit->nt, hit->tt, hit->u_t, hit->friction);
     hit->rate_n = hit->nn + hit->ratio * hit->nt;
@@ -164,7 +165,7 @@ static double compress(Hit *hit) {
         double closed = hit->rate_n > WEDGED_RTOL * hit->nn ? -hit->u_n / hit->rate_n : HUGE_VAL;
         double step = lesser(sticking, closed);
         if (step == HUGE_VAL) {
-            break; /* zero mobility: the remaining rate is round-off or an error, see stronge */
+            break; /* No impulse opens the gap; stronge checks the remaining rate. */
         }
         work -= work_of(hit, step);
         receive(hit, step);
@@ -204,7 +205,7 @@ PRBM bool stronge(const double *W, const double *u, double friction, double rest
         return fail(problem, "the wall pushes the mechanism in a direction that friction locks; "
                              "reduce the friction of the stop, or the velocity of the wall");
     }
-    /* with one degree of freedom both rates vanish together, up to round-off */
+    /* With one degree of freedom both rates become zero at once, up to round-off. */
     hit.u_n = hit.u_n > small_n ? hit.u_n : 0.0;
     hit.u_t = fabs(hit.u_t) > small_t ? hit.u_t : 0.0;
     restore(&hit, restitution * restitution * work);
@@ -215,13 +216,13 @@ PRBM bool stronge(const double *W, const double *u, double friction, double rest
 
 /* --- several hits with friction --------------------------------------------------------------- */
 
-/* Limits of the work of restitution: of the normal impulses, and of all impulses. */
+/* Upper limits of the work of the normal impulses, and of all impulses, in restitution. */
 typedef struct {
     double normal, all;
 } Returned;
 
-/* Compute impulses R of restitution of at least s wanted; *allowed: their work is within the limits
- * most. */
+/* Compute impulses R of restitution that are at least s times wanted.  *allowed: whether their work
+ * is within the limits most. */
 static bool rebound(int k, const double *W, const double *after, const double *friction,
                     const double *wanted, double s, const Returned *most, double tolerance,
                     double *R, bool *allowed, Scratch *scratch) {

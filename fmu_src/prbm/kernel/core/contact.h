@@ -4,11 +4,11 @@
 
 #include "core/memory.h"
 
-/* Changes of velocity X (n, k) by unit impulses along the rows (k, n), while the rates of the rows
- * held (r, n) do not change. */
+/* Compute the changes of velocity X (n, k) by unit impulses along the rows (k, n).  The rates of
+ * the rows held (r, n) do not change. */
 PRBM bool response(int n, int r, int k, const double *M, const double *held, const double *rows,
                    double *X, Scratch *scratch, Problem *problem);
-/* speed: a scale of speeds, relative to which violations of the laws are round-off */
+/* speed: the speed [m/s] relative to which violations of the laws count as round-off. */
 PRBM bool newton(int k, const double *W, const double *u, const double *restitution, double speed,
                  double *P, Scratch *scratch, Problem *problem);
 PRBM bool stronge(const double *W, const double *u, double friction, double restitution,

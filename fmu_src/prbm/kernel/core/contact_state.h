@@ -5,7 +5,8 @@
 #include "core/constraints.h"
 
 /* Contacts are numbered in one list: the stops, then the friction points, which are never open.
- * CONTACT_FRICTIONLESS is a closed contact without friction, or whose load other contacts carry. */
+ * CONTACT_FRICTIONLESS is a closed contact without friction, or a contact that cannot slide
+ * independently of other contacts. */
 PRBM int slip_sign(ContactMode mode); /* Sign of the sliding velocity: -1, 0 or +1. */
 
 typedef struct {

@@ -49,7 +49,7 @@ SIZED bool rates_of_length(int even, const Equations *q, const double *y, const 
     return true;
 }
 
-/* The lengths of the guides' vectors are known where they are compiled, so that loops unroll. */
+/* The code for the vector lengths of the guides is compiled separately, so that loops unroll. */
 static bool rates_of_motion(const Equations *q, const double *y, const Reference *near,
                             Evaluation *result, double *dy) {
     int even = q->system->even;
@@ -110,7 +110,8 @@ PRBM double gap_acceleration(const Equations *equations, int i, double t, const 
 
 /* --- reactions -------------------------------------------------------------------------------- */
 
-/* E (i w' - w^2) of the arms: a place accelerates by A times that. */
+/* Compute the second derivatives E (i w' - w^2) of the arms.  The acceleration of a point is its
+ * row A times these derivatives. */
 static void arm_accelerations(const System *system, const Complex *e, const double *v,
                               const double *a, Complex *result, Scratch *scratch) {
     size_t mark = scratch->used;
@@ -125,7 +126,7 @@ static void arm_accelerations(const System *system, const Complex *e, const doub
     scratch->used = mark;
 }
 
-/* A E */
+/* Return the product A E of a row of A. */
 PRBM Complex along_arms(int n, const Complex *A, const Complex *e) {
     Complex sum = {0.0, 0.0};
     for (int j = 0; j < n; j++) {

@@ -4,10 +4,11 @@
 
 #include "core/evaluation.h"
 
-/* The rates dy of y = (q, v, dissipated energy, work), and their evaluation. */
+/* Compute the rates dy of y = (q, v, dissipated energy, work) at time t. */
 PRBM bool rate(const Equations *equations, double t, const double *y, const Reference *near,
                Evaluation *result, double *dy, Problem *problem);
-/* The same at the time of the evaluation, which matters only if the walls of held stops move. */
+/* Compute the rates as rate does, at the time stored in the result.  Rates depend on the time only
+ * if the walls of held stops move. */
 PRBM bool rate_at_time(const Equations *equations, const double *y, const Reference *near,
                        Evaluation *result, double *dy, Problem *problem);
 PRBM double gap(const Equations *equations, int i, double t, const Complex *e);

@@ -40,7 +40,7 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 
 /* --- contacts --------------------------------------------------------------------------------- */
 
-/* Make the i-th of some rows the next active one, with the constant c. */
+/* Append row i of some rows to the active rows, with the constant c. */
 static void add_row(Equations *q, const Rows *rows, int i, double c) {
     int n = q->system->n, on = seen_from(rows, i);
     memcpy(q->B + q->r * n, rows->B + i * n, (size_t)n * sizeof *rows->B);
@@ -53,7 +53,7 @@ static void add_row(Equations *q, const Rows *rows, int i, double c) {
     q->r++;
 }
 
-/* The rows of the loops, of the stops that are closed and of the contacts that stick. */
+/* Set the active rows: those of the loops, of closed stops and of sticking contacts. */
 static void set_rows(Equations *q) {
     const System *system = q->system;
     Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
@@ -92,11 +92,11 @@ PRBM Parts parts_from(Parts parts, int start) {
     return parts;
 }
 
-/* The parts of the rows, spread over stretches and padded. */
+/* Set the real and imaginary parts of the rows, with columns for stretches, padded. */
 static void set_row_parts(Equations *q) {
     int n = q->system->n, even = q->system->even;
     for (int k = 0; k < q->r; k++) {
-        spread(q->system, 1, q->B + k * n, q->w); /* which the loads are put into later */
+        spread(q->system, 1, q->B + k * n, q->w); /* w is free memory here. */
         pad_parts(n, q->w, parts_from(q->B_conjugate, k * even));
     }
     for (int i = 0; i < q->r * even; i++) {
@@ -104,7 +104,7 @@ static void set_row_parts(Equations *q) {
     }
 }
 
-/* Where an index stands in a list that has it. */
+/* Return the position of an index in a list that contains it. */
 PRBM int place_in(const int *list, int index) {
     int k = 0;
     while (list[k] != index) {
@@ -113,7 +113,7 @@ PRBM int place_in(const int *list, int index) {
     return k;
 }
 
-/* The place of a held stop among those that hold. */
+/* Return the position of a held stop in the list of held stops. */
 PRBM int held_at(const Equations *q, int stop) {
     return place_in(q->held, stop);
 }
@@ -187,9 +187,9 @@ PRBM double reference_at(const Wall *wall, double t) {
     return wall->position + wall->rate * (t - wall->since);
 }
 
-/* With s = min((t - since) / span, 1):
+/* The motion on the cubic: with s = min((t - since) / span, 1),
  *     x = reference + offset (1 - 3 s^2 + 2 s^3) + excess span (s - 2 s^2 + s^3).
- * Beyond the end of the cubic the wall is to be replaced by its reference. */
+ * Callers replace the wall by its reference at the end of the cubic. */
 RARE WallMotion cubic_motion(const Wall *wall, double t) {
     double T = wall->span, s = lesser((t - wall->since) / T, 1.0);
     double e = wall->offset, u = wall->excess;

@@ -5,13 +5,14 @@
 #include "core/constraints.h"
 #include "core/contact_state.h"
 
-/* A wall that joins its reference, a uniform motion, along a cubic: at the time since it is ahead by
- * the offset and faster by the excess, and after the span it is on it. */
+/* A wall that joins its reference, a uniform motion, along a cubic.  At the time since, the wall is
+ * ahead of the reference by the offset [m] and faster by the excess [m/s]; after the span [s] it
+ * follows the reference. */
 typedef struct {
     double position, rate, since, offset, excess, span;
 } Wall;
 
-/* Position along the direction of the stop, velocity and acceleration. */
+/* Position x, velocity v and acceleration a of a wall along the direction of its stop. */
 typedef struct {
     double x, v, a;
 } WallMotion;
@@ -39,7 +40,7 @@ typedef struct {
     double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
     Complex *B, *z;         /* (r, n), (r,) of the active rows */
     double *c;              /* (r,) */
-    int *on, *carried;      /* (r,), (carried_count,) those that are seen from a body */
+    int *on, *carried;      /* (r,), (carried_count,) rows relative to a moving body */
     int carried_count;
     Rows active;
     Complex *w, *w_input;   /* (n,) */

@@ -112,7 +112,7 @@ RARE void stretch_squares(const System *system, double *squares) {
     }
 }
 
-/* Set a to the loads Re(w e) + moment, and the squares of the rates. */
+/* Compute the loads Re(w e) + moment, stored in a, and the squares of the rates. */
 SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
     const double *moment = q->moment, *v = result->at.speed;
     double *x = result->a, *squares = result->at.squares;
@@ -131,8 +131,8 @@ SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
 
 /* --- loads and rows --------------------------------------------------------------------------- */
 
-/* Return Im(w^2) = -2 theta' s' of a link that stretches.  The terms of links without stretch give
- * its angular acceleration minus Im(w^2); add_coriolis adds Im(w^2) to the solution. */
+/* Return Im(w^2) = -2 theta' s' of a link that stretches.  The equations without these terms give
+ * the angular acceleration minus Im(w^2); add_coriolis adds Im(w^2) to the solution. */
 static double coriolis(const System *system, const double *v, int stretch_coordinate) {
     return -2.0 * v[arm_of(system, stretch_coordinate)] * v[stretch_coordinate];
 }
@@ -161,7 +161,7 @@ SIZED void add_springs(int even, const Equations *q, Evaluation *result) {
     result->spring_loss = q->beta * sum;
 }
 
-/* Rows -Im(b e) and, in lam, their convective terms Re(b e) v^2, with the conjugate B of b. */
+/* Compute the rows -Im(b e) and, in lam, their convective terms Re(b e) v^2.  B is conj(b). */
 SIZED void convect(int count, int even, Parts B, Parts e, const double *ALONE squares,
                    double *ALONE rows, double *ALONE lam) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};
@@ -231,7 +231,7 @@ SHARED void rows_of_length(int even, const Equations *q, const Kinematics *at, d
 
 /* --- inertia ---------------------------------------------------------------------------------- */
 
-/* x -= c M v within a block. */
+/* Subtract the damping c M v of a block from its loads x. */
 SIZED void damp_mass(int size, double c, const double *ALONE M, const double *ALONE v,
                      double *ALONE x) {
     for (int i = 0; i < size; i++) {
@@ -341,7 +341,7 @@ static bool blocks_motion(const Equations *q, Evaluation *result) {
     return regular;
 }
 
-/* v^T diag(e)^H H diag(e) v / 2 */
+/* Return the kinetic energy v^T diag(e)^H H diag(e) v / 2. */
 PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation,
                               const double *v) {
     const System *system = equations->system;
@@ -428,7 +428,7 @@ static void set_columns(const Equations *q, Evaluation *result) {
 
 /* --- accelerations ---------------------------------------------------------------------------- */
 
-/* Compute the factors from the rows in Z, and a := L^-1 a. */
+/* Compute the factors from the rows in Z, and replace a by L^-1 a. */
 SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
     result->factors.r = q->r;
     result->factors.block_count = q->system->block_count;
@@ -446,7 +446,7 @@ RARE void add_coriolis(const System *system, Evaluation *result) {
     }
 }
 
-/* Held stops accelerate with their walls. */
+/* Subtract the accelerations of the walls from the right sides of the held stops. */
 RARE void add_walls(const Equations *q, double t, double *right) {
     for (int k = 0; k < q->held_count; k++) {
         right[q->first_hold + k] -= wall_motion(&q->inputs.walls[q->held[k]], t).a;

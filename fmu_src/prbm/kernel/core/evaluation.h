@@ -12,7 +12,7 @@ typedef struct {
     Parts e_parts; /* (even,) unit vectors, without stretch */
 } Reference;
 
-/* Position and velocity of a system: entries of the coordinates first, then of the ground. */
+/* Position and velocity of a system.  The coordinates come first, then the ground. */
 typedef struct {
     double time;                     /* used if the walls of held stops move */
     double *angle, *speed, *squares; /* (even,), (even + 2,), (even,): speed^2 */
@@ -35,8 +35,8 @@ typedef struct {
 PRBM void reference_place(Reference *reference, const System *system, Memory *memory);
 PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory *memory);
 PRBM void set_reference(Reference *reference, const System *system, const double *angle);
-/* Accelerations a (n,) and multipliers lam (r,): loops, closed stops (> 0 pushes),
- * sticking contacts.  near: a reference near q, or NULL. */
+/* Compute the accelerations a (n,) and the multipliers lam (r,): forces of loops, of closed stops
+ * (> 0 pushes), of sticking contacts.  near: a reference near q, or NULL. */
 PRBM bool evaluate_equations(const Equations *equations, double t, const double *q,
                              const double *v, const Reference *near, Evaluation *result, Problem *problem);
 /* Compute only the factors of the equations at a state. */

@@ -34,13 +34,13 @@ RARE bool factor(int size, const double *M, double *L, double *inverse) {
     return factor_any(size, M, L, inverse);
 }
 
-#define LEAST_MULTIPLE 1e-280 /* smaller and larger multiples may underflow or overflow */
+#define LEAST_MULTIPLE 1e-280 /* Multiples outside these limits may underflow or overflow. */
 #define LARGEST_MULTIPLE 1e280
 
-/* Factor a small M like factor_any, but with independent divisions at the end, which overlap.
- * Elimination without divisions gives w_0 = M_00, w_1 = M_00 D_1, w_2 = w_0 w_1 D_2, ..., and all
- * w_k L_ik.  Also return false if these multiples may underflow or overflow; factor may then
- * succeed. */
+/* Factor a small M like factor_any, but with all divisions at the end, so that they overlap in
+ * time. The elimination without divisions computes multiples w_k of D_k and w_k L_ik of L_ik, with
+ * w_0 = M_00, w_1 = w_0 D_1, w_2 = w_0 w_1 D_2, ...  Also return false if these multiples may
+ * underflow or overflow; factor may then succeed. */
 SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     double w[SMALL][SMALL], multiple = 1.0;
     bool safe;
@@ -197,7 +197,8 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
     return small_factor(r, S, L, L + r * r) || factor(r, S, L, L + r * r);
 }
 
-/* Compute and factor S if columns differ from rows (a stop slides), or if S is large. */
+/* Compute and factor S by LU, for columns that differ from the rows (a stop slides) or a large
+ * S. */
 static bool factor_unsymmetric(Factors *factors) {
     int even = factors->even, r = factors->r;
     for (int i = 0; i < r; i++) {
@@ -246,8 +247,8 @@ SIZED void multipliers_of_size(int r, const double *S, double *lam) {
     block_backward(r, L, lam);
 }
 
-/* lam -= Z D^-1 x */
-SIZED void ask_multipliers(int count, int even, const double *ALONE Z, const double *ALONE x,
+/* Subtract Z D^-1 x from the right side of the rows, given in lam. */
+SIZED void reduce_right_side(int count, int even, const double *ALONE Z, const double *ALONE x,
                            const double *ALONE inverse, double *ALONE lam) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};
     UNROLLED_BY_LANES
@@ -272,7 +273,7 @@ SIZED void constrain_of_size(int r, int even, const Factors *factors, double *AL
     const double *ALONE inverse = factors->inverse;
     const int together = r <= SMALL ? r : 1;
     for (int k = 0; k < r; k += together) {
-        ask_multipliers(together, even, Z + k * even, x, inverse, lam + k);
+        reduce_right_side(together, even, Z + k * even, x, inverse, lam + k);
     }
     if (factors->symmetric) {
         multipliers_of_size(r, factors->S, lam);

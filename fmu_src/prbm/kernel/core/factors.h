@@ -21,8 +21,8 @@ typedef enum { BACKWARD, FORWARD } Substitution;
 
 /* Compute S from Z and Z_columns, and factor it. */
 PRBM bool factor_schur(Factors *factors);
-/* Solve with existing factors: x (even,) and lam (r,) are the right side at first, the solution
- * and the multipliers at the end. */
+/* Solve with existing factors.  The right sides x (even,) and lam (r,) are replaced by the solution
+ * and the multipliers. */
 PRBM void solve_again(const Factors *factors, double *x, double *lam);
 /* Functions that are compiled for each small size of a block or of the system. */
 SHARED bool factor_any(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse);

@@ -36,7 +36,7 @@ PRBM void reversed(Segments *pieces) {
     reverse(n, pieces->axial);
 }
 
-/* Mirrored halves share the middle link; at a free end the last link is part of the body. */
+/* Two mirrored halves share the middle link.  At a free end the last link is part of the body. */
 PRBM int links_of(const FlexureType *model, int start_end, int end_end) {
     if (model->links > 0) {
         return model->links;
@@ -98,7 +98,7 @@ static bool cut_cantilevers(const FlexureType *model, const double *gamma, const
             result->lengths[n + 1 - i] = result->lengths[i];
             result->rates[n - i] = result->rates[i];
         }
-    } else if (n == pivots) { /* A pin at the tip. */
+    } else if (n == pivots) { /* The tip is a pin. */
         result->lengths[n + 1] = 0.0;
         result->rates[n] = 0.0;
     }

@@ -1,4 +1,4 @@
-/* The order of the assembly, the coordinates, and where inputs and values are found. */
+/* The order of the assembly, the coordinates, and the positions of inputs and values. */
 #include <string.h>
 
 #include "core/flexure.h"

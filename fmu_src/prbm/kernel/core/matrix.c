@@ -71,7 +71,7 @@ PRBM void exchange(int n, double *a, double *b) {
     }
 }
 
-/* Factorise; the diagonal of U is stored inverted, for lu_solve. */
+/* The diagonal of U is stored inverted, for lu_solve. */
 PRBM bool lu_factor(int n, double *a, int *pivot) {
     for (int k = 0; k < n; k++) {
         double *row = a + k * n;
@@ -110,7 +110,7 @@ PRBM void lu_solve(int n, const double *a, const int *pivot, double *b) {
 
 /* --- Cholesky --------------------------------------------------------------------------------- */
 
-/* L_ij = (a_ij - sum_k L_ik L_jk)/L_jj, L_ii^2 = a_ii - sum_k L_ik^2; 1/L_ii is stored for L_ii. */
+/* For k < j: L_ij = (a_ij - sum_k L_ik L_jk)/L_jj, L_jj^2 = a_jj - sum_k L_jk^2. */
 PRBM bool cholesky(int n, double *a) {
     for (int i = 0; i < n; i++) {
         double *row = a + i * n;
@@ -141,8 +141,8 @@ PRBM void backward(int n, const double *a, double *b) {
 
 /* --- singular values -------------------------------------------------------------------------- */
 
-/* Compute the rotation p := c p - s q, q := s p + c q that makes [[p.p, p.q], [p.q, q.q]] diagonal;
- * of the two solutions, the one with the smaller angle. */
+/* Compute the rotation p := c p - s q, q := s p + c q that makes [[pp, pq], [pq, qq]] diagonal.  Of
+ * its two solutions the smaller angle is chosen. */
 static void small_rotation(double pp, double pq, double qq, double *c, double *s) {
     double slope = (qq - pp) / (2.0 * pq);
     double t = (slope >= 0.0 ? 1.0 : -1.0) / (fabs(slope) + sqrt(1.0 + slope * slope));
@@ -158,10 +158,10 @@ static void rotate(int n, double c, double s, double *p, double *q, int stride) 
     }
 }
 
-/* One-sided Jacobi: rotate the rows of g (k, n) until they are orthogonal, and the rows of v (k,
- * k), unless NULL, with them.  The norms of the rows are then the singular values.  Rows shorter
- * than the round-off of the longest count as orthogonal.  False without convergence, or if a
- * number is not finite. */
+/* One-sided Jacobi method: rotate the rows of g (k, n) until they are orthogonal; their norms are
+ * then the singular values.  The rows of v (k, k), unless NULL, are rotated with them.  Rows
+ * shorter than the round-off of the longest count as orthogonal.  Return false without convergence,
+ * or if a number is not finite. */
 static bool orthogonalise(int k, int n, double *g, double *v) {
     double noise = DBL_EPSILON * largest(k * n, g);
     bool turned = finite_number(noise);
@@ -207,8 +207,8 @@ static double norm(int n, const double *x) {
     return sqrt(dot(n, x, x));
 }
 
-/* Compute the singular values s (k,), k = min(m, n), of a.  If m > n, a^T replaces a.  With a^T =
- * sum s_i u_i v_i^T, row i of g is s_i u_i and row i of v (k, k) is v_i; v may be NULL. */
+/* Compute the singular values s (k,), k = min(m, n), of a = sum s_i v_i u_i^T.  If m > n, a^T
+ * replaces a.  Row i of g is s_i u_i, and row i of v (k, k), unless NULL, is v_i. */
 static bool singular_values(int m, int n, const double *a, double *s, double *g, double *v) {
     int k = m < n ? m : n, length = m < n ? n : m;
     wide(m, n, a, g);
@@ -222,8 +222,8 @@ static bool singular_values(int m, int n, const double *a, double *s, double *g,
     return found;
 }
 
-/* x = sum (left_i . b) right_i/s_i^2 over the s_i above the limit, where either left_i or right_i
- * has the norm s_i and the other the norm 1. */
+/* x is the sum of (left_i . b) right_i/s_i^2 over the singular values s_i above the limit.  One of
+ * left_i and right_i has the norm s_i, the other the norm 1. */
 PRBM bool least_squares(int m, int n, const double *a, const double *b, double rcond, double *x,
                         Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -243,8 +243,8 @@ PRBM bool least_squares(int m, int n, const double *a, const double *b, double r
         }
     }
     scratch->used = used;
-    return found || fail(problem, "a sum of least squares was not found: a mass, a length or an "
-                                  "input is too large or too small; check the parameters");
+    return found || fail(problem, "a least-squares solution did not converge: a mass, a length or "
+                                  "an input is too large or too small; check the parameters");
 }
 
 /* --- eigenvalues ------------------------------------------------------------------------------ */
@@ -261,7 +261,7 @@ static void jacobi_rotation(int n, double *a, double *z, int p, int q) {
     }
 }
 
-/* False without convergence, or if a number is not finite. */
+/* Rotate until a is diagonal.  Return false without convergence, or if a number is not finite. */
 static bool jacobi_sweeps(int n, double *a, double *z) {
     double negligible = 0.5 * DBL_EPSILON * DBL_EPSILON * largest(n * n, a);
     bool turned = finite_number(negligible);
@@ -303,8 +303,8 @@ PRBM bool symmetric_eigen(int n, double *a, double *w, double *z, Problem *probl
         identity(n, z);
     }
     if (!jacobi_sweeps(n, a, z)) {
-        return fail(problem, "the eigenvalues of a matrix were not found: a mass, a stiffness or a "
-                             "length is too large or too small; check the parameters");
+        return fail(problem, "the eigenvalues of a matrix did not converge: a mass, a stiffness or "
+                             "a length is too large or too small; check the parameters");
     }
     for (int i = 0; i < n; i++) {
         w[i] = a[i * n + i];
@@ -315,8 +315,8 @@ PRBM bool symmetric_eigen(int n, double *a, double *w, double *z, Problem *probl
 
 /* --- null space ------------------------------------------------------------------------------- */
 
-/* Replace x by the u of the Householder reflection 1 - u u^T that maps x to a multiple of the first
- * unit vector. */
+/* Replace x by the vector u whose Householder reflection 1 - u u^T maps x to a multiple of the
+ * first unit vector. */
 static void householder(int n, double *x) {
     double length = norm(n, x);
     if (!(length > 0.0)) {

@@ -37,7 +37,7 @@ typedef struct {
     const Expression *gamma, *K_theta; /* (pivots,) */
 } FlexureType;
 
-/* Two points of different bodies; bodies are numbered 1, 2, ..., and GROUND. */
+/* Two points of different bodies.  Bodies are numbered from 1; the ground has the number GROUND. */
 typedef struct {
     int start, end;
     Point start_point, end_point;
@@ -57,7 +57,7 @@ typedef struct {
 
 typedef struct {
     const char *name;
-    int body, on; /* The body that it stops, and the body that carries its wall, or GROUND. */
+    int body, on; /* The stopped body, and the body or GROUND that carries the wall. */
     Point point;
     double direction; /* deg */
     Expression position, offset, restitution, friction, rest_speed;
@@ -98,7 +98,7 @@ typedef struct {
 
 typedef struct {
     uint32_t reference;
-    int type; /* REAL, INTEGER, BOOLEAN, CLOCK; a clock has the slot of its impact_count */
+    int type; /* REAL, INTEGER, BOOLEAN or CLOCK; a clock has the slot of impact_count */
     int slot; /* Index in the vector of all values, see Slots. */
     const char *name;
 } Variable;
@@ -119,15 +119,15 @@ typedef struct {
     const char *name;
     const Connection *between;
     const Flexure *flexure; /* NULL for a joint. */
-    bool backwards;         /* From its end to its start. */
-    bool closes;            /* It closes a loop: its far body is already placed, too. */
-    int first;              /* The first coordinate that it adds. */
+    bool backwards;         /* The part is added from its end to its start. */
+    bool closes;            /* The part closes a loop: both its bodies are already placed. */
+    int first;              /* The first coordinate that the part adds. */
 } Step;
 
 /* A coordinate: the angle of a link, its stretch, or the angle of a body. */
 typedef struct {
     int link, body; /* The link, counted from 0, or -1; the body, counted from 1, or 0. */
-    int arm;        /* The coordinate of the arm that it turns or stretches. */
+    int arm;        /* The coordinate of the arm that this coordinate turns or stretches. */
 } Coordinate;
 
 typedef struct {
@@ -153,7 +153,7 @@ typedef struct {
     const Step *steps;             /* Flexures and joints in the order of the assembly. */
     const Coordinate *coordinates; /* (coordinate_count,) */
     const int *links, *stretches;  /* Coordinates that are angles and stretches of links. */
-    const int *independent; /* Coordinates that are states, with their rates, in model exchange. */
+    const int *independent; /* Coordinates that are states of model exchange. */
     Release release;
     int gravity[2], tolerance, damping_zeta, damping_beta; /* Indices of parameters. */
     /* Sizes of the assembled system. */
@@ -162,7 +162,7 @@ typedef struct {
     Slots slots;
 } Mechanism;
 
-PRBM double evaluate(Expression quantity, const double *values); /* Twin: mechanism.Affine. */
+PRBM double evaluate(Expression quantity, const double *values); /* Twin: Affine in mechanism/. */
 PRBM bool check_parameter(const Parameter *parameter, double x, Problem *problem);
 /* Check all values and the fields that are expressions (Mechanism.values of the twin). */
 PRBM bool check_values(const Mechanism *mechanism, const double *values, Problem *problem);

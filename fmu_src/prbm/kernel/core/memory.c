@@ -14,8 +14,8 @@ PRBM bool fail(Problem *problem, const char *format, ...) {
     return false;
 }
 
-/* Return the next part of a block, aligned for every type; NULL while counting.  A block whose size
- * does not fit into a size_t counts as SIZE_MAX bytes, which cannot be allocated. */
+/* Return the next part of a block, aligned for every type, or NULL if only bytes are counted.  If
+ * the size of the block exceeds size_t, it becomes SIZE_MAX, which cannot be allocated. */
 PRBM void *place(Memory *memory, size_t count, size_t size) {
     size_t start = memory->used;
     size_t room = SIZE_MAX - start;
@@ -27,7 +27,7 @@ PRBM void *place(Memory *memory, size_t count, size_t size) {
     return memory->base == NULL ? NULL : memory->base + start;
 }
 
-/* Requests beyond the size are counted, too, so that most is the size that suffices. */
+/* Requests beyond the size are counted, too: most becomes a size that is sufficient. */
 PRBM double *take(Scratch *scratch, size_t count) {
     double *taken = scratch->base + scratch->used;
     bool enough = scratch->used <= scratch->size && count <= scratch->size - scratch->used;

@@ -17,7 +17,7 @@ PRBM bool fail(Problem *problem, const char *format, ...) __attribute__((format(
 PRBM bool fail(Problem *problem, const char *format, ...);
 #endif
 
-/* A block of memory: laid out with base NULL to count its bytes, then again to place its parts. */
+/* A block of memory.  A first layout with base NULL counts its bytes, a second places its parts. */
 typedef struct {
     char *base;
     size_t used;
@@ -25,9 +25,9 @@ typedef struct {
 
 PRBM void *place(Memory *memory, size_t count, size_t size);
 
-/* Working memory for one call, taken in order and released by restoring the value of used.  If a
- * request exceeds the rest, it gets the spare block, which is as large as any single request, and
- * exceeded is set: the results are then invalid, but no other memory is overwritten. */
+/* Working memory for one call, taken in order and released by restoring the value of used.  A
+ * request that exceeds the rest gets the spare block, which is as large as any single request, and
+ * exceeded is set.  The results are then invalid, but no other memory is overwritten. */
 typedef struct {
     double *base, *spare;
     size_t used, size, most;

@@ -52,8 +52,8 @@ static void divide_twice(int n, const double *L, double *A, double *column) {
     }
 }
 
-/* Solve K y = w M y with y^T M y = 1: w in ascending order, y the columns of Y.  K and M are
- * overwritten. */
+/* Solve K y = w M y with y^T M y = 1.  The eigenvalues w are in ascending order, the y are the
+ * columns of Y.  K and M are overwritten. */
 static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y, Scratch *scratch,
                               Problem *problem) {
     size_t used = scratch->used;
@@ -80,7 +80,7 @@ static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y,
     return true;
 }
 
-/* Set the spread row w of gravity. */
+/* Set the row w (n,) of the loads of gravity, with columns for stretches. */
 static void gravity_row(const System *system, Complex *w) {
     field_row(system->n, system->S, system->gravity, w);
     spread(system, 1, w, w);
@@ -96,9 +96,9 @@ static void tangent_space(const System *system, const Complex *e, double *Z, Scr
     scratch->used = used;
 }
 
-/* Solve K_t phi = omega^2 M phi on the tangent space of the loops: frequency (k,), phi (n, k), with
- * M (n, n).  The stiffness K_t is that of the rows B with the multipliers lam (r,); B may have a
- * row more than the loops. */
+/* Solve K_t phi = omega^2 M phi on the tangent space of the loops for the frequencies [Hz] (k,) and
+ * the modes phi (n, k).  K_t includes the loads of the multipliers lam (r,) along the rows B, which
+ * may have one row more than the loops.  M (n, n) becomes the mass matrix. */
 static bool modes_about(const System *system, const double *q, int r, const Complex *B,
                         const double *lam, double *frequency, double *phi, double *M,
                         Scratch *scratch, Problem *problem) {
@@ -109,7 +109,7 @@ static bool modes_about(const System *system, const double *q, int r, const Comp
     double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
     double *reduced = take_matrix(scratch, k, k);
     directions(system, q, e);
-    inertia(n, system->H, system->J, e, M, K_t); /* K_t gets the velocity matrix, unused. */
+    inertia(n, system->H, system->J, e, M, K_t); /* K_t is only memory here. */
     gravity_row(system, w);
     tangent_stiffness(system, r, w, B, lam, e, K_t);
     tangent_space(system, e, Z, scratch);
@@ -130,7 +130,7 @@ static bool modes_about(const System *system, const double *q, int r, const Comp
     return found;
 }
 
-/* The holding force of the shape acts as a dead load. */
+/* The holding force of the shape is a dead load: its direction and size are constant. */
 PRBM bool modes(const System *system, const Equilibrium *shape, double *frequency, double *phi,
                 Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -163,8 +163,9 @@ PRBM bool fundamental_frequency(const System *system, double *frequency, Scratch
     return found;
 }
 
-/* Compute the multipliers of a shape that a force on the released body holds at rest: -lam of
- * [M, rows^T; rows, 0] (a, -lam) = (Q, 0), which makes the remaining accelerations least. */
+/* Compute the multipliers lam of a shape held at rest by a force on the released body.  They solve
+ * [M, rows^T; rows, 0] (a, -lam) = (Q, 0) for the loads Q, so that the accelerations a that remain
+ * are as small as possible. */
 static bool resting_multipliers(const System *system, const double *q, const Complex *B,
                                 double *lam, double *M, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;

@@ -1,5 +1,5 @@
-/* Elementary functions of sums, products and quotients, whose rounding IEEE 754 defines.  Results
- * are the same bits on every platform, unlike those of the C libraries.
+/* Elementary functions, computed by sums, products and quotients only.  IEEE 754 defines their
+ * rounding, so that the results have the same bits on every platform.  Those of C libraries differ.
  *
  * The polynomials of sine and cosine are minimax polynomials on [-pi/4, pi/4], from a Remez
  * exchange in multiple precision; the others are Taylor polynomials.  Source of the argument
@@ -17,14 +17,15 @@
 
 #define LARGEST_ANGLE UINT64_C(0x40f86a0000000000) /* The bits of 1e5 rad. */
 #define QUARTERS_PER_RADIAN 0.6366197723675814 /* 2/pi */
-/* pi/2 in three parts; the first two have 36 bits, so that their multiples up to 2^17 are exact. */
+/* pi/2 is the sum of three parts.  The first two have 36 bits, so that their multiples by integers
+ * up to 2^17 are exact. */
 #define QUARTER_HIGH 1.5707963267923333
 #define QUARTER_MIDDLE 2.5633441515839558e-12
 #define QUARTER_LOW 1.0562999066987428e-23
-/* Adding it rounds to an integer, which is then in the last bits of the sum. */
+/* A sum with ROUNDER is rounded to an integer, which is then in the last bits of the sum. */
 #define ROUNDER 6755399441055744.0 /* 1.5 2^52 */
 
-/* Return the angle, or NaN (all bits set) if it is not below the limit. */
+/* Return the angle, or NaN (all bits set) if its magnitude is not below LARGEST_ANGLE. */
 static Lanes valid_angle(Lanes q) {
     LaneBits magnitude = bits_of(q) & (UINT64_MAX >> 1);
     LaneBits invalid = ((magnitude - LARGEST_ANGLE) >> 63) - UINT64_C(1);
@@ -52,8 +53,7 @@ static Lanes sine(Lanes y, Lanes rest) {
     return y + (y * z * S + rest * (1.0 - 0.5 * z));
 }
 
-/* cos(y + rest) = 1 - y^2/2 + y^4 C(y^2) - y rest, with a correction for the rounding of 1 -
- * y^2/2. */
+/* cos(y + rest) = 1 - y^2/2 + y^4 C(y^2) - y rest; the rounding error of 1 - y^2/2 is corrected. */
 static Lanes cosine(Lanes y, Lanes rest) {
     Lanes z = y * y, zz = z * z;
     Lanes half = 0.5 * z;
@@ -65,7 +65,7 @@ static Lanes cosine(Lanes y, Lanes rest) {
     return most + (((1.0 - most) - half) + (zz * C - y * rest));
 }
 
-/* Select sine or cosine, and the sign, by the quarter turn, without a branch. */
+/* Select sine or cosine and the sign by the number of quarter turns, without a branch. */
 static void turn_quarters(LaneBits quarters, LaneBits s, LaneBits c, Lanes *re, Lanes *im) {
     LaneBits swap = UINT64_C(0) - (quarters & UINT64_C(1)); /* All bits 1 or all bits 0. */
     LaneBits exchange = (s ^ c) & swap;
@@ -105,7 +105,7 @@ PRBM void unit_vectors(int n, const double *q, Complex *e) {
     }
 }
 
-#define SMALL_TURN_MAX 0.0625 /* rad; below, the error of four Taylor terms is round-off. */
+#define SMALL_TURN_MAX 0.0625 /* rad; up to it, four Taylor terms suffice. */
 
 /* sin d = d - d^3/6 + ..., cos d - 1 = -d^2/2 + ... */
 SIZED void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
@@ -221,8 +221,8 @@ static double atan_series(double u) {
     return u * z * series(9, c, z);
 }
 
-/* The angle of (x, y), 0 <= y <= x, x > 0: atan y/x = atan t + atan (y - t x)/(x + t y), with t the
- * nearest quarter, whose angles are tabulated in two parts. */
+/* Return the angle atan(y/x) of (x, y) for 0 <= y <= x, x > 0.  It is atan t + atan((y - t x)/(x +
+ * t y)), with the multiple t of 1/4 that is nearest to y/x; the values of atan t are tabulated. */
 static double first_octant(double x, double y) {
     static const double high[] = {0.0, 0.24497866312686414, 0.4636476090008061,
                                   0.6435011087932844, 0.7853981633974483};

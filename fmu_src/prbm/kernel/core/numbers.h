@@ -1,4 +1,4 @@
-/* Elementary functions, the same bits on every platform, and complex numbers. */
+/* Elementary functions with the same bits on every platform, and complex numbers. */
 #ifndef PRBM_NUMBERS_H
 #define PRBM_NUMBERS_H
 
@@ -20,7 +20,7 @@ PRBM double exponential(double x);
 PRBM double power(double x, double y);                      /* x^y for x > 0 */
 PRBM double phase(Complex z);                               /* as cmath.phase, in (-pi, pi] */
 PRBM bool finite_number(double x);
-PRBM double largest(int n, const double *x);                /* max |x_i|, 0 for none */
+PRBM double largest(int n, const double *x);                /* max |x_i|; 0 if n = 0 */
 PRBM double greater(double a, double b); /* b unless a > b. */
 PRBM double lesser(double a, double b);  /* b unless a < b. */
 PRBM Complex unit(double degrees);

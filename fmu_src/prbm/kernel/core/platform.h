@@ -18,25 +18,25 @@
 #endif
 #endif
 
-/* restrict: qualifier of a pointer that is the only one to its array within the function. */
+/* ALONE (restrict in C99) marks a pointer that is the only one to its array in a function. */
 #if defined(_MSC_VER)
 #define ALONE __restrict
 #else
 #define ALONE restrict
 #endif
 
-/* Functions with loops over parts of the mechanism are compiled separately for each small size. */
+/* SIZED functions are compiled once for each small size, so that their loops unroll. */
 #if defined(__GNUC__)
 #define SIZED static inline __attribute__((always_inline))
 #else
 #define SIZED static
 #endif
-/* A SIZED function that functions of other files consist of.  A test that compiles each file alone
- * defines SHARED as nothing. */
+/* SHARED functions are SIZED functions that other files inline.  A test that compiles each file
+ * alone defines SHARED as nothing. */
 #ifndef SHARED
 #define SHARED SIZED
 #endif
-/* Functions that few mechanisms need are not inlined. */
+/* RARE functions, which few mechanisms need, are not inlined. */
 #if defined(__GNUC__)
 #define RARE static __attribute__((noinline))
 #else
@@ -49,14 +49,14 @@
 #define UNROLLED
 #define UNROLLED_BY_LANES
 #endif
-/* Vectors of the compiler: two numbers at a time, with the same operations on each.  The results
- * are bit for bit those of loops without vectors (-DPRBM_PLAIN). */
+/* Whether the vector types of the compiler are used, which compute with two numbers at a time.  The
+ * results are bit for bit those of loops without vectors (-DPRBM_PLAIN). */
 #if defined(__GNUC__) && !defined(PRBM_PLAIN)
 #define VECTORS 1
 #else
 #define VECTORS 0
 #endif
-/* Whether a length is a constant after inlining; functions for other lengths are compiled once. */
+/* Whether a length is a compile-time constant.  Functions for other lengths are compiled once. */
 #if defined(__GNUC__)
 #define KNOWN(length) __builtin_constant_p(length)
 #else

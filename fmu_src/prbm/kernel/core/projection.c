@@ -78,7 +78,7 @@ SIZED double active_value(int even, const Equations *q, const Kinematics *at, in
     return total(sum);
 }
 
-/* The residuals of the positions; returns the largest. */
+/* Compute the residuals of the positions, and return the largest magnitude. */
 SIZED double position_residuals(int even, const Equations *q, const Kinematics *at, double t,
                                 double *residual) {
     double worst = 0.0;
@@ -97,7 +97,7 @@ SIZED void velocity_residuals(int even, const Equations *q, double t, Correction
     }
 }
 
-/* y += the least change that removes the residuals. */
+/* Add to y the smallest change, in the metric of the mass matrix, that removes the residuals. */
 SIZED void correct(int even, const Equations *q, const Factors *factors, Correction *c,
                    double *y) {
     UNROLLED_BY_LANES
@@ -110,7 +110,7 @@ SIZED void correct(int even, const Equations *q, const Factors *factors, Correct
     }
 }
 
-/* One correction of y by the factors of its evaluation. */
+/* Correct y once by the factors of its evaluation; return false if a residual remains. */
 SIZED bool corrected_of_length(int even, const Equations *q, const Evaluation *evaluation,
                                const Reference *near, double t, double *y, Correction *c) {
     int n = q->system->n;
@@ -150,6 +150,6 @@ PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
     if (q->slipping_stops == 0 && corrected(q, evaluation, near, t, y, correction)) {
         return true;
     }
-    copy(n, kept, y); /* as if nothing had been tried */
+    copy(n, kept, y); /* Undo the correction. */
     return project(q, t, y, scratch, problem);
 }

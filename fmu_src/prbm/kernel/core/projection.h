@@ -12,13 +12,14 @@ typedef struct {
 } Correction;
 
 PRBM void correction_place(Correction *correction, const System *system, Memory *memory);
-/* Bring y onto the constraints at time t. */
+/* Project y onto the constraints at time t. */
 PRBM bool project(const Equations *equations, double t, double *y, Scratch *scratch,
                   Problem *problem);
-/* The same, with the impulses (r,) along the active rows that change the velocities, or NULL. */
+/* Project y, and compute the impulses (r,) along the active rows that change the velocities;
+ * impulses may be NULL. */
 PRBM bool project_with_impulses(const Equations *equations, double t, double *y, double *impulses,
                                 Scratch *scratch, Problem *problem);
-/* As project, with the factors of the evaluation of y, in one correction if that is enough. */
+/* Project y by one correction with the factors of its evaluation; call project if that fails. */
 PRBM bool project_near(const Equations *equations, const Evaluation *evaluation,
                        const Reference *near, double t, double *y, Correction *correction,
                        Scratch *scratch, Problem *problem);

@@ -70,7 +70,7 @@ PRBM const char *read_text(Reader *reader) {
     return text ? text : "";
 }
 
-/* Read an index of at least from and below count. */
+/* Read an index i with from <= i < count. */
 PRBM int read_index(Reader *reader, int from, int count) {
     uint32_t x = read_u32(reader);
     if (x < (uint32_t)from || x >= (uint32_t)count) {
@@ -84,7 +84,7 @@ PRBM bool read_flag(Reader *reader) {
     return read_index(reader, 0, 2) == 1;
 }
 
-/* Read the number of records of at least so many bytes each that follow. */
+/* Read the number of the records that follow; each has at least the given number of bytes. */
 PRBM int read_count(Reader *reader, size_t bytes) {
     uint32_t count = read_u32(reader);
     if (count > reader->left / bytes) {

@@ -12,7 +12,7 @@ static const double ERROR_WEIGHT[STAGES] = ERROR_WEIGHTS;
 static const double DENSE_WEIGHT[STAGES][DENSE] = DENSE_WEIGHTS;
 static const double LARGEST_WEIGHT[STAGES] = LARGEST_WEIGHTS;
 
-/* result = y + h sum(a_i k_i) for n even, as it is with two rates for each angle and two
+/* Compute y + h sum(a_i k_i).  The length n is even: y contains angles, as many rates, and two
  * energies. */
 SIZED void combine_of(int count, int n, int stride, double h, const double *a, const double *k,
                       const double *y, double *result) {
@@ -91,7 +91,8 @@ PRBM void error_of(int n, const double *k, double h, double *error) {
     combine(n, STAGES, h, ERROR_WEIGHT, k, error, error);
 }
 
-/* How far the first n components of the dense output can be from the start of the step. */
+/* Bound the distance of the first n components of the dense output from their values at the start
+ * of the step. */
 PRBM void furthest(int n, int ny, const double *k, double h, double *distance) {
     for (int j = 0; j < n; j += LANES) {
         Lanes sum = NO_LANES;
@@ -105,7 +106,7 @@ PRBM void furthest(int n, int ny, const double *k, double h, double *distance) {
     }
 }
 
-/* The weights of the stages at a fraction of a step. */
+/* Compute the weights b of the stages in the dense output at a fraction theta of a step. */
 PRBM void weights(double theta, double *b) {
     for (int i = 0; i < STAGES; i++) {
         const double *d = DENSE_WEIGHT[i];

@@ -9,8 +9,8 @@ typedef struct {
     double *least, *largest; /* (held_count,) */
 } ForceRange;
 
-/* The stages k (STAGES, n), of which the first is given, the new state y1 and its evaluation; the
- * reference becomes that of y. */
+/* Compute the stages k (STAGES, n) after the first, which is given, the new state y1 and its
+ * evaluation.  The reference becomes that of y. */
 PRBM bool stages(const Equations *equations, double t, int n, const double *y, double h,
                  double *k, double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
                  Problem *problem);

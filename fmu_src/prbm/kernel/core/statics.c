@@ -1,6 +1,7 @@
 /* Static equilibrium under gravity and a holding force: the twin of mechanics/statics.py.
  *
- * At rest the torques balance: -K (q - q0) + Re(w e) + J^T lam + r^T F = 0.
+ * At rest the torques of springs, gravity, loops and the holding force F balance:
+ * -K (q - q0) + Re(w e) + J^T lam + r^T F = 0, with the row r of the released body.
  */
 #include <math.h>
 
@@ -23,8 +24,8 @@ PRBM void stack_release(const System *system, Complex *B, double *c) {
     c[r] = system->release_c;
 }
 
-/* The stiffness is K + diag(Re(p)) with the pull p = (lam^T B - i w) e of each arm.  A stretch has
- * -Re(p) of its arm on the diagonal and Im(p) in the column and row of the arm's angle. */
+/* K_t is K + diag(Re(p)), with the pull p = (lam^T B - i w) e of each arm.  The diagonal element of
+ * a stretch is -Re(p) of its arm; the elements of a stretch and the arm's angle are Im(p). */
 PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t) {
     int n = system->n;
@@ -44,7 +45,7 @@ PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const
     }
 }
 
-/* The equations at a fraction of the load: constraints s = Re(B e) + c = 0, dead loads of row w. */
+/* The equations at a fraction of the load: constraints Re(B e) + c = 0 and dead loads Re(w e). */
 typedef struct {
     const System *system;
     Rows rows;
@@ -74,7 +75,7 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
     scratch->used = used;
 }
 
-/* Make one Newton step, no larger than STATICS_TURN_MAX; false if the system is singular. */
+/* Make one Newton step, limited to STATICS_TURN_MAX [rad]; false if the system is singular. */
 static bool newton_step(const Balance *balance, const Complex *e, double *torque, double *open_by,
                         const double *rows, double *state, double *turned, Scratch *scratch) {
     size_t used = scratch->used;
@@ -125,7 +126,7 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     return done || (balanced && !going);
 }
 
-/* Solve the balance at a fraction of gravity and, if held, of the displacement. */
+/* Find the equilibrium at a fraction of gravity and, if held, of the displacement. */
 static bool loaded(const System *system, bool held, double displacement, double fraction,
                    double *state, Scratch *scratch) {
     size_t used = scratch->used;
@@ -173,8 +174,8 @@ static bool unreachable(const System *system, bool held, double displacement, do
                 heavy ? ", or reduce gravity across the motion" : "");
 }
 
-/* Increase the load and the displacement together from the straight, unloaded shape, to follow the
- * branch that slow loading reaches; state is (q, lam, force). */
+/* Increase the load and the displacement together from the straight, unloaded shape, so that the
+ * result is the equilibrium that slow loading reaches.  state is (q, lam, force). */
 static bool load_slowly(const System *system, bool held, double displacement, double *state,
                         Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -183,7 +184,7 @@ static bool load_slowly(const System *system, bool held, double displacement, do
     while (done < 1.0 && fraction >= STATICS_LOAD_STEP_MIN) {
         double target = lesser(1.0, done + fraction);
         copy(size, state, trial);
-        /* A jump of a link leads to another branch, which slow loading does not reach. */
+        /* If a link jumps, slow loading does not reach this equilibrium: reduce the step. */
         if (loaded(system, held, displacement, target, trial, scratch) &&
             jump(system, state, trial) <= STATICS_TURN_MAX) {
             copy(size, trial, state);
@@ -212,7 +213,7 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     return found;
 }
 
-/* Return whether the loops allow the released body to move; its row is the last of rows (r, n). */
+/* Check that the loops allow the released body to move; its row is the last of rows (r, n). */
 static bool releasable(const System *system, const double *M, int r, const double *rows,
                        double speed, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;

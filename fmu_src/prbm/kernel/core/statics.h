@@ -11,7 +11,7 @@ typedef struct {
 
 /* Set B (r + 1, n) and c (r + 1,): the loops, then the row of the released body. */
 PRBM void stack_release(const System *system, Complex *B, double *c);
-/* Compute the tangent stiffness; w is spread, B is not. */
+/* Compute the tangent stiffness K_t (n, n).  The row w has columns for stretches, B does not. */
 PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t);
 /* Compute the equilibrium; held: whether the released body is held at the displacement. */

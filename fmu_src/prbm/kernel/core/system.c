@@ -1,14 +1,14 @@
 /* The constant arrays of a mechanism, and the kinematics of its arms: the twin of
  * mechanics/system.py.
  *
- * Each link and body has an arm E = exp(s + i theta), E' = i w E, w = theta' - i s'.  A point is at
- * z = c + A E.  A coordinate is an angle theta or a stretch s.  The elements of e are E for angles
- * and -i E for stretches, so that dE/dq = i e for both.
+ * Each link and body has an arm E = exp(s + i theta).  Its derivative is E' = i w E, with the
+ * complex rate w = theta' - i s'.  A point is at z = c + A E.  A coordinate is an angle theta or a
+ * stretch s. The elements of e are E for angles and -i E for stretches, so that dE/dq = i e for
+ * both.
  */
 #include "core/system.h"
 #include "core/vectors.h"
 
-/* Frames with rows of n columns. */
 static BodyFrame *place_frames(Memory *memory, size_t count, size_t n) {
     BodyFrame *frames = place(memory, count, sizeof *frames);
     Complex *rows = place(memory, count * n, sizeof *rows);

@@ -4,7 +4,7 @@
 
 #include "core/mechanism.h"
 
-enum { NOWHERE = -2, FIXED = -1 }; /* For coordinates: of a body not placed yet, of the ground. */
+enum { NOWHERE = -2, FIXED = -1 }; /* In place of a coordinate: body without a place yet, ground */
 
 /* A point of a body, z = c + A E, with the coordinate of the body and the drawn position. */
 typedef struct {
@@ -13,8 +13,8 @@ typedef struct {
     Complex *A; /* (n,) */
 } BodyFrame;
 
-/* A point of the mechanism, z = c + A E; for the origin of a body also the coordinate of the body
- * and the drawn position. */
+/* A point of the mechanism, z = c + A E.  The origin of a body also has the coordinate j of the
+ * body and the drawn position. */
 typedef struct {
     Complex c, drawn;
     Complex *A; /* (n,) */
@@ -28,8 +28,8 @@ typedef struct {
     int a, b;
 } Spring;
 
-/* A dense block on the diagonal of the mass matrix.  The links of a flexure that closes a loop, for
- * example, have no mass in common with other links. */
+/* A dense block on the diagonal of the mass matrix, for example that of the links of a flexure that
+ * closes a loop. */
 typedef struct {
     int start, size;
 } Block;
@@ -83,7 +83,7 @@ PRBM void turning(const System *system, const double *v, Complex *w);
 /* Compute the displacement of a point from the straight shape, and its velocity. */
 PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
                  Complex *displacement, Complex *velocity);
-/* Copy rows (r, n), with the column of each arm repeated for its stretch; rows may be B. */
+/* Copy B (r, n) to rows, and repeat the column of each arm for its stretch.  rows may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
 PRBM void stretch(const System *system, const double *q, Complex *e);
 

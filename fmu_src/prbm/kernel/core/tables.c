@@ -1,4 +1,4 @@
-/* The tables of a mechanism, read once, from untrusted bytes. */
+/* Reading of the tables of a mechanism from untrusted bytes. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -6,7 +6,7 @@
 #include "core/tables.h"
 
 enum {
-    ROOM = 8,                /* Bytes of memory per byte of the tables, more than needed. */
+    ROOM = 8,                /* Bytes of memory per byte of the tables, an upper bound. */
     ROOM_OF_COORDINATE = 32, /* Bytes of memory per coordinate. */
 };
 
@@ -284,7 +284,7 @@ static void read_header(Reader *reader, const unsigned char *bytes, size_t size)
     if (read_u32(reader) != TABLES_VERSION) {
         reader->wrong = "tables of another version";
     } else if (read_u32(reader) != size) {
-        reader->wrong = "a size that differs from the one in its head";
+        reader->wrong = "a size that differs from the size in its header";
     } else if (read_u32(reader) != checksum(bytes + TABLES_HEAD, size - TABLES_HEAD)) {
         reader->wrong = "a wrong checksum";
     }
@@ -328,7 +328,7 @@ static void read_mechanism(Reader *reader, Mechanism *m) {
     lay_out_coordinates(reader, m);
     read_independents(reader, m);
     if (reader->wrong) {
-        return; /* The counts may be larger than the numbers of parts. */
+        return; /* Counts of invalid tables may exceed the numbers of parts. */
     }
     lay_out_inputs(m);
     lay_out_slots(m);

@@ -6,7 +6,8 @@
 
 #include "core/numbers.h"
 
-/* Two numbers at a time if the compiler has vectors, else one, with the same operations on each. */
+/* Lanes: two numbers if the compiler has vectors, else one.  An operation applies to each
+ * number. */
 #if VECTORS
 typedef double Lanes __attribute__((vector_size(16)));
 typedef uint64_t LaneBits __attribute__((vector_size(16)));
@@ -51,8 +52,8 @@ static inline Lanes magnitudes(Lanes x) {
     return from_bits(bits_of(x) & (UINT64_MAX >> 1));
 }
 
-/* Sums are computed as separate sums of the even and the odd terms, which are added at the end:
- * Lanes sum[SUMS], to which term i contributes in sum[SUM_OF(i)]. */
+/* The even and the odd terms of a sum are summed separately and added at the end.  For Lanes
+ * sum[SUMS], term i is added to sum[SUM_OF(i)]. */
 #define SUM_OF(i) ((i) / LANES % SUMS)
 
 static inline double total(const Lanes *sum) {

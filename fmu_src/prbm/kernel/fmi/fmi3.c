@@ -33,7 +33,7 @@ PRBM Instance *called3(fmi3Instance handle, int rule, size_t count, const void *
     return instance && given(instance, &FMI3[rule], count, pointer) ? instance : NULL;
 }
 
-/* The same for functions of Event Mode, which need eventModeUsed = true in co-simulation. */
+/* Like called3, for functions of Event Mode.  In co-simulation they need eventModeUsed = true. */
 PRBM Instance *called_for_event3(fmi3Instance handle, int rule) {
     const Instance *instance = handle;
     if (instance && instance->kind == CO_SIMULATION && !instance->event_mode) {

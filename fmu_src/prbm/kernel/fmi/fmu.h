@@ -56,7 +56,7 @@ typedef struct {
 /* The names that a version of the standard gives to functions, types and modes. */
 typedef struct {
     int version;
-    const char *prefix; /* Of its functions. */
+    const char *prefix; /* The first part of the names of functions. */
     const char *types[CLOCK + 1];
     const char *modes[MODES];
     ModeTransition transitions[KINDS][MODES];
@@ -99,8 +99,8 @@ typedef struct {
     const char *token, *resources;
     bool event_mode, early_return; /* Co-simulation of FMI 3.0. */
     Update *update;                /* NULL if there are no intermediate updates. */
-    Callback *intermediate;        /* The importer's callback for them. */
-    const uint32_t *required;      /* References of variables that they may get. */
+    Callback *intermediate;        /* The importer's callback for intermediate updates. */
+    const uint32_t *required;      /* References of variables that this callback may get. */
     size_t required_count;
 } Request;
 
@@ -116,11 +116,11 @@ struct Instance {
     bool clocks; /* Whether the FMU has clocks. */
     Mechanism *mechanism;
     Simulation *simulation;
-    int states, indicators; /* Their numbers in model exchange. */
+    int states, indicators; /* Numbers of states and event indicators in model exchange. */
 
     Mode mode;
     bool experiment;         /* Whether fmi2SetupExperiment was called. */
-    bool experiment_refused; /* Whether its last call was rejected. */
+    bool experiment_refused; /* Whether the last call of fmi2SetupExperiment was rejected. */
     bool stop_defined, tolerance_defined;
     double start_time, stop_time, tolerance;
     bool event_due;      /* An event is to be handled in Event Mode before the next step. */

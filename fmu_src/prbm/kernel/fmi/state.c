@@ -111,7 +111,7 @@ static void put_state(const Instance *instance, unsigned char *bytes, size_t siz
     }
 }
 
-/* Check by their head whether bytes are a state of this FMU and of an instance of the same kind. */
+/* Check by the header whether saved bytes are from this FMU and an instance of the same kind. */
 static bool check_head(const Instance *instance, const unsigned char *bytes, size_t size,
                       Problem *problem) {
     const char *token = instance->mechanism->token;
@@ -181,7 +181,7 @@ static bool read_fields(const Instance *instance, const unsigned char **at, Inst
                                                                          "damaged");
 }
 
-/* Return whether the simulation has started, or not, as the mode requires. */
+/* Return whether the mode is possible for a simulation that has started, or has not started. */
 static bool is_consistent(const Simulation *simulation, Mode mode) {
     bool begun = simulation_started(simulation);
     return mode == MODE_INITIALIZATION || mode == MODE_TERMINATED ||

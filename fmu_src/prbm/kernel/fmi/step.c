@@ -29,7 +29,9 @@ static int check_step(const Instance *instance, double time, double size) {
     }
     if (!finite_number(time) || !finite_number(size)) {
         return refuse(instance, FMU_DISCARD,
-                      "cannot step from t = %g s by %g s: not finite numbers", time, size);
+                      "currentCommunicationPoint = %g s and communicationStepSize = %g s must be "
+                      "finite numbers",
+                      time, size);
     }
     if (size <= 0.0) {
         return refuse(instance, FMU_DISCARD, "communicationStepSize = %.9g s must be positive",
@@ -72,7 +74,7 @@ static bool advance_by_events(Instance *instance, double target, Outcome *outcom
             instance->event_due = true;
             return true;
         }
-        if (event && !simulation_happen(simulation, problem)) {
+        if (event && !simulation_handle_event(simulation, problem)) {
             return false;
         }
         enough = each && instance->update(instance);
@@ -130,7 +132,7 @@ static bool any_tick(const Instance *instance) {
     return false;
 }
 
-/* Log a warning if a wall penetrates a body; again when the penetration has doubled. */
+/* Log a warning if a wall penetrates a body, and again when the penetration has doubled. */
 static int warn_of_depth(Instance *instance) {
     double depth;
     const char *stop = exchange_deepest(instance->simulation, &depth);
@@ -155,7 +157,7 @@ PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed) 
     *changed = false;
     bool exchange = instance->kind == MODEL_EXCHANGE;
     if (exchange ? !exchange_event(instance->simulation, changed, &problem)
-                 : !simulation_happen(instance->simulation, &problem)) {
+                 : !simulation_handle_event(instance->simulation, &problem)) {
         return refuse(instance, FMU_ERROR, "%s", problem.text);
     }
     *again = instance->clocks && any_tick(instance);

@@ -53,8 +53,8 @@ PRBM int read_value(Instance *instance, uint32_t reference, int type, double *x)
         return FMU_ERROR;
     }
     if (!settable(mechanism, slot) && !simulation_started(instance->simulation)) {
-        return refuse(instance, FMU_ERROR, "%s is computed when the instance is initialized; it "
-                                           "has no value before",
+        return refuse(instance, FMU_ERROR, "%s has no value before the instance is initialized: "
+                                           "get it in Initialization Mode or later",
                       variable->name);
     }
     if (!simulation_get(instance->simulation, slot, x, &problem)) {
@@ -132,8 +132,8 @@ static bool check_changeable(const Instance *instance, int slot, double x, doubl
     return false;
 }
 
-/* Return the kind of a variable that can be set only in Event Mode, NULL for other variables and if
- * the present mode allows the change. */
+/* Return the kind of a variable if the present mode forbids to set it, because it can be set in
+ * Event Mode only; otherwise NULL. */
 static const char *event_mode_kind(const Instance *instance, int slot) {
     const Mechanism *m = instance->mechanism;
     int impulses = m->slots.inputs + m->input.impulses;

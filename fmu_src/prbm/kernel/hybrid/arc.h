@@ -5,11 +5,11 @@
 #include "hybrid/state.h"
 
 PRBM void arc_at(const Simulation *sim, double t, double *y);
-/* Take the step from the start of the latest step to a later time: its stages k (STAGES, ny), and
- * the state y at its end, which is not projected. */
+/* Compute a step from the start of the latest step to time t: its stages k (STAGES, ny) and the
+ * state y at its end, which is not projected. */
 PRBM bool arc_cut(Simulation *sim, double t, double *k, double *y, Problem *problem);
-/* The state y at the present time, on the constraints; near is set to a reference near it, and the
- * evaluation is working memory. */
+/* Compute the state y at the present time, projected onto the constraints, and a reference near it.
+ * The evaluation is working memory. */
 PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *evaluation,
                     Problem *problem);
 

@@ -14,9 +14,10 @@ PRBM double zero_acceleration(const Configuration *configuration) {
     return ZERO_RATE_RTOL * scales->rate * scales->rate * scales->length;
 }
 
-/* The scale of rates is the fundamental frequency or, without one, that of the stiffest spring;
- * the scale of energies is one radian against the stiffest torsion spring or, without one, a turn
- * by one radian in a period. */
+/* The scale of rates is the fundamental angular frequency; if it is zero, that of the stiffest
+ * spring with the largest inertia.  The scale of energies is the torque of the stiffest torsion
+ * spring at one radian; without torsion springs, the largest inertia times the square of the
+ * rate. */
 PRBM void set_scales(Configuration *configuration, double frequency) {
     const System *system = &configuration->system;
     Scales *scales = &configuration->scales;

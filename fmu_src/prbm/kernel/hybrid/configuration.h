@@ -5,11 +5,11 @@
 #include "hybrid/state.h"
 
 PRBM void set_scales(Configuration *configuration, double frequency);
-PRBM bool take_values(Simulation *sim, Problem *problem); /* act on the values set */
+PRBM bool take_values(Simulation *sim, Problem *problem); /* assemble */
 PRBM bool values_changed(const Simulation *sim);
-PRBM bool inputs_changed(const Simulation *sim); /* except those that move walls */
+PRBM bool inputs_changed(const Simulation *sim); /* other than those of walls */
 PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
-PRBM double zero_acceleration(const Configuration *configuration); /* likewise for accelerations */
+PRBM double zero_acceleration(const Configuration *configuration); /* lower ones are round-off */
 PRBM double stop_field(const Simulation *sim, Expression field);
 
 #endif

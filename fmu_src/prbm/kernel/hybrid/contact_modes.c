@@ -17,7 +17,7 @@ static void try_contacts(Simulation *sim, const ContactMode *modes) {
                   sim->configuration.omega);
 }
 
-/* The mode of a closed contact with a sliding velocity; CONTACT_FRICTIONLESS if it is round-off. */
+/* Return the slip mode for a sliding velocity, or CONTACT_FRICTIONLESS if that is round-off. */
 static ContactMode slip_mode(const Simulation *sim, double speed) {
     return fabs(speed) <= zero_speed(&sim->configuration) ? CONTACT_FRICTIONLESS
                                                           : slipping_mode(speed);
@@ -55,8 +55,8 @@ PRBM const Equations *equations_holding(Simulation *sim, const HoldingSet *holdi
     return &sim->trial.equations;
 }
 
-/* Whether a contact at rest satisfies its law in the trial equations, up to round-off; slack is the
- * friction that is round-off. */
+/* Whether a contact at rest satisfies its law in the trial equations.  A friction force may exceed
+ * its limit by slack [N]. */
 static bool obeys_coulomb(Simulation *sim, int contact, double slack, const Complex *e,
                           const double *v, double *row) {
     const System *system = system_of(sim);
@@ -102,9 +102,9 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
 
 /* --- stops ------------------------------------------------------------------------------------ */
 
-/* The stops at rest that hold: pressed together, while the others open.  In this choice contacts
- * with a sliding velocity slip, and contacts at rest are frictionless.  Of stops that can move only
- * together, some with independent rows hold. */
+/* Find the stops at rest that hold: these are pressed, and the others open.  In this search
+ * contacts with a sliding velocity slip, and contacts at rest are frictionless.  If stops can move
+ * only together, a subset with independent rows holds. */
 PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                              const double *v, HoldingSet *holding, Problem *problem) {
     HoldingSet every = {0, {0}, false}, none = {0, {0}, true};
@@ -138,7 +138,7 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
     }
     holding->found = found.solved;
     if (!found.solved || every.count == 1) {
-        return true; /* a single stop needs no check; several may depend on each other */
+        return true; /* Only the rows of several stops may be dependent: check these. */
     }
     equations_holding(sim, holding, q, v);
     return modes_agree(sim, q, v, &every, &rest, &found, &holding->found, problem);
@@ -152,8 +152,8 @@ static bool holding_stops(Simulation *sim, int count, const int *candidates, con
 
 /* --- friction --------------------------------------------------------------------------------- */
 
-/* The contact of an event of friction, or -1.  It slips and cannot stick, or else its sliding has
- * ended: speeds up to slow are then round-off. */
+/* A slip (slips is true) or reversal at a contact; contact is -1 without such an event.  After a
+ * reversal, sliding speeds of the contact up to slow [m/s] count as zero. */
 typedef struct {
     int contact;
     bool slips;
@@ -184,8 +184,8 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     return right;
 }
 
-/* The mode in which a contact slips faster than the round-off of the event; CONTACT_FRICTIONLESS if
- * it is at rest. */
+/* Return the slip mode of a contact.  Return CONTACT_FRICTIONLESS if its speed is zero within the
+ * round-off of the event. */
 static ContactMode sliding_mode(Simulation *sim, int contact, const FrictionEvent *event) {
     size_t mark = sim->scratch.used;
     const double *q = sim->state.front, *v = q + system_of(sim)->n;
@@ -217,8 +217,8 @@ static bool mode_of_forces(Simulation *sim, const RestForces *found, int j, int 
     return true;
 }
 
-/* Choose the modes of contacts at rest by their forces.  Of contacts that can stick only together,
- * those with friction below its limit stick, which are independent of each other; the others have
+/* Choose the modes of contacts at rest by their forces.  If contacts can stick only together, those
+ * with friction below its limit stick, because they are independent of each other; the others have
  * friction at its limit, or none. */
 static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestForces *found,
                           const FrictionEvent *event, ContactMode *modes, Problem *problem) {
@@ -347,19 +347,19 @@ static bool settle_friction(Simulation *sim, const HoldingSet *holding, const Ho
 
 /* --- all contacts ----------------------------------------------------------------------------- */
 
-/* The spacing of the numbers around x. */
+/* The distance of x from the next floating-point number. */
 static double spacing(double x) {
     int exponent;
     (void)frexp(x, &exponent);
     return ldexp(1.0, exponent - 53);
 }
 
-/* The error of the time of an event. */
+/* The error of the time of an event [s]. */
 static double time_resolution(double time) {
     return EVENT_TIME_FACTOR * EVENT_TIME_ATOL + EVENT_TIME_ULPS * spacing(time);
 }
 
-/* The sliding speed that the resolution of time leaves where sliding ends. */
+/* Compute the sliding speed [m/s] at the end of sliding that the error of the event time causes. */
 static bool residual_speed(Simulation *sim, int contact, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
@@ -390,7 +390,7 @@ static bool friction_event(Simulation *sim, const Event *event, FrictionEvent *r
     return result->slips || residual_speed(sim, event->contact, &result->slow, problem);
 }
 
-/* The closed stops, and those of the given open stops whose gaps are zero and do not open. */
+/* List the closed stops, and the open stops in touching whose gaps are zero and do not open. */
 static int resting_candidates(Simulation *sim, const int *touching, int touching_count,
                               int *candidates) {
     size_t mark = sim->scratch.used;
@@ -471,9 +471,8 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
     return contacts_unsettled(sim, count, candidates, problem);
 }
 
-/* Open the closed stops whose gaps have a rate, after a change of a wall's velocity or an impulse.
- * A wall that retreats leaves the body behind; a wall that advances strikes it, and so does a body
- * that an impulse throws against a wall that it touches.  Returns a stop that is struck, or -1. */
+/* Open the closed stops whose gaps have a rate after a change of a wall's velocity or an impulse.
+ * Return a stop that is struck, or -1: a stop whose body touches the wall and moves towards it. */
 static int release_moving(Simulation *sim) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);

@@ -4,8 +4,7 @@
 
 #include "hybrid/state.h"
 
-/* The stops that hold, and whether the search has found a choice that satisfies the laws of
- * contact. */
+/* The stops that hold.  found: whether this choice satisfies the laws of contact. */
 typedef struct {
     int count, stops[STOPS_MAX];
     bool found;

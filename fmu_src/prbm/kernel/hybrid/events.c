@@ -88,7 +88,7 @@ static bool count_event(Simulation *sim, const Event *event, Problem *problem) {
     state->window_count++;
     if (state->window_count > EVENTS_MAX) {
         return fail(problem,
-                    "more than %d events (%s the last) within %.3g s at t = %.9g s: the contact "
+                    "more than %d events (last: %s) within %.3g s at t = %.9g s: the contact "
                     "chatters; raise rest_speed or damping.beta, lower the restitution, or give "
                     "the body room between its walls",
                     EVENTS_MAX, transition(event->kind)->guard.event,

@@ -14,15 +14,15 @@ typedef bool Reset(Simulation *sim, const Event *event, Problem *problem);
 typedef struct {
     Guard guard;
     Watched *watched; /* whether the event may occur at a contact */
-    Near *near;       /* whether it may occur in the latest step */
+    Near *near;       /* whether the event may occur in the latest step */
     bool samples;     /* whether detect needs sample_arc */
     Detect *detect;
     Reset *reset;     /* the change of state at the event */
 } Transition;
 
-/* The rows are in the order of the kinds, in which events of one time are applied. */
+/* The row of a kind of event.  Events at one time are applied in the order of the kinds. */
 PRBM const Transition *transition(EventKind kind);
-/* The first event within the latest step, of kind EVENT_NONE without one. */
+/* Find the first event within the latest step; its kind is EVENT_NONE if there is no event. */
 PRBM bool first_event(Simulation *sim, Event *first, Problem *problem);
 PRBM bool apply_event(Simulation *sim, const Event *event, Problem *problem);
 

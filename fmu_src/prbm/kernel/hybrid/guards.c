@@ -1,5 +1,5 @@
-/* Guards: the scalars whose fall through zero is an event, and where in a step they fall: the twin
- * of hybrid/guards.py. */
+/* Guards, which are scalars whose fall through zero is an event, and the location of their zeros in
+ * a step: the twin of hybrid/guards.py. */
 #include <math.h>
 
 #include "hybrid/arc.h"
@@ -77,8 +77,8 @@ PRBM bool reversal_near(Simulation *sim) {
     return sim->equations.slipping_count > 0;
 }
 
-/* How far the arms may move within the step: coordinates change by no more than the dense output
- * can make of the stages, |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
+/* Bound the changes |dE| of the arms within the step.  The dense output bounds the changes dtheta
+ * of angles and ds of stretches; then |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
 static void bound_arms(const Simulation *sim, double *reach) {
     const System *system = system_of(sim);
     furthest(system->n, state_size(sim), sim->state.arc.k, sim->state.arc.h, reach);
@@ -89,8 +89,8 @@ static void bound_arms(const Simulation *sim, double *reach) {
     }
 }
 
-/* The change of a gap in the step at most: as far as the wall and the arms move, and by the turn of
- * a body that carries the wall. */
+/* Bound the change of a gap within the step [m]: by the motion of the wall and of the arms, and by
+ * the rotation of the body that carries the wall. */
 static double gap_reach(const Simulation *sim, int stop, const Complex *e, const double *arms) {
     const System *system = system_of(sim);
     const Complex *row = system->gaps + stop * system->n;
@@ -148,7 +148,7 @@ static ArcGuard arc_guard(Search *search) {
     return result;
 }
 
-/* Fail with the name of the contact at which an event is sought; the value is no event. */
+/* Report that a search has failed, and return a positive value, which is not an event. */
 static double no_guard(Search *search, const char *cause) {
     const Simulation *sim = search->sim;
     const Arc *arc = &sim->state.arc;
@@ -190,7 +190,7 @@ static const char NOT_CONVERGED[] =
 
 /* The next point of Brent's search, by inverse interpolation or bisection. */
 typedef struct {
-    double a, b, other; /* previous point, best point, a point where the sign is another */
+    double a, b, other; /* previous point, best point, point of the opposite sign */
     double fa, fb, f_other;
     double step, last;
 } Bracket;
@@ -256,8 +256,9 @@ static double locate(const ArcGuard *guard, double a, double b) {
     return x.b;
 }
 
-/* Move the time of an impact to the root of the projected state.  Never before the apex: the gap is
- * opening there, the impact would have no effect and be located forever. */
+/* Correct the time of an impact, so that the gap of the projected state is zero.  The time is never
+ * before the apex: the gap is opening there, so that the impact would have no effect and be located
+ * again and again. */
 static bool polish_impact(const Search *search, double apex, double *time) {
     Simulation *sim = search->sim;
     int n = system_of(sim)->n, stop = search->contact;
@@ -274,7 +275,7 @@ static bool polish_impact(const Search *search, double apex, double *time) {
         double change = -distance / speed;
         if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_ATOL * fabs(speed) ||
             fabs(change) > EVENT_CORRECTION_RTOL * sim->state.arc.h) {
-            break; /* grazing: the dense output has the better root */
+            break; /* Converged, or grazing, where the time by the dense output is better. */
         }
         t = greater(apex, t + change);
     }
@@ -288,7 +289,7 @@ static double sample_time(const Simulation *sim, int k) {
     return sim->state.arc.start + sim->state.arc.h * ((double)k / (double)GUARD_INTERVALS);
 }
 
-/* Positions, rates and directions at the samples. */
+/* Compute positions, rates and directions at the samples of the step. */
 PRBM void sample_arc(Simulation *sim) {
     const Arc *arc = &sim->state.arc;
     Stepping *stepping = &sim->stepping;
@@ -319,13 +320,13 @@ static Instant sample(const Simulation *sim, int k) {
 typedef struct {
     double a, b;
     bool at_a;    /* closed at a */
-    bool pressed; /* a resting contact that is pressed again */
+    bool pressed; /* a contact that was released too early is pressed again */
 } Closing;
 
-/* Detect whether a gap closes in one interval of the samples: z > 0 -> z <= 0 at a closing rate.  A
- * gap that is opening at the start of the interval closes only after its apex: so the impact that
- * was resolved last, whose gap is zero up to round-off of either sign, is not found again.  A dip
- * below zero between two samples shows in the rates. */
+/* Detect whether a gap closes within one interval of the samples.  A gap that is opening at the
+ * start of the interval can close only after its apex.  Therefore the last impact, after which the
+ * gap is round-off of either sign, is not found again.  The rates show a dip below zero between
+ * samples. */
 static bool detect_closing(Search *search, const double *gaps, const double *rates, int k,
                            Closing *closing) {
     Simulation *sim = search->sim;
@@ -340,20 +341,20 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
     }
     if (fabs(rates[0]) <= zero_speed(&sim->configuration) &&
         fabs(gaps[0]) <= CONSTRAINT_RTOL * length) {
-        closing->pressed = true; /* released too early: a little later it is pressed again */
+        closing->pressed = true;
         return gaps[1] < -near;
     }
     if (rates[0] > 0.0) {
         if (rates[1] >= 0.0) {
-            return false; /* still opening from zero */
+            return false; /* The gap opens throughout the interval. */
         }
         closing->a = locate(&rate, closing->a, closing->b);
-        closing->at_a = guard_at(&guard, closing->a) <= 0.0; /* an unresolved arc */
+        closing->at_a = guard_at(&guard, closing->a) <= 0.0; /* too short a flight */
         if (closing->at_a) {
             return true;
         }
     } else if (gaps[0] <= 0.0) {
-        closing->at_a = true; /* else it touches, or opens from a small penetration */
+        closing->at_a = true; /* An impact only if the penetration increases. */
         return gaps[1] < gaps[0] - near;
     }
     if (dips) {
@@ -379,7 +380,7 @@ static bool locate_closing(Search *search, const Closing *closing, double *time)
     return polish_impact(search, closing->a, time);
 }
 
-/* The first closing of a gap within the step. */
+/* Find the first time within the step at which a gap closes. */
 PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall,
                        Problem *problem) {
     Search search = {sim, guard, stop, false, problem};
@@ -401,8 +402,8 @@ PRBM bool closing_time(Simulation *sim, const Guard *guard, int stop, Fall *fall
 
 /* --- friction and releases -------------------------------------------------------------------- */
 
-/* When a sliding velocity changes its sign.  A contact that begins to slide is at rest up to
- * round-off of either sign: it slides the other way if it does so at the end of the step. */
+/* Find the time at which a sliding velocity changes its sign.  When sliding begins, the velocity is
+ * round-off of either sign; only its sign at the end of the step is then used. */
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                         Problem *problem) {
     Search search = {sim, guard, contact, false, problem};
@@ -426,7 +427,8 @@ PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *
     return !search.failed;
 }
 
-/* When a force is used up, from its guard at the start, the middle and the end of the step. */
+/* Find the time at which the guard of a force falls to zero, from its values at the start, the
+ * middle and the end of the step. */
 PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                      Problem *problem) {
     Search search = {sim, guard, contact, false, problem};

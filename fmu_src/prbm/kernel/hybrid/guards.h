@@ -1,4 +1,5 @@
-/* Guards: the scalars whose fall through zero is an event, and where in a step they fall. */
+/* Guards, which are scalars whose fall through zero is an event, and the location of their
+ * zeros. */
 #ifndef PRBM_GUARDS_H
 #define PRBM_GUARDS_H
 
@@ -14,11 +15,11 @@ typedef struct {
 
 typedef double GuardValue(const Equations *equations, const Instant *at, int contact);
 
-/* The scalar z of a kind of event, positive before it: the event is the fall z > 0 -> z <= 0. */
+/* The scalar z of a kind of event.  The event is the change from z > 0 to z <= 0. */
 typedef struct {
     const char *event;
     GuardValue *value;
-    bool forces; /* whether it needs multipliers */
+    bool forces; /* whether the value needs multipliers */
 } Guard;
 
 /* Whether and when a guard falls in the latest step. */
@@ -41,8 +42,8 @@ PRBM bool release_near(Simulation *sim);
 PRBM bool slip_near(Simulation *sim);
 PRBM bool reversal_near(Simulation *sim);
 PRBM bool impact_near(Simulation *sim);
-/* Find when the guard of a contact first falls in the latest step; the caller passes a fall that is
- * not found.  False on failure. */
+/* Find the first time in the latest step at which the guard of a contact falls to zero.  The caller
+ * sets fall->found to false.  Return false on failure. */
 PRBM bool yield_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,
                      Problem *problem);
 PRBM bool reversal_time(Simulation *sim, const Guard *guard, int contact, Fall *fall,

@@ -24,7 +24,7 @@ PRBM Inertia inertia_at(Simulation *sim, const double *q) {
     return at;
 }
 
-/* The inverse mass along a row while the rows held (r, n) rest. */
+/* Compute the inverse mass along a row; the rates of the rows held (r, n) do not change. */
 PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held,
                    const double *row, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -48,7 +48,7 @@ PRBM void contact_mobility(int k, int n, const double *rows, const double *X, do
     }
 }
 
-/* after = v + X P */
+/* Compute the velocities after = v + X P. */
 static void add_impulses(int k, int n, const double *v, const double *X, const double *P,
                          double *after) {
     copy(n, v, after);
@@ -120,7 +120,8 @@ static bool impulses_without_friction(Simulation *sim, const Approach *approach,
     return true;
 }
 
-/* The reaction impulses along rows (r, n), by M (v+ - v-) - GT^T P = rows^T reaction; GT (k, n). */
+/* Compute the reaction impulses along rows (r, n) from M (v+ - v-) - GT^T P = rows^T reaction, with
+ * the impulses P (k,) along the rows GT (k, n). */
 static bool reaction_impulses(Simulation *sim, const Approach *approach, const double *after,
                               int k, const double *GT, const double *P, int r,
                               const double *rows, double *reaction, Problem *problem) {
@@ -147,8 +148,8 @@ static bool reaction_impulses(Simulation *sim, const Approach *approach, const d
     return right;
 }
 
-/* The normal and tangential rows GT (2 k, n) of the stops struck, their rates before the impact,
- * and the rows (r, n) of the loops and of the kept stops. */
+/* Set the normal and tangential rows GT (2 k, n) of the stops struck, their rates before the
+ * impact, and the rows (r, n) of the loops and of the kept stops. */
 static void impact_rows(Simulation *sim, const Approach *approach, const Hits *hits,
                         int kept_count, const int *kept, double *rows, double *GT,
                         double *rates) {
@@ -197,8 +198,8 @@ static void set_impulses(Hits *hits, const double *P, int kept_count, const int 
     }
 }
 
-/* One round with friction: kept stops are constraints.  Those that would pull are removed, and
- * *pulling is set: then another round is needed. */
+/* Compute impulses with friction, with the kept stops as constraints.  Kept stops that would pull
+ * are removed.  *pulling: whether there were any, so that the impulses must be computed again. */
 static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hits *hits,
                                    int *kept_count, int *kept, bool *pulling, Problem *problem) {
     const System *system = system_of(sim);
@@ -235,7 +236,7 @@ static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hi
     return true;
 }
 
-/* Rounds with friction until no kept stop would pull. */
+/* Repeat impulses_with_friction until no kept stop would pull. */
 static bool rounds_with_friction(Simulation *sim, const Approach *approach, Hits *hits,
                                  int *kept_count, int *kept, Problem *problem) {
     bool pulling = true, right = true;
@@ -249,7 +250,7 @@ static bool rounds_with_friction(Simulation *sim, const Approach *approach, Hits
     return right;
 }
 
-/* Impulses with friction.  If a held stop that has been released would close, all held stops are
+/* Compute impulses with friction.  If a held stop that was removed would close, all held stops are
  * treated as struck, without restitution and friction. */
 static bool with_released_stops(Simulation *sim, Approach *approach, Hits *hits,
                                 Problem *problem) {
@@ -297,10 +298,10 @@ static bool name_partners(const Simulation *sim, const Hits *hits, Problem *prob
                 cause.text);
 }
 
-/* The velocities after an impact, the normal and the tangential impulses by stop.  Held stops take
- * part.  If the stops that are struck have no friction, they are unknowns of the same
- * complementarity problem; else they are constraints that are removed if they would pull.  Friction
- * of held stops and of friction points is finite and has no impulse. */
+/* Compute the velocities after an impact, and the normal and tangential impulses by stop.  If the
+ * struck stops have no friction, the impulses of held stops are unknowns of the same
+ * complementarity problem.  Otherwise held stops are constraints, which are removed if they would
+ * pull.  The friction of held stops and of friction points is finite and has no impulse. */
 static bool impact_impulses(Simulation *sim, const double *q, const double *v, Hits *hits,
                             Problem *problem) {
     size_t mark = sim->scratch.used;
@@ -326,8 +327,8 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
 /* --- captures --------------------------------------------------------------------------------- */
 
 /* Whether a resting stop is pressed so strongly that a bounce would be shorter than
- * SHORTEST_FLIGHT_RTOL of the period, or lower than the mode resolves: such a bounce might never
- * decay, because late closing adds as much energy as the impact dissipates. */
+ * SHORTEST_FLIGHT_RTOL of the period, or lower than the simulation mode resolves.  Such bounces
+ * might never decay, because an impact detected late adds as much energy as it dissipates. */
 static bool bounce_vanishes(Simulation *sim, int stop, const HoldingSet *resting, const double *q,
                             const double *v, double speed, bool *result, Problem *problem) {
     const System *system = system_of(sim);
@@ -410,9 +411,9 @@ typedef struct {
 } Account;
 
 /* Change the velocities of the walls, sum up the impulses and add the energies to the state.  A
- * normal impulse P dissipates -P (u- + u+)/2, with u the rate of the gap; a tangential one the same
- * with the sliding velocity.  The wall does the work -P (w- + w+)/2, and its velocity w changes by
- * its mobility times P. */
+ * normal impulse P dissipates -P (u- + u+)/2, with the rate u of the gap before and after the
+ * impact. For a tangential impulse, u is the sliding velocity.  The wall does the work -P (w- +
+ * w+)/2; its velocity w changes by its mobility times P. */
 static void book_energies(Simulation *sim, const Hits *hits, const double *q, const double *v,
                           Account *account) {
     size_t mark = sim->scratch.used;
@@ -479,7 +480,7 @@ static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *acco
 
 /* --- impacts ---------------------------------------------------------------------------------- */
 
-/* The stops that are struck together with one, and those that are held. */
+/* List the stops that are struck together with the stop hit, and the held stops. */
 static void find_partners(Simulation *sim, int hit, const double *q, const double *v, Hits *hits,
                           double *rates) {
     size_t mark = sim->scratch.used;
@@ -498,7 +499,8 @@ static void find_partners(Simulation *sim, int hit, const double *q, const doubl
     sim->scratch.used = mark;
 }
 
-/* The restitution of each stop struck, 0 for one that comes to rest, which is not counted. */
+/* Choose the restitution of each stop struck.  If a stop comes to rest, its restitution is 0 and
+ * the impact is not counted. */
 static bool choose_restitutions(Simulation *sim, const double *q, const double *v,
                                 const double *rates, Hits *hits, bool *counted,
                                 Problem *problem) {
@@ -517,7 +519,7 @@ static bool choose_restitutions(Simulation *sim, const double *q, const double *
     return right;
 }
 
-/* Open all stops; return the number of those that took part and do not separate. */
+/* Open all stops.  List those that took part and do not separate; return their number. */
 static int open_all(Simulation *sim, const Hits *hits, int *touching) {
     size_t mark = sim->scratch.used;
     double bound = zero_speed(&sim->configuration), t = sim->state.front_time;
@@ -570,7 +572,7 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
 
 /* --- impulses of the inputs ------------------------------------------------------------------- */
 
-/* The impulses so far, of each force (b, 3). */
+/* The sums of the impulses given so far: x, y and moment of each force. */
 PRBM const double *given_impulses(const Simulation *sim) {
     return sim->state.given + sim->configuration.mechanism->input.impulses;
 }
@@ -588,8 +590,8 @@ static void free_sticking(Simulation *sim) {
     set_contacts(sim, sim->state.modes);
 }
 
-/* Apply the impulses (3,) of the i-th force: each component P changes the rate u of the point along
- * it, and its work is P (u- + u+)/2. */
+/* Apply the impulses (3,) of the i-th force.  The work of a component P is P (u- + u+)/2, with the
+ * rate u along it before and after. */
 static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);

@@ -181,7 +181,7 @@ PRBM bool compute_outputs(Simulation *sim, int groups, bool near, Problem *probl
     return !(groups & MOBILITIES) || output_mobilities(sim, problem);
 }
 
-/* The groups that must be computed for a value. */
+/* Return the groups of outputs that must be computed for a value. */
 PRBM int output_groups(const Simulation *sim, int slot) {
     const Slots *slots = &sim->configuration.mechanism->slots;
     bool of_stop = slot >= slots->stops && slot < slots->base;

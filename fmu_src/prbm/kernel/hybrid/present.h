@@ -4,16 +4,16 @@
 
 #include "hybrid/guards.h"
 
-/* A state, its rates (ny,) and the evaluation of the equations that gives them. */
+/* A state, its rates (ny,) and its evaluation. */
 typedef struct {
     Instant at;
     const double *rates;
     const Evaluation *evaluation;
 } Moment;
 
-PRBM void forget_present(Simulation *sim); /* time, states, inputs or parameters have been set */
-PRBM void forget_outputs(Simulation *sim); /* the front or its equations have changed */
-/* The present moment at the present state y. */
+PRBM void forget_present(Simulation *sim); /* after a change of time, states or values */
+PRBM void forget_outputs(Simulation *sim); /* after a change of the front or the equations */
+/* Evaluate the rates of the present state y, unless they are up to date. */
 PRBM bool moment_at(Simulation *sim, const double *y, Moment *now, Problem *problem);
 
 #endif

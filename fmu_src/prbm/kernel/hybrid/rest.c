@@ -32,7 +32,7 @@ static void rest_rows(Simulation *sim, const RestContacts *rest, const Complex *
     sim->scratch.used = mark;
 }
 
-/* The accelerations of gaps and slides without contact forces. */
+/* Compute the accelerations u of gaps and sliding without contact forces. */
 static void rest_accelerations(const Simulation *sim, const RestContacts *rest, const Complex *e,
                                const double *v, const double *rows, double *u) {
     const System *system = system_of(sim);
@@ -47,7 +47,7 @@ static void rest_accelerations(const Simulation *sim, const RestContacts *rest, 
     }
 }
 
-/* The laws of friction of the contacts at rest. */
+/* Set the limits of friction of the contacts at rest, see coulomb. */
 static void rest_laws(const Simulation *sim, const RestContacts *rest, const Complex *e,
                       double *friction, double *fixed, int *normal) {
     const System *system = system_of(sim);

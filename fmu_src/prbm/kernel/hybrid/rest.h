@@ -6,15 +6,15 @@
 
 enum { CONTACTS_MAX = 2 * STOPS_MAX, NAMES_LENGTH = PROBLEM_LENGTH / 2 };
 
-/* Stops that touch, with the signs of their sliding velocities; contacts with friction and without
- * a sliding velocity, which are some of these stops, and friction points. */
+/* stops: stops that touch, with the signs of their sliding velocities.  contacts: those of these
+ * stops and of the friction points that have friction and do not slide. */
 typedef struct {
     int stop_count, stops[STOPS_MAX], slips[STOPS_MAX];
     int count, contacts[CONTACTS_MAX];
 } RestContacts;
 
-/* Their forces and accelerations: the acceleration that each normal force alone gives its gap; the
- * friction and its limits; the accelerations of sliding, and those by unit friction (mobility). */
+/* Forces of RestContacts.  normal: acceleration of each gap by its normal force alone; friction and
+ * limit: forces; slide: accelerations of sliding; mobility: their changes by unit forces. */
 typedef struct {
     bool solved;
     double normal[STOPS_MAX];
@@ -26,13 +26,13 @@ typedef struct {
     char text[NAMES_LENGTH];
 } ContactNames;
 
-/* The forces that satisfy the laws of all contacts; not solved without such forces.  In the trial
- * equations all stops must be open, and friction points at rest have no friction. */
+/* Compute the forces that satisfy the laws of all contacts; solved is false if there are none.  In
+ * the trial equations all stops must be open, and friction points at rest without friction. */
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
                       const RestContacts *rest, RestForces *found, Problem *problem);
 PRBM const char *contact_name(const Mechanism *m, int contact);
 PRBM bool has_contact(int count, const int *contacts, int contact);
-/* The names of contacts, or as many of them as there is room for. */
+/* List the names of contacts; names that do not fit are replaced by "...". */
 PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, ContactNames *names);
 /* Set the problem of contacts whose laws no forces satisfy; return false. */
 PRBM bool contacts_jammed(const Simulation *sim, int count, const int *contacts, Problem *problem);

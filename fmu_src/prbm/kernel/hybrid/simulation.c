@@ -33,7 +33,7 @@ PRBM Complex *directions_at(Simulation *sim, const double *q) {
 
 /* --- memory ----------------------------------------------------------------------------------- */
 
-/* The arrays of numbers of the state, one behind the other. */
+/* Place the arrays of numbers of the state one after another. */
 static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
     size_t ny = 2 * (size_t)m->coordinate_count + 2, s = (size_t)m->stop_count;
     size_t np = (size_t)m->parameter_count, nu = (size_t)m->input_count;
@@ -78,7 +78,7 @@ static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) 
         size_t pivots = (size_t)m->types[i].pivots;
         pieces = pivots > pieces ? pivots : pieces;
     }
-    /* unknowns of a complementarity problem of all contacts */
+    /* The number of unknowns of a complementarity problem of all contacts. */
     size_t forces = 4 * s + 3 * (size_t)m->friction_count, pivots_size = forces * (2 * forces + 2);
     size_t single = size * size + 4 * size + 2 * drawn + 4 * pieces + 16 + pivots_size;
     scratch->size = 12 * size * size + 60 * size + 2 * drawn + 16 * pieces + 64 + pivots_size +
@@ -167,7 +167,7 @@ PRBM void simulation_close(Simulation *simulation) {
     free(simulation);
 }
 
-PRBM void simulation_listen(Simulation *simulation, Hear *hear, void *listener) {
+PRBM void simulation_listen(Simulation *simulation, ImpactListener *hear, void *listener) {
     simulation->hear = hear;
     simulation->listener = listener;
 }
@@ -225,7 +225,7 @@ static void free_contacts(Simulation *sim) {
     }
 }
 
-/* The contacts, walls and impacts of a simulation that has not moved. */
+/* Clear the contacts, walls and impacts. */
 static void clear_stops(Simulation *sim) {
     State *state = &sim->state;
     size_t s = (size_t)sim->configuration.mechanism->stop_count;
@@ -235,7 +235,7 @@ static void clear_stops(Simulation *sim) {
     free_contacts(sim);
 }
 
-/* The scalars of a simulation that has not started. */
+/* Set the scalars of the state to their values before the start. */
 static void clear_progress(State *state, double start_time) {
     const Event none = {EVENT_NONE, 0, 0.0};
     const SimulationMode cosimulation = {false, 0.0};
@@ -273,7 +273,7 @@ static bool set_parameter(Simulation *sim, int slot, double x, Problem *problem)
         return false;
     }
     if (sim->state.started && !parameter->tunable && x != sim->state.values[slot]) {
-        return fail(problem, "%s is fixed once the motion has started; set it before",
+        return fail(problem, "%s is a fixed parameter; set it before the motion starts",
                     parameter->name);
     }
     sim->state.values[slot] = x;
@@ -283,7 +283,7 @@ static bool set_parameter(Simulation *sim, int slot, double x, Problem *problem)
 static bool set_input(Simulation *sim, int i, double x, Problem *problem) {
     const Mechanism *m = sim->configuration.mechanism;
     if (i < 0 || i >= m->input_count) {
-        return fail(problem, "what the model computes cannot be set; parameters and inputs can");
+        return fail(problem, "a computed value cannot be set; only parameters and inputs can");
     }
     if (!finite_number(x)) {
         return fail(problem, "%s = %g must be a finite number", m->input_names[i], x);
@@ -340,7 +340,7 @@ static bool start_shape(Simulation *sim, Problem *problem) {
     return right;
 }
 
-/* Reject a penetrated wall at the start, and begin with the impact if one is hit at once. */
+/* Reject a penetrated wall at the start.  Apply the impact if a wall is struck at the start. */
 static bool check_walls(Simulation *sim, Problem *problem) {
     size_t mark = sim->scratch.used;
     int n = system_of(sim)->n, struck = -1;

@@ -8,7 +8,7 @@ PRBM int state_size(const Simulation *sim); /* ny = 2 n + 2 */
 PRBM const System *system_of(const Simulation *sim);
 PRBM int contact_count(const Simulation *sim);
 PRBM Complex *directions_at(Simulation *sim, const double *q); /* in working memory */
-PRBM void set_inputs(Simulation *sim); /* the equations of the present contacts and inputs */
+PRBM void set_inputs(Simulation *sim); /* and the equations of the contacts */
 PRBM void set_contacts(Simulation *sim, const ContactMode *modes);
 PRBM void set_mode(Simulation *sim, int contact, ContactMode mode);
 /* Start the motion; the caller keeps a backup for the case of failure. */

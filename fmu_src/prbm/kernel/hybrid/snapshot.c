@@ -56,7 +56,7 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
 
 /* --- from numbers ----------------------------------------------------------------------------- */
 
-/* The next number to read, and whether all so far are such as simulation_save writes. */
+/* The next number to read, and whether all numbers read so far are valid. */
 typedef struct {
     const double *at;
     bool sound;
@@ -124,8 +124,8 @@ static void get_stop(State *state, int i, StateReader *reader) {
     last->impulse_sum = get_number(reader);
 }
 
-/* Read the state; returns whether its numbers are such as simulation_save writes.  The states of
- * model exchange, which are the last, may be any numbers: an importer's solver has set them. */
+/* Read the state; return whether its numbers are valid.  The states of model exchange, which come
+ * last, may have any values, because an importer's solver sets them. */
 static bool read_state(Simulation *sim, const double *from) {
     State *state = &sim->state;
     const Mechanism *m = sim->configuration.mechanism;
@@ -183,7 +183,7 @@ PRBM void keep_backup(Simulation *sim) {
 
 PRBM bool attempt(Simulation *sim, bool right, Problem *problem) {
     if (sim->scratch.exceeded) {
-        right = fail(problem, "the working memory of the simulation was too small; please report");
+        right = fail(problem, "the working memory of the simulation is too small; report this");
         sim->scratch.exceeded = false;
     }
     if (!right) {
@@ -207,7 +207,7 @@ PRBM bool simulation_restore(Simulation *simulation, const double *state, Proble
                  rebuild(sim, &ignored);
     forget_present(sim);
     if (!right) {
-        fail(problem, "the saved state is damaged: its numbers are not those of a motion");
+        fail(problem, "the saved state is damaged: its numbers are not a state of this mechanism");
     }
     return attempt(sim, right, problem);
 }

@@ -5,7 +5,7 @@
 #include "hybrid/state.h"
 
 PRBM void keep_backup(Simulation *sim);
-/* End an attempt: return whether it was right, and restore the backup if it was not. */
+/* End an attempt: return whether it was successful, and restore the backup if it was not. */
 PRBM bool attempt(Simulation *sim, bool right, Problem *problem);
 
 #endif

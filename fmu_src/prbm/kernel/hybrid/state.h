@@ -9,8 +9,8 @@
 
 #define TWO_PI 6.283185307179586
 
-/* Units of the motion: the size of the mechanism, the fundamental frequency, the energy of one
- * radian against the stiffest spring, and the period. */
+/* Scales of the motion: the size of the mechanism [m], a rate [rad/s], an energy [J], a period
+ * [s]. */
 typedef struct {
     double length, rate, energy, time;
 } Scales;
@@ -51,8 +51,8 @@ typedef struct {
     double growth_max;   /* of the step size; 1 after a rejected step */
 } StepSizeController;
 
-/* The mode of a simulation, and the height, as a fraction of the size, of the lowest bounce that it
- * resolves. */
+/* The mode of a simulation.  lowest_bounce: the height of the lowest bounce that it resolves,
+ * divided by the size of the mechanism. */
 typedef struct {
     bool exchange; /* model exchange: an importer integrates */
     double lowest_bounce;
@@ -77,12 +77,12 @@ typedef struct {
     bool *driven;         /* (s,): whether stop.velocity has ever been non-zero */
     Latched *latched;     /* (s,) */
     Wall *walls;          /* (s,) */
-    double *numbers;      /* the arrays below, one behind the other */
+    double *numbers;      /* the arrays below, one after another */
     size_t number_count;
-    double *values, *given;               /* as they were set */
-    double *acting_values, *acting_given; /* since the last restart */
-    double *received;                     /* (3 b,): impulses that have acted */
-    double *front, *k1;                   /* (ny,): the end of the last step, its rates */
+    double *values, *given;               /* parameters and inputs as set last */
+    double *acting_values, *acting_given; /* parameters and inputs of the last restart */
+    double *received;                     /* (3 per force): impulses that have acted */
+    double *front, *k1;                   /* (ny,): state at the end of the last step, its rates */
     double *floors;                       /* (s,): depth below zero at which gaps close */
     double *accepted;                     /* model exchange: (n,) angles of the last step */
     double *states;                       /* model exchange: the states as they were set */
@@ -111,8 +111,8 @@ typedef struct {
     ForceRange forces;
     double *end, *error;   /* (ny,) */
     double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
-    double *sample_y;      /* (2 n,), (n,) of each */
-    Complex *sample_e;
+    double *sample_y;      /* (2 n,) of each sample */
+    Complex *sample_e;     /* (n,) of each sample */
     Located located;
     double *reach;         /* (n,) bounds of the changes of the arms */
 } Stepping;
@@ -141,14 +141,14 @@ struct Simulation {
     State state;
     double *backup; /* the state before an attempt, as simulation_save writes it */
     Equations equations;
-    double *forces; /* (3 b,) acting inputs */
+    double *forces; /* (3 per force): acting inputs */
     Trial trial;
     Stepping stepping;
     Present present;
-    Evaluation at_front;   /* of the present equations at the front, while contacts change there */
+    Evaluation at_front;   /* at the front, while contacts change */
     Correction correction; /* working memory of projections */
     Scratch scratch;
-    Hear *hear;
+    ImpactListener *hear;
     void *listener;
     size_t bytes;
 };

@@ -12,8 +12,7 @@
 
 /* --- errors ----------------------------------------------------------------------------------- */
 
-/* The sum of the squares of errors x, relative to the larger of y and y1, but at least to a least
- * size. */
+/* Sum the squares of the errors x, each divided by the largest of |y|, |y1| and least. */
 static double squares_of(int n, const double *x, const double *y, const double *y1, double least) {
     double sum = 0.0;
     for (int i = 0; i < n; i++) {
@@ -23,8 +22,8 @@ static double squares_of(int n, const double *x, const double *y, const double *
     return sum;
 }
 
-/* The root mean square of errors x: of angles [rad], and of rates and energies relative to their
- * size. */
+/* Return the root mean square of the errors x.  Those of angles are in rad, those of rates and
+ * energies relative to their size. */
 static double relative_size(const Simulation *sim, const double *x, const double *y,
                             const double *y1) {
     const Scales *scales = &sim->configuration.scales;
@@ -40,7 +39,7 @@ PRBM double longest_step(const Simulation *sim) {
     return STEP_MAX_RTOL * sim->configuration.scales.time;
 }
 
-/* A first step size from the size of the rates (Hairer, II.4). */
+/* Choose the first step size by the size of the rates (Hairer, II.4). */
 static double first_step(const Simulation *sim) {
     const State *state = &sim->state;
     double size = relative_size(sim, state->k1, state->front, state->front);
@@ -48,8 +47,9 @@ static double first_step(const Simulation *sim) {
     return lesser(longest_step(sim), allowed / greater(size, FIRST_RATE_MIN));
 }
 
-/* Choose the next step size from an error relative to the allowed one; returns whether the step is
- * accepted.  The size does not grow after a step that was rejected and repeated (Hairer, IV.2). */
+/* Choose the next step size from the error relative to the allowed error; return whether the step
+ * is accepted.  The size does not grow after a step that was rejected and repeated (Hairer,
+ * IV.2). */
 static bool next(StepSizeController *controller, double error) {
     if (!(error <= 1.0)) {
         double factor = finite_number(error)
@@ -71,21 +71,21 @@ static bool next(StepSizeController *controller, double error) {
 static bool check_step_size(const State *state, double h, Problem *problem) {
     if (h < STEP_MIN_ATOL) {
         return fail(problem,
-                    "the step size fell below %g s at t = %.9g s: the motion is too violent "
-                    "for the model, or its links lie flat, where it ends; check the inputs and "
-                    "parameters, or add damping.beta",
+                    "the step size fell below %g s at t = %.9g s: the motion is too fast for the "
+                    "model, or links of a loop form a straight line, beyond which they cannot "
+                    "move; check the inputs and parameters, or add damping.beta",
                     STEP_MIN_ATOL, state->front_time);
     }
     if (state->front_time + h == state->front_time) {
         return fail(problem,
-                    "at t = %.9g s a step of %.3g s is lost in the rounding of the time: start "
-                    "the simulation nearer to zero",
+                    "at t = %.9g s a step of %.3g s is smaller than the rounding error of the "
+                    "time: start the simulation at a time nearer to zero",
                     state->front_time, h);
     }
     return true;
 }
 
-/* The error of a step of the arc, relative to the allowed one; infinite if a stage fails. */
+/* Return the error of a step, relative to the allowed error; infinite if a stage fails. */
 static double step_error(Simulation *sim, double h, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     const Arc *arc = &sim->state.arc;
@@ -99,8 +99,8 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
            (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
-/* Compute a step within the tolerance, no longer than the longest: its stages in the arc, its end
- * in stepping. */
+/* Compute a step within the tolerance and no longer than longest [s].  Its stages are stored in the
+ * arc, its end in stepping. */
 static bool find_step(Simulation *sim, double longest, double *h, Problem *problem) {
     State *state = &sim->state;
     int ny = state_size(sim);
@@ -116,7 +116,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
         }
     } while (!next(&controller, step_error(sim, *h, problem)));
     state->step_size = controller.h;
-    if (*h == longest && longest < wanted) { /* shortened by a wall: no measure for the next step */
+    if (*h == longest && longest < wanted) { /* A wall shortened this step only. */
         state->step_size = greater(controller.h, wanted);
     }
     state->log_of_error = controller.log_of_error;
@@ -128,7 +128,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
 /* End the step at an event. */
 static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     State *state = &sim->state;
-    state->step_size = state->arc.h; /* the time of an event is no measure for the next step */
+    state->step_size = state->arc.h; /* The event does not shorten the next step. */
     state->front_time = event->time;
     state->pending = *event;
     state->has_k1 = false;

@@ -16,7 +16,7 @@ static Wall given_reference(const Simulation *sim, int i) {
     return reference;
 }
 
-/* Put all walls on their references, with the velocities of these. */
+/* Set the position and velocity of each wall to those of its reference. */
 PRBM void start_walls(Simulation *sim) {
     for (int i = 0; i < system_of(sim)->s; i++) {
         sim->state.walls[i] = given_reference(sim, i);
@@ -24,7 +24,7 @@ PRBM void start_walls(Simulation *sim) {
     }
 }
 
-/* The wall that joins another reference, from the time reference.since on. */
+/* Return a wall that joins another reference from the time reference.since on. */
 static Wall joining(const Wall *wall, Wall reference, double velocity, double span) {
     reference.offset = wall_motion(wall, reference.since).x - reference.position;
     reference.excess = velocity - reference.rate;
@@ -32,20 +32,20 @@ static Wall joining(const Wall *wall, Wall reference, double velocity, double sp
     return reference;
 }
 
-/* The wall from a time t on, with new velocities of the wall and of its reference. */
+/* Return a wall with new velocities of the wall and of its reference from a time t on. */
 PRBM Wall turned_wall(const Wall *wall, double t, double velocity, double rate) {
     Wall reference = {reference_at(wall, t), rate, t, 0.0, 0.0, 0.0};
     return joining(wall, reference, velocity, wall->span);
 }
 
-/* The change of stop.position at a communication point: a jump that gives the wall no velocity. */
+/* The change of stop.position at a communication point, a jump without velocity [m]. */
 static double shift(const Simulation *sim, int i) {
     Expression position = sim->configuration.mechanism->stops[i].position;
     return evaluate(position, sim->state.values) - evaluate(position, sim->state.acting_values);
 }
 
-/* The walls in a communication step from the present time to another; returns whether a reference
- * has changed.
+/* Compute the walls in a communication step from the present time to the given time; return whether
+ * a reference has changed.
  *
  * Without stop.velocity, the velocity of a reference is the mean rate of the displacement over the
  * recent longest step.  It is reduced if the following step is longer, so that a jump is not
@@ -77,8 +77,8 @@ PRBM bool join_walls(Simulation *sim, double time, Wall *joined) {
     return changed;
 }
 
-/* The walls in event mode: a wall whose stop.velocity has changed takes it, and so does its
- * reference.  Returns whether there is such a wall. */
+/* Compute the walls in event mode.  If stop.velocity has changed, the wall and its reference take
+ * the new velocity.  Return whether there is such a wall. */
 PRBM bool turn_walls(const Simulation *sim, Wall *turned) {
     const Mechanism *m = sim->configuration.mechanism;
     const State *state = &sim->state;
@@ -97,8 +97,8 @@ PRBM double wall_reach(const Wall *wall, double h) {
     return fabs(wall->rate) * h + 2.0 * fabs(wall->offset) + fabs(wall->excess) * wall->span;
 }
 
-/* Put walls whose cubics end at the front on their references; return the longest step from there:
- * a fraction of a cubic, and only up to its end. */
+/* Put walls whose cubics end at the front on their references.  Return the longest step from there:
+ * a fraction of each other cubic, not beyond the end of that cubic. */
 PRBM double follow_cubics(Simulation *sim) {
     double longest = HUGE_VAL;
     for (int i = 0; i < system_of(sim)->s; i++) {
@@ -125,7 +125,7 @@ PRBM double jump_allowed(const Simulation *sim, int i) {
 
 /* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
  * stops open or are struck.  The impulses P on the held stops dissipate energy as captures do.
- * They may pull, but not more than the present forces press within the given time. */
+ * P may be negative (pull), but not below minus the present force times the given time. */
 PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;

@@ -38,7 +38,7 @@ class FiniteElements:
     model : ElementModel
         The assembled elements.
     equations : Equations
-        Their forces, stiffness, mass and constraints.
+        Forces, stiffness, mass and constraints of the elements.
 
     Raises
     ------
@@ -157,7 +157,7 @@ class FiniteElements:
         return row
 
     def modal_restitution(self, shape: Shape, stop: int, restitution: float) -> float:
-        r"""Return the modal restitution of an arriving pure fundamental mode (algebraic) [-].
+        r"""Return the modal restitution if only the fundamental mode moves before the impact [-].
 
         C = (1 + eps) mu_1 - 1,  mu_1 = G_1^2 / sum_i G_i^2 over all modes of the elements,
         G_i = (d gap/dq) phi_i.
@@ -185,7 +185,7 @@ class FiniteElements:
         stop_time, step : float
             Duration and step size [s].
         spectral_radius : float
-            Of the method, below 1: a smaller one damps unresolved frequencies more strongly.
+            Spectral radius of the method, below 1: smaller values damp unresolved frequencies more.
         impacts : int or None
             Number of impacts after which the run ends; None: no limit.
 

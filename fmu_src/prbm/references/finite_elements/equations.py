@@ -103,7 +103,7 @@ class Equations:
         return M
 
     def constraint_stiffness(self, q: Real, mu: Real) -> Real:
-        """Return -d(C mu)/dq, (n, n), which is no part of Exudyn's K."""
+        """Return -d(C mu)/dq, (n, n), which Exudyn's K does not include."""
         touched = np.flatnonzero(np.any(self.constraint_columns(q) != 0.0, axis=1))
         result = self.bend(q, mu, touched.tolist())
         return (result + result.T) / 2

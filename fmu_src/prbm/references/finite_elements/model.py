@@ -278,5 +278,5 @@ def _check_supported(
     for name in unsupported:
         raise FiniteElementError(
             f"{name} is not 0: the finite elements have no friction, no damping in proportion to "
-            "mass, and walls and a base at rest; set it to 0"
+            "mass, no moving walls and no moving base; set it to 0"
         )

@@ -14,7 +14,7 @@ from ...mechanics.modal import Modes
 from .equations import Equations
 
 NEWTON_STEPS_MAX = 25
-NEWTON_STEP_ATOL = 1e-9  # Last Newton step [m], [rad]; the remaining error is of its square.
+NEWTON_STEP_ATOL = 1e-9  # Newton step that ends the iteration [m], [rad]; the error is its square.
 NEWTON_STEP_MAX = 10.0  # A larger Newton step [m], [rad] ends the iteration.
 STATE_CHANGE_MAX = 1.0  # Slopes and angles that change more in one load step reach another shape.
 LOAD_STEP_START, LOAD_STEP_MIN = 1 / 8, 1 / 1024  # Steps of the load, as fractions of all loads.
@@ -28,7 +28,7 @@ class Shape:
     Parameters
     ----------
     q : (n,)
-        Displacements of all nodes from the drawn shape [m], of slopes [-], of bodies [rad].
+        Changes from the drawn shape: displacements [m], slopes [-], rotations of bodies [rad].
     mu : (r,)
         Multipliers of the constraints [N], [N m].
     force : float
@@ -54,7 +54,7 @@ def equilibrium(
     equations : Equations
         The elements.
     row : (n,)
-        Derivatives of the displacement of the released body by the coordinates.
+        Derivatives of the displacement of the released body with respect to the coordinates.
     turns : sequence of int
         Indices of the rotations of bodies.
     displacement : float or None

@@ -59,7 +59,7 @@ class Transient:
     step : float
         Step size [s].
     spectral_radius : float
-        Of the generalised-alpha method, below 1.
+        Spectral radius of the generalised-alpha method, below 1.
     """
 
     def __init__(self, fe: "FiniteElements", step: float, spectral_radius: float) -> None:
@@ -241,7 +241,7 @@ class Transient:
             fe.model.exu.config.printToConsole = talks
         if gains:
             raise StepError(
-                f"a step of Exudyn's from t = {state[0]:.6g} s gained energy: it did not converge; "
+                f"a step of Exudyn from t = {state[0]:.6g} s gained energy: it did not converge; "
                 "shorten the step"
             )
         return state
