@@ -44,8 +44,9 @@ typedef struct {
     Rows active;
     Complex *w, *w_input;   /* (n,) */
     double *moment;         /* (even,) */
-    bool driven;
-    bool walls_push, walls_join; /* walls of held stops move; walls are off their references */
+    bool walls_move;
+    bool driven;            /* inputs or walls do work */
+    bool special;           /* walls move, or contacts slip */
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
 } Equations;

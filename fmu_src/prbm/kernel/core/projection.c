@@ -9,7 +9,7 @@
 
 /* The constant part of an active constraint at time t. */
 static double offset(const Equations *q, int k, double t) {
-    if (q->walls_push && k >= q->first_hold && k < q->first_stick) {
+    if (q->walls_move && k >= q->first_hold && k < q->first_stick) {
         int i = q->held[k - q->first_hold];
         return q->system->gaps_c[i] + wall_motion(&q->inputs.walls[i], t).x;
     }
@@ -18,7 +18,7 @@ static double offset(const Equations *q, int k, double t) {
 
 /* The part of the rate of an active constraint that is prescribed at time t. */
 PRBM double prescribed(const Equations *q, int k, double t) {
-    bool moves = q->walls_push && k >= q->first_hold && k < q->first_stick;
+    bool moves = q->walls_move && k >= q->first_hold && k < q->first_stick;
     return moves ? wall_motion(&q->inputs.walls[q->held[k - q->first_hold]], t).v : 0.0;
 }
 
