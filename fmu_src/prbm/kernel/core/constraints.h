@@ -36,7 +36,8 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
 /* Project q (n,) onto the rows with the constants c (count,); e becomes its directions. */
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
                             Complex *e, Scratch *scratch, Problem *problem);
-/* v (n,) moves onto rows v + rates = 0 by impulses (r,) along the rows, which may be NULL. */
+/* v (n,) moves onto rows v + rates = 0 by impulses along the rows.  The impulses (r,), unless NULL,
+ * are given as the mobilities by which they change the rates. */
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, double *impulses, Scratch *scratch,
                              Problem *problem);

@@ -32,6 +32,10 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
     for (int k = 0; k < q->r; k++) {
         c[k] = offset(q, k, t);
         rates[k] = prescribed(q, k, t);
+        if (impulses) {
+            bool held = k >= q->first_hold && k < q->first_stick;
+            impulses[k] = held ? q->inputs.mobilities[q->held[k - q->first_hold]] : 0.0;
+        }
     }
     Rows positions = q->active;
     positions.count = q->first_stick;
