@@ -161,8 +161,8 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* --- event mode ------------------------------------------------------------------------------- */
 
-/* Let changed velocities of walls and impulses act, and apply the pending event, if any.  Held stops
- * follow their walls unless impulses act on the body, too. */
+/* Let changed velocities of walls and impulses act, and apply the pending event, if any.  Held
+ * stops follow their walls unless impulses act on the body, too. */
 static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *problem) {
     if (!event && !leave_arc(sim, problem)) {
         return false;

@@ -106,8 +106,8 @@ class Wall:
 
     def pushed(self, t: float, change: float) -> "Wall":
         """Return the wall after its velocity and its reference's have changed at time t [m/s]."""
-        line = Wall(self.reference(t), self.rate + change, t)
-        return self.joining(line, float(self.motion(t)[1]) + change, self.span)
+        position = self.position - change * (t - self.since)
+        return replace(self, position=position, rate=self.rate + change)
 
     def arrived(self) -> "Wall":
         """Return the wall on its reference."""

@@ -183,17 +183,14 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
 
 /* --- walls ------------------------------------------------------------------------------------ */
 
-PRBM double reference_at(const Wall *wall, double t) {
-    return wall->position + wall->rate * (t - wall->since);
-}
-
 /* With s = (t - since) / span:
  *     x = reference + (1 - s)^2 (offset + (2 offset + excess span) s).
  * At the end of the cubic the wall is to be replaced by its reference. */
 PRBM WallMotion wall_motion(const Wall *wall, double t) {
-    WallMotion result = {reference_at(wall, t), wall->rate, 0.0};
-    if (wall->span > 0.0) {
-        double T = wall->span, s = (t - wall->since) / T, left = 1.0 - s;
+    double tau = t - wall->since, T = wall->span;
+    WallMotion result = {wall->position + wall->rate * tau, wall->rate, 0.0};
+    if (T > 0.0) {
+        double s = tau / T, left = 1.0 - s;
         double slope = 2.0 * wall->offset + wall->excess * T, ahead = wall->offset + slope * s;
         result.x += left * left * ahead;
         result.v += left * (left * slope - 2.0 * ahead) / T;

@@ -55,7 +55,6 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 /* Set up the rows and loads of a contact state. */
 PRBM void set_equations(Equations *equations, const Inputs *inputs,
                         const ContactState *contacts, double omega);
-PRBM double reference_at(const Wall *wall, double t);
 PRBM WallMotion wall_motion(const Wall *wall, double t);
 PRBM Parts place_parts(Memory *memory, size_t count);
 PRBM Parts parts_from(Parts parts, int start);

@@ -23,16 +23,10 @@ PRBM void start_walls(Simulation *sim) {
     }
 }
 
-/* The wall with another velocity, joining another reference from the time line.since on. */
-static Wall joining(const Wall *wall, Wall line, double velocity, double span) {
-    double offset = wall_motion(wall, line.since).x - line.position;
-    return (Wall){line.position, line.rate, line.since, offset, velocity - line.rate, span};
-}
-
-/* The wall from a time t on, with new velocities of the wall and of its reference. */
-static Wall turned_wall(const Wall *wall, double t, double velocity, double rate) {
-    Wall line = {reference_at(wall, t), rate, t, 0.0, 0.0, 0.0};
-    return joining(wall, line, velocity, wall->span);
+/* Change the velocities of a wall and of its reference at a time t. */
+static void turn_wall(Wall *wall, double t, double change) {
+    wall->position -= change * (t - wall->since);
+    wall->rate += change;
 }
 
 /* Push a wall by the impulse P on the body; returns the work of the wall. */
@@ -40,7 +34,7 @@ PRBM double push_wall(Simulation *sim, int i, double P) {
     Wall *wall = &sim->state.walls[i];
     double t = sim->state.front_time, change = sim->equations.inputs.mobilities[i] * P;
     double velocity = wall_motion(wall, t).v;
-    *wall = change != 0.0 ? turned_wall(wall, t, velocity + change, wall->rate + change) : *wall;
+    turn_wall(wall, t, change);
     sim->state.latched[i].impulse_sum += P;
     return -P * (velocity + change / 2);
 }
@@ -49,45 +43,46 @@ PRBM double push_wall(Simulation *sim, int i, double P) {
  * returns whether a reference has changed.
  *
  * Without stop.velocity, the velocity of a reference is the mean rate of the displacement over the
- * recent longest step; a jump of stop.position gives it no velocity.  It is reduced if the following
- * step is longer, so that a jump is not extrapolated beyond its own size.  Before the first step,
- * the velocity of a wall is that of its reference. */
+ * recent longest step; a change of stop.position gives it no velocity.  It is reduced if the
+ * following step is longer, so that a jump is not extrapolated beyond its own size.  Before the
+ * first step, the velocity of a wall is that of its reference. */
 PRBM bool join_walls(Simulation *sim, double time) {
     State *state = &sim->state;
     double now = state->time, last = now - state->point, following = time - now;
     double H = greater(last > 0.0 ? last : following, state->longest - WALL_FADING_FACTOR * last);
-    double T = 2.0 * lesser(H, WALL_LONGEST_RTOL * sim->configuration.scales.time);
-    double longest = last > 0.0 ? greater(0.5 * T, last) : HUGE_VAL;
-    double share = lesser(longest / following, 1.0);
+    state->longest = lesser(H, WALL_LONGEST_RTOL * sim->configuration.scales.time);
+    state->point = now;
+    double T = 2.0 * state->longest, share = lesser(H / following, 1.0);
+    double least = WALL_PATH_RTOL * system_of(sim)->length;
     bool changed = false;
     for (int i = 0; i < system_of(sim)->s; i++) {
         Wall *wall = &state->walls[i], line = given_reference(sim, i);
         Expression at = sim->configuration.mechanism->stops[i].position;
-        double off = line.position - reference_at(wall, now);
+        double off = line.position - wall->position - wall->rate * (now - wall->since);
         state->driven[i] = state->driven[i] || line.rate != 0.0;
         if (!state->driven[i]) {
-            double moved = off == 0.0 ? 0.0
-                                      : off - evaluate(at, state->values) +
-                                            evaluate(at, state->acting_values);
-            line.rate = (wall->rate + moved / longest) * share * share;
+            double old = off != 0.0 ? evaluate(at, state->acting_values) : 0.0;
+            double moved = off != 0.0 && last > 0.0 ? off + old - evaluate(at, state->values) : 0.0;
+            line.rate = (wall->rate + moved / H) * share * share;
         }
-        if (fabs(off) + fabs(line.rate - wall->rate) * T > WALL_PATH_RTOL * system_of(sim)->length) {
-            double velocity = last > 0.0 ? wall_motion(wall, now).v : line.rate;
-            *wall = joining(wall, line, velocity, T);
+        if (fabs(off) + fabs(line.rate - wall->rate) * T > least) {
+            WallMotion here = wall_motion(wall, now);
+            line.offset = here.x - line.position;
+            line.excess = last > 0.0 ? here.v - line.rate : 0.0;
+            line.span = T;
+            *wall = line;
             changed = true;
         }
     }
-    state->point = now;
-    state->longest = 0.5 * T;
     return changed;
 }
 
-/* Give walls whose stop.velocity has changed in event mode this velocity, and their references. */
+/* Give walls whose stop.velocity has changed in event mode this velocity. */
 PRBM void turn_walls(Simulation *sim) {
     for (int i = 0; i < system_of(sim)->s; i++) {
-        double v = given_reference(sim, i).rate;
-        if (v != wall_inputs(sim->configuration.mechanism, sim->state.acting_given, i)[1]) {
-            sim->state.walls[i] = turned_wall(&sim->state.walls[i], sim->state.time, v, v);
+        Wall *wall = &sim->state.walls[i], line = given_reference(sim, i);
+        if (line.rate != wall_inputs(sim->configuration.mechanism, sim->state.acting_given, i)[1]) {
+            turn_wall(wall, line.since, line.rate - wall_motion(wall, line.since).v);
         }
     }
 }
@@ -128,27 +123,26 @@ PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *prob
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
     Evaluation *at = &sim->at_front;
-    int n = system_of(sim)->n, count = q->held_count;
+    int n = system_of(sim)->n, ny = state_size(sim), h = q->first_hold;
     double *y = sim->state.front, t = sim->state.front_time, speed[STOPS_MAX];
-    double *P = take(&sim->scratch, (size_t)q->r);
-    double *after = take(&sim->scratch, (size_t)state_size(sim));
+    double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);
     bool moved = drifted, follows = true;
-    copy(state_size(sim), y, after);
+    copy(ny, y, after);
     bool right = evaluate_equations(q, t, y, y + n, NULL, at, problem) &&
                  project_with_impulses(q, t, after, P, &sim->scratch, problem);
-    const double *held_P = P + q->first_hold, *force = at->lam + q->first_hold;
-    for (int k = 0; right && k < count; k++) {
+    for (int k = 0; right && k < q->held_count; k++) {
         speed[k] = gap_rate(q, q->held[k], t, at->at.e, y + n);
         bool jumps = fabs(speed[k]) > zero_speed(&sim->configuration);
         moved = moved || jumps;
         follows = follows && fabs(speed[k]) <= jump_allowed(sim, q->held[k]) &&
-                  (!jumps || held_P[k] >= -greater(force[k], 0.0) * time);
+                  (!jumps || P[h + k] >= -greater(at->lam[h + k], 0.0) * time);
     }
-    for (int k = 0; right && moved && follows && k < count; k++) {
-        after[2 * n] -= held_P[k] * speed[k] / 2;
-        after[2 * n + 1] += push_wall(sim, q->held[k], held_P[k]);
+    bool captures = right && moved && follows;
+    for (int k = 0; captures && k < q->held_count; k++) {
+        after[2 * n] -= P[h + k] * speed[k] / 2;
+        after[2 * n + 1] += push_wall(sim, q->held[k], P[h + k]);
     }
-    copy(right && moved && follows ? state_size(sim) : 0, after, y);
+    copy(captures ? ny : 0, after, y);
     sim->scratch.used = mark;
     return right && (!moved || follows || settle_moved(sim, problem));
 }
