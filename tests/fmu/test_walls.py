@@ -194,6 +194,38 @@ def test_impact_times_of_an_accelerated_wall_converge_with_the_square_of_the_ste
         assert errors[2] < errors[0] / 8
 
 
+def bounces(instance, step, end=0.16):
+    """Return the times of the impacts on a wall whose inputs are set at steps and in events."""
+    instance.initialize(values={"stop.velocity": sine(0.0)["stop.velocity"]})
+    times = []
+    for k in range(round(end / step)):
+        if instance.kind == "me":
+            Driven(instance, sine).advance((k + 1) * step)
+        else:
+            assert instance.set(sine(k * step)) == OK
+            while instance.time < (k + 1) * step:
+                left = (k + 1) * step - instance.time
+                event, _, _, instance.time = instance.fmu.doStep(instance.time, left)
+                if event:
+                    instance.change(sine(instance.time))
+        found = instance.values()
+        if found["stop.impact_count"] > len(times):
+            times.append(found["stop.impact_time"])
+    return np.array(times)
+
+
+def test_times_of_successive_impacts_converge_with_the_square_of_the_step_in_event_mode(native):
+    """The velocity of the wall is exact at each impact, so that no error accumulates."""
+    with Instance(native["PRBDM", 3], "me") as instance:
+        true, errors = bounces(instance, 1e-3), []
+    assert len(true) == 3
+    for step in (2e-3, 1e-3, 5e-4):
+        with Instance(native["PRBDM", 3], "events") as instance:
+            errors.append(np.abs(bounces(instance, step) - true).max())
+    assert errors[1] / errors[0] == pytest.approx(1 / 4, rel=0.1)
+    assert errors[2] / errors[1] == pytest.approx(1 / 4, rel=0.1)
+
+
 class FreeMass:
     """A partner that moves the wall and receives the impulses."""
 
@@ -286,6 +318,26 @@ def test_a_pressed_body_stays_on_its_wall(opened, model, fmi, kind):
     assert found["stop.impact_count"] == count
     start = energy_balance(simulation(model, PRESSED).outputs())
     assert energy_balance(found) == pytest.approx(start, abs=1e-9)
+
+
+@all_ways
+def test_work_of_a_wall_under_a_body_is_force_times_velocity_of_the_true_wall(opened, fmi, kind):
+    """The difference is within the force times the error of the wall's velocity, a h/4."""
+    step, rows = 1e-3, []
+    with opened("PRBDM", fmi, kind).initialize(values=PRESSED | sine(0.0)) as instance:
+        for k in range(150):
+            assert instance.set(sine(k * step)) == OK
+            instance.advance((k + 1) * step)
+            found = instance.values()
+            if k >= 50:
+                assert found["stop.contact"]
+                velocity = sine((k + 1) * step)["stop.velocity"]
+                rows.append((-found["stop.force"] * velocity, found["energy.work"]))
+    power, work = np.array(rows).T
+    expected = np.sum((power[1:] + power[:-1]) / 2) * step
+    bound = found["stop.force"] * AMPLITUDE * RATE**2 * step / 4 * (len(rows) - 1) * step
+    assert work[-1] - work[0] == pytest.approx(expected, abs=bound)
+    assert abs(expected) > 50 * bound
 
 
 @pytest.mark.parametrize("inside", [False, True])
