@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
@@ -226,6 +227,22 @@ def test_a_parameter_cannot_have_the_name_of_another_variable(mechanisms, name):
         guide, geometry=(*guide.geometry, prbm.mechanism.parameters.Parameter("shuttle.depth", 1.0))
     )
     assert {v.name for v in interface(harmless, {})} > {"shuttle.depth", "shuttle.x"}
+
+
+def test_the_page_draws_a_wall_that_joins_its_line_smoothly(mechanisms):
+    """The figure is the cubic: level before t0, and on the dashed line at t0 + T."""
+    html = page(mechanisms["PRBDM"], interface(mechanisms["PRBDM"], {}), Experiment())
+    assert "Moving walls" in html
+    paths = [
+        np.array([point.split(",") for point in points.split()], float)
+        for points in re.findall(r'points="([^"]*)"', html.partition("Moving walls")[2])
+    ]
+    wall, line, begin, end = paths
+    assert wall[0, 1] == wall[1, 1] == pytest.approx(wall[2, 1], abs=1.0)
+    joined = wall[wall[:, 0] == end[0, 0]]
+    slope = (line[1] - line[0])[1] / (line[1] - line[0])[0]
+    assert joined[0, 1] == pytest.approx(line[0, 1] + slope * (end - begin)[0, 0], abs=0.1)
+    assert (wall[-1] == line[-1]).all()
 
 
 @each_shipped

@@ -67,13 +67,12 @@ def given(true, t: float, velocities: bool) -> dict[str, float]:
 @pytest.mark.parametrize(("offset", "excess"), [(1e-3, 0.0), (0.0, 0.2), (-1e-3, 0.3)])
 def test_velocity_and_acceleration_of_a_wall_are_derivatives_of_its_position(offset, excess):
     wall = Wall(0.1, -0.3, 2.0, offset, excess, 4e-3)
-    for t in (2.0005, 2.002, 2.0039, 2.1):
+    for t in (2.0005, 2.002, 2.0039):
         _, velocity, acceleration = wall.motion(t)
         near = [wall.motion(t + dt) for dt in (-1e-7, 1e-7)]
         assert velocity == pytest.approx((near[1][0] - near[0][0]) / 2e-7, abs=1e-6)
-        if t < wall.end:
-            slope = (near[1][1] - near[0][1]) / 2e-7
-            assert acceleration == pytest.approx(slope, abs=1e-6 * abs(acceleration) + 1e-3)
+        slope = (near[1][1] - near[0][1]) / 2e-7
+        assert acceleration == pytest.approx(slope, abs=1e-6 * abs(acceleration) + 1e-3)
     start, end = wall.motion(wall.since), wall.motion(wall.end)
     assert start[:2] == pytest.approx((0.1 + offset, -0.3 + excess))
     assert end[:2] == pytest.approx((0.1 - 0.3 * 4e-3, -0.3))

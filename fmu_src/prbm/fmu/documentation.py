@@ -8,6 +8,7 @@ from ..base.text import printable
 from ..base.version import GENERATION_TOOL
 from ..interface.native import NativeInterface
 from ..interface.variables import Variable
+from ..mechanics.inputs import Wall
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import FlexureType
 from ..runs.experiment import Experiment
@@ -71,6 +72,7 @@ def page(mechanism: Mechanism, variables: tuple[Variable, ...], experiment: Expe
         _summary(mechanism, "FMI 2.0 co-simulation"),
         _use(mechanism, experiment),
         _equations(mechanism),
+        _walls(mechanism),
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_STEPS),
         _list("Sources", (escape(source) for source in SOURCES), ordered=True),
@@ -111,6 +113,7 @@ def native_page(
         _equations(mechanism),
         _exchange(interface, version),
         _events(mechanism, interface, version),
+        _walls(mechanism),
         _variables(variables),
         _limits(mechanism, variables, INPUTS_OF_BOTH),
         _list("Sources", (escape(source) for source in SOURCES), ordered=True),
@@ -288,24 +291,66 @@ STOP_LIMITS = (
     "pressed against the stop. Bouncing then ends earlier by at most "
     "2 eps v / (a (1 - eps)), with v the rest speed, eps the restitution and a the "
     "pressing acceleration.",
-    "In co-simulation the inputs of a wall at a communication point t0 define a line, "
-    "r(t) = <code>position + displacement</code> + v (t - t0). Its velocity v is the input "
-    "<code>velocity</code> or, while this has always been zero, the mean rate of the "
-    "<code>displacement</code>. The wall joins the line within T, twice the recent longest "
-    "communication step (at most a fifth of the period): x = r + e (1 - 3 s<sup>2</sup> + "
-    "2 s<sup>3</sup>) + u T (s - 2 s<sup>2</sup> + s<sup>3</sup>), s = (t - t0)/T &le; 1, "
-    "with e and u its distance and speed ahead of the line at t0. A uniform motion that is "
-    "given with its velocity is exact. After a jump of the displacement by d, the wall is "
-    "never further than d from its target. All impacts within one communication step are "
-    "computed and counted; the latched outputs describe the last one.",
-    "A body rests on a moving wall while the contact force, which includes the wall's "
-    "acceleration, is positive. When it becomes zero, the body leaves the wall. Other forces "
-    "may close the gap again. A <code>velocity</code> that is set in event mode acts at once.",
-    "A wall that is part of another model takes part in impacts by its "
-    "<code>mobility</code>, its inverse effective mass. The impulse is that between two "
-    "masses, the wall changes its velocity within the step, and the other model must "
-    "receive <code>impulse_sum</code>. With <code>mobility</code> 0 the wall is immovable.",
+    "All impacts within one communication step are computed and counted; the latched outputs "
+    "describe the last one.",
 )
+
+WALLS = (
+    "In co-simulation the inputs of a wall at a communication point t0 define a line",
+    "r(t) = position + displacement + v (t - t0),",
+    "with v the input <code>velocity</code> or, until that has been non-zero, the mean rate of the "
+    "<code>displacement</code>. The wall joins the line within T, twice the recent longest "
+    "communication step (at most a fifth of the period). With e and u its distance and speed ahead "
+    "of the line at t0, and s = (t - t0)/T &le; 1, its position is",
+    "x(t) = r(t) + (1 - s)<sup>2</sup> (e + (2 e + u T) s).",
+)
+WALL_RULES = (
+    "A uniform motion that is given with its velocity is exact. Otherwise the error is below "
+    "2 a h<sup>2</sup>, with a the acceleration of the true wall and h the longest step. After a "
+    "jump of the displacement by d, the wall is never further than d from its target.",
+    "A body rests on a moving wall while the contact force, which includes the wall's "
+    "acceleration, is positive.",
+    "In event mode, <code>velocity</code> acts at once. A jump below <code>rest_speed</code> "
+    "leaves a closed stop closed; its impulse is part of <code>impulse_sum</code>.",
+    "A wall that is part of another model has a <code>mobility</code>, its inverse effective mass. "
+    "The impulse is that between two masses, the wall changes its velocity by it, and the other "
+    "model must receive <code>impulse_sum</code>.",
+)
+
+
+def _walls(mechanism: Mechanism) -> str:
+    """Return the section on moving walls, if the mechanism has stops."""
+    if not mechanism.stops:
+        return ""
+    line, position = WALLS[1], WALLS[3]
+    rules = "".join(f"<li>{rule}</li>" for rule in WALL_RULES)
+    return (
+        f"<h2>Moving walls</h2>\n<p>{WALLS[0]}</p>\n<pre>{line}</pre>\n<p>{WALLS[2]}</p>\n"
+        f"<pre>{position}</pre>\n{_drawn_wall()}\n<ul>{rules}</ul>"
+    )
+
+
+def _drawn_wall() -> str:
+    """Return a figure of a wall at rest that joins the line of new inputs."""
+    wall, width, rise = Wall(0.4, 0.6, 0.0, -0.4, -0.6, 1.0), 200.0, 90.0
+
+    def path(kind: str, points: Iterable[tuple[float, float]]) -> str:
+        places = " ".join(f"{80 + width * t:.1f},{140 - rise * x:.1f}" for t, x in points)
+        return f'<polyline points="{places}" fill="none" stroke="#1f4e79" {kind}/>'
+
+    joining = [(k / 20, float(wall.motion(k / 20)[0])) for k in range(21)]
+    drawn = [
+        path('stroke-width="2.5"', [(-0.3, 0.0), *joining, (1.4, wall.reference(1.4))]),
+        path('stroke-dasharray="5 4"', [(0.0, wall.reference(0.0)), (1.4, wall.reference(1.4))]),
+        path('stroke-width="0.7"', [(0.0, -0.1), (0.0, 1.2)]),
+        path('stroke-width="0.7"', [(1.0, -0.1), (1.0, 1.2)]),
+    ]
+    labels = ((96, 88, "line r"), (150, 135, "wall x"), (76, 165, "t0"), (262, 165, "t0 + T"))
+    drawn += [f'<text x="{x}" y="{y}" font-size="13">{text}</text>' for x, y, text in labels]
+    return (
+        '<figure><svg viewBox="0 0 380 170" width="380" role="img" '
+        f'aria-label="A wall joins the line of its inputs">{"".join(drawn)}</svg></figure>'
+    )
 
 
 def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) -> str:

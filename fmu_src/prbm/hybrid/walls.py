@@ -100,8 +100,8 @@ def join(
         This communication point and the next [s].
     """
     last, following = now - course.point, time - now
-    longest = max(last or following, course.longest - WALL_FADING_FACTOR * last)
-    longest = min(longest, WALL_LONGEST_RTOL * configuration.scales.time)
+    recent = max(last or following, course.longest - WALL_FADING_FACTOR * last)
+    longest = min(recent, WALL_LONGEST_RTOL * configuration.scales.time)
     span, round_off = 2.0 * longest, WALL_PATH_RTOL * configuration.system.length
     joined, driven = list(walls), list(course.driven)
     for i, wall in enumerate(walls):
@@ -110,7 +110,7 @@ def join(
         driven[i] = driven[i] or line.rate != 0.0
         if not driven[i]:
             moved = off - (_position(configuration, i) - _position(acting, i)) if last else 0.0
-            line = replace(line, rate=_mean_rate(wall.rate, moved, max(longest, last), following))
+            line = replace(line, rate=_mean_rate(wall.rate, moved, recent, following))
         if abs(off) + abs(line.rate - wall.rate) * span > round_off:
             velocity = float(wall.motion(now)[1]) if last else line.rate
             joined[i] = wall.joining(line, velocity, span)

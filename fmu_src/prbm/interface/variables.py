@@ -364,8 +364,7 @@ def _inputs(mechanism: Mechanism, nominal: Scales) -> Iterator[Variable]:
     for stop in mechanism.stops:
         mobility = given(
             f"{stop.name}.{MOBILITY}",
-            f"Inverse of the effective mass of the {wall(stop)}: its change of velocity per unit "
-            "impulse; 0 if it is immovable",
+            f"Inverse effective mass (0 if immovable) of the {wall(stop)}",
         )
         yield replace(mobility, minimum=0.0, maximum=WALL_MOBILITY_MAX)
     for axis in "xy":

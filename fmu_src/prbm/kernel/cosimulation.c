@@ -14,23 +14,30 @@
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
-/* Restart the integration from the present state with the present walls, inputs and parameters.
- * follow: whether held stops may follow jumps of their walls' velocities. */
-static bool restart(Simulation *sim, const Wall *walls, bool follow, Problem *problem) {
+/* Make the present state the front, from which the integration continues. */
+static bool leave_arc(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     if (!arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem)) {
         return false;
     }
-    memmove(state->walls, walls, (size_t)system_of(sim)->s * sizeof *walls);
     state->front_time = state->time;
     state->arc.valid = state->has_k1 = false;
-    if (values_changed(sim) && !take_values(sim, problem)) {
+    return true;
+}
+
+/* Let the inputs act that have been set. */
+static void take_inputs(Simulation *sim) {
+    copy(sim->configuration.mechanism->input_count, sim->state.given, sim->state.acting_given);
+    set_inputs(sim);
+}
+
+/* Continue from the present state with the inputs and parameters that have been set. */
+static bool restart(Simulation *sim, Problem *problem) {
+    if (!leave_arc(sim, problem) || (values_changed(sim) && !take_values(sim, problem))) {
         return false;
     }
-    copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
-    set_inputs(sim);
-    return receive_impulses(sim, problem) &&
-           (!follow || follow_walls(sim, false, HUGE_VAL, problem)) && settle_moved(sim, problem);
+    take_inputs(sim);
+    return receive_impulses(sim, problem) && settle_moved(sim, problem);
 }
 
 static bool event_due(const State *state, double time) {
@@ -65,23 +72,20 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
 /* Whether the inputs that move walls have not changed since they began to act. */
 static bool same_walls(const Simulation *sim) {
     const InputGroups *from = &sim->configuration.mechanism->input;
-    size_t bytes = (size_t)(from->impulses - from->walls) * sizeof(double);
-    const double *given = sim->state.given + from->walls;
-    return memcmp(given, sim->state.acting_given + from->walls, bytes) == 0;
+    return memcmp(sim->state.given + from->walls, sim->state.acting_given + from->walls,
+                  (size_t)(from->impulses - from->walls) * sizeof(double)) == 0;
 }
 
 /* Begin a communication step: join the walls to their references, and apply changed inputs and
  * parameters.  A step that was interrupted at an event keeps its references, unless an input of a
  * wall or a parameter has changed. */
 static bool begin_step(Simulation *sim, double time, Problem *problem) {
-    State *state = &sim->state;
-    Wall joined[STOPS_MAX];
-    bool goes_on = state->interrupted && same_walls(sim) && !values_changed(sim);
-    bool walls = !goes_on && join_walls(sim, time, joined);
-    if (walls || values_changed(sim) || inputs_changed(sim)) {
-        return restart(sim, walls ? joined : state->walls, false, problem);
+    bool goes_on = sim->state.interrupted && same_walls(sim) && !values_changed(sim);
+    bool joined = !goes_on && join_walls(sim, time);
+    if (joined || values_changed(sim) || inputs_changed(sim)) {
+        return restart(sim, problem);
     }
-    copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
+    copy(sim->configuration.mechanism->input_count, sim->state.given, sim->state.acting_given);
     return true;
 }
 
@@ -159,30 +163,29 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 
 /* --- event mode ------------------------------------------------------------------------------- */
 
-/* Apply the given walls, the inputs, changed impulses, and the pending event, if any. */
-static bool apply_here(Simulation *sim, const Wall *walls, bool event, bool impulses,
-                       Problem *problem) {
-    State *state = &sim->state;
-    state->interrupted = state->interrupted && same_walls(sim);
-    if (!event) {
-        return restart(sim, walls, !impulses, problem);
+/* Let changed velocities of walls and impulses act, and apply the pending event, if any.  Held
+ * stops follow their walls unless impulses act on the body, too. */
+static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *problem) {
+    if (!event && !leave_arc(sim, problem)) {
+        return false;
     }
-    memcpy(state->walls, walls, (size_t)system_of(sim)->s * sizeof *walls);
-    copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
-    set_inputs(sim);
-    return follow_walls(sim, false, HUGE_VAL, problem) && apply_pending(sim, problem) &&
-           (!impulses || restart(sim, state->walls, false, problem));
+    sim->state.interrupted = sim->state.interrupted && same_walls(sim);
+    turn_walls(sim);
+    take_inputs(sim);
+    if ((event || !impulses) && !follow_walls(sim, false, HUGE_VAL, problem)) {
+        return false;
+    }
+    return (!event || apply_pending(sim, problem)) &&
+           ((event && !impulses) || restart(sim, problem));
 }
 
 PRBM bool simulation_handle_event(Simulation *simulation, Problem *problem) {
     Simulation *sim = simulation;
-    Wall walls[STOPS_MAX];
     bool event = event_due(&sim->state, sim->state.time), impulses = impulses_changed(sim);
-    bool turned = turn_walls(sim, walls);
-    if (!event && !impulses && !turned) {
+    if (!event && !impulses && same_walls(sim)) {
         return true;
     }
     keep_backup(sim);
     sim->present.fresh = NOTHING;
-    return attempt(sim, apply_here(sim, walls, event, impulses, problem), problem);
+    return attempt(sim, apply_here(sim, event, impulses, problem), problem);
 }

@@ -4,8 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-import numpy as np
-
 from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..base.tolerances import WALL_MOBILITY_MAX
@@ -32,9 +30,9 @@ T = TypeVar("T", float, Real, float | Real)
 class Wall:
     """A wall that joins its reference, a uniform motion, along a cubic.
 
-    With tau = t - since and s = min(tau / span, 1), the wall is at
+    With tau = t - since and s = tau / span, the wall is at
 
-        x = position + rate tau + offset (1 - 3 s^2 + 2 s^3) + excess span (s - 2 s^2 + s^3).
+        x = position + rate tau + (1 - s)^2 (offset + (2 offset + excess span) s).
 
     Parameters
     ----------
@@ -84,12 +82,12 @@ class Wall:
         x, zero = self.reference(t), 0.0 * t
         if not self.span:
             return x, self.rate + zero, zero
-        e, u, T = self.offset, self.excess, self.span
-        s = np.minimum((t - self.since) / T, 1.0) + zero
-        x = x + e * (1.0 + s * s * (2.0 * s - 3.0)) + u * T * s * (1.0 - s) ** 2
-        velocity = self.rate + 6.0 * e / T * s * (s - 1.0) + u * (1.0 - s) * (1.0 - 3.0 * s)
-        acceleration = (6.0 * e / T * (2.0 * s - 1.0) + u * (6.0 * s - 4.0)) / T
-        return x, velocity, acceleration
+        s = (t - self.since) / self.span
+        left, slope = 1.0 - s, 2.0 * self.offset + self.excess * self.span
+        ahead = self.offset + slope * s
+        velocity = self.rate + left * (left * slope - 2.0 * ahead) / self.span
+        acceleration = (2.0 * ahead - 4.0 * left * slope) / self.span**2
+        return x + left * left * ahead, velocity, acceleration
 
     def joining(self, line: "Wall", velocity: float, span: float) -> "Wall":
         """Return the wall that joins another reference from the time ``line.since`` on.
@@ -108,8 +106,8 @@ class Wall:
 
     def pushed(self, t: float, change: float) -> "Wall":
         """Return the wall after a change of its velocity and that of its reference at time t."""
-        line = Wall(self.reference(t), self.rate + change, t)
-        return self.joining(line, float(self.motion(t)[1]) + change, self.span)
+        position = self.position - change * (t - self.since)
+        return replace(self, position=position, rate=self.rate + change)
 
     def arrived(self) -> "Wall":
         """Return the wall on its reference."""

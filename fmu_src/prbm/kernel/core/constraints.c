@@ -210,6 +210,9 @@ PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
         right[n + k] = -(dot(n, rows + k * n, v) + rates[k]);
     }
     saddle(n, r, M, rows, rows, kkt);
+    for (size_t k = (size_t)n; impulses && k < size; k++) {
+        kkt[k * size + k] -= impulses[k - (size_t)n];
+    }
     bool regular = solve((int)size, kkt, right, scratch, problem);
     for (int i = 0; regular && i < n; i++) {
         v[i] += right[i];

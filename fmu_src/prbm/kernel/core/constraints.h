@@ -37,8 +37,8 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
 /* Project q (n,) onto the rows with the constants c (count,), and set e to the directions of q. */
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
                             Complex *e, Scratch *scratch, Problem *problem);
-/* Project v (n,) onto rows v + rates = 0.  impulses (r,) along the rows, which may be NULL, is set
- * to those that change v. */
+/* v (n,) moves onto rows v + rates = 0 by impulses along the rows.  The impulses (r,), unless NULL,
+ * are given as the mobilities by which they change the rates. */
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, double *impulses, Scratch *scratch,
                              Problem *problem);

@@ -27,7 +27,7 @@ static double rubbing_power(const Equations *q, const Evaluation *at, const doub
 static double input_power(const Equations *q, const Evaluation *at, const double *v) {
     int n = q->system->n;
     double power = 0.0;
-    for (int j = 0; q->driven && j < n; j++) {
+    for (int j = 0; j < n; j++) {
         power += (product(q->w_input[j], at->at.e[j]).re + q->moment[j]) * v[j];
     }
     for (int k = 0; k < q->held_count; k++) {
@@ -76,7 +76,7 @@ PRBM bool rate_at_time(const Equations *equations, const double *y, const Refere
     if (q->slipping_count > 0) {
         dy[2 * n] += rubbing_power(q, result, v);
     }
-    if (q->driven || q->walls_push) {
+    if (q->driven) {
         dy[2 * n + 1] = input_power(q, result, v);
     }
     return true;

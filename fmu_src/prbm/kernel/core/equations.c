@@ -158,13 +158,13 @@ static void set_loads(Equations *q) {
                     q->moment[j] != 0.0;
     }
     pad_parts(n, q->w, q->w_parts);
-    q->walls_push = q->walls_join = false;
+    q->walls_move = false;
     for (int i = 0; i < system->s; i++) {
         const Wall *wall = &q->inputs.walls[i];
-        bool held = q->contacts.modes[i] != CONTACT_OPEN;
-        q->walls_join = q->walls_join || wall->span > 0.0;
-        q->walls_push = q->walls_push || (held && (wall->rate != 0.0 || wall->span > 0.0));
+        q->walls_move = q->walls_move || wall->rate != 0.0 || wall->span > 0.0;
     }
+    q->driven = q->driven || q->walls_move;
+    q->special = q->walls_move || q->slipping_count > 0;
 }
 
 PRBM void set_equations(Equations *equations, const Inputs *inputs,
@@ -183,26 +183,18 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
 
 /* --- walls ------------------------------------------------------------------------------------ */
 
-PRBM double reference_at(const Wall *wall, double t) {
-    return wall->position + wall->rate * (t - wall->since);
-}
-
-/* The motion on the cubic: with s = min((t - since) / span, 1),
- *     x = reference + offset (1 - 3 s^2 + 2 s^3) + excess span (s - 2 s^2 + s^3).
- * Callers replace the wall by its reference at the end of the cubic. */
-RARE WallMotion cubic_motion(const Wall *wall, double t) {
-    double T = wall->span, s = lesser((t - wall->since) / T, 1.0);
-    double e = wall->offset, u = wall->excess;
-    WallMotion result = {
-        reference_at(wall, t) + e * (1.0 + s * s * (2.0 * s - 3.0)) +
-            u * T * s * (1.0 - s) * (1.0 - s),
-        wall->rate + 6.0 * e / T * s * (s - 1.0) + u * (1.0 - s) * (1.0 - 3.0 * s),
-        (6.0 * e / T * (2.0 * s - 1.0) + u * (6.0 * s - 4.0)) / T,
-    };
-    return result;
-}
-
+/* With s = (t - since) / span:
+ *     x = reference + (1 - s)^2 (offset + (2 offset + excess span) s).
+ * At the end of the cubic the wall is to be replaced by its reference. */
 PRBM WallMotion wall_motion(const Wall *wall, double t) {
-    const WallMotion uniform = {reference_at(wall, t), wall->rate, 0.0};
-    return wall->span > 0.0 ? cubic_motion(wall, t) : uniform;
+    double tau = t - wall->since, T = wall->span;
+    WallMotion result = {wall->position + wall->rate * tau, wall->rate, 0.0};
+    if (T > 0.0) {
+        double s = tau / T, left = 1.0 - s;
+        double slope = 2.0 * wall->offset + wall->excess * T, ahead = wall->offset + slope * s;
+        result.x += left * left * ahead;
+        result.v += left * (left * slope - 2.0 * ahead) / T;
+        result.a = (2.0 * ahead - 4.0 * left * slope) / (T * T);
+    }
+    return result;
 }

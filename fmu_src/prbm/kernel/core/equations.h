@@ -45,8 +45,9 @@ typedef struct {
     Rows active;
     Complex *w, *w_input;   /* (n,) */
     double *moment;         /* (even,) */
-    bool driven;
-    bool walls_push, walls_join; /* walls of held stops move; walls are off their references */
+    bool walls_move;
+    bool driven;            /* inputs or walls do work */
+    bool special;           /* walls move, or contacts slip */
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
 } Equations;
@@ -55,7 +56,6 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 /* Set up the rows and loads of a contact state. */
 PRBM void set_equations(Equations *equations, const Inputs *inputs,
                         const ContactState *contacts, double omega);
-PRBM double reference_at(const Wall *wall, double t);
 PRBM WallMotion wall_motion(const Wall *wall, double t);
 PRBM Parts place_parts(Memory *memory, size_t count);
 PRBM Parts parts_from(Parts parts, int start);

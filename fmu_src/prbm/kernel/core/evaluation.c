@@ -394,12 +394,17 @@ PRBM double rub_force(const Equations *q, int i, const Complex *e) {
     return -slip_sign(q->contacts.modes[q->system->s + i]) * rub_limit(q, i, e);
 }
 
-static void add_rubs(const Equations *q, Evaluation *result) {
+/* Add slipping friction points, and the accelerations of the walls of held stops. */
+RARE void add_special(const Equations *q, Evaluation *result) {
     Rows rubs = rub_rows(q->system);
     for (int k = q->slipping_stops; k < q->slipping_count; k++) {
         int i = q->slipping[k] - q->system->s;
         row_jacobian(&rubs, i, result->at.e, result->row);
         add_scaled(q->system->n, rub_force(q, i, result->at.e), result->row, result->a);
+    }
+    for (int k = 0; q->walls_move && k < q->held_count; k++) {
+        const Wall *wall = &q->inputs.walls[q->held[k]];
+        result->lam[q->first_hold + k] -= wall_motion(wall, result->at.time).a;
     }
 }
 
@@ -446,13 +451,6 @@ RARE void add_coriolis(const System *system, Evaluation *result) {
     }
 }
 
-/* Subtract the accelerations of the walls from the right sides of the held stops. */
-RARE void add_walls(const Equations *q, double t, double *right) {
-    for (int k = 0; k < q->held_count; k++) {
-        right[q->first_hold + k] -= wall_motion(&q->inputs.walls[q->held[k]], t).a;
-    }
-}
-
 /* Solve for a and lam at the time, angles and rates of the evaluation. */
 SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,
                             Evaluation *result) {
@@ -460,10 +458,9 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
     find_loads(even, q, result);
     add_springs(even, q, result);
     rows_of_length(even, q, &result->at, result->factors.Z, result->lam);
-    if (q->walls_push) {
-        add_walls(q, result->at.time, result->lam);
+    if (q->special) {
+        add_special(q, result);
     }
-    add_rubs(q, result);
     if (!factor_motion(even, q, result)) {
         return false;
     }

@@ -9,7 +9,7 @@
 
 /* The constant part of an active constraint at time t. */
 static double offset(const Equations *q, int k, double t) {
-    if (q->walls_push && k >= q->first_hold && k < q->first_stick) {
+    if (q->walls_move && k >= q->first_hold && k < q->first_stick) {
         int i = q->held[k - q->first_hold];
         return q->system->gaps_c[i] + wall_motion(&q->inputs.walls[i], t).x;
     }
@@ -18,7 +18,7 @@ static double offset(const Equations *q, int k, double t) {
 
 /* The part of the rate of an active constraint that is prescribed at time t. */
 PRBM double prescribed(const Equations *q, int k, double t) {
-    bool moves = q->walls_push && k >= q->first_hold && k < q->first_stick;
+    bool moves = q->walls_move && k >= q->first_hold && k < q->first_stick;
     return moves ? wall_motion(&q->inputs.walls[q->held[k - q->first_hold]], t).v : 0.0;
 }
 
@@ -32,6 +32,10 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
     for (int k = 0; k < q->r; k++) {
         c[k] = offset(q, k, t);
         rates[k] = prescribed(q, k, t);
+        if (impulses) {
+            bool held = k >= q->first_hold && k < q->first_stick;
+            impulses[k] = held ? q->inputs.mobilities[q->held[k - q->first_hold]] : 0.0;
+        }
     }
     Rows positions = q->active;
     positions.count = q->first_stick;

@@ -75,7 +75,7 @@ PRBM bool stages(const Equations *equations, double t, int n, const double *y, d
     set_reference(reference, equations->system, y);
     for (int i = 1; i < STAGES; i++) {
         combine(n, i, h, STAGE[i], k, y, y1);
-        if (equations->walls_push) {
+        if (equations->walls_move) {
             evaluation->at.time = t + STAGE_TIME[i] * h;
         }
         if (!rate_at_time(equations, y1, reference, evaluation, k + i * n, problem)) {

@@ -422,21 +422,14 @@ static void book_energies(Simulation *sim, const Hits *hits, const double *q, co
     double lost = 0.0, work = 0.0, *front = sim->state.front, t = sim->state.front_time;
     Complex *e = directions_at(sim, q);
     for (int i = 0; i < system->s; i++) {
-        double wall = wall_motion(&sim->state.walls[i], t).v, P = hits->normal[i];
+        double P = hits->normal[i];
         account->before[i] = gap_rate(&sim->equations, i, t, e, v);
-        if (hits->with_normal[i]) {
-            Wall *hit = &sim->state.walls[i];
-            double change = sim->equations.inputs.mobilities[i] * P;
-            *hit = change != 0.0 ? turned_wall(hit, t, wall + change, hit->rate + change) : *hit;
-            sim->state.latched[i].impulse_sum += P;
-        }
+        work += hits->with_normal[i] ? push_wall(sim, i, P) : 0.0;
         account->after[i] = gap_rate(&sim->equations, i, t, e, hits->after);
         double slid = row_rate(&walls, i, e, v) + row_rate(&walls, i, e, hits->after);
         account->lost[i] = -P * (account->before[i] + account->after[i]) / 2 -
                            hits->tangential[i] * slid / 2;
         lost += hits->with_normal[i] ? account->lost[i] : 0.0;
-        wall += wall_motion(&sim->state.walls[i], t).v;
-        work -= hits->with_normal[i] ? P * wall / 2 : 0.0;
     }
     copy(system->n, hits->after, front + system->n);
     front[2 * system->n] += lost;

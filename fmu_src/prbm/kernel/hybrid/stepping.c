@@ -148,7 +148,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     Stepping *stepping = &sim->stepping;
     int ny = state_size(sim);
-    double h = 0.0, longest = sim->equations.walls_join ? follow_cubics(sim) : HUGE_VAL;
+    double h = 0.0, longest = sim->equations.walls_move ? follow_cubics(sim) : HUGE_VAL;
     if (!state->has_k1 && !rate(&sim->equations, state->front_time, state->front, NULL,
                                 &stepping->evaluation, state->k1, problem)) {
         return false;

@@ -12,8 +12,7 @@ static Wall given_reference(const Simulation *sim, int i) {
     const Mechanism *m = sim->configuration.mechanism;
     const double *given = wall_inputs(m, sim->state.given, i);
     double position = evaluate(m->stops[i].position, sim->state.values) + given[0];
-    Wall reference = {position, given[1], sim->state.time, 0.0, 0.0, 0.0};
-    return reference;
+    return (Wall){position, given[1], sim->state.time, 0.0, 0.0, 0.0};
 }
 
 /* Set the position and velocity of each wall to those of its reference. */
@@ -24,72 +23,68 @@ PRBM void start_walls(Simulation *sim) {
     }
 }
 
-/* Return a wall that joins another reference from the time reference.since on. */
-static Wall joining(const Wall *wall, Wall reference, double velocity, double span) {
-    reference.offset = wall_motion(wall, reference.since).x - reference.position;
-    reference.excess = velocity - reference.rate;
-    reference.span = span;
-    return reference;
+/* Change the velocities of a wall and of its reference at a time t. */
+static void turn_wall(Wall *wall, double t, double change) {
+    wall->position -= change * (t - wall->since);
+    wall->rate += change;
 }
 
-/* Return a wall with new velocities of the wall and of its reference from a time t on. */
-PRBM Wall turned_wall(const Wall *wall, double t, double velocity, double rate) {
-    Wall reference = {reference_at(wall, t), rate, t, 0.0, 0.0, 0.0};
-    return joining(wall, reference, velocity, wall->span);
+/* Push a wall by the impulse P on the body; returns the work of the wall. */
+PRBM double push_wall(Simulation *sim, int i, double P) {
+    Wall *wall = &sim->state.walls[i];
+    double t = sim->state.front_time, change = sim->equations.inputs.mobilities[i] * P;
+    double velocity = wall_motion(wall, t).v;
+    turn_wall(wall, t, change);
+    sim->state.latched[i].impulse_sum += P;
+    return -P * (velocity + change / 2);
 }
 
-/* The change of stop.position at a communication point, a jump without velocity [m]. */
-static double shift(const Simulation *sim, int i) {
-    Expression position = sim->configuration.mechanism->stops[i].position;
-    return evaluate(position, sim->state.values) - evaluate(position, sim->state.acting_values);
-}
-
-/* Compute the walls in a communication step from the present time to the given time; return whether
- * a reference has changed.
+/* Join the walls to their references in a communication step from the present time to another;
+ * returns whether a reference has changed.
  *
  * Without stop.velocity, the velocity of a reference is the mean rate of the displacement over the
- * recent longest step.  It is reduced if the following step is longer, so that a jump is not
- * extrapolated beyond its own size.  Before the first step, the velocity of a wall is that of its
- * reference. */
-PRBM bool join_walls(Simulation *sim, double time, Wall *joined) {
+ * recent longest step; a change of stop.position gives it no velocity.  It is reduced if the
+ * following step is longer, so that a jump is not extrapolated beyond its own size.  Before the
+ * first step, the velocity of a wall is that of its reference. */
+PRBM bool join_walls(Simulation *sim, double time) {
     State *state = &sim->state;
     double now = state->time, last = now - state->point, following = time - now;
     double H = greater(last > 0.0 ? last : following, state->longest - WALL_FADING_FACTOR * last);
-    double T = 2.0 * lesser(H, WALL_LONGEST_RTOL * sim->configuration.scales.time);
-    double longest = greater(0.5 * T, last), share = lesser(longest / following, 1.0);
+    state->longest = lesser(H, WALL_LONGEST_RTOL * sim->configuration.scales.time);
+    state->point = now;
+    double T = 2.0 * state->longest, share = lesser(H / following, 1.0);
+    double least = WALL_PATH_RTOL * system_of(sim)->length;
     bool changed = false;
     for (int i = 0; i < system_of(sim)->s; i++) {
         Wall *wall = &state->walls[i], line = given_reference(sim, i);
-        double off = line.position - reference_at(wall, now);
+        Expression at = sim->configuration.mechanism->stops[i].position;
+        double off = line.position - wall->position - wall->rate * (now - wall->since);
         state->driven[i] = state->driven[i] || line.rate != 0.0;
         if (!state->driven[i]) {
-            double moved = last > 0.0 && off != 0.0 ? off - shift(sim, i) : 0.0;
-            line.rate = (wall->rate + moved / longest) * share * share;
+            double old = off != 0.0 ? evaluate(at, state->acting_values) : 0.0;
+            double moved = off != 0.0 && last > 0.0 ? off + old - evaluate(at, state->values) : 0.0;
+            line.rate = (wall->rate + moved / H) * share * share;
         }
-        bool same = fabs(off) + fabs(line.rate - wall->rate) * T <=
-                    WALL_PATH_RTOL * system_of(sim)->length;
-        double velocity = last > 0.0 ? wall_motion(wall, now).v : line.rate;
-        joined[i] = same ? *wall : joining(wall, line, velocity, T);
-        changed = changed || !same;
+        if (fabs(off) + fabs(line.rate - wall->rate) * T > least) {
+            WallMotion here = wall_motion(wall, now);
+            line.offset = here.x - line.position;
+            line.excess = last > 0.0 ? here.v - line.rate : 0.0;
+            line.span = T;
+            *wall = line;
+            changed = true;
+        }
     }
-    state->point = now;
-    state->longest = 0.5 * T;
     return changed;
 }
 
-/* Compute the walls in event mode.  If stop.velocity has changed, the wall and its reference take
- * the new velocity.  Return whether there is such a wall. */
-PRBM bool turn_walls(const Simulation *sim, Wall *turned) {
-    const Mechanism *m = sim->configuration.mechanism;
-    const State *state = &sim->state;
-    bool any = false;
-    for (int i = 0; i < m->stop_count; i++) {
-        double v = wall_inputs(m, state->given, i)[1];
-        bool same = v == wall_inputs(m, state->acting_given, i)[1];
-        turned[i] = same ? state->walls[i] : turned_wall(&state->walls[i], state->time, v, v);
-        any = any || !same;
+/* Give walls whose stop.velocity has changed in event mode this velocity. */
+PRBM void turn_walls(Simulation *sim) {
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        Wall *wall = &sim->state.walls[i], line = given_reference(sim, i);
+        if (line.rate != wall_inputs(sim->configuration.mechanism, sim->state.acting_given, i)[1]) {
+            turn_wall(wall, line.since, line.rate - wall_motion(wall, line.since).v);
+        }
     }
-    return any;
 }
 
 /* An upper bound of the distance that a wall moves in a step h. */
@@ -103,14 +98,13 @@ PRBM double follow_cubics(Simulation *sim) {
     double longest = HUGE_VAL;
     for (int i = 0; i < system_of(sim)->s; i++) {
         Wall *wall = &sim->state.walls[i];
-        double end = wall->span > 0.0 ? wall->since + wall->span : HUGE_VAL;
-        double left = end - sim->state.front_time;
-        if (left <= EVENT_TIME_ATOL) {
+        double left = wall->since + wall->span - sim->state.front_time;
+        if (wall->span > 0.0 && left > EVENT_TIME_ATOL) {
+            longest = lesser(longest, lesser(WALL_STEP_RTOL * wall->span, left));
+        } else if (wall->span > 0.0) {
             wall->offset = wall->excess = wall->span = 0.0;
             sim->state.has_k1 = false;
             set_inputs(sim);
-        } else if (left < HUGE_VAL) {
-            longest = lesser(longest, lesser(WALL_STEP_RTOL * wall->span, left));
         }
     }
     return longest;
@@ -118,38 +112,37 @@ PRBM double follow_cubics(Simulation *sim) {
 
 /* The largest jump of a wall's velocity at which a held stop stays closed. */
 PRBM double jump_allowed(const Simulation *sim, int i) {
-    const Stop *stop = &sim->configuration.mechanism->stops[i];
-    return greater(stop_field(sim, stop->rest_speed),
-                   REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
+    double rest_speed = stop_field(sim, sim->configuration.mechanism->stops[i].rest_speed);
+    return greater(rest_speed, REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
 }
 
 /* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
- * stops open or are struck.  The impulses P on the held stops dissipate energy as captures do.
- * P may be negative (pull), but not below minus the present force times the given time. */
+ * stops open or are struck.  Impulses may pull, but not more than the present forces press within
+ * the given time. */
 PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem) {
     size_t mark = sim->scratch.used;
     const Equations *q = &sim->equations;
     Evaluation *at = &sim->at_front;
-    int ny = state_size(sim), n = system_of(sim)->n;
-    double *y = sim->state.front, t = sim->state.front_time;
+    int n = system_of(sim)->n, ny = state_size(sim), h = q->first_hold;
+    double *y = sim->state.front, t = sim->state.front_time, speed[STOPS_MAX];
     double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);
     bool moved = drifted, follows = true;
     copy(ny, y, after);
     bool right = evaluate_equations(q, t, y, y + n, NULL, at, problem) &&
                  project_with_impulses(q, t, after, P, &sim->scratch, problem);
-    for (int k = q->first_hold; right && k < q->first_stick; k++) {
-        int i = q->held[k - q->first_hold];
-        double speed = gap_rate(q, i, t, at->at.e, y + n);
-        bool jumps = fabs(speed) > zero_speed(&sim->configuration);
+    for (int k = 0; right && k < q->held_count; k++) {
+        speed[k] = gap_rate(q, q->held[k], t, at->at.e, y + n);
+        bool jumps = fabs(speed[k]) > zero_speed(&sim->configuration);
         moved = moved || jumps;
-        follows = follows && fabs(speed) <= jump_allowed(sim, i) &&
-                  (!jumps || P[k] >= -greater(at->lam[k], 0.0) * time);
-        after[2 * n] -= P[k] * speed / 2;
-        after[2 * n + 1] -= P[k] * wall_motion(&q->inputs.walls[i], t).v;
+        follows = follows && fabs(speed[k]) <= jump_allowed(sim, q->held[k]) &&
+                  (!jumps || P[h + k] >= -greater(at->lam[h + k], 0.0) * time);
     }
-    if (right && moved && follows) {
-        copy(ny, after, y);
+    bool captures = right && moved && follows;
+    for (int k = 0; captures && k < q->held_count; k++) {
+        after[2 * n] -= P[h + k] * speed[k] / 2;
+        after[2 * n + 1] += push_wall(sim, q->held[k], P[h + k]);
     }
+    copy(captures ? ny : 0, after, y);
     sim->scratch.used = mark;
     return right && (!moved || follows || settle_moved(sim, problem));
 }
