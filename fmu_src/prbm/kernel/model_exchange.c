@@ -80,9 +80,31 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
     return true;
 }
 
+static bool all_finite(int count, const double *x) {
+    for (int i = 0; i < count; i++) {
+        if (!finite_number(x[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool too_large(const Simulation *sim, Problem *problem) {
+    const double *y = sim->state.front;
+    int n = system_of(sim)->n;
+    return fail(problem,
+                "the accelerations at t = %.9g s are not finite numbers (largest angle or strain: "
+                "%g, largest rate: %g 1/s): the states are far from every motion of the mechanism; "
+                "shorten the steps of the solver",
+                sim->state.time, largest(n, y), largest(n, y + n));
+}
+
 /* The present moment: that of the front. */
 PRBM bool exchange_moment(Simulation *sim, Moment *now, Problem *problem) {
-    return exchange_refresh(sim, problem) && moment_at(sim, sim->state.front, now, problem);
+    if (!exchange_refresh(sim, problem) || !moment_at(sim, sim->state.front, now, problem)) {
+        return false;
+    }
+    return all_finite(state_size(sim), now->rates) || too_large(sim, problem);
 }
 
 /* Accept the shape of the front, from which later shapes are computed. */
