@@ -352,6 +352,25 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     return attempt(sim, right, problem);
 }
 
+PRBM bool exchange_pending(Simulation *simulation, bool *pending, Problem *problem) {
+    Simulation *sim = simulation;
+    const bool struck[STOPS_MAX] = {false};
+    size_t mark = sim->scratch.used;
+    Moment now;
+    if (!exchange_moment(sim, &now, problem)) {
+        return false;
+    }
+    double *z = take(&sim->scratch, (size_t)exchange_indicators(sim));
+    event_indicators(sim, &now.at, z);
+    *pending = impulses_changed(sim) || drift(sim, &now.at) > DRIFT_RTOL ||
+               due_here(sim, &now.at, struck).kind != EVENT_NONE;
+    for (int i = 0; i < exchange_indicators(sim); i++) {
+        *pending = *pending || z[i] <= 0.0;
+    }
+    sim->scratch.used = mark;
+    return true;
+}
+
 /* The stop that is penetrated most, if deeper than a solver's errors explain; else NULL. */
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth) {
     Simulation *sim = simulation;

@@ -77,6 +77,8 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
 /* Event mode: apply the inputs and all events that are due.  *changed: whether the states have
  * changed. */
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem);
+/* Whether exchange_event would apply an event or an impulse here. */
+PRBM bool exchange_pending(Simulation *simulation, bool *pending, Problem *problem);
 /* The stop that is penetrated most, if deeper than a solver's errors explain; else NULL. */
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth);
 /* Derivative of all values (slots.count) along a change of states dx and of inputs du, by exact

@@ -168,8 +168,26 @@ PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed) 
     return FMU_OK;
 }
 
+/* Whether an update of the discrete states would change anything. */
+static bool update_pending(Instance *instance) {
+    bool pending = true;
+    Problem problem;
+    if (instance->clocks && any_tick(instance)) {
+        return true;
+    }
+    if (instance->kind == CO_SIMULATION) {
+        return instance->event_due;
+    }
+    return !exchange_pending(instance->simulation, &pending, &problem) || pending;
+}
+
+/* Leave Event Mode.  Some importers do not update the discrete states before, which is accepted if
+ * nothing is pending. */
 PRBM int leave_event_mode(Instance *instance, const Rule *rule, Mode next) {
-    if (!instance->updated) {
+    if (!instance->updated && has_rejected(instance, FMU_ERROR)) {
+        return FMU_ERROR;
+    }
+    if (!instance->updated && update_pending(instance)) {
         return refuse(instance, FMU_ERROR, "%s: the event is not finished; call %s = false",
                       rule->function,
                       instance->standard->version == 2
