@@ -99,6 +99,8 @@ STEP_SUM_RTOL = 1e-6  # Of a communication step: round-off that an importer's ti
 STOP_TIME_RTOL = 1e-3  # Of a communication step: allowed overshoot of the stop time.
 
 # --- model exchange ----------------------------------------------------------------------------
+NOMINAL_ANGLE_MIN = 1e-2  # rad; smallest amplitude from which nominal values of states are derived.
+NOMINAL_STRAIN_FACTOR = 0.1  # Of the energy at the start: assumed in the stiffest axial spring.
 DRIFT_RTOL = 1e-8  # Of the size: drift of a held contact that requests an event.
 MOVING_DRIFT_FACTOR = 100.0  # Of DRIFT_RTOL: the same while the wall moves.
 DRIFT_CORRECTED_RTOL = 1e-12  # Of the size: drift that an event leaves uncorrected.

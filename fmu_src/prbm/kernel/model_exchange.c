@@ -128,11 +128,43 @@ PRBM void exchange_get(const Simulation *simulation, double *x) {
     copy(exchange_states(simulation), simulation->state.states, x);
 }
 
-/* The least power of ten that is not below a value, as the nominal value in modelDescription.xml.
- * Solvers derive their absolute tolerance from it: with a nominal value below the scale of the
- * motion they would resolve round-off. */
-static double next_power_of_ten(double value) {
+/* --- nominal values --------------------------------------------------------------------------- */
+
+/* Keep the magnitudes of the motion from the start. */
+static void measure_motion(Simulation *sim) {
+    const System *system = system_of(sim);
+    const Scales *scales = &sim->configuration.scales;
+    size_t mark = sim->scratch.used;
+    int n = system->n;
+    const double *q = sim->state.front, *v = q + n;
+    double *amplitude = take(&sim->scratch, (size_t)n), energy = 0.0, angle = NOMINAL_ANGLE_MIN;
+    for (int j = 0; j < n; j++) {
+        amplitude[j] = q[j] - system->q0[j] + v[j] / scales->rate;
+        angle = arm_of(system, j) == j ? greater(angle, fabs(amplitude[j])) : angle;
+    }
+    for (int j = 0; j < n; j++) {
+        energy += amplitude[j] * dot(n, system->K + j * n, amplitude) / 2.0;
+    }
+    sim->state.angle = angle;
+    sim->state.energy = greater(energy, scales->energy * (NOMINAL_ANGLE_MIN * NOMINAL_ANGLE_MIN));
+    sim->scratch.used = mark;
+}
+
+/* The strain of a link, if a part of the energy is in the stiffest axial spring. */
+static double typical_strain(const Simulation *sim) {
+    const System *system = system_of(sim);
+    double stiffest = 0.0;
+    for (int j = 0; j < system->n; j++) {
+        bool stretches = arm_of(system, j) != j;
+        stiffest = stretches ? greater(stiffest, system->K[j * system->n + j]) : stiffest;
+    }
+    return sqrt(2.0 * NOMINAL_STRAIN_FACTOR * sim->state.energy / stiffest);
+}
+
+/* The nearest power of ten, as the nominal value in modelDescription.xml. */
+static double nearest_power_of_ten(double value) {
     double power = 1.0; /* exact to 1e22 */
+    value /= sqrt(10.0);
     if (value <= 1.0) {
         while (value * power * 10.0 <= 1.0) {
             power *= 10.0;
@@ -145,15 +177,18 @@ static double next_power_of_ten(double value) {
     return power;
 }
 
+/* Solvers derive their absolute tolerances from the nominal values. */
 PRBM void exchange_nominals(const Simulation *simulation, double *x) {
-    const Scales *scales = &simulation->configuration.scales;
-    int count = simulation->configuration.mechanism->independent_count;
-    double rate = next_power_of_ten(scales->rate);
+    const Mechanism *m = simulation->configuration.mechanism;
+    const State *state = &simulation->state;
+    int count = m->independent_count;
+    double rate = nearest_power_of_ten(state->angle * simulation->configuration.scales.rate);
     for (int k = 0; k < count; k++) {
-        x[k] = 1.0;
+        bool turns = m->coordinates[m->independent[k]].arm == m->independent[k];
+        x[k] = nearest_power_of_ten(turns ? state->angle : typical_strain(simulation));
         x[count + k] = rate;
     }
-    x[2 * count] = x[2 * count + 1] = next_power_of_ten(scales->energy);
+    x[2 * count] = x[2 * count + 1] = nearest_power_of_ten(state->energy);
 }
 
 PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *problem) {
@@ -395,6 +430,7 @@ PRBM void exchange_begin(Simulation *sim) {
     Problem ignored;
     Moment now;
     accept(sim);
+    measure_motion(sim);
     states_of(sim, sim->state.front, sim->state.states);
     forget_present(sim);
     if (exchange_moment(sim, &now, &ignored)) {
