@@ -213,16 +213,24 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
 
 /* --- drift ------------------------------------------------------------------------------------ */
 
+/* The drift of a speed, relative to the scale of speed. */
+static double speed_drift(const Simulation *sim, double speed) {
+    return fabs(speed) / (DRIFT_SPEED_FACTOR * guard_scale(sim, EVENT_REVERSAL));
+}
+
 /* The drift of a closed stop off its wall, relative to the scales of length and speed.  While the
  * wall moves, its acceleration is unknown: the release indicator then watches the speed, and a
  * larger distance is allowed. */
 static double stop_drift(const Simulation *sim, const Instant *at, int i) {
     double off = fabs(gap(&sim->equations, i, at->time, at->e)) / system_of(sim)->length;
-    double speed = fabs(leaving_rate(sim, at, i)) / guard_scale(sim, EVENT_REVERSAL);
-    return sim->state.walls[i].rate != 0.0 ? off / MOVING_DRIFT_FACTOR : greater(off, speed);
+    return sim->state.walls[i].rate != 0.0
+               ? off / MOVING_DRIFT_FACTOR
+               : greater(off, speed_drift(sim, leaving_rate(sim, at, i)));
 }
 
-/* The largest drift of the closed stops and the sticking contacts. */
+/* The largest drift of the closed stops and the sticking contacts.  The limit that requests an
+ * event is above the errors of solvers at usual tolerances: an event restarts a solver, whose error
+ * in its first steps is large. */
 static double drift(const Simulation *sim, const Instant *at) {
     const Equations *q = &sim->equations;
     double most = 0.0;
@@ -230,8 +238,7 @@ static double drift(const Simulation *sim, const Instant *at) {
         most = greater(most, stop_drift(sim, at, q->held[k]));
     }
     for (int k = q->first_stick; k < q->r; k++) {
-        double speed = fabs(row_rate(&q->active, k, at->e, at->v));
-        most = greater(most, speed / guard_scale(sim, EVENT_REVERSAL));
+        most = greater(most, speed_drift(sim, row_rate(&q->active, k, at->e, at->v)));
     }
     return most;
 }
@@ -253,7 +260,7 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
 /* Whether the sliding speed of a contact is within a solver's error at the end of sliding. */
 static bool sliding_ends(const Simulation *sim, const Instant *at, int contact) {
     double speed = sliding_velocity(system_of(sim), contact, at->e, at->v);
-    return fabs(speed) <= DRIFT_RTOL * guard_scale(sim, EVENT_REVERSAL);
+    return fabs(speed) <= SLIDING_ERROR_RTOL * guard_scale(sim, EVENT_REVERSAL);
 }
 
 /* Bring a contact to rest, so that the solver's error is not taken for sliding back. */
