@@ -1,9 +1,11 @@
 """Calls that other importers make in model exchange, though the standard does not foresee them."""
 
+import contextlib
 from ctypes import c_double
 
 import numpy as np
 import pytest
+from fmpy.fmi1 import FMICallException
 
 from native_host import DISCARD, ERROR, OK, Instance, Integrator, status
 from support import each_shipped
@@ -117,6 +119,38 @@ def statuses(instance: Instance) -> dict[str, int]:
             assert np.isfinite(instance.get(name)).all(), name
             del results[name]
     return results
+
+
+def evaluated(instance: Instance) -> list[np.ndarray]:
+    """Return the results of all evaluations whose status is OK."""
+    integrator, fmu = Integrator(instance), instance.fmu
+    nx, nz = integrator.states, integrator.indicators
+    unknown = [u.variable.valueReference for u in instance.description.derivatives]
+    known = [u.variable.derivative.valueReference for u in instance.description.derivatives]
+    found, dx, z = [], np.zeros(nx), np.zeros(nz)
+    if status(integrator.derivatives, np.ctypeslib.as_ctypes(dx), nx) == OK:
+        found.append(dx)
+    if status(fmu.getEventIndicators, np.ctypeslib.as_ctypes(z), nz) == OK:
+        found.append(z)
+    with contextlib.suppress(FMICallException):
+        found.append(np.array(fmu.getDirectionalDerivative(unknown, known, [1.0] * nx)))
+    return found
+
+
+@pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
+@pytest.mark.parametrize("kind", ["angle", "omega"])
+def test_the_status_ok_means_finite_numbers_at_any_magnitude(native, model, kind):
+    with Instance(native[model, 3], "me").initialize() as instance:
+        names = [u.variable.derivative.name for u in instance.description.derivatives]
+        x, results = Integrator(instance).x(), 0
+        place = next(k for k, name in enumerate(names) if name.endswith(f".{kind}"))
+        for exponent in range(0, 309, 3):
+            x[place] = 10.0**exponent
+            Integrator(instance).put(0.0, x)
+            for values in evaluated(instance):
+                assert np.isfinite(values).all(), exponent
+                results += 1
+        assert results > 0
 
 
 @pytest.mark.parametrize("case", FAR)
