@@ -169,7 +169,7 @@ def test_written_simulation_obeys_the_impact_law_and_keeps_the_energy(capsys):
 
 def test_spectrum_after_the_last_impact_peaks_at_a_mode(capsys):
     """The hammer vibrates freely after its last hit, at the frequency of the second mode."""
-    line = "simulate ImpactOscillator --stop-time 0.35 --spectrum last --out ."
+    line = "simulate ImpactOscillator --stop-time 0.45 --spectrum last --out ."
     assert run(line) == cli.OK
     rows = {key: np.array(x, float) for key, x in table("ImpactOscillator-spectrum.csv").items()}
     line_width = rows["frequency [Hz]"][1]

@@ -1,11 +1,13 @@
 """The code of docs/embedding.md runs, and its co-simulation masters agree."""
 
+import json
 import re
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
+from prbm.fmu.start import interface
 from support import ROOT, built, mechanism
 
 PAGE = ROOT / "docs" / "embedding.md"
@@ -55,3 +57,21 @@ def test_coupling_errors_of_the_page_halve_with_the_step_and_masters_agree(print
     assert abs(float(speeds[0])) > 1e-2  # The equal speeds are not zero.
     events = int(re.search(r"^(\d+) events", printed, re.MULTILINE)[1])
     assert events >= 3
+
+
+def test_recipes_for_other_tools_connect_the_same_variables():
+    """The systems of fmucontainer and ecos are those of the first example of the page."""
+    text = PAGE.read_text()
+    (code,) = re.findall(r"```json\n(.*?)```", text, re.DOTALL)
+    recipe = json.loads(code)
+    short = {"PRBDM.fmu": "guide", "Brake.fmu": "brake"}
+    links = {(f"{short[a]}.{x}", f"{short[b]}.{y}") for a, x, b, y in recipe["link"]}
+    ecos = re.findall(r'real_connection\("(\S+)::(\S+)", "(\S+)::(\S+)"\)', text)
+    assert links == {(f"{a}.{x}", f"{b}.{y}") for a, x, b, y in ecos}
+    assert links == {("guide.shuttle.vx", "brake.velocity"), ("brake.force", "guide.force.x")}
+    (coupled,) = re.findall(r"^connections = (\{.*\})$", text, re.MULTILINE)
+    assert links == {(source, to) for to, source in json.loads(coupled).items()}
+    starts = {f"{short[fmu]}.{name}": value for fmu, name, value in recipe["start"]}
+    assert starts == {"brake.damping": 0.2, "guide.release.displacement": -0.012}
+    described = interface(mechanism("PRBDM"), {})
+    assert {"shuttle.vx", "force.x", "release.displacement"} <= {v.name for v in described}

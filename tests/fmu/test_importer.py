@@ -196,13 +196,14 @@ def locations(resources: Path) -> dict[str, str]:
         "one slash": f"file:{path}",
         "localhost": f"file://localhost{path}",
         "slash at the end": f"{uri}/",
+        "not encoded": f"file://{resources}",
         "all encoded": "file:///" + "".join(f"%{b:02x}" for b in str(resources)[1:].encode()),
     }
 
 
 @pytest.mark.parametrize("form", locations(Path("/")))
 def test_every_form_of_the_resource_location_is_accepted(tmp_path, form):
-    folder = unpack(native("PRBDM", 2).with_suffix(".fmu"), tmp_path / "Über #1")
+    folder = unpack(native("PRBDM", 2).with_suffix(".fmu"), tmp_path / "Über #1 %20%00")
     location = locations(folder / "resources")[form]
     expected = run(Job(folder)).output
     assert run(Job(folder, resources=location)).output == expected

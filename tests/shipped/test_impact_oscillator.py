@@ -47,7 +47,8 @@ def test_impacts_obey_newtons_law_and_conserve_momentum(default) -> None:
     The effective mass is m_i = M_i/cos(phi_i)^2 with sin(phi_i) = x_i/r_i.
     """
     hammer, oscillator = guides(default.simulation.values)
-    assert len(default.simulation.record) > 10
+    assert len(default.simulation.record) > 5
+    restitution = default.simulation.values["impact.restitution"]
     for impact in default.simulation.record:
         mass, change = [], []
         before = motions(default.simulation, impact.q, impact.before)
@@ -58,11 +59,11 @@ def test_impacts_obey_newtons_law_and_conserve_momentum(default) -> None:
         closing = before[0][1].real - before[1][1].real
         opening = after[1][1].real - after[0][1].real
         assert impact.latched.approach_speed == pytest.approx(closing, rel=1e-9)
-        assert opening == pytest.approx(0.8 * closing, rel=1e-9)
+        assert opening == pytest.approx(restitution * closing, rel=1e-9)
         pair = 1.0 / (1.0 / mass[0] + 1.0 / mass[1])
-        assert impact.impulse == pytest.approx(1.8 * pair * closing, rel=1e-9)
+        assert impact.impulse == pytest.approx((1 + restitution) * pair * closing, rel=1e-9)
         np.testing.assert_allclose(np.multiply(mass, change), [-impact.impulse, impact.impulse])
-        lost = 0.5 * (1 - 0.8**2) * pair * closing**2
+        lost = 0.5 * (1 - restitution**2) * pair * closing**2
         assert impact.latched.energy_lost == pytest.approx(lost, rel=1e-9)
 
 

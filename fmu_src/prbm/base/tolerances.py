@@ -100,8 +100,12 @@ STEP_SUM_RTOL = 1e-6  # Of a communication step: round-off that an importer's ti
 STOP_TIME_RTOL = 1e-3  # Of a communication step: allowed overshoot of the stop time.
 
 # --- model exchange ----------------------------------------------------------------------------
-DRIFT_RTOL = 1e-8  # Of the size: drift of a held contact that requests an event.
-MOVING_DRIFT_FACTOR = 100.0  # Of DRIFT_RTOL: drift that requests an event while the wall moves.
+NOMINAL_ANGLE_MIN = 1e-2  # rad; smallest amplitude from which nominal values of states are derived.
+NOMINAL_STRAIN_FACTOR = 0.1  # Of the energy at the start: assumed in the stiffest axial spring.
+DRIFT_RTOL = 1e-7  # Of the size: drift of a held contact that requests an event.
+DRIFT_SPEED_FACTOR = 10.0  # Of DRIFT_RTOL: the same for speeds, which solvers keep less exactly.
+MOVING_DRIFT_FACTOR = 10.0  # Of DRIFT_RTOL: the same while the wall moves.
+SLIDING_ERROR_RTOL = 1e-8  # Of the speed: sliding at the end of sliding that is a solver's error.
 DRIFT_CORRECTED_RTOL = 1e-12  # Of the size: drift that an event leaves uncorrected.
 PENETRATION_WARNING_RTOL = 1e-2  # Of the size: a larger penetration is logged as a warning.
 REST_JUMP_FACTOR = 0.5  # Of the largest jump that opens no stop: gap rate that needs an event.

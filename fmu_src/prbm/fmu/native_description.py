@@ -207,7 +207,8 @@ BASE_MEMBERS = ("acceleration.x", "acceleration.y", "force.x", "force.y", "momen
 def terminals(mechanism: Mechanism) -> bytes:
     """Return terminalsAndIcons.xml: one terminal per stop, one per force, and one of the base.
 
-    FMI 2.0 has adopted this file of FMI 3.0 without change.
+    The file belongs to FMI 3.0.  FMI 2.0 has adopted it, but tools such as FMI Library report it as
+    an error there.
     """
     root = Element("fmiTerminalsAndIcons", {"fmiVersion": "3.0"})
     corners = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}

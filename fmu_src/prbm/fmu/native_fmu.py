@@ -85,19 +85,17 @@ def build(
         f"resources/{MODEL}": _model(mechanism, native),
         f"sources/{source}": amalgamation(name, mechanism.title, fmi).encode(),
         f"sources/{TABLES}": tables_header(table).encode(),
-        "terminalsAndIcons/terminalsAndIcons.xml": terminals(mechanism),
     }
     if fmi == 3:
         contents["sources/buildDescription.xml"] = build_description(name, source)
+        contents["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism)
     contents |= dict(_binaries(name, fmi, compiled))
     progress("computing the reference results")
     results = reference(mechanism, changes, native.variables, run, progress)
     contents |= results
     progress("drawing the icon and writing the documentation")
     png = icon(mechanism, start_sample(mechanism, changes))
-    contents["terminalsAndIcons/icon.png"] = png
-    if fmi == 2:
-        contents["model.png"] = png
+    contents["model.png" if fmi == 2 else "terminalsAndIcons/icon.png"] = png
     names = sorted(platform.name for platform in compiled)
     contents["documentation/index.html"] = documentation.native_page(
         mechanism, native, fmi, names, run, bool(results)

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from ..hybrid.configuration import Magnitudes
 from ..hybrid.simulation import Simulation
 from ..interface.variables import Number, Variable, variables, with_starts
 from ..mechanism.description import Mechanism
@@ -18,8 +19,8 @@ def start_sample(mechanism: Mechanism, changes: Mapping[str, float]) -> dict[str
     return dict(Simulation(mechanism, changes).outputs())
 
 
-def magnitudes(mechanism: Mechanism, changes: Mapping[str, float]) -> tuple[float, float, float]:
-    """Return typical magnitudes of angles [rad], rates [rad/s] and energies [J]."""
+def magnitudes(mechanism: Mechanism, changes: Mapping[str, float]) -> Magnitudes:
+    """Return typical magnitudes of the motion from the start."""
     return Simulation(mechanism, changes).magnitudes()
 
 

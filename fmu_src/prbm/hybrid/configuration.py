@@ -8,6 +8,8 @@ import numpy as np
 
 from ..base.errors import ParameterError
 from ..base.tolerances import (
+    NOMINAL_ANGLE_MIN,
+    NOMINAL_STRAIN_FACTOR,
     SPRINGLESS_RATE,
     STEP_MAX_RTOL,
     TOLERANCE_MAX,
@@ -103,6 +105,42 @@ class Scales:
         np.maximum(scale[n : 2 * n], self.rate, out=scale[n : 2 * n])
         np.maximum(scale[2 * n :], self.energy, out=scale[2 * n :])
         return scale
+
+
+@dataclass(frozen=True)
+class Magnitudes:
+    """Typical magnitudes of a motion, from its start; nominal values are derived from them.
+
+    Parameters
+    ----------
+    angle : float
+        Largest angle from the straight shape [rad].
+    rate : float
+        Angular velocity, or strain rate, that corresponds to it at the fundamental frequency
+        [rad/s], [1/s].
+    strain : float
+        Strain of a link; 0 if no link stretches.
+    energy : float
+        Elastic energy of the springs [J].
+    """
+
+    angle: float
+    rate: float
+    strain: float
+    energy: float
+
+    @classmethod
+    def of(cls, system: System, scales: Scales, y: Real) -> "Magnitudes":
+        """Return the magnitudes of the motion that starts with the state y, (2 n + 2,)."""
+        n, K = system.n, system.K
+        amplitude = y[:n] - system.q0 + y[n : 2 * n] / scales.rate
+        turns = np.setdiff1d(np.arange(n), system.stretches)
+        angle = max(float(np.abs(amplitude[turns]).max()), NOMINAL_ANGLE_MIN)
+        least = scales.energy * NOMINAL_ANGLE_MIN**2
+        energy = max(float(amplitude @ K @ amplitude) / 2, least)
+        stiffest = float(K.diagonal()[list(system.stretches)].max(initial=0.0))
+        strain = math.sqrt(2 * NOMINAL_STRAIN_FACTOR * energy / stiffest) if stiffest else 0.0
+        return cls(angle, angle * scales.rate, strain, energy)
 
 
 @dataclass(frozen=True)

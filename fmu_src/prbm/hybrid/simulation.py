@@ -25,7 +25,7 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from . import contact_modes, events, impacts, snapshot, walls
 from .arc import Arc
-from .configuration import Configuration
+from .configuration import Configuration, Magnitudes
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
 from .guards import StepView
@@ -325,9 +325,9 @@ class Simulation:
         evaluation = self.equations.evaluate(self.time, y[:n], y[n : 2 * n])
         return self.equations.project_near(self.time, y, evaluation.factors)
 
-    def magnitudes(self) -> tuple[float, float, float]:
-        """Return the scales of angles [rad], of rates [rad/s] and of energies [J]."""
-        return 1.0, self.configuration.scales.rate, self.configuration.scales.energy
+    def magnitudes(self) -> Magnitudes:
+        """Return typical magnitudes of a motion that starts with the present state."""
+        return Magnitudes.of(self.system, self.configuration.scales, self.state())
 
     def outputs(self) -> Outputs:
         """Return all outputs, locals and calculated parameters at the present time, by name.

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from ..hybrid.configuration import Magnitudes
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from .variables import (
@@ -14,7 +15,7 @@ from .variables import (
     Scales,
     Variable,
     check_names,
-    next_power_of_ten,
+    nearest_power_of_ten,
     scales,
 )
 
@@ -57,7 +58,7 @@ def native_interface(
     mechanism: Mechanism,
     plain: Sequence[Variable],
     sample: Mapping[str, Number],
-    magnitudes: tuple[float, float, float],
+    magnitudes: Magnitudes,
     independent: Sequence[int],
     *,
     time: bool = False,
@@ -73,9 +74,9 @@ def native_interface(
         The variables that all FMUs of the mechanism have.
     sample : mapping
         All outputs at the start.
-    magnitudes : tuple of float
-        Typical magnitudes of angles [rad], rates [rad/s] and energies [J].  The nominal values of
-        states are the next powers of ten, as in the C kernel.
+    magnitudes : Magnitudes
+        Of the motion.  The nominal values of states are the nearest powers of ten, as in the C
+        kernel.
     independent : sequence of int
         Indices of the independent coordinates, whose values and rates are states.
     time : bool
@@ -92,11 +93,11 @@ def native_interface(
     names = coordinate_variables(mechanism)
     angles, rates = (tuple(names[j][order] for j in independent) for order in (0, 1))
     states = (*angles, *rates, *STORED)
-    nominals = {
-        name: next_power_of_ten(size)
-        for kind, size in zip((angles, rates, STORED), magnitudes, strict=True)
-        for name in kind
+    sizes = {
+        name: magnitudes.strain if name.endswith(".strain") else magnitudes.angle for name in angles
     }
+    sizes |= dict.fromkeys(rates, magnitudes.rate) | dict.fromkeys(STORED, magnitudes.energy)
+    nominals = {name: nearest_power_of_ten(size) for name, size in sizes.items()}
     accelerations = state_derivatives(names, independent)
     indicators = tuple(_indicators(mechanism))
     clocks = tuple(f"{stop.name}.impact" for stop in mechanism.stops) if clock else ()

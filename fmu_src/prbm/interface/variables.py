@@ -137,7 +137,7 @@ def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
         "J": mass * (x * omega) ** 2,
         "W": mass * (x * omega) ** 2 * omega,
     }
-    return Scales({unit: _power_of_ten(value) for unit, value in magnitudes.items()})
+    return Scales({unit: nearest_power_of_ten(value) for unit, value in magnitudes.items()})
 
 
 def extent(mechanism: Mechanism) -> float:
@@ -157,19 +157,15 @@ def _quantity(quantity: float | str, name: str, values: Mapping[str, float]) -> 
     return affine(quantity)(values) if isinstance(quantity, str) else values[name]
 
 
-def _power_of_ten(value: float) -> float:
-    return float(f"1e{round(math.log10(value))}")
-
-
-def next_power_of_ten(value: float) -> float:
-    """Return the smallest power of ten that is not below a positive value.
+def nearest_power_of_ten(value: float) -> float:
+    """Return the power of ten whose logarithm is nearest to that of a positive value.
 
     Examples
     --------
-    >>> next_power_of_ten(3e-3), next_power_of_ten(0.1)
-    (0.01, 0.1)
+    >>> nearest_power_of_ten(3e-3), nearest_power_of_ten(0.4)
+    (0.001, 1.0)
     """
-    return float(f"1e{math.ceil(math.log10(value))}")
+    return float(f"1e{round(math.log10(value))}")
 
 
 def variables(mechanism: Mechanism, sample: Mapping[str, Number]) -> tuple[Variable, ...]:

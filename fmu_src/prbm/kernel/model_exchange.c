@@ -80,9 +80,31 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
     return true;
 }
 
+static bool all_finite(int count, const double *x) {
+    for (int i = 0; i < count; i++) {
+        if (!finite_number(x[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static bool too_large(const Simulation *sim, Problem *problem) {
+    const double *y = sim->state.front;
+    int n = system_of(sim)->n;
+    return fail(problem,
+                "the accelerations at t = %.9g s are not finite numbers (largest angle or strain: "
+                "%g, largest rate: %g 1/s): the states are far from every motion of the mechanism; "
+                "shorten the steps of the solver",
+                sim->state.time, largest(n, y), largest(n, y + n));
+}
+
 /* Evaluate the equations at the present time, states and inputs. */
 PRBM bool exchange_moment(Simulation *sim, Moment *now, Problem *problem) {
-    return exchange_refresh(sim, problem) && moment_at(sim, sim->state.front, now, problem);
+    if (!exchange_refresh(sim, problem) || !moment_at(sim, sim->state.front, now, problem)) {
+        return false;
+    }
+    return all_finite(state_size(sim), now->rates) || too_large(sim, problem);
 }
 
 /* Accept the shape of the front, from which later shapes are computed. */
@@ -106,11 +128,43 @@ PRBM void exchange_get(const Simulation *simulation, double *x) {
     copy(exchange_states(simulation), simulation->state.states, x);
 }
 
-/* The least power of ten that is not below a value, as the nominal value in modelDescription.xml.
- * Solvers derive their absolute tolerance from it: with a nominal value below the scale of the
- * motion they would resolve round-off. */
-static double next_power_of_ten(double value) {
+/* --- nominal values --------------------------------------------------------------------------- */
+
+/* Store the typical angle and energy of a motion that starts with the present state. */
+static void measure_motion(Simulation *sim) {
+    const System *system = system_of(sim);
+    const Scales *scales = &sim->configuration.scales;
+    size_t mark = sim->scratch.used;
+    int n = system->n;
+    const double *q = sim->state.front, *v = q + n;
+    double *amplitude = take(&sim->scratch, (size_t)n), energy = 0.0, angle = NOMINAL_ANGLE_MIN;
+    for (int j = 0; j < n; j++) {
+        amplitude[j] = q[j] - system->q0[j] + v[j] / scales->rate;
+        angle = arm_of(system, j) == j ? greater(angle, fabs(amplitude[j])) : angle;
+    }
+    for (int j = 0; j < n; j++) {
+        energy += amplitude[j] * dot(n, system->K + j * n, amplitude) / 2.0;
+    }
+    sim->state.angle = angle;
+    sim->state.energy = greater(energy, scales->energy * (NOMINAL_ANGLE_MIN * NOMINAL_ANGLE_MIN));
+    sim->scratch.used = mark;
+}
+
+/* The strain of a link, if a part of the energy is in the stiffest axial spring. */
+static double typical_strain(const Simulation *sim) {
+    const System *system = system_of(sim);
+    double stiffest = 0.0;
+    for (int j = 0; j < system->n; j++) {
+        bool stretches = arm_of(system, j) != j;
+        stiffest = stretches ? greater(stiffest, system->K[j * system->n + j]) : stiffest;
+    }
+    return sqrt(2.0 * NOMINAL_STRAIN_FACTOR * sim->state.energy / stiffest);
+}
+
+/* The power of ten nearest to a value, as the nominal value in modelDescription.xml. */
+static double nearest_power_of_ten(double value) {
     double power = 1.0; /* Powers of ten are exact up to 1e22. */
+    value /= sqrt(10.0);
     if (value <= 1.0) {
         while (value * power * 10.0 <= 1.0) {
             power *= 10.0;
@@ -123,15 +177,18 @@ static double next_power_of_ten(double value) {
     return power;
 }
 
+/* Solvers derive their absolute tolerances from the nominal values. */
 PRBM void exchange_nominals(const Simulation *simulation, double *x) {
-    const Scales *scales = &simulation->configuration.scales;
-    int count = simulation->configuration.mechanism->independent_count;
-    double rate = next_power_of_ten(scales->rate);
+    const Mechanism *m = simulation->configuration.mechanism;
+    const State *state = &simulation->state;
+    int count = m->independent_count;
+    double rate = nearest_power_of_ten(state->angle * simulation->configuration.scales.rate);
     for (int k = 0; k < count; k++) {
-        x[k] = 1.0;
+        bool turns = m->coordinates[m->independent[k]].arm == m->independent[k];
+        x[k] = nearest_power_of_ten(turns ? state->angle : typical_strain(simulation));
         x[count + k] = rate;
     }
-    x[2 * count] = x[2 * count + 1] = next_power_of_ten(scales->energy);
+    x[2 * count] = x[2 * count + 1] = nearest_power_of_ten(state->energy);
 }
 
 PRBM bool exchange_derivatives(Simulation *simulation, double *dx, Problem *problem) {
@@ -156,16 +213,24 @@ PRBM bool exchange_event_indicators(Simulation *simulation, double *z, Problem *
 
 /* --- drift ------------------------------------------------------------------------------------ */
 
+/* The drift of a speed, relative to the scale of speed. */
+static double speed_drift(const Simulation *sim, double speed) {
+    return fabs(speed) / (DRIFT_SPEED_FACTOR * guard_scale(sim, EVENT_REVERSAL));
+}
+
 /* The drift of a closed stop off its wall, relative to the scales of length and speed.  While the
  * wall moves, its acceleration is unknown.  A larger distance is then allowed, and the release
  * indicator limits the speed instead. */
 static double stop_drift(const Simulation *sim, const Instant *at, int i) {
     double off = fabs(gap(&sim->equations, i, at->time, at->e)) / system_of(sim)->length;
-    double speed = fabs(leaving_rate(sim, at, i)) / guard_scale(sim, EVENT_REVERSAL);
-    return sim->state.walls[i].rate != 0.0 ? off / MOVING_DRIFT_FACTOR : greater(off, speed);
+    return sim->state.walls[i].rate != 0.0
+               ? off / MOVING_DRIFT_FACTOR
+               : greater(off, speed_drift(sim, leaving_rate(sim, at, i)));
 }
 
-/* The largest drift of the closed stops and the sticking contacts. */
+/* The largest drift of the closed stops and the sticking contacts.  The limit that requests an
+ * event is above the errors of solvers at usual tolerances: an event restarts a solver, whose error
+ * in its first steps is large. */
 static double drift(const Simulation *sim, const Instant *at) {
     const Equations *q = &sim->equations;
     double most = 0.0;
@@ -173,8 +238,7 @@ static double drift(const Simulation *sim, const Instant *at) {
         most = greater(most, stop_drift(sim, at, q->held[k]));
     }
     for (int k = q->first_stick; k < q->r; k++) {
-        double speed = fabs(row_rate(&q->active, k, at->e, at->v));
-        most = greater(most, speed / guard_scale(sim, EVENT_REVERSAL));
+        most = greater(most, speed_drift(sim, row_rate(&q->active, k, at->e, at->v)));
     }
     return most;
 }
@@ -196,7 +260,7 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
 /* Whether the sliding speed of a contact is zero within a solver's error. */
 static bool sliding_ends(const Simulation *sim, const Instant *at, int contact) {
     double speed = sliding_velocity(system_of(sim), contact, at->e, at->v);
-    return fabs(speed) <= DRIFT_RTOL * guard_scale(sim, EVENT_REVERSAL);
+    return fabs(speed) <= SLIDING_ERROR_RTOL * guard_scale(sim, EVENT_REVERSAL);
 }
 
 /* Make a contact stick, so that a solver's error does not count as sliding backwards. */
@@ -330,6 +394,25 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     return attempt(sim, right, problem);
 }
 
+PRBM bool exchange_pending(Simulation *simulation, bool *pending, Problem *problem) {
+    Simulation *sim = simulation;
+    const bool struck[STOPS_MAX] = {false};
+    size_t mark = sim->scratch.used;
+    Moment now;
+    if (!exchange_moment(sim, &now, problem)) {
+        return false;
+    }
+    double *z = take(&sim->scratch, (size_t)exchange_indicators(sim));
+    event_indicators(sim, &now.at, z);
+    *pending = impulses_changed(sim) || drift(sim, &now.at) > DRIFT_RTOL ||
+               due_here(sim, &now.at, struck).kind != EVENT_NONE;
+    for (int i = 0; i < exchange_indicators(sim); i++) {
+        *pending = *pending || z[i] <= 0.0;
+    }
+    sim->scratch.used = mark;
+    return true;
+}
+
 /* Return the stop with the deepest penetration if it exceeds a solver's errors, else NULL. */
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth) {
     Simulation *sim = simulation;
@@ -354,6 +437,7 @@ PRBM void exchange_begin(Simulation *sim) {
     Problem ignored;
     Moment now;
     accept(sim);
+    measure_motion(sim);
     states_of(sim, sim->state.front, sim->state.states);
     forget_present(sim);
     if (exchange_moment(sim, &now, &ignored)) {

@@ -79,6 +79,8 @@ PRBM bool exchange_completed_step(Simulation *simulation, bool *event, Problem *
 /* Event mode: apply the inputs and all events that are due.  *changed: whether the states have
  * changed. */
 PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem);
+/* Whether exchange_event would apply an event or an impulse here. */
+PRBM bool exchange_pending(Simulation *simulation, bool *pending, Problem *problem);
 /* The stop with the deepest penetration and its depth [m]; NULL if no penetration exceeds a
  * solver's errors. */
 PRBM const char *exchange_deepest(Simulation *simulation, double *depth);

@@ -110,5 +110,10 @@ PRBM bool simulation_get(Simulation *simulation, int slot, double *x, Problem *p
     }
     const double *outputs = present_outputs(sim, output_groups(sim, slot), problem);
     *x = outputs ? outputs[slot] : 0.0;
+    if (outputs && !finite_number(*x)) {
+        return fail(problem, "its value at t = %.9g s is %g, because the states are not finite "
+                             "numbers, or far from every motion of the mechanism",
+                    sim->state.time, *x);
+    }
     return outputs != NULL;
 }

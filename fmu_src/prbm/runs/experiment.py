@@ -48,8 +48,8 @@ def experiment(mechanism: Mechanism, values: Mapping[str, float] | None = None) 
     ParameterError, EquilibriumError
         If the mechanism cannot start with these values.
     """
-    _, rate, _ = Simulation(mechanism, values).magnitudes()
-    return Experiment(_duration(rate / (2 * math.pi)))
+    scales = Simulation(mechanism, values).configuration.scales
+    return Experiment(_duration(1 / scales.time))
 
 
 def _duration(frequency: float) -> float:

@@ -83,6 +83,14 @@ PRBM int get_indicators(Instance *instance, double *z, size_t count) {
     if (!exchange_event_indicators(instance->simulation, z, &problem)) {
         return refuse(instance, FMU_DISCARD, "%s", problem.text);
     }
+    for (size_t i = 0; i < count; i++) {
+        if (!finite_number(z[i])) {
+            return refuse(instance, FMU_DISCARD, "event indicator %d is not a finite number: the "
+                                                 "states are too large; shorten the steps of the "
+                                                 "solver",
+                          (int)i + 1);
+        }
+    }
     return FMU_OK;
 }
 
@@ -168,7 +176,13 @@ PRBM int directional_derivative(Instance *instance, const uint32_t *unknowns, si
                       "%s", problem.text);
     }
     for (size_t i = 0; i < unknown_count; i++) {
-        sensitivity[i] = instance->dvalues[find_variable(instance->mechanism, unknowns[i])->slot];
+        const Variable *unknown = find_variable(instance->mechanism, unknowns[i]);
+        sensitivity[i] = instance->dvalues[unknown->slot];
+        if (!finite_number(sensitivity[i])) {
+            return refuse(instance, FMU_DISCARD, "the derivative of %s is not a finite number: the "
+                                                 "seed or the states are too large",
+                          unknown->name);
+        }
     }
     return FMU_OK;
 }

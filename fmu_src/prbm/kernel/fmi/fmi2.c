@@ -44,7 +44,7 @@ enum {
     RULE(NewDiscreteStates, IN_EVENT, IN_NONE)                                  \
     RULE(EnterContinuousTimeMode, IN_EVENT, IN_NONE)                            \
     RULE(CompletedIntegratorStep, IN_CONTINUOUS, IN_NONE)                       \
-    RULE(SetTime, IN_CONTINUOUS, IN_NONE)                                       \
+    RULE(SetTime, IN_EVENT | IN_CONTINUOUS, IN_NONE)                            \
     RULE(SetContinuousStates, IN_CONTINUOUS, IN_NONE)                           \
     RULE(GetDerivatives, EVALUATES2, IN_NONE)                                   \
     RULE(GetEventIndicators, EVALUATES2, IN_NONE)                               \

@@ -37,7 +37,7 @@ enum {
     TYPE(UInt64)
 
 /* Functions and the modes in which model exchange and co-simulation allow them; FMI 3.0, sections
- * 2.3, 3.2 and 4.2. */
+ * 2.3, 3.2 and 4.2.  SetTime in Event Mode is an addition, which importers use as in FMI 2.0. */
 #define FMI3_RULES(RULE)                                                       \
     RULE(SetDebugLogging, ANY3, ANY3)                                          \
     RULE(EnterInitializationMode, IN_INSTANTIATED, IN_INSTANTIATED)            \
@@ -97,7 +97,7 @@ enum {
     RULE(UpdateDiscreteStates, IN_EVENT, IN_EVENT)                             \
     RULE(EnterContinuousTimeMode, IN_EVENT, IN_NONE)                           \
     RULE(CompletedIntegratorStep, IN_CONTINUOUS, IN_NONE)                      \
-    RULE(SetTime, IN_CONTINUOUS, IN_NONE)                                      \
+    RULE(SetTime, IN_EVENT | IN_CONTINUOUS, IN_NONE)                           \
     RULE(SetContinuousStates, IN_CONTINUOUS, IN_NONE)                          \
     RULE(GetContinuousStateDerivatives, EVALUATES3, IN_NONE)                   \
     RULE(GetEventIndicators, EVALUATES3, IN_NONE)                              \

@@ -93,15 +93,23 @@ static char *path_of_uri(char *uri) {
     return path;
 }
 
+static bool check_location(const char *resources, Problem *problem) {
+    if (!resources || !*resources) {
+        return fail(problem, "the importer passed no location of the FMU's folder resources, which "
+                             "contains the tables of the mechanism: pass it at instantiation");
+    }
+    if (!begins(resources, "file:") && strstr(resources, "://")) {
+        return fail(problem, "the location of the FMU's folder resources must be a file: URI or a "
+                             "path, not %s",
+                    resources);
+    }
+    return true;
+}
+
 /* Return the path of the tables in UTF-8, which the caller frees; NULL and a problem on failure.
  * FMI 2.0 passes a URI and FMI 3.0 a path.  Both are accepted in both versions, because no absolute
- * path begins with file:. */
-static char *tables_path(const char *resources, Problem *problem) {
-    if (!resources || !*resources) {
-        fail(problem, "the importer passed no location of the FMU's folder resources, which "
-                      "contains the tables of the mechanism: pass it at instantiation");
-        return NULL;
-    }
+ * path begins with file:.  Not decoded, a URI is taken as if %XX in it were no code. */
+static char *tables_path(const char *resources, bool decode, Problem *problem) {
     size_t length = strlen(resources);
     char *text = malloc(length + sizeof TABLES_NAME + 1);
     if (!text) {
@@ -112,17 +120,11 @@ static char *tables_path(const char *resources, Problem *problem) {
     char *path = text;
     if (begins(text, "file:")) {
         path = path_of_uri(text);
-        if (!percent_decoded(path)) {
+        if (decode && !percent_decoded(path)) {
             fail(problem, "the location of the FMU's folder resources contains %%00");
             free(text);
             return NULL;
         }
-    } else if (strstr(text, "://")) {
-        fail(problem, "the location of the FMU's folder resources must be a file: URI or a path, "
-                      "not %s",
-             resources);
-        free(text);
-        return NULL;
     }
     length = strlen(path);
     memmove(text, path, length + 1);
@@ -253,19 +255,33 @@ static unsigned char *contents(FILE *file, size_t *size, Problem *problem) {
     return bytes;
 }
 
-PRBM Mechanism *tables_read(const char *resources, Problem *problem) {
-    char *path = tables_path(resources, problem);
-    if (!path) {
+/* Open the tables; NULL and a problem on failure.  The path as it stands is the second attempt,
+ * because some importers do not encode a % in the name of a folder. */
+static FILE *opened_tables(const char *resources, Problem *problem) {
+    if (!check_location(resources, problem)) {
         return NULL;
     }
-    FILE *file = opened(path);
+    char *path = tables_path(resources, true, problem);
+    FILE *file = path ? opened(path) : NULL;
     if (!file) {
+        Problem ignored;
+        char *plain = tables_path(resources, false, &ignored);
+        file = plain ? opened(plain) : NULL;
+        free(plain);
+    }
+    if (!file && path) {
         fail(problem, "the tables of the mechanism cannot be opened; unpack the whole FMU, "
                       "including its folder resources: there is no readable file %s", path);
-        free(path);
-        return NULL;
     }
     free(path);
+    return file;
+}
+
+PRBM Mechanism *tables_read(const char *resources, Problem *problem) {
+    FILE *file = opened_tables(resources, problem);
+    if (!file) {
+        return NULL;
+    }
     size_t size;
     unsigned char *bytes = contents(file, &size, problem);
     (void)fclose(file);

@@ -16,7 +16,7 @@
 
 #include "fmi/fmu.h"
 
-enum { STATE_VERSION = 1, STATE_CHECKED_FROM = 20, STATE_HEAD = 36, STATE_FIXED = 16 + 24 };
+enum { STATE_VERSION = 2, STATE_CHECKED_FROM = 20, STATE_HEAD = 36, STATE_FIXED = 16 + 24 };
 static const char STATE_MAGIC[8] = {'P', 'R', 'B', 'M', 'S', 'T', 'A', 'T'};
 
 enum {

@@ -132,18 +132,19 @@ static bool any_tick(const Instance *instance) {
     return false;
 }
 
-/* Log a warning if a wall penetrates a body, and again when the penetration has doubled. */
-static int warn_of_depth(Instance *instance) {
+/* Log a warning if a wall penetrates a body, and again when the penetration has doubled.  A warning
+ * is never a return status: some importers stop at any status but OK. */
+static void warn_of_depth(Instance *instance) {
     double depth;
     const char *stop = exchange_deepest(instance->simulation, &depth);
     if (!stop || depth <= 2.0 * instance->depth_logged) {
-        return FMU_OK;
+        return;
     }
     instance->depth_logged = depth;
-    return refuse(instance, FMU_WARNING,
-                  "%s.gap = %.6g m: the wall is inside the body, which is not pushed out; move it "
-                  "continuously, with %s.displacement and %s.velocity, or integrate in shorter steps",
-                  stop, -depth, stop, stop);
+    report(&instance->journal, FMU_WARNING,
+           "%s.gap = %.6g m: the wall is inside the body, which is not pushed out; move it "
+           "continuously, with %s.displacement and %s.velocity, or integrate in shorter steps",
+           stop, -depth, stop, stop);
 }
 
 /* Handle the pending events.  A clock ticks in a separate super-dense instant after an impact, in
@@ -163,11 +164,32 @@ PRBM int update_discrete_states(Instance *instance, bool *again, bool *changed) 
     *again = instance->clocks && any_tick(instance);
     instance->event_due = false;
     instance->updated = !*again;
-    return exchange ? warn_of_depth(instance) : FMU_OK;
+    if (exchange) {
+        warn_of_depth(instance);
+    }
+    return FMU_OK;
 }
 
+/* Whether an update of the discrete states would change anything. */
+static bool update_pending(Instance *instance) {
+    bool pending = true;
+    Problem problem;
+    if (instance->clocks && any_tick(instance)) {
+        return true;
+    }
+    if (instance->kind == CO_SIMULATION) {
+        return instance->event_due;
+    }
+    return !exchange_pending(instance->simulation, &pending, &problem) || pending;
+}
+
+/* Leave Event Mode.  Some importers do not update the discrete states before, which is accepted if
+ * nothing is pending. */
 PRBM int leave_event_mode(Instance *instance, const Rule *rule, Mode next) {
-    if (!instance->updated) {
+    if (!instance->updated && has_rejected(instance, FMU_ERROR)) {
+        return FMU_ERROR;
+    }
+    if (!instance->updated && update_pending(instance)) {
         return refuse(instance, FMU_ERROR, "%s: the event is not finished; call %s = false",
                       rule->function,
                       instance->standard->version == 2

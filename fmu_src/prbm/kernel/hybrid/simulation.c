@@ -245,7 +245,7 @@ static void clear_progress(State *state, double start_time) {
     state->point = start_time;
     state->longest = state->arc.start = state->arc.h = 0.0;
     state->step_size = state->log_of_error = 0.0;
-    state->tolerance = state->frequency = 0.0;
+    state->tolerance = state->frequency = state->angle = state->energy = 0.0;
     state->window_count = 0;
     state->pending = none;
 }

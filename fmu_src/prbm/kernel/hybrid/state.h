@@ -63,6 +63,7 @@ typedef struct {
     bool started;
     SimulationMode mode;
     double time, tolerance, frequency;
+    double angle, energy; /* model exchange: magnitudes of the motion from the start [rad], [J] */
     double step_size, log_of_error; /* of the step size controller */
     double front_time;
     bool has_k1;          /* whether k1 has the rates of the front */
