@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.adequacy import Impact, Shape, Vibration, notes
 from ..base.unit_text import frequency_unit
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Complex, Real
@@ -48,6 +49,9 @@ def frequencies(options: argparse.Namespace) -> None:
         print(
             f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
         )
+    shapes: list[Shape] = [Vibration(at), *map(Impact, range(len(mechanism.stops)))]
+    for sentence in notes(mechanism, values, shapes):
+        print(sentence)
     output.table(
         f"{mechanism.name}-modes.csv",
         ["mode", "frequency [Hz]",
