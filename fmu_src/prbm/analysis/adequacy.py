@@ -52,7 +52,8 @@ class Vibration:
     Parameters
     ----------
     held : float or None
-        Displacement of the released body, held by a force [m]; None: at rest.
+        Displacement [m] or, if the release is by an angle, rotation [rad] of the released body,
+        held by a force or a moment; None: at rest.
     """
 
     held: float | None = None
@@ -387,6 +388,8 @@ def _where(model: _Model, shape: Shape, cause: Cause = Cause.PIVOTS) -> str:
     system, released = model.system(shape), model.mechanism.release.body
     factor, name = length_unit(system.length)
     if isinstance(shape, Vibration):
+        if model.mechanism.release.turns:
+            factor, name = 180 / math.pi, "deg"
         at = "at rest" if shape.held is None else f"held at {factor * shape.held:.4g} {name}"
         return f"{released} {at}"
     stop = model.mechanism.stops[shape.stop]

@@ -14,6 +14,7 @@ from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
+from ..mechanism.parts import value
 from ..plots import impact_map as figures
 from .output import Output
 from .systems import check_length
@@ -67,8 +68,10 @@ def _points(
     """Return wall positions and offsets in increasing order [m], from options or by default."""
     known = {name for name in values if name in mechanism.values()}
     system = assemble(mechanism, mechanism.values({name: values[name] for name in known}))
+    release = mechanism.release
+    amount = abs(value(release, release.start, system.values))
     scales = {
-        "wall-positions": WALL_SHARE * abs(system.values["release.displacement"]),
+        "wall-positions": WALL_SHARE * amount * (system.length if release.turns else 1.0),
         "offsets": OFFSET_SHARE * system.length,
     }
     result = []
@@ -80,7 +83,7 @@ def _points(
         )  # fmt: skip
         if scale == 0.0 and not texts:
             raise UserMistake(
-                "release.displacement = 0 m: no default wall positions; give --wall-positions"
+                f"release.{release.start} = 0: no default wall positions; give --wall-positions"
             )
         if len(set(chosen)) < len(chosen):
             raise UserMistake(f"--{name} {' '.join(texts or [])}: a value is given twice")

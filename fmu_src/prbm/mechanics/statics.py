@@ -306,17 +306,17 @@ def immobile(system: System) -> str:
             f"the body {system.mechanism.release.body} cannot turn; give release.displacement "
             "instead, or let flexures stretch (axial = true)"
         )
-    return _immovable(system)
+    return _immovable(system, "give release.angle, another release.point, or release another body")
 
 
-def _immovable(system: System) -> str:
+def _immovable(system: System, remedy: str) -> str:
     """Return why the released point, as drawn, cannot move along the release, and a remedy."""
     name = system.mechanism.release.body
     if _on_pivot(system, name):
         point = "centre of mass" if system.mechanism.release.point is None else "released point"
         return (
             f"the {point} of the body {name} stays where it is, on the pivot that the body turns "
-            "about; give release.angle, another release.point, or release another body"
+            f"about; {remedy}"
         )
     return (
         f"the body {name} cannot move along the direction of the release; choose another "
@@ -369,7 +369,8 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     loops, row = rows[:-1], rows[-1:]
     left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
     if left <= RELEASE_MOBILITY_RTOL * free:
-        raise ParameterError(f"release.velocity = {speed:g} m/s: {_immovable(system)}")
+        remedy = "give another release.point, or release another body"
+        raise ParameterError(f"release.velocity = {speed:g} m/s: {_immovable(system, remedy)}")
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     return constraints.project_velocities(M, rows, rates, np.zeros(system.n))
