@@ -21,6 +21,7 @@ from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Joint, Probe, Release, Stop
+from prbm.plots.figures import response
 from prbm.plots.motion import film, motion, needed
 from prbm.plots.picture import MODE_AMPLITUDE, moved, picture
 from prbm.plots.scene import Scene
@@ -189,6 +190,16 @@ def test_a_straight_release_is_drawn_once_and_an_impossible_one_is_explained() -
     assert "release.displacement = -0.2 m cannot be reached" in reason
     behind = labels(guide, values={"stop.position": -0.019})
     assert "behind stop by 1 mm" in behind
+
+
+def test_the_motion_of_a_body_that_is_released_by_an_angle_is_a_rotation() -> None:
+    pivot = read_mechanism(SUPPORT / "pivot.toml")
+    result = simulate(pivot, stop_time=2e-3)
+    axes = response(result).axes
+    assert [panel.get_ylabel() for panel in axes[:2]] == ["rotation [deg]", "rate [rad/s]"]
+    drawn = np.asarray(axes[0].lines[0].get_ydata())
+    assert drawn[0] == pytest.approx(-5.0, rel=1e-9)
+    assert np.radians(drawn) == pytest.approx(result["wheel.angle"], rel=1e-12)
 
 
 def test_modes_are_titled_with_their_frequencies() -> None:
