@@ -3,13 +3,12 @@
 import csv
 import io
 import itertools
-import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from prbm.analysis import impact_map, stretching
+from prbm.analysis import impact_map
 from prbm.analysis.touching import impact_shape
 from prbm.base.errors import EquilibriumError, ParameterError
 from prbm.data.series import RecordError
@@ -318,33 +317,3 @@ def test_coefficients_are_kept_only_for_the_same_model():
     parts = replace(guide("1R"), flexure_types=(own,))
     assert impact_map.with_flexures(parts, "1R", axial=True).values()["flexure.K_theta"] == 2.5449
     assert impact_map.with_flexures(parts, "2R").values()["flexure.K_theta1"] == 3.4710
-
-
-def test_a_note_compares_stretching_with_inextensible_flexures():
-    """With stretching flexures C is near that of a free body, 1.6/(1 + m d^2/J) - 1."""
-    values = WEIGHTLESS | {"stop.offset": 4e-3, "stop.position": 0.0}
-    known = guide().values()
-    free = 1.6 / (1 + known["shuttle.mass"] * 4e-3**2 / known["shuttle.inertia"]) - 1
-    note = stretching.note(guide(), values, 0)
-    assert "stop hits 4 mm off the centre of mass of shuttle" in note
-    pattern = r"is ([-\d.]+) with inextensible flexures and ([-\d.]+) with stretching"
-    inextensible, stretched = map(float, re.search(pattern, note).groups())
-    assert inextensible == pytest.approx(0.6, abs=0.005)
-    assert stretched == pytest.approx(free, abs=0.005)
-
-
-@pytest.mark.parametrize(
-    ("model", "values"),
-    [
-        (guide(), {}),  # centred
-        (guide(), {"stop.offset": 0.5e-3}),  # nearly centred
-        (guide(axial=True), {"stop.offset": 4e-3}),  # stretches already
-        (
-            mechanism("Cantilever"),
-            {"stop.offset": 4e-3},
-        ),  # off-centre, but stretching has no effect
-        (guide(), {"stop.offset": 4e-3, "stop.position": 1.0}),  # out of reach
-    ],
-)
-def test_no_note_where_stretching_does_not_matter(model, values):
-    assert stretching.notes(model, values) == []

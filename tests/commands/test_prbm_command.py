@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import os
 import re
 import shlex
@@ -23,7 +24,7 @@ from prbm.files.mechanism_file import load, shipped
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import free_displacement
 from signals import interruptible
-from support import ROOT
+from support import ROOT, SUPPORT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
@@ -498,7 +499,10 @@ def test_a_wheel_on_a_cross_pivot_has_an_equilibrium_but_no_stiffness(capsys):
     assert "= 0.001 m: the centre of mass of the body wheel cannot move" in failed.err
     assert failed.out == "", "head of a table without rows"
     assert run("simulate cross.toml --set release.velocity=0.1") == cli.MISTAKE
-    assert "move the centre of mass, or release another body" in capsys.readouterr().err
+    assert (
+        "turns about; give another release.point, or release another body"
+        in capsys.readouterr().err
+    )
 
 
 def test_commands_that_need_a_stop_report_a_missing_one(capsys):
@@ -792,3 +796,40 @@ def test_the_help_of_validate_names_a_compared_quantity(capsys):
     """A measured value needs the full name of its row, "frequency 1 at rest"."""
     assert run("validate --help") == cli.OK
     assert '--measured "frequency 1 at rest=4.82 Hz +- 0.06"' in capsys.readouterr().out
+
+
+def test_a_body_that_is_released_by_an_angle_is_held_by_a_moment(capsys):
+    """Amounts are angles in all commands that hold the body."""
+    pivot = SUPPORT / "pivot.toml"
+    assert run(f"equilibrium {pivot} --held 5deg") == cli.OK
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "Pivot: rotation of wheel, from straight; no gravity acts"
+    assert lines[1].split()[:4] == ["at", "[deg]", "moment", "[N.m]"]
+    at, moment, stiffness = map(float, lines[2].split()[:3])
+    assert at == 5.0
+    assert moment == pytest.approx(stiffness * math.radians(5.0), rel=0.01)
+    assert run(f"modes {pivot} --held 5deg --count 1") == cli.OK
+    assert "Pivot, wheel held at 5 deg from straight by" in capsys.readouterr().out
+    assert run(f"simulate {pivot} --stop-time 1ms") == cli.OK
+    assert "free rest position   wheel 0.00 deg from straight" in capsys.readouterr().out
+    assert run(f"equilibrium {pivot} --held 10deg --set eccentricity=1mm") == cli.OK
+    assert run(f"modes {pivot} --held 400deg") == cli.MISTAKE
+    assert "more than a turn; check the unit" in capsys.readouterr().err
+    assert run(f"validate {pivot}") == cli.MISTAKE
+    assert "give release.displacement" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["modes", "simulate --stop-time 1ms", "picture --modes 2"])
+def test_commands_note_a_mode_that_inextensible_flexures_suppress(name, capsys, tmp_path):
+    command, *options = name.split()
+    out = f"--out {tmp_path / 'finger.png'}" if command == "picture" else ""
+    assert run(f"{command} {SUPPORT / 'finger.toml'} {' '.join(options)} {out}") == cli.OK
+    assert "note: finger at rest: mode 2 is at 3953 Hz" in capsys.readouterr().out
+
+
+def test_an_impact_map_notes_positions_that_few_pivots_do_not_describe(capsys):
+    finger = SUPPORT / "finger.toml"
+    assert run(f"impact-map {finger} --wall-positions 0 3 mm --offsets 0") == cli.OK
+    out = capsys.readouterr().out
+    assert "note, 2R: finger held at the wall of stop, hit point displaced by 3 mm" in out
+    assert "set axial = true" in out

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from prbm.analysis.stretching import notes, restitution, stretching
+from prbm.analysis.adequacy import Cause, Impact, Quantity, check
 from prbm.files.mechanism_file import read_mechanism
 from support import ROOT
 
@@ -45,10 +45,12 @@ def test_the_page_gives_the_modal_restitution_with_and_without_stretch(tmp_path:
     match = re.search(r"`axial = true` changes it from ([\d.]+) to ([\d.]*\d)\.", PAGE)
     assert match is not None
     inextensible, stretched = map(float, match.groups())
-    (note,) = notes(lever, {})
-    assert "off the centre of mass of lever" in note
-    assert restitution(lever, {}, 0) == pytest.approx(inextensible, abs=0.005)
-    assert restitution(stretching(lever), {}, 0) == pytest.approx(stretched, abs=0.005)
+    found = check(lever, {}, [Impact(0)])
+    (finding,) = (one for one in found if one.quantity is Quantity.RESTITUTION)
+    assert finding.cause is Cause.INEXTENSIBLE
+    assert "off the centre of mass of lever" in str(finding)
+    assert finding.found == pytest.approx(inextensible, abs=0.005)
+    assert finding.better == pytest.approx(stretched, abs=0.005)
 
 
 @pytest.mark.fmu

@@ -18,7 +18,7 @@ from prbm.mechanics.independent import independent
 from prbm.mechanics.inputs import input_names
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.expressions import affine
-from prbm.mechanism.parts import FIELDS, value
+from prbm.mechanism.parts import FIELDS, fields_of, value
 from support import SHIPPED
 
 TOKEN = "{0}"
@@ -134,7 +134,7 @@ def written(mechanism) -> bytes:
 
 def test_the_head_contains_version_size_and_checksum(written):
     magic, version, size, check = struct.unpack_from("<4sIII", written)
-    assert (magic, version, size) == (b"PRBM", 2, len(written))
+    assert (magic, version, size) == (b"PRBM", 3, len(written))
     assert check == zlib.crc32(written[16:])
 
 
@@ -156,12 +156,12 @@ class Comparison:
         self.bounds = [
             (part, name)
             for part in mechanism._parts()
-            for name in FIELDS[type(part)]
+            for name in fields_of(part)
             if isinstance(getattr(part, name), str)
         ]
 
     def fields(self, part) -> None:
-        for name in FIELDS[type(part)]:
+        for name in fields_of(part):
             assert_same(
                 self.mechanism, self.reader.expression(), lambda v, name=name: value(part, name, v)
             )
@@ -262,8 +262,12 @@ class Comparison:
         for probe in m.probes:
             assert (r.text(), self.body()) == (probe.name, probe.point.rpartition(".")[0])
             self.point(m.point(probe.point, probe.name))
-        assert (self.body(), r.take("d")) == (m.release.body, m.release.direction)
-        self.fields(m.release)
+        release = m.release
+        assert (self.body(), r.take("d")) == (release.body, release.direction)
+        self.point(release.point or next(b for b in m.bodies if b.name == release.body).centre)
+        start = ("displacement", "angle", "amplitude").index(release.start)
+        assert r.take("II") == (start, release.mode or 0)
+        self.fields(release)
         for place in m.ground.values():
             self.point(place)
 

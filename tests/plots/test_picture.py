@@ -13,7 +13,7 @@ from prbm.commands.command_line import main
 from prbm.drawing.icon import icon, shape
 from prbm.drawing.shapes import Shapes, box, corners, hull
 from prbm.drawing.style import png
-from prbm.files.mechanism_file import load, shipped
+from prbm.files.mechanism_file import load, read_mechanism, shipped
 from prbm.fmu.start import start_sample
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.assembly import assemble
@@ -21,11 +21,12 @@ from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Joint, Probe, Release, Stop
+from prbm.plots.figures import response
 from prbm.plots.motion import film, motion, needed
 from prbm.plots.picture import MODE_AMPLITUDE, moved, picture
 from prbm.plots.scene import Scene
 from prbm.runs.run import simulate
-from support import mechanism
+from support import SUPPORT, mechanism
 
 LEAF = FlexureType("leaf", "2R", 2e-4, 1e-2, 2e11, 7800.0, axial=True)
 CRANK = Mechanism(
@@ -158,6 +159,47 @@ def test_the_picture_contains_all_parts_and_their_names(name: str) -> None:
         z = scale * shapes.body(body, E)
         assert left < z.real.min() < z.real.max() < right
         assert low < z.imag.min() < z.imag.max() < high
+
+
+def labels(chosen: Mechanism, **options: object) -> list[str]:
+    """Return the texts in the main panel of a picture, and its caption."""
+    axes = picture(chosen, **options).axes[0]  # type: ignore[arg-type]
+    return [text.get_text() for text in axes.findobj(Text)] + [axes.get_xlabel()]
+
+
+@pytest.mark.parametrize("name", ["PRBDM2R", "Bistable", "ImpactOscillator", "Pivot"])
+def test_the_picture_shows_the_gaps_of_the_released_shape(name: str) -> None:
+    chosen = read_mechanism(SUPPORT / "pivot.toml") if name == "Pivot" else mechanism(name)
+    outputs = Simulation(chosen).outputs()
+    found = labels(chosen)
+    gaps = sorted(float(t.split()[2]) for t in found if t.startswith("start gap"))
+    expected = sorted(1e3 * outputs[f"{stop.name}.gap"] for stop in chosen.stops)
+    assert gaps == pytest.approx(expected, rel=5e-3)
+    assert any(f"release.{chosen.release.start} = " in text for text in found)
+
+
+def test_a_straight_release_is_drawn_once_and_an_impossible_one_is_explained() -> None:
+    guide = mechanism("PRBDM2R")
+    straight = {"release.displacement": 0.0, "gravity.x": 0.0}
+    assert not any("released" in text for text in labels(guide, values=straight))
+    (reason,) = {
+        " ".join(text.split())
+        for text in labels(guide, values={"release.displacement": -0.2})
+        if "released shape is not drawn" in text
+    }
+    assert "release.displacement = -0.2 m cannot be reached" in reason
+    behind = labels(guide, values={"stop.position": -0.019})
+    assert "behind stop by 1 mm" in behind
+
+
+def test_the_motion_of_a_body_that_is_released_by_an_angle_is_a_rotation() -> None:
+    pivot = read_mechanism(SUPPORT / "pivot.toml")
+    result = simulate(pivot, stop_time=2e-3)
+    axes = response(result).axes
+    assert [panel.get_ylabel() for panel in axes[:2]] == ["rotation [deg]", "rate [rad/s]"]
+    drawn = np.asarray(axes[0].lines[0].get_ydata())
+    assert drawn[0] == pytest.approx(-5.0, rel=1e-9)
+    assert np.radians(drawn) == pytest.approx(result["wheel.angle"], rel=1e-12)
 
 
 def test_modes_are_titled_with_their_frequencies() -> None:

@@ -30,8 +30,9 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from ..references.finite_elements import FiniteElements
+from .adequacy import Impact
+from .adequacy import notes as adequacy_notes
 from .impact_map import algebraic, by_elements
-from .stretching import notes as stretching_notes
 
 PERCENT_DECIMALS = 1e3  # Larger differences are printed without decimals [%].
 FREQUENCIES = 3  # Number of the lowest frequencies that are compared.
@@ -268,7 +269,8 @@ def compare(
     for i, (name, pair) in enumerate(_restitutions(mechanism, given, elements, notes)):
         model[name], found[name] = pair
         report(0.5 + 0.5 * (i + 1) / len(mechanism.stops))
-    notes += stretching_notes(mechanism, given)
+    stops = range(len(mechanism.stops))
+    notes += adequacy_notes(mechanism, given, [Impact(stop) for stop in stops])
     known = dict(measured or {})
     for name in known:
         if name not in model:

@@ -1,7 +1,8 @@
 """A mechanism held at displacements: force, stiffness, deviation from a straight line, frequency.
 
-The released body is held at its centre of mass, along the direction u of the release.  At the
-displacement d the holding force is F(d) and the position of the centre of mass z(d).  Then
+The released body is held at its centre of mass or at the released point, along the direction u of
+the release.  If the release is by an angle, a moment holds the body at a rotation.  At the
+displacement d the holding force is F(d) and the position of the point z(d).  Then
 
     stiffness = dF/dd,    across = Im(conj(u) (z - z_straight)),
 
@@ -23,7 +24,7 @@ from ..mechanics.statics import Equilibrium, equilibrium, free_displacement, hel
 from ..mechanics.system import System, unit
 from .equilibria import Rest, holding_force, rests, snap
 
-DIFFERENCE_STEP = 1e-5  # Step of the stiffness, as a share of the size of the mechanism.
+DIFFERENCE_STEP = 1e-5  # Step of the stiffness, as a share of the size, or of one radian.
 
 
 @dataclass(frozen=True)
@@ -34,12 +35,12 @@ class Held:
     ----------
     displacement : float
         Displacement of the released body along the direction of the release, from the drawn shape
-        [m].
+        [m]; its rotation [rad] if the release is by an angle.
     force : float
-        Holding force on the body along that direction [N]; 0 at an equilibrium.
+        Holding force on the body along that direction [N], or moment [N m]; 0 at an equilibrium.
     stiffness : float
-        Derivative of the force by the displacement [N/m]; NaN where the loops prevent a further
-        motion along that direction.
+        Derivative of the force by the displacement [N/m], [N m/rad]; NaN where the loops prevent
+        a further motion along that direction.
     across : float
         Displacement of the body to the left of that direction [m].
     angle : float
@@ -70,7 +71,7 @@ def _described(system: System, displacement: float, shape: Equilibrium) -> Held:
 
 def _stiffness(system: System, displacement: float) -> float:
     """Return the derivative of the holding force by the displacement [N/m]."""
-    step = DIFFERENCE_STEP * system.length
+    step = DIFFERENCE_STEP * (1.0 if system.mechanism.release.turns else system.length)
     try:
         behind, ahead = (holding_force(system, displacement + k * step) for k in (-1, 1))
     except EquilibriumError:

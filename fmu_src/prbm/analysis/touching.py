@@ -99,7 +99,9 @@ def impact_shape(system: System, stop: int, wall: float) -> Equilibrium:
     def gap(shape: Equilibrium) -> float:
         return float(rows.values(system.directions(shape.q))[stop]) + wall
 
-    return touching(lambda x, _: equilibrium(system, x), gap, wall, system.length)
+    # The search is in metres: a rotation is taken on the radius of the size.
+    share = 1.0 / system.length if system.mechanism.release.turns else 1.0
+    return touching(lambda x, _: equilibrium(system, share * x), gap, wall, system.length)
 
 
 def lever(system: System, stop: int) -> float:

@@ -163,7 +163,8 @@ def _modes(commands: Commands) -> None:
     )
     parser.add_argument(
         "--held", metavar="X",
-        help="displacement at which a force holds the released body [m] (default: no force)",
+        help="displacement [m] at which the released body is held, or angle [rad] if it is "
+        "released by an angle (default: not held)",
     )  # fmt: skip
     set_argument(parser)
     _out(parser)
@@ -182,7 +183,8 @@ def _equilibrium(commands: Commands) -> None:
     )  # fmt: skip
     _mechanism(parser)
     add = parser.add_argument
-    add("--held", nargs="+", metavar="X", help="displacements at which the body is held [m]")
+    text = "displacements [m] or angles [rad] at which the body is held"
+    add("--held", nargs="+", metavar="X", help=text)
     add("--from", dest="start", metavar="A", help="first displacement of a force curve [m]")
     add("--to", dest="end", metavar="B", help="last displacement of the force curve [m]")
     add(

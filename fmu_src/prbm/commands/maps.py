@@ -6,15 +6,15 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 
-from ..analysis import impact_map
+from ..analysis import adequacy, impact_map
 from ..analysis.impact_map import ImpactMap
-from ..analysis.stretching import note
 from ..analysis.touching import lever, stop_index
 from ..base.progress import Progress, reporter
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantities, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
+from ..mechanism.parts import value
 from ..plots import impact_map as figures
 from .output import Output
 from .systems import check_length
@@ -68,8 +68,10 @@ def _points(
     """Return wall positions and offsets in increasing order [m], from options or by default."""
     known = {name for name in values if name in mechanism.values()}
     system = assemble(mechanism, mechanism.values({name: values[name] for name in known}))
+    release = mechanism.release
+    amount = abs(value(release, release.start, system.values))
     scales = {
-        "wall-positions": WALL_SHARE * abs(system.values["release.displacement"]),
+        "wall-positions": WALL_SHARE * amount * (system.length if release.turns else 1.0),
         "offsets": OFFSET_SHARE * system.length,
     }
     result = []
@@ -81,7 +83,7 @@ def _points(
         )  # fmt: skip
         if scale == 0.0 and not texts:
             raise UserMistake(
-                "release.displacement = 0 m: no default wall positions; give --wall-positions"
+                f"release.{release.start} = 0: no default wall positions; give --wall-positions"
             )
         if len(set(chosen)) < len(chosen):
             raise UserMistake(f"--{name} {' '.join(texts or [])}: a value is given twice")
@@ -139,18 +141,22 @@ def _notes(
     positions: Sequence[float],
     offsets: Sequence[float],
 ) -> Iterator[str]:
-    """Yield notes on inextensible flexures, for the hit farthest from the centre of mass."""
+    """Yield notes on flexure models, for the hit farthest from the centre of mass.
+
+    The positions of the wall are the nearest to the straight shape and both ends of the map.
+    """
     if not FLEXURE_METHODS.intersection(options.method):
         return
-    stop, nearest = stop_index(mechanism, options.stop), min(positions, key=abs)
+    stop, name = stop_index(mechanism, options.stop), None
     name = mechanism.stops[stop].name
+    walls = sorted({min(positions, key=abs), positions[0], positions[-1]}, key=abs)
     for label, model in _models(options, mechanism):
-        known = {**values, f"{name}.position": nearest, f"{name}.offset": 0.0}
+        known = {**values, f"{name}.offset": 0.0}
         lever_arm = lever(assemble(model, model.values(known)), stop)
         farthest = max(offsets, key=partial(_distance, lever_arm))
-        sentence = note(model, {**known, f"{name}.offset": farthest}, stop)
-        if sentence is not None:
-            yield f"note, {label}: {sentence}"
+        shapes = [adequacy.Impact(stop, wall, farthest) for wall in walls]
+        for finding in adequacy.worst(adequacy.check(model, values, shapes)):
+            yield f"note, {label}: {finding}"
 
 
 def _distance(lever_arm: float, offset: float) -> float:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.adequacy import Impact, Shape, Vibration, notes
 from ..base.unit_text import frequency_unit
 from ..files.settings import UserMistake, quantity
 from ..mechanics.arrays import Complex, Real
@@ -15,7 +16,7 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .output import Output, aligned
-from .systems import assembled, check_length, rounded
+from .systems import assembled, check_held, held_scale, held_unit, rounded
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,9 +28,9 @@ def frequencies(options: argparse.Namespace) -> None:
     output = Output(options.out)
     if options.count < 1:
         raise UserMistake(f"--count {options.count}: must be at least 1")
-    at = None
+    at, held = None, held_unit(mechanism)
     if options.held is not None:
-        at = check_length(quantity(options.held, "m", "--held"), system.length, "--held")
+        at = check_held(quantity(options.held, held.si, "--held"), system, "--held")
     shape = equilibrium(system, at)
     found = modes(system, shape)
     count = min(options.count, len(found.frequency))
@@ -48,6 +49,9 @@ def frequencies(options: argparse.Namespace) -> None:
         print(
             f"{len(found.frequency) - count} higher modes are not shown; show more with --count N"
         )
+    shapes: list[Shape] = [Vibration(at), *map(Impact, range(len(mechanism.stops)))]
+    for sentence in notes(mechanism, values, shapes):
+        print(sentence)
     output.table(
         f"{mechanism.name}-modes.csv",
         ["mode", "frequency [Hz]",
@@ -87,14 +91,15 @@ def _hertz(frequency: float) -> str:
 def _where(system: System, shape: Equilibrium, at: float | None) -> str:
     """Return a description of the shape about which the mechanism vibrates."""
     name, release = system.mechanism.name, system.mechanism.release
-    along = "" if release.direction == 0.0 else f" along {release.direction:g} degrees"
+    held = held_unit(system.mechanism)
+    straight = release.direction == 0.0 or release.turns
+    along = "" if straight else f" along {release.direction:g} degrees"
     if at is not None:
+        effort = held.si_effort.replace(".", " ")
         return (
-            f"{name}, {release.body} held at {1e3 * at:.6g} mm from straight{along} by "
-            f"{shape.force:.5g} N"
+            f"{name}, {release.body} held at {held.factor * at:.6g} {held.shown} from straight"
+            f"{along} by {shape.force:.5g} {effort}"
         )
-    e = system.directions(shape.q)
-    rest = float((system.release @ e).real) + system.release_c
     at_rest = "at rest under gravity" if system.gravity else "at rest without gravity"
-    place = rounded(1e3 * rest, 1e3 * system.length)
-    return f"{name} {at_rest}, {release.body} {place} mm from straight{along}"
+    place = rounded(held.factor * system.amount(shape.q), held.factor * held_scale(system))
+    return f"{name} {at_rest}, {release.body} {place} {held.shown} from straight{along}"

@@ -4,6 +4,7 @@ import argparse
 from collections.abc import Iterable
 from pathlib import Path
 
+from ..analysis.adequacy import Vibration, notes
 from ..base.atomic import FileError, check_file
 from ..base.errors import ParameterError
 from ..base.names import unknown
@@ -27,13 +28,17 @@ def drawn(options: argparse.Namespace) -> None:
     mechanism = load(options.mechanism)
     path = options.out or Path(f"{mechanism.name}.png")
     check_file(path)
-    figure = picture(mechanism, settings(mechanism, options.set), options.modes)
+    values = settings(mechanism, options.set)
+    figure = picture(mechanism, values, options.modes)
     try:
         print(save(figure, path))
     except OSError as error:
         if isinstance(error, FileError):
             raise
         raise FileError(f"{error.filename}: cannot be written ({error.strerror})") from None
+    if options.modes:
+        for sentence in notes(mechanism, values, [Vibration()]):
+            print(sentence)
 
 
 def animated(options: argparse.Namespace) -> None:

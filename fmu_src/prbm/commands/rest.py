@@ -14,15 +14,8 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from ..plots.holding import holding_figure
 from .output import Output, aligned
-from .systems import assembled, check_length, rounded
+from .systems import HeldUnit, assembled, check_held, held_scale, held_unit, rounded
 
-HELD_HEAD = (
-    "displacement [m]", "holding force [N]", "stiffness [N/m]", "across [m]", "angle [rad]",
-    "fundamental frequency [Hz]",
-)  # fmt: skip
-PRINTED_HEAD = (
-    "at [mm]", "force [N]", "stiffness [N/m]", "across [µm]", "angle [mrad]", "f [Hz]",
-)  # fmt: skip
 POINTS_MAX = 100_000
 
 
@@ -35,24 +28,22 @@ def equilibria(options: argparse.Namespace) -> None:
         raise UserMistake("--from and --to: give both ends of the range")
     if ranged != (None, None) and options.held:
         raise UserMistake("--held excludes --from and --to: give one or the other")
-    body, direction = mechanism.release.body, mechanism.release.direction
-    axis = "x" if direction == 0.0 else f"{direction:g} degrees"
-    weight = "gravity acts" if system.gravity else "no gravity acts"
-    head = f"{mechanism.name}: displacement of {body} along {axis}, from straight; {weight}"
+    unit = held_unit(mechanism)
+    head = f"{mechanism.name}: {unit.amount} of {_held(mechanism)}, from straight; " + (
+        "gravity acts" if system.gravity else "no gravity acts"
+    )
     if ranged != (None, None):
         _range(options, mechanism, system, output, head)
     elif options.held:
-        displacements = quantities(options.held, "m", "--held")
-        points = [
-            holding.held(system, check_length(x, system.length, "--held")) for x in displacements
-        ]
+        displacements = quantities(options.held, unit.si, "--held")
+        points = [holding.held(system, check_held(x, system, "--held")) for x in displacements]
         _print(head, points, system)
-        output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows(points))
+        output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(points))
     else:
         rest = holding.free(system)
         _print(head, [rest], system)
         _print_equilibrium(rest.displacement, rest.frequency > 0.0, system)
-        output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows([rest]))
+        output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows([rest]))
     output.write()
 
 
@@ -60,12 +51,13 @@ def _range(
     options: argparse.Namespace, mechanism: Mechanism, system: System, output: Output, head: str
 ) -> None:
     """Print equilibria and snap-through in a range of displacements; write the force curve."""
+    unit = held_unit(mechanism)
     low, high = (
-        check_length(quantity(text, "m", option), system.length, option)
+        check_held(quantity(text, unit.si, option), system, option)
         for text, option in ((options.start, "--from"), (options.end, "--to"))
     )
     if not low < high:
-        raise UserMistake(f"--from {low:g} m must be below --to {high:g} m")
+        raise UserMistake(f"--from {low:g} {unit.si} must be below --to {high:g} {unit.si}")
     if not 3 <= options.points <= POINTS_MAX:
         raise UserMistake(f"--points {options.points}: must lie between 3 and {POINTS_MAX}")
     curve = holding.curve(system, np.linspace(low, high, options.points), reporter())
@@ -78,19 +70,22 @@ def _range(
     if not curve.rests:
         print("no equilibrium in this range")
     for x, force in curve.snaps:
-        print(f"snap-through at {1e3 * x:.6g} mm, under {force:.5g} N")
-    output.table(f"{mechanism.name}-equilibrium.csv", HELD_HEAD, _rows(curve.points))
+        effort = unit.si_effort.replace(".", " ")
+        print(f"snap-through at {unit.factor * x:.6g} {unit.shown}, under {force:.5g} {effort}")
+    output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows(curve.points))
     output.table(
         f"{mechanism.name}-stability.csv",
-        ["kind", "displacement [m]", "force [N]"],
+        ["kind", f"{unit.amount} [{unit.si}]", f"{unit.effort} [{unit.si_effort}]"],
         [
             *([f"{_stability(x.stable)} equilibrium", x.displacement, 0.0]
               for x in curve.rests),
             *(["snap-through", x, force] for x, force in curve.snaps),
         ],
     )  # fmt: skip
+    turns = mechanism.release.turns
     output.figure(
-        f"{mechanism.name}-equilibrium.png", lambda: holding_figure(curve, mechanism.title)
+        f"{mechanism.name}-equilibrium.png",
+        lambda: holding_figure(curve, mechanism.title, turns),
     )
 
 
@@ -99,8 +94,27 @@ def _stability(stable: bool) -> str:
 
 
 def _print_equilibrium(displacement: float, stable: bool, system: System) -> None:
-    at = rounded(1e3 * displacement, 1e3 * system.length)
-    print(f"equilibrium at {at} mm: {_stability(stable)}")
+    unit = held_unit(system.mechanism)
+    at = rounded(unit.factor * displacement, unit.factor * held_scale(system))
+    print(f"equilibrium at {at} {unit.shown}: {_stability(stable)}")
+
+
+def _held(mechanism: Mechanism) -> str:
+    """Return what is held, with the direction of a displacement."""
+    release = mechanism.release
+    if release.turns:
+        return release.body
+    point = release.body if release.point is None else f"the released point of {release.body}"
+    return f"{point} along {'x' if release.direction == 0.0 else f'{release.direction:g} degrees'}"
+
+
+def _csv_head(unit: HeldUnit) -> list[str]:
+    """Return the names of the columns of held shapes, in SI units."""
+    return [
+        f"{unit.amount} [{unit.si}]", f"holding {unit.effort} [{unit.si_effort}]",
+        f"stiffness [{unit.si_stiffness}]", "across [m]", "angle [rad]",
+        "fundamental frequency [Hz]",
+    ]  # fmt: skip
 
 
 def _rows(points: Sequence[holding.Held]) -> list[list[float]]:
@@ -111,21 +125,27 @@ def _rows(points: Sequence[holding.Held]) -> list[list[float]]:
 def _print(head: str, points: Sequence[holding.Held], system: System) -> None:
     """Print held shapes, and the reason for a missing stiffness."""
     print(head)
-    print(_table(points, system.length))
+    print(_table(points, system))
     if any(math.isnan(p.stiffness) for p in points):
         print(f"no stiffness: {immobile(system)}")
 
 
-def _table(points: Sequence[holding.Held], size: float) -> str:
-    """Return the printed table of held shapes of a mechanism of a size [m]."""
+def _table(points: Sequence[holding.Held], system: System) -> str:
+    """Return the printed table of held shapes."""
+    unit, scale = held_unit(system.mechanism), held_scale(system)
     largest = max(abs(p.force) for p in points)
     rows = [
         [
-            rounded(1e3 * p.displacement, 1e3 * size, ".5g"), rounded(p.force, largest),
+            rounded(unit.factor * p.displacement, unit.factor * scale, ".5g"),
+            rounded(p.force, largest),
             "-" if math.isnan(p.stiffness) else f"{p.stiffness:.5g}",
             rounded(1e6 * p.across, 1e3), rounded(1e3 * p.angle, 1e3),
             f"{p.frequency:.5g}" if p.frequency > 0.0 else "unstable",
         ]
         for p in points
     ]  # fmt: skip
-    return aligned(PRINTED_HEAD, rows)
+    head = (
+        f"at [{unit.shown}]", f"{unit.effort} [{unit.si_effort}]",
+        f"stiffness [{unit.si_stiffness}]", "across [µm]", "angle [mrad]", "f [Hz]",
+    )  # fmt: skip
+    return aligned(head, rows)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..analysis.stretching import notes
+from ..analysis.adequacy import Impact, Shape, Vibration, notes
 from ..base.progress import reporter
 from ..base.unit_text import frequency_text
 from ..files.mechanism_file import load
@@ -54,7 +54,7 @@ def simulated(options: argparse.Namespace) -> None:
     output.table(f"{mechanism.name}-impacts.csv", IMPACT_HEAD, _impacts(result))
     output.figure(f"{mechanism.name}.png", lambda: _figure(result))
     output.write()
-    for sentence in _notes(mechanism, values):
+    for sentence in _notes(result.mechanism, values):
         print(sentence)
     if options.spectrum is not None:
         _spectrum(options, result, values, duration)
@@ -71,9 +71,10 @@ def _tolerance(text: str | None) -> float | None:
 
 
 def _notes(mechanism: Mechanism, values: Mapping[str, float]) -> list[str]:
-    """Return notes on effects of impacts that inextensible flexures suppress."""
+    """Return notes on the flexure model, at rest and in impacts."""
     parameters = {p.name for p in mechanism.parameters}
-    return notes(mechanism, {name: x for name, x in values.items() if name in parameters})
+    shapes: list[Shape] = [Vibration(), *map(Impact, range(len(mechanism.stops)))]
+    return notes(mechanism, {n: x for n, x in values.items() if n in parameters}, shapes)
 
 
 def _impacts(result: Result) -> Iterator[list[object]]:

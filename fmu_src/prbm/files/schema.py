@@ -321,13 +321,20 @@ class ProbeTable(Named):
 
 
 class ReleaseTable(Table):
-    """Start of the motion: from a shape that is held by a force on a body along a direction."""
+    """Start of the motion: from a shape held at a displacement or angle, or along a mode."""
 
     body: StrictStr = Field(description="Body that is held and released")
-    direction: Angle = parts.Release.direction
-    displacement: Annotated[Quantity, measured(parts.Release, "displacement")] = (
-        parts.Release.displacement
+    point: PointOrName | None = Field(
+        None,
+        description="Released point, coordinates as drawn or body.point (default: centre of mass)",
     )
+    direction: Angle = parts.Release.direction
+    displacement: Annotated[Quantity, measured(parts.Release, "displacement")] | None = None
+    angle: Annotated[Quantity, measured(parts.Release, "angle")] | None = None
+    mode: Annotated[StrictInt, Field(ge=1, le=parts.MODE_MAX)] | None = Field(
+        None, description="Number of the mode, with amplitude"
+    )
+    amplitude: Annotated[Quantity, measured(parts.Release, "amplitude")] | None = None
     velocity: Annotated[Quantity, measured(parts.Release, "velocity")] = parts.Release.velocity
 
 
@@ -398,7 +405,7 @@ def mechanism(file: MechanismTable, drawing: str = "") -> Mechanism:
         frictions=tuple(parts.Friction(**_attached(part, points)) for part in file.frictions),
         forces=tuple(parts.Force(**_attached(force, points)) for force in file.forces),
         probes=tuple(parts.Probe(**dict(probe)) for probe in file.probes),
-        release=parts.Release(**dict(file.release)),
+        release=_release(file.release, points),
         geometry=tuple(_parameters(file)),
         drawing=drawing,
     )
@@ -495,8 +502,14 @@ def _flexure(table: FlexureTable) -> parts.Flexure:
     return parts.Flexure(table.name, kind, table.start, table.end, ends)
 
 
+def _release(table: ReleaseTable, bodies: Mapping[str, Mapping[str, parts.Point]]) -> parts.Release:
+    """Return the release of a table."""
+    return parts.Release(**_attached(table, bodies))
+
+
 def _attached(
-    table: StopTable | FrictionTable | ForceTable, bodies: Mapping[str, Mapping[str, parts.Point]]
+    table: StopTable | FrictionTable | ForceTable | ReleaseTable,
+    bodies: Mapping[str, Mapping[str, parts.Point]],
 ) -> dict[str, Any]:
     """Return the fields of a part; a point given by name is replaced by its coordinates."""
     given = dict(table)
@@ -504,8 +517,9 @@ def _attached(
         body, _, name = table.point.rpartition(".")
         points = bodies.get(table.body, {})
         if body != table.body or name not in points:
+            name = "release" if isinstance(table, ReleaseTable) else table.name
             raise MechanismError(
-                f"{table.name}.point = {table.point!r} is not a point of the body {table.body}; "
+                f"{name}.point = {table.point!r} is not a point of the body {table.body}; "
                 f"its points are {', '.join(f'{table.body}.{p}' for p in points) or 'none'}"
             )
         given["point"] = points[name]

@@ -6,7 +6,8 @@ from ..base.errors import ParameterError
 from ..base.tolerances import RELEASE_PENETRATION_ATOL
 from ..mechanics.contact_state import ContactState
 from ..mechanics.inputs import Inputs
-from ..mechanics.statics import equilibrium, release_velocity
+from ..mechanics.start import start_shape
+from ..mechanics.statics import release_velocity
 from ..mechanism.parts import value
 from .configuration import Configuration
 from .contact_modes import settle
@@ -29,20 +30,18 @@ def released(configuration: Configuration, inputs: Inputs, time: float) -> Front
     Raises
     ------
     EquilibriumError
-        If no equilibrium has the displacement of the release.
+        If no equilibrium has the displacement or the angle of the release.
     ParameterError
-        If a wall is penetrated, or the loops do not allow the velocity of the release.
+        If a wall is penetrated, the loops do not allow the velocity of the release, or its mode
+        does not move the released point.
     """
     mechanism, system = configuration.mechanism, configuration.system
-    displacement, speed = (
-        value(mechanism.release, name, configuration.values)
-        for name in ("displacement", "velocity")
-    )
-    shape = equilibrium(system, displacement)
-    velocity = release_velocity(system, shape.q, speed)
+    q = start_shape(system, configuration.values)
+    speed = value(mechanism.release, "velocity", configuration.values)
+    velocity = release_velocity(system, q, speed)
     stops = len(mechanism.stops)
     contacts = ContactState.free(stops, len(mechanism.frictions))
-    y = np.concatenate([shape.q, velocity, np.zeros(2)])
+    y = np.concatenate([q, velocity, np.zeros(2)])
     equations = configuration.equations(inputs, contacts)
     front = Front(time, y, equations, (Latched(),) * stops).projected()
     check_walls(configuration, front)

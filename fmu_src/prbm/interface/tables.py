@@ -17,7 +17,6 @@ from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
 from ..mechanism.flexure import ENDS  # of a chain; also pivots of a flexure
 from ..mechanism.parts import (
-    FIELDS,
     GROUND,
     Flexure,
     FlexureType,
@@ -26,7 +25,9 @@ from ..mechanism.parts import (
     Joint,
     Part,
     Point,
+    Release,
     body_of,
+    fields_of,
 )
 from .native import coordinate_variables, counter_of, state_derivatives
 from .variables import (
@@ -44,8 +45,9 @@ from .variables import (
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 2
+MAGIC, VERSION = b"PRBM", 3
 HEAD = 16  # Bytes before those that the checksum covers.
+STARTS = ("displacement", "angle", "amplitude")  # The starts of a release.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
 COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
 STOPS_MAX = 64  # Largest number of stops, and of friction points.
@@ -200,8 +202,7 @@ class _Writer:
             yield _text(name) + _f64(self._start(name, 0.0))
         yield from self._members()
         yield from self._contacts()
-        yield _u32(self.body[m.release.body]) + _f64(m.release.direction)
-        yield self._fields(m.release)
+        yield from self._release(m.release)
         yield from map(self._point, m.ground.values())
         yield from self.bounds
         yield _u32(*self.independent)
@@ -233,6 +234,13 @@ class _Writer:
         for probe in m.probes:
             point = self._point(m.point(probe.point, probe.name))
             yield _text(probe.name) + _u32(self.body[body_of(probe.point)]) + point
+
+    def _release(self, release: Release) -> Iterator[bytes]:
+        """Yield the release: body, direction, point, the kind of its start, mode and fields."""
+        body = self.mechanism.bodies[self.body[release.body] - 1]
+        yield _u32(self.body[release.body]) + _f64(release.direction)
+        yield self._point(body.centre if release.point is None else release.point)
+        yield _u32(STARTS.index(release.start), release.mode or 0) + self._fields(release)
 
     def _counts(self) -> tuple[int, ...]:
         m = self.mechanism
@@ -267,7 +275,7 @@ class _Writer:
         return self._expression(affine(quantity) if isinstance(quantity, str) else parameter)
 
     def _fields(self, part: Part) -> bytes:
-        names = FIELDS[type(part)]
+        names = fields_of(part)
         return b"".join(self._field(f"{part.name}.{n}", getattr(part, n)) for n in names)
 
     def _point(self, point: Point) -> bytes:
@@ -302,7 +310,7 @@ class _Writer:
         m = self.mechanism
         parts: tuple[Part, ...] = (*m.flexure_types, *m.bodies, *m.frictions, *m.stops, m.release)
         for part in parts:
-            for name, (unit, _, minimum, maximum, *_) in FIELDS[type(part)].items():
+            for name, (unit, _, minimum, maximum, *_) in fields_of(part).items():
                 quantity = getattr(part, name)
                 if isinstance(quantity, str):
                     head = _text(f"{part.name}.{name}") + _text(unit)

@@ -117,7 +117,9 @@ def scales(mechanism: Mechanism, sample: Mapping[str, Number]) -> Scales:
     """Return typical magnitudes, from the release, the masses and the fundamental frequency."""
     values = mechanism.values()
     span = extent(mechanism)
-    x = abs(affine(mechanism.release.displacement)(values)) or span / 10
+    release = mechanism.release
+    amount = abs(_quantity(getattr(release, release.start), f"release.{release.start}", values))
+    x = (span * min(amount, 1.0) if release.turns else amount) or span / 10
     omega = 2 * math.pi * float(sample["mode.frequency"]) or 1.0
     mass = sum(_quantity(body.mass, f"{body.name}.mass", values) for body in mechanism.bodies)
     magnitudes = {

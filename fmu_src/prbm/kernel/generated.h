@@ -22,6 +22,8 @@ enum { STATICS_ITERATIONS_MAX = 30 };
 #define STATICS_FORCE_RTOL 1e-12
 #define STATICS_STEP_ATOL 1e-08
 #define RELEASE_ROW_RTOL 1e-09
+#define RELEASE_LEVER_RTOL 0.02
+#define RELEASE_MODE_RTOL 1e-06
 #define RELEASE_MOBILITY_RTOL 1e-12
 #define ZERO_FREQUENCY_RTOL 1e-07
 #define ZERO_MODE_RTOL 1e-12
@@ -132,7 +134,7 @@ enum { LINKS_MAX = 200 };
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 2 };
+enum { TABLES_VERSION = 3 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
 enum { STOPS_MAX = 64 };
@@ -163,6 +165,12 @@ typedef enum {
     BOOLEAN = 2,
     CLOCK = 3,
 } VariableType;
+typedef enum {
+    START_DISPLACEMENT = 0,
+    START_ANGLE = 1,
+    START_AMPLITUDE = 2,
+    START_COUNT = 3,
+} ReleaseStart;
 
 /* --- prbm.interface.variables ------------------------------------------------------------------- */
 

@@ -137,6 +137,7 @@ def _tables() -> Iterator[str]:
     yield _constant("GROUND", tables.GROUND_NUMBER)
     yield _enumeration("SlotGroup", "SLOTS", _counted(tables.SLOT_GROUPS))
     yield _enumeration("VariableType", "", tables.TYPES)
+    yield _enumeration("ReleaseStart", "START", _numbers((*tables.STARTS, "count")))
 
 
 def _groups() -> Iterator[str]:

@@ -23,6 +23,7 @@
 #include "core/forces.c"
 #include "core/statics.c"
 #include "core/modal.c"
+#include "core/start.c"
 #include "core/complementarity.c"
 #include "core/contact.c"
 #include "core/contact_state.c"

@@ -292,7 +292,9 @@ class _Assembler:
         frames = {body.name: self.frame(body.name, body.name, None) for body in mechanism.bodies}
         self.lines += [(body, "body", self.corners(body)) for body in frames]
         release = mechanism.release
-        along_release, release_c = self.displaced(release.body, None, release.direction, e0)
+        along_release, release_c = self.displaced(
+            release.body, release.point, release.direction, e0
+        )
         return System(
             mechanism=mechanism,
             values=dict(self.values),

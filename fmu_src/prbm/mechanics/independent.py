@@ -10,19 +10,18 @@ The choice of q_i is valid as long as dPhi/dq_d is not close to singular.  It is
 shapes between the straight shape and the release.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from scipy.linalg import qr
 
 from ..mechanism.description import Mechanism
-from ..mechanism.parts import value
 from .arrays import Real
 from .assembly import assemble
-from .statics import equilibrium
+from .start import start_shape
 from .system import System
 
-SHAPES = (0.0, 0.5, 1.0)  # Fractions of the displacement at the release.
+SHAPES = (0.0, 0.5, 1.0)  # Fractions of the displacement, angle or amplitude of the release.
 
 
 def independent(mechanism: Mechanism) -> tuple[int, ...]:
@@ -47,19 +46,20 @@ def independent(mechanism: Mechanism) -> tuple[int, ...]:
     system = assemble(mechanism, values)
     if not len(system.loops):
         return tuple(range(system.n))
-    rows = list(_jacobians(system, value(mechanism.release, "displacement", values)))
+    rows = list(_jacobians(system, values))
     choices = [_pivots(jacobian) for jacobian in rows]
     best = max(choices, key=lambda dependent: min(conditioning(J, dependent) for J in rows))
     return tuple(j for j in range(system.n) if j not in best)
 
 
-def _jacobians(system: System, displacement: float) -> Iterator[Real]:
+def _jacobians(system: System, values: Mapping[str, float]) -> Iterator[Real]:
     """Yield the Jacobian of the loops at the straight shape and towards the release."""
     loops = system.loop_rows
     yield loops.jacobian(system.directions(system.q0))
-    for fraction in SHAPES:
-        shape = equilibrium(system, fraction * displacement)
-        yield loops.jacobian(system.directions(shape.q))
+    # The released shape comes first, so that an error message has its value.
+    shapes = [start_shape(system, values, fraction) for fraction in reversed(SHAPES)]
+    for q in reversed(shapes):
+        yield loops.jacobian(system.directions(q))
 
 
 def _pivots(jacobian: Real) -> tuple[int, ...]:

@@ -47,7 +47,7 @@ def modes(system: System, shape: Equilibrium) -> Modes:
     """
     B, lam = system.loops, shape.lam
     if shape.force != 0.0:
-        B = np.vstack([B, system.release])
+        B = np.vstack([B, system.holding_row(shape.q)])
         lam = np.append(lam, shape.force)
     return _modes(system, shape.q, B, lam, shape.load)
 
@@ -101,7 +101,7 @@ def modes_at(system: System, q: Real) -> Modes:
     """
     e = system.directions(q)
     M, _ = inertia(system.H, np.diag(system.J), e)
-    B = np.vstack([system.loops, system.release])
+    B = np.vstack([system.loops, system.holding_row(q)])
     rows = jacobian(system.spread(B), e)
     w = field_row(system.spread(system.S), system.gravity)
     right = np.concatenate([springs(system.K, q - system.q0) + (w * e).real, np.zeros(len(B))])

@@ -19,6 +19,7 @@ import numpy as np
 from ..base.errors import EquilibriumError, ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import (
+    RELEASE_LEVER_RTOL,
     RELEASE_MOBILITY_RTOL,
     RELEASE_ROW_RTOL,
     STATICS_CONSTRAINT_RTOL,
@@ -48,7 +49,8 @@ class Equilibrium:
     lam : (r,)
         Multipliers of the loops: forces at their closures [N].
     force : float
-        Holding force on the released body along the direction of the release [N]; 0 if free.
+        Holding force on the released body along the direction of the release [N], or its holding
+        moment [N m] if the release is by an angle; 0 if free.
     load : (n,) complex
         Row w of gravity and the forces that act, Q = Re(w e) [N m].
     """
@@ -116,8 +118,9 @@ def equilibrium(
     system : System
         The mechanism.
     displacement : float or None
-        Displacement of the released body's centre of mass along the direction of the release [m],
-        held by a force along that direction.  None: no holding force.
+        Displacement of the released point along the direction of the release [m], held by a force
+        along that direction; the rotation of the body [rad], held by a moment, if the release is
+        by an angle.  None: no holding force.
     loads : mapping or None
         Forces and moments by the names of the inputs, ``force.x`` and ``force.y`` [N],
         ``force.moment`` [N m] for a :class:`prbm.mechanism.parts.Force` of the name
@@ -128,26 +131,26 @@ def equilibrium(
     ParameterError
         If a load is unknown, or not a finite number.
     EquilibriumError
-        If there is no such shape, or slow loading does not reach it.
+        If there is no such shape, slow loading does not reach it, or the body turns about the point
+        that is to be displaced.
     """
-    B, c = system.loops, system.loops_c
     w, moment = _loads(system, loads or {})
     if displacement is not None:
         moved = displacement != 0.0 or np.any(w) or np.any(moment)
         if moved and held_by_loops(system):  # The matrix of the balance would be singular.
-            raise EquilibriumError(f"release.displacement = {displacement:g} m: {immobile(system)}")
-        B = np.vstack([B, system.release])
-        c = np.append(c, system.release_c)
-    state = np.concatenate([system.q0, np.zeros(len(c))])
+            raise EquilibriumError(f"{_given(system, displacement)}: {immobile(system)}")
+        if displacement != 0.0 and turns_about_point(system):
+            raise EquilibriumError(f"{_given(system, displacement)}: {_about(system)}")
+    n, r = system.n, len(system.loops)
+    state = np.concatenate([system.q0, np.zeros(r + (displacement is not None))])
     # Only bodies without a spring, for instance on a pin, may turn far in one load step.  If
     # another coordinate jumps, slow loading does not reach the shape.
     bent = sorted({*system.links, *np.flatnonzero(np.diag(system.K) > 0.0).tolist()})
     done, fraction = 0.0, 1.0
     while done < 1.0:
         target = min(1.0, done + fraction)
-        trial = _newton(
-            system, B, c, target * (displacement or 0.0), (target * w, target * moment), state
-        )
+        held = None if displacement is None else target * displacement
+        trial = _newton(system, held, (target * w, target * moment), state)
         if trial is not None and np.abs((trial - state)[bent]).max() <= STATICS_TURN_MAX:
             state, done = trial, target
             fraction = min(1.0, 2 * fraction)
@@ -155,8 +158,9 @@ def equilibrium(
             fraction /= 2
             if fraction < STATICS_LOAD_STEP_MIN:
                 raise EquilibriumError(_unreachable(system, displacement, bool(loads), done))
-    n, r = system.n, len(system.loops)
     force = float(state[n + r]) if displacement is not None else 0.0
+    if system.mechanism.release.turns:
+        force *= system.length  # The constraint is the rotation times the size.
     return Equilibrium(state[:n], state[n : n + r], force, w)
 
 
@@ -177,28 +181,24 @@ def _loads(system: System, loads: Mapping[str, float]) -> tuple[Complex, Real]:
 
 
 def free_displacement(system: System) -> float:
-    """Return the rest position of the released body under gravity, without stops [m].
+    """Return the rest position of the released body under gravity, without stops.
 
-    It is the displacement of the centre of mass from the straight shape along the release.
+    It is the displacement of the released point from the straight shape along the release [m], or
+    the rotation of the body [rad] if the release is by an angle.
     """
-    e = system.directions(equilibrium(system).q)
-    return float((system.release @ e).real) + system.release_c
+    return system.amount(equilibrium(system).q)
 
 
 def _newton(
-    system: System,
-    B: Complex,
-    c: Real,
-    displacement: float,
-    load: tuple[Complex, Real],
-    start: Real,
+    system: System, held: float | None, load: tuple[Complex, Real], start: Real
 ) -> Real | None:
     """Find the equilibrium under a load (row w, moments); None without convergence."""
     n = system.n
     w, moment = load
-    shift = np.zeros(len(c))
-    if len(c) > len(system.loops):
-        shift[-1] = displacement
+    B, c = system.loops, system.loops_c
+    if held is not None:
+        row, constant = system.holding(held)
+        B, c = np.vstack([B, row]), np.append(c, constant)
     scale = STATICS_FORCE_RTOL * float(np.abs(system.K).max() or np.abs(w).max())
     state, turn = start.copy(), math.inf
     for _ in range(STATICS_ITERATIONS_MAX):
@@ -206,7 +206,7 @@ def _newton(
         e = system.directions(q)
         rows = jacobian(system.spread(B), e)
         torque = springs(system.K, q - system.q0) + (w * e).real + moment + lam @ rows
-        open_by = values(B, c, e) - shift
+        open_by = values(B, c, e)
         closed = (
             not len(open_by) or np.abs(open_by).max() <= STATICS_CONSTRAINT_RTOL * system.length
         )
@@ -244,8 +244,8 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
             "load; reduce gravity or the masses, or stiffen the flexures"
         )
     where = (
-        f"release.displacement = {displacement:g} m cannot be reached: no equilibrium was found "
-        f"beyond {done * displacement:.4g} m"
+        f"{_given(system, displacement)} cannot be reached: no equilibrium was found beyond "
+        f"{done * displacement:.4g} {_unit(system)}"
     )
     if not system.gravity:
         return f"{where}; release closer to the straight shape"
@@ -255,20 +255,72 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
     )
 
 
+def _unit(system: System) -> str:
+    return "rad" if system.mechanism.release.turns else "m"
+
+
+def _given(system: System, amount: float) -> str:
+    """Return the start of the release with a value, the beginning of a message."""
+    name = "angle" if system.mechanism.release.turns else "displacement"
+    return f"release.{name} = {amount:g} {_unit(system)}"
+
+
 def held_by_loops(system: System) -> bool:
     """Return whether the loops keep the released body, as drawn, from moving along the release."""
     e = system.directions(system.q0)
-    along = jacobian(system.spread(system.release[None]), e)
+    along = jacobian(system.spread(system.holding_row(system.q0)[None]), e)
     return _left_by_loops(system, e, along) <= RELEASE_ROW_RTOL * system.length
 
 
+def turns_about_point(system: System) -> bool:
+    """Return whether a small force on the released point, as drawn, turns the body about it.
+
+    The displacement of the point is then below :data:`RELEASE_LEVER_RTOL` times the size times the
+    rotation, so that a displacement of the point determines the shape badly.
+    """
+    if system.mechanism.release.turns:
+        return False
+    e = system.directions(system.q0)
+    row = jacobian(system.spread(system.release[None]), e)[0]
+    loops = system.loop_rows.jacobian(e)
+    try:
+        kkt = constraints.saddle(system.K, loops, loops)
+        response = constraints.solve(kkt, np.append(row, np.zeros(len(loops))))[: system.n]
+    except SimulationError:  # A body without a spring, for instance on a pin.
+        return False
+    turn = abs(float(response[system.released.j]))
+    return abs(float(row @ response)) < RELEASE_LEVER_RTOL * system.length * turn
+
+
+def _about(system: System) -> str:
+    """Return why a displacement of the released point is rejected, and a remedy."""
+    release = system.mechanism.release
+    point = "centre of mass" if release.point is None else "released point"
+    return (
+        f"a force along the direction of the release turns the body {release.body} about its "
+        f"{point}, and hardly displaces that point; give release.angle instead, or another "
+        "release.point or direction"
+    )
+
+
 def immobile(system: System) -> str:
-    """Return why the released body, as drawn, cannot move along the release, and a remedy."""
+    """Return why the released body, as drawn, cannot be held, and a remedy."""
+    if system.mechanism.release.turns:
+        return (
+            f"the body {system.mechanism.release.body} cannot turn; give release.displacement "
+            "instead, or let flexures stretch (axial = true)"
+        )
+    return _immovable(system, "give release.angle, another release.point, or release another body")
+
+
+def _immovable(system: System, remedy: str) -> str:
+    """Return why the released point, as drawn, cannot move along the release, and a remedy."""
     name = system.mechanism.release.body
     if _on_pivot(system, name):
+        point = "centre of mass" if system.mechanism.release.point is None else "released point"
         return (
-            f"the centre of mass of the body {name} cannot move, because it lies on the pivot that "
-            "the body turns about; move the centre of mass, or release another body"
+            f"the {point} of the body {name} cannot move, because it lies on the pivot that the "
+            f"body turns about; {remedy}"
         )
     return (
         f"the body {name} cannot move along the direction of the release; choose another "
@@ -279,7 +331,7 @@ def immobile(system: System) -> str:
 def _on_pivot(system: System, name: str) -> bool:
     """Return whether a body, as drawn, can turn while its centre of mass is fixed."""
     e, frame = system.directions(system.q0), system.bodies[name]
-    both = jacobian(system.spread(np.vstack([frame.A, -1j * frame.A])), e)
+    both = jacobian(system.spread(np.vstack([system.release, -1j * system.release])), e)
     turn = np.eye(system.n)[[frame.j]]
     return _left_by_loops(system, e, both) <= RELEASE_ROW_RTOL * system.length and (
         _left_by_loops(system, e, turn) > RELEASE_ROW_RTOL
@@ -301,12 +353,12 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     q : (n,)
         Angles at release [rad].
     speed : float
-        Speed of the centre of mass along the direction of the release [m/s].
+        Speed of the released point along the direction of the release [m/s].
 
     Returns
     -------
     v : (n,)
-        Rates of the coordinates, as after an impulse on the centre of mass [rad/s].
+        Rates of the coordinates, as after an impulse on the point along that direction [rad/s].
 
     Raises
     ------
@@ -321,7 +373,8 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     loops, row = rows[:-1], rows[-1:]
     left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
     if left <= RELEASE_MOBILITY_RTOL * free:
-        raise ParameterError(f"release.velocity = {speed:g} m/s: {immobile(system)}")
+        remedy = "give another release.point, or release another body"
+        raise ParameterError(f"release.velocity = {speed:g} m/s: {_immovable(system, remedy)}")
     rates = np.zeros(len(rows))
     rates[-1] = -speed
     return constraints.project_velocities(M, rows, rates, np.zeros(system.n))

@@ -240,7 +240,7 @@ class System:
     rubs, lifts, lifts_c : (f, n) complex, (f, n) complex, (f,)
         Displacement along and to the left of the direction of each friction point [m].
     release, release_c : (n,) complex, float
-        Displacement of the released body along the direction of the release [m].
+        Displacement of the released point along the direction of the release [m].
     bodies : dict of BodyFrame
         The bodies by name: their centres of mass.
     pushed : tuple of BodyFrame
@@ -378,6 +378,42 @@ class System:
     def spread(self, B: Complex) -> Complex:
         """Return rows with the column of each arm repeated for its stretch."""
         return B[..., self.arm] if len(self.stretches) else B
+
+    @property
+    def released(self) -> BodyFrame:
+        """The released body, at its centre of mass."""
+        return self.bodies[self.mechanism.release.body]
+
+    def holding(self, amount: float) -> tuple[Complex, float]:
+        """Return B, c of the constraint Re(B E) + c = 0 that holds the released body.
+
+        For a rotation the constraint is the sine of the remaining angle times the size.  Its
+        derivative at the solution is the size, and its second derivative is zero, so that the
+        multiplier is the holding moment over the size.
+
+        Parameters
+        ----------
+        amount : float
+            Displacement along the direction of the release [m]; rotation [rad] if the release is
+            by an angle.
+        """
+        if not self.mechanism.release.turns:
+            return self.release, self.release_c - amount
+        j = self.released.j
+        row = np.zeros(self.n, complex)
+        row[j] = -1j * self.length * np.exp(-1j * (self.q0[j] + amount))
+        return row, 0.0
+
+    def amount(self, q: Real) -> float:
+        """Return the displacement [m] or, if the release is by an angle, the rotation [rad]."""
+        j = self.released.j
+        if self.mechanism.release.turns:
+            return float(q[j] - self.q0[j])
+        return float((self.release @ self.directions(q)).real) + self.release_c
+
+    def holding_row(self, q: Real) -> Complex:
+        """Return the row of the holding force or moment in a shape."""
+        return self.holding(self.amount(q))[0]
 
     @property
     def gravity(self) -> complex:

@@ -23,8 +23,8 @@ from .expressions import Quantity, affine
 from .flexure import CLAMP, ENDS, FREE, LINKS_MAX, MODELS, FlexureModel
 from .parameters import Parameter
 from .parts import (
-    FIELDS,
     GROUND,
+    MODE_MAX,
     Body,
     Flexure,
     FlexureType,
@@ -37,6 +37,7 @@ from .parts import (
     Release,
     Stop,
     body_of,
+    fields_of,
 )
 
 RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "release", "solver")
@@ -183,7 +184,7 @@ class Mechanism:
                 raise ParameterError(unknown(name, parameters))
             result[name] = parameters[name].check(value)
         for part in self._parts():
-            for name, meta in FIELDS[type(part)].items():
+            for name, meta in fields_of(part).items():
                 quantity = getattr(part, name)
                 if isinstance(quantity, str):  # reject expressions out of bounds
                     Parameter(f"{part.name}.{name}", affine(quantity)(result), *meta)
@@ -252,6 +253,7 @@ class Mechanism:
                 )
         if self.release.body not in bodies:
             raise MechanismError(_undefined("release.body", self.release.body, bodies))
+        _check_release(self.release)
 
     def _check_type(self, kind: FlexureType) -> None:
         """Reject a flexure type with an unknown model, or with options of another model."""
@@ -340,13 +342,13 @@ class Mechanism:
             yield from ((f"{body.name}.centre", c) for c in body.centre)
             for name, point in body.points.items():
                 yield from ((f"{body.name}.{name}", c) for c in point)
-        points: tuple[Stop | Friction | Force, ...] = (*self.stops, *self.frictions, *self.forces)
-        for part in points:
+        points: tuple[Stop | Friction | Force | Release, ...] = (*self.stops, *self.frictions)
+        for part in (*points, *self.forces, self.release):
             yield from ((f"{part.name}.point", c) for c in part.point or ())
         for kind in self.flexure_types:
             yield from ((f"{kind.name}.{n}", c) for n, c in kind.coefficients.items())
         for one in self._parts():
-            yield from ((f"{one.name}.{f}", getattr(one, f)) for f in FIELDS[type(one)])
+            yield from ((f"{one.name}.{f}", getattr(one, f)) for f in fields_of(one))
 
 
 def _undefined(key: str, name: str, known: Iterable[str]) -> str:
@@ -354,9 +356,26 @@ def _undefined(key: str, name: str, known: Iterable[str]) -> str:
     return f"{key} = {name!r} is not defined; choose one of {', '.join(known) or 'none'}"
 
 
+def _check_release(release: Release) -> None:
+    """Reject a release from several shapes, or a mode without an amplitude."""
+    starts = [n for n in ("displacement", "angle", "amplitude") if getattr(release, n) is not None]
+    if len(starts) > 1:
+        raise MechanismError(
+            f"release.{starts[1]} excludes release.{starts[0]}: give one of displacement, angle, "
+            "and mode with amplitude"
+        )
+    if (release.mode is None) != (release.amplitude is None):
+        given, missing = ("mode", "amplitude") if release.mode else ("amplitude", "mode")
+        raise MechanismError(f"release.{given} is given without release.{missing}: add the key")
+    if release.mode is not None and not 1 <= release.mode <= MODE_MAX:
+        raise MechanismError(
+            f"release.mode = {release.mode} must be the number of a mode, from 1 to {MODE_MAX}"
+        )
+
+
 def _fields(part: Part) -> Iterator[Parameter]:
     """Yield the parameters of a part: its fields that are numbers."""
-    for name, meta in FIELDS[type(part)].items():
+    for name, meta in fields_of(part).items():
         quantity = getattr(part, name)
         if not isinstance(quantity, str):
             yield Parameter(f"{part.name}.{name}", quantity, *meta)

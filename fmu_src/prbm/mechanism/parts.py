@@ -186,18 +186,58 @@ class Probe:
 
 @dataclass(frozen=True)
 class Release:
-    """Start of the motion: from a shape that a force on a body along a direction [deg] holds.
+    """Start of the motion, from one of three shapes.
 
-    ``displacement`` [m] is that of the body's centre of mass from the straight shape along the
-    direction.  ``velocity`` [m/s] is that of the centre of mass along the direction; the velocities
-    of the other coordinates are those of least kinetic energy.
+    * ``displacement``: a force on a point of a body along a direction holds it (default).
+    * ``angle``: a moment on the body holds it.
+    * ``amplitude``: the mechanism is displaced from its rest under gravity along a mode.
+
+    Parameters
+    ----------
+    body : str
+        Body that is released.
+    direction : float
+        Direction of displacement, amplitude and velocity, counter-clockwise from +x [deg].
+    displacement : Quantity or None
+        Displacement of the point from the straight shape along the direction [m].
+    velocity : Quantity
+        Velocity of the point along the direction [m/s]; the velocities of the other coordinates are
+        those of least kinetic energy.
+    point : Point or None
+        Point of the body as drawn [m]; None: its centre of mass.
+    angle : Quantity or None
+        Rotation of the body from the straight shape [rad].
+    mode : int or None
+        Number of the mode, from 1.
+    amplitude : Quantity or None
+        Displacement of the point along the direction by the mode, from the rest [m].
     """
 
     name: ClassVar[str] = "release"
     body: str
     direction: float = 0.0
-    displacement: Quantity = 0.0
+    displacement: Quantity | None = None
     velocity: Quantity = 0.0
+    point: Point | None = None
+    angle: Quantity | None = None
+    mode: int | None = None
+    amplitude: Quantity | None = None
+
+    def __post_init__(self) -> None:
+        if self.angle is None and self.amplitude is None and self.mode is None:
+            object.__setattr__(self, "displacement", self.displacement or 0.0)
+
+    @property
+    def start(self) -> str:
+        """Name of the given start: ``displacement``, ``angle`` or ``amplitude``."""
+        if self.angle is not None:
+            return "angle"
+        return "displacement" if self.mode is None else "amplitude"
+
+    @property
+    def turns(self) -> bool:
+        """Whether a moment holds the body at a rotation, instead of a force at a displacement."""
+        return self.angle is not None
 
 
 Part = Body | FlexureType | Flexure | Joint | Stop | Friction | Force | Probe | Release
@@ -205,6 +245,8 @@ Part = Body | FlexureType | Flexure | Joint | Stop | Friction | Force | Probe | 
 LENGTH_MIN = 1e-9  # m; smallest dimension of a mechanism.
 MASS_MIN = 1e-15  # kg; half the mass of a cubic micrometre of silicon.
 LENGTH_MAX = 1e3  # m; largest dimension of a mechanism.
+ANGLE_MAX = 100.0  # rad; largest rotation of a release.
+MODE_MAX = 512  # Largest number of the mode of a release.
 
 
 def _meta(
@@ -267,9 +309,31 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
             "m", "Displacement from the straight shape at which the body is released",
             -LENGTH_MAX, LENGTH_MAX, 1e-2,
         ),
+        "angle": _meta(
+            "rad", "Rotation from the straight shape at which the body is released",
+            -ANGLE_MAX, ANGLE_MAX, 0.1,
+        ),
+        "amplitude": _meta(
+            "m", "Displacement along a mode, from the rest, at which the body is released",
+            -LENGTH_MAX, LENGTH_MAX, 1e-2,
+        ),
         "velocity": _meta("m/s", "Velocity at release", -1e4, 1e4),
     },
 }  # fmt: skip
+
+
+Meta = tuple[str, str, float, float, float | None, bool]
+
+
+def fields_of(part: Part) -> dict[str, Meta]:
+    """Return the fields of a part that are given, with the arguments of their parameters.
+
+    Examples
+    --------
+    >>> [*fields_of(Release("lever", angle=0.1))]
+    ['angle', 'velocity']
+    """
+    return {n: meta for n, meta in FIELDS[type(part)].items() if getattr(part, n) is not None}
 
 
 def value(part: Part, name: str, values: Mapping[str, float]) -> float:

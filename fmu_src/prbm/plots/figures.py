@@ -118,9 +118,10 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
     -------
     Figure
         One panel for each recorded quantity: displacement and velocity of the released body along
-        the direction of its release, closing and opening speeds of the impacts, energies.  The sum
-        of the energies less the work is constant.  Times at which a stop holds are shaded.  The
-        time axis ends shortly after the motion has settled.  If no body moves, the figure says so.
+        the direction of its release, or its rotation and rate if it is released by an angle;
+        closing and opening speeds of the impacts, energies.  The sum of the energies less the work
+        is constant.  Times at which a stop holds are shaded.  The time axis ends shortly after the
+        motion has settled.  If no body moves, the figure says so.
 
     Raises
     ------
@@ -138,10 +139,11 @@ def response(result: Result | Columns, mechanism: Mechanism | None = None) -> Fi
         return _motionless(plot)
     body = mechanism.release.body
     drawn: list[Panel] = []
-    if plot.has(f"{body}.x", f"{body}.y"):
-        drawn.append(_displacement)
-    if plot.has(f"{body}.vx", f"{body}.vy"):
-        drawn.append(_velocity)
+    turns = mechanism.release.turns
+    if plot.has(f"{body}.angle") if turns else plot.has(f"{body}.x", f"{body}.y"):
+        drawn.append(_rotation if turns else _displacement)
+    if plot.has(f"{body}.omega") if turns else plot.has(f"{body}.vx", f"{body}.vy"):
+        drawn.append(_turning if turns else _velocity)
     if plot.marks:
         drawn.append(_speeds)
     if plot.has(*(f"energy.{name}" for name in ENERGIES)):
@@ -213,6 +215,24 @@ def _displacement(axes: Axes, plot: _Plot) -> None:
     if len(axes.lines) > 1:
         axes.legend(loc="best", fontsize=9, frameon=False, ncols=3)
     axes.set_ylabel(f"displacement [{unit_name}]")
+
+
+def _rotation(axes: Axes, plot: _Plot) -> None:
+    body = plot.mechanism.release.body
+    angle = np.degrees(plot.columns[f"{body}.angle"])
+    axes.plot(plot.time, angle, color=PAST, linewidth=1.4, label=body)
+    if plot.marks:
+        when = plot.factor * np.array([mark.time for mark in plot.marks])
+        at_hit = np.interp(when, plot.time, angle)
+        axes.plot(when, at_hit, "v", color=IMPACT, markersize=5, label="impact")
+        axes.legend(loc="best", fontsize=9, frameon=False, ncols=2)
+    axes.set_ylabel("rotation [deg]")
+
+
+def _turning(axes: Axes, plot: _Plot) -> None:
+    omega = plot.columns[f"{plot.mechanism.release.body}.omega"]
+    axes.plot(plot.time, omega, color=PAST, linewidth=1.2)
+    axes.set_ylabel("rate [rad/s]")
 
 
 def _walls(axes: Axes, plot: _Plot, x: Real, factor: float) -> None:

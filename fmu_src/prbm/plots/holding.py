@@ -1,5 +1,7 @@
 """Figure of a holding force over the displacement, with equilibria and snap-through."""
 
+import math
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -14,25 +16,29 @@ SIDEWAYS_RTOL = 1e-9  # Sideways motion below this fraction of the displacement 
 
 
 @own_style()
-def holding_figure(curve: Curve, title: str) -> Figure:
+def holding_figure(curve: Curve, title: str, turns: bool = False) -> Figure:
     """Draw holding force, sideways motion and fundamental frequency over the displacement.
+
+    With ``turns``, a moment holds the body at rotations.
 
     Stable equilibria are filled circles, unstable ones are open circles; diamonds mark the
     displacements at which the mechanism snaps through under a force.
     """
     x = np.array([point.displacement for point in curve.points])
     factor, name = length_unit(float(np.abs(x).max()) or 1.0)
+    if turns:
+        factor, name = 180 / math.pi, "deg"
     drawn = Figure((8.0, 6.6), dpi=120, layout="constrained")
     every: list[Axes] = list(
         drawn.subplots(3, 1, sharex=True, gridspec_kw={"height_ratios": [2, 1, 1]})
     )
     force, across, frequency = every
-    _draw_force(force, curve, factor)
+    _draw_force(force, curve, factor, turns)
     force.set_title(title, fontsize=11, loc="left")
     _draw_across(across, curve, factor)
     _draw_frequency(frequency, curve, factor)
     _shade_unstable(every, factor * x, _frequencies(curve))
-    frequency.set_xlabel(f"displacement [{name}]")
+    frequency.set_xlabel(f"{'rotation' if turns else 'displacement'} [{name}]")
     for axes in every:
         plain(axes)
     drawn.align_ylabels(every)
@@ -43,7 +49,7 @@ def _frequencies(curve: Curve) -> Real:
     return np.array([point.frequency for point in curve.points])
 
 
-def _draw_force(axes: Axes, curve: Curve, factor: float) -> None:
+def _draw_force(axes: Axes, curve: Curve, factor: float, turns: bool) -> None:
     """Draw the holding force, the equilibria and the points of snap-through."""
     scale, newton = _force_unit(max(abs(point.force) for point in curve.points))
     axes.plot(
@@ -63,7 +69,7 @@ def _draw_force(axes: Axes, curve: Curve, factor: float) -> None:
         axes.plot(*snaps.T, "D", color=IMPACT, markersize=5, label="snap-through")
     if curve.rests:
         axes.legend(fontsize=9, frameon=False)
-    axes.set_ylabel(f"holding force [{newton}]")
+    axes.set_ylabel(f"holding moment [{newton} m]" if turns else f"holding force [{newton}]")
 
 
 def _draw_across(axes: Axes, curve: Curve, factor: float) -> None:

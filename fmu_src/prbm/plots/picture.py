@@ -3,6 +3,8 @@
 import cmath
 import math
 from collections.abc import Mapping, Sequence
+from textwrap import fill
+from typing import Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,14 +12,17 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.patheffects import withStroke
 
-from ..base.errors import ParameterError
+from ..base.errors import ParameterError, PrbmError
+from ..base.tolerances import RELEASE_PENETRATION_ATOL
 from ..base.unit_text import frequency_unit, length_unit
 from ..drawing.shapes import Shapes, corners, curve
 from ..drawing.style import BODY, CHAIN, FLEXURE, IMPACT, LINK, PROBE, STRAIGHT, WALL, own_style
 from ..mechanics.arrays import Complex
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import Modes, modes
+from ..mechanics.start import start_shape
 from ..mechanics.statics import equilibrium
+from ..mechanics.system import FIXED, unit
 from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .scene import quiet
@@ -28,6 +33,10 @@ MODES_MAX = 12  # Largest number of modes in a picture.
 COLUMNS = 3  # Modes per row.
 THIN_BODY = 0.12  # Bodies of a lower height, as a share of the size, have their names above.
 NAME_AT = 0.36  # Position of a name along its flexure, off the middle where flexures may cross.
+START = "#7a3fa0"  # Colour of the released shape.
+MOVED_RTOL = 1e-6  # Of the size: a released shape that differs by less is straight.
+VISIBLE_RTOL = 2e-3  # Of the size: a part that is released by less is drawn once.
+CAPTION_WIDTH = 125  # Characters of a line of the caption.
 NAME, NAME_OFFSET = "#303030", 7.0  # Colour; distance of a flexure from its name [points].
 WIDTH, HEIGHT_MIN, HEIGHT_MAX, FRAME = 7.2, 2.4, 6.4, 0.9  # Sizes of the picture [inch].
 
@@ -40,6 +49,9 @@ def picture(
     held: float | None = None,
 ) -> Figure:
     """Draw the straight shape with the names of its parts, and modes about an equilibrium.
+
+    The released shape is drawn in dashed lines, with its gaps to the walls.  A release that is
+    impossible is left out; the picture gives the reason.
 
     Parameters
     ----------
@@ -69,7 +81,10 @@ def picture(
     shapes = Shapes(assemble(mechanism, mechanism.values(values)))
     if not 0 <= shown <= MODES_MAX:
         raise ParameterError(f"{shown} modes: choose a number from 0 to {MODES_MAX}")
+    start, reason = _released(shapes)
     z = np.concatenate([*_places(shapes, shapes.straight), *_walls(shapes)])
+    if start is not None:
+        z = np.concatenate([z, *_places(shapes, start)])
     vibrating = _vibrating(shapes, held) if shown else None
     if vibrating is not None:
         shown = min(shown, len(vibrating[0].frequency))
@@ -80,12 +95,30 @@ def picture(
     figure = Figure((WIDTH, height + rows * row), dpi=120, layout="constrained")
     grid = figure.add_gridspec(1 + rows, COLUMNS, height_ratios=[height, *[row] * rows])
     axes = figure.add_subplot(grid[0, :])
-    _Drawing(axes, shapes).parts()
+    drawing = _Drawing(axes, shapes)
+    drawing.parts()
+    if start is not None:
+        drawing.released(start)
+    elif reason:
+        axes.set_xlabel(f"{axes.get_xlabel()}\n{fill(reason, CAPTION_WIDTH)}", fontsize=7)
     axes.set_title(mechanism.title, fontsize=10, loc="left")
     if vibrating is not None:
         places = [grid[1 + k // COLUMNS, k % COLUMNS] for k in range(shown)]
         _draw_modes(figure, places, shapes, *vibrating)
     return figure
+
+
+def _released(shapes: Shapes) -> tuple[Complex | None, str]:
+    """Return the arms of the released shape; None if it is straight, or with a reason."""
+    system = shapes.system
+    try:
+        q = start_shape(system, system.values)
+    except PrbmError as error:
+        return None, f"the released shape is not drawn: {error}"
+    E = shapes.arms(q)
+    moved = zip(_places(shapes, E), _places(shapes, shapes.straight), strict=True)
+    apart = max(float(np.abs(a - b).max()) for a, b in moved)
+    return (E if apart > MOVED_RTOL * shapes.size else None), ""
 
 
 def _vibrating(shapes: Shapes, held: float | None) -> tuple[Modes, Complex]:
@@ -158,6 +191,11 @@ def _walls(shapes: Shapes) -> list[Complex]:
 def _places(shapes: Shapes, E: Complex) -> list[Complex]:
     lines = [corners(line.outline, E) for line in shapes.flexures]
     return [*lines, *(shapes.body(name, E) for name in shapes.bodies)]
+
+
+def _aligned(across: float) -> Literal["left", "center", "right"]:
+    """Return the horizontal alignment of words on a side of a line."""
+    return "center" if abs(across) < 0.5 else "left" if across > 0.0 else "right"
 
 
 class _Drawing:
@@ -253,6 +291,60 @@ class _Drawing:
             self.mark(np.array([self.shapes.hit(i, E)]), "o", IMPACT, 6.0, 7.0)
             end = max(wall[:2], key=lambda z: (round(z.imag / self.shapes.size, 6), z.real))
             self.text(complex(end), stop.name, va="bottom")
+
+    def released(self, E: Complex) -> None:
+        """Draw the released shape in dashed lines, and the gaps of its hit points to the walls."""
+        shapes, system = self.shapes, self.shapes.system
+        for line in shapes.flexures:
+            z = corners(line.outline, E)
+            many = len(z) - 2 > CHAIN
+            if self.apart(z, corners(line.outline, shapes.straight)):
+                self.line(z if many else curve(z, line.guided), START, 1.0, 3.6, "--")
+        for name in shapes.bodies:
+            z = shapes.body(name, E)
+            if self.apart(z, shapes.body(name, shapes.straight)):
+                self.line(np.append(z, z[0]), START, 1.0, 3.6, "--")
+        name = f"release.{system.mechanism.release.start}"
+        label = f"dashed: released shape, {name} = {self.start()}"
+        self.axes.set_xlabel(f"{self.axes.get_xlabel()}\n{label}", fontsize=8)
+        gaps = system.gap_rows.values(E)
+        for i, stop in enumerate(system.mechanism.stops):
+            gap = float(gaps[i]) + value(stop, "position", system.values)
+            hit, into = self.shapes.hit(i, E), unit(stop.direction)
+            if system.on[i] != FIXED:
+                into *= complex(E[system.on[i]])
+            self.line(np.array([hit, hit + gap * into]), START, 1.0, 6.5, ":")
+            self.mark(np.array([hit]), "o", START, 5.0, 6.6)
+            if gap < -RELEASE_PENETRATION_ATOL:
+                words = f"behind {stop.name} by {-gap * self.factor:.3g} {self.unit}"
+            else:
+                words = f"start gap {gap * self.factor:.3g} {self.unit}"
+            self.beside(hit + gap * into / 2, into, words)
+        self.axes.autoscale_view()
+
+    def apart(self, a: Complex, b: Complex) -> bool:
+        """Return whether two drawings of a part differ visibly."""
+        return float(np.abs(a - b).max()) > VISIBLE_RTOL * self.shapes.size
+
+    def start(self) -> str:
+        """Return the displacement, angle or amplitude of the release with its unit."""
+        system = self.shapes.system
+        release = system.mechanism.release
+        amount = value(release, release.start, system.values)
+        if release.turns:
+            return f"{math.degrees(amount):.4g} deg"
+        mode = "" if release.mode is None else f" along mode {release.mode}"
+        return f"{self.factor * amount:.4g} {self.unit}{mode}"
+
+    def beside(self, place: complex, along: complex, words: str) -> None:
+        """Write words beside a line, below it if it is horizontal."""
+        away = -1j * along if (1j * along).imag > -0.5 else 1j * along
+        self.axes.annotate(
+            words, (place.real * self.factor, place.imag * self.factor),
+            (NAME_OFFSET * away.real, NAME_OFFSET * away.imag), textcoords="offset points",
+            color=START, fontsize=7, ha=_aligned(away.real), va="center", zorder=9,
+            path_effects=[withStroke(linewidth=2.2, foreground="white")],
+        )  # fmt: skip
 
     def forces(self, E: Complex) -> None:
         length = ARROW_LENGTH * self.shapes.size * self.factor

@@ -1,5 +1,7 @@
 """The summary of a result: frequency, free rest position, impacts, rest on a stop."""
 
+import cmath
+import math
 from collections.abc import Mapping
 
 from ..base.unit_text import frequency_unit, length_unit, time_unit
@@ -7,6 +9,7 @@ from ..mechanics.assembly import assemble
 from ..mechanics.statics import free_displacement
 from ..mechanics.system import System, unit
 from ..mechanism.description import Mechanism
+from ..mechanism.expressions import affine
 from .marks import marks
 from .result import Columns, column, moves, rest_time
 
@@ -107,28 +110,36 @@ def _free(columns: Columns, system: System) -> list[str]:
         weight = " under gravity" if system.gravity else ""
         return [f"fundamental          none: without stops, the equilibrium{weight} is unstable"]
     factor, hertz = frequency_unit(frequency)
-    release = system.mechanism.release
     weight = "under gravity" if system.gravity else "without gravity"
-    rest = length(free_displacement(system), system.length)
+    rest = _from_straight(free_displacement(system), system)
     return [
         f"fundamental          {factor * frequency:.4g} {hertz}",
-        f"free rest position   {release.body} {rest} from straight"
-        f"{_along(release.direction)}, {weight}, without stops",
+        f"free rest position   {rest}, {weight}, without stops",
     ]
 
 
-def _along(direction: float) -> str:
-    """Return the direction of a displacement [degrees] as text, empty for the x direction."""
-    return "" if direction == 0.0 else f" along {direction:g} degrees"
+def _from_straight(amount: float, system: System) -> str:
+    """Return a displacement [m] or rotation [rad] of the released body as text."""
+    release = system.mechanism.release
+    if release.turns:
+        return f"{release.body} {round(math.degrees(amount), 2) + 0.0:.2f} deg from straight"
+    along = "" if release.direction == 0.0 else f" along {release.direction:g} degrees"
+    point = "" if release.point is None else " at the released point"
+    return f"{release.body} {length(amount, system.length)} from straight{along}{point}"
 
 
 def _place(columns: Columns, system: System) -> str:
     """Return the final position of the released body as text."""
-    body, direction = system.mechanism.release.body, system.mechanism.release.direction
-    x, y = (float(column(columns, f"{body}.{axis}")[-1]) for axis in "xy")
-    u = unit(direction)
-    if direction == 0.0:
-        return f"{body}.x = {length(x, system.length)}"
-    return (
-        f"{body} {length(x * u.real + y * u.imag, system.length)} from straight{_along(direction)}"
+    release, frame = system.mechanism.release, system.released
+    x, y, angle = (
+        float(column(columns, f"{release.body}.{output}")[-1]) for output in ("x", "y", "angle")
     )
+    if release.turns:
+        return _from_straight(angle, system)
+    if release.direction == 0.0 and release.point is None:
+        return f"{release.body}.x = {length(x, system.length)}"
+    drawn = frame.drawn
+    if release.point is not None:
+        drawn = complex(*(affine(coordinate)(system.values) for coordinate in release.point))
+    moved = complex(x, y) + (drawn - frame.drawn) * (cmath.exp(1j * angle) - 1.0)
+    return _from_straight((unit(release.direction).conjugate() * moved).real, system)

@@ -102,6 +102,8 @@ class Frequency:
     def model(self, mechanism: Mechanism, values: Mapping[str, float]) -> Real:
         """Return the frequency of the mechanism, (1,) [Hz]."""
         system = assemble(mechanism, mechanism.values(of_mechanism(values)))
+        if self.displacement is not None:
+            check_displaced(mechanism)
         found = modes(system, equilibrium(system, self.displacement)).frequency
         if self.mode > len(found):
             raise EvaluationError(
@@ -213,9 +215,25 @@ class ForceDeflection:
 
     def model(self, mechanism: Mechanism, values: Mapping[str, float]) -> Real:
         """Return the forces of the mechanism, (m,) [N]."""
+        check_displaced(mechanism)
         system = assemble(mechanism, mechanism.values(of_mechanism(values)))
         forces = [equilibrium(system, float(x)).force for x in self.displacement]
         return np.array(forces) + values.get(RECORD_ZERO, 0.0)
+
+
+def check_displaced(mechanism: Mechanism) -> None:
+    """Reject a mechanism that is held at an angle, for a quantity at a displacement.
+
+    Raises
+    ------
+    EvaluationError
+        If the release is by an angle.
+    """
+    if mechanism.release.turns:
+        raise EvaluationError(
+            f"{mechanism.release.body} is released by an angle: for forces and frequencies at a "
+            "displacement, give release.displacement and release.point in the mechanism file"
+        )
 
 
 def of_mechanism(values: Mapping[str, float]) -> dict[str, float]:

@@ -1,6 +1,6 @@
 """Impact maps: the modal restitution over positions of the wall and offsets of the hit."""
 
-from .flexure_models import with_flexures
+from ..flexure_models import with_flexures
 from .free_body import closed_form
 from .impacts import first_impact
 from .maps import OFFSETS, WALLS, Hit, ImpactMap, grouped

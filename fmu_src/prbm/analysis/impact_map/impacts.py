@@ -29,10 +29,11 @@ def first_impact(simulation: Simulation, stop: int) -> Impact:
         for impact in simulation.record:
             if impact.stop == name:
                 return impact
+    release = simulation.mechanism.release
+    amount = value(release, release.start, simulation.values)
     raise EquilibriumError(
-        f"the wall of {name} is not reached in {PERIODS_MAX:g} periods from "
-        f"release.displacement = {simulation.values.get('release.displacement', 0.0):g} m: release "
-        "further from the wall"
+        f"the wall of {name} is not reached in {PERIODS_MAX:g} periods from release.{release.start}"
+        f" = {amount:g} {'rad' if release.turns else 'm'}: release further from the wall"
     )
 
 

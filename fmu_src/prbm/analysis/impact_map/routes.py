@@ -31,8 +31,8 @@ from ...mechanics.modal import Modes, modes
 from ...mechanism.description import Mechanism
 from ...mechanism.parts import value
 from ...references.finite_elements import FiniteElements, Shape
+from ..flexure_models import with_flexures
 from ..touching import impact_shape, touching
-from .flexure_models import with_flexures
 from .impacts import first_impact, mode_energies
 from .maps import OFFSETS, WALLS, Hit, ImpactMap, MovedStop, map_of, point_counter
 from .responses import fit_response, response

@@ -615,8 +615,9 @@ static void add_arrays(System *system, Scratch *scratch) {
     add_stops(system, e0, scratch);
     add_frictions(system, e0, scratch);
     add_pushed_and_probes(system, scratch);
-    system->release_c = along(system->n, unit(release->direction),
-                              system->bodies[release->body - 1].A, e0, system->release);
+    add_frame(system, release->body, at_point(system, release->point), &system->released, scratch);
+    system->release_c =
+        along(system->n, unit(release->direction), system->released.A, e0, system->release);
     system->anchor = first_clamp(system);
 }
 

@@ -85,8 +85,10 @@ typedef struct {
 
 typedef struct {
     int body;
-    double direction;
-    Expression displacement, velocity;
+    double direction; /* deg */
+    Point point;
+    int start, mode; /* START_..., and the number of the mode of START_AMPLITUDE, from 1 */
+    Expression amount, velocity;
 } Release;
 
 /* A field of a part that is an expression instead of a parameter, with its bounds. */

@@ -137,7 +137,7 @@ PRBM bool modes(const System *system, const Equilibrium *shape, double *frequenc
     int n = system->n, r = system->r;
     Complex *B = take_complex(scratch, r + 1, n);
     double *lam = take(scratch, (size_t)r + 1), *M = take_matrix(scratch, n, n);
-    stack_release(system, B, lam);
+    stack_holding_at(system, shape->q, B, lam);
     copy(r, shape->lam, lam);
     lam[r] = shape->force;
     r += shape->force != 0.0;
@@ -204,7 +204,7 @@ PRBM bool fundamental_at(const System *system, const double *q, double *phi, dou
     Complex *B = take_complex(scratch, r, n);
     double *lam = take(scratch, (size_t)r), *frequency = take(scratch, (size_t)k);
     double *all = take_matrix(scratch, n, k);
-    stack_release(system, B, lam);
+    stack_holding_at(system, q, B, lam);
     bool found = resting_multipliers(system, q, B, lam, M, scratch, problem) &&
                  modes_about(system, q, r, B, lam, frequency, all, M, scratch, problem);
     for (int i = 0; found && i < n; i++) {

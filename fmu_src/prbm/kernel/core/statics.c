@@ -24,6 +24,29 @@ PRBM void stack_release(const System *system, Complex *B, double *c) {
     c[r] = system->release_c;
 }
 
+static bool turns(const System *system) {
+    return system->mechanism->release.start == START_ANGLE;
+}
+
+PRBM void stack_holding(const System *system, double amount, Complex *B, double *c) {
+    int n = system->n, r = system->r, j = system->released.j;
+    stack_release(system, B, c);
+    c[r] -= amount;
+    if (turns(system)) {
+        for (int k = 0; k < n; k++) {
+            B[r * n + k] = complex_of(0.0, 0.0);
+        }
+        double angle = system->q0[j] + amount;
+        B[r * n + j] = complex_of(-system->length * sin(angle), -system->length * cos(angle));
+        c[r] = 0.0;
+    }
+}
+
+PRBM void stack_holding_at(const System *system, const double *q, Complex *B, double *c) {
+    int j = system->released.j;
+    stack_holding(system, turns(system) ? q[j] - system->q0[j] : 0.0, B, c);
+}
+
 /* K_t is K + diag(Re(p)), with the pull p = (lam^T B - i w) e of each arm.  The diagonal element of
  * a stretch is -Re(p) of its arm; the elements of a stretch and the arm's angle are Im(p). */
 PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
@@ -134,8 +157,7 @@ static bool loaded(const System *system, bool held, double displacement, double 
     Complex *B = take_complex(scratch, r + 1, n);
     double *c = take(scratch, (size_t)r + 1);
     Balance balance = {system, plain_rows(system, r + held, B, c), take_complex(scratch, 1, n)};
-    stack_release(system, B, c);
-    c[r] -= fraction * displacement;
+    stack_holding(system, fraction * displacement, B, c);
     field_row(n, system->S, scaled(fraction, system->gravity), balance.w);
     spread(system, 1, balance.w, balance.w);
     bool balanced = balance_out(&balance, state, scratch);
@@ -156,6 +178,41 @@ static double jump(const System *system, const double *from, const double *to) {
     return top;
 }
 
+/* Return whether a small force on the released point, as drawn, turns the body about it. */
+static bool turns_about_point(const System *system, Scratch *scratch) {
+    size_t used = scratch->used;
+    int n = system->n, r = system->r, size = n + r;
+    Complex *B = take_complex(scratch, r + 1, n);
+    double *rows = take_matrix(scratch, r + 1, n), *kkt = take_matrix(scratch, size, size);
+    double *response = take(scratch, (size_t)size + 1);
+    stack_release(system, B, response);
+    Rows held = plain_rows(system, r + 1, B, NULL);
+    jacobian(&held, system->e0, rows);
+    saddle(n, r, system->K, rows, rows, kkt);
+    zeros(size, response);
+    copy(n, rows + r * n, response);
+    Problem ignored; /* A body without a spring, for instance on a pin. */
+    bool solved = solve(size, kkt, response, scratch, &ignored);
+    double lever = RELEASE_LEVER_RTOL * system->length * fabs(response[system->released.j]);
+    bool about = solved && fabs(dot(n, rows + r * n, response)) < lever;
+    scratch->used = used;
+    return about;
+}
+
+/* Reject a displacement of a point that a body turns about. */
+static bool displaceable(const System *system, double displacement, Scratch *scratch,
+                         Problem *problem) {
+    if (turns(system) || displacement == 0.0 || !turns_about_point(system, scratch)) {
+        return true;
+    }
+    const Mechanism *m = system->mechanism;
+    return fail(problem,
+                "release.displacement = %g m: a force along the direction of the release turns the "
+                "body %s about its released point, and hardly displaces that point; give "
+                "release.angle instead, or another release.point or direction",
+                displacement, m->bodies[m->release.body - 1].name);
+}
+
 static bool unreachable(const System *system, bool held, double displacement, double done,
                         Problem *problem) {
     bool heavy = system->gravity.re != 0.0 || system->gravity.im != 0.0;
@@ -167,10 +224,13 @@ static bool unreachable(const System *system, bool held, double displacement, do
                           : "no static equilibrium was found: the drawn shape is not in "
                             "equilibrium, or the flexures are too weak to hold it");
     }
+    const char *name = turns(system) ? "angle" : "displacement";
+    const char *unit_name = turns(system) ? "rad" : "m";
     return fail(problem,
-                "release.displacement = %g m cannot be reached: no equilibrium was found beyond "
-                "%.4g m%s; release closer to the straight shape%s",
-                displacement, done * displacement, heavy ? " (gravity raised in proportion)" : "",
+                "release.%s = %g %s cannot be reached: no equilibrium was found beyond %.4g %s%s; "
+                "release closer to the straight shape%s",
+                name, displacement, unit_name, done * displacement, unit_name,
+                heavy ? " (gravity raised in proportion)" : "",
                 heavy ? ", or reduce gravity across the motion" : "");
 }
 
@@ -205,10 +265,12 @@ PRBM bool equilibrium(const System *system, bool held, double displacement, Equi
     double *state = take(scratch, (size_t)n + (size_t)r + 1);
     zeros(n + r + 1, state);
     copy(n, system->q0, state);
-    bool found = load_slowly(system, held, displacement, state, scratch, problem);
+    bool found = (!held || displaceable(system, displacement, scratch, problem)) &&
+                 load_slowly(system, held, displacement, state, scratch, problem);
     copy(n, state, shape->q);
     copy(r, state + n, shape->lam);
-    shape->force = state[n + r];
+    /* The constraint of an angle is the rotation times the size. */
+    shape->force = turns(system) ? system->length * state[n + r] : state[n + r];
     scratch->used = used;
     return found;
 }

@@ -6,15 +6,21 @@
 
 typedef struct {
     double *q, *lam; /* (n,), (r,) */
-    double force;
+    double force; /* N, or N m if the release is by an angle */
 } Equilibrium;
 
-/* Set B (r + 1, n) and c (r + 1,): the loops, then the row of the released body. */
+/* Set B (r + 1, n) and c (r + 1,): the loops, then the displacement of the released point. */
 PRBM void stack_release(const System *system, Complex *B, double *c);
+/* Stack the loops and a last row that holds the released body at a displacement [m], or at an angle
+ * [rad] if the release is by an angle.  In that case the row is the sine of the remaining angle times
+ * the size. */
+PRBM void stack_holding(const System *system, double amount, Complex *B, double *c);
+/* Stack the loops and the row that holds the released body at its place in a shape q (n,). */
+PRBM void stack_holding_at(const System *system, const double *q, Complex *B, double *c);
 /* Compute the tangent stiffness K_t (n, n).  The row w has columns for stretches, B does not. */
 PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t);
-/* Compute the equilibrium; held: whether the released body is held at the displacement. */
+/* Compute the equilibrium; held: whether the released body is held at the displacement or angle. */
 PRBM bool equilibrium(const System *system, bool held, double displacement, Equilibrium *shape,
                       Scratch *scratch, Problem *problem);
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,

@@ -61,6 +61,7 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.lifts = place(memory, f * n, sizeof(Complex));
     result.lifts_c = place(memory, f, sizeof(double));
     result.release = place(memory, n, sizeof(Complex));
+    result.released.A = place(memory, n, sizeof(Complex));
     result.bodies = place_frames(memory, b, n);
     result.pushed = place_frames(memory, (size_t)m->force_count, n);
     result.probes = place_frames(memory, (size_t)m->probe_count, n);

@@ -54,6 +54,7 @@ typedef struct {
     int *on;                  /* (s,) coordinate of the body that carries a wall, or FIXED */
     Complex *rubs, *lifts;    /* (f, n) */
     double *lifts_c;          /* (f,) */
+    BodyFrame released;       /* the released point */
     Complex *release;         /* (n,) */
     double release_c;
     BodyFrame *bodies;        /* (b,) */

@@ -203,7 +203,13 @@ static void read_probes(Reader *reader, Mechanism *m) {
 static void read_release(Reader *reader, Mechanism *m) {
     m->release.body = read_index(reader, 1, m->body_count + 1);
     m->release.direction = read_finite(reader);
-    m->release.displacement = read_expression(reader, m);
+    m->release.point = read_point(reader, m);
+    m->release.start = read_index(reader, 0, START_COUNT);
+    m->release.mode = (int)(read_u32(reader) & INT32_MAX);
+    if ((m->release.start == START_AMPLITUDE) != (m->release.mode > 0)) {
+        reader->wrong = reader->wrong ? reader->wrong : "a release along no mode";
+    }
+    m->release.amount = read_expression(reader, m);
     m->release.velocity = read_expression(reader, m);
 }
 

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "core/start.h"
 #include "hybrid/configuration.h"
 #include "hybrid/contact_modes.h"
 #include "hybrid/impacts.h"
@@ -322,19 +323,18 @@ static bool check_tolerance(double x, Problem *problem) {
     return true;
 }
 
-static bool start_shape(Simulation *sim, Problem *problem) {
+static bool start_state(Simulation *sim, Problem *problem) {
     const Mechanism *m = sim->configuration.mechanism;
     const System *system = system_of(sim);
     size_t mark = sim->scratch.used, n = (size_t)system->n;
     double *front = sim->state.front;
-    Equilibrium shape = {take(&sim->scratch, n), take(&sim->scratch, (size_t)system->r + 1), 0.0};
-    double displacement = evaluate(m->release.displacement, sim->state.acting_values);
+    double *q = take(&sim->scratch, n);
     double speed = evaluate(m->release.velocity, sim->state.acting_values);
-    bool right = equilibrium(system, true, displacement, &shape, &sim->scratch, problem);
+    bool right = start_shape(system, sim->state.acting_values, q, &sim->scratch, problem);
     if (right) {
         zeros(state_size(sim), front);
-        copy((int)n, shape.q, front);
-        right = release_velocity(system, shape.q, speed, front + n, &sim->scratch, problem);
+        copy((int)n, q, front);
+        right = release_velocity(system, q, speed, front + n, &sim->scratch, problem);
     }
     sim->scratch.used = mark;
     return right;
@@ -376,7 +376,7 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
     start_walls(sim);
     copy(LOADS * sim->configuration.mechanism->force_count, given_impulses(sim), state->received);
     set_inputs(sim);
-    return start_shape(sim, problem) &&
+    return start_state(sim, problem) &&
            project(&sim->equations, state->time, state->front, &sim->scratch, problem) &&
            check_walls(sim, problem) && settle(sim, every, system_of(sim)->s, NULL, problem);
 }

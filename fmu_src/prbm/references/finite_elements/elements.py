@@ -16,7 +16,7 @@ from ...mechanism.parts import value
 from ...runs.result import Result
 from . import statics
 from .equations import Equations
-from .model import ElementModel
+from .model import ElementModel, FiniteElementError
 from .statics import Shape
 from .transient import Transient
 
@@ -70,8 +70,19 @@ class FiniteElements:
 
     @cached_property
     def release_row(self) -> Real:
-        """Derivatives of the displacement along the direction of the release, (n,)."""
+        """Derivatives of the displacement along the direction of the release, (n,).
+
+        Raises
+        ------
+        FiniteElementError
+            If the release is by an angle, or by a point other than the centre of mass.
+        """
         release = self.mechanism.release
+        if release.turns or release.point is not None:
+            raise FiniteElementError(
+                f"finite elements hold {release.body} by a force on its centre of mass: give "
+                "release.displacement, and no release.angle or release.point"
+            )
         u, row = unit(release.direction), np.zeros(self.n)
         first = self.model.rigid[release.body].first
         assert first is not None
@@ -214,6 +225,11 @@ class FiniteElements:
 
     def release(self) -> tuple[Real, Real]:
         """Return displacements and velocities at the release, (n,), (n,)."""
+        if self.mechanism.release.mode is not None:
+            raise FiniteElementError(
+                "finite elements are released from a held shape: give release.displacement, and "
+                "no release.mode"
+            )
         held = value(self.mechanism.release, "displacement", self.values)
         speed = value(self.mechanism.release, "velocity", self.values)
         q = self.equilibrium(held).q

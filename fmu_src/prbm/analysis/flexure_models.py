@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from ...mechanism.description import Mechanism
+from ..mechanism.description import Mechanism
 
 
 def with_flexures(
@@ -29,4 +29,16 @@ def with_flexures(
         )
         for kind in mechanism.flexure_types
     )  # fmt: skip
+    return replace(mechanism, flexure_types=kinds)
+
+
+def stretching(mechanism: Mechanism) -> Mechanism:
+    """Return a mechanism with stretching flexures and the same models of bending.
+
+    Raises
+    ------
+    MechanismError
+        If a flexure has one link, which its free end fixes to a body.
+    """
+    kinds = tuple(replace(kind, axial=True) for kind in mechanism.flexure_types)
     return replace(mechanism, flexure_types=kinds)

@@ -1,0 +1,11 @@
+/* The shape from which a mechanism is released. */
+#ifndef PRBM_START_H
+#define PRBM_START_H
+
+#include "core/system.h"
+
+/* Compute the coordinates q (n,) of the released shape for the values of all parameters. */
+PRBM bool start_shape(const System *system, const double *values, double *q, Scratch *scratch,
+                      Problem *problem);
+
+#endif

@@ -1,0 +1,93 @@
+"""The shape from which a mechanism is released."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..base.errors import EquilibriumError, ParameterError, SimulationError
+from ..base.tolerances import RELEASE_MODE_RTOL
+from ..mechanism.parts import value
+from .arrays import Real
+from .constraints import project_positions
+from .modal import modes
+from .statics import equilibrium
+from .system import Rows, System, jacobian
+
+
+def start_shape(system: System, values: Mapping[str, float], fraction: float = 1.0) -> Real:
+    """Return the coordinates of the released shape, (n,).
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    values : mapping
+        Values of all parameters.
+    fraction : float
+        Share of the displacement, angle or amplitude [-].
+
+    Raises
+    ------
+    EquilibriumError
+        If no equilibrium has the displacement or the angle, or no shape the amplitude.
+    ParameterError
+        If there is no such mode, or it does not move the released point.
+    """
+    release = system.mechanism.release
+    amount = fraction * value(release, release.start, values)
+    if release.mode:
+        return mode_shape(system, release.mode, amount)
+    return equilibrium(system, amount).q
+
+
+def mode_shape(system: System, mode: int, amplitude: float) -> Real:
+    """Return the rest under gravity displaced along a mode, (n,).
+
+    The change of the coordinates is the mode, plus the least mass-weighted change that closes the
+    loops and gives the released point the displacement exactly.
+
+    Parameters
+    ----------
+    system : System
+        The mechanism.
+    mode : int
+        Number of the mode, from 1.
+    amplitude : float
+        Displacement of the released point along the direction of the release, from the rest [m].
+
+    Raises
+    ------
+    EquilibriumError
+        If there is no rest, or no shape with the amplitude.
+    ParameterError
+        If there is no such mode, or it does not move the released point.
+    """
+    rest = equilibrium(system)
+    found = modes(system, rest)
+    count, name = found.shape.shape[1], system.mechanism.release.body
+    if mode > count:
+        raise ParameterError(
+            f"release.mode = {mode}: the mechanism has {count} modes; choose one of them, or a "
+            "flexure model with more pivots"
+        )
+    phi = found.shape[:, mode - 1]
+    row = jacobian(system.spread(system.release[None]), system.directions(rest.q))[0]
+    moved = float(row @ phi)
+    if abs(moved) <= RELEASE_MODE_RTOL * system.length * float(np.abs(phi).max()):
+        raise ParameterError(
+            f"release.mode = {mode}: this mode does not move the released point of {name} along "
+            "the direction of the release; choose another mode, release.point or direction"
+        )
+    if amplitude == 0.0:
+        return rest.q
+    rows = Rows(system, np.vstack([system.loops, system.release]), np.zeros(len(system.loops) + 1))
+    target = system.amount(rest.q) + amplitude
+    constants = np.append(system.loops_c, system.release_c - target)
+    start = rest.q + phi * (amplitude / moved)
+    try:
+        return project_positions(system, rows, start, constants)[0]
+    except SimulationError:
+        raise EquilibriumError(
+            f"release.amplitude = {amplitude:g} m: no shape along mode {mode} has this amplitude; "
+            "reduce it, or choose another mode, release.point or direction"
+        ) from None
