@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
-from ..base.tolerances import STEPS_MAX
+from ..base.tolerances import STABLE_STEP_WATCH_FACTOR, STEPS_MAX
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
@@ -32,6 +32,7 @@ from .guards import Looks
 from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
 from .release import released
+from .stability import FastestMode
 from .stepping import StepSizeController, take_step
 
 
@@ -100,6 +101,7 @@ class Simulation:
         self.course, at_start = walls.start(self.configuration, self.given, self.time)
         inputs = Inputs.of(mechanism, self.given, at_start)
         self.front = released(self.configuration, inputs, self.time)
+        self.fastest = FastestMode.at(self.front.equations, self.time, self.front.y)
         # The step that leads to the front, the event at its end, and the rates there.
         self.arc: Arc | None = None
         self.pending: Event | None = None
@@ -295,7 +297,9 @@ class Simulation:
         configuration, equations = self.configuration, front.equations
         if self.k1 is None:
             self.k1 = equations.rate(front.time, front.y)
-        step, controller = take_step(configuration, front, self.k1, self.controller)
+        step, controller = take_step(configuration, front, self.k1, self.controller, self.fastest)
+        if step.h > STABLE_STEP_WATCH_FACTOR * self.fastest.longest_step(equations):
+            self.fastest = self.fastest.refined(equations, step.factors)
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k)
         event = events.first_event(Looks(configuration.scales, equations, arc, step.forces))
         if event is None:
@@ -365,6 +369,7 @@ class Simulation:
             "course": asdict(self.course),
             "window": asdict(self.window),
             "controller": asdict(self.controller),
+            "fastest": snapshot.plain_fastest(self.fastest),
             "arc": snapshot.plain_arc(self.arc),
             "pending": snapshot.plain_event(self.pending),
             "k1": snapshot.plain_array(self.k1),
@@ -391,6 +396,7 @@ class Simulation:
         self.course = snapshot.course_of(saved["course"])
         self.window = EventWindow(**saved["window"])
         self.controller = StepSizeController(**saved["controller"])
+        self.fastest = snapshot.fastest_of(saved["fastest"])
         self.arc = snapshot.arc_of(saved["arc"])
         self.pending = snapshot.event_of(saved["pending"])
         self.k1 = snapshot.array_of(saved["k1"])

@@ -69,7 +69,12 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define STEP_GROWTH_MAX 5.0
 #define STEP_MEMORY_EXPONENT 0.04
 #define STEP_TREND_FACTOR 0.75
-#define STEP_ERROR_FACTOR 30.0
+#define STEP_ERROR_FACTOR 2.0
+#define STEP_ROUNDING_FACTOR 562949953421313.0
+#define STABLE_STEP_FACTOR 4.0
+#define STABLE_STEP_WATCH_FACTOR 0.25
+#define FASTEST_RATE_RTOL 0.001
+enum { FASTEST_ITERATIONS_MAX = 100 };
 #define STEP_ERROR_MIN 0.0001
 #define STEP_MAX_RTOL 0.08
 #define STEP_MIN_ATOL 1e-13
@@ -246,7 +251,7 @@ typedef enum {
 /* --- prbm.hybrid.runge_kutta -------------------------------------------------------------------- */
 
 enum { STAGES = 10 };
-enum { ERROR_ORDER = 5 };
+enum { STEP_ORDER = 8 };
 enum { DENSE = 5 };
 #define STAGE_TIMES \
     { \
@@ -285,6 +290,19 @@ enum { DENSE = 5 };
         0.08765358154601828, \
         -0.03545897557975343, \
         0.0, \
+        0.0, \
+    }
+#define COARSE_ERROR_WEIGHTS \
+    { \
+        3.6881450369884017, \
+        0.0, \
+        -12.199086990863163, \
+        7.842839760687878, \
+        8.448253139182773, \
+        -8.185232784607853, \
+        0.529455809152473, \
+        -0.166913130089828, \
+        0.04253915954932026, \
         0.0, \
     }
 #define DENSE_WEIGHTS \
