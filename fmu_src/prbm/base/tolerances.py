@@ -77,7 +77,8 @@ EVENT_CORRECTION_RTOL = 1e-2  # Of the step: a larger correction is that of a gr
 
 # --- step size ---------------------------------------------------------------------------------
 TOLERANCE_MIN = 1e-13  # Smallest relative tolerance of the integration.
-TOLERANCE_MAX = 1e-2  # Largest relative tolerance of the integration.
+TOLERANCE_MAX = 1e-2  # Largest relative tolerance that is accepted.
+TOLERANCE_USED_MAX = 1e-5  # Largest one that is used: looser ones lose energy without notice.
 TABLEAU_ATOL = 1e-14  # Error of a sum of Runge-Kutta coefficients that is round-off.
 STEP_SAFETY_FACTOR = 0.85  # Of the optimal step size.
 STEP_SHRINK_MIN = 0.2  # Smallest ratio of successive step sizes.
@@ -97,6 +98,9 @@ FIRST_STEP_FACTOR = 0.1  # Of the first step that the tolerance allows [Hairer, 
 FIRST_STEP_EXPONENT = 1 / 6  # Of the tolerance in the first step.
 FIRST_RATE_MIN = 1e-6  # 1/s: smallest relative rate of the state that the first step assumes.
 STEPS_MAX = 1e9  # Longest steps to one communication point; more is a mistake of units.
+
+DEFAULT_EFFORT_MAX = 1000.0  # Integration steps in a step of the default experiment.
+EFFORT_MAX = 1000000  # Integration steps from one communication point to the next.
 
 # --- communication times -----------------------------------------------------------------------
 TIME_SUM_RTOL = 1e-12  # Of a time: round-off of importers that add up steps.

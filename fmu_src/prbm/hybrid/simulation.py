@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
-from ..base.tolerances import STABLE_STEP_WATCH_FACTOR, STEPS_MAX
+from ..base.tolerances import EFFORT_MAX, STABLE_STEP_WATCH_FACTOR, STEPS_MAX
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
@@ -220,7 +220,8 @@ class Simulation:
         Raises
         ------
         SimulationError
-            If time runs backwards, the step size vanishes or the events do not end.
+            If time runs backwards, the step size vanishes, the events do not end, or more than
+            ``EFFORT_MAX`` integration steps are needed.
         """
         if not math.isfinite(time) or time < self.time:
             raise SimulationError(
@@ -250,11 +251,18 @@ class Simulation:
         )  # fmt: skip
         if self.changed or moved != self.inputs.walls:
             self._restart(moved)
+        last = self.step_count + EFFORT_MAX
         while True:
             if self.pending is not None and self.pending.time <= time:
                 self._apply(self.pending)
             if self.front.time >= time:
                 break
+            if self.step_count >= last:
+                raise SimulationError(
+                    f"t = {time:.12g} s is not reached in {EFFORT_MAX} integration steps, which "
+                    f"end at t = {self.front.time:.9g} s with steps of {self.controller.h:.3g} s: "
+                    "make shorter communication steps, or check units and stiffnesses"
+                )
             self._take_step()
         self.time = time
         self._output_cache = None
@@ -314,6 +322,16 @@ class Simulation:
             y, self.k1 = equations.project(event.time, y), None
         self.front = Front(arc.end, y, equations, front.latched)
         self.arc, self.pending, self.controller = arc, event, controller
+
+    def check_effort(self, step: float) -> None:
+        """Reject a communication step [s] of the default experiment that needs too many steps.
+
+        Raises
+        ------
+        SimulationError
+            As :meth:`prbm.hybrid.stability.FastestMode.check_effort`.
+        """
+        self.fastest.check_effort(self.equations, step)
 
     # -- state and outputs --
 

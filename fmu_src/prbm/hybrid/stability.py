@@ -11,7 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.tolerances import FASTEST_ITERATIONS_MAX, FASTEST_RATE_RTOL, STABLE_STEP_FACTOR
+from ..base.errors import SimulationError
+from ..base.tolerances import (
+    DEFAULT_EFFORT_MAX,
+    FASTEST_ITERATIONS_MAX,
+    FASTEST_RATE_RTOL,
+    STABLE_STEP_FACTOR,
+)
 from ..mechanics.arrays import Real
 from ..mechanics.constraints import Factors, solve_again
 from ..mechanics.dynamics import Equations
@@ -76,3 +82,27 @@ class FastestMode:
         if damping > 2.0 * rate:
             rate = 0.5 * (damping + math.sqrt(damping * damping - 4.0 * (rate * rate)))
         return STABLE_STEP_FACTOR / rate if rate > 0.0 else math.inf
+
+    def check_effort(self, equations: Equations, step: float) -> None:
+        """Reject a communication step of the default experiment that needs too many steps.
+
+        Parameters
+        ----------
+        equations : Equations
+            The equations of motion.
+        step : float
+            Communication step [s]; 0: not known.
+
+        Raises
+        ------
+        SimulationError
+            If it is longer than ``DEFAULT_EFFORT_MAX`` stable steps.
+        """
+        needed = step / self.longest_step(equations)
+        if needed > DEFAULT_EFFORT_MAX:
+            raise SimulationError(
+                f"the fastest mode has {self.rate / (2.0 * math.pi):.4g} Hz: a communication step "
+                f"of {step:g} s would need {needed:.4g} integration steps, more than "
+                f"{DEFAULT_EFFORT_MAX:g}; check the units of lengths, stiffnesses, masses and "
+                "damping.beta"
+            )

@@ -328,6 +328,11 @@ static bool check_tolerance(double x, Problem *problem) {
     return true;
 }
 
+PRBM double simulation_requested(const Simulation *simulation, double tolerance) {
+    int parameter = simulation->configuration.mechanism->tolerance;
+    return tolerance == 0.0 ? simulation->state.values[parameter] : tolerance;
+}
+
 static bool start_shape(Simulation *sim, Problem *problem) {
     const Mechanism *m = sim->configuration.mechanism;
     const System *system = system_of(sim);
@@ -392,9 +397,8 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
                        Problem *problem) {
     State *state = &sim->state;
     Configuration *configuration = &sim->configuration;
-    int parameter = configuration->mechanism->tolerance;
     clear_progress(state, start_time);
-    state->tolerance = tolerance == 0.0 ? state->values[parameter] : tolerance;
+    state->tolerance = simulation_requested(sim, tolerance);
     state->mode = mode;
     state->log_of_error = natural_log(STEP_ERROR_MIN);
     if (!check_tolerance(state->tolerance, problem) || !take_values(sim, problem) ||
@@ -402,6 +406,7 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
                                problem)) {
         return false;
     }
+    state->tolerance = lesser(state->tolerance, TOLERANCE_USED_MAX);
     set_scales(configuration, state->frequency);
     state->started = release_mechanism(sim, problem);
     return state->started;

@@ -158,7 +158,7 @@ static bool consistent(const Simulation *sim) {
         return false;
     }
     return !state->started ||
-           (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_MAX &&
+           (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_USED_MAX &&
             state->frequency >= 0.0 && state->fastest_rate >= 0.0 && (!state->arc.valid || state->arc.h > 0.0) &&
             state->front_time >= state->time);
 }

@@ -60,6 +60,19 @@ PRBM bool find_fastest(Simulation *sim, Problem *problem) {
     return true;
 }
 
+PRBM bool simulation_check_effort(const Simulation *simulation, Problem *problem) {
+    double step = simulation->configuration.mechanism->default_step;
+    double needed = step / stable_step(simulation);
+    if (needed > DEFAULT_EFFORT_MAX) {
+        return fail(problem,
+                    "the fastest mode has %.4g Hz: a communication step of %g s would need %.4g "
+                    "integration steps, more than %g; check the units of lengths, stiffnesses, "
+                    "masses and damping.beta",
+                    simulation->state.fastest_rate / TWO_PI, step, needed, DEFAULT_EFFORT_MAX);
+    }
+    return true;
+}
+
 PRBM double stable_step(const Simulation *sim) {
     double rate = sim->state.fastest_rate;
     double damping = sim->equations.beta * (rate * rate) + sim->equations.mass_damping;
