@@ -5,9 +5,11 @@ import pytest
 from scipy.optimize import brentq
 
 from prbm.base.errors import SimulationError
+from prbm.hybrid.configuration import Scales
 from prbm.hybrid.runge_kutta import TSITOURAS_PAPAKOSTAS as PAIR
 from prbm.hybrid.runge_kutta import Tableau, interpolate, stages
 from prbm.hybrid.simulation import Simulation
+from prbm.hybrid.stepping import error_norm, step_error
 from support import mechanism
 
 SMOOTH = {"stop.position": 0.05}
@@ -57,7 +59,7 @@ def test_observed_order_is_that_of_the_dense_output(case):
     squares = np.zeros(len(steps))
     for release in releases:
         start = values | {"release.displacement": float(release)}
-        exact = path(model, start, span, tolerance=1e-13)
+        exact = path(model, start, span, step=longest / 32)
         squares += [error(path(model, start, span, step=h), exact) ** 2 for h in steps]
     slope = np.polyfit(np.log(steps), np.log(squares) / 2, 1)[0]
     print(f"{case}: observed order {slope:.3f}")
@@ -214,9 +216,36 @@ def test_dense_output_equals_the_new_state_at_the_end_of_a_step():
     np.testing.assert_allclose(interpolate(PAIR, y, k, 0.1, 0.5)[0], np.cos(0.05), atol=1e-8)
 
 
+def test_last_stage_but_one_is_a_solution_of_third_order():
+    """It satisfies the conditions up to order three, not four."""
+    assert PAIR.c[-2] == pytest.approx(1.0, abs=1e-14)
+    defects = {
+        order: [PAIR.coarse_error @ elementary(PAIR.a, tree) for tree in trees(order)]
+        for order in range(1, PAIR.coarse_order + 2)
+    }
+    for order in range(1, PAIR.coarse_order + 1):
+        assert np.abs(defects[order]).max() < 1e-14
+    assert np.abs(defects[PAIR.coarse_order + 1]).max() > 1e-3
+
+
+@pytest.mark.parametrize("z", np.linspace(0.2, 4.4, 22))
+def test_estimated_error_of_an_oscillation_is_close_to_its_error(z):
+    """It is 0.35 to 1.8 times the error of a step up to the limit of stability, h omega = 4.4."""
+    scales = Scales(length=1.0, rate=1.0, energy=1e-9)
+    turn = np.array([[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0] * 4, [0.0] * 4])
+    estimated, squares = [], []
+    for phase in np.linspace(0.0, np.pi, 8, endpoint=False):
+        y = np.array([np.cos(phase), -np.sin(phase), 0.0, 0.0])
+        k, y1 = stages(PAIR, lambda _, x: turn @ x, 0.0, y, z, turn @ y)
+        exact = np.array([np.cos(phase + z), -np.sin(phase + z), 0.0, 0.0])
+        estimated.append(step_error(scales, z, k, y, y1))
+        squares.append(error_norm(scales, y1 - exact, y, y1))
+    assert 0.35 < np.linalg.norm(estimated) / np.linalg.norm(squares) < 1.8
+
+
 @pytest.mark.parametrize("field", ["a", "error", "dense"])
 def test_inconsistent_coefficients_are_rejected(field):
     parts = {"a": PAIR.a.copy(), "error": PAIR.error.copy(), "dense": PAIR.dense.copy()}
     parts[field][-1, ...] += 1e-3
     with pytest.raises(ValueError, match=r"must|depend"):
-        Tableau(**parts, order=7, error_order=5)
+        Tableau(**parts, order=7, error_order=5, coarse_order=3)

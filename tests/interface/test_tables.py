@@ -22,6 +22,7 @@ from prbm.mechanism.parts import FIELDS, fields_of, value
 from support import SHIPPED
 
 TOKEN = "{0}"
+STEP = 2e-3  # s, communication step of the default experiment
 TYPES = {0: "Real", 1: "Integer", 2: "Boolean", 3: CLOCK}
 EXPRESSIONS = """
 name = "Lever"
@@ -129,7 +130,7 @@ def mechanism(request, tmp_path_factory) -> Mechanism:
 @pytest.fixture(scope="module")
 def written(mechanism) -> bytes:
     native = described(mechanism, {}, 3, clock=True)
-    return tables(mechanism, native.variables, TOKEN, native.independent)
+    return tables(mechanism, native.variables, TOKEN, native.independent, STEP)
 
 
 def test_the_head_contains_version_size_and_checksum(written):
@@ -208,6 +209,7 @@ class Comparison:
         assert [r.parameters[r.take("I")] for _ in range(5)] == [
             "gravity.x", "gravity.y", "solver.tolerance", "damping.zeta", "damping.beta"
         ]  # fmt: skip
+        assert r.take("d") == STEP
         for name in input_names(m):
             assert (r.text(), r.take("d")) == (name, 0.0)
 

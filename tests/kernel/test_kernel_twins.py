@@ -1281,6 +1281,8 @@ def test_steps_of_the_integration_are_the_same(name):
         assert np.all(forces[0] <= forces[1])
         kernel().error_of(size, expected, h, error)
         assert_same(error, h * (PAIR.error @ expected), scale=h * np.abs(expected).max())
+        kernel().coarse_error_of(size, expected, h, error)
+        assert_same(error, h * (PAIR.coarse_error @ expected), scale=h * np.abs(expected).max())
         for theta in (0.0, 0.3, 1.0):
             b, middle = np.full(count, np.nan), np.full(size, np.nan)
             kernel().weights(theta, b)

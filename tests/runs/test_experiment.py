@@ -83,8 +83,8 @@ def test_motion_scales_with_the_size_of_the_mechanism():
 
 @pytest.mark.parametrize(("links", "axial"), [(40, True), (12, False)])
 def test_reference_results_are_omitted_if_they_take_minutes(links, axial, monkeypatch):
-    """The first chain is excluded by its frequencies, the second one after 10,000 steps."""
-    monkeypatch.setattr(reference, "STEPS_MAX", 5e4)
+    """The first chain is excluded by its frequencies, the second one after 5,000 steps."""
+    monkeypatch.setattr(reference, "STEPS_MAX", 2.5e4)
     messages: list[str] = []
     chain = guide(0.1, "nR", n=links, axial=axial)
     begin = time.process_time()

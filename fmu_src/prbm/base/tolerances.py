@@ -80,14 +80,20 @@ EVENT_CORRECTION_RTOL = 1e-2  # Of the step: a larger correction indicates grazi
 
 # --- step size ---------------------------------------------------------------------------------
 TOLERANCE_MIN = 1e-13  # Smallest relative tolerance of the integration.
-TOLERANCE_MAX = 1e-2  # Largest relative tolerance of the integration.
+TOLERANCE_MAX = 1e-2  # Largest relative tolerance that is accepted.
+TOLERANCE_USED_MAX = 1e-5  # Largest one that is used: looser ones lose energy without notice.
 TABLEAU_ATOL = 1e-14  # Error of a sum of Runge-Kutta coefficients that is round-off.
 STEP_SAFETY_FACTOR = 0.85  # Of the optimal step size.
 STEP_SHRINK_MIN = 0.2  # Smallest ratio of successive step sizes.
 STEP_GROWTH_MAX = 5.0  # Largest ratio of successive step sizes.
 STEP_MEMORY_EXPONENT = 0.04  # Exponent of the previous error in the step size [Hairer, IV.2].
 STEP_TREND_FACTOR = 0.75  # Of STEP_MEMORY_EXPONENT: reduction of the exponent of the last error.
-STEP_ERROR_FACTOR = 30.0  # Of the tolerance: error of the embedded solution of lower order.
+STEP_ERROR_FACTOR = 2.0  # Of the tolerance: error of a step that is accepted.
+STEP_ROUNDING_FACTOR = 2.0**49 + 1.0  # Rounds a step size to 4 binary digits [Dekker, 1971].
+STABLE_STEP_FACTOR = 4.0  # Of the inverse rate of the fastest mode: longest step; 4.4 is stable.
+STABLE_STEP_WATCH_FACTOR = 0.25  # Of the longest stable step: above, that mode is refined.
+FASTEST_RATE_RTOL = 1e-3  # Change of the rate of the fastest mode at which iteration ends.
+FASTEST_ITERATIONS_MAX = 100  # At the start of the motion; about ten are usual.
 STEP_ERROR_MIN = 1e-4  # Of the tolerance: smallest error that the controller remembers.
 STEP_MAX_RTOL = 0.08  # Of the period: longest step.
 STEP_MIN_ATOL = 1e-13  # s; shortest step.
@@ -95,6 +101,9 @@ FIRST_STEP_FACTOR = 0.1  # Of the first step that the tolerance allows [Hairer, 
 FIRST_STEP_EXPONENT = 1 / 6  # Exponent of the tolerance in the first step size.
 FIRST_RATE_MIN = 1e-6  # 1/s: smallest relative rate of the state that the first step assumes.
 STEPS_MAX = 1e9  # Longest steps to one target time; more are a mistake of units.
+
+DEFAULT_EFFORT_MAX = 1000.0  # Integration steps in a step of the default experiment.
+EFFORT_MAX = 1000000  # Integration steps from one communication point to the next.
 
 # --- communication times -----------------------------------------------------------------------
 TIME_SUM_RTOL = 1e-12  # Of a time: round-off of importers that add up steps.

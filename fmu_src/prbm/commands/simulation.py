@@ -12,6 +12,7 @@ from ..base.progress import reporter
 from ..base.unit_text import frequency_text
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantity, settings
+from ..hybrid.configuration import replaced_tolerance
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
@@ -41,11 +42,11 @@ def simulated(options: argparse.Namespace) -> None:
     stop_time, step = span(mechanism, values, options.stop_time, options.step)
     duration = quantity(options.spectrum_time, "s", "--spectrum-time")
     communication_points(stop_time, step)
+    tolerance = _tolerance(options.tolerance)
     begin = time.perf_counter()
     result = simulate(
-        mechanism, values, stop_time=stop_time, step=step,
-        tolerance=_tolerance(options.tolerance), progress=reporter(),
-    )  # fmt: skip
+        mechanism, values, stop_time=stop_time, step=step, tolerance=tolerance, progress=reporter()
+    )
     print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")
     for line in headline(result.columns, mechanism, result.values):
         print(line)
@@ -54,8 +55,10 @@ def simulated(options: argparse.Namespace) -> None:
     output.table(f"{mechanism.name}-impacts.csv", IMPACT_HEAD, _impacts(result))
     output.figure(f"{mechanism.name}.png", lambda: _figure(result))
     output.write()
-    for sentence in _notes(result.mechanism, values):
-        print(sentence)
+    given = result.values["solver.tolerance"] if tolerance is None else tolerance
+    for sentence in (replaced_tolerance(given), *_notes(result.mechanism, values)):
+        if sentence:
+            print(sentence)
     if options.spectrum is not None:
         _spectrum(options, result, values, duration)
 

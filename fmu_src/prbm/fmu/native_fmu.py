@@ -78,11 +78,11 @@ def build(
     heading = Heading(name, mechanism.title, "", LOG_CATEGORIES, run)
     token = f"{{{uuid.uuid5(NAMESPACE, _digest(mechanism, native, fmi, source, heading))}}}"
     heading = replace(heading, guid=token)
-    table = tables(mechanism, native.variables, token, native.independent)
+    table = tables(mechanism, native.variables, token, native.independent, run.step)
     contents = {
         "modelDescription.xml": description(fmi, heading, mechanism, native, source),
         f"resources/{FILE}": table,
-        f"resources/{MODEL}": _model(mechanism, native),
+        f"resources/{MODEL}": _model(mechanism, native, run.step),
         f"sources/{source}": amalgamation(name, mechanism.title, fmi).encode(),
         f"sources/{TABLES}": tables_header(table).encode(),
     }
@@ -138,7 +138,7 @@ def _digest(
     """Return a hash of everything that determines the FMU's behaviour, except its token."""
     parts = kernel() | {
         "modelDescription.xml": description(fmi, heading, mechanism, native, source),
-        FILE: tables(mechanism, native.variables, "", native.independent),
+        FILE: tables(mechanism, native.variables, "", native.independent, heading.experiment.step),
     }
     digest = hashlib.sha256()
     for name in sorted(parts):
@@ -146,10 +146,10 @@ def _digest(
     return digest.hexdigest()
 
 
-def _model(mechanism: Mechanism, native: NativeInterface) -> bytes:
+def _model(mechanism: Mechanism, native: NativeInterface, step: float) -> bytes:
     """Return the mechanism and its variables as JSON for tools; the FMU itself does not read it."""
     listed = [v for v in native.variables if v.type != CLOCK]
-    return json.dumps(resolved(mechanism, listed), indent=1, sort_keys=True).encode()
+    return json.dumps(resolved(mechanism, listed, step), indent=1, sort_keys=True).encode()
 
 
 def _binaries(

@@ -99,13 +99,13 @@ def build(
     progress("checking the start")
     listed = interface(mechanism, changes)
     progress(f"collecting {len(listed)} variables and the engine")
-    sources = dict(_sources(mechanism, listed))
+    run = experiment(mechanism, changes)
+    sources = dict(_sources(mechanism, listed, run.step))
     token = f"{mechanism.name}_{_digest(sources | {'': SCRIPT.encode()})[:TOKEN_DIGITS]}"
     progress("drawing the icon and writing the documentation")
     contents = {f"resources/{path}": text for path, text in _named(mechanism, token, sources)}
     contents |= dict(_binaries(mechanism.name))
     contents |= dict(_licenses())
-    run = experiment(mechanism, changes)
     heading = Heading(mechanism.name, mechanism.title, "", MechanismSlave.log_categories, run)
     anonymous = _digest(sources | {"": model_description(heading, listed)})
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
@@ -124,9 +124,11 @@ def _digest(files: Mapping[str, bytes]) -> str:
     return digest.hexdigest()
 
 
-def _sources(mechanism: Mechanism, listed: tuple[Variable, ...]) -> Iterator[tuple[str, bytes]]:
+def _sources(
+    mechanism: Mechanism, listed: tuple[Variable, ...], step: float
+) -> Iterator[tuple[str, bytes]]:
     """Yield the data and modules of the simulation, which determine the package's name."""
-    data = json.dumps(resolved(mechanism, listed), indent=1, sort_keys=True)
+    data = json.dumps(resolved(mechanism, listed, step), indent=1, sort_keys=True)
     yield FILE, data.encode()
     yield f"{ENGINE}/__init__.py", INIT.encode()
     for path, text in shipped_modules().items():

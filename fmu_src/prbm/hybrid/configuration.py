@@ -14,6 +14,7 @@ from ..base.tolerances import (
     STEP_MAX_RTOL,
     TOLERANCE_MAX,
     TOLERANCE_MIN,
+    TOLERANCE_USED_MAX,
     TOUCHING_RTOL,
     ZERO_RATE_RTOL,
 )
@@ -158,7 +159,7 @@ class Configuration:
     calculated : mapping
         Calculated parameters, such as ``flexure.gamma0``.
     tolerance : float
-        Relative tolerance of the integration.
+        Relative tolerance of the integration, at most ``TOLERANCE_USED_MAX``.
     step : float or None
         Fixed step size [s]; None: adaptive.
     frequency : float
@@ -193,14 +194,13 @@ class Configuration:
         """
         system = assemble(mechanism, values)
         known = calculated(mechanism, values)
-        tolerance = checked_tolerance(
-            values["solver.tolerance"] if tolerance is None else tolerance
-        )
+        wanted = checked_tolerance(values["solver.tolerance"] if tolerance is None else tolerance)
         if step is not None and not (math.isfinite(step) and step > 0.0):
             raise ParameterError(f"step = {step} s must be positive")
         frequency = fundamental_frequency(system)
         scales = Scales.of(system, 2 * math.pi * frequency)
-        return cls(mechanism, values, system, known, tolerance, step, frequency, scales)
+        used = min(wanted, TOLERANCE_USED_MAX)
+        return cls(mechanism, values, system, known, used, step, frequency, scales)
 
     @property
     def omega(self) -> float:
@@ -255,3 +255,21 @@ def checked_tolerance(tolerance: float) -> float:
             f"tolerance = {tolerance:g} must lie between {TOLERANCE_MIN:g} and {TOLERANCE_MAX:g}"
         )
     return float(tolerance)
+
+
+def replaced_tolerance(wanted: float) -> str:
+    """Return the message that a tolerance is too loose to be used; empty if it is not.
+
+    Examples
+    --------
+    >>> replaced_tolerance(1e-6)
+    ''
+    >>> replaced_tolerance(1e-3)
+    'tolerance = 0.001 is replaced by 1e-05: looser tolerances lose energy without notice'
+    """
+    if not wanted > TOLERANCE_USED_MAX:
+        return ""
+    return (
+        f"tolerance = {wanted:g} is replaced by {TOLERANCE_USED_MAX:g}: looser tolerances lose "
+        "energy without notice"
+    )

@@ -34,6 +34,8 @@ class Tableau:
         Order of the solution that is continued.
     error_order : int
         Order of the solution that estimates the error.
+    coarse_order : int
+        Order of the last stage but one, which is a third solution at the end of the step.
 
     Raises
     ------
@@ -46,12 +48,15 @@ class Tableau:
     dense: Real
     order: int
     error_order: int
+    coarse_order: int
 
     def __post_init__(self) -> None:
         if np.any(np.triu(self.a)):
             raise ValueError("the stages of an explicit method depend on earlier stages only")
         if max(abs(self.weights.sum() - 1), abs(self.error.sum())) > TABLEAU_ATOL:
             raise ValueError("the weights must add up to one, those of the error to zero")
+        if abs(self.a[-2].sum() - 1) > TABLEAU_ATOL:
+            raise ValueError("the last stage but one must be at the end of the step")
         if not np.allclose(self.dense.sum(axis=1), self.weights, rtol=0, atol=TABLEAU_ATOL):
             raise ValueError("the dense output must end at the solution")
 
@@ -66,6 +71,17 @@ class Tableau:
         """Weights of the solution, the last row of a."""
         result: Real = self.a[-1]
         return result
+
+    @property
+    def coarse_error(self) -> Real:
+        """Weights of the difference between the solution and the last stage but one."""
+        result: Real = self.a[-1] - self.a[-2]
+        return result
+
+    @property
+    def step_order(self) -> int:
+        """Power of the step size to which :func:`prbm.hybrid.stepping.step_error` falls."""
+        return 2 * (self.error_order + 1) - (self.coarse_order + 1)
 
 
 def _lower(*rows: tuple[float, ...]) -> Real:
@@ -123,6 +139,7 @@ TSITOURAS_PAPAKOSTAS = Tableau(
     ),
     order=7,
     error_order=5,
+    coarse_order=3,
 )  # fmt: skip
 """The pair of the engine, chosen by ``benchmarks/work_precision.py``: of the pairs compared there,
 it needs the fewest right-hand sides at the accuracy of the default run, and its interpolant needs

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
-from ..base.tolerances import STEPS_MAX
+from ..base.tolerances import EFFORT_MAX, STABLE_STEP_WATCH_FACTOR, STEPS_MAX
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
@@ -32,6 +32,7 @@ from .guards import StepView
 from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
 from .release import released
+from .stability import FastestMode
 from .stepping import StepSizeController, take_step
 
 
@@ -100,6 +101,7 @@ class Simulation:
         self.course, at_start = walls.start(self.configuration, self.given, self.time)
         inputs = Inputs.of(mechanism, self.given, at_start)
         self.front = released(self.configuration, inputs, self.time)
+        self.fastest = FastestMode.at(self.front.equations, self.time, self.front.y)
         # The step that leads to the front, the event at its end, and the rates at its end.
         self.arc: Arc | None = None
         self.pending: Event | None = None
@@ -218,8 +220,8 @@ class Simulation:
         Raises
         ------
         SimulationError
-            If the target time is invalid, the step size becomes too small, or too many events
-            occur.
+            If the target time is invalid, the step size becomes too small, too many events
+            occur, or more than ``EFFORT_MAX`` integration steps are needed.
         """
         if not math.isfinite(time) or time < self.time:
             raise SimulationError(
@@ -251,11 +253,18 @@ class Simulation:
         )  # fmt: skip
         if self.changed or moved != self.inputs.walls:
             self._restart(moved)
+        last = self.step_count + EFFORT_MAX
         while True:
             if self.pending is not None and self.pending.time <= time:
                 self._apply(self.pending)
             if self.front.time >= time:
                 break
+            if self.step_count >= last:
+                raise SimulationError(
+                    f"t = {time:.12g} s is not reached in {EFFORT_MAX} integration steps, which "
+                    f"end at t = {self.front.time:.9g} s with steps of {self.controller.h:.3g} s: "
+                    "make shorter communication steps, or check units and stiffnesses"
+                )
             self._take_step()
         self.time = time
         self._output_cache = None
@@ -298,7 +307,9 @@ class Simulation:
         configuration, equations = self.configuration, front.equations
         if self.k1 is None:
             self.k1 = equations.rate(front.time, front.y)
-        step, controller = take_step(configuration, front, self.k1, self.controller)
+        step, controller = take_step(configuration, front, self.k1, self.controller, self.fastest)
+        if step.h > STABLE_STEP_WATCH_FACTOR * self.fastest.longest_step(equations):
+            self.fastest = self.fastest.refined(equations, step.factors)
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k)
         event = events.first_event(StepView(configuration.scales, equations, arc, step.forces))
         if event is None:
@@ -313,6 +324,16 @@ class Simulation:
             y, self.k1 = equations.project(event.time, y), None
         self.front = Front(arc.end, y, equations, front.latched)
         self.arc, self.pending, self.controller = arc, event, controller
+
+    def check_effort(self, step: float) -> None:
+        """Reject a communication step [s] of the default experiment that needs too many steps.
+
+        Raises
+        ------
+        SimulationError
+            As :meth:`prbm.hybrid.stability.FastestMode.check_effort`.
+        """
+        self.fastest.check_effort(self.equations, step)
 
     # -- state and outputs --
 
@@ -367,6 +388,7 @@ class Simulation:
             "course": asdict(self.course),
             "window": asdict(self.window),
             "controller": asdict(self.controller),
+            "fastest": snapshot.plain_fastest(self.fastest),
             "arc": snapshot.plain_arc(self.arc),
             "pending": snapshot.plain_event(self.pending),
             "k1": snapshot.plain_array(self.k1),
@@ -393,6 +415,7 @@ class Simulation:
         self.course = snapshot.course_of(saved["course"])
         self.window = EventWindow(**saved["window"])
         self.controller = StepSizeController(**saved["controller"])
+        self.fastest = snapshot.fastest_of(saved["fastest"])
         self.arc = snapshot.arc_of(saved["arc"])
         self.pending = snapshot.event_of(saved["pending"])
         self.k1 = snapshot.array_of(saved["k1"])

@@ -13,6 +13,7 @@ from .arc import Arc
 from .configuration import Configuration
 from .events import Event, EventKind
 from .front import Front, Latched
+from .stability import FastestMode
 from .walls import Course
 
 Plain = dict[str, Any]
@@ -93,6 +94,16 @@ def plain_event(event: Event | None) -> list[float] | None:
 def event_of(plain: Any) -> Event | None:
     """Return an event from plain values, the inverse of :func:`plain_event`."""
     return None if plain is None else Event(EventKind(plain[0]), plain[1], plain[2])
+
+
+def plain_fastest(mode: FastestMode) -> Plain:
+    """Return the fastest mode as plain values."""
+    return {"direction": mode.direction.tolist(), "rate": mode.rate}
+
+
+def fastest_of(plain: Mapping[str, Any]) -> FastestMode:
+    """Return the fastest mode from plain values, the inverse of :func:`plain_fastest`."""
+    return FastestMode(np.array(plain["direction"]), plain["rate"])
 
 
 def plain_array(x: Real | None) -> list[float] | None:

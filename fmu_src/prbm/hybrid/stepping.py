@@ -4,6 +4,8 @@ Sources
 -------
 .. [1] E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.4.
 .. [2] E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, IV.2 (memory).
+.. [3] E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.10 (two
+   estimates of the error).
 """
 
 import math
@@ -21,6 +23,7 @@ from ..base.tolerances import (
     STEP_GROWTH_MAX,
     STEP_MEMORY_EXPONENT,
     STEP_MIN_ATOL,
+    STEP_ROUNDING_FACTOR,
     STEP_SAFETY_FACTOR,
     STEP_SHRINK_MIN,
     STEP_TREND_FACTOR,
@@ -32,9 +35,10 @@ from .configuration import Configuration, Scales
 from .front import Front
 from .runge_kutta import TSITOURAS_PAPAKOSTAS as PAIR
 from .runge_kutta import stages
+from .stability import FastestMode
 from .walls import step_limit
 
-REJECTED_EXPONENT = 1.0 / (PAIR.error_order + 1)
+REJECTED_EXPONENT = 1.0 / PAIR.step_order
 ACCEPTED_EXPONENT = REJECTED_EXPONENT - STEP_TREND_FACTOR * STEP_MEMORY_EXPONENT
 
 
@@ -54,8 +58,8 @@ class StepSizeController:
     Examples
     --------
     >>> controller = StepSizeController(h=1.0)
-    >>> round(controller.next(error=2.0**6).h, 12)
-    0.425
+    >>> controller.next(error=2.0**8).h  # 0.425, rounded
+    0.4375
     """
 
     h: float = 0.0
@@ -72,11 +76,27 @@ class StepSizeController:
             optimal = (
                 STEP_SAFETY_FACTOR * error**-REJECTED_EXPONENT if math.isfinite(error) else 0.0
             )
-            return replace(self, h=self.h * max(STEP_SHRINK_MIN, optimal), growth=1.0)
+            h = rounded_step(self.h * max(STEP_SHRINK_MIN, optimal))
+            return replace(self, h=h, growth=1.0)
         error = max(error, STEP_ERROR_MIN)
         optimal = STEP_SAFETY_FACTOR * error**-ACCEPTED_EXPONENT
         ratio = min(self.growth, optimal * self.last_error**STEP_MEMORY_EXPONENT)
-        return StepSizeController(self.h * max(STEP_SHRINK_MIN, ratio), error)
+        return StepSizeController(rounded_step(self.h * max(STEP_SHRINK_MIN, ratio)), error)
+
+
+def rounded_step(h: float) -> float:
+    """Return a step size rounded to four binary digits.
+
+    Round-off in the errors hence does not change the step sizes, except where it changes the
+    rounding.  Otherwise it would grow: a step size affects the next error.
+
+    Examples
+    --------
+    >>> rounded_step(1.06), rounded_step(1.07)
+    (1.0, 1.125)
+    """
+    shifted = STEP_ROUNDING_FACTOR * h
+    return shifted - (shifted - h)
 
 
 @dataclass(frozen=True)
@@ -108,7 +128,11 @@ class Step:
 
 
 def take_step(
-    configuration: Configuration, front: Front, k1: Real, controller: StepSizeController
+    configuration: Configuration,
+    front: Front,
+    k1: Real,
+    controller: StepSizeController,
+    fastest: FastestMode,
 ) -> tuple[Step, StepSizeController]:
     """Return a step whose error is within the tolerance, and the controller of the next.
 
@@ -122,6 +146,8 @@ def take_step(
         Rates at the start.
     controller : StepSizeController
         Controller with the size of this step.
+    fastest : FastestMode
+        The mode that limits the step.
 
     Raises
     ------
@@ -131,7 +157,8 @@ def take_step(
     t, y, equations = front.time, front.y, front.equations
     if configuration.step:
         return fixed_step(configuration, front, k1), controller
-    wanted = min(controller.h or first_step(configuration, y, k1), configuration.scales.step_max)
+    longest = min(configuration.scales.step_max, fastest.longest_step(equations))
+    wanted = rounded_step(min(controller.h or first_step(configuration, y, k1), longest))
     h = min(wanted, step_limit(front.inputs.walls, t))
     controller = StepSizeController(h, controller.last_error)
     while True:
@@ -217,10 +244,23 @@ def compute_step(
 
     with np.errstate(over="ignore", invalid="ignore"):
         k, y1 = stages(PAIR, rate, t, y, h, k1)
-        error = error_norm(configuration.scales, h * (PAIR.error @ k), y, y1)
+        error = step_error(configuration.scales, h, k, y, y1)
     error /= STEP_ERROR_FACTOR * configuration.tolerance
     forces = np.array([evaluation.lam for evaluation in evaluations])
     return Step(h, k, y1, error, forces, evaluations[-1].factors)
+
+
+def step_error(scales: Scales, h: float, k: Real, y: Real, y1: Real) -> float:
+    """Return the error of a step of size h from y to y1 with the stages k, in units of the scales.
+
+    The differences to solutions of orders 5 and 3 fall with h^6 and h^4.  The square of the first
+    over the second falls with h^8, as the error of the solution of order 7 does [3].  On linear
+    oscillations it is 0.4 to 1.8 times that error, up to the limit of stability.
+    """
+    fine = error_norm(scales, h * (PAIR.error @ k), y, y1)
+    coarse = error_norm(scales, h * (PAIR.coarse_error @ k), y, y1)
+    size = math.sqrt(fine * fine + coarse * coarse)
+    return fine * fine / size if size > 0.0 else size
 
 
 def error_norm(scales: Scales, difference: Real, y: Real, y1: Real) -> float:

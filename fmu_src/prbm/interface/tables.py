@@ -67,6 +67,7 @@ def tables(
     variables: Iterable[Variable],
     token: str,
     independent: Sequence[int],
+    step: float = 0.0,
 ) -> bytes:
     """Return the tables of a mechanism.
 
@@ -80,6 +81,8 @@ def tables(
         The guid or instantiation token of the model description.
     independent : sequence of int
         Indices of the independent coordinates, whose values and rates are states in model exchange.
+    step : float
+        Communication step of the default experiment [s]; 0: not known.
 
     Raises
     ------
@@ -88,7 +91,7 @@ def tables(
     """
     check_size(mechanism)
     listed = tuple(variables)
-    body = b"".join(_Writer(mechanism, listed, independent).parts(token))
+    body = b"".join(_Writer(mechanism, listed, independent).parts(token, step))
     size = struct.pack("<I", HEAD + len(body))
     return MAGIC + _u32(VERSION) + size + _u32(zlib.crc32(body)) + body
 
@@ -189,7 +192,7 @@ class _Writer:
         self.type = {kind.name: i for i, kind in enumerate(mechanism.flexure_types)}
         self.bounds = [*self._bounds()]
 
-    def parts(self, token: str) -> Iterator[bytes]:
+    def parts(self, token: str, step: float) -> Iterator[bytes]:
         """Yield everything after the head."""
         m = self.mechanism
         yield _text(token) + _text(m.name)
@@ -198,6 +201,7 @@ class _Writer:
             yield _text(p.name) + _text(p.unit)
             yield _f64(self._start(p.name, p.value), p.minimum, p.maximum) + _u32(p.tunable)
         yield _u32(*(self.parameters[name] for name in FIXED_NAMES))
+        yield _f64(step)
         for name in self.inputs:
             yield _text(name) + _f64(self._start(name, 0.0))
         yield from self._members()

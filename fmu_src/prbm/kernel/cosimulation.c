@@ -94,6 +94,18 @@ typedef struct {
     bool steps, events;
 } Stops;
 
+/* Reject a target time that has not been reached after the given number of integration steps. */
+static bool check_effort(const State *state, double time, int steps, Problem *problem) {
+    if (steps < EFFORT_MAX) {
+        return true;
+    }
+    return fail(problem,
+                "t = %.12g s is not reached in %d integration steps, which end at t = %.9g s with "
+                "steps of %.3g s: make shorter communication steps, or check units and "
+                "stiffnesses",
+                time, EFFORT_MAX, state->front_time, state->step_size);
+}
+
 static bool advance(Simulation *sim, double time, Stops stops, bool *event, Problem *problem) {
     State *state = &sim->state;
     *event = false;
@@ -101,6 +113,7 @@ static bool advance(Simulation *sim, double time, Stops stops, bool *event, Prob
         return false;
     }
     state->interrupted = false;
+    int effort = 0;
     for (bool stepped = false;; stepped = true) {
         if (event_due(state, time)) {
             if (stops.events) {
@@ -121,7 +134,7 @@ static bool advance(Simulation *sim, double time, Stops stops, bool *event, Prob
             state->interrupted = true;
             return true;
         }
-        if (!take_step(sim, problem)) {
+        if (!check_effort(state, time, effort++, problem) || !take_step(sim, problem)) {
             return false;
         }
     }

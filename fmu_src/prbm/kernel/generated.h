@@ -66,13 +66,19 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define EVENT_CORRECTION_RTOL 0.01
 #define TOLERANCE_MIN 1e-13
 #define TOLERANCE_MAX 0.01
+#define TOLERANCE_USED_MAX 1e-05
 #define TABLEAU_ATOL 1e-14
 #define STEP_SAFETY_FACTOR 0.85
 #define STEP_SHRINK_MIN 0.2
 #define STEP_GROWTH_MAX 5.0
 #define STEP_MEMORY_EXPONENT 0.04
 #define STEP_TREND_FACTOR 0.75
-#define STEP_ERROR_FACTOR 30.0
+#define STEP_ERROR_FACTOR 2.0
+#define STEP_ROUNDING_FACTOR 562949953421313.0
+#define STABLE_STEP_FACTOR 4.0
+#define STABLE_STEP_WATCH_FACTOR 0.25
+#define FASTEST_RATE_RTOL 0.001
+enum { FASTEST_ITERATIONS_MAX = 100 };
 #define STEP_ERROR_MIN 0.0001
 #define STEP_MAX_RTOL 0.08
 #define STEP_MIN_ATOL 1e-13
@@ -80,6 +86,8 @@ enum { EVENT_CORRECTIONS_MAX = 3 };
 #define FIRST_STEP_EXPONENT 0.16666666666666666
 #define FIRST_RATE_MIN 1e-06
 #define STEPS_MAX 1000000000.0
+#define DEFAULT_EFFORT_MAX 1000.0
+enum { EFFORT_MAX = 1000000 };
 #define TIME_SUM_RTOL 1e-12
 #define STEP_SUM_RTOL 1e-06
 #define STOP_TIME_RTOL 0.001
@@ -259,7 +267,7 @@ typedef enum {
 /* --- prbm.hybrid.runge_kutta -------------------------------------------------------------------- */
 
 enum { STAGES = 10 };
-enum { ERROR_ORDER = 5 };
+enum { STEP_ORDER = 8 };
 enum { DENSE = 5 };
 #define STAGE_TIMES \
     { \
@@ -298,6 +306,19 @@ enum { DENSE = 5 };
         0.08765358154601828, \
         -0.03545897557975343, \
         0.0, \
+        0.0, \
+    }
+#define COARSE_ERROR_WEIGHTS \
+    { \
+        3.6881450369884017, \
+        0.0, \
+        -12.199086990863163, \
+        7.842839760687878, \
+        8.448253139182773, \
+        -8.185232784607853, \
+        0.529455809152473, \
+        -0.166913130089828, \
+        0.04253915954932026, \
         0.0, \
     }
 #define DENSE_WEIGHTS \

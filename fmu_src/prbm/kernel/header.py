@@ -168,11 +168,12 @@ def _inputs() -> Iterator[str]:
 def _tableau(tableau: Tableau) -> Iterator[str]:
     stages, dense = tableau.dense.shape
     yield _constant("STAGES", stages)
-    yield _constant("ERROR_ORDER", tableau.error_order)
+    yield _constant("STEP_ORDER", tableau.step_order)
     yield _constant("DENSE", dense)
     yield _array("STAGE_TIMES", tableau.c)
     yield _array("STAGE_WEIGHTS", tableau.a)
     yield _array("ERROR_WEIGHTS", tableau.error)
+    yield _array("COARSE_ERROR_WEIGHTS", tableau.coarse_error)
     yield _array("DENSE_WEIGHTS", tableau.dense)
     yield "/* Bounds of the magnitude of each weight of the dense output within a step. */"
     yield _array("LARGEST_WEIGHTS", largest_weights(tableau))

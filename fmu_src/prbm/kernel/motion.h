@@ -48,6 +48,12 @@ PRBM double simulation_time(const Simulation *simulation);
 PRBM bool simulation_start(Simulation *simulation, double start_time, double tolerance,
                            bool exchange, Problem *problem);
 
+/* Reject a start whose communication step of the default experiment, in co-simulation, needs too
+ * many integration steps. */
+PRBM bool simulation_check_effort(const Simulation *simulation, Problem *problem);
+/* The tolerance that solver.tolerance or an importer's tolerance (not 0) requests. */
+PRBM double simulation_requested(const Simulation *simulation, double tolerance);
+
 /* --- co-simulation --- */
 
 /* Simulate to a time, and apply the events before it. */

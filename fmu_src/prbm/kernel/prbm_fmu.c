@@ -40,6 +40,7 @@
 #include "hybrid/impacts.c"
 #include "hybrid/rest.c"
 #include "hybrid/contact_modes.c"
+#include "hybrid/stability.c"
 #include "hybrid/stepping.c"
 #include "hybrid/simulation.c"
 #include "hybrid/snapshot.c"

@@ -18,7 +18,7 @@ from keyword import iskeyword
 
 from ..base.errors import MechanismError, ParameterError
 from ..base.names import proposal, unknown
-from ..base.tolerances import TOLERANCE_MAX, TOLERANCE_MIN
+from ..base.tolerances import TOLERANCE_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
 from .expressions import Quantity, affine
 from .flexure import CLAMP, ENDS, FREE, LINKS_MAX, MODELS, FlexureModel
 from .parameters import Parameter
@@ -147,9 +147,9 @@ class Mechanism:
         yield from _fields(self.release)
         yield Parameter(
             "solver.tolerance", 1e-8, "",
-            "Relative tolerance of the integration, unless the importer gives one", TOLERANCE_MIN,
-            TOLERANCE_MAX,
-            1e-8,
+            "Relative tolerance of the integration, unless the importer gives one; "
+            f"at most {TOLERANCE_USED_MAX:g} is used",
+            TOLERANCE_MIN, TOLERANCE_MAX, 1e-8,
         )  # fmt: skip
         yield Parameter(
             "damping.zeta", self.damping_zeta, "",

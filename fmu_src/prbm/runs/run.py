@@ -96,6 +96,7 @@ def simulate(
     if tolerance is not None:
         tolerance = _number("tolerance", tolerance, "")
     simulation = Simulation(mechanism, values, tolerance=tolerance)
+    _check_effort(simulation, spacing)
     simulation.record = []
     start = {**simulation.values, **simulation.given}
     rows = []
@@ -110,6 +111,17 @@ def simulate(
         if progress is not None:
             progress(k / (len(times) - 1))
     return Result(mechanism, start, structured(rows), tuple(simulation.record))
+
+
+def _check_effort(simulation: Simulation, spacing: float) -> None:
+    """Reject a simulation that needs too many steps for a communication step [s].
+
+    The communication step is the given one, or that of the default experiment if it is shorter.
+    """
+    try:
+        simulation.check_effort(spacing)
+    except SimulationError:
+        simulation.check_effort(min(spacing, experiment(simulation.mechanism).step))
 
 
 def _check_steps(simulation: Simulation, steps_max: float, fraction: float) -> None:

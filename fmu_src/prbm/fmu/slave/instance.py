@@ -8,6 +8,7 @@ from typing import Any
 
 from ...base.errors import ParameterError, PrbmError
 from ...base.tolerances import STEP_SUM_RTOL, TIME_SUM_RTOL
+from ...hybrid.configuration import replaced_tolerance
 from ...hybrid.simulation import Simulation
 from .messages import Messages
 from .resolved import EMPTY, Model
@@ -107,14 +108,21 @@ class Instance:
         if self.simulation is not None or self.failure or self.refused:
             return
         try:
-            self.simulation = Simulation(
+            simulation = Simulation(
                 self.model.mechanism,
                 self.given,
                 start_time=self.start_time,
                 tolerance=self.tolerance,
             )
+            simulation.check_effort(self.model.step)
         except PrbmError as error:
             self._refuse(START, str(error))
+            return
+        self.simulation = simulation
+        given = self.given["solver.tolerance"]
+        replaced = replaced_tolerance(given if self.tolerance is None else self.tolerance)
+        if replaced:
+            self.messages.warning(replaced)
 
     def _forget(self) -> None:
         """Drop the simulation, because a value at its start has changed."""

@@ -40,6 +40,12 @@ class Messages:
         """Log an event."""
         self._logged(sentence, Fmi2Status.ok, EVENTS)
 
+    def warning(self, sentence: str) -> None:
+        """Log and print a warning, unless it has been printed before."""
+        if sentence not in self.printed:
+            self._logged(sentence, Fmi2Status.warning)
+            self._print(sentence)
+
     def error(self, sentence: str) -> None:
         """Log an error."""
         self._logged(sentence, Fmi2Status.error)

@@ -53,6 +53,8 @@ class Model:
         The parameters, with bounds and units.
     computed : dict of str to number
         All other variables, with their values when there is no simulation: NaN, 0 or False.
+    step : float
+        Communication step of the default experiment [s]; 0: not known.
     """
 
     mechanism: Mechanism
@@ -61,13 +63,14 @@ class Model:
     given: Mapping[str, float]
     parameters: Mapping[str, Parameter]
     computed: Mapping[str, float | int | bool]
+    step: float
 
 
-def resolved(mechanism: Mechanism, variables: Iterable[Any]) -> dict[str, Any]:
-    """Return a mechanism and its variables as values that JSON preserves exactly."""
+def resolved(mechanism: Mechanism, variables: Iterable[Any], step: float = 0.0) -> dict[str, Any]:
+    """Return a mechanism, its variables and its step as values that JSON preserves exactly."""
     kept = ("name", "reference", "type", "start")
     table = [{key: getattr(variable, key) for key in kept} for variable in variables]
-    return {"mechanism": asdict(mechanism), "variables": table}
+    return {"mechanism": asdict(mechanism), "variables": table, "step": step}
 
 
 def read(folder: str | Path) -> Model:
@@ -89,6 +92,7 @@ def read(folder: str | Path) -> Model:
         {v["name"]: v["start"] for v in table if v["start"] is not None},
         {p.name: p for p in mechanism.parameters},
         {v["name"]: EMPTY[v["type"]] for v in table if v["start"] is None},
+        data["step"],
     )
 
 

@@ -9,6 +9,7 @@
 static const double STAGE_TIME[STAGES] = STAGE_TIMES;
 static const double STAGE[STAGES][STAGES] = STAGE_WEIGHTS;
 static const double ERROR_WEIGHT[STAGES] = ERROR_WEIGHTS;
+static const double COARSE_ERROR_WEIGHT[STAGES] = COARSE_ERROR_WEIGHTS;
 static const double DENSE_WEIGHT[STAGES][DENSE] = DENSE_WEIGHTS;
 static const double LARGEST_WEIGHT[STAGES] = LARGEST_WEIGHTS;
 
@@ -89,6 +90,11 @@ PRBM bool stages(const Equations *equations, double t, int n, const double *y, d
 PRBM void error_of(int n, const double *k, double h, double *error) {
     zeros(n, error);
     combine(n, STAGES, h, ERROR_WEIGHT, k, error, error);
+}
+
+PRBM void coarse_error_of(int n, const double *k, double h, double *error) {
+    zeros(n, error);
+    combine(n, STAGES, h, COARSE_ERROR_WEIGHT, k, error, error);
 }
 
 /* Bound the distance of the first n components of the dense output from their values at the start

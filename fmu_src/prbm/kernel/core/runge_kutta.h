@@ -14,7 +14,9 @@ typedef struct {
 PRBM bool stages(const Equations *equations, double t, int n, const double *y, double h,
                  double *k, double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
                  Problem *problem);
+/* The differences between the solution and those of orders 5 and 3. */
 PRBM void error_of(int n, const double *k, double h, double *error);
+PRBM void coarse_error_of(int n, const double *k, double h, double *error);
 PRBM void weights(double theta, double *b);
 PRBM void interpolate(int n, const double *y, const double *k, double h, double theta,
                       double *result);

@@ -50,6 +50,7 @@ static void read_parameters(Reader *reader, Mechanism *m) {
     m->tolerance = read_index(reader, 0, m->parameter_count);
     m->damping_zeta = read_index(reader, 0, m->parameter_count);
     m->damping_beta = read_index(reader, 0, m->parameter_count);
+    m->default_step = read_finite(reader);
 }
 
 static void read_inputs(Reader *reader, Mechanism *m) {

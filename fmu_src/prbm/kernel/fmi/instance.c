@@ -313,6 +313,31 @@ PRBM void acknowledge(Instance *instance) {
     }
 }
 
+/* Start co-simulation or model exchange.  Log a warning if the tolerance of co-simulation is too
+ * loose to be used. */
+static bool start(Instance *instance, Problem *problem) {
+    Simulation *simulation = instance->simulation;
+    bool exchange = instance->kind == MODEL_EXCHANGE;
+    if (!simulation_start(simulation, instance->start_time, instance->tolerance, exchange,
+                          problem)) {
+        return false;
+    }
+    if (exchange) {
+        return true;
+    }
+    if (!simulation_check_effort(simulation, problem)) {
+        simulation_unstart(simulation);
+        return false;
+    }
+    double wanted = simulation_requested(simulation, instance->tolerance);
+    if (wanted > TOLERANCE_USED_MAX) {
+        report(&instance->journal, FMU_WARNING,
+               "tolerance = %g is replaced by %g: looser tolerances lose energy without notice",
+               wanted, TOLERANCE_USED_MAX);
+    }
+    return true;
+}
+
 /* Start the simulation if needed.  Log the reason and return false on failure. */
 PRBM bool started(Instance *instance) {
     Problem problem;
@@ -326,8 +351,7 @@ PRBM bool started(Instance *instance) {
         refuse(instance, FMU_ERROR, "the instance was never initialized: " TO_RESET);
         return false;
     }
-    if (!simulation_start(instance->simulation, instance->start_time, instance->tolerance,
-                          instance->kind == MODEL_EXCHANGE, &problem)) {
+    if (!start(instance, &problem)) {
         refuse(instance, FMU_ERROR, "%s", problem.text);
         return false;
     }

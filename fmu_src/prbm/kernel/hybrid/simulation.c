@@ -9,6 +9,7 @@
 #include "hybrid/impacts.h"
 #include "hybrid/present.h"
 #include "hybrid/simulation.h"
+#include "hybrid/stability.h"
 #include "hybrid/walls.h"
 
 /* --- access ----------------------------------------------------------------------------------- */
@@ -47,6 +48,7 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->received, LOADS * (size_t)m->force_count},
         {&state->front, ny},         {&state->k1, ny},
         {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
+        {&state->fastest, (size_t)m->coordinate_count},
         {&state->floors, s},         {&state->accepted, (size_t)m->coordinate_count},
         {&state->states, 2 * (size_t)m->independent_count + 2},
     };
@@ -99,6 +101,7 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     stepping->forces.largest = place(memory, s, d);
     stepping->end = place(memory, ny, d);
     stepping->error = place(memory, ny, d);
+    stepping->coarse_error = place(memory, ny, d);
     stepping->sample_y = place(memory, samples * 2 * n, d);
     stepping->sample_e = place(memory, samples * n, sizeof(Complex));
     stepping->located.y = place(memory, ny, d);
@@ -108,6 +111,9 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     stepping->located.forces.largest = place(memory, s, d);
     stepping->located.k = place(memory, STAGES * ny, d);
     stepping->reach = place(memory, n, d);
+    stepping->torques = place(memory, (size_t)system->even + 2, d);
+    stepping->response = place(memory, (size_t)system->even + 2, d);
+    stepping->multipliers = place(memory, (size_t)system->r + 2 * s + (size_t)system->f, d);
 }
 
 static void place_present(Simulation *sim, const System *system, Memory *memory) {
@@ -245,7 +251,7 @@ static void clear_progress(State *state, double start_time) {
     state->time = state->front_time = state->window_since = start_time;
     state->point = start_time;
     state->longest = state->arc.start = state->arc.h = 0.0;
-    state->step_size = state->log_of_error = 0.0;
+    state->step_size = state->log_of_error = state->fastest_rate = 0.0;
     state->tolerance = state->frequency = state->angle = state->energy = 0.0;
     state->window_count = 0;
     state->pending = none;
@@ -323,6 +329,11 @@ static bool check_tolerance(double x, Problem *problem) {
     return true;
 }
 
+PRBM double simulation_requested(const Simulation *simulation, double tolerance) {
+    int parameter = simulation->configuration.mechanism->tolerance;
+    return tolerance == 0.0 ? simulation->state.values[parameter] : tolerance;
+}
+
 static bool start_state(Simulation *sim, Problem *problem) {
     const Mechanism *m = sim->configuration.mechanism;
     const System *system = system_of(sim);
@@ -378,16 +389,16 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
     set_inputs(sim);
     return start_state(sim, problem) &&
            project(&sim->equations, state->time, state->front, &sim->scratch, problem) &&
-           check_walls(sim, problem) && settle(sim, every, system_of(sim)->s, NULL, problem);
+           check_walls(sim, problem) && settle(sim, every, system_of(sim)->s, NULL, problem) &&
+           find_fastest(sim, problem);
 }
 
 PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, SimulationMode mode,
                        Problem *problem) {
     State *state = &sim->state;
     Configuration *configuration = &sim->configuration;
-    int parameter = configuration->mechanism->tolerance;
     clear_progress(state, start_time);
-    state->tolerance = tolerance == 0.0 ? state->values[parameter] : tolerance;
+    state->tolerance = simulation_requested(sim, tolerance);
     state->mode = mode;
     state->log_of_error = natural_log(STEP_ERROR_MIN);
     if (!check_tolerance(state->tolerance, problem) || !take_values(sim, problem) ||
@@ -395,6 +406,7 @@ PRBM bool start_motion(Simulation *sim, double start_time, double tolerance, Sim
                                problem)) {
         return false;
     }
+    state->tolerance = lesser(state->tolerance, TOLERANCE_USED_MAX);
     set_scales(configuration, state->frequency);
     state->started = release_mechanism(sim, problem);
     return state->started;

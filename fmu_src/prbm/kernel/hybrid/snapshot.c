@@ -7,7 +7,7 @@
 #include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 
-enum { SCALARS = 23, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
+enum { SCALARS = 24, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
@@ -41,7 +41,7 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
         state->pending.time, state->time,           state->tolerance,    state->frequency,
         state->step_size,    state->log_of_error,   state->front_time,   state->arc.start,
         state->arc.h,        state->window_since,   state->point,        state->longest,
-        state->mode.lowest_bounce, state->angle,    state->energy,
+        state->mode.lowest_bounce, state->angle,     state->energy,         state->fastest_rate,
     };
     memcpy(to, scalars, sizeof scalars);
     to += SCALARS;
@@ -103,6 +103,7 @@ static void get_scalars(State *state, StateReader *reader) {
     state->mode.lowest_bounce = get_number(reader);
     state->angle = get_number(reader);
     state->energy = get_number(reader);
+    state->fastest_rate = get_number(reader);
 }
 
 static void get_stop(State *state, int i, StateReader *reader) {
@@ -159,9 +160,9 @@ static bool consistent(const Simulation *sim) {
         return false;
     }
     return !state->started ||
-           (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_MAX &&
-            state->frequency >= 0.0 && (!state->arc.valid || state->arc.h > 0.0) &&
-            state->front_time >= state->time &&
+           (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_USED_MAX &&
+            state->frequency >= 0.0 && state->fastest_rate >= 0.0 &&
+            (!state->arc.valid || state->arc.h > 0.0) && state->front_time >= state->time &&
             (!state->mode.exchange ||
              (state->angle >= NOMINAL_ANGLE_MIN && state->energy > 0.0)));
 }

@@ -65,6 +65,7 @@ typedef struct {
     double time, tolerance, frequency;
     double angle, energy; /* model exchange: magnitudes of the motion from the start [rad], [J] */
     double step_size, log_of_error; /* of the step size controller */
+    double fastest_rate;            /* angular frequency of the fastest mode */
     double front_time;
     bool has_k1;          /* whether k1 has the rates of the front */
     Arc arc;
@@ -84,6 +85,7 @@ typedef struct {
     double *acting_values, *acting_given; /* parameters and inputs of the last restart */
     double *received;                     /* (3 per force): impulses that have acted */
     double *front, *k1;                   /* (ny,): state at the end of the last step, its rates */
+    double *fastest;                      /* (n,): shape of the fastest mode */
     double *floors;                       /* (s,): depth below zero at which gaps close */
     double *accepted;                     /* model exchange: (n,) angles of the last step */
     double *states;                       /* model exchange: the states as they were set */
@@ -110,12 +112,16 @@ typedef struct {
     Evaluation evaluation; /* at the last stage */
     Reference reference;   /* at the start */
     ForceRange forces;
-    double *end, *error;   /* (ny,) */
+    double *end;           /* (ny,) */
+    double *error, *coarse_error; /* (ny,) */
     double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
     double *sample_y;      /* (2 n,) of each sample */
     Complex *sample_e;     /* (n,) of each sample */
     Located located;
     double *reach;         /* (n,) bounds of the changes of the arms */
+    double *torques;       /* (even + 2,) of the springs in the fastest mode */
+    double *response;      /* (even + 2,) accelerations by these torques */
+    double *multipliers;   /* (r,) of that response */
 } Stepping;
 
 /* Groups of present quantities: outputs, the rates and, in model exchange, the front itself. */

@@ -4,33 +4,39 @@
 #include "hybrid/arc.h"
 #include "hybrid/events.h"
 #include "hybrid/simulation.h"
+#include "hybrid/stability.h"
 #include "hybrid/stepping.h"
 #include "hybrid/walls.h"
 
-#define STEP_ERROR_EXPONENT (1.0 / ((double)ERROR_ORDER + 1.0))
+#define STEP_ERROR_EXPONENT (1.0 / (double)STEP_ORDER)
 #define STEP_TREND_EXPONENT (STEP_ERROR_EXPONENT - STEP_TREND_FACTOR * STEP_MEMORY_EXPONENT)
 
 /* --- errors ----------------------------------------------------------------------------------- */
 
-/* Sum the squares of the errors x, each divided by the largest of |y|, |y1| and least. */
-static double squares_of(int n, const double *x, const double *y, const double *y1, double least) {
-    double sum = 0.0;
+/* Add the squares of the errors x and z, each divided by the largest of |y|, |y1| and least, to two
+ * sums. */
+static void add_squares(int n, const double *x, const double *z, const double *y, const double *y1,
+                        double least, double *sums) {
     for (int i = 0; i < n; i++) {
-        double ratio = x[i] / greater(least, greater(fabs(y[i]), fabs(y1[i])));
-        sum += ratio * ratio;
+        double scale = 1.0 / greater(least, greater(fabs(y[i]), fabs(y1[i])));
+        double fine = x[i] * scale, coarse = z[i] * scale;
+        sums[0] += fine * fine;
+        sums[1] += coarse * coarse;
     }
-    return sum;
 }
 
-/* Return the root mean square of the errors x.  Those of angles are in rad, those of rates and
+/* Compute the mean squares of the errors x and z.  Those of angles are in rad, those of rates and
  * energies relative to their size. */
-static double relative_size(const Simulation *sim, const double *x, const double *y,
-                            const double *y1) {
+static void mean_squares(const Simulation *sim, const double *x, const double *z, const double *y,
+                         const double *y1, double *means) {
     const Scales *scales = &sim->configuration.scales;
     int n = system_of(sim)->n;
-    double sum = dot(n, x, x) + squares_of(n, x + n, y + n, y1 + n, scales->rate) +
-                 squares_of(2, x + 2 * n, y + 2 * n, y1 + 2 * n, scales->energy);
-    return sqrt(sum / state_size(sim));
+    means[0] = dot(n, x, x);
+    means[1] = dot(n, z, z);
+    add_squares(n, x + n, z + n, y + n, y1 + n, scales->rate, means);
+    add_squares(2, x + 2 * n, z + 2 * n, y + 2 * n, y1 + 2 * n, scales->energy, means);
+    means[0] /= state_size(sim);
+    means[1] /= state_size(sim);
 }
 
 /* --- step sizes ------------------------------------------------------------------------------- */
@@ -42,9 +48,16 @@ PRBM double longest_step(const Simulation *sim) {
 /* Choose the first step size by the size of the rates (Hairer, II.4). */
 static double first_step(const Simulation *sim) {
     const State *state = &sim->state;
-    double size = relative_size(sim, state->k1, state->front, state->front);
+    double means[2];
+    mean_squares(sim, state->k1, state->k1, state->front, state->front, means);
     double allowed = FIRST_STEP_FACTOR * power(state->tolerance, FIRST_STEP_EXPONENT);
-    return lesser(longest_step(sim), allowed / greater(size, FIRST_RATE_MIN));
+    return lesser(longest_step(sim), allowed / greater(sqrt(means[0]), FIRST_RATE_MIN));
+}
+
+/* A step size rounded to four binary digits, so that round-off in the errors does not change it. */
+static double rounded_step(double h) {
+    double shifted = STEP_ROUNDING_FACTOR * h;
+    return shifted - (shifted - h);
 }
 
 /* Choose the next step size from the error relative to the allowed error; return whether the step
@@ -56,14 +69,14 @@ static bool next(StepSizeController *controller, double error) {
                             ? STEP_SAFETY_FACTOR * power(error, -STEP_ERROR_EXPONENT)
                             : STEP_SHRINK_MIN;
         controller->growth_max = 1.0;
-        controller->h *= greater(STEP_SHRINK_MIN, factor);
+        controller->h = rounded_step(controller->h * greater(STEP_SHRINK_MIN, factor));
         return false;
     }
     double log_of_error = natural_log(greater(error, STEP_ERROR_MIN));
     double trend =
         STEP_MEMORY_EXPONENT * controller->log_of_error - STEP_TREND_EXPONENT * log_of_error;
     double growth = lesser(controller->growth_max, STEP_SAFETY_FACTOR * exponential(trend));
-    controller->h = controller->h * greater(STEP_SHRINK_MIN, growth);
+    controller->h = rounded_step(controller->h * greater(STEP_SHRINK_MIN, growth));
     controller->log_of_error = log_of_error;
     return true;
 }
@@ -85,7 +98,9 @@ static bool check_step_size(const State *state, double h, Problem *problem) {
     return true;
 }
 
-/* Return the error of a step, relative to the allowed error; infinite if a stage fails. */
+/* Return the error of a step of the arc, relative to the allowed error; infinite if a stage fails.
+ * The differences from solutions of orders 5 and 3 give an estimate that falls with the 8th power
+ * of h (Hairer, II.10), as the error of the solution of order 7 does. */
 static double step_error(Simulation *sim, double h, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     const Arc *arc = &sim->state.arc;
@@ -95,8 +110,11 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
         return HUGE_VAL;
     }
     error_of(ny, arc->k, h, stepping->error);
-    return relative_size(sim, stepping->error, arc->y, stepping->end) /
-           (STEP_ERROR_FACTOR * sim->state.tolerance);
+    coarse_error_of(ny, arc->k, h, stepping->coarse_error);
+    double means[2];
+    mean_squares(sim, stepping->error, stepping->coarse_error, arc->y, stepping->end, means);
+    double size = sqrt(means[0] + means[1]), error = size > 0.0 ? means[0] / size : size;
+    return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
 /* Compute a step within the tolerance and no longer than longest [s].  Its stages are stored in the
@@ -105,7 +123,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
     State *state = &sim->state;
     int ny = state_size(sim);
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
-    wanted = lesser(wanted, longest_step(sim));
+    wanted = rounded_step(lesser(wanted, lesser(longest_step(sim), stable_step(sim))));
     StepSizeController controller = {lesser(wanted, longest), state->log_of_error, STEP_GROWTH_MAX};
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
@@ -160,6 +178,9 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     state->arc.start = start;
     state->arc.h = h;
     state->pending.kind = EVENT_NONE;
+    if (h > STABLE_STEP_WATCH_FACTOR * stable_step(sim)) {
+        refine_fastest(sim);
+    }
     copy(ny, stepping->end, state->front); /* the state of the last stage */
     if (!project_near(&sim->equations, &stepping->evaluation, &stepping->reference, end,
                       state->front, &sim->correction, &sim->scratch, problem)) {

@@ -1,0 +1,83 @@
+/* The fastest mode and the longest stable step: the twin of hybrid/stability.py. */
+#include <math.h>
+
+#include "hybrid/simulation.h"
+#include "hybrid/stability.h"
+
+/* Set the torques (n,) of the springs, K w, for changes w of the coordinates. */
+static void spring_torques(const System *system, const double *w, double *torques) {
+    int n = system->n;
+    zeros(n, torques);
+    for (int k = 0; k < system->spring_count; k++) {
+        int a = system->spring[k].a, b = system->spring[k].b; /* index n is the ground */
+        double torque = system->spring[k].rate * ((a < n ? w[a] : 0.0) - (b < n ? w[b] : 0.0));
+        if (a < n) {
+            torques[a] += torque;
+        }
+        if (b < n) {
+            torques[b] -= torque;
+        }
+    }
+}
+
+/* One power iteration with the factors of the equations: w becomes the accelerations by the torques
+ * K w, of which the rate is the Rayleigh quotient. */
+PRBM void refine_fastest(Simulation *sim) {
+    State *state = &sim->state;
+    Stepping *stepping = &sim->stepping;
+    const System *system = system_of(sim);
+    int n = system->n;
+    double *x = stepping->response;
+    spring_torques(system, state->fastest, stepping->torques);
+    zeros(system->even, x);
+    copy(n, stepping->torques, x);
+    zeros(sim->equations.r, stepping->multipliers);
+    solve_again(&stepping->evaluation.factors, x, stepping->multipliers);
+    double energy = dot(n, state->fastest, stepping->torques);
+    double response = dot(n, x, stepping->torques), longest = largest(n, x);
+    state->fastest_rate = energy > 0.0 && response > 0.0 ? sqrt(response / energy) : 0.0;
+    for (int j = 0; j < n && longest > 0.0; j++) {
+        state->fastest[j] = x[j] / longest;
+    }
+}
+
+PRBM bool find_fastest(Simulation *sim, Problem *problem) {
+    State *state = &sim->state;
+    int n = system_of(sim)->n;
+    if (!factor_equations(&sim->equations, state->front, state->front + n, NULL,
+                          &sim->stepping.evaluation, problem)) {
+        return false;
+    }
+    for (int j = 0; j < n; j++) {
+        state->fastest[j] = 1.0 / (1.0 + j);
+    }
+    double change = HUGE_VAL;
+    for (int i = 0; i < FASTEST_ITERATIONS_MAX && change > FASTEST_RATE_RTOL; i++) {
+        double last = state->fastest_rate;
+        refine_fastest(sim);
+        change = fabs(state->fastest_rate - last) / greater(state->fastest_rate, last);
+    }
+    return true;
+}
+
+PRBM bool simulation_check_effort(const Simulation *simulation, Problem *problem) {
+    double step = simulation->configuration.mechanism->default_step;
+    double needed = step / stable_step(simulation);
+    if (needed > DEFAULT_EFFORT_MAX) {
+        return fail(problem,
+                    "the fastest mode has %.4g Hz: a communication step of %g s would need %.4g "
+                    "integration steps, more than %g; check the units of lengths, stiffnesses, "
+                    "masses and damping.beta",
+                    simulation->state.fastest_rate / TWO_PI, step, needed, DEFAULT_EFFORT_MAX);
+    }
+    return true;
+}
+
+PRBM double stable_step(const Simulation *sim) {
+    double rate = sim->state.fastest_rate;
+    double damping = sim->equations.beta * (rate * rate) + sim->equations.mass_damping;
+    if (damping > 2.0 * rate) {
+        rate = 0.5 * (damping + sqrt(damping * damping - 4.0 * (rate * rate)));
+    }
+    return rate > 0.0 ? STABLE_STEP_FACTOR / rate : HUGE_VAL;
+}

@@ -1,0 +1,86 @@
+"""Loose tolerances are replaced, and the number of integration steps is limited."""
+
+import numpy as np
+import pytest
+
+from kernel_simulation import KernelMistake, KernelSimulation
+from prbm.base import tolerances
+from prbm.base.errors import SimulationError
+from prbm.base.tolerances import TOLERANCE_USED_MAX
+from prbm.files.mechanism_file import shipped
+from prbm.hybrid import simulation
+from prbm.hybrid.simulation import Simulation
+from prbm.runs.run import simulate
+from support import energy_balance, mechanism
+
+each_engine = pytest.mark.parametrize("engine", [Simulation, KernelSimulation])
+THICK = {"flexure.thickness": 1.0}  # m, where 0.1 mm is meant
+LIMIT = f"enum {{ EFFORT_MAX = {tolerances.EFFORT_MAX} }};"
+FEW = ("generated.h", LIMIT, "enum { EFFORT_MAX = 20 };")
+
+
+@each_engine
+@pytest.mark.parametrize("given", [{"tolerance": 1e-2}, {"values": {"solver.tolerance": 1e-3}}])
+def test_a_loose_tolerance_is_replaced(engine, given):
+    """The motion is bit for bit that of the largest tolerance in use."""
+    ends = []
+    for options in (given, {"tolerance": TOLERANCE_USED_MAX}):
+        sim = engine(mechanism("PRBDM2R"), **options)
+        sim.advance(0.05)
+        out = sim.outputs()
+        ends.append({k: x for k, x in out.items() if k != "solver.tolerance"})
+    assert ends[0] == ends[1]
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_energy_error_at_the_loosest_tolerance_is_below_five_per_mille(name):
+    """Within 50 ms under 1e4 m/s2, relative to the largest kinetic or initial elastic energy."""
+    sim = KernelSimulation(mechanism(name), {"base.acceleration.x": 1e4}, tolerance=1e-2)
+    out = sim.outputs()
+    start, scale, worst = energy_balance(out), out["energy.elastic"], 0.0
+    for t in np.linspace(0.0, 0.05, 51)[1:]:
+        sim.advance(t)
+        out = sim.outputs()
+        worst = max(worst, abs(energy_balance(out) - start))
+        scale = max(scale, out["energy.kinetic"])
+    assert worst < 5e-3 * scale
+
+
+def test_a_thickness_of_a_metre_is_rejected_at_the_steps_of_the_default_experiment():
+    sim = Simulation(mechanism("PRBDM2R"), THICK)
+    needed = 1e-3 / sim.fastest.longest_step(sim.equations)
+    assert needed > tolerances.DEFAULT_EFFORT_MAX
+    with pytest.raises(SimulationError, match=r"Hz: a communication step of 0\.001 s would need"):
+        sim.check_effort(1e-3)
+    with pytest.raises(SimulationError, match=r"Hz: a communication step of 0\.001 s would need"):
+        simulate(mechanism("PRBDM2R"), THICK, stop_time=1.0, step=1e-3)
+
+
+def test_short_communication_steps_of_a_stiff_mechanism_are_accepted():
+    assert len(simulate(mechanism("PRBDM2R"), THICK, stop_time=1e-7, step=1e-8)["time"]) == 11
+
+
+def test_the_shipped_mechanisms_need_few_steps_in_a_default_communication_step():
+    for name in shipped():
+        Simulation(mechanism(name)).check_effort(10 * 1e-3)
+
+
+@pytest.mark.parametrize("engine", ["package", "kernel"])
+def test_the_effort_of_one_communication_step_is_limited(monkeypatch, engine):
+    """A long step fails and changes nothing; shorter steps succeed."""
+    guide = mechanism("PRBDM2R")
+    if engine == "package":
+        monkeypatch.setattr(simulation, "EFFORT_MAX", 20)
+        sim = Simulation(guide)
+    else:
+        sim = KernelSimulation(guide, changes=(FEW,))
+    before = sim.outputs()
+    with pytest.raises((SimulationError, KernelMistake), match="not reached in 20 integration st"):
+        sim.advance(0.1)
+    assert sim.outputs() == before
+    for t in np.linspace(0.0, 0.1, 201)[1:]:
+        sim.advance(t)
+    expected = Simulation(guide)
+    monkeypatch.undo()
+    expected.advance(0.1)
+    assert sim.outputs()["shuttle.x"] == pytest.approx(expected.outputs()["shuttle.x"], abs=1e-9)
