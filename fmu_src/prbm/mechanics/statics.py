@@ -341,7 +341,7 @@ def _on_pivot(system: System, name: str) -> bool:
 def _left_by_loops(system: System, e: Complex, rows: Real) -> float:
     """Return the largest entry of rows (k, n) without their components along the loops' rows."""
     loops = system.loop_rows.jacobian(e)
-    left = rows - (loops.T @ np.linalg.lstsq(loops.T, rows.T)[0]).T
+    left = rows - (loops.T @ np.linalg.lstsq(loops.T, rows.T, rcond=None)[0]).T
     return float(np.abs(left).max())
 
 

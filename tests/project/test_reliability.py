@@ -1,0 +1,94 @@
+"""Short runs of the campaign in ``docs/reliability.md``."""
+
+import pytest
+
+from c_importer import ANVIL, needs
+from reliability import calls, draws, faults, states, texts, threads
+from reliability.driver import drive
+from reliability.report import Part
+
+pytestmark = pytest.mark.native
+
+QUICK = [ANVIL, "PRBDM2R"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["cs", "events", "me"])
+def test_arbitrary_calls_give_true_values_or_errors(kind):
+    for model in QUICK:
+        found = calls.called(model, 3, kind, 10_000, 0, sanitize=False)
+        assert found["calls"] >= 10_000
+        assert found["illegal"] > 20
+        assert found.violations() == {}, found.details
+
+
+def test_oracles_report_penetration_energy_and_cost():
+    """With limits that no FMU satisfies, each oracle reports violations."""
+    limits = {"gap_atol": -1.0, "energy_rtol": -1.0, "energy_factor": 0.0, "call_seconds": 0.0}
+    found = drive(ANVIL, 2, "cs", "calls", count=1, size=40, **limits)
+    assert set(found.violations()) == {"penetrated", "energy_lost", "over_budget"}
+
+
+@pytest.mark.parametrize("kind", ["cs", "me"])
+def test_damaged_states_are_rejected_or_give_finite_values(kind):
+    drawn = drive(ANVIL, 3, kind, "states", count=2, size=states.TRIALS)
+    assert drawn["restored"] + drawn["undone"] == 2 * states.TRIALS
+    assert drawn["undone"] >= 2 * states.TRIALS * 3 // 4
+    assert drawn.violations() == {}, drawn.details
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["PRBDM2R", "Cantilever"])
+def test_drawn_parameters_run_or_are_rejected(model):
+    found = draws.drawn(model, 40)
+    assert found.classes["wrong"] == 0, found.wrong
+    assert found.classes["ran"] > 0
+    assert found.classes["rejected"] > 0
+
+
+@pytest.mark.parametrize("name", ["TOML", "CSV", "LVM", "units"])
+def test_changed_texts_are_read_or_rejected(name):
+    part = texts.run(100, seed=1, names=[name])
+    assert part.failures == []
+
+
+@pytest.mark.slow
+def test_changed_packages_are_read_or_rejected():
+    assert texts.run(500, names=["SSP"]).failures == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not faults.available(), reason="faults are injected on Linux only")
+@pytest.mark.parametrize("name", ["build", "simulate", "compile"])
+def test_files_are_old_or_new_after_a_fault_at_a_write(name):
+    found = faults.searched(name, 3)
+    assert found["failures"] == []
+    assert found["faults"] >= 6
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not faults.available(), reason="needs a compiler")
+def test_several_writers_leave_one_complete_file():
+    assert faults.two_writers() == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not faults.available(), reason="needs a compiler")
+@pytest.mark.parametrize("case", ["no compiler", "unprivileged user", "read-only home"])
+def test_commands_run_without_rights_or_explain_the_failure(case):
+    assert faults.without_rights(case) == []
+
+
+@pytest.mark.slow
+def test_instances_in_threads_have_no_data_races():
+    needs("cc")
+    for fmi, kind in calls.INTERFACES:
+        assert threads.races(ANVIL, fmi, kind, 4) == ""
+
+
+def test_tables_have_a_row_of_sums():
+    part = Part("title", ("name", "count", "text"))
+    part.add("one", 1000, "x")
+    part.add("two", 2, "y")
+    part.total()
+    assert part.table().splitlines()[-1] == "| all | 1,002 |  |"

@@ -1,0 +1,1 @@
+"""The parts of the reliability campaign; ``benchmarks/reliability.py`` runs them."""
