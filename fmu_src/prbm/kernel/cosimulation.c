@@ -69,18 +69,11 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
     return true;
 }
 
-/* Whether the inputs that move walls have not changed since they began to act. */
-static bool same_walls(const Simulation *sim) {
-    const InputGroups *from = &sim->configuration.mechanism->input;
-    return memcmp(sim->state.given + from->walls, sim->state.acting_given + from->walls,
-                  (size_t)(from->impulses - from->walls) * sizeof(double)) == 0;
-}
-
 /* Begin a communication step: join the walls to their references, and apply changed inputs and
  * parameters.  A step that was interrupted at an event keeps its references, unless an input of a
  * wall or a parameter has changed. */
 static bool begin_step(Simulation *sim, double time, Problem *problem) {
-    bool goes_on = sim->state.interrupted && same_walls(sim) && !values_changed(sim);
+    bool goes_on = sim->state.interrupted && !walls_changed(sim) && !values_changed(sim);
     bool joined = !goes_on && join_walls(sim, time);
     if (joined || values_changed(sim) || inputs_changed(sim)) {
         return restart(sim, problem);
@@ -182,7 +175,7 @@ static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *prob
     if (!event && !leave_arc(sim, problem)) {
         return false;
     }
-    sim->state.interrupted = sim->state.interrupted && same_walls(sim);
+    sim->state.interrupted = sim->state.interrupted && !walls_changed(sim);
     turn_walls(sim);
     take_inputs(sim);
     if ((event || !impulses) && !follow_walls(sim, false, HUGE_VAL, problem)) {
@@ -195,7 +188,7 @@ static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *prob
 PRBM bool simulation_handle_event(Simulation *simulation, Problem *problem) {
     Simulation *sim = simulation;
     bool event = event_due(&sim->state, sim->state.time), impulses = impulses_changed(sim);
-    if (!event && !impulses && same_walls(sim)) {
+    if (!event && !impulses && !walls_changed(sim)) {
         return true;
     }
     keep_backup(sim);

@@ -53,12 +53,21 @@ PRBM bool values_changed(const Simulation *sim) {
     return memcmp(sim->state.values, sim->state.acting_values, bytes) != 0;
 }
 
+/* Whether the inputs from an index up to another have changed since they began to act. */
+static bool changed_between(const Simulation *sim, int from, int to) {
+    return memcmp(sim->state.given + from, sim->state.acting_given + from,
+                  (size_t)(to - from) * sizeof(double)) != 0;
+}
+
 PRBM bool inputs_changed(const Simulation *sim) {
     const Mechanism *m = sim->configuration.mechanism;
-    const double *given = sim->state.given, *acting = sim->state.acting_given;
-    size_t from = (size_t)m->input.impulses, count = (size_t)m->input_count;
-    return memcmp(given, acting, (size_t)m->input.walls * sizeof(double)) != 0 ||
-           memcmp(given + from, acting + from, (count - from) * sizeof(double)) != 0;
+    return changed_between(sim, 0, m->input.walls) ||
+           changed_between(sim, m->input.impulses, m->input_count);
+}
+
+PRBM bool walls_changed(const Simulation *sim) {
+    const InputGroups *from = &sim->configuration.mechanism->input;
+    return changed_between(sim, from->walls, from->impulses);
 }
 
 PRBM double stop_field(const Simulation *sim, Expression field) {

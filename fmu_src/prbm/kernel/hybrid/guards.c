@@ -94,7 +94,9 @@ static void bound_arms(const Simulation *sim, double *reach) {
 static double gap_reach(const Simulation *sim, int stop, const Complex *e, const double *arms) {
     const System *system = system_of(sim);
     const Complex *row = system->gaps + stop * system->n;
-    double reach = wall_reach(&sim->state.walls[stop], sim->state.arc.h);
+    const Wall *wall = &sim->state.walls[stop];
+    double reach = fabs(wall->rate) * sim->state.arc.h + 2.0 * fabs(wall->offset) +
+                   fabs(wall->excess) * wall->span;
     for (int j = 0; j < system->n; j++) {
         reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
     }

@@ -33,10 +33,9 @@ static void turn_wall(Wall *wall, double t, double change) {
 PRBM double push_wall(Simulation *sim, int i, double P) {
     Wall *wall = &sim->state.walls[i];
     double t = sim->state.front_time, change = sim->equations.inputs.mobilities[i] * P;
-    double velocity = wall_motion(wall, t).v;
     turn_wall(wall, t, change);
     sim->state.latched[i].impulse_sum += P;
-    return -P * (velocity + change / 2);
+    return -P * (wall_motion(wall, t).v - change / 2);
 }
 
 /* Join the walls to their references in a communication step from the present time to another;
@@ -61,9 +60,8 @@ PRBM bool join_walls(Simulation *sim, double time) {
         double off = line.position - wall->position - wall->rate * (now - wall->since);
         state->driven[i] = state->driven[i] || line.rate != 0.0;
         if (!state->driven[i]) {
-            double old = off != 0.0 ? evaluate(at, state->acting_values) : 0.0;
-            double moved = off != 0.0 && last > 0.0 ? off + old - evaluate(at, state->values) : 0.0;
-            line.rate = (wall->rate + moved / H) * share * share;
+            double shift = evaluate(at, state->values) - evaluate(at, state->acting_values);
+            line.rate = (wall->rate + (last > 0.0 ? (off - shift) / H : 0.0)) * share * share;
         }
         if (fabs(off) + fabs(line.rate - wall->rate) * T > least) {
             WallMotion here = wall_motion(wall, now);
@@ -87,11 +85,6 @@ PRBM void turn_walls(Simulation *sim) {
     }
 }
 
-/* An upper bound of the distance that a wall moves in a step h. */
-PRBM double wall_reach(const Wall *wall, double h) {
-    return fabs(wall->rate) * h + 2.0 * fabs(wall->offset) + fabs(wall->excess) * wall->span;
-}
-
 /* Put walls whose cubics end at the front on their references.  Return the longest step from there:
  * a fraction of each other cubic, not beyond the end of that cubic. */
 PRBM double follow_cubics(Simulation *sim) {
@@ -112,8 +105,8 @@ PRBM double follow_cubics(Simulation *sim) {
 
 /* The largest jump of a wall's velocity at which a held stop stays closed. */
 PRBM double jump_allowed(const Simulation *sim, int i) {
-    double rest_speed = stop_field(sim, sim->configuration.mechanism->stops[i].rest_speed);
-    return greater(rest_speed, REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
+    return greater(stop_field(sim, sim->configuration.mechanism->stops[i].rest_speed),
+                   REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
 }
 
 /* Keep held stops on walls whose velocities have jumped by less than rest_speed; otherwise the
