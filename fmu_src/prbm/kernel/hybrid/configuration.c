@@ -60,6 +60,6 @@ PRBM bool inputs_changed(const Simulation *sim) {
            memcmp(given + from, acting + from, (count - from) * sizeof(double)) != 0;
 }
 
-PRBM double stop_field(const Simulation *sim, Expression field) {
+PRBM double field_value(const Simulation *sim, Expression field) {
     return evaluate(field, sim->state.acting_values);
 }

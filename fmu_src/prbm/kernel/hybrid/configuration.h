@@ -10,6 +10,6 @@ PRBM bool values_changed(const Simulation *sim);
 PRBM bool inputs_changed(const Simulation *sim); /* except those that move walls */
 PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
 PRBM double zero_acceleration(const Configuration *configuration); /* likewise for accelerations */
-PRBM double stop_field(const Simulation *sim, Expression field);
+PRBM double field_value(const Simulation *sim, Expression field);
 
 #endif
