@@ -27,6 +27,7 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modal_restitution, modes
 from prbm.mechanics.statics import equilibrium, free_displacement
 from prbm.mechanics.system import System
+from prbm.mechanism import flexure
 from prbm.mechanism.parts import Body, Flexure, FlexureType, Force, Probe, Release
 from prbm.references.beams import Tip, end_force, end_moment, wavenumber
 
@@ -39,7 +40,8 @@ Cell = float | None
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "flexure-models.md"
 FIGURE = ROOT / "docs" / "figures" / "flexure-models.png"
-MODELS = ("1R", "2R", "3R", "10R", "40R")
+PUBLISHED = tuple(name for name, model in flexure.MODELS.items() if model.coefficients)
+MODELS = (*PUBLISHED, "10R", "40R")
 FORCES = (0.1, 1.0, 2.0, 4.0, 8.0)  # Scaled forces P L^2/EI.
 MOMENTS = (0.1, math.pi / 4, math.pi / 2, math.pi)  # Scaled moments M L/EI.
 TIPS = (
@@ -72,8 +74,7 @@ MASS = DENSITY * WIDTH * THICKNESS * L
 
 def kind(name: str, model: str, *, axial: bool = False) -> FlexureType:
     """Return a flexure type of the steel cantilever; ``10R`` is a chain of ten links."""
-    n = int(model[:-1])
-    which = ("nR", n) if n > 3 else (model, 0)
+    which = (model, 0) if model in flexure.MODELS else ("nR", int(model[:-1]))
     return FlexureType(name, which[0], THICKNESS, WIDTH, MODULUS, DENSITY, n=which[1], axial=axial)
 
 
@@ -264,8 +265,8 @@ def order(ns: Sequence[int], errors: Sequence[float]) -> float:
     return -float(np.polyfit(np.log(ns), np.log(errors), 1)[0])
 
 
-COLOURS = dict(
-    zip(MODELS, ("#d55e00", "#e69f00", "#cc79a7", "#009e73", "#0072b2"), strict=True)
+COLOURS = {"10R": "#009e73", "40R": "#0072b2"} | dict(
+    zip(PUBLISHED, ("#d55e00", "#e69f00", "#cc79a7", "#56b4e9", "#000000"), strict=False)
 )  # Colours that colour-blind readers can distinguish.
 LOADS: dict[str, tuple[str, Callable[[float], Tip], float]] = {
     "force": ("end force, P L²/EI", end_force, 8.0),
@@ -292,7 +293,7 @@ def draw_paths(axes: plt.Axes) -> None:
         axes.plot(path.real, path.imag, color="0.7", lw=4)
         marks = np.array([exact(x).z for x in np.linspace(0, largest, 5)])
         axes.plot(marks.real, marks.imag, "o", color="0.35", mfc="none", ms=10)
-        for model in MODELS[:3]:
+        for model in PUBLISHED:
             system = cantilever(model)
             z = np.array([tip_of(system, **{loading: x}).z for x in np.linspace(0.0, largest, 33)])
             axes.plot(z.real, z.imag, color=COLOURS[model], lw=1.2)
@@ -302,8 +303,8 @@ def draw_paths(axes: plt.Axes) -> None:
     axes.annotate("end moment 0 to π", (0.02, 0.56), color="0.35")
     axes.annotate("end force\n0 to 8", (0.76, 0.68), color="0.35")
     lines = [plt.Line2D([], [], color="0.7", lw=4)]
-    lines += [plt.Line2D([], [], color=COLOURS[model], marker="o", ms=4) for model in MODELS[:3]]
-    axes.legend(lines, ["elastica", *MODELS[:3]], loc="lower left")
+    lines += [plt.Line2D([], [], color=COLOURS[model], marker="o", ms=4) for model in PUBLISHED]
+    axes.legend(lines, ["elastica", *PUBLISHED], loc="lower left")
 
 
 def draw_errors(axes: plt.Axes, loading: str) -> None:

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -236,6 +237,14 @@ def test_dependencies_cover_every_output_and_derivative(model, mechanisms):
     assert found[f"{it.stop}.impact_count"] == ()
     assert f"{it.force}.x" in found["base.force.x"]
     assert f"{it.force}.x" not in found[f"{it.body}.vx"]
+
+
+def test_an_output_without_dependencies_is_rejected(mechanisms):
+    guide = mechanisms["PRBDM"]
+    native = described(guide, {}, 3)
+    added = replace(native.variables[-1], name="shuttle.energy", causality="output")
+    with pytest.raises(MechanismError, match=r"outputs shuttle.energy: add them to"):
+        dependencies(guide, replace(native, variables=(*native.variables, added)))
 
 
 def test_the_source_is_one_file_with_the_functions_of_one_version_of_fmi(mechanisms):

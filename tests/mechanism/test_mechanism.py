@@ -95,7 +95,7 @@ LEAF = GUIDE.flexure_types[0]
         ({"flexures": (dataclasses.replace(LEFT, type="leaf"), RIGHT)}, "'leaf' is not"),
         ({"flexures": (dataclasses.replace(LEFT, ends=("free", "pin")), RIGHT)}, "needs a clamp"),
         ({"flexures": (dataclasses.replace(LEFT, end="ground.right"), RIGHT)}, "to itself"),
-        ({"flexure_types": (dataclasses.replace(LEAF, model="4R"),)}, "choose one of 1R, 2R, 3R"),
+        ({"flexure_types": (dataclasses.replace(LEAF, model="R"),)}, "choose one of 1R, 2R, 3R"),
         (
             {"flexure_types": (dataclasses.replace(LEAF, coefficients={"gamma": 0.8}),)},
             "not a coefficient of the 2R model",

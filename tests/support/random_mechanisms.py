@@ -24,6 +24,7 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.contact import response
 from prbm.mechanics.kinetics import inertia
 from prbm.mechanics.system import jacobian
+from prbm.mechanism import flexure
 from prbm.mechanism.description import Mechanism
 from prbm.mechanism.flexure import CLAMP, FREE, PIN
 from prbm.mechanism.parts import (
@@ -43,7 +44,7 @@ Choose = Callable[[Sequence], object]
 """Function that picks an element of a sequence; the first element is the simplest."""
 
 CELL = 0.06  # m; bodies are within a fifth of this length of the points of a lattice.
-MODELS = (("1R", 0), ("2R", 0), ("3R", 0), ("nR", 1), ("nR", 2), ("nR", 4))
+MODELS = tuple((name, n) for name in flexure.MODELS for n in ((1, 2, 4) if name == "nR" else (0,)))
 ENDS = ((CLAMP, CLAMP), (CLAMP, PIN), (PIN, CLAMP), (CLAMP, FREE), (FREE, CLAMP), (PIN, PIN))
 RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # Axial modes of some hundred Hz.
 STEEL = {"thickness": (2e-4, 3e-4), "modulus": (1e9, 1e10)}

@@ -10,6 +10,7 @@ from ..interface.native import NativeInterface
 from ..interface.variables import Variable
 from ..mechanics.inputs import Wall
 from ..mechanism.description import Mechanism
+from ..mechanism.flexure import MODELS
 from ..mechanism.parts import FlexureType
 from ..runs.experiment import Experiment
 
@@ -41,20 +42,10 @@ KINDS = {
     ("local", "fixed"): "Local constants",
 }
 
-END_MOMENT = {"1R": 0.443, "2R": 0.772, "3R": 1.007}
-"""Ratio of the tip slope of a cantilever under an end moment to the exact slope."""
-
 SOURCES = (
     "S. Boersma, Modelling and Validation of the Impact Response in Compliant Mechanisms, MSc "
     "thesis, TU Delft, 2015.",
-    "L. L. Howell, Compliant Mechanisms, Wiley, 2001 (1R).",
-    "Y.-Q. Yu et al., Dynamic modeling of compliant mechanisms based on the pseudo-rigid-body "
-    "model, J. Mech. Des. 127 (2005) 760 (1R, masses).",
-    "Y.-Q. Yu, Z.-L. Feng, Q.-P. Xu, A pseudo-rigid-body 2R model of flexural beam in compliant "
-    "mechanisms, Mech. Mach. Theory 55 (2012) 18 (2R).",
-    "H.-J. Su, A pseudorigid-body 3R model, J. Mech. Robotics 1 (2009) 021008 (3R).",
-    "H. Hencky, Über die angenäherte Lösung von Stabilitätsproblemen im Raum mittels der "
-    "elastischen Gelenkkette, Der Eisenbau 11 (1920) 437 (nR).",
+    *(reference for model in MODELS.values() for reference in model.references),
     "W. J. Stronge, Rigid body collisions with friction, Proc. R. Soc. A 431 (1990) 169 "
     "(restitution with friction).",
 )
@@ -371,11 +362,13 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
         "impact depends on the duration of the contact.",
     ]
     items = [impact, planar] if _stretches(mechanism) else rigid
-    for model in sorted(models & END_MOMENT.keys()):
-        items.append(
-            f"End moments: the tip slope of a {model} cantilever under an end moment is "
-            f"{END_MOMENT[model]:g} times the exact slope. Transverse end forces are modelled well."
-        )
+    for name in sorted(models):
+        if MODELS[name].coefficients:
+            items.append(
+                f"End moments: the tip slope of a {name} cantilever under an end moment is "
+                f"{MODELS[name].end_slope:.3f} times the exact slope. Transverse end forces are "
+                "modelled well."
+            )
     straight = "kilohertz" if _stretches(mechanism) else "infinite stiffness"
     if "2R" in models:
         items.append(

@@ -7,6 +7,7 @@ mechanism or in some discrete state, even if it vanishes for others.
 
 from collections.abc import Mapping
 
+from ..base.errors import MechanismError
 from ..mechanics.inputs import MOBILITY, impulse_names, input_names
 from ..mechanism.description import Mechanism
 from .native import NativeInterface
@@ -22,6 +23,11 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
     -------
     mapping of str to tuple of str
         Names of the knowns, in the order of the interface, by the name of the unknown.
+
+    Raises
+    ------
+    MechanismError
+        If the dependencies of an output are not defined here.
     """
     count = len(interface.independent)
     shape, rates = interface.states[:count], interface.states[count : 2 * count]
@@ -50,6 +56,13 @@ def dependencies(mechanism: Mechanism, interface: NativeInterface) -> Dependenci
     found |= {"energy.kinetic": moving, "energy.elastic": shape, "energy.gravitational": shape}
     found |= {name: everything for name in interface.derivatives}
     found |= {name: (name,) for name in (*moving, *STORED)}  # A state depends on itself only.
+    outputs = (v.name for v in interface.variables if v.causality == "output")
+    missing = [name for name in outputs if name not in found]
+    if missing:
+        raise MechanismError(
+            f"no dependencies for the outputs {', '.join(missing)}: add them to the function "
+            "dependencies of prbm.interface.structure"
+        )
     order = {v.name: i for i, v in enumerate(interface.variables)}
     return {name: tuple(sorted(known, key=order.__getitem__)) for name, known in found.items()}
 

@@ -52,6 +52,7 @@
 #include "model_exchange.c"
 #include "values.c"
 #include "tangent.c"
+#include "tangent_indicators.c"
 #include "fmi/fmu.h"
 #include "fmi/resources.c"
 #include "fmi/journal.c"

@@ -1,31 +1,13 @@
 /* Directional derivatives: exact changes of all values along changes of states and inputs. */
 #include <string.h>
 
-#include "hybrid/events.h"
-#include "hybrid/guards.h"
 #include "hybrid/impacts.h"
 #include "hybrid/present.h"
 #include "hybrid/simulation.h"
 #include "dependents.h"
-#include "indicators.h"
+#include "tangent.h"
+#include "tangent_indicators.h"
 #include "values.h"
-
-/* Values, and their changes d... along a change of states and inputs.  The change of an arm E =
- * exp(s + i theta) is dE = i E dphi with dphi = dtheta - i ds; dw is the change of its rate w. */
-typedef struct {
-    Simulation *sim;
-    const Equations *q;
-    const Complex *e;
-    const Factors *factors;
-    const Instant *at;
-    const double *y, *v, *a, *lam, *du;
-    double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,), (r,); dx ends as da */
-    Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
-    Complex *dE;                    /* (n,) i E dphi */
-    Complex *swing, *dswing;        /* (n,) E w */
-    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); bend_arms adds the change of w' */
-    Complex *pull;                  /* (n,) of the arms: torques, + i times forces along them */
-} Tangent;
 
 static Complex times_i(Complex z) {
     return complex_of(-z.im, z.re);
@@ -92,7 +74,7 @@ static double value_change(const Tangent *t, const Rows *rows, int i) {
     return sum;
 }
 
-static double rate_change(const Tangent *t, const Rows *rows, int i) {
+PRBM double rate_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
     for (int j = 0; j <= rows->system->n; j++) {
@@ -264,12 +246,12 @@ static double lift_change(const Tangent *t, int i) {
 }
 
 /* Change of the limit of friction of a friction point. */
-static double limit_change(const Tangent *t, int i) {
+PRBM double limit_change(const Tangent *t, int i) {
     const double *law = t->q->rub_law + 3 * i;
     return rub_limit(t->q, i, t->e) > 0.0 ? law[0] * law[2] * lift_change(t, i) : 0.0;
 }
 
-static int sliding_sign(const Tangent *t, int contact) {
+PRBM int sliding_sign(const Tangent *t, int contact) {
     return slip_sign(t->q->contacts.modes[contact]);
 }
 
@@ -367,13 +349,13 @@ static const double *wall_change(const Tangent *t, int i) {
     return wall_inputs(t->q->system->mechanism, t->du, i);
 }
 
-static double gap_change(const Tangent *t, int i) {
+PRBM double gap_change(const Tangent *t, int i) {
     const System *system = t->q->system;
     Rows gaps = gap_rows(system);
     return value_change(t, &gaps, i) + wall_change(t, i)[0];
 }
 
-static double gap_rate_change(const Tangent *t, int i) {
+PRBM double gap_rate_change(const Tangent *t, int i) {
     const System *system = t->q->system;
     Rows gaps = gap_rows(system);
     return rate_change(t, &gaps, i) + wall_change(t, i)[1];
@@ -550,67 +532,6 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
         sum -= t->dlam[h] * w + t->lam[h] * velocity;
     }
     return sum;
-}
-
-/* Change of |x|; at zero, the mean of both one-sided derivatives. */
-static double sign_times(double x, double change) {
-    return x < 0.0 ? -change : x > 0.0 ? change : 0.0;
-}
-
-static double impact_indicator_change(const Tangent *t, int i) {
-    const Scales *scales = &t->sim->configuration.scales;
-    bool opens = gap_rate(t->q, i, t->at->time, t->e, t->v) > 0.0;
-    double ahead = opens ? INDICATOR_LEAD_RTOL * scales->time * gap_rate_change(t, i) : 0.0;
-    return (gap_change(t, i) + ahead) / scales->length;
-}
-
-static double release_indicator_change(const Tangent *t, int i) {
-    const Simulation *sim = t->sim;
-    double force = guard_scale(sim, EVENT_RELEASE), speed = guard_scale(sim, EVENT_REVERSAL);
-    double pressed = lifted_guard(sim, t->at, EVENT_RELEASE, i) / force;
-    return pressed <= release_indicator(sim, t->at, i)
-               ? t->dlam[t->q->first_hold + held_at(t->q, i)] / force
-               : -sign_times(leaving_rate(sim, t->at, i), gap_rate_change(t, i)) / speed;
-}
-
-static double slip_indicator_change(const Tangent *t, int contact) {
-    const Equations *q = t->q;
-    int row = q->first_stick + place_in(q->sticking, contact);
-    double friction = sign_times(t->lam[row], t->dlam[row]), limit;
-    if (is_stop(q->system, contact)) {
-        int held = q->first_hold + held_at(q, contact);
-        limit = q->stop_friction[contact] * t->dlam[held];
-    } else {
-        limit = limit_change(t, contact - q->system->s);
-    }
-    return ((1.0 + FRICTION_EXCESS_RTOL) * limit - friction) /
-           guard_scale(t->sim, EVENT_SLIP);
-}
-
-static double reversal_indicator_change(const Tangent *t, int contact) {
-    int i;
-    Rows rows = tangential_rows(t->q->system, contact, &i);
-    return sliding_sign(t, contact) * rate_change(t, &rows, i) /
-           guard_scale(t->sim, EVENT_REVERSAL);
-}
-
-static double indicator_change(const Tangent *t, EventKind kind, int contact) {
-    switch (kind) {
-    case EVENT_IMPACT: return impact_indicator_change(t, contact);
-    case EVENT_RELEASE: return release_indicator_change(t, contact);
-    case EVENT_SLIP: return slip_indicator_change(t, contact);
-    default: return reversal_indicator_change(t, contact);
-    }
-}
-
-static void indicator_changes(const Tangent *t, double *out) {
-    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
-        for (int contact = 0; contact < contact_count(t->sim); contact++) {
-            if (transition(kind)->watched(t->q, contact)) {
-                out[indicator_place(t->sim, kind, contact)] = indicator_change(t, kind, contact);
-            }
-        }
-    }
 }
 
 static void all_changes(const Tangent *t, const double *dx, const Complex *dw,

@@ -20,13 +20,7 @@ and 2 n EI/L at each end that is clamped or free.
 With axial compliance, the middle link of a flexure stretches with the stiffness EA/L.  In a chain
 all links stretch, each with the stiffness n EA/L.
 
-Sources
--------
-.. [1] L. L. Howell, Compliant Mechanisms, Wiley, 2001 (1R: gamma, K_Theta).
-.. [2] Y.-Q. Yu, Z.-L. Feng, Q.-P. Xu, Mech. Mach. Theory 55 (2012) 18 (2R).
-.. [3] H.-J. Su, J. Mech. Robotics 1 (2009) 021008 (3R).
-.. [4] Y.-Q. Yu et al., J. Mech. Des. 127 (2005) 760 (1R, dynamic: the lumped masses).
-.. [5] H. Hencky, Der Eisenbau 11 (1920) 437 (the chain of rigid links and springs).
+Each model in :data:`MODELS` names its publications.
 """
 
 from collections.abc import Sequence
@@ -62,10 +56,12 @@ class FlexureModel:
     rate_with_gamma : bool
         Whether the spring rates are gamma_i K_theta_i EI/h; otherwise they are K_theta_i EI/h.
     lumped : bool
-        Whether the mass is lumped at the pivots (equivalent kinetic energy, [4]); otherwise each
+        Whether the mass is lumped at the pivots, with an equivalent kinetic energy; otherwise each
         segment is a slender rod, with a mass in proportion to its length.
     source : str
-        Source of the coefficients.
+        Authors and years of the publications, for tables.
+    references : tuple of str
+        The publications, for the documentation of FMUs.
     links : int
         Number of equal links of a chain; 0 for the other models.
     """
@@ -76,12 +72,27 @@ class FlexureModel:
     rate_with_gamma: bool
     lumped: bool
     source: str
+    references: tuple[str, ...]
     links: int = 0
 
     @property
     def coefficients(self) -> tuple[Coefficient, ...]:
         """All coefficients, lengths first."""
         return self.gamma + self.K_theta
+
+    @property
+    def end_slope(self) -> float:
+        """Tip slope of a cantilever under an end moment, over the slope of the beam [-].
+
+        Every spring carries the whole moment.  The value is 0 for a chain, whose slope is exact.
+
+        Examples
+        --------
+        >>> [round(MODELS[name].end_slope, 3) for name in ("1R", "2R", "3R")]
+        [0.443, 0.772, 1.007]
+        """
+        rates = _rates(self, [c.value for c in self.gamma], [c.value for c in self.K_theta])
+        return sum(1.0 / rate for rate in rates)
 
 
 def _gamma(name: str, value: float, which: str) -> Coefficient:
@@ -105,6 +116,11 @@ MODELS = {
             rate_with_gamma=True,
             lumped=True,
             source="Howell 2001; Yu et al. 2005",
+            references=(
+                "L. L. Howell, Compliant Mechanisms, Wiley, 2001 (1R).",
+                "Y.-Q. Yu et al., Dynamic modeling of compliant mechanisms based on the "
+                "pseudo-rigid-body model, J. Mech. Des. 127 (2005) 760 (1R, masses).",
+            ),
         ),
         FlexureModel(
             "2R",
@@ -119,6 +135,10 @@ MODELS = {
             rate_with_gamma=False,
             lumped=False,
             source="Yu, Feng, Xu 2012",
+            references=(
+                "Y.-Q. Yu, Z.-L. Feng, Q.-P. Xu, A pseudo-rigid-body 2R model of flexural beam in "
+                "compliant mechanisms, Mech. Mach. Theory 55 (2012) 18 (2R).",
+            ),
         ),
         FlexureModel(
             "3R",
@@ -135,8 +155,22 @@ MODELS = {
             rate_with_gamma=False,
             lumped=False,
             source="Su 2009",
+            references=(
+                "H.-J. Su, A pseudorigid-body 3R model, J. Mech. Robotics 1 (2009) 021008 (3R).",
+            ),
         ),
-        FlexureModel("nR", (), (), rate_with_gamma=False, lumped=False, source="Hencky 1920"),
+        FlexureModel(
+            "nR",
+            (),
+            (),
+            rate_with_gamma=False,
+            lumped=False,
+            source="Hencky 1920",
+            references=(
+                "H. Hencky, Über die angenäherte Lösung von Stabilitätsproblemen im Raum mittels "
+                "der elastischen Gelenkkette, Der Eisenbau 11 (1920) 437 (nR).",
+            ),
+        ),
     )
 }
 
@@ -271,6 +305,13 @@ def _chain(n: int, ends: tuple[str, str], L: float, EI: float) -> tuple[list[flo
     return [0.0, *[L / n] * n, 0.0], [at_start, *[rate] * (n - 1), at_end]
 
 
+def _rates(model: FlexureModel, gamma: Sequence[float], K_theta: Sequence[float]) -> list[float]:
+    """Return the rates of the springs of a cantilever, in units of EI/h [-]."""
+    if not model.rate_with_gamma:
+        return [*K_theta]
+    return [g * K for g, K in zip(gamma, K_theta, strict=True)]
+
+
 def _cantilevers(
     model: FlexureModel,
     gamma: Sequence[float],
@@ -282,10 +323,7 @@ def _cantilevers(
     """Return lengths and rates of one cantilever, or of two mirrored ones."""
     h = L / 2 if ends == (CLAMP, CLAMP) else L
     half = [h * g for g in (stub(gamma), *gamma)]
-    stiffness = [
-        (g if model.rate_with_gamma else 1.0) * K * EI / h
-        for g, K in zip(gamma, K_theta, strict=True)
-    ]
+    stiffness = [rate * EI / h for rate in _rates(model, gamma, K_theta)]
     if ends == (CLAMP, CLAMP):
         return [*half[:-1], 2 * half[-1], *reversed(half[:-1])], [*stiffness, *stiffness[::-1]]
     if FREE in ends:  # The last link is fixed to the body.

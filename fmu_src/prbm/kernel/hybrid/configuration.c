@@ -70,6 +70,6 @@ PRBM bool walls_changed(const Simulation *sim) {
     return changed_between(sim, from->walls, from->impulses);
 }
 
-PRBM double stop_field(const Simulation *sim, Expression field) {
+PRBM double field_value(const Simulation *sim, Expression field) {
     return evaluate(field, sim->state.acting_values);
 }

@@ -11,6 +11,6 @@ PRBM bool inputs_changed(const Simulation *sim); /* other than those of walls */
 PRBM bool walls_changed(const Simulation *sim);  /* inputs that move walls */
 PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
 PRBM double zero_acceleration(const Configuration *configuration); /* lower ones are round-off */
-PRBM double stop_field(const Simulation *sim, Expression field);
+PRBM double field_value(const Simulation *sim, Expression field);
 
 #endif

@@ -315,7 +315,7 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
     }
     for (int a = 0; a < hits->struck_count; a++) {
         const Stop *stop = &sim->configuration.mechanism->stops[hits->struck[a]];
-        approach.friction[a] = stop_field(sim, stop->friction);
+        approach.friction[a] = field_value(sim, stop->friction);
         rough = rough || approach.friction[a] != 0.0;
     }
     bool right = rough ? with_released_stops(sim, &approach, hits, problem)
@@ -381,7 +381,7 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
         rests = rests || resting.stops[k] == stop;
     }
     if (right && rests) {
-        *result = speed < stop_field(sim, sim->configuration.mechanism->stops[stop].rest_speed);
+        *result = speed < field_value(sim, sim->configuration.mechanism->stops[stop].rest_speed);
         right = *result || bounce_vanishes(sim, stop, &resting, q, soft.after, speed, result,
                                            problem);
     }
@@ -507,7 +507,7 @@ static bool choose_restitutions(Simulation *sim, const double *q, const double *
         bool soft = false;
         right = captured(sim, i, hits, q, v, -rates[i], &soft, problem);
         counted[i] = !soft;
-        hits->restitution[k] = soft ? 0.0 : stop_field(sim, stop->restitution);
+        hits->restitution[k] = soft ? 0.0 : field_value(sim, stop->restitution);
     }
     return right;
 }

@@ -48,7 +48,7 @@ static void output_stops(const Simulation *sim, double *out) {
         values[STOP_GAP] = gap(&sim->equations, i, sim->state.time, e);
         values[STOP_GAP_RATE] = gap_rate(&sim->equations, i, sim->state.time, e, v);
         values[STOP_POINT_DISPLACEMENT] = -(row_value(&gaps, i, e) + gaps.c[i]) -
-                    stop_field(sim, system->mechanism->stops[i].position);
+                    field_value(sim, system->mechanism->stops[i].position);
         values[STOP_POINT_VELOCITY] = -row_rate(&gaps, i, e, v);
     }
 }

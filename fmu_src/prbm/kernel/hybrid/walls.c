@@ -105,7 +105,7 @@ PRBM double follow_cubics(Simulation *sim) {
 
 /* The largest jump of a wall's velocity at which a held stop stays closed. */
 PRBM double jump_allowed(const Simulation *sim, int i) {
-    return greater(stop_field(sim, sim->configuration.mechanism->stops[i].rest_speed),
+    return greater(field_value(sim, sim->configuration.mechanism->stops[i].rest_speed),
                    REST_SPEED_MIN_FACTOR * zero_speed(&sim->configuration));
 }
 

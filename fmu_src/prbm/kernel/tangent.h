@@ -1,0 +1,32 @@
+/* Directional derivatives: the changes, and those of rows and contacts. */
+#ifndef PRBM_TANGENT_H
+#define PRBM_TANGENT_H
+
+#include "values.h"
+
+/* Values, and their changes d... along a change of states and inputs.  The change of an arm E =
+ * exp(s + i theta) is dE = i E dphi with dphi = dtheta - i ds; dw is the change of its rate w. */
+typedef struct {
+    Simulation *sim;
+    const Equations *q;
+    const Complex *e;
+    const Factors *factors;
+    const Instant *at;
+    const double *y, *v, *a, *lam, *du;
+    double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,), (r,); dx ends as da */
+    Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
+    Complex *dE;                    /* (n,) i E dphi */
+    Complex *swing, *dswing;        /* (n,) E w */
+    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); bend_arms adds the change of w' */
+    Complex *pull;                  /* (n,) of the arms: torques, + i times forces along them */
+} Tangent;
+
+PRBM double rate_change(const Tangent *t, const Rows *rows, int i);
+PRBM double gap_change(const Tangent *t, int i);
+PRBM double gap_rate_change(const Tangent *t, int i);
+/* Change of the friction limit of a friction point. */
+PRBM double limit_change(const Tangent *t, int i);
+/* Sign of the sliding velocity of a contact. */
+PRBM int sliding_sign(const Tangent *t, int contact);
+
+#endif

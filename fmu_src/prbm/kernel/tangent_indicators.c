@@ -1,0 +1,67 @@
+/* Directional derivatives of the event indicators. */
+#include "hybrid/events.h"
+#include "hybrid/guards.h"
+#include "hybrid/simulation.h"
+#include "indicators.h"
+#include "tangent_indicators.h"
+
+/* Change of |x|; at zero, the mean of both one-sided derivatives. */
+static double sign_times(double x, double change) {
+    return x < 0.0 ? -change : x > 0.0 ? change : 0.0;
+}
+
+static double impact_indicator_change(const Tangent *t, int i) {
+    const Scales *scales = &t->sim->configuration.scales;
+    bool opens = gap_rate(t->q, i, t->at->time, t->e, t->v) > 0.0;
+    double ahead = opens ? INDICATOR_LEAD_RTOL * scales->time * gap_rate_change(t, i) : 0.0;
+    return (gap_change(t, i) + ahead) / scales->length;
+}
+
+static double release_indicator_change(const Tangent *t, int i) {
+    const Simulation *sim = t->sim;
+    double force = guard_scale(sim, EVENT_RELEASE), speed = guard_scale(sim, EVENT_REVERSAL);
+    double pressed = lifted_guard(sim, t->at, EVENT_RELEASE, i) / force;
+    return pressed <= release_indicator(sim, t->at, i)
+               ? t->dlam[t->q->first_hold + held_at(t->q, i)] / force
+               : -sign_times(leaving_rate(sim, t->at, i), gap_rate_change(t, i)) / speed;
+}
+
+static double slip_indicator_change(const Tangent *t, int contact) {
+    const Equations *q = t->q;
+    int row = q->first_stick + place_in(q->sticking, contact);
+    double friction = sign_times(t->lam[row], t->dlam[row]), limit;
+    if (is_stop(q->system, contact)) {
+        int held = q->first_hold + held_at(q, contact);
+        limit = q->stop_friction[contact] * t->dlam[held];
+    } else {
+        limit = limit_change(t, contact - q->system->s);
+    }
+    return ((1.0 + FRICTION_EXCESS_RTOL) * limit - friction) /
+           guard_scale(t->sim, EVENT_SLIP);
+}
+
+static double reversal_indicator_change(const Tangent *t, int contact) {
+    int i;
+    Rows rows = tangential_rows(t->q->system, contact, &i);
+    return sliding_sign(t, contact) * rate_change(t, &rows, i) /
+           guard_scale(t->sim, EVENT_REVERSAL);
+}
+
+static double indicator_change(const Tangent *t, EventKind kind, int contact) {
+    switch (kind) {
+    case EVENT_IMPACT: return impact_indicator_change(t, contact);
+    case EVENT_RELEASE: return release_indicator_change(t, contact);
+    case EVENT_SLIP: return slip_indicator_change(t, contact);
+    default: return reversal_indicator_change(t, contact);
+    }
+}
+
+PRBM void indicator_changes(const Tangent *t, double *out) {
+    for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
+        for (int contact = 0; contact < contact_count(t->sim); contact++) {
+            if (transition(kind)->watched(t->q, contact)) {
+                out[indicator_place(t->sim, kind, contact)] = indicator_change(t, kind, contact);
+            }
+        }
+    }
+}
