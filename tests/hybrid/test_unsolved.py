@@ -171,7 +171,8 @@ def test_many_contacts_at_rest_bear_the_force_of_one_stop():
         out = sim.outputs()
         force = sum(out[f"wall{k}.force"] for k in range(24))
         assert force == pytest.approx(alone.outputs()["stop.force"], rel=1e-3)
-        assert abs(out["shuttle.vy"]) < 1e-9
+        # Vibrations along the flexures have decayed to the tolerance of the integration.
+        assert abs(out["shuttle.vy"]) < 1e-6
 
 
 @pytest.mark.fmu
