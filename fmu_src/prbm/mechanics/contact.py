@@ -42,6 +42,10 @@ WEDGED = (
     "the wall pushes the mechanism in a direction that friction locks; reduce the friction of the "
     "stop, or the velocity of the wall"
 )
+WEDGED_SEVERAL = (
+    "the walls push the mechanism in directions that friction locks; reduce the friction of the "
+    "stops, or the velocities of the walls"
+)
 
 
 def response(M: Real, held: Real, rows: Real) -> Real:
@@ -291,11 +295,16 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
     Raises
     ------
     SimulationError
-        If no impulses satisfy both laws.
+        If no impulses satisfy both laws, because walls close in on the mechanism or because
+        friction locks it.
     """
     k = len(friction)
     tolerance = COMPLEMENTARITY_RTOL * max(float(np.abs(u).max()), speed)
-    P = _resolved(W, u, friction, np.zeros(k), tolerance)
+    found = impulses(W, u, friction, np.zeros(k), tolerance)
+    if found is None:
+        opens = impulses(W[:k, :k], u[:k], np.zeros(0), np.zeros(k), tolerance) is not None
+        raise SimulationError(WEDGED_SEVERAL if opens else CLOSING_IN)
+    P = found
     after = u + W @ P
     lost = float(-(P[:k] * (u + after)[:k] / 2) @ restitution**2)
     wanted = restitution * P[:k]
@@ -304,7 +313,9 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
     taken = -float(P @ (u + after)) / 2 + COMPLEMENTARITY_RTOL * abs(float(P @ u))
 
     def rebound(s: float) -> tuple[Real, bool]:
-        R = _resolved(W, after, friction, s * wanted, tolerance)
+        R = impulses(W, after, friction, s * wanted, tolerance)
+        if R is None:
+            raise SimulationError(WEDGED_SEVERAL)
         work = R * (2 * after + W @ R) / 2
         return R, float(work[:k].sum()) <= lost and float(work.sum()) <= taken
 
@@ -314,17 +325,3 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
         s = (low + high) / 2
         low, high = (s, high) if rebound(s)[1] else (low, s)
     return P + (R if allowed else rebound(low)[0])
-
-
-def _resolved(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real:
-    """Return impulses that satisfy the laws of contact and friction, with P_n >= least.
-
-    Raises
-    ------
-    SimulationError
-        If there are no such impulses.
-    """
-    P = impulses(W, u, friction, least, tolerance)
-    if P is None:
-        raise SimulationError(CLOSING_IN)
-    return P

@@ -267,6 +267,27 @@ static bool restitution_of_several(int k, const double *W, const double *after,
     return rebound(k, W, after, friction, wanted, low, most, tolerance, R, &trial, scratch);
 }
 
+static bool friction_locks(Problem *problem) {
+    return fail(problem, "the walls push the mechanism in directions that friction locks; reduce "
+                         "the friction of the stops, or the velocities of the walls");
+}
+
+/* Report why no impulses of compression exist: friction is the cause if impulses without it would
+ * open all gaps. */
+static bool unsolved_compression(int k, const double *W, const double *u, double tolerance,
+                                 Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    double *normals = take_matrix(scratch, k, k), *least = take(scratch, (size_t)k);
+    double *P = take(scratch, (size_t)k);
+    zeros(k, least);
+    for (int i = 0; i < k; i++) {
+        copy(k, W + i * 2 * k, normals + i * k);
+    }
+    bool opens = impulses(k, 0, normals, u, NULL, least, tolerance, P, scratch);
+    scratch->used = used;
+    return opens ? friction_locks(problem) : closing_in(problem);
+}
+
 PRBM bool several(int k, const double *W, const double *u, const double *friction,
                   const double *restitution, double speed, double *P, Scratch *scratch,
                   Problem *problem) {
@@ -276,23 +297,26 @@ PRBM bool several(int k, const double *W, const double *u, const double *frictio
     Returned most = {0.0, 0.0};
     double tolerance = COMPLEMENTARITY_RTOL * greater(largest(2 * k, u), speed);
     zeros(k, wanted);
-    bool settled = impulses(k, k, W, u, friction, wanted, tolerance, P, scratch);
-    for (int i = 0; settled && i < 2 * k; i++) {
+    if (!impulses(k, k, W, u, friction, wanted, tolerance, P, scratch)) {
+        scratch->used = used;
+        return unsolved_compression(k, W, u, tolerance, scratch, problem);
+    }
+    for (int i = 0; i < 2 * k; i++) {
         after[i] = u[i] + dot(2 * k, W + i * 2 * k, P);
     }
-    for (int i = 0; settled && i < k; i++) {
+    for (int i = 0; i < k; i++) {
         most.normal -= P[i] * (u[i] + after[i]) / 2 * (restitution[i] * restitution[i]);
         wanted[i] = restitution[i] * P[i];
     }
-    for (int i = 0; settled && i < 2 * k; i++) {
+    for (int i = 0; i < 2 * k; i++) {
         most.all -= P[i] * (u[i] + after[i]) / 2;
     }
-    most.all += settled ? COMPLEMENTARITY_RTOL * fabs(dot(2 * k, P, u)) : 0.0;
-    settled = settled && restitution_of_several(k, W, after, friction, wanted, &most, tolerance, R,
-                                                scratch);
+    most.all += COMPLEMENTARITY_RTOL * fabs(dot(2 * k, P, u));
+    bool settled = restitution_of_several(k, W, after, friction, wanted, &most, tolerance, R,
+                                          scratch);
     for (int i = 0; settled && i < 2 * k; i++) {
         P[i] += R[i];
     }
     scratch->used = used;
-    return settled || closing_in(problem);
+    return settled || friction_locks(problem);
 }
