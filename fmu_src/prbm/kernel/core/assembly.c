@@ -117,8 +117,8 @@ static bool cut_flexure(const System *system, const Flexure *flexure, Segments *
     double rho = evaluate(kind->density, system->values);
     double EI = E * b * (h * h * h) / 12, EA = E * b * h, mass = rho * b * h * L;
     take_segments(pieces, system->mechanism->longest, scratch);
-    return segments(kind, gamma, K_theta, flexure->start_end, flexure->end_end, L, EI, mass, EA,
-                    pieces, problem);
+    return segments(kind, gamma, K_theta, flexure->type_at_start, flexure->type_at_end, L, EI,
+                    mass, EA, pieces, problem);
 }
 
 /* Add the loop constraint that two places coincide. */
