@@ -34,8 +34,8 @@ class Held:
     Parameters
     ----------
     displacement : float
-        Displacement of the released body along the direction of the release, from the drawn shape
-        [m]; its rotation [rad] if the release is by an angle.
+        Displacement of the released body along the direction of the release, from the straight
+        shape [m]; its rotation [rad] if the release is by an angle.
     force : float
         Holding force on the body along that direction [N], or moment [N m]; 0 at an equilibrium.
     stiffness : float
@@ -98,7 +98,7 @@ def free(system: System) -> Held:
     Raises
     ------
     EquilibriumError
-        If no such shape is found.
+        If no static shape is found.
     """
     return _described(system, free_displacement(system), equilibrium(system))
 
