@@ -408,7 +408,7 @@ def headline(mechanisms, tmp_path, **changes: float) -> str:
     fmu = tmp_path / "PRBDM.fmu"
     values = {name.replace("__", "."): value for name, value in changes.items()}
     atomic.write(fmu, python_fmu.build(mechanisms["PRBDM"], values))
-    return "\n".join(report.headline(report.simulate(fmu, lambda fraction: None)))
+    return "\n".join(report.summary(report.simulate(fmu, lambda fraction: None)))
 
 
 def test_an_impact_at_the_start_is_counted(mechanisms, tmp_path):

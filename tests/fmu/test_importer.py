@@ -31,8 +31,8 @@ def points_of(model: str) -> np.ndarray:
 
 
 @cache
-def engine(model: str) -> list[dict]:
-    """Return the outputs of the engine at the communication points."""
+def python_engine(model: str) -> list[dict]:
+    """Return the outputs of the Python engine at the communication points."""
     sim = Simulation(described(model))
     rows = []
     for t in points_of(model):
@@ -47,7 +47,11 @@ def nominals(model: str) -> dict[str, float]:
 
 
 def assert_close(rows: np.ndarray, expected: list[dict], model: str, tolerance: float) -> None:
-    """Check every output of the engine, relative to its nominal value or its magnitude."""
+    """Compare the outputs of an FMU with those of the Python engine.
+
+    The error of an output is at most the tolerance times the larger of its nominal value and its
+    largest magnitude.
+    """
     scales = nominals(model)
     for name in expected[0]:
         wanted = np.array([float(row[name]) for row in expected])
@@ -57,9 +61,9 @@ def assert_close(rows: np.ndarray, expected: list[dict], model: str, tolerance: 
 
 @pytest.mark.parametrize(("fmi", "kind"), INTERFACES[:3])
 @pytest.mark.parametrize("model", [*SHIPPED, TWO_STOPS])
-def test_a_c_importer_reads_the_values_of_the_engine(model, fmi, kind):
+def test_a_c_importer_reads_the_values_of_the_python_engine(model, fmi, kind):
     """Equations and step control are the same; impacts amplify differences of round-off."""
-    expected, points = engine(model), points_of(model)
+    expected, points = python_engine(model), points_of(model)
     done = run(Job(native(model, fmi), kind, points))
     rows = done.rows()
     assert (rows["at"] == points).all()
@@ -101,8 +105,8 @@ def test_event_mode_records_values_before_and_after_each_impact(model):
 @pytest.mark.parametrize("fmi", [2, 3])
 @each_shipped
 def test_a_runge_kutta_importer_of_model_exchange_computes_the_same_motion(model, fmi):
-    """Classical Runge-Kutta steps of 20 us, events by bisection; the error is below 1e-6 m."""
-    it, expected, points = case(model), engine(model), points_of(model)
+    """The steps are at most 20 us, events are located by bisection; the error is below 1e-6 m."""
+    it, expected, points = case(model), python_engine(model), points_of(model)
     rows = run(Job(native(model, fmi), "me", points, substep=it.substep(2e-5))).rows()
     wanted = np.array([row[it.released] for row in expected])
     assert np.abs(rows[it.released] - wanted).max() < 1e-6  # m
@@ -151,7 +155,7 @@ def test_the_library_can_be_unloaded_and_loaded_again(fmi):
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-def test_inputs_and_tunable_parameters_have_the_same_effect_as_in_the_engine(fmi):
+def test_inputs_and_tunable_parameters_have_the_same_effect_as_in_the_python_engine(fmi):
     points = 2.0 + 0.01 * np.arange(21)
     start = {"release.displacement": -0.01, "stop.position": 2e-3, "force.x": 0.05}
     changes = {

@@ -343,7 +343,7 @@ def test_the_report_reads_the_mechanism_from_the_fmu(fmu, mechanisms):
     run = report.simulate(fmu.path, lambda fraction: None)
     assert run.mechanism == mechanisms[fmu.name]
     assert run.finished
-    text, it = "\n".join(report.headline(run)), case(fmu.name)
+    text, it = "\n".join(report.summary(run)), case(fmu.name)
     assert re.search(rf"impacts at {it.stop} +\d+, the first at t = 0\.", text)
     if fmu.name in GUIDES:
         assert re.search(r"impacts at stop +14, the first at t = 0\.04", text)

@@ -320,7 +320,7 @@ def check_energy(mechanism, seed):
 
 
 def momentum(sim):
-    """Return linear momentum and angular momentum about the first clamp, [N s] and [N m s]."""
+    """Return the linear momentum [N s], and the angular momentum about the anchor [N m s]."""
     system, y, n = sim.system, sim.state(), sim.system.n
     q, v = y[:n], y[n : 2 * n]
     z = masses(system, q) - system.anchor

@@ -47,6 +47,27 @@ def test_a_wall_that_pushes_where_friction_locks_is_rejected():
         kernel().stronge(W, u, 1.0, 0.5, 0.0, np.zeros(1), np.zeros(1))
 
 
+def test_several_walls_that_push_where_friction_locks_are_rejected():
+    """Without friction, impulses open both gaps: friction is the cause."""
+    row = np.array([1.0, 1.0, 2.0, 2.0])
+    W, u, eps = np.outer(row, row), np.array([-1.0, -1.0, 1.0, 1.0]), np.full(2, 0.5)
+    assert (W @ contact.several(W, u, np.zeros(2), eps) + u)[:2].min() >= 0.0
+    with pytest.raises(SimulationError, match="friction locks; reduce the friction of the stops"):
+        contact.several(W, u, np.ones(2), eps)
+    with pytest.raises(KernelError, match="friction locks; reduce the friction of the stops"):
+        kernel().several(2, W, u, np.ones(2), eps, 0.0, np.zeros(4))
+
+
+def test_walls_with_friction_that_close_in_are_rejected():
+    """The gaps of opposite walls stay closed without friction too: the walls are the cause."""
+    row = np.array([1.0, -1.0, 0.5, 0.5])
+    W, u, mu, eps = np.outer(row, row), np.array([-1.0, -1.0, 0.0, 0.0]), np.ones(2), np.zeros(2)
+    with pytest.raises(SimulationError, match="the walls close in on the mechanism"):
+        contact.several(W, u, mu, eps)
+    with pytest.raises(KernelError, match="the walls close in on the mechanism"):
+        kernel().several(2, W, u, mu, eps, 0.0, np.zeros(4))
+
+
 def test_stops_at_one_place_share_the_impulse_of_a_single_stop_evenly():
     """Each of forty stops receives a fortieth of the impulse."""
     k = 40

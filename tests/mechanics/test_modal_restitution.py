@@ -34,7 +34,7 @@ def impact_of_two_modes(share, towards):
     away from it.  The second mode, a rotation, moves towards the wall.  With G_i the derivatives of
     the gap by the modes and v_i their velocities,
 
-        C = (1 + eps) G_1 (G_1 v_1 + G_2 v_2)/(v_1 sum_i G_i^2) - 1.
+        R = (1 + eps) G_1 (G_1 v_1 + G_2 v_2)/(v_1 sum_i G_i^2) - 1.
     """
     sim = simulation("PRBDM2RAxial", STRAIGHT)
     system = sim.system
@@ -69,7 +69,7 @@ def test_restitution_is_above_minus_one_if_the_fundamental_mode_moves_towards_th
 
 
 def test_restitution_is_bounded_by_the_share_of_the_fundamental_mode():
-    """With the share s of the energy before the impact, C^2 <= 1/s: an impact gains no energy."""
+    """With the share p of the energy before the impact, R^2 <= 1/p: an impact gains no energy."""
     sim = Simulation(mechanism("PRBDM3R"), OFFSET)
     sim.record = []
     sim.advance(0.24)

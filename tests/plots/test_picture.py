@@ -57,7 +57,11 @@ CRANK = Mechanism(
 
 
 def shapes_of(chosen: Mechanism, displacement: float | None = None) -> tuple[Shapes, np.ndarray]:
-    """Return the shapes of a mechanism, and its arms when straight or held at a displacement."""
+    """Return the shapes of a mechanism, and the values of its arms.
+
+    The arms (direction and relative length of each link and body) are those of the straight shape,
+    or of the body held at a displacement.
+    """
     system = assemble(chosen, chosen.values())
     shapes = Shapes(system)
     if displacement is None:
@@ -100,7 +104,7 @@ def test_the_drawn_gap_to_a_wall_on_a_body_is_that_of_the_engine() -> None:
 
 
 def test_an_inclined_bar_is_drawn_as_an_inclined_thin_box() -> None:
-    """A body whose points form a square is drawn upright."""
+    """The box around points that form a square has horizontal and vertical sides."""
     shapes, E = shapes_of(CRANK)
     z = shapes.body("bar", E)
     sides = np.diff(z, append=z[:1])
@@ -117,7 +121,7 @@ def test_a_body_is_the_hull_of_its_points_around_the_centre_of_mass() -> None:
     z = shapes.body("stage", E)
     expected = {0.05j, 0.02 + 0.05j, 0.02 + 0.07j, 0.07j}
     assert {complex(round(x.real, 9), round(x.imag, 9)) for x in z} >= expected
-    triangle = hull(np.array([0, 1, 1j, 0.2 + 0.2j]))
+    triangle = hull(np.array([0, 1, 1j, 0.2 + 0.2j]))  # The last point is inside.
     assert len(triangle) == 3
     area = 0.5 * abs(np.sum(triangle.real * np.roll(triangle.imag, -1)
                             - triangle.imag * np.roll(triangle.real, -1)))  # fmt: skip
@@ -147,13 +151,13 @@ def test_the_picture_contains_all_parts_and_their_names(name: str) -> None:
     chosen = CRANK if name == "Crank" else mechanism(name)
     figure = picture(chosen, shown=1)
     png(figure)
-    stage = figure.axes[0]
-    written = {text.get_text().strip() for text in stage.findobj(Text)}
+    axes = figure.axes[0]
+    written = {text.get_text().strip() for text in axes.findobj(Text)}
     parts = (*chosen.bodies, *chosen.flexures, *chosen.stops, *chosen.joints, *chosen.probes)
     assert {part.name for part in (*parts, *chosen.forces)} <= written
-    assert chosen.title in {text.get_text() for text in stage.findobj(Text)}
+    assert chosen.title in {text.get_text() for text in axes.findobj(Text)}
     shapes, E = shapes_of(chosen)
-    (left, right), (low, high) = stage.get_xlim(), stage.get_ylim()
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     scale = 1e3  # All are drawn in mm.
     for body in shapes.bodies:
         z = scale * shapes.body(body, E)
@@ -168,7 +172,7 @@ def labels(chosen: Mechanism, **options: object) -> list[str]:
 
 
 @pytest.mark.parametrize("name", ["PRBDM2R", "Bistable", "ImpactOscillator", "Pivot"])
-def test_the_picture_shows_the_gaps_of_the_released_shape(name: str) -> None:
+def test_the_picture_shows_the_gaps_at_the_start_of_the_simulation(name: str) -> None:
     chosen = read_mechanism(SUPPORT / "pivot.toml") if name == "Pivot" else mechanism(name)
     outputs = Simulation(chosen).outputs()
     found = labels(chosen)

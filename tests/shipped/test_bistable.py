@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from prbm.analysis import holding
-from prbm.analysis.equilibria import force_curve, holding_force, rests, snap
+from prbm.analysis.equilibria import force_curve, holding_force, rest_positions, snap
 from prbm.mechanics.assembly import assemble
 from prbm.plots.holding import holding_figure
 from support import mechanism, run
@@ -48,7 +48,7 @@ def test_holding_force_is_that_of_four_struts() -> None:
 
 def test_there_are_two_stable_equilibria_and_an_unstable_one_between_them() -> None:
     """The equilibria are the drawn shape, its mirror image, and that with the shortest struts."""
-    found = rests(SYSTEM, np.array([-0.3, 0.4, 1.3, 2.3]) * RISE)
+    found = rest_positions(SYSTEM, np.array([-0.3, 0.4, 1.3, 2.3]) * RISE)
     assert [rest.stable for rest in found] == [True, False, True]
     np.testing.assert_allclose([r.displacement for r in found], [0, RISE, 2 * RISE], atol=1e-12)
 

@@ -17,17 +17,18 @@ from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Fmi2Variability, Intege
 class Integrator(Fmi2Slave):
     """value' = gain * rate with the rate at the beginning of each step.
 
-    value(0) = start + passed * rate.  The first ``skipped`` steps, or all if ``off``, do nothing.
+    value(0) = start + feedthrough * rate.  The first ``skipped`` steps do not change the value, and
+    no step does if ``off`` is true.
     """
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         self.gain, self.value, self.rate = 1.0, 0.0, 0.0
-        self.start, self.passed, self.skipped, self.off = 0.0, 0.0, 0, False
+        self.start, self.feedthrough, self.skipped, self.off = 0.0, 0.0, 0, False
         for kind, name, causality, variability in (
             (Real, "gain", "parameter", "fixed"),
             (Real, "start", "parameter", "fixed"),
-            (Real, "passed", "parameter", "fixed"),
+            (Real, "feedthrough", "parameter", "fixed"),
             (Integer, "skipped", "parameter", "fixed"),
             (Boolean, "off", "parameter", "fixed"),
             (Real, "rate", "input", "continuous"),
@@ -39,7 +40,7 @@ class Integrator(Fmi2Slave):
             )
 
     def exit_initialization_mode(self):
-        self.value = self.start + self.passed * self.rate
+        self.value = self.start + self.feedthrough * self.rate
 
     def do_step(self, current_time, step_size):
         if self.skipped > 0 or self.off:

@@ -46,7 +46,7 @@ DTYPES = {
 }
 
 
-ENUMERATIONS = ("ContactMode",)  # Types of arguments and members.
+ENUMERATIONS = ("ContactMode",)  # Those that are types of arguments or of structure members.
 SCALARS |= dict.fromkeys(ENUMERATIONS, ctypes.c_int)
 DTYPES |= dict.fromkeys(ENUMERATIONS, np.int32)
 
@@ -102,7 +102,10 @@ def _declared(text: str) -> list[Declared]:
 
 @cache
 def _header() -> str:
-    """Return all declarations of kernel.h; those of each header follow a line ``@name.c@``."""
+    """Return the declarations of generated.h and of all headers that kernel.h includes.
+
+    A line ``@name.c@`` precedes the declarations of each header ``core/name.h``.
+    """
     included = re.findall(r'#include "core/(\w+)\.h"', (KERNEL / "kernel.h").read_text())
     return _plain((KERNEL / "generated.h").read_text()) + "\n".join(
         f"@{name}.c@\n" + _plain((KERNEL / "core" / f"{name}.h").read_text()) for name in included
@@ -143,7 +146,7 @@ def structures() -> dict[str, type[ctypes.Structure]]:
 def prototypes() -> dict[str, Prototype]:
     """Return all functions of the header by name."""
     found = {}
-    file = "memory.c"
+    file = ""
     for heading, head, body in re.findall(
         r"@(\w+\.c)@|\bPRBM\b([^;()]*)\(([^;]*?)\)\s*;", _header()
     ):
@@ -160,8 +163,8 @@ def prototypes() -> dict[str, Prototype]:
 # --- the library ----------------------------------------------------------------------------------
 
 
-def unit() -> str:
-    """Return C code that includes the files of the functions declared by kernel.h."""
+def translation_unit() -> str:
+    """Return C code that includes kernel.h and all C files of core/."""
     includes = re.findall(r'#include "(core/\w+\.c)"', (KERNEL / "prbm_fmu.c").read_text())
     return "".join(f'#include "{name}"\n' for name in ("kernel.h", *includes))
 
@@ -169,11 +172,14 @@ def unit() -> str:
 def compiled(
     flags: Sequence[str] = (), compiler: Sequence[str] = ("cc",), text: str = ""
 ) -> ctypes.CDLL:
-    """Compile and load the kernel and more C code, with all functions visible."""
+    """Compile the C files of core/ and the code ``text`` after them, and load the library.
+
+    All functions are visible, because ``FLAGS`` defines the macro PRBM, static elsewhere, as empty.
+    """
     folder = Path(mkdtemp(prefix="prbm-kernel-"))
     try:
         source, library = folder / "kernel.c", folder / "kernel.so"
-        source.write_text(unit() + text)
+        source.write_text(translation_unit() + text)
         command = [*compiler, *FLAGS, *flags, str(source), "-o", str(library), "-lm"]
         subprocess.run(command, check=True, capture_output=True, text=True)
         return ctypes.CDLL(str(library))
@@ -184,8 +190,8 @@ def compiled(
 class Kernel:
     """The functions of the kernel as methods with their names in C.
 
-    Arrays are passed without a copy.  Arrays that a function writes must be contiguous and of the
-    right type.
+    Arrays that a function only reads (const) are converted to contiguous arrays of the right type.
+    Arrays that it writes are passed without a copy, and must be contiguous and of the right type.
     """
 
     def __init__(self, library: ctypes.CDLL) -> None:
@@ -347,9 +353,10 @@ class KernelSystem:
         return array(self.structure.blocks, self.structure.block_count, 2, kind="int")
 
     def frame(self, group: str, i: int) -> tuple[int, complex, complex, np.ndarray]:
-        """Return the coordinate, constant, drawn position and row of a point fixed to a body.
+        """Return ``(j, c, drawn, A)`` of the i-th point of a group, fixed to a body.
 
-        The group is ``bodies``, ``pushed`` or ``probes``.
+        j is the coordinate of the body's rotation.  The position of the point is c + A e, and
+        ``drawn`` at the straight shape.  The group is ``bodies``, ``pushed`` or ``probes``.
         """
         kind = structures()["BodyFrame"]
         frame = kind.from_address(getattr(self.structure, group) + i * ctypes.sizeof(kind))

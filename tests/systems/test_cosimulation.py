@@ -52,7 +52,7 @@ def test_outputs_reach_inputs_in_initialization_mode():
     """The start of an instance may depend on its connected inputs."""
     fmus = {"sum": integrator(), "guide": guide(2)}
     with System(fmus, {"sum.rate": "guide.shuttle.x"}, watched=["sum.value"]) as system:
-        system.start({"sum.passed": 2.0, "guide.release.displacement": -3e-3})
+        system.start({"sum.feedthrough": 2.0, "guide.release.displacement": -3e-3})
         assert system.values["sum.value"] == pytest.approx(-6e-3, rel=1e-12)
 
 

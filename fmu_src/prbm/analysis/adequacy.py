@@ -241,7 +241,7 @@ class _Model:
         return assemble(self.mechanism, self.mechanism.values(given))
 
     def values(self, shape: Shape) -> Values:
-        """Return the quantities in a shape; empty if there is no such shape."""
+        """Return the quantities in a shape; empty if the shape is not found."""
         if shape not in self._known:
             try:
                 self._known[shape] = self._values(self.system(shape), shape)

@@ -22,7 +22,7 @@ from ..mechanics.arrays import Real
 from ..mechanics.modal import modes
 from ..mechanics.statics import Equilibrium, equilibrium, free_displacement, held_by_loops
 from ..mechanics.system import System, unit
-from .equilibria import Rest, holding_force, rests, snap
+from .equilibria import RestPosition, holding_force, rest_positions, snap
 
 DIFFERENCE_STEP = 1e-5  # Step of the stiffness, as a share of the size, or of one radian.
 
@@ -34,8 +34,8 @@ class Held:
     Parameters
     ----------
     displacement : float
-        Displacement of the released body along the direction of the release, from the drawn shape
-        [m]; its rotation [rad] if the release is by an angle.
+        Displacement of the released body along the direction of the release, from the straight
+        shape [m]; its rotation [rad] if the release is by an angle.
     force : float
         Holding force on the body along that direction [N], or moment [N m]; 0 at an equilibrium.
     stiffness : float
@@ -87,7 +87,7 @@ def held(system: System, displacement: float) -> Held:
     Raises
     ------
     EquilibriumError
-        If there is no such shape.
+        If no static shape with this displacement is found.
     """
     return _described(system, displacement, equilibrium(system, displacement))
 
@@ -98,7 +98,7 @@ def free(system: System) -> Held:
     Raises
     ------
     EquilibriumError
-        If no such shape is found.
+        If no static shape is found.
     """
     return _described(system, free_displacement(system), equilibrium(system))
 
@@ -111,42 +111,44 @@ class Curve:
     ----------
     points : tuple of Held
         Points in the order of the displacements.
-    rests : tuple of Rest
-        Equilibria without a holding force.
+    rests : tuple of RestPosition
+        Rest positions, in the order of the displacements.
     snaps : tuple of (float, float)
-        Displacement [m] and force [N] of the largest force between neighbouring equilibria:
-        there the mechanism snaps through under a force.
+        Displacement [m] and holding force [N] of largest magnitude between each pair of
+        neighbouring rest positions.  Under a growing load the mechanism snaps through there.
     """
 
     points: tuple[Held, ...]
-    rests: tuple[Rest, ...]
+    rests: tuple[RestPosition, ...]
     snaps: tuple[tuple[float, float], ...]
 
 
 def curve(
     system: System, displacements: Sequence[float] | Real, progress: Progress | None = None
 ) -> Curve:
-    """Return the holding forces at displacements, with the equilibria and the snap-throughs.
+    """Return the holding forces at displacements, with rest positions and snap-throughs.
 
     Parameters
     ----------
     system : System
         The mechanism.
     displacements : (k,)
-        Increasing displacements [m], between two of which the force changes its sign at most once.
+        Increasing displacements [m], or rotations [rad].  Between neighbouring displacements the
+        force changes its sign at most once.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
 
     Raises
     ------
     EquilibriumError
-        If there is no shape with one of the displacements.
+        If no static shape with one of the displacements is found, or a search for a rest position
+        or a snap-through fails.
     """
     points = []
     for x in displacements:
         points.append(held(system, float(x)))
         if progress is not None:
             progress(len(points) / len(displacements))
-    found = rests(system, displacements, np.array([point.force for point in points]))
+    found = rest_positions(system, displacements, np.array([point.force for point in points]))
     between = (snap(system, a.displacement, b.displacement) for a, b in pairwise(found))
     return Curve(tuple(points), tuple(found), tuple(between))

@@ -59,7 +59,7 @@ def touching(
     Raises
     ------
     EquilibriumError
-        If no such shape is found in :data:`SECANT_STEPS_MAX` steps.
+        If no shape that touches the wall is found in :data:`SECANT_STEPS_MAX` steps.
     """
     x, shape = wall, hold(wall, near)
     g = gap(shape)
@@ -92,7 +92,7 @@ def impact_shape(system: System, stop: int, wall: float) -> Equilibrium:
     Raises
     ------
     EquilibriumError
-        If no such shape is found.
+        If no shape that touches the wall is found.
     """
     rows = system.gap_rows
 

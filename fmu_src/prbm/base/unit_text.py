@@ -42,7 +42,9 @@ def frequency_text(frequency: float, digits: int = 4) -> str:
 
 
 def prefixed_unit(largest: float, unit: str) -> tuple[float, str]:
-    """Return the display unit of a quantity in a unit, by its largest magnitude.
+    """Return factor and name of the display unit of a quantity whose SI unit is ``unit``.
+
+    ``largest`` is the largest magnitude that is to be displayed.
 
     Examples
     --------

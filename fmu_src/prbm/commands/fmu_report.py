@@ -24,7 +24,7 @@ from ..fmu.unpack import unpacked
 from ..interface.variables import CLOCK
 from ..mechanism.description import Mechanism
 from ..plots.figures import response
-from ..runs import headline as results
+from ..runs.headline import FREQUENCY, headline
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
 
 
@@ -85,7 +85,7 @@ def simulate(fmu: Path, progress: Progress) -> Run:
         record = fmpy.simulate_fmu(
             str(folder),
             model_description=description,
-            output=[*outputs, results.FREQUENCY],
+            output=[*outputs, FREQUENCY],
             use_event_mode=clocks,
             early_return_allowed=clocks,
             step_finished=step_finished,
@@ -100,7 +100,7 @@ def simulate(fmu: Path, progress: Progress) -> Run:
 
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
-    """Yield a function that returns false after Ctrl-C; a second one raises KeyboardInterrupt."""
+    """Yield a function that is false after Ctrl-C; a second Ctrl-C raises KeyboardInterrupt."""
     interrupted: list[int] = []
 
     def record_signal(number: int, _: object) -> None:
@@ -114,12 +114,12 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def headline(run: Run) -> list[str]:
+def summary(run: Run) -> list[str]:
     """Return a summary of a simulation, line by line."""
     record = run.record
     lines = [
         f"simulated            {record['time'][-1]:g} s in {run.seconds:.2f} s",
-        *results.headline(record, run.mechanism, run.values),
+        *headline(record, run.mechanism, run.values),
     ]
     if not run.finished:
         lines.append(
@@ -138,7 +138,7 @@ def main(arguments: Sequence[str]) -> int:
     except Exception as error:
         print(f"{fmu}: {error}", file=sys.stderr)
         return FAILED
-    for line in headline(run):
+    for line in summary(run):
         print(f"  {line}")
     try:
         write(picture, png(response(run.record, run.mechanism)))

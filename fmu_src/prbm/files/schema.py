@@ -167,17 +167,13 @@ class Named(Table):
 class ParameterTable(Named):
     """A parameter that points and other quantities refer to."""
 
-    unit: StrictStr = Field("", description="SI unit (default: that of the value)")
-    value: Annotated[float, InUnit()] = Field(description="Default, in the unit")
+    unit: StrictStr = Field("", description="SI unit of the parameter (default: that of the value)")
+    value: Annotated[float, InUnit()] = Field(description="Default value")
     description: StrictStr = Field("", description="Description of the FMU parameter")
-    minimum: Annotated[float, InUnit(bound=True)] | None = Field(
-        None, description="Smallest value, in the unit"
-    )
-    maximum: Annotated[float, InUnit(bound=True)] | None = Field(
-        None, description="Largest value, in the unit"
-    )
+    minimum: Annotated[float, InUnit(bound=True)] | None = Field(None, description="Smallest value")
+    maximum: Annotated[float, InUnit(bound=True)] | None = Field(None, description="Largest value")
     nominal: Annotated[float, InUnit(bound=True)] | None = Field(
-        None, description="Typical magnitude, in the unit"
+        None, description="Typical magnitude"
     )
     tunable: StrictBool = Field(False, description="Whether it may change during a simulation")
 
@@ -252,7 +248,8 @@ class FlexureTable(Section):
     start: Reference = Field(description="Start point, body.point or ground.point")
     end: Reference = Field(description="End point, body.point or ground.point")
     ends: EndOrEnds = Field(
-        (CLAMP, CLAMP), description="Type of both ends, or a pair for start and end"
+        (CLAMP, CLAMP),
+        description="Type of both ends, or a pair for start and end; free needs a clamp",
     )
 
 

@@ -50,7 +50,7 @@ UNITS = {
 
 @dataclass(frozen=True)
 class Quantity:
-    """A physical quantity with its unit and its display unit, None for the unit itself."""
+    """A physical quantity, its SI unit, and its display unit (None: the SI unit)."""
 
     name: str
     unit: str

@@ -490,7 +490,8 @@ def _base(nominal: Scales) -> Iterator[Variable]:
             nominal,
         )  # fmt: skip
     yield _output(
-        f"{BASE}.moment", "N.m", "Moment of the mechanism on the ground about the first clamp",
+        f"{BASE}.moment", "N.m", "Moment of the mechanism on the ground, about the first flexure "
+        "end there (without one: the origin)",
         nominal,
     )  # fmt: skip
 

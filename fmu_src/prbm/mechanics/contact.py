@@ -42,6 +42,10 @@ WEDGED = (
     "the wall pushes the mechanism in a direction that friction locks; reduce the friction of the "
     "stop, or the velocity of the wall"
 )
+WEDGED_SEVERAL = (
+    "the walls push the mechanism in directions that friction locks; reduce the friction of the "
+    "stops, or the velocities of the walls"
+)
 
 
 def response(M: Real, held: Real, rows: Real) -> Real:
@@ -176,7 +180,11 @@ def stronge(
 
 @dataclass
 class _Hit:
-    """A hit with friction in progress: inverse masses, rates and impulses so far."""
+    """A hit with friction in progress.
+
+    It has inverse masses nn, nt, tt, rates u, impulses p, the ratio dP_t/dP_n, and the derivatives
+    du_n and du_t of the rates by the normal impulse.
+    """
 
     nn: float
     nt: float
@@ -187,8 +195,8 @@ class _Hit:
     p_n: float = 0.0
     p_t: float = 0.0
     ratio: float = 0.0
-    rate_n: float = 0.0
-    rate_t: float = 0.0
+    du_n: float = 0.0
+    du_t: float = 0.0
 
     def compress(self, speed: float) -> float:
         """Apply the impulses of compression and return their work [J].
@@ -203,14 +211,14 @@ class _Hit:
         small_t = ZERO_SPEED_RTOL * (u_t + u_n * math.sqrt(tt / nn) if nn > 0.0 else u_t)
         work = 0.0
         while self.u_n < 0.0:
-            sticking = self.sliding_ends()
-            closed = -self.u_n / self.rate_n if self.rate_n > WEDGED_RTOL * nn else math.inf
-            step = min(sticking, closed)
+            to_stick = self.impulse_to_stick()
+            to_open = -self.u_n / self.du_n if self.du_n > WEDGED_RTOL * nn else math.inf
+            step = min(to_stick, to_open)
             if step == math.inf:
                 break  # The wall is wedged, unless u_n is round-off: checked below.
             work -= self.receive(step)
-            self.u_n = 0.0 if step == closed else self.u_n + self.rate_n * step
-            self.u_t = 0.0 if step == sticking else self.u_t + self.rate_t * step
+            self.u_n = 0.0 if step == to_open else self.u_n + self.du_n * step
+            self.u_t = 0.0 if step == to_stick else self.u_t + self.du_t * step
         if not self.u_n >= -max(small_n, COMPLEMENTARITY_RTOL * speed):
             raise SimulationError(WEDGED)
         # With one degree of freedom both rates become zero at once, up to round-off.
@@ -218,40 +226,47 @@ class _Hit:
         self.u_t = self.u_t if abs(self.u_t) > small_t else 0.0
         return work
 
-    def restore(self, left: float) -> None:
-        """Apply the impulses of restitution that do the work ``left`` [J]."""
-        while left > 0.0:
-            sticking = self.sliding_ends()
-            rate_n = self.rate_n if abs(self.rate_n) > WEDGED_RTOL * self.nn else 0.0
-            spent = _restitution_ends(self.u_n, rate_n, left)
-            step = min(sticking, spent)
+    def restore(self, work_left: float) -> None:
+        """Apply the impulses of restitution that do the work ``work_left`` [J]."""
+        while work_left > 0.0:
+            to_stick = self.impulse_to_stick()
+            du_n = self.du_n if abs(self.du_n) > WEDGED_RTOL * self.nn else 0.0
+            to_end = _impulse_to_end(self.u_n, du_n, work_left)
+            step = min(to_stick, to_end)
             if step == math.inf:
                 break
-            left -= self.receive(step)
-            if step == spent:
+            work_left -= self.receive(step)
+            if step == to_end:
                 break
-            self.u_n, self.u_t = max(0.0, self.u_n + self.rate_n * step), 0.0
+            self.u_n, self.u_t = max(0.0, self.u_n + self.du_n * step), 0.0
 
-    def sliding_ends(self) -> float:
-        """Return the normal impulse at which sliding ends, and set the rates until then."""
+    def impulse_to_stick(self) -> float:
+        """Return the normal impulse that stops sliding [N s]; infinity if none does.
+
+        Also set the ratio of the impulses and the derivatives of the rates, which are constant
+        until then.
+        """
         self.ratio = _friction_ratio(self.nt, self.tt, self.u_t, self.friction)
-        self.rate_n = self.nn + self.ratio * self.nt
-        self.rate_t = self.nt + self.ratio * self.tt
-        return -self.u_t / self.rate_t if self.u_t * self.rate_t < 0.0 else math.inf
+        self.du_n = self.nn + self.ratio * self.nt
+        self.du_t = self.nt + self.ratio * self.tt
+        return -self.u_t / self.du_t if self.u_t * self.du_t < 0.0 else math.inf
 
     def receive(self, step: float) -> float:
         """Add a normal impulse with its friction, and return its work [J]."""
         self.p_n, self.p_t = self.p_n + step, self.p_t + self.ratio * step
-        return self.u_n * step + self.rate_n * step**2 / 2
+        return self.u_n * step + self.du_n * step**2 / 2
 
 
-def _restitution_ends(u_n: float, rate_n: float, left: float) -> float:
-    """Return the impulse at which the work ``left`` is done, or the gap stops opening."""
-    root = u_n**2 + 2.0 * rate_n * left
+def _impulse_to_end(u_n: float, du_n: float, work_left: float) -> float:
+    """Return the normal impulse that does the rest of the work of restitution [N s].
+
+    If the gap stops opening before, return the impulse at which this happens.
+    """
+    root = u_n**2 + 2.0 * du_n * work_left
     if root < 0.0:
-        return -u_n / rate_n
+        return -u_n / du_n
     total = u_n + math.sqrt(root)
-    return 2.0 * left / total if total > 0.0 else math.inf
+    return 2.0 * work_left / total if total > 0.0 else math.inf
 
 
 def _friction_ratio(nt: float, tt: float, u_t: float, friction: float) -> float:
@@ -291,11 +306,16 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
     Raises
     ------
     SimulationError
-        If no impulses satisfy both laws.
+        If no impulses satisfy both laws, because walls close in on the mechanism or because
+        friction locks it.
     """
     k = len(friction)
     tolerance = COMPLEMENTARITY_RTOL * max(float(np.abs(u).max()), speed)
-    P = _resolved(W, u, friction, np.zeros(k), tolerance)
+    found = impulses(W, u, friction, np.zeros(k), tolerance)
+    if found is None:
+        opens = impulses(W[:k, :k], u[:k], np.zeros(0), np.zeros(k), tolerance) is not None
+        raise SimulationError(WEDGED_SEVERAL if opens else CLOSING_IN)
+    P = found
     after = u + W @ P
     lost = float(-(P[:k] * (u + after)[:k] / 2) @ restitution**2)
     wanted = restitution * P[:k]
@@ -304,7 +324,9 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
     taken = -float(P @ (u + after)) / 2 + COMPLEMENTARITY_RTOL * abs(float(P @ u))
 
     def rebound(s: float) -> tuple[Real, bool]:
-        R = _resolved(W, after, friction, s * wanted, tolerance)
+        R = impulses(W, after, friction, s * wanted, tolerance)
+        if R is None:
+            raise SimulationError(WEDGED_SEVERAL)
         work = R * (2 * after + W @ R) / 2
         return R, float(work[:k].sum()) <= lost and float(work.sum()) <= taken
 
@@ -314,17 +336,3 @@ def several(W: Real, u: Real, friction: Real, restitution: Real, speed: float = 
         s = (low + high) / 2
         low, high = (s, high) if rebound(s)[1] else (low, s)
     return P + (R if allowed else rebound(low)[0])
-
-
-def _resolved(W: Real, u: Real, friction: Real, least: Real, tolerance: float) -> Real:
-    """Return impulses that satisfy the laws of contact and friction, with P_n >= least.
-
-    Raises
-    ------
-    SimulationError
-        If there are no such impulses.
-    """
-    P = impulses(W, u, friction, least, tolerance)
-    if P is None:
-        raise SimulationError(CLOSING_IN)
-    return P

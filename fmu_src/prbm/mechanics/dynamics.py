@@ -429,10 +429,11 @@ class Equations:
 
 
 def base_reaction(equations: Equations, q: Real, v: Real, a: Real) -> tuple[complex, float]:
-    """Return the force [N] and the moment about the first clamp [N m] on the ground.
+    """Return the force [N] and the moment [N m] of the mechanism on the ground.
 
-    They follow from the balance of momentum of all moving parts: the forces of clamps, stops and
-    friction points on the ground balance gravity, inputs and inertia.
+    They follow from the balance of momentum of all moving parts: the forces of clamps, pins, stops
+    and friction points on the ground balance gravity, inputs and inertia.  The moment is about the
+    first flexure end on the ground, or about the origin if there is none.
     """
     system, inputs = equations.system, equations.inputs
     e = system.directions(q)

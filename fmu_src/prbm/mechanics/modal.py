@@ -110,11 +110,11 @@ def modes_at(system: System, q: Real) -> Modes:
 
 
 def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> float:
-    """Return the modal restitution C of an impact, -phi^T M v+ / phi^T M v- [-].
+    """Return the modal restitution R of an impact, -phi^T M v+ / phi^T M v- [-].
 
-    C is zero if the velocity of the fundamental mode before the impact is round-off.  Otherwise
-    |C| <= 1/sqrt(s), with the share s of this mode in the kinetic energy before the impact.  If s
-    is small, C can be far below -1 or above 1.
+    R is zero if the velocity of the fundamental mode before the impact is round-off.  Otherwise
+    |R| <= 1/sqrt(p), with the share p of this mode in the kinetic energy before the impact.  If p
+    is small, R can be far below -1 or above 1.
 
     Examples
     --------
@@ -130,11 +130,11 @@ def simulated_restitution(phi: Real, M: Real, before: Real, after: Real) -> floa
 
 
 def modal_restitution(system: System, shape: Equilibrium, stop: int, restitution: float) -> float:
-    r"""Return the modal restitution C of an impact before which only the fundamental mode moves.
+    r"""Return the modal restitution R of an impact before which only the fundamental mode moves.
 
-    C depends on the share mu_1 of the fundamental mode in the mobility of the hit point:
+    R depends on the share mu_1 of the fundamental mode in the mobility of the hit point:
 
-        C = (1 + eps) mu_1 - 1,    mu_1 = G_1^2 / sum_i G_i^2,    G_i = (dg/dq) phi_i,
+        R = (1 + eps) mu_1 - 1,    mu_1 = G_1^2 / sum_i G_i^2,    G_i = (dg/dq) phi_i,
 
     with the gap g and the mass-normalised modes phi_i.
 

@@ -58,7 +58,7 @@ def mode_shape(system: System, mode: int, amplitude: float) -> Real:
     Raises
     ------
     EquilibriumError
-        If there is no rest, or no shape with the amplitude.
+        If no rest position, or no shape with the amplitude, is found.
     ParameterError
         If there is no such mode, or it does not move the released point.
     """

@@ -131,8 +131,8 @@ def equilibrium(
     ParameterError
         If a load is unknown, or not a finite number.
     EquilibriumError
-        If there is no such shape, slow loading does not reach it, or the body turns about the point
-        that is to be displaced.
+        If slow loading reaches no static shape with this displacement and these loads, or the body
+        turns about the point that is to be displaced.
     """
     w, moment = _loads(system, loads or {})
     if displacement is not None:

@@ -252,7 +252,8 @@ class System:
     outlines : tuple of Outline
         Lines to draw.
     anchor : complex
-        The first clamp, about which moments on the base are taken [m].
+        The first flexure end on the ground, or the origin if there is none: moments on the base
+        are about this point [m].
     length : float
         Size of the mechanism, scale of all lengths [m].
     """

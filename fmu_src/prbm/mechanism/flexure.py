@@ -3,8 +3,8 @@
 A model is a set of published coefficients for a cantilever of length h.  Common rules give the
 segments of a flexure of length L:
 
-* Clamped at one end: one cantilever, h = L.  The other end is a pin, or free; the body at a free
-  end is fixed to the last link.
+* Clamped at one end: one cantilever, h = L.  The other end is a pin, or free.  The body at a free
+  end is fixed to the last link, which is the link at the tip of the model.
 * Clamped at both ends: two mirrored cantilevers, h = L/2, whose last links form one link in the
   middle::
 
@@ -14,11 +14,13 @@ segments of a flexure of length L:
 
 * Pinned at both ends: one rigid link.
 
-The chain of n equal links (nR, Hencky) has no coefficients.  Its springs are n EI/L between links
-and 2 n EI/L at each end that is clamped or free.
+The chain of n equal links (nR, Hencky) has no coefficients, and other rules for its ends.  Its
+springs are n EI/L between links.  At each end that is clamped or free, a spring 2 n EI/L connects
+the last link with the body.
 
-With axial compliance, the middle link of a flexure stretches with the stiffness EA/L.  In a chain
-all links stretch, each with the stiffness n EA/L.
+With axial compliance, one link of a flexure stretches with the stiffness EA/L: the middle one, or
+of an even number the one after the middle, counted from the start.  In a chain all links stretch,
+each with the stiffness n EA/L.
 
 Each model in :data:`MODELS` names its publications.
 """
@@ -63,7 +65,8 @@ class FlexureModel:
     references : tuple of str
         The publications, for the documentation of FMUs.
     links : int
-        Number of equal links of a chain; 0 for the other models.
+        Number of equal links of a chain, set from the flexure type; 0 in :data:`MODELS`, and for
+        the other models.
     """
 
     name: str
@@ -186,7 +189,8 @@ class Segments:
     Parameters
     ----------
     lengths : tuple of float, n + 2
-        Lengths of the stub fixed to the body at the start, n links, and the stub at the end [m].
+        Lengths [m] of the segments: a stub at the start, n links, and a stub at the end.  Each stub
+        is fixed to the body at its end of the flexure.
     rates : tuple of float, n + 1
         Rates of the torsion springs between consecutive segments [N m/rad].
     rods : tuple of float, n + 2
@@ -244,10 +248,12 @@ def segments(
     """Return the rigid segments, springs and masses of a flexure.
 
     The spring rates are K_i = K_theta_i EI/h, or gamma_i K_theta_i EI/h with ``rate_with_gamma``.
-    Each pivot of the 1R has the mass m/4 + (m L^2/12)/(gamma L)^2 (eq. 3.3 of the thesis).  Moving
-    on the radius gamma L, it has the kinetic energy of a uniform rod of the length L whose centre
-    moves on the radius gamma L/2.
-    With a free end, or two pinned ends, the 1R consists of rods like the other models.
+
+    Each pivot of the 1R has the mass m/4 + (m L^2/12)/(gamma L)^2, with the mass m of the flexure
+    (eq. 3.3 of Boersma, MSc thesis, TU Delft, 2015).  If one pivot is at rest and the other moves
+    on a circle of the radius gamma L, the kinetic energy is that of a uniform rod of the length L
+    whose centre moves on a circle of the radius gamma L/2.  With a free end, or two pinned ends,
+    the 1R consists of rods like the other models.
 
     Parameters
     ----------

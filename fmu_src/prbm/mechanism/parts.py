@@ -81,7 +81,8 @@ class Flexure:
 
     * ``clamp``: fixed to the body;
     * ``pin``: free to rotate about the point;
-    * ``free``: the tip of a cantilever; the body at this end is fixed to the last link.
+    * ``free``: the tip of a cantilever; the body at this end is fixed to the last link of the model
+      1R, 2R or 3R.  In a chain (nR) it is the same as a clamp.
     """
 
     name: str
@@ -125,7 +126,8 @@ class Stop:
     friction : Quantity
         Coefficient of friction [-].
     rest_speed : Quantity
-        Closing speed below which an impact ends in rest under a pressing force [m/s].
+        Closing speed below which an impact ends in rest, if the body is then pressed against the
+        wall [m/s].
     on : str
         Body that carries the wall, or ``ground``.
     """
@@ -290,7 +292,8 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
         ),
         "friction": _meta("", "Coefficient of friction at the stop", 0.0, 100.0, tunable=True),
         "rest_speed": _meta(
-            "m/s", "Closing speed below which an impact ends in rest under a pressing force",
+            "m/s", "Closing speed below which an impact ends in rest, if the body is then "
+            "pressed against the wall",
             0.0, 1e3, 1e-3, tunable=True,
         ),
     },

@@ -117,8 +117,8 @@ static bool cut_flexure(const System *system, const Flexure *flexure, Segments *
     double rho = evaluate(kind->density, system->values);
     double EI = E * b * (h * h * h) / 12, EA = E * b * h, mass = rho * b * h * L;
     take_segments(pieces, system->mechanism->longest, scratch);
-    return segments(kind, gamma, K_theta, flexure->start_end, flexure->end_end, L, EI, mass, EA,
-                    pieces, problem);
+    return segments(kind, gamma, K_theta, flexure->type_at_start, flexure->type_at_end, L, EI,
+                    mass, EA, pieces, problem);
 }
 
 /* Add the loop constraint that two places coincide. */
@@ -439,7 +439,7 @@ static double size_of(const System *system, Scratch *scratch) {
     return longest;
 }
 
-static Complex first_clamp(const System *system) {
+static Complex first_ground_end(const System *system) {
     const Mechanism *m = system->mechanism;
     for (int i = 0; i < m->flexure_count; i++) {
         const Connection *c = &m->flexures[i].between;
@@ -618,7 +618,7 @@ static void add_arrays(System *system, Scratch *scratch) {
     add_frame(system, release->body, at_point(system, release->point), &system->released, scratch);
     system->release_c =
         along(system->n, unit(release->direction), system->released.A, e0, system->release);
-    system->anchor = first_clamp(system);
+    system->anchor = first_ground_end(system);
 }
 
 PRBM bool assemble(System *system, const double *values, Scratch *scratch, Problem *problem) {

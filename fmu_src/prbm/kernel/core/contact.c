@@ -36,8 +36,9 @@ static bool closing_in(Problem *problem) {
                          "them apart, or slow them down");
 }
 
-/* Solve W P = -b for the impulses P of the members only.  Members with a negative impulse get the
- * impulse zero and are removed; *pulling: whether a member is removed. */
+/* Solve W P = -b for the impulses P of the stops whose indices are in members (size); all other
+ * impulses are zero.  A stop with a negative impulse would pull: its impulse is set to zero, and it
+ * is removed from members.  *pulling: whether a stop is removed. */
 static bool share_impulses(int k, int *size, int *members, const double *W, const double *b,
                            double *P, bool *pulling, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -65,8 +66,8 @@ static bool share_impulses(int k, int *size, int *members, const double *W, cons
     return solved;
 }
 
-/* Distribute the impulses as evenly as possible between the stops whose rate after the impact
- * equals the rate that restitution prescribes. */
+/* Distribute the impulses P (k,) as evenly as possible between the stops that open at the rate of
+ * restitution.  P does not change if the result would violate the laws. */
 static bool share_evenly(int k, const double *W, const double *b, double tolerance, double *P,
                          Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -110,14 +111,15 @@ static double sign_of(double x) {
     return x < 0.0 ? -1.0 : 1.0;
 }
 
-/* Return the normal impulse after which the work of restitution is done or the gap rate is zero. */
-static double restitution_ends(double u_n, double rate_n, double left) {
-    double root = u_n * u_n + 2.0 * rate_n * left;
+/* Return the normal impulse that does the rest of the work of restitution, work_left.  If the gap
+ * stops opening before, return the impulse at which this happens. */
+static double impulse_to_end(double u_n, double du_n, double work_left) {
+    double root = u_n * u_n + 2.0 * du_n * work_left;
     if (root < 0.0) {
-        return -u_n / rate_n;
+        return -u_n / du_n;
     }
     double total = u_n + sqrt(root);
-    return total > 0.0 ? 2.0 * left / total : HUGE_VAL;
+    return total > 0.0 ? 2.0 * work_left / total : HUGE_VAL;
 }
 
 /* Return dP_t/dP_n by Coulomb's law for a contact that slips, sticks, or begins to slip. */
@@ -131,65 +133,68 @@ static double friction_ratio(double nt, double tt, double u_t, double friction) 
     return -friction * sign_of(nt);
 }
 
-/* State of an impact: mobilities nn, nt, tt, rates u, impulses p, the ratio dP_t/dP_n, and the
- * derivatives of the rates u_n and u_t by the normal impulse. */
+/* State of an impact: inverse masses nn, nt, tt, rates u, impulses p, the ratio dP_t/dP_n, and the
+ * derivatives du_n and du_t of the rates by the normal impulse. */
 typedef struct {
     double nn, nt, tt, friction;
     double u_n, u_t, p_n, p_t;
-    double ratio, rate_n, rate_t;
+    double ratio, du_n, du_t;
 } Hit;
 
-/* Set the derivatives of the rates by the normal impulse.  They are constant until sliding stops;
- * return the normal impulse at which it stops. */
-static double stops_sliding(Hit *hit) {
+/* Set the ratio of the impulses and the derivatives of the rates, which are constant until sliding
+ * stops.  Return the normal impulse that stops sliding; HUGE_VAL if none does. */
+static double impulse_to_stick(Hit *hit) {
     hit->ratio = friction_ratio(hit->nt, hit->tt, hit->u_t, hit->friction);
-    hit->rate_n = hit->nn + hit->ratio * hit->nt;
-    hit->rate_t = hit->nt + hit->ratio * hit->tt;
-    return hit->u_t * hit->rate_t < 0.0 ? -hit->u_t / hit->rate_t : HUGE_VAL;
+    hit->du_n = hit->nn + hit->ratio * hit->nt;
+    hit->du_t = hit->nt + hit->ratio * hit->tt;
+    return hit->u_t * hit->du_t < 0.0 ? -hit->u_t / hit->du_t : HUGE_VAL;
 }
 
+/* Return the work of an increment of the normal impulse. */
 static double work_of(const Hit *hit, double step) {
-    return hit->u_n * step + hit->rate_n * (step * step) / 2;
+    return hit->u_n * step + hit->du_n * (step * step) / 2;
 }
 
+/* Add an increment of the normal impulse, with its friction. */
 static void receive(Hit *hit, double step) {
     hit->p_n += step;
     hit->p_t += hit->ratio * step;
 }
 
-/* Apply the compression; return its work. */
+/* Apply the impulses of compression; return the energy that they take. */
 static double compress(Hit *hit) {
     double work = 0.0;
     while (hit->u_n < 0.0) {
-        double sticking = stops_sliding(hit);
-        double closed = hit->rate_n > WEDGED_RTOL * hit->nn ? -hit->u_n / hit->rate_n : HUGE_VAL;
-        double step = lesser(sticking, closed);
+        double to_stick = impulse_to_stick(hit);
+        double to_open = hit->du_n > WEDGED_RTOL * hit->nn ? -hit->u_n / hit->du_n : HUGE_VAL;
+        double step = lesser(to_stick, to_open);
         if (step == HUGE_VAL) {
             break; /* No impulse opens the gap; stronge checks the remaining rate. */
         }
         work -= work_of(hit, step);
         receive(hit, step);
-        hit->u_n = step == closed ? 0.0 : hit->u_n + hit->rate_n * step;
-        hit->u_t = step == sticking ? 0.0 : hit->u_t + hit->rate_t * step;
+        hit->u_n = step == to_open ? 0.0 : hit->u_n + hit->du_n * step;
+        hit->u_t = step == to_stick ? 0.0 : hit->u_t + hit->du_t * step;
     }
     return work;
 }
 
-static void restore(Hit *hit, double left) {
-    while (left > 0.0) {
-        double sticking = stops_sliding(hit);
-        double rate = fabs(hit->rate_n) > WEDGED_RTOL * hit->nn ? hit->rate_n : 0.0;
-        double spent = restitution_ends(hit->u_n, rate, left);
-        double step = lesser(sticking, spent);
+/* Apply the impulses of restitution that do the work work_left. */
+static void restore(Hit *hit, double work_left) {
+    while (work_left > 0.0) {
+        double to_stick = impulse_to_stick(hit);
+        double du_n = fabs(hit->du_n) > WEDGED_RTOL * hit->nn ? hit->du_n : 0.0;
+        double to_end = impulse_to_end(hit->u_n, du_n, work_left);
+        double step = lesser(to_stick, to_end);
         if (step == HUGE_VAL) {
             break;
         }
-        left -= work_of(hit, step);
+        work_left -= work_of(hit, step);
         receive(hit, step);
-        if (step == spent) {
+        if (step == to_end) {
             break;
         }
-        hit->u_n = greater(0.0, hit->u_n + hit->rate_n * step);
+        hit->u_n = greater(0.0, hit->u_n + hit->du_n * step);
         hit->u_t = 0.0;
     }
 }
@@ -197,9 +202,10 @@ static void restore(Hit *hit, double left) {
 PRBM bool stronge(const double *W, const double *u, double friction, double restitution,
                   double speed, double *P_n, double *P_t, Problem *problem) {
     Hit hit = {.nn = W[0], .nt = W[1], .tt = W[3], .friction = friction, .u_n = u[0], .u_t = u[1]};
-    double reach = hit.nn > 0.0 ? fabs(hit.u_n) * sqrt(hit.tt / hit.nn) : 0.0;
+    /* Magnitude of the sliding speed that corresponds to the closing rate. */
+    double slide = hit.nn > 0.0 ? fabs(hit.u_n) * sqrt(hit.tt / hit.nn) : 0.0;
     double small_n = ZERO_SPEED_RTOL * fabs(hit.u_n);
-    double small_t = ZERO_SPEED_RTOL * (fabs(hit.u_t) + reach);
+    double small_t = ZERO_SPEED_RTOL * (fabs(hit.u_t) + slide);
     double work = compress(&hit);
     if (!(hit.u_n >= -greater(small_n, COMPLEMENTARITY_RTOL * speed))) {
         return fail(problem, "the wall pushes the mechanism in a direction that friction locks; "
@@ -216,15 +222,15 @@ PRBM bool stronge(const double *W, const double *u, double friction, double rest
 
 /* --- several hits with friction --------------------------------------------------------------- */
 
-/* Upper limits of the work of the normal impulses, and of all impulses, in restitution. */
+/* Upper limits of the work in restitution: of the normal impulses, and of all impulses. */
 typedef struct {
     double normal, all;
-} Returned;
+} WorkLimits;
 
-/* Compute impulses R of restitution that are at least s times wanted.  *allowed: whether their work
- * is within the limits most. */
+/* Compute impulses R of restitution, with normal impulses of at least s times wanted.  *allowed:
+ * whether their work is within the limits.  Return false if there are no such impulses. */
 static bool rebound(int k, const double *W, const double *after, const double *friction,
-                    const double *wanted, double s, const Returned *most, double tolerance,
+                    const double *wanted, double s, const WorkLimits *limits, double tolerance,
                     double *R, bool *allowed, Scratch *scratch) {
     size_t used = scratch->used;
     double *least = take(scratch, (size_t)k);
@@ -238,19 +244,20 @@ static bool rebound(int k, const double *W, const double *after, const double *f
         normal += i < k ? work : 0.0;
         all += work;
     }
-    *allowed = normal <= most->normal && all <= most->all;
+    *allowed = normal <= limits->normal && all <= limits->all;
     scratch->used = used;
     return settled;
 }
 
-/* Find the rebound with the largest s whose work is within the limits. */
+/* Compute the impulses R of restitution with the largest s in [0, 1] whose work is within the
+ * limits.  Return false if there are no impulses for one of the s that are tried. */
 static bool restitution_of_several(int k, const double *W, const double *after,
                                    const double *friction, const double *wanted,
-                                   const Returned *most, double tolerance, double *R,
+                                   const WorkLimits *limits, double tolerance, double *R,
                                    Scratch *scratch) {
     double low = 0.0, high = 1.0;
     bool allowed, trial;
-    if (!rebound(k, W, after, friction, wanted, 1.0, most, tolerance, R, &allowed, scratch)) {
+    if (!rebound(k, W, after, friction, wanted, 1.0, limits, tolerance, R, &allowed, scratch)) {
         return false;
     }
     if (allowed) {
@@ -258,13 +265,34 @@ static bool restitution_of_several(int k, const double *W, const double *after,
     }
     while (high - low > REBOUND_RTOL) {
         double s = (low + high) / 2;
-        if (!rebound(k, W, after, friction, wanted, s, most, tolerance, R, &trial, scratch)) {
+        if (!rebound(k, W, after, friction, wanted, s, limits, tolerance, R, &trial, scratch)) {
             return false;
         }
         low = trial ? s : low;
         high = trial ? high : s;
     }
-    return rebound(k, W, after, friction, wanted, low, most, tolerance, R, &trial, scratch);
+    return rebound(k, W, after, friction, wanted, low, limits, tolerance, R, &trial, scratch);
+}
+
+static bool friction_locks(Problem *problem) {
+    return fail(problem, "the walls push the mechanism in directions that friction locks; reduce "
+                         "the friction of the stops, or the velocities of the walls");
+}
+
+/* Report why no impulses of compression exist: friction is the cause if impulses without it would
+ * open all gaps. */
+static bool unsolved_compression(int k, const double *W, const double *u, double tolerance,
+                                 Scratch *scratch, Problem *problem) {
+    size_t used = scratch->used;
+    double *normals = take_matrix(scratch, k, k), *least = take(scratch, (size_t)k);
+    double *P = take(scratch, (size_t)k);
+    zeros(k, least);
+    for (int i = 0; i < k; i++) {
+        copy(k, W + i * 2 * k, normals + i * k);
+    }
+    bool opens = impulses(k, 0, normals, u, NULL, least, tolerance, P, scratch);
+    scratch->used = used;
+    return opens ? friction_locks(problem) : closing_in(problem);
 }
 
 PRBM bool several(int k, const double *W, const double *u, const double *friction,
@@ -273,26 +301,29 @@ PRBM bool several(int k, const double *W, const double *u, const double *frictio
     size_t used = scratch->used;
     double *after = take(scratch, 2 * (size_t)k), *R = take(scratch, 2 * (size_t)k);
     double *wanted = take(scratch, (size_t)k);
-    Returned most = {0.0, 0.0};
+    WorkLimits limits = {0.0, 0.0};
     double tolerance = COMPLEMENTARITY_RTOL * greater(largest(2 * k, u), speed);
     zeros(k, wanted);
-    bool settled = impulses(k, k, W, u, friction, wanted, tolerance, P, scratch);
-    for (int i = 0; settled && i < 2 * k; i++) {
+    if (!impulses(k, k, W, u, friction, wanted, tolerance, P, scratch)) {
+        scratch->used = used;
+        return unsolved_compression(k, W, u, tolerance, scratch, problem);
+    }
+    for (int i = 0; i < 2 * k; i++) {
         after[i] = u[i] + dot(2 * k, W + i * 2 * k, P);
     }
-    for (int i = 0; settled && i < k; i++) {
-        most.normal -= P[i] * (u[i] + after[i]) / 2 * (restitution[i] * restitution[i]);
+    for (int i = 0; i < k; i++) {
+        limits.normal -= P[i] * (u[i] + after[i]) / 2 * (restitution[i] * restitution[i]);
         wanted[i] = restitution[i] * P[i];
     }
-    for (int i = 0; settled && i < 2 * k; i++) {
-        most.all -= P[i] * (u[i] + after[i]) / 2;
+    for (int i = 0; i < 2 * k; i++) {
+        limits.all -= P[i] * (u[i] + after[i]) / 2;
     }
-    most.all += settled ? COMPLEMENTARITY_RTOL * fabs(dot(2 * k, P, u)) : 0.0;
-    settled = settled && restitution_of_several(k, W, after, friction, wanted, &most, tolerance, R,
-                                                scratch);
+    limits.all += COMPLEMENTARITY_RTOL * fabs(dot(2 * k, P, u));
+    bool settled = restitution_of_several(k, W, after, friction, wanted, &limits, tolerance, R,
+                                          scratch);
     for (int i = 0; settled && i < 2 * k; i++) {
         P[i] += R[i];
     }
     scratch->used = used;
-    return settled || closing_in(problem);
+    return settled || friction_locks(problem);
 }

@@ -197,7 +197,7 @@ RARE void carried_rows(const Equations *q, const Kinematics *at, double *rows,
     }
 }
 
-SIZED void rows_to_length(int even, const Equations *q, const Kinematics *at, double *rows,
+SIZED void rows_padded(int even, const Equations *q, const Kinematics *at, double *rows,
                           double *convective) {
     Parts B = q->B_conjugate, e = at->e_parts;
     switch (q->r) {
@@ -217,13 +217,13 @@ SIZED void rows_to_length(int even, const Equations *q, const Kinematics *at, do
 
 static void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
                                 double *convective) {
-    rows_to_length(q->system->even, q, at, rows, convective);
+    rows_padded(q->system->even, q, at, rows, convective);
 }
 
-SHARED void rows_of_length(int even, const Equations *q, const Kinematics *at, double *rows,
+SHARED void rows_dispatch(int even, const Equations *q, const Kinematics *at, double *rows,
                            double *convective) {
     if (KNOWN(even)) {
-        rows_to_length(even, q, at, rows, convective);
+        rows_padded(even, q, at, rows, convective);
     } else {
         rows_and_convection(q, at, rows, convective);
     }
@@ -441,7 +441,7 @@ SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
         return false;
     }
     set_columns(q, result);
-    return schur_of_length(even, &result->factors);
+    return schur_dispatch(even, &result->factors);
 }
 
 RARE void add_coriolis(const System *system, Evaluation *result) {
@@ -457,14 +457,14 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
     directions_of(even, q->system, near, &result->at);
     find_loads(even, q, result);
     add_springs(even, q, result);
-    rows_of_length(even, q, &result->at, result->factors.Z, result->lam);
+    rows_dispatch(even, q, &result->at, result->factors.Z, result->lam);
     if (q->special) {
         add_special(q, result);
     }
     if (!factor_motion(even, q, result)) {
         return false;
     }
-    finish_of_length(even, &result->factors, result->a, result->lam);
+    finish_dispatch(even, &result->factors, result->a, result->lam);
     if (q->system->stretch_count > 0) {
         add_coriolis(q->system, result);
     }

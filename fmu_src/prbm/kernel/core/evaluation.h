@@ -46,7 +46,7 @@ PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *eval
                               const double *v);
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
 SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at);
-SHARED void rows_of_length(int even, const Equations *q, const Kinematics *at, double *rows,
+SHARED void rows_dispatch(int even, const Equations *q, const Kinematics *at, double *rows,
                            double *convective);
 SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,
                              Evaluation *result);

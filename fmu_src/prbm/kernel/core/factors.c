@@ -34,13 +34,14 @@ RARE bool factor(int size, const double *M, double *L, double *inverse) {
     return factor_any(size, M, L, inverse);
 }
 
-#define LEAST_MULTIPLE 1e-280 /* Multiples outside these limits may underflow or overflow. */
+/* Limits of the products of pivots in small_factor, beyond which they may underflow or overflow. */
+#define LEAST_MULTIPLE 1e-280
 #define LARGEST_MULTIPLE 1e280
 
-/* Factor a small M like factor_any, but with all divisions at the end, so that they overlap in
- * time. The elimination without divisions computes multiples w_k of D_k and w_k L_ik of L_ik, with
- * w_0 = M_00, w_1 = w_0 D_1, w_2 = w_0 w_1 D_2, ...  Also return false if these multiples may
- * underflow or overflow; factor may then succeed. */
+/* Factor M, of a size up to SMALL, like factor_any, but with all divisions at the end, so that they
+ * overlap in time.  Elimination without divisions computes w_k = w_0 w_1 ... w_(k-1) D_k on the
+ * diagonal, with w_0 = D_0, and w_k L_ik below it.  Return false if M is not positive definite, or
+ * if a product may underflow or overflow; factor may then succeed. */
 SHARED bool small_factor(int size, const double *ALONE M, double *ALONE L, double *ALONE inverse) {
     double w[SMALL][SMALL], multiple = 1.0;
     bool safe;
@@ -136,7 +137,8 @@ SIZED void block_solve(int size, const double *ALONE L, double *ALONE b, Substit
     }
 }
 
-/* Apply block_solve to the coordinates from start, for a small block. */
+/* Apply block_solve to the entries of x that belong to a block: size entries from the index start,
+ * with a size up to SMALL. */
 SHARED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
                         Substitution way) {
     double b[SMALL];
@@ -171,7 +173,8 @@ static void backward_all(const Factors *factors, double *x) {
     solve_blocks(factors, x, BACKWARD);
 }
 
-/* Compute the lower triangle of S = Z D^-1 Z^T, and store its factor and 1/D behind S. */
+/* Compute the lower triangle of S = Z D^-1 Z^T, with the D of M, and factor S = L_S D_S L_S^T.
+ * L_S (r, r) and 1/D_S (r,) are stored behind S. */
 SIZED bool schur_of_size(int r, int even, Factors *factors) {
     const double *Z = factors->Z, *inverse = factors->inverse;
     double *S = factors->S, *L = S + r * r;
@@ -197,8 +200,8 @@ SIZED bool schur_of_size(int r, int even, Factors *factors) {
     return small_factor(r, S, L, L + r * r) || factor(r, S, L, L + r * r);
 }
 
-/* Compute and factor S by LU, for columns that differ from the rows (a stop slides) or a large
- * S. */
+/* Compute S, and factor it by LU: for an S that is larger than SMALL, or not symmetric because a
+ * stop slides and the columns differ from the rows. */
 static bool factor_unsymmetric(Factors *factors) {
     int even = factors->even, r = factors->r;
     for (int i = 0; i < r; i++) {
@@ -214,7 +217,8 @@ static bool factor_unsymmetric(Factors *factors) {
     return lu_factor(r, factors->S, factors->pivots);
 }
 
-SIZED bool schur_to_length(int even, Factors *factors) {
+/* Compute and factor S for vectors of the padded length even. */
+SIZED bool schur_padded(int even, Factors *factors) {
     factors->symmetric = factors->Z_columns == factors->Z && factors->r <= SMALL;
     if (!factors->symmetric) {
         return factor_unsymmetric(factors);
@@ -229,14 +233,15 @@ SIZED bool schur_to_length(int even, Factors *factors) {
 }
 
 PRBM bool factor_schur(Factors *factors) {
-    return schur_to_length(factors->even, factors);
+    return schur_padded(factors->even, factors);
 }
 
-SHARED bool schur_of_length(int even, Factors *factors) {
-    return KNOWN(even) ? schur_to_length(even, factors) : factor_schur(factors);
+/* Compute and factor S, by code for this padded length if the compiler knows it. */
+SHARED bool schur_dispatch(int even, Factors *factors) {
+    return KNOWN(even) ? schur_padded(even, factors) : factor_schur(factors);
 }
 
-/* Solve S lam = right side of the rows, given in lam. */
+/* Solve S lam = b with the factors of a symmetric S.  On entry lam contains b. */
 SIZED void multipliers_of_size(int r, const double *S, double *lam) {
     const double *L = S + r * r, *inverse = L + r * r;
     block_forward(r, L, lam);
@@ -247,7 +252,7 @@ SIZED void multipliers_of_size(int r, const double *S, double *lam) {
     block_backward(r, L, lam);
 }
 
-/* Subtract Z D^-1 x from the right side of the rows, given in lam. */
+/* Subtract Z D^-1 x from lam, the right side of the constraint rows. */
 SIZED void reduce_right_side(int count, int even, const double *ALONE Z, const double *ALONE x,
                            const double *ALONE inverse, double *ALONE lam) {
     Lanes sum[SMALL][SUMS] = {{NO_LANES}};
@@ -265,8 +270,8 @@ SIZED void reduce_right_side(int count, int even, const double *ALONE Z, const d
     }
 }
 
-/* Compute lam and x := D^-1 (x + Z^T lam) from x = L^-1 f and the right side of the rows, given in
- * lam. */
+/* Solve for the multipliers lam, and set x := D^-1 (x + Z_columns^T lam).  On entry x contains
+ * L^-1 f, and lam the right side of the constraint rows. */
 SIZED void constrain_of_size(int r, int even, const Factors *factors, double *ALONE x,
                              double *ALONE lam) {
     const double *ALONE Z = factors->Z, *ALONE columns = factors->Z_columns;
@@ -291,8 +296,9 @@ SIZED void constrain_of_size(int r, int even, const Factors *factors, double *AL
     }
 }
 
-/* Compute the solution from x = L^-1 f and the right side of the rows, given in lam. */
-SIZED void finish_to_length(int even, const Factors *factors, double *x, double *lam) {
+/* Compute the solution x and the multipliers lam.  On entry x contains L^-1 f, and lam the right
+ * side of the constraint rows. */
+SIZED void finish_padded(int even, const Factors *factors, double *x, double *lam) {
     switch (factors->r) {
     case 0: constrain_of_size(0, even, factors, x, lam); break;
     case 1: constrain_of_size(1, even, factors, x, lam); break;
@@ -305,12 +311,13 @@ SIZED void finish_to_length(int even, const Factors *factors, double *x, double 
 }
 
 static void finish(const Factors *factors, double *x, double *lam) {
-    finish_to_length(factors->even, factors, x, lam);
+    finish_padded(factors->even, factors, x, lam);
 }
 
-SHARED void finish_of_length(int even, const Factors *factors, double *x, double *lam) {
+/* Finish the solution, by code for this padded length if the compiler knows it. */
+SHARED void finish_dispatch(int even, const Factors *factors, double *x, double *lam) {
     if (KNOWN(even)) {
-        finish_to_length(even, factors, x, lam);
+        finish_padded(even, factors, x, lam);
     } else {
         finish(factors, x, lam);
     }

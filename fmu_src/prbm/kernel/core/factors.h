@@ -31,8 +31,8 @@ SHARED void put_block(int size, int start, const double *from, double *to);
 SHARED void block_forward(int size, const double *ALONE L, double *ALONE b);
 SHARED void solve_small(int size, int start, const double *ALONE L, double *ALONE x,
                         Substitution way);
-SHARED bool schur_of_length(int even, Factors *factors);
-SHARED void finish_of_length(int even, const Factors *factors, double *x, double *lam);
+SHARED bool schur_dispatch(int even, Factors *factors);
+SHARED void finish_dispatch(int even, const Factors *factors, double *x, double *lam);
 PRBM void forward_all(const Factors *factors, double *x);
 
 #endif

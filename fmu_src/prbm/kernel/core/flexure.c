@@ -37,27 +37,28 @@ PRBM void reversed(Segments *pieces) {
 }
 
 /* Two mirrored halves share the middle link.  At a free end the last link is part of the body. */
-PRBM int links_of(const FlexureType *model, int start_end, int end_end) {
+PRBM int links_of(const FlexureType *model, int type_at_start, int type_at_end) {
     if (model->links > 0) {
         return model->links;
     }
-    if (start_end == PIN && end_end == PIN) {
+    if (type_at_start == PIN && type_at_end == PIN) {
         return 1;
     }
-    if (start_end == CLAMP && end_end == CLAMP) {
+    if (type_at_start == CLAMP && type_at_end == CLAMP) {
         return 2 * model->pivots - 1;
     }
-    return start_end == FREE || end_end == FREE ? model->pivots - 1 : model->pivots;
+    return type_at_start == FREE || type_at_end == FREE ? model->pivots - 1 : model->pivots;
 }
 
-/* Return whether link i of n stretches: every link of a chain, else the middle link only. */
+/* Every link of a chain stretches; of other flexures, link n / 2, rounded down: the middle one, or
+ * the one after the middle. */
 PRBM bool stretches(const FlexureType *model, int i, int n) {
     return model->axial && (model->links > 0 || i == n / 2);
 }
 
 /* Set the segments of a chain of equal links. */
-static void cut_chain(const FlexureType *model, int start_end, int end_end, double L, double EI,
-                      Segments *result) {
+static void cut_chain(const FlexureType *model, int type_at_start, int type_at_end, double L,
+                      double EI, Segments *result) {
     int n = model->links;
     double rate = n * EI / L;
     for (int i = 0; i <= n; i++) {
@@ -65,8 +66,8 @@ static void cut_chain(const FlexureType *model, int start_end, int end_end, doub
         result->rates[i] = rate;
     }
     result->lengths[n + 1] = 0.0;
-    result->rates[0] = start_end == PIN ? 0.0 : 2 * rate;
-    result->rates[n] = end_end == PIN ? 0.0 : 2 * rate;
+    result->rates[0] = type_at_start == PIN ? 0.0 : 2 * rate;
+    result->rates[n] = type_at_end == PIN ? 0.0 : 2 * rate;
 }
 
 /* Set the segments of a flexure between two pins: one link. */
@@ -76,11 +77,11 @@ static void cut_bar(double L, Segments *result) {
     result->rates[0] = result->rates[1] = 0.0;
 }
 
-/* Set the segments of one cantilever of length h, from the clamp to the tip, or of two mirrored. */
+/* Set the segments of one cantilever of length h, or of two mirrored ones. */
 static bool cut_cantilevers(const FlexureType *model, const double *gamma, const double *K_theta,
-                            int start_end, int end_end, double L, double EI, Segments *result,
-                            Problem *problem) {
-    bool mirrored = start_end == CLAMP && end_end == CLAMP;
+                            int type_at_start, int type_at_end, double L, double EI,
+                            Segments *result, Problem *problem) {
+    bool mirrored = type_at_start == CLAMP && type_at_end == CLAMP;
     int pivots = model->pivots, n = result->n;
     double h = mirrored ? L / 2 : L, gamma0;
     if (!stub(pivots, gamma, &gamma0, problem)) {
@@ -102,7 +103,7 @@ static bool cut_cantilevers(const FlexureType *model, const double *gamma, const
         result->lengths[n + 1] = 0.0;
         result->rates[n] = 0.0;
     }
-    if (start_end != CLAMP) {
+    if (type_at_start != CLAMP) {
         reverse(n + 2, result->lengths);
         reverse(n + 1, result->rates);
     }
@@ -110,16 +111,16 @@ static bool cut_cantilevers(const FlexureType *model, const double *gamma, const
 }
 
 PRBM bool segments(const FlexureType *model, const double *gamma, const double *K_theta,
-                   int start_end, int end_end, double L, double EI, double mass, double EA,
+                   int type_at_start, int type_at_end, double L, double EI, double mass, double EA,
                    Segments *result, Problem *problem) {
-    int n = result->n = links_of(model, start_end, end_end);
-    bool clamped = start_end == CLAMP || end_end == CLAMP;
-    bool freed = start_end == FREE || end_end == FREE;
+    int n = result->n = links_of(model, type_at_start, type_at_end);
+    bool clamped = type_at_start == CLAMP || type_at_end == CLAMP;
+    bool freed = type_at_start == FREE || type_at_end == FREE;
     if (model->links > 0) {
-        cut_chain(model, start_end, end_end, L, EI, result);
-    } else if (start_end == PIN && end_end == PIN) {
+        cut_chain(model, type_at_start, type_at_end, L, EI, result);
+    } else if (type_at_start == PIN && type_at_end == PIN) {
         cut_bar(L, result);
-    } else if (!cut_cantilevers(model, gamma, K_theta, start_end, end_end, L, EI, result,
+    } else if (!cut_cantilevers(model, gamma, K_theta, type_at_start, type_at_end, L, EI, result,
                                 problem)) {
         return false;
     }

@@ -10,7 +10,7 @@ static const FlexureType *kind_of(const Mechanism *m, const Flexure *flexure) {
 }
 
 static int link_count(const Mechanism *m, const Flexure *flexure) {
-    return links_of(kind_of(m, flexure), flexure->start_end, flexure->end_end);
+    return links_of(kind_of(m, flexure), flexure->type_at_start, flexure->type_at_end);
 }
 
 PRBM void count_coordinates(Reader *reader, Mechanism *m) {

@@ -47,7 +47,7 @@ typedef struct {
     const char *name;
     int type;
     Connection between;
-    int start_end, end_end; /* CLAMP, PIN or FREE */
+    int type_at_start, type_at_end; /* CLAMP, PIN or FREE */
 } Flexure;
 
 typedef struct {

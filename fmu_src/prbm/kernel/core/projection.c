@@ -94,7 +94,7 @@ SIZED double position_residuals(int even, const Equations *q, const Kinematics *
 }
 
 SIZED void velocity_residuals(int even, const Equations *q, double t, Correction *c) {
-    rows_of_length(even, q, &c->at, c->rows, c->convective);
+    rows_dispatch(even, q, &c->at, c->rows, c->convective);
     for (int k = 0; k < q->r; k++) {
         double rate = even_dot(even, c->rows + k * even, c->at.speed);
         c->residual[k] = -(rate + prescribed(q, k, t));
@@ -108,7 +108,7 @@ SIZED void correct(int even, const Equations *q, const Factors *factors, Correct
     for (int j = 0; j < even; j += LANES) {
         set_lanes(c->change + j, all_lanes(0.0));
     }
-    finish_of_length(even, factors, c->change, c->residual);
+    finish_dispatch(even, factors, c->change, c->residual);
     for (int i = 0; i < q->system->n; i++) {
         y[i] += c->change[i];
     }

@@ -126,10 +126,10 @@ static void read_flexures(Reader *reader, Mechanism *m) {
         f->name = read_text(reader);
         f->type = read_index(reader, 0, m->type_count);
         f->between = read_connection(reader, m);
-        f->start_end = read_index(reader, CLAMP, FREE + 1);
-        f->end_end = read_index(reader, CLAMP, FREE + 1);
-        bool freed = f->start_end == FREE || f->end_end == FREE;
-        if (freed && f->start_end != CLAMP && f->end_end != CLAMP) {
+        f->type_at_start = read_index(reader, CLAMP, FREE + 1);
+        f->type_at_end = read_index(reader, CLAMP, FREE + 1);
+        bool freed = f->type_at_start == FREE || f->type_at_end == FREE;
+        if (freed && f->type_at_start != CLAMP && f->type_at_end != CLAMP) {
             reader->wrong = reader->wrong ? reader->wrong : "a flexure without a clamp";
         }
     }
