@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from kernel_simulation import KernelSimulation
+from kernel_simulation import KernelMistake, KernelSimulation
+from prbm.base.errors import SimulationError
 from prbm.hybrid.simulation import Simulation
 from prbm.hybrid.stability import FastestMode
 from prbm.hybrid.stepping import StepSizeController, rounded_step
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
-from support import mechanism
+from support import energy_balance, mechanism
 
 STIFF = ("FoldedSuspension", "PRBDM2RAxial")
 each_stiff = pytest.mark.parametrize("name", STIFF)
@@ -69,3 +70,23 @@ def test_a_rounded_step_has_four_binary_digits():
         fraction, _ = np.frexp(rounded_step(h))
         assert fraction * 16 == round(fraction * 16)
         assert rounded_step(h) == pytest.approx(h, rel=1 / 16)
+
+
+@each_engine
+@pytest.mark.parametrize("velocity", [-5.0, -7.0, -15.0])
+def test_energy_is_balanced_up_to_an_error_at_the_flat_shape(velocity, engine):
+    """Friction reverses where the flexures are flat and the loop does not determine the motion."""
+    values = {"release.velocity": velocity, "stop.position": 1.0, "friction.coefficient": 0.3}
+    sim = engine(mechanism("PRBDM"), values)
+    out = sim.outputs()
+    start, scale, message = energy_balance(out), 0.0, "straight line"
+    for t in np.linspace(0.0, 0.03, 31)[1:]:
+        try:
+            sim.advance(float(t))
+            out = sim.outputs()
+        except (SimulationError, KernelMistake) as error:
+            message = str(error)
+            break
+        scale = max(scale, out["energy.kinetic"], out["energy.elastic"])
+        assert energy_balance(out) == pytest.approx(start, abs=4e-5 * scale)
+    assert "straight line" in message

@@ -18,6 +18,7 @@ STUB_RTOL = 1e-12  # Of a cantilever's length: excess of the sum of its links th
 CONSTRAINT_RTOL = 1e-14  # Of the size: residual of a closed loop, a few roundings of a coordinate.
 CONSTRAINT_STALLED_RTOL = 1e-12  # Of the size: residual accepted when iteration stops improving.
 CONSTRAINT_ITERATIONS_MAX = 20  # Gauss-Newton converges quadratically; three are usual.
+PROJECTION_FACTOR = 1.0  # Of the square root of the tolerance: largest change by a projection.
 
 # --- statics and modes -------------------------------------------------------------------------
 STATICS_ITERATIONS_MAX = 30  # Newton steps at one load.

@@ -33,7 +33,7 @@ from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
 from .release import released
 from .stability import FastestMode
-from .stepping import StepSizeController, take_step
+from .stepping import StepSizeController, check_projection, take_step
 
 
 class Simulation:
@@ -313,7 +313,7 @@ class Simulation:
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k)
         event = events.first_event(StepView(configuration.scales, equations, arc, step.forces))
         if event is None:
-            y, self.k1 = equations.project_near(arc.end, step.y, step.factors), step.k[-1]
+            y, self.k1 = step.y, step.k[-1]
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
@@ -321,7 +321,9 @@ class Simulation:
                 arc, y = arc.cut(equations.rate, event.time)
             else:
                 arc, y = replace(arc, end=event.time), arc.at(event.time)
-            y, self.k1 = equations.project(event.time, y), None
+            cut, self.k1 = y, None
+            y = equations.project(event.time, cut)
+            check_projection(configuration, event.time, cut, y)
         self.front = Front(arc.end, y, equations, front.latched)
         self.arc, self.pending, self.controller = arc, event, controller
 
@@ -344,7 +346,9 @@ class Simulation:
         # The present equations are those of the step that passes the present time.
         n, y = self.system.n, self.arc.at(self.time)
         evaluation = self.equations.evaluate(self.time, y[:n], y[n : 2 * n])
-        return self.equations.project_near(self.time, y, evaluation.factors)
+        projected = self.equations.project_near(self.time, y, evaluation.factors)
+        check_projection(self.configuration, self.time, y, projected)
+        return projected
 
     def magnitudes(self) -> Magnitudes:
         """Return typical magnitudes of a motion that starts with the present state."""

@@ -18,6 +18,7 @@ from ..base.tolerances import (
     FIRST_RATE_MIN,
     FIRST_STEP_EXPONENT,
     FIRST_STEP_FACTOR,
+    PROJECTION_FACTOR,
     STEP_ERROR_FACTOR,
     STEP_ERROR_MIN,
     STEP_GROWTH_MAX,
@@ -110,7 +111,7 @@ class Step:
     k : (stages, 2 n + 2)
         Rates of the stages.
     y : (2 n + 2,)
-        State at the end, not projected.
+        State at the end.
     error : float
         Error divided by the allowed error.
     forces : (stages - 1, r)
@@ -134,7 +135,7 @@ def take_step(
     controller: StepSizeController,
     fastest: FastestMode,
 ) -> tuple[Step, StepSizeController]:
-    """Return a step whose error is within the tolerance, and the controller of the next.
+    """Return a projected step within the tolerance, and the controller of the next.
 
     Parameters
     ----------
@@ -165,7 +166,9 @@ def take_step(
         check_size(t, controller.h)
         try:
             step = compute_step(configuration, equations, t, y, controller.h, k1)
-        except SimulationError:  # The equations fail at a stage: the step is far too long.
+            if step.error <= 1.0:
+                step = projected(configuration, equations, t, step)
+        except SimulationError:  # A stage or the projection fails: the step is far too long.
             controller = controller.next(math.inf)
             continue
         controller = controller.next(step.error)
@@ -181,7 +184,7 @@ def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
     Raises
     ------
     SimulationError
-        If the error is larger than the state, or the equations fail at a stage.
+        If the error is larger than the state, or a stage or the projection fails.
     """
     t = front.time
     h = min(configuration.step or 0.0, step_limit(front.inputs.walls, t))
@@ -192,7 +195,7 @@ def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
             f"the fixed step of {h:g} s is too long at t = {t:.9g} s: its error is larger than "
             "the state; shorten it"
         )
-    return step
+    return projected(configuration, front.equations, t, step)
 
 
 def check_size(t: float, h: float) -> None:
@@ -248,6 +251,42 @@ def compute_step(
     error /= STEP_ERROR_FACTOR * configuration.tolerance
     forces = np.array([evaluation.lam for evaluation in evaluations])
     return Step(h, k, y1, error, forces, evaluations[-1].factors)
+
+
+def projected(configuration: Configuration, equations: Equations, t: float, step: Step) -> Step:
+    """Return a step from time t [s] with its end projected onto the constraints.
+
+    Raises
+    ------
+    SimulationError
+        If the loops cannot be closed, or as :func:`check_projection`.
+    """
+    y = equations.project_near(t + step.h, step.y, step.factors)
+    check_projection(configuration, t + step.h, step.y, y)
+    return replace(step, y=y)
+
+
+def check_projection(configuration: Configuration, t: float, y: Real, projected: Real) -> None:
+    """Reject a projection at time t [s] that changes a state y (2 n + 2,) too much.
+
+    Near a shape in which the loops do not determine the motion, the projection turns small errors
+    into large changes of the velocities.  The kinetic energy changes by the square of their
+    relative change, which the limit keeps below the tolerance.  Fixed steps have no limit.
+
+    Raises
+    ------
+    SimulationError
+        If the change relative to the state is too large.
+    """
+    change = error_norm(configuration.scales, projected - y, y, projected)
+    largest = PROJECTION_FACTOR * math.sqrt(configuration.tolerance)
+    if not (change <= largest or configuration.step):
+        raise SimulationError(
+            f"at t = {t:.9g} s closing the loops would change the motion by {change:.3g} of its "
+            f"size, more than {largest:.3g}: links of a loop form a straight line, where the "
+            "motion is not unique; change the inputs, the stops or the release so that the "
+            "mechanism does not pass this shape"
+        )
 
 
 def step_error(scales: Scales, h: float, k: Real, y: Real, y1: Real) -> float:

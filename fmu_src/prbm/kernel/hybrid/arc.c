@@ -1,6 +1,7 @@
 /* The latest step and its dense output: the twin of hybrid/arc.py. */
 #include "hybrid/arc.h"
 #include "hybrid/simulation.h"
+#include "hybrid/stepping.h"
 
 PRBM void arc_at(const Simulation *sim, double t, double *y) {
     const Arc *arc = &sim->state.arc;
@@ -30,7 +31,13 @@ PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *eva
     }
     arc_at(sim, state->time, y);
     set_reference(near, system, y);
-    return factor_equations(&sim->equations, y, y + system->n, near, evaluation, problem) &&
-           project_near(&sim->equations, evaluation, near, state->time, y, &sim->correction,
-                        &sim->scratch, problem);
+    size_t mark = sim->scratch.used;
+    double *interpolated = take(&sim->scratch, (size_t)state_size(sim));
+    copy(state_size(sim), y, interpolated);
+    bool right = factor_equations(&sim->equations, y, y + system->n, near, evaluation, problem) &&
+                 project_near(&sim->equations, evaluation, near, state->time, y, &sim->correction,
+                              &sim->scratch, problem) &&
+                 check_projection(sim, state->time, interpolated, y, problem);
+    sim->scratch.used = mark;
+    return right;
 }

@@ -117,8 +117,47 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
+PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
+                           Problem *problem) {
+    size_t mark = sim->scratch.used;
+    int ny = state_size(sim);
+    double *change = take(&sim->scratch, (size_t)ny), means[2];
+    for (int i = 0; i < ny; i++) {
+        change[i] = projected[i] - y[i];
+    }
+    mean_squares(sim, change, change, y, projected, means);
+    sim->scratch.used = mark;
+    double size = sqrt(means[0]), most = PROJECTION_FACTOR * sqrt(sim->state.tolerance);
+    if (!(size <= most)) {
+        return fail(problem,
+                    "at t = %.9g s closing the loops would change the motion by %.3g of its size, "
+                    "more than %.3g: links of a loop form a straight line, where the motion is not "
+                    "unique; change the inputs, the stops or the release so that the mechanism "
+                    "does not pass this shape",
+                    t, size, most);
+    }
+    return true;
+}
+
+/* Compute a step and project its end, which becomes the front.  Return the error relative to the
+ * allowed error; infinite if a stage or the projection fails. */
+static double projected_error(Simulation *sim, double h, Problem *problem) {
+    State *state = &sim->state;
+    Stepping *stepping = &sim->stepping;
+    double error = step_error(sim, h, problem);
+    if (!(error <= 1.0)) {
+        return error;
+    }
+    copy(state_size(sim), stepping->end, state->front);
+    double end = state->front_time + h;
+    bool closed = project_near(&sim->equations, &stepping->evaluation, &stepping->reference, end,
+                               state->front, &sim->correction, &sim->scratch, problem) &&
+                  check_projection(sim, end, stepping->end, state->front, problem);
+    return closed ? error : HUGE_VAL;
+}
+
 /* Compute a step within the tolerance and no longer than longest [s].  Its stages are stored in the
- * arc, its end in stepping. */
+ * arc, its projected end in the front. */
 static bool find_step(Simulation *sim, double longest, double *h, Problem *problem) {
     State *state = &sim->state;
     int ny = state_size(sim);
@@ -132,7 +171,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
         if (!check_step_size(state, *h, problem)) {
             return false;
         }
-    } while (!next(&controller, step_error(sim, *h, problem)));
+    } while (!next(&controller, projected_error(sim, *h, problem)));
     state->step_size = controller.h;
     if (*h == longest && longest < wanted) { /* A wall shortened this step only. */
         state->step_size = greater(controller.h, wanted);
@@ -158,7 +197,10 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
         }
         state->arc.h = event->time - state->arc.start;
     }
-    return project(&sim->equations, event->time, state->front, &sim->scratch, problem);
+    double *y = sim->stepping.end;
+    copy(state_size(sim), state->front, y);
+    return project(&sim->equations, event->time, state->front, &sim->scratch, problem) &&
+           check_projection(sim, event->time, y, state->front, problem);
 }
 
 /* Take one step from the front, up to its first event. */
@@ -180,11 +222,6 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     state->pending.kind = EVENT_NONE;
     if (h > STABLE_STEP_WATCH_FACTOR * stable_step(sim)) {
         refine_fastest(sim);
-    }
-    copy(ny, stepping->end, state->front); /* the state of the last stage */
-    if (!project_near(&sim->equations, &stepping->evaluation, &stepping->reference, end,
-                      state->front, &sim->correction, &sim->scratch, problem)) {
-        return false;
     }
     Event event;
     if (!first_event(sim, &event, problem)) {

@@ -7,4 +7,8 @@
 PRBM double longest_step(const Simulation *sim);
 PRBM bool take_step(Simulation *sim, Problem *problem);
 
+/* Fail if a projection at time t has changed a state y too much. */
+PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
+                           Problem *problem);
+
 #endif
