@@ -13,4 +13,10 @@ PRBM double wall_reach(const Wall *wall, double h);
 PRBM double follow_cubics(Simulation *sim);
 PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem);
 
+/* Compute the gaps of all stops at the present time and front, and their rates. */
+PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates);
+/* After a change of stop.offset, move each wall so that its gap and rate are the given ones.  The
+ * wall then joins its reference along a cubic. */
+PRBM void keep_gaps(Simulation *sim, const double *gaps, const double *rates);
+
 #endif
