@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelSimulation
+from many_parts import anvil
 from prbm.base.tolerances import WALL_LONGEST_RTOL
 from prbm.hybrid.simulation import Simulation
 from prbm.mechanics.inputs import Wall
@@ -335,3 +336,22 @@ def test_the_engine_and_the_kernel_agree_on_random_motions_of_the_wall():
         for name in ("shuttle.x", "stop.gap", "stop.impact_count"):
             assert kernel[name] == pytest.approx(engine[name], abs=1e-7), (t, name)
     assert kernel["stop.impact_count"] > 1
+
+
+@both
+def test_energy_is_balanced_when_the_offset_of_a_held_stop_changes(twin):
+    """The wall moves with the hit point: the gap stays closed, and the wall does the work."""
+    sim = TWINS[twin](anvil(), {"face.restitution": 0.0, "blow.y": -2.0})
+    points = [k * 1e-4 for k in range(1, 41)]
+    while not sim.outputs()["face.force"] > 0.0:
+        sim.advance(points.pop(0))
+    start = energy_balance(sim.outputs())
+    sim.set({"face.offset": 3e-3})
+    sim.advance(points.pop(0))
+    assert abs(sim.outputs()["face.gap"]) < 1e-12
+    assert sim.outputs()["face.force"] > 0.0
+    for t in points:
+        sim.advance(t)
+        out = sim.outputs()
+        scale = out["energy.kinetic"] + out["energy.elastic"]
+        assert energy_balance(out) == pytest.approx(start, abs=1e-6 * scale)

@@ -22,6 +22,7 @@ from ..base.tolerances import (
     WALL_PATH_RTOL,
     WALL_STEP_RTOL,
 )
+from ..mechanics.arrays import Real
 from ..mechanics.inputs import Wall
 from ..mechanism.parts import value
 from .configuration import Configuration
@@ -115,6 +116,47 @@ def join(
             velocity = float(wall.motion(now)[1]) if last else line.rate
             joined[i] = wall.joining(line, velocity, span)
     return Course(now, longest, tuple(driven)), tuple(joined)
+
+
+def keeping_gaps(
+    acting: Configuration,
+    configuration: Configuration,
+    course: Course,
+    walls: tuple[Wall, ...],
+    now: float,
+    y: Real,
+) -> tuple[Wall, ...]:
+    """Return walls that have moved with the hit points after a change of ``stop.offset``.
+
+    The gaps and their rates do not jump.  Each wall then joins its reference along a cubic.
+
+    Parameters
+    ----------
+    acting, configuration : Configuration
+        Configurations with the parameter values up to now, and from now on.
+    course : Course
+        Past communication steps.
+    walls : (s,) tuple of Wall
+        Motions of the walls.
+    now : float
+        The present time [s].
+    y : (2 n + 2,)
+        The present state.
+    """
+    n, system = configuration.system.n, configuration.system
+    e, v = system.directions(y[:n]), y[n : 2 * n]
+    old, new = acting.system.gap_rows, system.gap_rows
+    jumps = new.values(e) - old.values(e)
+    turns = new.rates(e, v) - old.rates(e, v)
+    span = 2.0 * (course.longest or WALL_LONGEST_RTOL * configuration.scales.time)
+    kept = list(walls)
+    for i, (wall, jump, turn) in enumerate(zip(walls, jumps, turns, strict=True)):
+        if abs(jump) + abs(turn) * span > WALL_PATH_RTOL * system.length:
+            x, velocity, _ = wall.motion(now)
+            line = wall.reference(now)
+            offset, excess = float(x - jump) - line, float(velocity - turn) - wall.rate
+            kept[i] = Wall(line, wall.rate, now, offset, excess, span)
+    return tuple(kept)
 
 
 def _mean_rate(rate: float, off: float, longest: float, following: float) -> float:

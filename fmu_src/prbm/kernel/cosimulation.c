@@ -31,9 +31,20 @@ static void take_inputs(Simulation *sim) {
     set_inputs(sim);
 }
 
+/* Let the parameters act that have been set.  The gaps do not jump. */
+static bool take_parameters(Simulation *sim, Problem *problem) {
+    double gaps[STOPS_MAX], rates[STOPS_MAX];
+    gaps_and_rates(sim, gaps, rates);
+    if (!take_values(sim, problem)) {
+        return false;
+    }
+    keep_gaps(sim, gaps, rates);
+    return true;
+}
+
 /* Continue from the present state with the inputs and parameters that have been set. */
 static bool restart(Simulation *sim, Problem *problem) {
-    if (!leave_arc(sim, problem) || (values_changed(sim) && !take_values(sim, problem))) {
+    if (!leave_arc(sim, problem) || (values_changed(sim) && !take_parameters(sim, problem))) {
         return false;
     }
     take_inputs(sim);

@@ -100,7 +100,7 @@ def _line(variable: Any, kind: str) -> str:
     v = variable
     role = ROLES.get(v.causality) or ("t" if v.variability == "tunable" else "p")
     end = v.name.rpartition(".")[2]
-    kept = (role == "t" and end == "offset") or (kind == "me" and end == "mobility")
+    kept = kind == "me" and (end == "mobility" or (role == "t" and end == "offset"))
     role = "k" if kept else role
     tag = "-" if v.name.startswith("der(") else ENDS.get(end, "-")
     start = float(v.start or 0.0)

@@ -474,17 +474,10 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
 /* Open the closed stops whose gaps have a rate after a change of a wall's velocity or an impulse.
  * Return a stop that is struck, or -1: a stop whose body touches the wall and moves towards it. */
 static int release_moving(Simulation *sim) {
-    size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     int struck = -1;
     double gaps[STOPS_MAX], rates[STOPS_MAX], bound = zero_speed(&sim->configuration);
-    double t = sim->state.time;
-    Complex *e = directions_at(sim, sim->state.front);
-    for (int i = 0; i < system->s; i++) {
-        gaps[i] = gap(&sim->equations, i, t, e);
-        rates[i] = gap_rate(&sim->equations, i, t, e, sim->state.front + system->n);
-    }
-    sim->scratch.used = mark;
+    gaps_and_rates(sim, gaps, rates);
     for (int i = 0; i < system->s; i++) {
         bool closed = sim->state.modes[i] != CONTACT_OPEN;
         if (closed && fabs(rates[i]) > bound) {

@@ -75,6 +75,38 @@ PRBM bool join_walls(Simulation *sim, double time) {
     return changed;
 }
 
+PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates) {
+    size_t mark = sim->scratch.used;
+    const State *state = &sim->state;
+    Complex *e = directions_at(sim, state->front);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        gaps[i] = gap(&sim->equations, i, state->time, e);
+        rates[i] = gap_rate(&sim->equations, i, state->time, e, state->front + system_of(sim)->n);
+    }
+    sim->scratch.used = mark;
+}
+
+PRBM void keep_gaps(Simulation *sim, const double *gaps, const double *rates) {
+    State *state = &sim->state;
+    double now = state->time, after[STOPS_MAX], rates_after[STOPS_MAX];
+    double longest = WALL_LONGEST_RTOL * sim->configuration.scales.time;
+    double T = 2.0 * (state->longest > 0.0 ? state->longest : longest);
+    double least = WALL_PATH_RTOL * system_of(sim)->length;
+    gaps_and_rates(sim, after, rates_after);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        double jump = after[i] - gaps[i], turn = rates_after[i] - rates[i];
+        if (fabs(jump) + fabs(turn) * T > least) {
+            Wall *wall = &state->walls[i];
+            WallMotion here = wall_motion(wall, now);
+            wall->position += wall->rate * (now - wall->since);
+            wall->since = now;
+            wall->offset = here.x - jump - wall->position;
+            wall->excess = here.v - turn - wall->rate;
+            wall->span = T;
+        }
+    }
+}
+
 /* Give walls whose stop.velocity has changed in event mode this velocity. */
 PRBM void turn_walls(Simulation *sim) {
     for (int i = 0; i < system_of(sim)->s; i++) {
