@@ -7,6 +7,7 @@
 #include "hybrid/impacts.h"
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
+#include "hybrid/walls.h"
 
 /* --- trial equations -------------------------------------------------------------------------- */
 
