@@ -353,3 +353,24 @@ def test_derivatives_after_an_event_with_impulses_are_those_of_the_state_after_i
     assert np.abs(expected[0] - before).max() > 1e-3
     for x, same in zip(found, expected, strict=True):
         np.testing.assert_allclose(x, same, rtol=1e-9, atol=1e-9 * np.abs(same).max())
+
+
+def test_a_wall_keeps_its_velocity_after_an_impulse_until_its_partner_sets_it():
+    """The velocity changes by mobility times impulse, and a saved state includes the change."""
+    mobility = 5.0
+    at_rest = {"release.displacement": 0.0, "stop.mobility": mobility}
+    sim = KernelSimulation(mechanism("PRBDM"), at_rest, exchange=True)
+    sim.set({"stop.velocity": -2e-2})
+    assert sim.event()
+    struck, state = sim.outputs(), sim.state
+    wall = struck["stop.gap_rate"] + struck["stop.point.velocity"]
+    assert struck["stop.impulse_sum"] > 0.0
+    assert wall == pytest.approx(-2e-2 + mobility * struck["stop.impulse_sum"], rel=1e-9)
+    sim.exchange_set(0.0, sim.exchange_get())  # The next evaluation.
+    assert sim.get("stop.gap_rate") == pytest.approx(struck["stop.gap_rate"], rel=1e-9)
+    sim.restore(state)
+    assert sim.get("stop.gap_rate") == pytest.approx(struck["stop.gap_rate"], rel=1e-9)
+    sim.set({"stop.velocity": wall})
+    assert sim.get("stop.gap_rate") == pytest.approx(struck["stop.gap_rate"], rel=1e-9)
+    sim.set({"stop.velocity": 0.0})
+    assert sim.get("stop.gap_rate") == pytest.approx(-sim.get("stop.point.velocity"), rel=1e-9)

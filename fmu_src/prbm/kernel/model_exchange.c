@@ -64,7 +64,7 @@ PRBM bool exchange_refresh(Simulation *sim, Problem *problem) {
         return false;
     }
     copy(m->input_count, state->given, state->acting_given);
-    start_walls(sim);
+    place_walls(sim);
     set_inputs(sim);
     copy(n, state->accepted, state->front); /* first guess of the loops */
     for (int k = 0; k < count; k++) {

@@ -28,7 +28,7 @@ ENDS = {
 """Tags of variables by the end of their names; the driver's oracles read them."""
 
 WALLS = ("displacement", "velocity")
-WALL_SHARE = 0.1  # Of the nominal value: jumps of walls that do not push the links flat.
+WALL_SHARE = 0.1  # Of the nominal value: jumps of walls that the interpolant follows.
 
 GAP_ATOL = 1e-8  # m: largest penetration of a rigid stop.
 ENERGY_RTOL = 1e-5  # Of the largest energy in a run: bound of its balance at tolerance 0.
@@ -100,7 +100,7 @@ def _line(variable: Any, kind: str) -> str:
     v = variable
     role = ROLES.get(v.causality) or ("t" if v.variability == "tunable" else "p")
     end = v.name.rpartition(".")[2]
-    kept = kind == "me" and (end == "mobility" or (role == "t" and end == "offset"))
+    kept = kind == "me" and role == "t" and end == "offset"
     role = "k" if kept else role
     tag = "-" if v.name.startswith("der(") else ENDS.get(end, "-")
     start = float(v.start or 0.0)

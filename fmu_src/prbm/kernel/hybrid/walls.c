@@ -29,11 +29,28 @@ static void turn_wall(Wall *wall, double t, double change) {
     wall->rate += change;
 }
 
+/* In model exchange, place the walls as their inputs define.  The changes of velocity by impulses,
+ * which are the excess, remain until stop.velocity is set. */
+PRBM void place_walls(Simulation *sim) {
+    double kicks[STOPS_MAX];
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        kicks[i] = sim->state.walls[i].excess;
+    }
+    start_walls(sim);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        sim->state.walls[i].rate += kicks[i];
+        sim->state.walls[i].excess = kicks[i];
+    }
+}
+
 /* Push a wall by the impulse P on the body; returns the work of the wall. */
 PRBM double push_wall(Simulation *sim, int i, double P) {
     Wall *wall = &sim->state.walls[i];
     double t = sim->state.front_time, change = sim->equations.inputs.mobilities[i] * P;
     turn_wall(wall, t, change);
+    if (sim->state.mode.exchange) {
+        wall->excess += change;
+    }
     sim->state.latched[i].impulse_sum += P;
     return -P * (wall_motion(wall, t).v - change / 2);
 }

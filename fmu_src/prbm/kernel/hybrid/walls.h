@@ -5,6 +5,7 @@
 #include "hybrid/state.h"
 
 PRBM void start_walls(Simulation *sim);
+PRBM void place_walls(Simulation *sim);
 PRBM bool join_walls(Simulation *sim, double time);
 PRBM double jump_allowed(const Simulation *sim, int i);
 PRBM void turn_walls(Simulation *sim);
