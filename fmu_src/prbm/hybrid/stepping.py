@@ -15,11 +15,11 @@ import numpy as np
 
 from ..base.errors import SimulationError
 from ..base.tolerances import (
-    DENSE_ERROR_FACTOR,
     FIRST_RATE_MIN,
     FIRST_STEP_EXPONENT,
     FIRST_STEP_FACTOR,
     PROJECTION_FACTOR,
+    STEP_ERROR_FACTOR,
     STEP_ERROR_MIN,
     STEP_GROWTH_MAX,
     STEP_MEMORY_EXPONENT,
@@ -190,7 +190,7 @@ def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
     h = min(configuration.step or 0.0, step_limit(front.inputs.walls, t))
     check_size(t, h)
     step = compute_step(configuration, front.equations, t, front.y, h, k1)
-    if not step.error * configuration.tolerance <= 1.0:
+    if not step.error * STEP_ERROR_FACTOR * configuration.tolerance <= 1.0:
         raise SimulationError(
             f"the fixed step of {h:g} s is too long at t = {t:.9g} s: its error is larger than "
             "the state; shorten it"
@@ -248,7 +248,7 @@ def compute_step(
     with np.errstate(over="ignore", invalid="ignore"):
         k, y1 = stages(PAIR, rate, t, y, h, k1)
         error = step_error(configuration.scales, h, k, y, y1)
-    error /= configuration.tolerance
+    error /= STEP_ERROR_FACTOR * configuration.tolerance
     forces = np.array([evaluation.lam for evaluation in evaluations])
     return Step(h, k, y1, error, forces, evaluations[-1].factors)
 
@@ -294,13 +294,12 @@ def step_error(scales: Scales, h: float, k: Real, y: Real, y1: Real) -> float:
 
     The differences to solutions of orders 5 and 3 fall with h^6 and h^4.  The square of the first
     over the second falls with h^8, as the error of the solution of order 7 does [3].  On linear
-    oscillations it is 0.4 to 1.8 times that error, up to the limit of stability.  At small steps
-    the error of the dense output is larger; it is a fraction of the difference to order 5.
+    oscillations it is 0.4 to 1.8 times that error, up to the limit of stability.
     """
     fine = error_norm(scales, h * (PAIR.error @ k), y, y1)
     coarse = error_norm(scales, h * (PAIR.coarse_error @ k), y, y1)
     size = math.sqrt(fine * fine + coarse * coarse)
-    return fine * max(fine / size, DENSE_ERROR_FACTOR) if size > 0.0 else size
+    return fine * fine / size if size > 0.0 else size
 
 
 def error_norm(scales: Scales, difference: Real, y: Real, y1: Real) -> float:

@@ -100,8 +100,7 @@ static bool check_step_size(const State *state, double h, Problem *problem) {
 
 /* Return the error of a step of the arc, relative to the allowed error; infinite if a stage fails.
  * The differences from solutions of orders 5 and 3 give an estimate that falls with the 8th power
- * of h (Hairer, II.10), as the error of the solution of order 7 does.  At small steps the error of
- * the dense output is larger; it is a fraction of the difference from the solution of order 5. */
+ * of h (Hairer, II.10), as the error of the solution of order 7 does. */
 static double step_error(Simulation *sim, double h, Problem *problem) {
     Stepping *stepping = &sim->stepping;
     const Arc *arc = &sim->state.arc;
@@ -114,9 +113,8 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     coarse_error_of(ny, arc->k, h, stepping->coarse_error);
     double means[2];
     mean_squares(sim, stepping->error, stepping->coarse_error, arc->y, stepping->end, means);
-    double size = sqrt(means[0] + means[1]), fine = sqrt(means[0]);
-    double error = size > 0.0 ? fine * greater(fine / size, DENSE_ERROR_FACTOR) : size;
-    return error / sim->state.tolerance;
+    double size = sqrt(means[0] + means[1]), error = size > 0.0 ? means[0] / size : size;
+    return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
 PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
