@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import linprog
 
 import random_contacts
+from kernel_library import kernel
 from prbm.base.tolerances import COMPLEMENTARITY_RTOL
 from prbm.mechanics import complementarity
 
@@ -45,6 +46,23 @@ def test_rejected_problems_have_no_solution_in_any_combination_of_modes():
             second_paths += not first_path_solves(W, u, mu, normal)
     assert rejected > 10
     assert second_paths > 0
+
+
+@pytest.mark.parametrize("engine", ["package", "kernel"])
+def test_contacts_that_separate_without_forces_receive_none(engine):
+    """Friction could jam a part of them: these problems have a second solution."""
+    rng = np.random.default_rng(0)
+    for _ in range(2000):
+        k = 2
+        W, u = random_contacts.drawn(rng, 2 * k, k)
+        u[:k] *= -1.0
+        mu, zero, normal = rng.uniform(0, 2, k), np.zeros(k), np.arange(k)
+        P, tolerance = np.ones(2 * k), COMPLEMENTARITY_RTOL * np.abs(u).max()
+        if engine == "kernel":
+            assert kernel().coulomb(k, k, W, u, mu, zero, normal, tolerance, P)
+        else:
+            P = complementarity.coulomb(W, u, mu, zero, normal, tolerance)
+        assert np.abs(P * np.diag(W)).max() < 1e-12 * np.abs(u).max()
 
 
 def first_path_solves(W, u, mu, normal):

@@ -124,6 +124,10 @@ def coulomb(
     tangential forces abs(P) <= limit, and P = -limit sign(rate) where the rate is not zero.  The
     limit is fixed + friction P_n, with the normal force P_n of the contact.
 
+    The solution need not be unique: friction can jam contacts that would also slide or separate.
+    Contacts that do not close without forces are therefore left out at first.  They take part only
+    if the forces of the others close them.
+
     Round-off on the path of pivots may lead to forces that violate the laws by more than the
     tolerance.  They are discarded, and the path of the next covering vector is followed.  If there
     is no solution, the normal rates are increased by half of the tolerance.
@@ -148,6 +152,12 @@ def coulomb(
     >>> W, none = np.eye(2), np.zeros(1)
     >>> coulomb(W, np.array([-10.0, 3.0]), none + 0.5, none, np.array([0]), 1e-9).tolist()
     [10.0, -3.0]
+
+    A contact that jams (forces 1 and -1.5 are a second solution) separates instead.
+
+    >>> W = np.array([[1.0, 1.4], [1.4, 2.0]])
+    >>> coulomb(W, np.array([1.1, 1.6]), none + 2.0, none, np.array([0]), 1e-9).tolist()
+    [0.0, 0.0]
     """
     m = len(fixed)
     k = len(u) - m
@@ -166,13 +176,20 @@ def coulomb(
     for j in range(m):
         if normal[j] >= 0:
             M[size + j, normal[j]] = friction[j] * scale[normal[j]] / scale[k + j]
-    for opened in (0.0, tolerance / 2):
-        b = scale * (u + opened * (np.arange(k + m) < k))
-        q = np.concatenate([spread.T @ b, fixed / scale[k:]])
+    attempts = [(M, u), (M, u + tolerance / 2 * (np.arange(k + m) < k))]
+    unloaded = np.flatnonzero(u[:k] >= -tolerance)
+    if len(unloaded):
+        reduced = M.copy()
+        reduced[unloaded], reduced[:, unloaded] = 0.0, 0.0
+        rates = u.copy()
+        rates[unloaded] = np.maximum(rates[unloaded], 0.0)
+        attempts.insert(0, (reduced, rates))
+    for matrix, rates in attempts:
+        q = np.concatenate([spread.T @ (scale * rates), fixed / scale[k:]])
         for heavy in range(-1, k):
             cover = np.ones(len(q))
             cover[:k][np.arange(k) == heavy] = COVER_FACTOR
-            z = lemke(M, q, cover)
+            z = lemke(matrix, q, cover)
             if z is None:
                 continue
             P = scale * (spread @ z[:size])

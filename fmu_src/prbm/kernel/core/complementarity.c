@@ -206,6 +206,22 @@ PRBM double violation(int k, int m, const double *W, const double *u, const doub
     return worst;
 }
 
+/* Leave the contacts that do not close without forces out of a problem; false if there are none. */
+static bool leave_out(int k, int size, const double *u, double tolerance, double *M, double *q) {
+    bool found = false;
+    for (int i = 0; i < k; i++) {
+        if (u[i] < -tolerance) {
+            continue;
+        }
+        found = true;
+        q[i] = greater(q[i], 0.0);
+        for (int j = 0; j < size; j++) {
+            M[i * size + j] = M[j * size + i] = 0.0;
+        }
+    }
+    return found;
+}
+
 /* Follow the path of one covering vector to forces P; false if it ends in a ray. */
 static bool follow_path(int k, int m, const double *M, const double *q, int heavy,
                         const double *scale, double *P, Scratch *scratch) {
@@ -235,11 +251,14 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *
         double mobility = fabs(W[i * (k + m) + i]);
         scale[i] = mobility > 0.0 ? 1.0 / sqrt(mobility) : 1.0;
     }
-    set_problem(k, m, W, u, friction, fixed, normal, scale, M, q);
-    /* If only round-off excludes a solution: normal rates larger by half of the tolerance. */
-    for (int attempt = 0; !solved && attempt < 2; attempt++) {
-        for (int i = 0; i < k; i++) {
-            q[i] = scale[i] * (u[i] + attempt * (tolerance / 2));
+    for (int attempt = 0; !solved && attempt < 3; attempt++) {
+        set_problem(k, m, W, u, friction, fixed, normal, scale, M, q);
+        if (attempt == 0 && !leave_out(k, size, u, tolerance, M, q)) {
+            continue;
+        }
+        /* If only round-off excludes a solution: normal rates larger by half of the tolerance. */
+        for (int i = 0; attempt == 2 && i < k; i++) {
+            q[i] += scale[i] * (tolerance / 2);
         }
         for (int heavy = -1; !solved && heavy < k; heavy++) {
             solved = follow_path(k, m, M, q, heavy, scale, P, scratch);
