@@ -52,6 +52,7 @@ def test_the_files_and_functions_that_the_page_names_exist():
         file = next((p for p in (SCRIPT["PACKAGE"] / path, ROOT / path) if p.exists()), None)
         assert file is not None, path
         if function:
-            assert re.search(rf"\b{function.split('.')[-1]}\(", file.read_text()), function
+            name = re.sub(r"^(fmi[23])(\w+)", r"(\1\2|FMI[23]\\(\2\\))", function.split(".")[-1])
+            assert re.search(rf"\b{name}\(", file.read_text()), function
     for name in re.findall(r"`(test_\w+\.py)`", PAGE):
         assert (ROOT / "tests" / "kernel" / name).exists(), name

@@ -510,7 +510,7 @@ def _native_licenses(platforms: Sequence[str]) -> str:
     )
     return (
         "<h2>Licences</h2>\n<p>The model and its engine: MIT, see "
-        '<a href="licenses/prbm-impact.txt">licenses/prbm-impact.txt</a>. The FMI headers, '
-        'used in the compilation: BSD 2-Clause, see <a href="licenses/fmi-headers.txt">'
-        f"licenses/fmi-headers.txt</a>.{windows}</p>"
+        '<a href="licenses/prbm-impact.txt">licenses/prbm-impact.txt</a>. Libraries that '
+        "were compiled with ziglang contain parts of its runtime library: MIT, see "
+        f'<a href="licenses/zig.txt">licenses/zig.txt</a>.{windows}</p>'
     )

@@ -26,7 +26,7 @@ from .slave.resolved import resolved
 from .start import interface, magnitudes, start_sample
 
 NAMESPACE = uuid.UUID("f0b6b5a1-6d5c-5b0e-8c55-1a52a0e6f1d3")
-LICENSES = ("prbm-impact.txt", "fmi-headers.txt")
+LICENSES = ("prbm-impact.txt", "zig.txt")
 WINDOWS_LICENSE = "mingw-w64.txt"
 
 

@@ -1,8 +1,8 @@
 """Compilation of the C kernel, once for each platform, with a cache in the user's folder.
 
-The library is the same for every mechanism, so an export compiles nothing if the cache has it.
-The system's compiler compiles for this machine; the compiler of the Python package ``ziglang``
-compiles for every platform, on Linux for glibc 2.17 or later.
+The library is the same for every mechanism, so an export compiles nothing if the package or the
+cache has it.  The system's compiler compiles for this machine; the compiler of the Python package
+``ziglang`` compiles for every platform, on Linux for glibc 2.17 or later.
 """
 
 import hashlib
@@ -24,6 +24,7 @@ from pathlib import Path
 from ..base.atomic import write
 from ..base.errors import PrbmError
 from ..base.lock import locked
+from .prebuilt import prebuilt
 from .sources import UNIT, kernel
 
 HOST, ALL = "host", "all"
@@ -39,10 +40,6 @@ LINK = {
     "windows": ("-shared", "-s"),
     "darwin": ("-fPIC", "-dynamiclib", "-Wl,-install_name,@rpath/prbm_fmu.dylib"),
 }  # fmt: skip
-HEADERS = (
-    "fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h",
-    "fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h",
-)  # fmt: skip
 _loaded: dict[str, bytes] = {}  # Libraries of this process by the names of their cache entries.
 ERROR_LINES_MAX = 6  # Lines of a compiler's output in an error message.
 TEMPORARY = ("TMPDIR", "TMP", "TEMP")  # Variables that name the folder of a compiler's files.
@@ -131,16 +128,26 @@ def libraries(
     ------
     CompilerError
         If there is no compiler for one of the platforms, or it fails.
+    DamagedLibraryError
+        If a library of the installed package is damaged.
     """
     result = {}
     for name in platforms:
         if name == HOST:
-            result[_host()] = _library(_host(), _host_compilers(), progress)
+            here = _host()
+            result[here] = _prebuilt(here) or _library(here, _host_compilers(), progress)
     names = PLATFORMS if ALL in platforms else [name for name in platforms if name in PLATFORMS]
     for name in names:
         chosen = PLATFORMS[name]
-        result[chosen] = _library(chosen, _zig(chosen), progress)
+        result[chosen] = _prebuilt(chosen) or _library(chosen, _zig(chosen), progress)
     return result
+
+
+def _prebuilt(wanted: Platform) -> bytes | None:
+    """Return the library of the installed package, unless CC names a compiler."""
+    if os.environ.get("CC", "").strip():
+        return None
+    return prebuilt(f"{wanted.name}{wanted.suffix}", kernel())
 
 
 def _host() -> Platform:
@@ -241,32 +248,11 @@ def _zig(wanted: Platform) -> list[Compiler]:
 # --- compiling ------------------------------------------------------------------------------------
 
 
-def headers() -> dict[str, bytes]:
-    """Return the headers of FMI 2.0 and 3.0, which are part of FMPy, by name.
-
-    Raises
-    ------
-    CompilerError
-        If FMPy does not have them.
-    """
-    import fmpy  # type: ignore[import-untyped]
-
-    folder = Path(fmpy.__file__).parent / "c-code"
-    try:
-        return {name: (folder / name).read_bytes() for name in HEADERS}
-    except OSError as error:
-        raise CompilerError(
-            f"the headers of FMI are missing in FMPy ({error.filename}: {error.strerror}); FMPy "
-            "0.3.20 to 0.3.x is supported: install it with "
-            "'python -m pip install \"fmpy>=0.3.20,<0.4\"'"
-        ) from None
-
-
 def _library(
     wanted: Platform, compilers: Iterable[Compiler], progress: Callable[[str], None]
 ) -> bytes:
     """Return the library of a platform from the first compiler that succeeds."""
-    files = kernel() | headers()
+    files = kernel()
     problem: CompilerError | None = None
     for compiler in compilers:
         try:

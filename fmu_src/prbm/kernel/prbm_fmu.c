@@ -1,8 +1,7 @@
 /* The library, compiled as one file; only the functions of FMI are exported.
  *
- * The headers fmi2Functions.h and fmi3Functions.h are those of the standards.  With -DPRBM_FMI=2
- * or 3 the library has the functions of that version only.  With -DPRBM_TABLES the tables of the
- * mechanism come from mechanism_tables.h instead of the FMU's folder resources.
+ * With -DPRBM_FMI=2 or 3 the library has the functions of that version only.  With -DPRBM_TABLES
+ * the tables of the mechanism come from mechanism_tables.h instead of the FMU's folder resources.
  */
 #include "generated.h"
 #include "kernel.h"

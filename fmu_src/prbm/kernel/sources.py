@@ -21,11 +21,11 @@ BYTES_PER_LINE = 20
 HEAD = """\
 /* {name}: {title}.
  *
- * The C kernel of {tool} as one file.  It needs the headers of FMI {version}.0; all functions
- * except those of the standard are static.  {tables} contains the mechanism, so that no file
- * is read at run time.  Compile without -ffast-math and, for the same results on every platform,
- * with -ffp-contract=off.  With the headers of the standard, function names have the prefix
- * {name}_, unless {override} is defined.
+ * The C kernel of {tool} as one file, for FMI {version}.0.  It needs the C library only; all
+ * functions except those of the standard are static.  {tables} contains the mechanism, so
+ * that no file is read at run time.  Compile without -ffast-math and, for the same results on every
+ * platform, with -ffp-contract=off.  Function names have the prefix {name}_, unless
+ * {override} is defined.
  */
 #ifndef {prefix}
 #define {prefix} {name}_

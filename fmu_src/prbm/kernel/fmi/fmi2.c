@@ -3,7 +3,7 @@
 
 #include <string.h>
 
-#include "fmi2Functions.h"
+#include "fmi/types2.h"
 #include "fmi/fmu.h"
 
 /* --- the state machine of the standard -------------------------------------------------------- */
@@ -101,12 +101,12 @@ static fmi2Status worse2(fmi2Status status, int another) {
 
 /* --- versions and messages -------------------------------------------------------------------- */
 
-const char *fmi2GetTypesPlatform(void) {
-    return fmi2TypesPlatform;
+EXPORTED const char *FMI2(GetTypesPlatform)(void) {
+    return FMI2_TYPES_PLATFORM;
 }
 
-const char *fmi2GetVersion(void) {
-    return fmi2Version;
+EXPORTED const char *FMI2(GetVersion)(void) {
+    return FMI2_VERSION;
 }
 
 /* Pass the message as the format itself, for loggers without variable arguments. */
@@ -115,8 +115,8 @@ static void send2(const Journal *journal, int status, const char *category, cons
     logger(journal->environment, journal->instance, (fmi2Status)status, category, text);
 }
 
-fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nCategories,
-                               const fmi2String categories[]) {
+EXPORTED fmi2Status FMI2(SetDebugLogging)(fmi2Component c, fmi2Boolean loggingOn,
+                                          size_t nCategories, const fmi2String categories[]) {
     Instance *instance = called2(c, RULE2_SetDebugLogging, nCategories, categories);
     return instance ? (fmi2Status)choose_categories(instance, &FMI2[RULE2_SetDebugLogging],
                                                     loggingOn != fmi2False, nCategories,
@@ -127,10 +127,10 @@ fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean loggingOn, size_t nC
 /* --- creation and initialization -------------------------------------------------------------- */
 
 /* Create an instance.  Errors are logged even if loggingOn is false, as FMI 2.0 requires. */
-fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2String fmuGUID,
-                              fmi2String fmuResourceLocation,
-                              const fmi2CallbackFunctions *functions, fmi2Boolean visible,
-                              fmi2Boolean loggingOn) {
+EXPORTED fmi2Component FMI2(Instantiate)(fmi2String instanceName, fmi2Type fmuType,
+                                         fmi2String fmuGUID, fmi2String fmuResourceLocation,
+                                         const fmi2CallbackFunctions *functions,
+                                         fmi2Boolean visible, fmi2Boolean loggingOn) {
     Request request = {0};
     (void)visible; /* The FMU has no graphical interface. */
     request.standard = &STANDARD2;
@@ -153,20 +153,20 @@ fmi2Component fmi2Instantiate(fmi2String instanceName, fmi2Type fmuType, fmi2Str
     return instance_open(&request);
 }
 
-void fmi2FreeInstance(fmi2Component c) {
+EXPORTED void FMI2(FreeInstance)(fmi2Component c) {
     instance_close(c);
 }
 
-fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fmi2Real tolerance,
-                               fmi2Real startTime, fmi2Boolean stopTimeDefined,
-                               fmi2Real stopTime) {
+EXPORTED fmi2Status FMI2(SetupExperiment)(fmi2Component c, fmi2Boolean toleranceDefined,
+                                          fmi2Real tolerance, fmi2Real startTime,
+                                          fmi2Boolean stopTimeDefined, fmi2Real stopTime) {
     Instance *instance = called2(c, RULE2_SetupExperiment, 0, NULL);
     return instance ? (fmi2Status)set_up(instance, toleranceDefined != fmi2False, tolerance,
                                          startTime, stopTimeDefined != fmi2False, stopTime)
                     : fmi2Error;
 }
 
-fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
+EXPORTED fmi2Status FMI2(EnterInitializationMode)(fmi2Component c) {
     Instance *instance = called2(c, RULE2_EnterInitializationMode, 0, NULL);
     if (!instance) {
         return fmi2Error;
@@ -180,17 +180,17 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     return fmi2OK;
 }
 
-fmi2Status fmi2ExitInitializationMode(fmi2Component c) {
+EXPORTED fmi2Status FMI2(ExitInitializationMode)(fmi2Component c) {
     Instance *instance = called2(c, RULE2_ExitInitializationMode, 0, NULL);
     return instance ? (fmi2Status)exit_initialization(instance) : fmi2Error;
 }
 
-fmi2Status fmi2Terminate(fmi2Component c) {
+EXPORTED fmi2Status FMI2(Terminate)(fmi2Component c) {
     Instance *instance = called2(c, RULE2_Terminate, 0, NULL);
     return instance ? (fmi2Status)end_run(instance) : fmi2Error;
 }
 
-fmi2Status fmi2Reset(fmi2Component c) {
+EXPORTED fmi2Status FMI2(Reset)(fmi2Component c) {
     Instance *instance = called2(c, RULE2_Reset, 0, NULL);
     return instance ? (fmi2Status)reset(instance) : fmi2Error;
 }
@@ -204,8 +204,8 @@ static Instance *accessed2(fmi2Component c, int rule, const fmi2ValueReference v
     return instance && given(instance, &FMI2[rule], nvr, value) ? instance : NULL;
 }
 
-fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                       fmi2Real value[]) {
+EXPORTED fmi2Status FMI2(GetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                  fmi2Real value[]) {
     Instance *instance = accessed2(c, RULE2_GetReal, vr, nvr, value);
     fmi2Status status = instance ? fmi2OK : fmi2Error;
     for (size_t i = 0; i < nvr && status == fmi2OK; i++) {
@@ -214,8 +214,8 @@ fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     return status;
 }
 
-fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          fmi2Integer value[]) {
+EXPORTED fmi2Status FMI2(GetInteger)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                     fmi2Integer value[]) {
     Instance *instance = accessed2(c, RULE2_GetInteger, vr, nvr, value);
     fmi2Status status = instance ? fmi2OK : fmi2Error;
     for (size_t i = 0; i < nvr && status == fmi2OK; i++) {
@@ -226,8 +226,8 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
     return status;
 }
 
-fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          fmi2Boolean value[]) {
+EXPORTED fmi2Status FMI2(GetBoolean)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                     fmi2Boolean value[]) {
     Instance *instance = accessed2(c, RULE2_GetBoolean, vr, nvr, value);
     fmi2Status status = instance ? fmi2OK : fmi2Error;
     for (size_t i = 0; i < nvr && status == fmi2OK; i++) {
@@ -239,8 +239,8 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 }
 
 /* Log the type of each variable: none is of type String. */
-fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                         fmi2String value[]) {
+EXPORTED fmi2Status FMI2(GetString)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                    fmi2String value[]) {
     Instance *instance = accessed2(c, RULE2_GetString, vr, nvr, value);
     fmi2Status status = instance ? fmi2OK : fmi2Error;
     for (size_t i = 0; i < nvr && instance; i++) {
@@ -251,8 +251,8 @@ fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return status;
 }
 
-fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                       const fmi2Real value[]) {
+EXPORTED fmi2Status FMI2(SetReal)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                  const fmi2Real value[]) {
     Instance *instance = accessed2(c, RULE2_SetReal, vr, nvr, value);
     fmi2Status status = instance ? fmi2OK : fmi2Error;
     for (size_t i = 0; i < nvr && instance; i++) {
@@ -261,8 +261,8 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t nv
     return status;
 }
 
-fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Integer value[]) {
+EXPORTED fmi2Status FMI2(SetInteger)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                     const fmi2Integer value[]) {
     Instance *instance = accessed2(c, RULE2_SetInteger, vr, nvr, value);
     fmi2Status status = instance ? fmi2OK : fmi2Error;
     for (size_t i = 0; i < nvr && instance; i++) {
@@ -271,8 +271,8 @@ fmi2Status fmi2SetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
     return status;
 }
 
-fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                          const fmi2Boolean value[]) {
+EXPORTED fmi2Status FMI2(SetBoolean)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                     const fmi2Boolean value[]) {
     Instance *instance = accessed2(c, RULE2_SetBoolean, vr, nvr, value);
     fmi2Status status = instance ? fmi2OK : fmi2Error;
     for (size_t i = 0; i < nvr && instance; i++) {
@@ -281,8 +281,8 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
     return status;
 }
 
-fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                         const fmi2String value[]) {
+EXPORTED fmi2Status FMI2(SetString)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
+                                    const fmi2String value[]) {
     Instance *instance = accessed2(c, RULE2_SetString, vr, nvr, value);
     fmi2Status status = instance ? fmi2OK : fmi2Error;
     for (size_t i = 0; i < nvr && instance; i++) {
@@ -291,10 +291,12 @@ fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], size_t 
     return status;
 }
 
-fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference vUnknown_ref[],
-                                        size_t nUnknown, const fmi2ValueReference vKnown_ref[],
-                                        size_t nKnown, const fmi2Real dvKnown[],
-                                        fmi2Real dvUnknown[]) {
+EXPORTED fmi2Status FMI2(GetDirectionalDerivative)(fmi2Component c,
+                                                   const fmi2ValueReference vUnknown_ref[],
+                                                   size_t nUnknown,
+                                                   const fmi2ValueReference vKnown_ref[],
+                                                   size_t nKnown, const fmi2Real dvKnown[],
+                                                   fmi2Real dvUnknown[]) {
     const Rule *rule = &FMI2[RULE2_GetDirectionalDerivative];
     Instance *instance = accessed2(c, RULE2_GetDirectionalDerivative, vUnknown_ref, nUnknown,
                                    dvUnknown);
@@ -308,17 +310,17 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
 
 /* --- saved states ----------------------------------------------------------------------------- */
 
-fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
+EXPORTED fmi2Status FMI2(GetFMUstate)(fmi2Component c, fmi2FMUstate *FMUstate) {
     Instance *instance = called2(c, RULE2_GetFMUstate, 1, FMUstate);
     return instance ? (fmi2Status)save_state(instance, FMUstate) : fmi2Error;
 }
 
-fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
+EXPORTED fmi2Status FMI2(SetFMUstate)(fmi2Component c, fmi2FMUstate FMUstate) {
     Instance *instance = called2(c, RULE2_SetFMUstate, 1, FMUstate);
     return instance ? (fmi2Status)restore_state(instance, FMUstate) : fmi2Error;
 }
 
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
+EXPORTED fmi2Status FMI2(FreeFMUstate)(fmi2Component c, fmi2FMUstate *FMUstate) {
     Instance *instance = called2(c, RULE2_FreeFMUstate, 0, NULL);
     if (instance && FMUstate) {
         free_state(FMUstate);
@@ -326,7 +328,8 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
     return instance ? fmi2OK : fmi2Error;
 }
 
-fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size) {
+EXPORTED fmi2Status FMI2(SerializedFMUstateSize)(fmi2Component c, fmi2FMUstate FMUstate,
+                                                 size_t *size) {
     const Rule *rule = &FMI2[RULE2_SerializedFMUstateSize];
     Instance *instance = called2(c, RULE2_SerializedFMUstateSize, 1, FMUstate);
     if (!instance || !given(instance, rule, 1, size)) {
@@ -336,8 +339,8 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
     return fmi2OK;
 }
 
-fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[],
-                                 size_t size) {
+EXPORTED fmi2Status FMI2(SerializeFMUstate)(fmi2Component c, fmi2FMUstate FMUstate,
+                                            fmi2Byte serializedState[], size_t size) {
     const Rule *rule = &FMI2[RULE2_SerializeFMUstate];
     Instance *instance = called2(c, RULE2_SerializeFMUstate, 1, FMUstate);
     if (!instance || !given(instance, rule, 1, serializedState)) {
@@ -346,8 +349,8 @@ fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byt
     return (fmi2Status)serialize(instance, FMUstate, (unsigned char *)serializedState, size);
 }
 
-fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size,
-                                   fmi2FMUstate *FMUstate) {
+EXPORTED fmi2Status FMI2(DeSerializeFMUstate)(fmi2Component c, const fmi2Byte serializedState[],
+                                              size_t size, fmi2FMUstate *FMUstate) {
     const Rule *rule = &FMI2[RULE2_DeSerializeFMUstate];
     Instance *instance = called2(c, RULE2_DeSerializeFMUstate, 1, serializedState);
     if (!instance || !given(instance, rule, 1, FMUstate)) {
@@ -359,12 +362,12 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
 
 /* --- model exchange --------------------------------------------------------------------------- */
 
-fmi2Status fmi2EnterEventMode(fmi2Component c) {
+EXPORTED fmi2Status FMI2(EnterEventMode)(fmi2Component c) {
     Instance *instance = called2(c, RULE2_EnterEventMode, 0, NULL);
     return instance ? (fmi2Status)enter_event_mode(instance) : fmi2Error;
 }
 
-fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
+EXPORTED fmi2Status FMI2(NewDiscreteStates)(fmi2Component c, fmi2EventInfo *eventInfo) {
     Instance *instance = called2(c, RULE2_NewDiscreteStates, 1, eventInfo);
     bool again = false, changed = false;
     if (!instance) {
@@ -380,17 +383,17 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *eventInfo) {
     return status;
 }
 
-fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
+EXPORTED fmi2Status FMI2(EnterContinuousTimeMode)(fmi2Component c) {
     Instance *instance = called2(c, RULE2_EnterContinuousTimeMode, 0, NULL);
     return instance ? (fmi2Status)leave_event_mode(instance, &FMI2[RULE2_EnterContinuousTimeMode],
                                                    MODE_CONTINUOUS)
                     : fmi2Error;
 }
 
-fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
-                                       fmi2Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi2Boolean *enterEventMode,
-                                       fmi2Boolean *terminateSimulation) {
+EXPORTED fmi2Status FMI2(CompletedIntegratorStep)(fmi2Component c,
+                                                  fmi2Boolean noSetFMUStatePriorToCurrentPoint,
+                                                  fmi2Boolean *enterEventMode,
+                                                  fmi2Boolean *terminateSimulation) {
     const Rule *rule = &FMI2[RULE2_CompletedIntegratorStep];
     Instance *instance = called2(c, RULE2_CompletedIntegratorStep, 1, enterEventMode);
     bool event = false;
@@ -404,40 +407,43 @@ fmi2Status fmi2CompletedIntegratorStep(fmi2Component c,
     return status;
 }
 
-fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
+EXPORTED fmi2Status FMI2(SetTime)(fmi2Component c, fmi2Real time) {
     Instance *instance = called2(c, RULE2_SetTime, 0, NULL);
     return instance ? (fmi2Status)set_time(instance, time) : fmi2Error;
 }
 
-fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t nx) {
+EXPORTED fmi2Status FMI2(SetContinuousStates)(fmi2Component c, const fmi2Real x[], size_t nx) {
     Instance *instance = called2(c, RULE2_SetContinuousStates, nx, x);
     return instance ? (fmi2Status)set_states(instance, x, nx) : fmi2Error;
 }
 
-fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t nx) {
+EXPORTED fmi2Status FMI2(GetDerivatives)(fmi2Component c, fmi2Real derivatives[], size_t nx) {
     Instance *instance = called2(c, RULE2_GetDerivatives, nx, derivatives);
     return instance ? (fmi2Status)get_derivatives(instance, derivatives, nx) : fmi2Error;
 }
 
-fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real eventIndicators[], size_t ni) {
+EXPORTED fmi2Status FMI2(GetEventIndicators)(fmi2Component c, fmi2Real eventIndicators[],
+                                             size_t ni) {
     Instance *instance = called2(c, RULE2_GetEventIndicators, ni, eventIndicators);
     return instance ? (fmi2Status)get_indicators(instance, eventIndicators, ni) : fmi2Error;
 }
 
-fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t nx) {
+EXPORTED fmi2Status FMI2(GetContinuousStates)(fmi2Component c, fmi2Real x[], size_t nx) {
     Instance *instance = called2(c, RULE2_GetContinuousStates, nx, x);
     return instance ? (fmi2Status)get_states(instance, x, nx) : fmi2Error;
 }
 
-fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real x_nominal[], size_t nx) {
+EXPORTED fmi2Status FMI2(GetNominalsOfContinuousStates)(fmi2Component c, fmi2Real x_nominal[],
+                                                        size_t nx) {
     Instance *instance = called2(c, RULE2_GetNominalsOfContinuousStates, nx, x_nominal);
     return instance ? (fmi2Status)get_nominals(instance, x_nominal, nx) : fmi2Error;
 }
 
 /* --- co-simulation ---------------------------------------------------------------------------- */
 
-fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                       const fmi2Integer order[], const fmi2Real value[]) {
+EXPORTED fmi2Status FMI2(SetRealInputDerivatives)(fmi2Component c, const fmi2ValueReference vr[],
+                                                  size_t nvr, const fmi2Integer order[],
+                                                  const fmi2Real value[]) {
     Instance *instance = called2(c, RULE2_SetRealInputDerivatives, 0, NULL);
     (void)vr, (void)nvr, (void)order, (void)value;
     if (instance) {
@@ -447,8 +453,9 @@ fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference
     return fmi2Error;
 }
 
-fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
-                                        const fmi2Integer order[], fmi2Real value[]) {
+EXPORTED fmi2Status FMI2(GetRealOutputDerivatives)(fmi2Component c, const fmi2ValueReference vr[],
+                                                   size_t nvr, const fmi2Integer order[],
+                                                   fmi2Real value[]) {
     Instance *instance = called2(c, RULE2_GetRealOutputDerivatives, 0, NULL);
     (void)vr, (void)nvr, (void)order, (void)value;
     if (instance) {
@@ -458,9 +465,9 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
     return fmi2Error;
 }
 
-fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
-                      fmi2Real communicationStepSize,
-                      fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
+EXPORTED fmi2Status FMI2(DoStep)(fmi2Component c, fmi2Real currentCommunicationPoint,
+                                 fmi2Real communicationStepSize,
+                                 fmi2Boolean noSetFMUStatePriorToCurrentPoint) {
     Instance *instance = called2(c, RULE2_DoStep, 0, NULL);
     Outcome outcome;
     (void)noSetFMUStatePriorToCurrentPoint; /* The FMU keeps no earlier state. */
@@ -469,7 +476,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint,
                     : fmi2Error;
 }
 
-fmi2Status fmi2CancelStep(fmi2Component c) {
+EXPORTED fmi2Status FMI2(CancelStep)(fmi2Component c) {
     Instance *instance = called2(c, RULE2_CancelStep, 0, NULL);
     if (instance) {
         refuse(instance, FMU_ERROR, "fmi2CancelStep: fmi2DoStep returns when it is done, so there "
@@ -487,7 +494,7 @@ static fmi2Status no_status2(const Instance *instance, int rule, fmi2StatusKind 
                               known ? names[(int)kind] : "this status");
 }
 
-fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
+EXPORTED fmi2Status FMI2(GetStatus)(fmi2Component c, const fmi2StatusKind s, fmi2Status *value) {
     Instance *instance = called2(c, RULE2_GetStatus, 1, value);
     if (!instance) {
         return fmi2Error;
@@ -499,7 +506,7 @@ fmi2Status fmi2GetStatus(fmi2Component c, const fmi2StatusKind s, fmi2Status *va
     return fmi2OK;
 }
 
-fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
+EXPORTED fmi2Status FMI2(GetRealStatus)(fmi2Component c, const fmi2StatusKind s, fmi2Real *value) {
     Instance *instance = called2(c, RULE2_GetRealStatus, 1, value);
     if (!instance) {
         return fmi2Error;
@@ -511,14 +518,16 @@ fmi2Status fmi2GetRealStatus(fmi2Component c, const fmi2StatusKind s, fmi2Real *
     return fmi2OK;
 }
 
-fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind s, fmi2Integer *value) {
+EXPORTED fmi2Status FMI2(GetIntegerStatus)(fmi2Component c, const fmi2StatusKind s,
+                                           fmi2Integer *value) {
     Instance *instance = called2(c, RULE2_GetIntegerStatus, 1, value);
     return instance ? no_status2(instance, RULE2_GetIntegerStatus, s) : fmi2Error;
 }
 
 /* Request the end of the simulation after a rejected step, so that importers do not repeat it
  * forever. */
-fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boolean *value) {
+EXPORTED fmi2Status FMI2(GetBooleanStatus)(fmi2Component c, const fmi2StatusKind s,
+                                           fmi2Boolean *value) {
     Instance *instance = called2(c, RULE2_GetBooleanStatus, 1, value);
     if (!instance) {
         return fmi2Error;
@@ -530,7 +539,8 @@ fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind s, fmi2Boo
     return fmi2OK;
 }
 
-fmi2Status fmi2GetStringStatus(fmi2Component c, const fmi2StatusKind s, fmi2String *value) {
+EXPORTED fmi2Status FMI2(GetStringStatus)(fmi2Component c, const fmi2StatusKind s,
+                                          fmi2String *value) {
     Instance *instance = called2(c, RULE2_GetStringStatus, 1, value);
     if (!instance) {
         return fmi2Error;

@@ -60,8 +60,8 @@ PRBM fmi3Status absent3(fmi3Instance handle, int rule, const char *why) {
 
 /* --- versions and messages -------------------------------------------------------------------- */
 
-const char *fmi3GetVersion(void) {
-    return fmi3Version;
+EXPORTED const char *FMI3(GetVersion)(void) {
+    return FMI3_VERSION;
 }
 
 static void send3(const Journal *journal, int status, const char *category, const char *text) {
@@ -69,8 +69,8 @@ static void send3(const Journal *journal, int status, const char *category, cons
     log_message(journal->environment, (fmi3Status)status, category, text);
 }
 
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
-                               const fmi3String categories[]) {
+EXPORTED fmi3Status FMI3(SetDebugLogging)(fmi3Instance instance, fmi3Boolean loggingOn,
+                                          size_t nCategories, const fmi3String categories[]) {
     Instance *it = called3(instance, RULE3_SetDebugLogging, nCategories, categories);
     return it ? (fmi3Status)choose_categories(it, &FMI3[RULE3_SetDebugLogging], loggingOn,
                                               nCategories, categories)
@@ -96,11 +96,12 @@ static Request request3(Kind kind, fmi3String instanceName, fmi3String instantia
     return request;
 }
 
-fmi3Instance fmi3InstantiateModelExchange(fmi3String instanceName, fmi3String instantiationToken,
-                                          fmi3String resourcePath, fmi3Boolean visible,
-                                          fmi3Boolean loggingOn,
-                                          fmi3InstanceEnvironment instanceEnvironment,
-                                          fmi3LogMessageCallback logMessage) {
+EXPORTED fmi3Instance FMI3(InstantiateModelExchange)(fmi3String instanceName,
+                                                     fmi3String instantiationToken,
+                                                     fmi3String resourcePath, fmi3Boolean visible,
+                                                     fmi3Boolean loggingOn,
+                                                     fmi3InstanceEnvironment instanceEnvironment,
+                                                     fmi3LogMessageCallback logMessage) {
     Request request = request3(MODEL_EXCHANGE, instanceName, instantiationToken, resourcePath,
                                loggingOn, instanceEnvironment, logMessage);
     (void)visible; /* The FMU has no graphical interface. */
@@ -120,7 +121,7 @@ static bool update3(Instance *instance) {
     return wanted && instance->early_return;
 }
 
-fmi3Instance fmi3InstantiateCoSimulation(
+EXPORTED fmi3Instance FMI3(InstantiateCoSimulation)(
     fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
     fmi3Boolean visible, fmi3Boolean loggingOn, fmi3Boolean eventModeUsed,
     fmi3Boolean earlyReturnAllowed, const fmi3ValueReference requiredIntermediateVariables[],
@@ -138,7 +139,7 @@ fmi3Instance fmi3InstantiateCoSimulation(
     return instance_open(&request);
 }
 
-fmi3Instance fmi3InstantiateScheduledExecution(
+EXPORTED fmi3Instance FMI3(InstantiateScheduledExecution)(
     fmi3String instanceName, fmi3String instantiationToken, fmi3String resourcePath,
     fmi3Boolean visible, fmi3Boolean loggingOn, fmi3InstanceEnvironment instanceEnvironment,
     fmi3LogMessageCallback logMessage, fmi3ClockUpdateCallback clockUpdate,
@@ -152,13 +153,15 @@ fmi3Instance fmi3InstantiateScheduledExecution(
     return NULL;
 }
 
-void fmi3FreeInstance(fmi3Instance instance) {
+EXPORTED void FMI3(FreeInstance)(fmi3Instance instance) {
     instance_close(instance);
 }
 
-fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined,
-                                       fmi3Float64 tolerance, fmi3Float64 startTime,
-                                       fmi3Boolean stopTimeDefined, fmi3Float64 stopTime) {
+EXPORTED fmi3Status FMI3(EnterInitializationMode)(fmi3Instance instance,
+                                                  fmi3Boolean toleranceDefined,
+                                                  fmi3Float64 tolerance, fmi3Float64 startTime,
+                                                  fmi3Boolean stopTimeDefined,
+                                                  fmi3Float64 stopTime) {
     Instance *it = called3(instance, RULE3_EnterInitializationMode, 0, NULL);
     if (!it || set_up(it, toleranceDefined, tolerance, startTime, stopTimeDefined, stopTime)) {
         return fmi3Error;
@@ -167,42 +170,42 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     return fmi3OK;
 }
 
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(ExitInitializationMode)(fmi3Instance instance) {
     Instance *it = called3(instance, RULE3_ExitInitializationMode, 0, NULL);
     return it ? (fmi3Status)exit_initialization(it) : fmi3Error;
 }
 
-fmi3Status fmi3Terminate(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(Terminate)(fmi3Instance instance) {
     Instance *it = called3(instance, RULE3_Terminate, 0, NULL);
     return it ? (fmi3Status)end_run(it) : fmi3Error;
 }
 
-fmi3Status fmi3Reset(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(Reset)(fmi3Instance instance) {
     Instance *it = called3(instance, RULE3_Reset, 0, NULL);
     return it ? (fmi3Status)reset(it) : fmi3Error;
 }
 
-fmi3Status fmi3EnterConfigurationMode(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(EnterConfigurationMode)(fmi3Instance instance) {
     return absent3(instance, RULE3_EnterConfigurationMode, "there are no structural parameters");
 }
 
-fmi3Status fmi3ExitConfigurationMode(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(ExitConfigurationMode)(fmi3Instance instance) {
     return absent3(instance, RULE3_ExitConfigurationMode, "there are no structural parameters");
 }
 
 /* --- saved states ----------------------------------------------------------------------------- */
 
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
+EXPORTED fmi3Status FMI3(GetFMUState)(fmi3Instance instance, fmi3FMUState *FMUState) {
     Instance *it = called3(instance, RULE3_GetFMUState, 1, FMUState);
     return it ? (fmi3Status)save_state(it, FMUState) : fmi3Error;
 }
 
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState) {
+EXPORTED fmi3Status FMI3(SetFMUState)(fmi3Instance instance, fmi3FMUState FMUState) {
     Instance *it = called3(instance, RULE3_SetFMUState, 1, FMUState);
     return it ? (fmi3Status)restore_state(it, FMUState) : fmi3Error;
 }
 
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
+EXPORTED fmi3Status FMI3(FreeFMUState)(fmi3Instance instance, fmi3FMUState *FMUState) {
     Instance *it = called3(instance, RULE3_FreeFMUState, 0, NULL);
     if (it && FMUState) {
         free_state(FMUState);
@@ -210,7 +213,8 @@ fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState) {
     return it ? fmi3OK : fmi3Error;
 }
 
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size) {
+EXPORTED fmi3Status FMI3(SerializedFMUStateSize)(fmi3Instance instance, fmi3FMUState FMUState,
+                                                 size_t *size) {
     Instance *it = called3(instance, RULE3_SerializedFMUStateSize, 1, FMUState);
     if (!it || !given(it, &FMI3[RULE3_SerializedFMUStateSize], 1, size)) {
         return fmi3Error;
@@ -219,8 +223,8 @@ fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUSta
     return fmi3OK;
 }
 
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
-                                 fmi3Byte serializedState[], size_t size) {
+EXPORTED fmi3Status FMI3(SerializeFMUState)(fmi3Instance instance, fmi3FMUState FMUState,
+                                            fmi3Byte serializedState[], size_t size) {
     Instance *it = called3(instance, RULE3_SerializeFMUState, 1, FMUState);
     if (!it || !given(it, &FMI3[RULE3_SerializeFMUState], 1, serializedState)) {
         return fmi3Error;
@@ -228,8 +232,9 @@ fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState,
     return (fmi3Status)serialize(it, FMUState, serializedState, size);
 }
 
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[],
-                                   size_t size, fmi3FMUState *FMUState) {
+EXPORTED fmi3Status FMI3(DeserializeFMUState)(fmi3Instance instance,
+                                              const fmi3Byte serializedState[], size_t size,
+                                              fmi3FMUState *FMUState) {
     Instance *it = called3(instance, RULE3_DeserializeFMUState, 1, serializedState);
     if (!it || !given(it, &FMI3[RULE3_DeserializeFMUState], 1, FMUState)) {
         return fmi3Error;
@@ -239,21 +244,20 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte seriali
 
 /* --- events ----------------------------------------------------------------------------------- */
 
-fmi3Status fmi3EnterEventMode(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(EnterEventMode)(fmi3Instance instance) {
     Instance *it = called_for_event3(instance, RULE3_EnterEventMode);
     return it ? (fmi3Status)enter_event_mode(it) : fmi3Error;
 }
 
 /* Do nothing: fmi3UpdateDiscreteStates handles events. */
-fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(EvaluateDiscreteStates)(fmi3Instance instance) {
     return called_for_event3(instance, RULE3_EvaluateDiscreteStates) ? fmi3OK : fmi3Error;
 }
 
-fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,
-                                    fmi3Boolean *terminateSimulation,
-                                    fmi3Boolean *nominalsOfContinuousStatesChanged,
-                                    fmi3Boolean *valuesOfContinuousStatesChanged,
-                                    fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
+EXPORTED fmi3Status FMI3(UpdateDiscreteStates)(
+    fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate, fmi3Boolean *terminateSimulation,
+    fmi3Boolean *nominalsOfContinuousStatesChanged, fmi3Boolean *valuesOfContinuousStatesChanged,
+    fmi3Boolean *nextEventTimeDefined, fmi3Float64 *nextEventTime) {
     Instance *it = called_for_event3(instance, RULE3_UpdateDiscreteStates);
     bool all = discreteStatesNeedUpdate && terminateSimulation &&
                nominalsOfContinuousStatesChanged && valuesOfContinuousStatesChanged &&
@@ -274,17 +278,17 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
 
 /* --- model exchange --------------------------------------------------------------------------- */
 
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(EnterContinuousTimeMode)(fmi3Instance instance) {
     Instance *it = called3(instance, RULE3_EnterContinuousTimeMode, 0, NULL);
     return it ? (fmi3Status)leave_event_mode(it, &FMI3[RULE3_EnterContinuousTimeMode],
                                              MODE_CONTINUOUS)
               : fmi3Error;
 }
 
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
-                                       fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi3Boolean *enterEventMode,
-                                       fmi3Boolean *terminateSimulation) {
+EXPORTED fmi3Status FMI3(CompletedIntegratorStep)(fmi3Instance instance,
+                                                  fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                                  fmi3Boolean *enterEventMode,
+                                                  fmi3Boolean *terminateSimulation) {
     Instance *it = called3(instance, RULE3_CompletedIntegratorStep, 1, enterEventMode);
     bool event = false;
     (void)noSetFMUStatePriorToCurrentPoint; /* The FMU keeps no earlier state. */
@@ -297,46 +301,50 @@ fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance,
     return status;
 }
 
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time) {
+EXPORTED fmi3Status FMI3(SetTime)(fmi3Instance instance, fmi3Float64 time) {
     Instance *it = called3(instance, RULE3_SetTime, 0, NULL);
     return it ? (fmi3Status)set_time(it, time) : fmi3Error;
 }
 
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
-                                   size_t nContinuousStates) {
+EXPORTED fmi3Status FMI3(SetContinuousStates)(fmi3Instance instance,
+                                              const fmi3Float64 continuousStates[],
+                                              size_t nContinuousStates) {
     Instance *it = called3(instance, RULE3_SetContinuousStates, nContinuousStates,
                            continuousStates);
     return it ? (fmi3Status)set_states(it, continuousStates, nContinuousStates) : fmi3Error;
 }
 
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[],
-                                             size_t nContinuousStates) {
+EXPORTED fmi3Status FMI3(GetContinuousStateDerivatives)(fmi3Instance instance,
+                                                        fmi3Float64 derivatives[],
+                                                        size_t nContinuousStates) {
     Instance *it = called3(instance, RULE3_GetContinuousStateDerivatives, nContinuousStates,
                            derivatives);
     return it ? (fmi3Status)get_derivatives(it, derivatives, nContinuousStates) : fmi3Error;
 }
 
-fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[],
-                                  size_t nEventIndicators) {
+EXPORTED fmi3Status FMI3(GetEventIndicators)(fmi3Instance instance, fmi3Float64 eventIndicators[],
+                                             size_t nEventIndicators) {
     Instance *it = called3(instance, RULE3_GetEventIndicators, nEventIndicators, eventIndicators);
     return it ? (fmi3Status)get_indicators(it, eventIndicators, nEventIndicators) : fmi3Error;
 }
 
-fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[],
-                                   size_t nContinuousStates) {
+EXPORTED fmi3Status FMI3(GetContinuousStates)(fmi3Instance instance, fmi3Float64 continuousStates[],
+                                              size_t nContinuousStates) {
     Instance *it = called3(instance, RULE3_GetContinuousStates, nContinuousStates,
                            continuousStates);
     return it ? (fmi3Status)get_states(it, continuousStates, nContinuousStates) : fmi3Error;
 }
 
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[],
-                                             size_t nContinuousStates) {
+EXPORTED fmi3Status FMI3(GetNominalsOfContinuousStates)(fmi3Instance instance,
+                                                        fmi3Float64 nominals[],
+                                                        size_t nContinuousStates) {
     Instance *it = called3(instance, RULE3_GetNominalsOfContinuousStates, nContinuousStates,
                            nominals);
     return it ? (fmi3Status)get_nominals(it, nominals, nContinuousStates) : fmi3Error;
 }
 
-fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators) {
+EXPORTED fmi3Status FMI3(GetNumberOfEventIndicators)(fmi3Instance instance,
+                                                     size_t *nEventIndicators) {
     Instance *it = called3(instance, RULE3_GetNumberOfEventIndicators, 1, nEventIndicators);
     if (!it) {
         return fmi3Error;
@@ -345,7 +353,8 @@ fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventI
     return fmi3OK;
 }
 
-fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nContinuousStates) {
+EXPORTED fmi3Status FMI3(GetNumberOfContinuousStates)(fmi3Instance instance,
+                                                      size_t *nContinuousStates) {
     Instance *it = called3(instance, RULE3_GetNumberOfContinuousStates, 1, nContinuousStates);
     if (!it) {
         return fmi3Error;
@@ -356,7 +365,7 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance instance, size_t *nConti
 
 /* --- co-simulation ---------------------------------------------------------------------------- */
 
-fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
+EXPORTED fmi3Status FMI3(EnterStepMode)(fmi3Instance instance) {
     Instance *it = instance;
     bool simulates = it && it->kind == CO_SIMULATION;
     it = simulates ? called_for_event3(instance, RULE3_EnterStepMode)
@@ -365,20 +374,20 @@ fmi3Status fmi3EnterStepMode(fmi3Instance instance) {
               : fmi3Error;
 }
 
-fmi3Status fmi3GetOutputDerivatives(fmi3Instance instance,
-                                    const fmi3ValueReference valueReferences[],
-                                    size_t nValueReferences, const fmi3Int32 orders[],
-                                    fmi3Float64 values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(GetOutputDerivatives)(fmi3Instance instance,
+                                               const fmi3ValueReference valueReferences[],
+                                               size_t nValueReferences, const fmi3Int32 orders[],
+                                               fmi3Float64 values[], size_t nValues) {
     (void)valueReferences, (void)nValueReferences, (void)orders, (void)values, (void)nValues;
     return absent3(instance, RULE3_GetOutputDerivatives,
                    "there are no derivatives of outputs (maxOutputDerivativeOrder = 0)");
 }
 
-fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
-                      fmi3Float64 communicationStepSize,
-                      fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                      fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
-                      fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
+EXPORTED fmi3Status FMI3(DoStep)(fmi3Instance instance, fmi3Float64 currentCommunicationPoint,
+                                 fmi3Float64 communicationStepSize,
+                                 fmi3Boolean noSetFMUStatePriorToCurrentPoint,
+                                 fmi3Boolean *eventHandlingNeeded, fmi3Boolean *terminateSimulation,
+                                 fmi3Boolean *earlyReturn, fmi3Float64 *lastSuccessfulTime) {
     Instance *it = called3(instance, RULE3_DoStep, 0, NULL);
     bool all = eventHandlingNeeded && terminateSimulation && earlyReturn && lastSuccessfulTime;
     Outcome outcome;
@@ -394,6 +403,5 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoi
     *lastSuccessfulTime = outcome.time;
     return status;
 }
-
 
 #endif

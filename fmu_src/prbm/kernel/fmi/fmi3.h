@@ -2,16 +2,8 @@
 #ifndef PRBM_FMI3_H
 #define PRBM_FMI3_H
 
-/* The standard's header declares callbacks without prototypes. */
-#if defined(__clang__)
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wstrict-prototypes"
-#endif
-#include "fmi3Functions.h"
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 #include "fmi/fmu.h"
+#include "fmi/types3.h"
 
 /* --- the state machine of the standard -------------------------------------------------------- */
 

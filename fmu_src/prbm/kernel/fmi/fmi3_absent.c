@@ -6,28 +6,28 @@
 static const char NO_DEPENDENCIES[] =
     "dependencies are those of modelDescription.xml (providesPerElementDependencies = false)";
 
-fmi3Status fmi3GetNumberOfVariableDependencies(fmi3Instance instance,
-                                               fmi3ValueReference valueReference,
-                                               size_t *nDependencies) {
+EXPORTED fmi3Status FMI3(GetNumberOfVariableDependencies)(fmi3Instance instance,
+                                                          fmi3ValueReference valueReference,
+                                                          size_t *nDependencies) {
     (void)valueReference, (void)nDependencies;
     return absent3(instance, RULE3_GetNumberOfVariableDependencies, NO_DEPENDENCIES);
 }
 
-fmi3Status fmi3GetVariableDependencies(fmi3Instance instance, fmi3ValueReference dependent,
-                                       size_t elementIndicesOfDependent[],
-                                       fmi3ValueReference independents[],
-                                       size_t elementIndicesOfIndependents[],
-                                       fmi3DependencyKind dependencyKinds[],
-                                       size_t nDependencies) {
+EXPORTED fmi3Status FMI3(GetVariableDependencies)(
+    fmi3Instance instance, fmi3ValueReference dependent, size_t elementIndicesOfDependent[],
+    fmi3ValueReference independents[], size_t elementIndicesOfIndependents[],
+    fmi3DependencyKind dependencyKinds[], size_t nDependencies) {
     (void)dependent, (void)elementIndicesOfDependent, (void)independents;
     (void)elementIndicesOfIndependents, (void)dependencyKinds, (void)nDependencies;
     return absent3(instance, RULE3_GetVariableDependencies, NO_DEPENDENCIES);
 }
 
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
-                                    size_t nUnknowns, const fmi3ValueReference knowns[],
-                                    size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-                                    fmi3Float64 sensitivity[], size_t nSensitivity) {
+EXPORTED fmi3Status FMI3(GetAdjointDerivative)(fmi3Instance instance,
+                                               const fmi3ValueReference unknowns[],
+                                               size_t nUnknowns, const fmi3ValueReference knowns[],
+                                               size_t nKnowns, const fmi3Float64 seed[],
+                                               size_t nSeed, fmi3Float64 sensitivity[],
+                                               size_t nSensitivity) {
     (void)unknowns, (void)nUnknowns, (void)knowns, (void)nKnowns;
     (void)seed, (void)nSeed, (void)sensitivity, (void)nSensitivity;
     return absent3(instance, RULE3_GetAdjointDerivative,
@@ -40,64 +40,73 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
 static const char NO_INTERVALS[] =
     "clocks have no interval and no shift: they are triggered by impacts";
 
-fmi3Status fmi3GetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                  size_t nValueReferences, fmi3Float64 intervals[],
-                                  fmi3IntervalQualifier qualifiers[]) {
+EXPORTED fmi3Status FMI3(GetIntervalDecimal)(fmi3Instance instance,
+                                             const fmi3ValueReference valueReferences[],
+                                             size_t nValueReferences, fmi3Float64 intervals[],
+                                             fmi3IntervalQualifier qualifiers[]) {
     (void)valueReferences, (void)nValueReferences, (void)intervals, (void)qualifiers;
     return absent3(instance, RULE3_GetIntervalDecimal, NO_INTERVALS);
 }
 
-fmi3Status fmi3GetIntervalFraction(fmi3Instance instance,
-                                   const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, fmi3UInt64 counters[],
-                                   fmi3UInt64 resolutions[], fmi3IntervalQualifier qualifiers[]) {
+EXPORTED fmi3Status FMI3(GetIntervalFraction)(fmi3Instance instance,
+                                              const fmi3ValueReference valueReferences[],
+                                              size_t nValueReferences, fmi3UInt64 counters[],
+                                              fmi3UInt64 resolutions[],
+                                              fmi3IntervalQualifier qualifiers[]) {
     (void)valueReferences, (void)nValueReferences, (void)counters;
     (void)resolutions, (void)qualifiers;
     return absent3(instance, RULE3_GetIntervalFraction, NO_INTERVALS);
 }
 
-fmi3Status fmi3GetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                               size_t nValueReferences, fmi3Float64 shifts[]) {
+EXPORTED fmi3Status FMI3(GetShiftDecimal)(fmi3Instance instance,
+                                          const fmi3ValueReference valueReferences[],
+                                          size_t nValueReferences, fmi3Float64 shifts[]) {
     (void)valueReferences, (void)nValueReferences, (void)shifts;
     return absent3(instance, RULE3_GetShiftDecimal, NO_INTERVALS);
 }
 
-fmi3Status fmi3GetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                size_t nValueReferences, fmi3UInt64 counters[],
-                                fmi3UInt64 resolutions[]) {
+EXPORTED fmi3Status FMI3(GetShiftFraction)(fmi3Instance instance,
+                                           const fmi3ValueReference valueReferences[],
+                                           size_t nValueReferences, fmi3UInt64 counters[],
+                                           fmi3UInt64 resolutions[]) {
     (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
     return absent3(instance, RULE3_GetShiftFraction, NO_INTERVALS);
 }
 
-fmi3Status fmi3SetIntervalDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                  size_t nValueReferences, const fmi3Float64 intervals[]) {
+EXPORTED fmi3Status FMI3(SetIntervalDecimal)(fmi3Instance instance,
+                                             const fmi3ValueReference valueReferences[],
+                                             size_t nValueReferences,
+                                             const fmi3Float64 intervals[]) {
     (void)valueReferences, (void)nValueReferences, (void)intervals;
     return absent3(instance, RULE3_SetIntervalDecimal, NO_INTERVALS);
 }
 
-fmi3Status fmi3SetIntervalFraction(fmi3Instance instance,
-                                   const fmi3ValueReference valueReferences[],
-                                   size_t nValueReferences, const fmi3UInt64 counters[],
-                                   const fmi3UInt64 resolutions[]) {
+EXPORTED fmi3Status FMI3(SetIntervalFraction)(fmi3Instance instance,
+                                              const fmi3ValueReference valueReferences[],
+                                              size_t nValueReferences, const fmi3UInt64 counters[],
+                                              const fmi3UInt64 resolutions[]) {
     (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
     return absent3(instance, RULE3_SetIntervalFraction, NO_INTERVALS);
 }
 
-fmi3Status fmi3SetShiftDecimal(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                               size_t nValueReferences, const fmi3Float64 shifts[]) {
+EXPORTED fmi3Status FMI3(SetShiftDecimal)(fmi3Instance instance,
+                                          const fmi3ValueReference valueReferences[],
+                                          size_t nValueReferences, const fmi3Float64 shifts[]) {
     (void)valueReferences, (void)nValueReferences, (void)shifts;
     return absent3(instance, RULE3_SetShiftDecimal, NO_INTERVALS);
 }
 
-fmi3Status fmi3SetShiftFraction(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                                size_t nValueReferences, const fmi3UInt64 counters[],
-                                const fmi3UInt64 resolutions[]) {
+EXPORTED fmi3Status FMI3(SetShiftFraction)(fmi3Instance instance,
+                                           const fmi3ValueReference valueReferences[],
+                                           size_t nValueReferences, const fmi3UInt64 counters[],
+                                           const fmi3UInt64 resolutions[]) {
     (void)valueReferences, (void)nValueReferences, (void)counters, (void)resolutions;
     return absent3(instance, RULE3_SetShiftFraction, NO_INTERVALS);
 }
 
-fmi3Status fmi3ActivateModelPartition(fmi3Instance instance, fmi3ValueReference clockReference,
-                                      fmi3Float64 activationTime) {
+EXPORTED fmi3Status FMI3(ActivateModelPartition)(fmi3Instance instance,
+                                                 fmi3ValueReference clockReference,
+                                                 fmi3Float64 activationTime) {
     (void)clockReference, (void)activationTime;
     return absent3(instance, RULE3_ActivateModelPartition, "there is no scheduled execution");
 }

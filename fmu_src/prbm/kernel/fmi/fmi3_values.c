@@ -20,8 +20,10 @@ static Instance *accessed3(fmi3Instance handle, int rule, const fmi3ValueReferen
     return instance;
 }
 
-fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                          size_t nValueReferences, fmi3Float64 values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(GetFloat64)(fmi3Instance instance,
+                                     const fmi3ValueReference valueReferences[],
+                                     size_t nValueReferences, fmi3Float64 values[],
+                                     size_t nValues) {
     Instance *it = accessed3(instance, RULE3_GetFloat64, valueReferences, nValueReferences, values,
                              nValues);
     fmi3Status status = it ? fmi3OK : fmi3Error;
@@ -31,8 +33,9 @@ fmi3Status fmi3GetFloat64(fmi3Instance instance, const fmi3ValueReference valueR
     return status;
 }
 
-fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, fmi3Int32 values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(GetInt32)(fmi3Instance instance,
+                                   const fmi3ValueReference valueReferences[],
+                                   size_t nValueReferences, fmi3Int32 values[], size_t nValues) {
     Instance *it = accessed3(instance, RULE3_GetInt32, valueReferences, nValueReferences, values,
                              nValues);
     fmi3Status status = it ? fmi3OK : fmi3Error;
@@ -44,8 +47,10 @@ fmi3Status fmi3GetInt32(fmi3Instance instance, const fmi3ValueReference valueRef
     return status;
 }
 
-fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                          size_t nValueReferences, fmi3Boolean values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(GetBoolean)(fmi3Instance instance,
+                                     const fmi3ValueReference valueReferences[],
+                                     size_t nValueReferences, fmi3Boolean values[],
+                                     size_t nValues) {
     Instance *it = accessed3(instance, RULE3_GetBoolean, valueReferences, nValueReferences, values,
                              nValues);
     fmi3Status status = it ? fmi3OK : fmi3Error;
@@ -57,8 +62,9 @@ fmi3Status fmi3GetBoolean(fmi3Instance instance, const fmi3ValueReference valueR
     return status;
 }
 
-fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, fmi3Clock values[]) {
+EXPORTED fmi3Status FMI3(GetClock)(fmi3Instance instance,
+                                   const fmi3ValueReference valueReferences[],
+                                   size_t nValueReferences, fmi3Clock values[]) {
     Instance *it = called_for_event3(instance, RULE3_GetClock);
     if (!it || !given(it, &FMI3[RULE3_GetClock], nValueReferences, valueReferences) ||
         !given(it, &FMI3[RULE3_GetClock], nValueReferences, values)) {
@@ -73,8 +79,10 @@ fmi3Status fmi3GetClock(fmi3Instance instance, const fmi3ValueReference valueRef
     return status;
 }
 
-fmi3Status fmi3SetFloat64(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                          size_t nValueReferences, const fmi3Float64 values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(SetFloat64)(fmi3Instance instance,
+                                     const fmi3ValueReference valueReferences[],
+                                     size_t nValueReferences, const fmi3Float64 values[],
+                                     size_t nValues) {
     Instance *it = accessed3(instance, RULE3_SetFloat64, valueReferences, nValueReferences, values,
                              nValues);
     fmi3Status status = it ? fmi3OK : fmi3Error;
@@ -104,22 +112,27 @@ static fmi3Status get_other3(Instance *instance, const fmi3ValueReference refere
     return status;
 }
 
-fmi3Status fmi3SetInt32(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, const fmi3Int32 values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(SetInt32)(fmi3Instance instance,
+                                   const fmi3ValueReference valueReferences[],
+                                   size_t nValueReferences, const fmi3Int32 values[],
+                                   size_t nValues) {
     Instance *it = accessed3(instance, RULE3_SetInt32, valueReferences, nValueReferences, values,
                              nValues);
     return set_other3(it, valueReferences, nValueReferences, INTEGER);
 }
 
-fmi3Status fmi3SetBoolean(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                          size_t nValueReferences, const fmi3Boolean values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(SetBoolean)(fmi3Instance instance,
+                                     const fmi3ValueReference valueReferences[],
+                                     size_t nValueReferences, const fmi3Boolean values[],
+                                     size_t nValues) {
     Instance *it = accessed3(instance, RULE3_SetBoolean, valueReferences, nValueReferences, values,
                              nValues);
     return set_other3(it, valueReferences, nValueReferences, BOOLEAN);
 }
 
-fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                        size_t nValueReferences, const fmi3Clock values[]) {
+EXPORTED fmi3Status FMI3(SetClock)(fmi3Instance instance,
+                                   const fmi3ValueReference valueReferences[],
+                                   size_t nValueReferences, const fmi3Clock values[]) {
     Instance *it = called_for_event3(instance, RULE3_SetClock);
     if (!it || !given(it, &FMI3[RULE3_SetClock], nValueReferences, valueReferences) ||
         !given(it, &FMI3[RULE3_SetClock], nValueReferences, values)) {
@@ -129,14 +142,14 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
 }
 
 #define FMI3_OTHER_TYPE(type)                                                                  \
-    fmi3Status fmi3Get##type(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
+    EXPORTED fmi3Status FMI3(Get##type)(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
                              size_t nValueReferences, fmi3##type values[], size_t nValues) {   \
         Instance *it = accessed3(instance, RULE3_Get##type, valueReferences, nValueReferences, \
                                  values, nValues);                                             \
         return get_other3(it, valueReferences, nValueReferences);                              \
     }                                                                                          \
                                                                                                \
-    fmi3Status fmi3Set##type(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
+    EXPORTED fmi3Status FMI3(Set##type)(fmi3Instance instance, const fmi3ValueReference valueReferences[], \
                              size_t nValueReferences, const fmi3##type values[],               \
                              size_t nValues) {                                                 \
         Instance *it = accessed3(instance, RULE3_Set##type, valueReferences, nValueReferences, \
@@ -146,42 +159,47 @@ fmi3Status fmi3SetClock(fmi3Instance instance, const fmi3ValueReference valueRef
 
 FMI3_OTHER_TYPES(FMI3_OTHER_TYPE)
 
-fmi3Status fmi3GetString(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                         size_t nValueReferences, fmi3String values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(GetString)(fmi3Instance instance,
+                                    const fmi3ValueReference valueReferences[],
+                                    size_t nValueReferences, fmi3String values[], size_t nValues) {
     Instance *it = accessed3(instance, RULE3_GetString, valueReferences, nValueReferences, values,
                              nValues);
     return get_other3(it, valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3SetString(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                         size_t nValueReferences, const fmi3String values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(SetString)(fmi3Instance instance,
+                                    const fmi3ValueReference valueReferences[],
+                                    size_t nValueReferences, const fmi3String values[],
+                                    size_t nValues) {
     Instance *it = accessed3(instance, RULE3_SetString, valueReferences, nValueReferences, values,
                              nValues);
     return set_other3(it, valueReferences, nValueReferences, NO_TYPE);
 }
 
-fmi3Status fmi3GetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                         size_t nValueReferences, size_t valueSizes[], fmi3Binary values[],
-                         size_t nValues) {
+EXPORTED fmi3Status FMI3(GetBinary)(fmi3Instance instance,
+                                    const fmi3ValueReference valueReferences[],
+                                    size_t nValueReferences, size_t valueSizes[],
+                                    fmi3Binary values[], size_t nValues) {
     Instance *it = accessed3(instance, RULE3_GetBinary, valueReferences, nValueReferences, values,
                              nValues);
     (void)valueSizes;
     return get_other3(it, valueReferences, nValueReferences);
 }
 
-fmi3Status fmi3SetBinary(fmi3Instance instance, const fmi3ValueReference valueReferences[],
-                         size_t nValueReferences, const size_t valueSizes[],
-                         const fmi3Binary values[], size_t nValues) {
+EXPORTED fmi3Status FMI3(SetBinary)(fmi3Instance instance,
+                                    const fmi3ValueReference valueReferences[],
+                                    size_t nValueReferences, const size_t valueSizes[],
+                                    const fmi3Binary values[], size_t nValues) {
     Instance *it = accessed3(instance, RULE3_SetBinary, valueReferences, nValueReferences, values,
                              nValues);
     (void)valueSizes;
     return set_other3(it, valueReferences, nValueReferences, NO_TYPE);
 }
 
-fmi3Status fmi3GetDirectionalDerivative(fmi3Instance instance, const fmi3ValueReference unknowns[],
-                                        size_t nUnknowns, const fmi3ValueReference knowns[],
-                                        size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
-                                        fmi3Float64 sensitivity[], size_t nSensitivity) {
+EXPORTED fmi3Status FMI3(GetDirectionalDerivative)(
+    fmi3Instance instance, const fmi3ValueReference unknowns[], size_t nUnknowns,
+    const fmi3ValueReference knowns[], size_t nKnowns, const fmi3Float64 seed[], size_t nSeed,
+    fmi3Float64 sensitivity[], size_t nSensitivity) {
     const int rule = RULE3_GetDirectionalDerivative;
     Instance *it = accessed3(instance, rule, unknowns, nUnknowns, sensitivity, nSensitivity);
     if (!it || !accessed3(instance, rule, knowns, nKnowns, seed, nSeed)) {
