@@ -22,11 +22,9 @@ def main() -> int:
 
         return command()
     except ModuleNotFoundError as error:
-        print(
-            f"prbm: the Python package {error.name} is missing; install all required packages with "
-            "'python -m pip install prbm-impact'",
-            file=sys.stderr,
-        )
+        from .commands.missing import missing_package
+
+        print(f"prbm: {missing_package(error)}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt:
         print("prbm: interrupted", file=sys.stderr)

@@ -7,6 +7,7 @@ in one sentence.
 import sys
 
 from ..fmu.date import date
+from .missing import missing_package
 from .program import INTERRUPTED, MISTAKE, command_name
 
 
@@ -22,11 +23,7 @@ def main() -> int:
 
         return building.main()
     except ModuleNotFoundError as error:
-        print(
-            f"{command_name()}: the Python package {error.name} is missing; install all required "
-            "packages with 'python -m pip install .' in the folder of build_fmu.py",
-            file=sys.stderr,
-        )
+        print(f"{command_name()}: {missing_package(error)}", file=sys.stderr)
         return MISTAKE
     except KeyboardInterrupt:
         print(f"{command_name()}: interrupted", file=sys.stderr)

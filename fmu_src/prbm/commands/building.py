@@ -1,6 +1,7 @@
 """The command that builds FMUs and, with ``--simulate``, simulates them."""
 
 import argparse
+import importlib.util
 import json
 import os
 import signal
@@ -22,6 +23,7 @@ from ..fmu import native_fmu, python_fmu
 from ..kernel.compiler import ALL, HOST, PLATFORMS, CompilerError, this_platform
 from ..mechanism.description import Mechanism
 from .arguments import ProposingParser
+from .missing import missing_package
 from .program import FAILED, INTERRUPTED, MISTAKE, OK, command_name
 
 TERMINATION_TIMEOUT = 2.0  # Time for the process of a simulation to end after Ctrl-C [s].
@@ -178,7 +180,8 @@ def selected_platforms(options: argparse.Namespace) -> tuple[str, ...]:
     Raises
     ------
     UserMistake
-        If a platform is unknown, or ``--simulate`` is given and none of them is this machine.
+        If a platform is unknown, or ``--simulate`` is given and none of them is this machine or
+        FMPy is not installed.
     """
     names = [name.strip() for text in options.platform or [HOST] for name in text.split(",")]
     aliases = {p.folder2: p.name for p in PLATFORMS.values()}
@@ -194,6 +197,10 @@ def selected_platforms(options: argparse.Namespace) -> tuple[str, ...]:
         raise UserMistake(
             f"--simulate: FMUs for {', '.join(chosen)} do not run on this machine; add --platform "
             f"{HOST}, or omit --simulate"
+        )
+    if options.simulate and importlib.util.find_spec("fmpy") is None:
+        raise UserMistake(
+            f"--simulate: {missing_package(ModuleNotFoundError(name='fmpy'))}, or omit --simulate"
         )
     return chosen
 
