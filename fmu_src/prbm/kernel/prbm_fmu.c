@@ -1,4 +1,5 @@
-/* The library, compiled as one file; only the functions of FMI are exported.
+/* The library, compiled as one file; only the functions of FMI are exported.  With -DPRBM_ENGINE it
+ * is the library of the Python package instead, and exports the functions of engine.h.
  *
  * The headers fmi2Functions.h and fmi3Functions.h are those of the standards.  With -DPRBM_FMI=2
  * or 3 the library has the functions of that version only.  With -DPRBM_TABLES the tables of the
@@ -53,6 +54,9 @@
 #include "values.c"
 #include "tangent.c"
 #include "tangent_indicators.c"
+#ifdef PRBM_ENGINE
+#include "engine.c"
+#else
 #include "fmi/fmu.h"
 #include "fmi/resources.c"
 #include "fmi/journal.c"
@@ -65,3 +69,4 @@
 #include "fmi/fmi3.c"
 #include "fmi/fmi3_values.c"
 #include "fmi/fmi3_absent.c"
+#endif
