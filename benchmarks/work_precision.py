@@ -52,9 +52,10 @@ from scipy.optimize import brentq
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "fmu_src"))
 
-from prbm import Simulation, load
+from prbm import load
 from prbm.base.errors import SimulationError
 from prbm.hybrid.runge_kutta import TSITOURAS_PAPAKOSTAS as ENGINE
+from prbm.hybrid.simulation import Simulation
 from prbm.mechanics import contact
 
 mpl.use("Agg")

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .base.version import __version__ as __version__
     from .files.mechanism_file import load as load
-    from .hybrid.simulation import Simulation
     from .mechanism.description import Mechanism
+    from .runs.engine import simulation as Simulation
     from .runs.result import Result
     from .runs.run import simulate
 
@@ -26,7 +26,7 @@ __all__ = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate
 _MODULES = {
     "Mechanism": ("mechanism.description", "Mechanism"),
     "Result": ("runs.result", "Result"),
-    "Simulation": ("hybrid.simulation", "Simulation"),
+    "Simulation": ("runs.engine", "simulation"),
     "__version__": ("base.version", "__version__"),
     "load": ("files.mechanism_file", "load"),
     "simulate": ("runs.run", "simulate"),

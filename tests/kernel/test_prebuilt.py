@@ -7,15 +7,15 @@ from prbm.kernel.compiler import PLATFORMS, libraries, this_platform
 from prbm.kernel.prebuilt import FOLDER, LIST, DamagedLibraryError
 
 SOURCES = {"a.c": b"int a;", "b.c": b"int b;"}
-NAME = "x86_64-linux.so"
+NAME = "x86_64-linux/prbm_fmu.so"
 
 
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """Return a folder that replaces the installed package; it has two libraries."""
-    made = {NAME: b"library", "x86_64-windows.dll": b"another"}
+    made = {NAME: b"library", "x86_64-windows/prbm_fmu.dll": b"another"}
     for name, content in prebuilt.package_files(made, "a compiler", SOURCES).items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(content)
     monkeypatch.setattr(prebuilt, "files", lambda _: tmp_path)
     return tmp_path
@@ -49,9 +49,9 @@ def test_error_for_a_damaged_package_names_the_file_and_the_remedy(package, file
 
 
 def test_exports_use_the_libraries_of_the_package_unless_cc_is_set(tmp_path, monkeypatch):
-    made = {f"{p.name}{p.suffix}": p.name.encode() for p in PLATFORMS.values()}
+    made = {f"{p.name}/prbm_fmu{p.suffix}": p.name.encode() for p in PLATFORMS.values()}
     for name, content in prebuilt.package_files(made, "a compiler", compiler.kernel()).items():
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_bytes(content)
     monkeypatch.setattr(prebuilt, "files", lambda _: tmp_path)
     monkeypatch.setattr(compiler, "_library", lambda *_: b"compiled")

@@ -163,7 +163,7 @@ def test_results_of_fmpy_and_of_the_engine_give_equal_films(
     mechanisms: dict[str, Mechanism], fmus: dict[str, Path]
 ) -> None:
     mechanism = mechanisms["PRBDM"]
-    of_engine = simulate(mechanism, {"stop.offset": 2e-3}, stop_time=STOP_TIME)
+    of_engine = simulate(mechanism, {"stop.offset": 2e-3}, stop_time=STOP_TIME, engine="python")
     of_fmpy = fmpy.simulate_fmu(
         fmus["PRBDM"],
         stop_time=STOP_TIME,

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from fmpy import simulate_fmu
 
-from prbm.kernel.compiler import PLATFORMS
+from prbm.kernel.compiler import PLATFORMS, PRODUCTS
 
 ROOT = Path(__file__).parents[2]
 
@@ -67,7 +67,9 @@ def test_the_wheel_lists_the_hash_of_each_library_and_is_small(wheel):
     assert wheel.name.endswith("-py3-none-any.whl")
     with zipfile.ZipFile(wheel) as archive:
         listed = json.loads(archive.read("prbm/kernel/libraries/libraries.json"))
-        assert listed["libraries"].keys() == {f"{p.name}{p.suffix}" for p in PLATFORMS.values()}
+        assert listed["libraries"].keys() == {
+            f"{p.name}/{product.name}{p.suffix}" for p in PLATFORMS.values() for product in PRODUCTS
+        }
         for name, digest in listed["libraries"].items():
             content = archive.read(f"prbm/kernel/libraries/{name}")
             assert hashlib.sha256(content).hexdigest() == digest

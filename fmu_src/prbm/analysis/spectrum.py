@@ -21,12 +21,12 @@ from scipy.signal.windows import hann
 
 from ..base.errors import ParameterError
 from ..hybrid.impacts import Impact
-from ..hybrid.simulation import Simulation
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at
 from ..mechanics.system import unit
 from ..mechanism.description import Mechanism
+from ..runs.engine import simulation as start
 from ..runs.result import Result
 from .impact_map import first_impact
 
@@ -77,6 +77,7 @@ def after_impact(
     *,
     stop: int = 0,
     tolerance: float = 1e-8,
+    engine: str | None = None,
 ) -> AfterImpact:
     """Simulate from the release to the first impact, then without the wall.
 
@@ -92,6 +93,8 @@ def after_impact(
         Index of the stop; the walls of other stops remain.
     tolerance : float
         Relative tolerance of the integration.
+    engine : str or None
+        As for :func:`prbm.simulate`.
 
     Raises
     ------
@@ -106,23 +109,19 @@ def after_impact(
             f"duration = {duration:g} s and step = {step:g} s give {count} samples; a spectrum "
             f"needs at least {SAMPLES_MIN}"
         )
-    simulation = Simulation(mechanism, values, tolerance=tolerance)
+    simulation = start(mechanism, values, tolerance=tolerance, engine=engine)
     impact = first_impact(simulation, stop)
     s = mechanism.stops[stop]
     simulation.set({f"{s.name}.displacement": REMOVED_WALL * simulation.system.length})
     u = unit(s.direction).conjugate()
-    moved = np.zeros((count, 3))
     times = np.linspace(0.0, (count - 1) * step, count)
     begin = simulation.time
-    for i, t in enumerate(times):
-        simulation.advance(begin + float(t))
-        out = simulation.outputs()
-        v = u * complex(out[f"{s.body}.vx"], out[f"{s.body}.vy"])
-        moved[i] = v.real, v.imag, out[f"{s.body}.omega"]
+    names = [f"{s.body}.{output}" for output in ("vx", "vy", "omega")]
+    vx, vy, turning = simulation.sample(begin + times, names).T
+    v = u * (vx + 1j * vy)
     found = modes_at(simulation.system, impact.q).frequency
-    along, across, turning = moved.T
     since = times + begin - impact.time
-    return AfterImpact(mechanism.title, impact, since, along, across, turning, found)
+    return AfterImpact(mechanism.title, impact, since, v.real, v.imag, turning, found)
 
 
 def after_last_impact(result: Result) -> AfterImpact:

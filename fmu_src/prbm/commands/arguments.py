@@ -82,6 +82,7 @@ def animation_arguments(parser: ArgumentParser) -> None:
         "--slow", type=float, metavar="FACTOR",
         help="factor of slow motion (default: a round factor for a film of about ten seconds)",
     )  # fmt: skip
+    engine_argument(parser)
     add("--fps", type=float, metavar="N", help="frames per second (default: 25)")
     add("--from", dest="start", metavar="T", help="first time shown [s] (default: the release)")
     add(
@@ -95,6 +96,15 @@ def stop_time_argument(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--stop-time", metavar="T",
         help="duration of the simulation [s] (default: that of the mechanism's FMU, usually 1)",
+    )  # fmt: skip
+
+
+def engine_argument(parser: ArgumentParser) -> None:
+    """Add --engine."""
+    parser.add_argument(
+        "--engine", metavar="ENGINE", choices=("kernel", "python"),
+        help="kernel: compiled C; python: the specification, about a hundred times slower "
+        "(default: kernel, or python without a C compiler)",
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from .arguments import (
     ANIMATION_USAGE,
     ProposingParser,
     animation_arguments,
+    engine_argument,
     picture_arguments,
     set_argument,
     stop_time_argument,
@@ -227,6 +228,7 @@ def _simulate(commands: Commands) -> None:
         "--spectrum-time", default="0.2", metavar="T",
         help="duration of the vibration after the first impact [s] (default: %(default)s)",
     )  # fmt: skip
+    engine_argument(parser)
     _out(parser)
 
 
@@ -271,6 +273,7 @@ def _response(parser: argparse.ArgumentParser) -> None:
         "--uncertainty", metavar="U",
         help="standard uncertainty of a sample (default: estimated from the residuals)",
     )  # fmt: skip
+    engine_argument(parser)
 
 
 def _fit(commands: Commands) -> None:
@@ -363,6 +366,7 @@ def _impact_map(commands: Commands) -> None:
         help="number of finite elements per flexure (default: %(default)s)",
     )  # fmt: skip
     add("--stop", metavar="NAME", help="stop that is hit (default: the first)")
+    engine_argument(parser)
     set_argument(parser)
     _out(parser)
 

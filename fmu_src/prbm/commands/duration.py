@@ -12,6 +12,7 @@ def span(
     values: Mapping[str, float],
     stop_time: str | None,
     step: str | None = None,
+    engine: str | None = None,
 ) -> tuple[float, float]:
     """Return duration and communication step of a simulation [s].
 
@@ -26,6 +27,8 @@ def span(
         Parameters and inputs that differ from their defaults.
     stop_time, step : str or None
         Options of the command, in seconds or with a unit.
+    engine : str or None
+        As for :func:`prbm.simulate`.
 
     Raises
     ------
@@ -43,7 +46,7 @@ def span(
     duration = None if stop_time is None else quantity(stop_time, "s", "--stop-time")
     if step is not None and duration is not None:
         return duration, quantity(step, "s", "--step")
-    chosen = experiment(mechanism, values)
+    chosen = experiment(mechanism, values, engine)
     if duration is None:
         duration, default = chosen.stop_time, chosen.step
     else:

@@ -43,7 +43,9 @@ def response(options: argparse.Namespace, path: str, mechanism: Mechanism) -> Re
     signal = series(path, options, output_unit(name))
     if signal.unit == "m":
         check_size(signal.values, mechanism, f"{signal.source}: {signal.name}")
-    return Response(signal, name, uncertainty(options.uncertainty, signal.unit))
+    return Response(
+        signal, name, uncertainty(options.uncertainty, signal.unit), engine=options.engine
+    )
 
 
 def uncertainty(text: str | None, unit: str) -> float | None:

@@ -26,6 +26,7 @@ ROUND_RTOL = 1e-9  # A round number may exceed its limit by this share: round-of
 GRID = (-1.0, -0.5, 0.0, 0.5, 1.0)  # Default positions and offsets, relative to the largest.
 POINTS_MAX = 400  # Points of a map.
 FLEXURE_METHODS = {"algebraic", "simulated", "fitted"}  # Methods that depend on flexure models.
+SIMULATED_METHODS = {"simulated", "fitted"}  # Methods that simulate.
 
 Method = Callable[..., ImpactMap]
 Job = Callable[[Progress], ImpactMap]
@@ -127,6 +128,8 @@ def _jobs(
             if name == "elements":
                 yield partial(_computed, method, "finite elements", elements=options.elements)
                 break  # Finite elements do not depend on the flexure model.
+            if name in SIMULATED_METHODS:
+                method = partial(method, engine=options.engine)
             yield partial(_computed, method, f"{label}, {name}")
 
 

@@ -70,8 +70,8 @@ def _result(options: argparse.Namespace) -> Result:
                 "nothing to show: give RESULT.csv, MECHANISM, --model or --mechanism"
             )
         changes = settings(mechanism, options.set)
-        stop_time, step = span(mechanism, changes, options.stop_time)
-        return simulate(mechanism, changes, stop_time=stop_time, step=step)
+        stop_time, step = span(mechanism, changes, options.stop_time, engine=options.engine)
+        return simulate(mechanism, changes, stop_time=stop_time, step=step, engine=options.engine)
     if len(files) > 2:
         raise ParameterError(f"{len(files)} files are given; expected RESULT.csv OUT, or OUT")
     columns = read_csv(files[0])

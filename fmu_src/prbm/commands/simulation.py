@@ -39,14 +39,15 @@ def simulated(options: argparse.Namespace) -> None:
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
-    stop_time, step = span(mechanism, values, options.stop_time, options.step)
+    stop_time, step = span(mechanism, values, options.stop_time, options.step, options.engine)
     duration = quantity(options.spectrum_time, "s", "--spectrum-time")
     communication_points(stop_time, step)
     tolerance = _tolerance(options.tolerance)
     begin = time.perf_counter()
     result = simulate(
-        mechanism, values, stop_time=stop_time, step=step, tolerance=tolerance, progress=reporter()
-    )
+        mechanism, values, stop_time=stop_time, step=step, tolerance=tolerance,
+        progress=reporter(), engine=options.engine,
+    )  # fmt: skip
     print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")
     for line in headline(result.columns, mechanism, result.values):
         print(line)
@@ -111,7 +112,9 @@ def _spectrum(
         )
     if options.spectrum == "first":
         stop = next(i for i, s in enumerate(mechanism.stops) if s.name == result.impacts[0].stop)
-        vibration = spectrum.after_impact(mechanism, values, duration, stop=stop)
+        vibration = spectrum.after_impact(
+            mechanism, values, duration, stop=stop, engine=options.engine
+        )
     else:
         vibration = spectrum.after_last_impact(result)
     lines = {

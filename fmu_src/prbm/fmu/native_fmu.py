@@ -15,6 +15,7 @@ from ..kernel.compiler import HOST, Platform, libraries
 from ..kernel.sources import TABLES, amalgamation, kernel, tables_header
 from ..mechanics.independent import independent
 from ..mechanism.description import Mechanism
+from ..runs.engine import PYTHON
 from ..runs.experiment import experiment
 from . import documentation
 from .archive import zipped
@@ -74,7 +75,7 @@ def build(
     compiled = libraries(platforms, progress)
     progress(f"collecting {len(native.variables)} variables and the tables")
     name, source = mechanism.name, f"{mechanism.name}.c"
-    run = experiment(mechanism, changes)
+    run = experiment(mechanism, changes, engine=PYTHON)
     heading = Heading(name, mechanism.title, "", LOG_CATEGORIES, run)
     token = f"{{{uuid.uuid5(NAMESPACE, _digest(mechanism, native, fmi, source, heading))}}}"
     heading = replace(heading, guid=token)

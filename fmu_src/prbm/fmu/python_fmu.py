@@ -13,6 +13,7 @@ from ..base.errors import MechanismError
 from ..base.text import printable
 from ..interface.variables import Variable
 from ..mechanism.description import Mechanism
+from ..runs.engine import PYTHON
 from ..runs.experiment import experiment
 from . import documentation
 from .archive import zipped
@@ -99,7 +100,7 @@ def build(
     progress("checking the start")
     listed = interface(mechanism, changes)
     progress(f"collecting {len(listed)} variables and the engine")
-    run = experiment(mechanism, changes)
+    run = experiment(mechanism, changes, engine=PYTHON)
     sources = dict(_sources(mechanism, listed, run.step))
     token = f"{mechanism.name}_{_digest(sources | {'': SCRIPT.encode()})[:TOKEN_DIGITS]}"
     progress("drawing the icon and writing the documentation")

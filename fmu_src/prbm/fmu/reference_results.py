@@ -21,6 +21,7 @@ from ..interface.variables import Variable
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import modes_at
 from ..mechanism.description import Mechanism
+from ..runs.engine import PYTHON
 from ..runs.experiment import Experiment
 from ..runs.result import names
 from ..runs.run import SlowSimulationError, simulate
@@ -126,6 +127,7 @@ def _columns(
     try:
         result = simulate(
             mechanism, dict(changes), stop_time=experiment.stop_time, step=experiment.step,
+            engine=PYTHON,
             steps_max=STEPS_MAX / max(1.0, size / LARGE) ** 2,
             progress=messages(lambda text: cached.progress(f"reference results {text}")),
         )  # fmt: skip

@@ -8,7 +8,7 @@ stop that holds is a constraint, not a spring and not a series of small bounces.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -20,7 +20,7 @@ from ..base.tolerances import EFFORT_MAX, STABLE_STEP_WATCH_FACTOR, STEPS_MAX
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
-from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, check_input, impulse_names, input_names
+from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from . import contact_modes, events, impacts, snapshot, walls
@@ -28,6 +28,7 @@ from .arc import Arc
 from .configuration import Configuration, Magnitudes
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
+from .given import changed_values, start_values
 from .guards import StepView
 from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
@@ -71,6 +72,9 @@ class Simulation:
         If no equilibrium has the displacement of the release.
     """
 
+    engine = "python"
+    """Name of the engine; :class:`prbm.kernel.simulation.KernelSimulation` is the other one."""
+
     def __init__(
         self,
         mechanism: Mechanism,
@@ -80,19 +84,7 @@ class Simulation:
         tolerance: float | None = None,
         step: float | None = None,
     ) -> None:
-        if not isinstance(mechanism, Mechanism):
-            raise TypeError(f"mechanism = {mechanism!r} must be a Mechanism, as prbm.load returns")
-        changes = dict(values or {})
-        defaults = mechanism.values()
-        known = mechanism.values({k: x for k, x in changes.items() if k in defaults})
-        self.given = dict.fromkeys(input_names(mechanism), 0.0)
-        for name in changes.keys() - defaults.keys():
-            if name not in self.given:
-                raise ParameterError(unknown(name, {**defaults, **self.given}))
-            self.given[name] = check_input(name, changes[name], self.given)
-        self.time = float(start_time)
-        if not math.isfinite(self.time):
-            raise ParameterError(f"start_time = {start_time} s must be a finite number")
+        known, self.given, self.time = start_values(mechanism, values, start_time)
         # The parameters in use, and those that are used from the next restart on.
         self.configuration = Configuration.of(mechanism, known, tolerance, step)
         self.prepared = self.configuration
@@ -179,20 +171,7 @@ class Simulation:
         ParameterError
             If a name is unknown or belongs to a fixed parameter, or a value is out of bounds.
         """
-        parameters = {p.name: p for p in self.mechanism.parameters}
-        values, given = dict(self.values), dict(self.given)
-        for name, x in changes.items():
-            if name in parameters:
-                number = parameters[name].check(x)
-                if not parameters[name].tunable and number != values[name]:
-                    raise ParameterError(
-                        f"{name} is a fixed parameter; set it before the motion starts"
-                    )
-                values[name] = number
-            elif name in given:
-                given[name] = check_input(name, x, given)
-            else:
-                raise ParameterError(unknown(name, {**parameters, **given}))
+        values, given = changed_values(self.mechanism, self.values, self.given, changes)
         # Inputs of walls act from the next step on, and need no restart.
         moving = {f"{stop.name}.{name}" for stop in self.mechanism.stops for name in WALL_INPUTS}
         others = any(given[name] != x for name, x in self.given.items() if name not in moving)
@@ -376,6 +355,35 @@ class Simulation:
         n, y = self.system.n, self.state()
         q, v = y[:n], y[n : 2 * n]
         return motions(self.system, q, v, self.system.directions(q))
+
+    def sample(self, times: Sequence[float] | Real, names: Sequence[str]) -> Real:
+        """Advance to each of several times and return outputs there, (m, k).
+
+        Parameters
+        ----------
+        times : (m,)
+            Times in ascending order, not before the present time [s].
+        names : (k,)
+            Names of outputs, in SI units and rad.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such output.
+        SimulationError
+            As :meth:`advance`; the simulation has then reached the times before.
+        """
+        outputs = self.outputs()
+        for name in names:
+            if name not in outputs:
+                raise ParameterError(unknown(name, outputs))
+        moving = self.motions().keys() >= set(names)
+        rows = np.empty((len(times), len(names)))
+        for row, t in zip(rows, times, strict=True):
+            self.advance(float(t))
+            out: Mapping[str, float] = self.motions() if moving else self.outputs()
+            row[:] = [out[name] for name in names]
+        return rows
 
     # -- saving and restoring --
 

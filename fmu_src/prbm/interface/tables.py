@@ -121,14 +121,14 @@ def check_size(mechanism: Mechanism) -> None:
 
 def slots(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, int]:
     """Return the slot of every value: its index in the vector of all values, by name."""
-    return {name: slot for slot, name in enumerate(_names(mechanism, independent))}
+    groups = slot_groups(mechanism, independent)
+    return {name: k for k, name in enumerate(name for names in groups.values() for name in names)}
 
 
-def _names(mechanism: Mechanism, independent: Sequence[int]) -> Iterator[str]:
-    """Yield the names of all values in the order of their slots."""
+def slot_groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, tuple[str, ...]]:
+    """Return the names of the values of each group, in the order of their slots."""
     groups = _groups(mechanism, independent)
-    for group in SLOT_GROUPS:
-        yield from groups[group]
+    return {group: tuple(groups[group]) for group in SLOT_GROUPS}
 
 
 def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Iterable[str]]:

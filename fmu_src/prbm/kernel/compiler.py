@@ -60,6 +60,27 @@ class NoCompilerError(CompilerError):
 
 
 @dataclass(frozen=True)
+class Product:
+    """A library that is compiled from the sources of the kernel.
+
+    Parameters
+    ----------
+    name : str
+        Name of the library without its suffix.
+    flags : tuple of str
+        Options of the compiler in addition to :data:`FLAGS`.
+    """
+
+    name: str
+    flags: tuple[str, ...] = ()
+
+
+FMU = Product("prbm_fmu")  # The library of native FMUs.
+ENGINE = Product("prbm_engine", ("-DPRBM_ENGINE",))  # The library of the Python package.
+PRODUCTS = (FMU, ENGINE)
+
+
+@dataclass(frozen=True)
 class Platform:
     """A platform on which native FMUs run.
 
@@ -108,7 +129,9 @@ def this_platform() -> Platform | None:
 
 
 def libraries(
-    platforms: Sequence[str], progress: Callable[[str], None] = lambda step: None
+    platforms: Sequence[str],
+    progress: Callable[[str], None] = lambda step: None,
+    product: Product = FMU,
 ) -> dict[Platform, bytes]:
     """Return the compiled kernel for platforms.
 
@@ -118,6 +141,8 @@ def libraries(
         Names of platforms, :data:`HOST` or :data:`ALL`.
     progress : callable
         Called with a description of each stage.
+    product : Product
+        The library to compile.
 
     Returns
     -------
@@ -135,19 +160,23 @@ def libraries(
     for name in platforms:
         if name == HOST:
             here = _host()
-            result[here] = _prebuilt(here) or _library(here, _host_compilers(), progress)
+            result[here] = _prebuilt(here, product) or _library(
+                here, _host_compilers(), product, progress
+            )
     names = PLATFORMS if ALL in platforms else [name for name in platforms if name in PLATFORMS]
     for name in names:
         chosen = PLATFORMS[name]
-        result[chosen] = _prebuilt(chosen) or _library(chosen, _zig(chosen), progress)
+        result[chosen] = _prebuilt(chosen, product) or _library(
+            chosen, _zig(chosen), product, progress
+        )
     return result
 
 
-def _prebuilt(wanted: Platform) -> bytes | None:
+def _prebuilt(wanted: Platform, product: Product) -> bytes | None:
     """Return the library of the installed package, unless CC names a compiler."""
     if os.environ.get("CC", "").strip():
         return None
-    return prebuilt(f"{wanted.name}{wanted.suffix}", kernel())
+    return prebuilt(f"{wanted.name}/{product.name}{wanted.suffix}", kernel())
 
 
 def _host() -> Platform:
@@ -182,19 +211,21 @@ class Compiler:
     name: str
 
 
-def _host_compilers() -> list[Compiler]:
-    """Return the compilers for this machine in order of preference; only CC if that is set."""
-    found = [*_system_compilers()]
+def _host_compilers() -> Iterator[Compiler]:
+    """Yield the compilers for this machine in order of preference; only CC if that is set."""
+    found = False
+    for compiler in _system_compilers():
+        found = True
+        yield compiler
     if os.environ.get("CC", "").strip():
-        return found
+        return
     try:
-        found += _zig(_host())
+        yield from _zig(_host())
     except NoCompilerError:
         if not found:
             raise NoCompilerError(
                 f"native FMUs need a C compiler, and none was found: {INSTALL}"
             ) from None
-    return found
 
 
 def _system_compilers() -> Iterator[Compiler]:
@@ -249,25 +280,57 @@ def _zig(wanted: Platform) -> list[Compiler]:
 
 
 def _library(
-    wanted: Platform, compilers: Iterable[Compiler], progress: Callable[[str], None]
+    wanted: Platform,
+    compilers: Iterable[Compiler],
+    product: Product,
+    progress: Callable[[str], None],
 ) -> bytes:
     """Return the library of a platform from the first compiler that succeeds."""
     files = kernel()
     problem: CompilerError | None = None
     for compiler in compilers:
         try:
-            return _cached(wanted, compiler, files, progress)
+            return _cached(Job(wanted, compiler, product, files), progress)
         except CompilerError as error:
             problem = problem or error
     assert problem is not None
     raise problem
 
 
-def _arguments(wanted: Platform) -> tuple[str, ...]:
-    return (*FLAGS, *LINK[wanted.system], "-I.", UNIT, "-o", f"prbm_fmu{wanted.suffix}")
+@dataclass(frozen=True)
+class Job:
+    """A library of a platform, the compiler that makes it, and the source files by path."""
+
+    platform: Platform
+    compiler: Compiler
+    product: Product
+    files: Mapping[str, bytes]
+
+    @property
+    def output(self) -> str:
+        """Name of the file that the compiler writes."""
+        return f"{self.product.name}{self.platform.suffix}"
+
+    @property
+    def arguments(self) -> tuple[str, ...]:
+        """Arguments of the compiler, without libraries."""
+        link = LINK[self.platform.system]
+        return (*FLAGS, *self.product.flags, *link, "-I.", UNIT, "-o", self.output)
+
+    @property
+    def digest(self) -> str:
+        """Hash of all that the library depends on."""
+        compiler, found = self.compiler, hashlib.sha256()
+        for text in (
+            self.platform.name, compiler.identity, *compiler.command[1:], *self.arguments
+        ):  # fmt: skip
+            found.update(text.encode(errors="surrogateescape") + b"\0")
+        for name in sorted(self.files):
+            found.update(name.encode() + b"\0" + hashlib.sha256(self.files[name]).digest())
+        return found.hexdigest()
 
 
-def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -> bytes:
+def compiled(job: Job) -> bytes:
     """Return the library that a compiler makes of the kernel in a temporary folder.
 
     All paths are relative to that folder, so that the library does not contain them.
@@ -277,10 +340,10 @@ def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -
     CompilerError
         If the compiler fails.
     """
-    libraries = () if wanted.system == "windows" else ("-lm",)
+    compiler, libraries = job.compiler, () if job.platform.system == "windows" else ("-lm",)
     with tempfile.TemporaryDirectory(prefix="prbm_") as name:
         folder = Path(name)
-        for file, content in files.items():
+        for file, content in job.files.items():
             (folder / file).parent.mkdir(parents=True, exist_ok=True)
             (folder / file).write_bytes(content)
         environment = os.environ | {"LC_ALL": "C"} | dict.fromkeys(TEMPORARY, name)
@@ -288,11 +351,11 @@ def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -
             environment |= _zig_folders(folder)
         try:
             done = subprocess.run(
-                [*compiler.command, *_arguments(wanted), *libraries], cwd=folder,
+                [*compiler.command, *job.arguments, *libraries], cwd=folder,
                 capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
                 errors="replace", env=environment,
             )  # fmt: skip
-            made = (folder / f"prbm_fmu{wanted.suffix}").read_bytes()
+            made = (folder / job.output).read_bytes()
         except FileNotFoundError:
             made = b""
         except OSError as error:
@@ -300,7 +363,7 @@ def compiled(wanted: Platform, compiler: Compiler, files: Mapping[str, bytes]) -
                 f"{compiler.name} cannot be run ({error.strerror}); {INSTALL}"
             ) from None
     if done.returncode != 0 or not made:
-        raise CompilerError(_failure(wanted, compiler, done))
+        raise CompilerError(_failure(job.platform, compiler, done))
     return made
 
 
@@ -379,10 +442,10 @@ def _private(folder: Path) -> bool:
             found = folder.stat()
     except OSError:
         return False
-    return _trusted(found)
+    return trusted(found)
 
 
-def _trusted(found: os.stat_result) -> bool:
+def trusted(found: os.stat_result) -> bool:
     """Return whether only this user, or the administrator, can write to a file or folder."""
     if sys.platform == "win32":  # Modes and numbers of users have no meaning there.
         return True
@@ -396,60 +459,39 @@ def _user() -> int:
     return os.geteuid()
 
 
-def _cached(
-    wanted: Platform,
-    compiler: Compiler,
-    files: Mapping[str, bytes],
-    progress: Callable[[str], None],
-) -> bytes:
+def _cached(job: Job, progress: Callable[[str], None]) -> bytes:
     """Return the library from the cache, or compile it and store it there.
 
     Without a private folder, or if it cannot be read or written, each process compiles the library.
     """
-    digest = hashlib.sha256()
-    for text in (wanted.name, compiler.identity, *compiler.command[1:], *_arguments(wanted)):
-        digest.update(text.encode(errors="surrogateescape") + b"\0")
-    for name in sorted(files):
-        digest.update(name.encode() + b"\0" + hashlib.sha256(files[name]).digest())
-    name = f"{digest.hexdigest()[:32]}{wanted.suffix}"
+    name = f"{job.digest[:32]}{job.platform.suffix}"
     if name not in _loaded:
         folder = private_cache()
         if folder is None:
-            content = _compile(wanted, compiler, files, progress)
+            content = _compile(job, progress)
             progress(
                 f"the folder {cache_folder()} cannot be written, or other users can write to it: "
                 "the library is not kept; the next export compiles again"
             )
         else:
             entry = folder / name
-            content = _read(entry) or _store(entry, wanted, compiler, files, progress)
+            content = _read(entry) or _store(entry, job, progress)
         _loaded[name] = content
     return _loaded[name]
 
 
-def _compile(
-    wanted: Platform,
-    compiler: Compiler,
-    files: Mapping[str, bytes],
-    progress: Callable[[str], None],
-) -> bytes:
+def _compile(job: Job, progress: Callable[[str], None]) -> bytes:
     """Report the start of a compilation, and compile."""
-    progress(f"compiling the kernel for {wanted.name} with {compiler.name}")
-    return compiled(wanted, compiler, files)
+    progress(f"compiling the kernel for {job.platform.name} with {job.compiler.name}")
+    return compiled(job)
 
 
-def _store(
-    entry: Path,
-    wanted: Platform,
-    compiler: Compiler,
-    files: Mapping[str, bytes],
-    progress: Callable[[str], None],
-) -> bytes:
+def _store(entry: Path, job: Job, progress: Callable[[str], None]) -> bytes:
     """Compile the library and store it in the cache, unless another process has just done so."""
     with _locked(entry.parent):
         content = _read(entry)
         if content is None:
-            content = _compile(wanted, compiler, files, progress)
+            content = _compile(job, progress)
             try:
                 write(entry, MAGIC + hashlib.sha256(content).digest() + content)
             except OSError:
@@ -462,7 +504,7 @@ def _read(entry: Path) -> bytes | None:
     try:
         with entry.open("rb") as file:
             found = os.fstat(file.fileno())
-            if not (stat.S_ISREG(found.st_mode) and _trusted(found)):
+            if not (stat.S_ISREG(found.st_mode) and trusted(found)):
                 return None
             kept = file.read()
     except OSError:

@@ -6,11 +6,14 @@
 
 typedef struct Simulation Simulation;
 
-/* The data of an impact that are logged. */
+/* An impact for a listener.  The arrays are valid during the call only. */
 typedef struct {
+    int index; /* of the stop */
     const char *stop;
-    double time, approach_speed, rebound_speed, impulse, energy_lost;
+    double time, approach_speed, rebound_speed, impulse, energy_lost, modal_restitution,
+        impulse_sum;
     int count;
+    const double *q, *before, *after; /* (n,): angles, and rates before and after the impact */
 } Impact;
 
 typedef void ImpactListener(void *listener, const Impact *impact);
@@ -51,6 +54,10 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
 /* Reject a start whose communication step of the default experiment, in co-simulation, needs too
  * many integration steps. */
 PRBM bool simulation_check_effort(const Simulation *simulation, Problem *problem);
+/* The same for a given communication step [s]. */
+PRBM bool simulation_check_step(const Simulation *simulation, double step, Problem *problem);
+/* Number of integration steps since simulation_open. */
+PRBM double simulation_steps(const Simulation *simulation);
 /* The tolerance that solver.tolerance or an importer's tolerance (not 0) requests. */
 PRBM double simulation_requested(const Simulation *simulation, double tolerance);
 

@@ -1,4 +1,5 @@
-/* The library, compiled as one file; only the functions of FMI are exported.
+/* The library, compiled as one file; only the functions of FMI are exported.  With -DPRBM_ENGINE it
+ * is the library of the Python package instead, and exports the functions of engine.h.
  *
  * With -DPRBM_FMI=2 or 3 the library has the functions of that version only.  With -DPRBM_TABLES
  * the tables of the mechanism come from mechanism_tables.h instead of the FMU's folder resources.
@@ -52,6 +53,9 @@
 #include "values.c"
 #include "tangent.c"
 #include "tangent_indicators.c"
+#ifdef PRBM_ENGINE
+#include "engine.c"
+#else
 #include "fmi/fmu.h"
 #include "fmi/resources.c"
 #include "fmi/journal.c"
@@ -64,3 +68,4 @@
 #include "fmi/fmi3.c"
 #include "fmi/fmi3_values.c"
 #include "fmi/fmi3_absent.c"
+#endif

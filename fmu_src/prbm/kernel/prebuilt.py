@@ -36,7 +36,7 @@ def package_files(
     Parameters
     ----------
     libraries : mapping of str to bytes
-        Libraries by file name, which is the name of the platform with the suffix of the library.
+        Libraries by path: the name of the platform, a slash and the name of the library.
     compiler : str
         Name and version of the compiler.
     sources : mapping of str to bytes
@@ -58,7 +58,7 @@ def prebuilt(name: str, sources: Mapping[str, bytes]) -> bytes | None:
     Parameters
     ----------
     name : str
-        File name of the library.
+        Path of the library, as in :func:`package_files`.
     sources : mapping of str to bytes
         The kernel's source.
 

@@ -9,6 +9,7 @@ from ..base.text import printable
 from ..base.version import GENERATION_TOOL
 
 UNIT = "prbm_fmu.c"  # The file that is compiled; it includes all others.
+ENGINE_UNIT = "engine.c"  # Functions of the library that the Python package loads.
 TABLES = "mechanism_tables.h"
 WRAPPERS = {
     2: ("fmi/fmi2.c",),
@@ -57,6 +58,7 @@ def amalgamation(name: str, title: str, version: int) -> str:
     """Return the kernel as one C file, with the wrapper for one version of FMI."""
     texts = {file: content.decode() for file, content in kernel().items()}
     left_out = {file for number in WRAPPERS if number != version for file in WRAPPERS[number]}
+    left_out |= {ENGINE_UNIT}
     head = HEAD.format(
         name=name,
         title=printable(title).replace("*/", "* /"),

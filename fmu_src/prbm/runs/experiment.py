@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ..hybrid.simulation import Simulation
 from ..mechanism.description import Mechanism
+from .engine import simulation
 
 PERIODS_MAX = 25.0  # Largest number of fundamental periods in one second: 40 steps in each.
 PERIODS = 10.0  # Approximate number of periods if one second has fewer than one or too many.
@@ -30,7 +30,11 @@ class Experiment:
         return float(f"{self.stop_time / STEPS:.12g}")
 
 
-def experiment(mechanism: Mechanism, values: Mapping[str, float] | None = None) -> Experiment:
+def experiment(
+    mechanism: Mechanism,
+    values: Mapping[str, float] | None = None,
+    engine: str | None = None,
+) -> Experiment:
     """Return the default experiment of a mechanism.
 
     Its duration is one second if that is between 1 and 25 periods of the fundamental mode.
@@ -42,13 +46,15 @@ def experiment(mechanism: Mechanism, values: Mapping[str, float] | None = None) 
         The mechanism.
     values : mapping or None
         Parameters and inputs that differ from their defaults.
+    engine : str or None
+        As for :func:`prbm.runs.engine.simulation`.
 
     Raises
     ------
     ParameterError, EquilibriumError
         If the mechanism cannot start with these values.
     """
-    scales = Simulation(mechanism, values).configuration.scales
+    scales = simulation(mechanism, values, engine=engine).configuration.scales
     return Experiment(_duration(1 / scales.time))
 
 

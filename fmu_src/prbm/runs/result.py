@@ -39,12 +39,15 @@ class Result:
         ``time`` and the variables by name, in SI units, one row per communication point.
     impacts : tuple of Impact
         All impacts in order, with the states before and after each; empty for results of FMPy.
+    engine : str
+        The engine, ``"kernel"`` or ``"python"``; empty for results of FMPy.
     """
 
     mechanism: Mechanism
     values: Mapping[str, float]
     columns: Columns
     impacts: tuple[Impact, ...] = field(default=())
+    engine: str = ""
 
     def __getitem__(self, name: str) -> Columns:
         """Return a column by name."""

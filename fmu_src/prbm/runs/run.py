@@ -7,8 +7,9 @@ from typing import Any
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.progress import Progress
-from ..hybrid.simulation import Simulation
+from ..hybrid.impacts import Impact
 from ..mechanism.description import Mechanism
+from .engine import Engine, simulation
 from .experiment import experiment
 from .result import Result, structured
 
@@ -32,6 +33,7 @@ def simulate(
     source: Source | None = None,
     progress: Progress | None = None,
     steps_max: float | None = None,
+    engine: str | None = None,
 ) -> Result:
     """Simulate a mechanism from its release.
 
@@ -55,6 +57,9 @@ def simulate(
     steps_max : float or None
         Largest number of integration steps; the simulation ends early if it takes more than a
         proportional part of them.  None: no limit.
+    engine : str or None
+        ``"kernel"``, the C kernel, or ``"python"``, the specification, which is slower.  None: the
+        kernel if it can be compiled.
 
     Returns
     -------
@@ -69,7 +74,7 @@ def simulate(
     UserMistake
         If a text is not a quantity of the right dimension.
     EquilibriumError, SimulationError
-        As :class:`prbm.Simulation`.
+        As :func:`prbm.Simulation`.
     SlowSimulationError
         If the simulation takes more than ``steps_max`` steps.
 
@@ -89,47 +94,49 @@ def simulate(
         for name, x in (("stop_time", stop_time), ("step", step))
     )
     if duration is None or spacing is None:
-        default = experiment(mechanism, values)
+        default = experiment(mechanism, values, engine)
         duration = default.stop_time if duration is None else duration
         spacing = default.step if spacing is None else spacing
     times = communication_points(duration, spacing)
     if tolerance is not None:
         tolerance = _number("tolerance", tolerance, "")
-    simulation = Simulation(mechanism, values, tolerance=tolerance)
-    _check_effort(simulation, spacing)
-    simulation.record = []
-    start = {**simulation.values, **simulation.given}
+    motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
+    _check_effort(motion, spacing)
+    impacts: list[Impact] = []
+    motion.record = impacts
+    start = {**motion.values, **motion.given}
     rows = []
     for k, t in enumerate(times):
-        simulation.advance(t)
+        motion.advance(t)
         if steps_max is not None:
-            _check_steps(simulation, steps_max, k / (len(times) - 1))
-        outputs = simulation.outputs()
+            _check_steps(motion, steps_max, k / (len(times) - 1))
+        outputs = motion.outputs()
         if source is not None:
-            simulation.set(source(t))
-        rows.append({"time": t, **simulation.given, **outputs})
+            motion.set(source(t))
+        rows.append({"time": t, **motion.given, **outputs})
         if progress is not None:
             progress(k / (len(times) - 1))
-    return Result(mechanism, start, structured(rows), tuple(simulation.record))
+    return Result(mechanism, start, structured(rows), tuple(impacts), motion.engine)
 
 
-def _check_effort(simulation: Simulation, spacing: float) -> None:
+def _check_effort(motion: Engine, spacing: float) -> None:
     """Reject a simulation that needs too many steps for a communication step [s].
 
     The communication step is the given one, or that of the default experiment if it is shorter.
     """
     try:
-        simulation.check_effort(spacing)
+        motion.check_effort(spacing)
     except SimulationError:
-        simulation.check_effort(min(spacing, experiment(simulation.mechanism).step))
+        default = experiment(motion.mechanism, engine=motion.engine)
+        motion.check_effort(min(spacing, default.step))
 
 
-def _check_steps(simulation: Simulation, steps_max: float, fraction: float) -> None:
+def _check_steps(motion: Engine, steps_max: float, fraction: float) -> None:
     """Reject a simulation that takes more than a proportional part of the steps."""
-    if simulation.step_count > steps_max * max(fraction, EARLY_SHARE):
+    if motion.step_count > steps_max * max(fraction, EARLY_SHARE):
         raise SlowSimulationError(
-            f"the simulation takes {simulation.step_count} integration steps until t = "
-            f"{simulation.time:.6g} s; at most {steps_max:g} are permitted in total"
+            f"the simulation takes {motion.step_count} integration steps until t = "
+            f"{motion.time:.6g} s; at most {steps_max:g} are permitted in total"
         )
 
 

@@ -19,10 +19,10 @@ from ..analysis.impact_map import (
 from ..base.errors import SimulationError
 from ..base.progress import Progress
 from ..drawing.style import own_style
-from ..hybrid.simulation import Simulation
 from ..mechanism.description import Mechanism
 from ..plots.impact_map import heat_map
 from ..references.finite_elements import FiniteElements
+from ..runs.engine import simulation
 from ..runs.result import Result as Motion
 from .common import WEIGHTLESS, K, guide
 from .side_by_side import Drawing, Number, Result
@@ -49,7 +49,7 @@ def element_impact(mechanism: Mechanism, h: float, d: float, fine: bool = False)
 def reached(mechanism: Mechanism, h: float, d: float) -> float:
     """Return the time of the first impact after the release [s]."""
     values = {"stop.position": h, "stop.offset": d}
-    return first_impact(Simulation(mechanism, values, tolerance=SIMULATION_RTOL), 0).time
+    return first_impact(simulation(mechanism, values, tolerance=SIMULATION_RTOL), 0).time
 
 
 def element_run(mechanism: Mechanism, h: float, d: float) -> Motion:

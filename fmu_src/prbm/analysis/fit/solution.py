@@ -109,7 +109,7 @@ class Fit:
 
     @property
     def values(self) -> dict[str, float]:
-        """Fitted and fixed parameters of the mechanism, for :class:`prbm.Simulation`."""
+        """Fitted and fixed parameters of the mechanism, for :func:`prbm.Simulation`."""
         return of_mechanism(self.problem.values(self.p))
 
     @property

@@ -10,13 +10,13 @@ import numpy as np
 from ...base.names import unknown
 from ...data.series import Series
 from ...data.uncertainty import Estimate, EvaluationError
-from ...hybrid.simulation import Simulation
 from ...mechanics.arrays import Real
 from ...mechanics.assembly import assemble
 from ...mechanics.modal import modes
 from ...mechanics.statics import equilibrium
 from ...mechanics.system import unit
 from ...mechanism.description import Mechanism
+from ...runs.engine import Engine, simulation
 
 RECORD_SHIFT, RECORD_ZERO = "record.shift", "record.zero"
 RECORD_UNITS = {RECORD_SHIFT: "s", RECORD_ZERO: "m"}  # Parameters of a record, not of a mechanism.
@@ -127,12 +127,15 @@ class Response:
         Standard uncertainty of a sample; None: estimated from the residuals.
     tolerance : float or None
         Relative tolerance of the integration (default: ``solver.tolerance``).
+    engine : str or None
+        As for :func:`prbm.simulate`.
     """
 
     series: Series
     output: str = "shuttle.x"
     uncertainty: float | None = None
     tolerance: float | None = None
+    engine: str | None = None
 
     def __post_init__(self) -> None:
         if self.uncertainty is not None and not 0.0 < self.uncertainty < math.inf:
@@ -159,27 +162,25 @@ class Response:
     def model(self, mechanism: Mechanism, values: Mapping[str, float]) -> Real:
         """Return the output of the mechanism at the times of the record, (m,)."""
         times = self.series.time + values.get(RECORD_SHIFT, 0.0)
-        simulation = Simulation(mechanism, of_mechanism(values), tolerance=self.tolerance)
-        result = np.empty(len(times))
-        for i, t in enumerate(times):
-            if t > simulation.time:
-                simulation.advance(float(t))
-            result[i] = _output(simulation, self.output)
-        return result + values.get(RECORD_ZERO, 0.0)
+        motion = simulation(
+            mechanism, of_mechanism(values), tolerance=self.tolerance, engine=self.engine
+        )
+        signal = _outputs(motion, np.maximum(times, motion.time), self.output)
+        return signal + values.get(RECORD_ZERO, 0.0)
 
 
-def _output(simulation: Simulation, name: str) -> float:
-    """Return an output by its name, or the displacement of the released body [m]."""
-    motions = simulation.motions()
+def _outputs(motion: Engine, times: Real, name: str) -> Real:
+    """Return an output, or the displacement of the released body [m], at times."""
+    release = motion.mechanism.release
     if name == DISPLACEMENT:
-        release = simulation.mechanism.release
-        x, y = (motions[f"{release.body}.{axis}"] for axis in "xy")
+        x, y = motion.sample(times, [f"{release.body}.{axis}" for axis in "xy"]).T
         u = unit(release.direction)
-        return float(u.real * x + u.imag * y)
-    outputs = motions if name in motions else simulation.outputs()
+        displacement: Real = u.real * x + u.imag * y
+        return displacement
+    outputs = motion.outputs()
     if name not in outputs:
         raise EvaluationError(unknown(name, {DISPLACEMENT: 0.0, **outputs}))
-    return float(outputs[name])
+    return motion.sample(times, [name])[:, 0]
 
 
 @dataclass(frozen=True)

@@ -2,17 +2,17 @@
 
 from ...base.errors import EquilibriumError
 from ...hybrid.impacts import Impact
-from ...hybrid.simulation import Simulation
 from ...mechanics.modal import modes_at
 from ...mechanics.system import System
 from ...mechanism.parts import value
+from ...runs.engine import Engine
 from .maps import Hit
 
 PERIODS_MAX = 1.5  # Periods of the fundamental mode within which a wall must be reached.
 STEPS_PER_PERIOD = 50
 
 
-def first_impact(simulation: Simulation, stop: int) -> Impact:
+def first_impact(simulation: Engine, stop: int) -> Impact:
     """Advance a simulation to its first impact at a stop, and return this impact.
 
     Raises
@@ -21,12 +21,13 @@ def first_impact(simulation: Simulation, stop: int) -> Impact:
         If the wall is not reached in :data:`PERIODS_MAX` periods of the fundamental mode.
     """
     name = simulation.mechanism.stops[stop].name
-    simulation.record = []
+    record: list[Impact] = []
+    simulation.record = record
     period = 1.0 / simulation.frequency
     end = simulation.time + PERIODS_MAX * period
     while simulation.time < end:
         simulation.advance(min(end, simulation.time + period / STEPS_PER_PERIOD))
-        for impact in simulation.record:
+        for impact in record:
             if impact.stop == name:
                 return impact
     release = simulation.mechanism.release
@@ -45,7 +46,7 @@ def mode_energies(system: System, impact: Impact) -> Hit:
     system : System
         The simulated mechanism.
     impact : Impact
-        Impact from the record of a :class:`prbm.Simulation`.
+        Impact from the record of a :func:`prbm.Simulation`.
 
     Returns
     -------

@@ -17,9 +17,10 @@ def response(
     values: Mapping[str, float],
     times: Real,
     tolerance: float = SIMULATION_RTOL,
+    engine: str | None = None,
 ) -> Real:
     """Return the displacement of the released body along its release at times, (m,) [m]."""
-    seen = Response(Series(times, np.zeros(len(times))), DISPLACEMENT, tolerance=tolerance)
+    seen = Response(Series(times, np.zeros(len(times))), DISPLACEMENT, None, tolerance, engine)
     return seen.model(mechanism, values)
 
 
@@ -29,6 +30,8 @@ def fit_response(
     times: Real,
     wanted: Real,
     values: Mapping[str, float] | None = None,
+    *,
+    engine: str | None = None,
 ) -> Fit:
     """Fit parameters of a mechanism to a computed response, starting from their values.
 
@@ -44,6 +47,8 @@ def fit_response(
         Displacement of the released body along the direction of its release [m].
     values : mapping
         Parameters that differ from their defaults.
+    engine : str or None
+        As for :func:`prbm.simulate`.
 
     Raises
     ------
@@ -52,5 +57,6 @@ def fit_response(
     RecordError
         If the times have gaps or are fewer than 16.
     """
-    target = Response(Series(times, wanted, DISPLACEMENT), DISPLACEMENT, tolerance=SIMULATION_RTOL)
+    series = Series(times, wanted, DISPLACEMENT)
+    target = Response(series, DISPLACEMENT, None, SIMULATION_RTOL, engine)
     return fit(mechanism, names, target, values, starts=1)

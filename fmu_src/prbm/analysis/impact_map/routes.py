@@ -24,13 +24,13 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from ...base.progress import Progress
-from ...hybrid.simulation import Simulation
 from ...mechanics.arrays import Real
 from ...mechanics.assembly import assemble
 from ...mechanics.modal import Modes, modes
 from ...mechanism.description import Mechanism
 from ...mechanism.parts import value
 from ...references.finite_elements import FiniteElements, Shape
+from ...runs.engine import simulation
 from ..flexure_models import with_flexures
 from ..touching import impact_shape, touching
 from .impacts import first_impact, mode_energies
@@ -181,6 +181,7 @@ def simulated(
     tolerance: float = 1e-7,
     label: str = "simulated",
     progress: Progress | None = None,
+    engine: str | None = None,
 ) -> ImpactMap:
     """Return the map of the first impacts after the release; parameters as for :func:`algebraic`.
 
@@ -190,6 +191,8 @@ def simulated(
         Relative tolerance of the integration.
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
+    engine : str or None
+        As for :func:`prbm.simulate`.
 
     Raises
     ------
@@ -201,9 +204,10 @@ def simulated(
 
     def hits(offset: float) -> Iterator[Hit]:
         for h in walls:
-            simulation = Simulation(mechanism, which.at(values, h, offset), tolerance=tolerance)
-            impact = first_impact(simulation, which.index)
-            yield mode_energies(simulation.system, impact)
+            changes = which.at(values, h, offset)
+            motion = simulation(mechanism, changes, tolerance=tolerance, engine=engine)
+            impact = first_impact(motion, which.index)
+            yield mode_energies(motion.system, impact)
             count()
 
     return map_of(label, [list(hits(d)) for d in offsets])
@@ -218,6 +222,7 @@ def fitted(
     stop: str | None = None,
     label: str = "fitted",
     progress: Progress | None = None,
+    engine: str | None = None,
 ) -> ImpactMap:
     """Return the restitution of an inextensible 1R model fitted to simulated responses.
 
@@ -246,12 +251,15 @@ def fitted(
     stiffness = [name for name in kinds if name in known]
     for i, d in enumerate(offsets):
         for j, h in enumerate(walls):
-            simulation = Simulation(mechanism, which.at(values, h, d), tolerance=RELEASE_RTOL)
-            hit = first_impact(simulation, which.index).time
-            end = hit + REBOUND_PERIODS / simulation.frequency
+            changes = which.at(values, h, d)
+            motion = simulation(mechanism, changes, tolerance=RELEASE_RTOL, engine=engine)
+            hit = first_impact(motion, which.index).time
+            end = hit + REBOUND_PERIODS / motion.frequency
             times = np.linspace(0.0, end, SAMPLES)
-            wanted = response(mechanism, which.at(values, h, d), times)
-            found = fit_response(model, [eps, *stiffness], times, wanted, which.at(shared, h, 0.0))
+            wanted = response(mechanism, changes, times, engine=engine)
+            found = fit_response(
+                model, [eps, *stiffness], times, wanted, which.at(shared, h, 0.0), engine=engine
+            )
             result[i, j] = found.values[eps]
             count()
     return ImpactMap(label, np.array(walls), np.array(offsets), result)

@@ -391,15 +391,23 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
 
 /* --- bookkeeping ------------------------------------------------------------------------------ */
 
-static void report_impact(const Simulation *sim, int i) {
+/* Report an impact at angles q, with the rates v before and after. */
+static void report_impact(const Simulation *sim, int i, const double *q, const double *v,
+                          const double *after) {
     const Latched *last = &sim->state.latched[i];
-    Impact report = {sim->configuration.mechanism->stops[i].name,
+    Impact report = {i,
+                     sim->configuration.mechanism->stops[i].name,
                      last->time,
                      last->approach_speed,
                      last->rebound_speed,
                      last->impulse,
                      last->energy_lost,
-                     last->count};
+                     last->modal_restitution,
+                     last->impulse_sum,
+                     last->count,
+                     q,
+                     v,
+                     after};
     if (sim->hear) {
         sim->hear(sim->listener, &report);
     }
@@ -464,7 +472,7 @@ static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *acco
             latched->impulse = hits->normal[i];
             latched->energy_lost = account->lost[i];
             latched->modal_restitution = modal;
-            report_impact(sim, i);
+            report_impact(sim, i, q, v, hits->after);
         }
     }
     sim->scratch.used = mark;

@@ -200,6 +200,10 @@ PRBM double simulation_time(const Simulation *simulation) {
     return simulation->state.time;
 }
 
+PRBM double simulation_steps(const Simulation *simulation) {
+    return simulation->steps;
+}
+
 /* --- contact state and inputs ----------------------------------------------------------------- */
 
 PRBM void set_inputs(Simulation *sim) {

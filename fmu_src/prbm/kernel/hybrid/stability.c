@@ -61,7 +61,11 @@ PRBM bool find_fastest(Simulation *sim, Problem *problem) {
 }
 
 PRBM bool simulation_check_effort(const Simulation *simulation, Problem *problem) {
-    double step = simulation->configuration.mechanism->default_step;
+    return simulation_check_step(simulation, simulation->configuration.mechanism->default_step,
+                                 problem);
+}
+
+PRBM bool simulation_check_step(const Simulation *simulation, double step, Problem *problem) {
     double needed = step / stable_step(simulation);
     if (needed > DEFAULT_EFFORT_MAX) {
         return fail(problem,

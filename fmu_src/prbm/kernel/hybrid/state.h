@@ -157,6 +157,7 @@ struct Simulation {
     Scratch scratch;
     ImpactListener *hear;
     void *listener;
+    double steps; /* integration steps since the simulation was opened */
     size_t bytes;
 };
 

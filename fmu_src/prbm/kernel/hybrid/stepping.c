@@ -213,6 +213,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
                                 &stepping->evaluation, state->k1, problem)) {
         return false;
     }
+    sim->steps += 1.0;
     if (!find_step(sim, longest, &h, problem)) {
         return false;
     }

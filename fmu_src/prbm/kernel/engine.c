@@ -1,0 +1,210 @@
+/* The library of the Python package: simulations with a record of their impacts. */
+#include <stdlib.h>
+#include <string.h>
+
+#include "core/tables.h"
+#include "engine.h"
+#include "hybrid/simulation.h"
+#include "values.h"
+
+enum { FIRST_IMPACTS = 64, IMPACTS_MAX = 1 << 24 };
+
+struct Engine {
+    Simulation *simulation;
+    int n;            /* number of coordinates */
+    double *record;   /* (room, ENGINE_IMPACT + 3 n) */
+    int count, room;  /* numbers of impacts */
+    bool incomplete;  /* an impact could not be recorded */
+};
+
+static bool succeed(bool right, const Problem *problem, char *message) {
+    if (!right) {
+        memcpy(message, problem->text, sizeof problem->text);
+    }
+    return right;
+}
+
+/* --- mechanisms ------------------------------------------------------------------------------- */
+
+EXPORTED Mechanism *prbm_mechanism_open(const unsigned char *tables, size_t size, char *message) {
+    Problem problem = {""};
+    Mechanism *mechanism = mechanism_open(tables, size, &problem);
+    succeed(mechanism != NULL, &problem, message);
+    return mechanism;
+}
+
+EXPORTED void prbm_mechanism_close(Mechanism *mechanism) {
+    mechanism_close(mechanism);
+}
+
+EXPORTED Engine *prbm_open(const Mechanism *mechanism) {
+    Engine *engine = calloc(1, sizeof *engine);
+    if (!engine) {
+        return NULL;
+    }
+    engine->simulation = simulation_open(mechanism);
+    engine->n = mechanism->coordinate_count;
+    if (!engine->simulation) {
+        free(engine);
+        return NULL;
+    }
+    return engine;
+}
+
+EXPORTED void prbm_close(Engine *engine) {
+    simulation_close(engine->simulation);
+    free(engine->record);
+    free(engine);
+}
+
+/* --- the record of impacts -------------------------------------------------------------------- */
+
+static size_t impact_size(const Engine *engine) {
+    return ENGINE_IMPACT + 3 * (size_t)engine->n;
+}
+
+/* Provide memory for one more impact. */
+static bool make_room(Engine *engine) {
+    if (engine->count < engine->room) {
+        return true;
+    }
+    int room = engine->room ? 2 * engine->room : FIRST_IMPACTS;
+    size_t size = impact_size(engine) * sizeof(double);
+    double *record = room <= IMPACTS_MAX && (size_t)room < SIZE_MAX / size
+                         ? realloc(engine->record, (size_t)room * size)
+                         : NULL;
+    if (!record) {
+        return false;
+    }
+    engine->record = record;
+    engine->room = room;
+    return true;
+}
+
+static void record_impact(void *listener, const Impact *impact) {
+    Engine *engine = listener;
+    if (!make_room(engine)) {
+        engine->incomplete = true;
+        return;
+    }
+    int n = engine->n;
+    double *to = engine->record + impact_size(engine) * (size_t)engine->count;
+    const double numbers[ENGINE_IMPACT] = {
+        impact->index,         impact->count,   impact->time,
+        impact->approach_speed, impact->rebound_speed, impact->impulse,
+        impact->energy_lost,   impact->modal_restitution, impact->impulse_sum,
+    };
+    memcpy(to, numbers, sizeof numbers);
+    copy(n, impact->q, to + ENGINE_IMPACT);
+    copy(n, impact->before, to + ENGINE_IMPACT + n);
+    copy(n, impact->after, to + ENGINE_IMPACT + 2 * n);
+    engine->count++;
+}
+
+EXPORTED void prbm_record(Engine *engine, bool record) {
+    simulation_listen(engine->simulation, record ? record_impact : NULL, engine);
+    engine->count = 0;
+}
+
+EXPORTED void prbm_impacts(Engine *engine, double *numbers) {
+    size_t count = (size_t)engine->count * impact_size(engine);
+    if (count > 0) {
+        memcpy(numbers, engine->record, count * sizeof *numbers);
+    }
+    engine->count = 0;
+}
+
+/* --- simulation ------------------------------------------------------------------------------- */
+
+EXPORTED bool prbm_set(Engine *engine, int first, int count, const double *values,
+                       char *message) {
+    Problem problem = {""};
+    bool right = true;
+    for (int i = 0; right && i < count; i++) {
+        right = simulation_set(engine->simulation, first + i, values[i], &problem);
+    }
+    return succeed(right, &problem, message);
+}
+
+EXPORTED bool prbm_start(Engine *engine, double start_time, double tolerance, char *message) {
+    Problem problem = {""};
+    bool right = simulation_start(engine->simulation, start_time, tolerance, false, &problem);
+    return succeed(right, &problem, message);
+}
+
+EXPORTED bool prbm_check_step(const Engine *engine, double step, char *message) {
+    Problem problem = {""};
+    return succeed(simulation_check_step(engine->simulation, step, &problem), &problem, message);
+}
+
+EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
+    Problem problem = {""};
+    int before = engine->count;
+    engine->incomplete = false;
+    bool right = simulation_advance(engine->simulation, time, &problem);
+    if (right && engine->incomplete) {
+        right = fail(&problem, "there is not enough memory to record the impacts up to "
+                               "t = %.9g s: simulate in shorter parts", time);
+    }
+    if (!succeed(right, &problem, message)) {
+        engine->count = before;
+        return -1;
+    }
+    return engine->count;
+}
+
+EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *values,
+                          char *message) {
+    Problem problem = {""};
+    bool right = true;
+    for (int i = 0; right && i < count; i++) {
+        right = simulation_get(engine->simulation, slots[i], &values[i], &problem);
+    }
+    return succeed(right, &problem, message);
+}
+
+EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int count,
+                         const int *slots, double *values, int *done, char *message) {
+    for (*done = 0; *done < samples; ++*done) {
+        bool later = times[*done] != simulation_time(engine->simulation);
+        double *row = values + (size_t)*done * (size_t)count;
+        if ((later && prbm_advance(engine, times[*done], message) < 0) ||
+            !prbm_values(engine, count, slots, row, message)) {
+            return -1;
+        }
+    }
+    return engine->count;
+}
+
+EXPORTED bool prbm_state(Engine *engine, double *y, char *message) {
+    Problem problem = {""};
+    Simulation *sim = engine->simulation;
+    bool right = present_outputs(sim, PLACES, &problem) != NULL;
+    if (right) {
+        copy(state_size(sim), sim->present.y, y);
+    }
+    return succeed(right, &problem, message);
+}
+
+EXPORTED double prbm_steps(const Engine *engine) {
+    return simulation_steps(engine->simulation);
+}
+
+EXPORTED int prbm_coordinates(const Engine *engine) {
+    return engine->n;
+}
+
+/* --- saving and restoring --------------------------------------------------------------------- */
+
+EXPORTED size_t prbm_saved_count(const Engine *engine) {
+    return simulation_state_count(engine->simulation);
+}
+
+EXPORTED void prbm_save(const Engine *engine, double *numbers) {
+    simulation_save(engine->simulation, numbers);
+}
+
+EXPORTED bool prbm_restore(Engine *engine, const double *numbers, char *message) {
+    Problem problem = {""};
+    return succeed(simulation_restore(engine->simulation, numbers, &problem), &problem, message);
+}

@@ -1,0 +1,61 @@
+/* The library of the Python package: the functions that kernel/library.py calls with ctypes.
+ *
+ * A function that can fail returns false, or -1, and writes a sentence to its argument message,
+ * which has PROBLEM_LENGTH bytes.  An engine is used by one thread at a time.
+ */
+#ifndef PRBM_ENGINE_H
+#define PRBM_ENGINE_H
+
+#include "motion.h"
+
+#if defined(_WIN32)
+#define EXPORTED __declspec(dllexport)
+#elif defined(__GNUC__)
+#define EXPORTED __attribute__((visibility("default")))
+#else
+#define EXPORTED
+#endif
+
+typedef struct Engine Engine;
+
+/* Read the tables of a mechanism; NULL on failure.  Engines refer to the result. */
+EXPORTED Mechanism *prbm_mechanism_open(const unsigned char *tables, size_t size, char *message);
+EXPORTED void prbm_mechanism_close(Mechanism *mechanism);
+
+/* Allocate a simulation; NULL if there is no memory. */
+EXPORTED Engine *prbm_open(const Mechanism *mechanism);
+EXPORTED void prbm_close(Engine *engine);
+/* Set parameters and inputs: count values from a slot on. */
+EXPORTED bool prbm_set(Engine *engine, int first, int count, const double *values, char *message);
+/* Start the motion.  If the tolerance is 0, solver.tolerance is used. */
+EXPORTED bool prbm_start(Engine *engine, double start_time, double tolerance, char *message);
+EXPORTED bool prbm_check_step(const Engine *engine, double step, char *message);
+/* Simulate to a time.  Return the number of recorded impacts, -1 on failure.  A failure leaves the
+ * simulation and the record unchanged. */
+EXPORTED int prbm_advance(Engine *engine, double time, char *message);
+/* Get the values of slots (count,) at the present time. */
+EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *values,
+                          char *message);
+/* Simulate to each of several times, and get the values of slots (samples, count) there.  Return
+ * the number of recorded impacts, -1 on failure; *done is the number of times reached. */
+EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int count,
+                         const int *slots, double *values, int *done, char *message);
+/* Get the present state (2 n + 2,): angles, rates, dissipated energy and work. */
+EXPORTED bool prbm_state(Engine *engine, double *y, char *message);
+EXPORTED double prbm_steps(const Engine *engine); /* integration steps so far */
+EXPORTED int prbm_coordinates(const Engine *engine); /* n */
+
+/* Record the impacts from now on, or no longer. */
+EXPORTED void prbm_record(Engine *engine, bool record);
+/* Move the recorded impacts out, ENGINE_IMPACT + 3 n numbers each: index of the stop, count, time,
+ * approach speed, rebound speed, impulse, energy lost, modal restitution, sum of impulses, angles,
+ * rates before, rates after. */
+EXPORTED void prbm_impacts(Engine *engine, double *numbers);
+enum { ENGINE_IMPACT = 9 };
+
+/* The complete state as numbers, as simulation_save writes it. */
+EXPORTED size_t prbm_saved_count(const Engine *engine);
+EXPORTED void prbm_save(const Engine *engine, double *numbers);
+EXPORTED bool prbm_restore(Engine *engine, const double *numbers, char *message);
+
+#endif
