@@ -23,6 +23,7 @@ from prbm.commands import systems
 from prbm.files.mechanism_file import load, shipped
 from prbm.mechanics.assembly import assemble
 from prbm.mechanics.statics import free_displacement
+from prbm.runs.run import simulate
 from signals import interruptible
 from support import ROOT, SUPPORT
 
@@ -51,6 +52,17 @@ def _empty_folder(tmp_path, monkeypatch):
 
 
 # --- page and help ----------------------------------------------------------------------
+
+
+def test_a_signal_of_the_command_line_is_that_of_python(capsys):
+    shock = "half-sine(20 g, 2 ms, 3 ms)"
+    line = f"simulate PRBDM --input 'base.acceleration.x = {shock}' --stop-time 8ms --out ."
+    assert run(line) == cli.OK
+    written = np.genfromtxt("PRBDM.csv", delimiter=",", names=True, deletechars="")
+    inputs = {"base.acceleration.x": shock}
+    columns = simulate(load("PRBDM"), inputs=inputs, stop_time=8e-3, step=8e-6).columns
+    assert written["base.acceleration.x"].max() == pytest.approx(20 * 9.80665, rel=1e-3)
+    np.testing.assert_array_equal(written["shuttle.x"], columns["shuttle.x"])
 
 
 @pytest.mark.slow
@@ -385,6 +397,14 @@ MISTAKES = [
     ("simulate PRBDM --step 1ns", "choose a larger step"),
     ("simulate PRBDM --tolerance 2", "must lie between 0 and 1"),
     ("simulate PRBDM --stop-time 10ms --spectrum", "no impact in 0.01 s"),
+    ("simulate PRBDM --input force.x", "--input force.x: write NAME=VALUE, for instance"),
+    ("simulate PRBDM --input 'forc.x=step(1 N)'", "did you mean force.x"),
+    ("simulate PRBDM --input 'force.x=stpe(1 N)'", "unknown shape 'stpe'; did you mean step"),
+    ("simulate PRBDM --input 'force.x=step(1 m)'", "the unit 'm' has another dimension"),
+    ("simulate PRBDM --input force.x=1 --input force.x=2", "force.x is given twice"),
+    ("simulate PRBDM --input force.x=1 --set force.x=1", "both as a constant and over time"),
+    ("simulate PRBDM --input 'force.x=step(1 N)' --spectrum", "use --spectrum last"),
+    ("animate a.csv a.gif --model PRBDM --input force.x=1", "--input: a result is shown"),
     ("fit PRBDM --free flexure.K_theta", "no measured data: give"),
     ("fit PRBDM --frequency '5 +- 1'", "required: --free"),
     ("fit PRBDM --free K_theta --frequency '5 +- 1'", "did you mean flexure.K_theta"),

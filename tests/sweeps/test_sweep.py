@@ -25,9 +25,12 @@ from mishap import CRASHES, CRASHES_ONCE, EXITS, FINE, HANGS, KILLS_WORKER, RAIS
 from native_host import clocked
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
+from prbm.runs.quantities import QUANTITIES
+from prbm.runs.run import simulate
 from prbm.sweeps import sweep as sweeps
+from prbm.sweeps.outputs import Output, evaluate, parse_output, reduce
 from prbm.sweeps.results import OWN
-from prbm.sweeps.runs import Job, Output, Runner, parse_output, reduce
+from prbm.sweeps.runs import Job, Runner
 from prbm.sweeps.sweep import SweepError, samples, sweep
 from signals import interruptible
 from support import SUPPORT
@@ -153,6 +156,34 @@ def test_reductions_match_a_closed_form():
     assert of("since(x < 0.75)") == pytest.approx(1.5, abs=2.5e-3)  # a step is 2e-3 here
     assert of("since(x <= 1)") == 0.0
     assert np.isnan([of("first(x > 1.5)"), of("since(x > 0.5)"), of("first(x >= 2)")]).all()
+
+
+def test_absolute_values_are_reduced_as_their_variable():
+    t, x = np.linspace(0.0, 1.0, 5), np.array([0.0, -3.0, 2.0, -1.0, 0.0])
+    columns = {"time": t, "x": x}
+    texts = ("max(abs(x))", "abs(x)", "first(abs(x) > 2.5)", "min(abs(x))")
+    values = [evaluate(parse_output(text, columns), columns) for text in texts]
+    assert values == [3.0, 0.0, 0.25, 0.0]
+    assert parse_output("abs(x)", {"abs(x)"}).absolute is False
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+def test_named_quantities_of_fmus_are_those_of_the_engine(native, mechanisms):
+    names = [*QUANTITIES, "max(abs(shuttle.vx))"]
+    table = pd.DataFrame({"stop.position": [0.0, 2e-3]})
+    found = sweep(native["PRBDM", 2], table, outputs=names, stop_time=0.3, step=1e-3)
+    for row, position in enumerate(table["stop.position"]):
+        result = simulate(mechanisms["PRBDM"], {"stop.position": position}, stop_time=0.3)
+        for name, quantity in QUANTITIES.items():
+            assert found[name][row] == pytest.approx(quantity.compute(result.columns), rel=1e-6)
+        largest = np.abs(result["shuttle.vx"]).max()
+        assert found["max(abs(shuttle.vx))"][row] == pytest.approx(largest, rel=1e-6)
+
+
+def test_a_named_quantity_of_an_fmu_without_its_variables_is_rejected(mishap):
+    with pytest.raises(ParameterError, match=r"output settling: the FMU has no variable energy\.k"):
+        sweep(mishap, pd.DataFrame({"x": [1.0]}), outputs=["settling"])
 
 
 def test_a_variable_name_takes_precedence_over_a_reduction():

@@ -77,6 +77,7 @@ def animation_arguments(parser: ArgumentParser) -> None:
     mechanism.add_argument("--model", metavar="NAME", help="name of a shipped mechanism")
     mechanism.add_argument("--mechanism", metavar="FILE.toml", help="mechanism file")
     set_argument(parser, "value of a parameter or input")
+    input_argument(parser)
     stop_time_argument(parser)
     add(
         "--slow", type=float, metavar="FACTOR",
@@ -105,6 +106,15 @@ def engine_argument(parser: ArgumentParser) -> None:
         "--engine", metavar="ENGINE", choices=("kernel", "python"),
         help="kernel: compiled C; python: the specification, about a hundred times slower "
         "(default: kernel, or python without a C compiler)",
+    )  # fmt: skip
+
+
+def input_argument(parser: ArgumentParser) -> None:
+    """Add --input."""
+    parser.add_argument(
+        "--input", action="append", default=[], metavar="NAME=SIGNAL",
+        help='input over time: "force.x=step(1 N, 10 ms)", or pulse, half-sine, sine, chirp, '
+        "csv(FILE, COLUMN); repeatable",
     )  # fmt: skip
 
 

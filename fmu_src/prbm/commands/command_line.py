@@ -24,6 +24,7 @@ from .arguments import (
     ProposingParser,
     animation_arguments,
     engine_argument,
+    input_argument,
     picture_arguments,
     set_argument,
     stop_time_argument,
@@ -203,6 +204,7 @@ def _simulate(commands: Commands) -> None:
         _examples(
             "prbm simulate PRBDM2R --set stop.restitution=0.5 --out results",
             "prbm simulate PRBDM2R --spectrum first --out results",
+            'prbm simulate PRBDM2R --input "base.acceleration.x=half-sine(50 g, 2 ms)"',
         ),
     )  # fmt: skip
     _mechanism(parser)
@@ -218,6 +220,7 @@ def _simulate(commands: Commands) -> None:
         help="relative tolerance of the integration (default: solver.tolerance)",
     )  # fmt: skip
     set_argument(parser, "value of a parameter or input")
+    input_argument(parser)
     add(
         "--spectrum", nargs="?", const="first", choices=("first", "last"),
         help="compute spectra of the vibration after an impact; first: after the first impact, "

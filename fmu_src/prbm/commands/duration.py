@@ -1,8 +1,9 @@
-"""Duration and communication step of a simulation, from the command line or by default."""
+"""Duration, communication step and inputs of a simulation, from the command line."""
 
+import argparse
 from collections.abc import Mapping
 
-from ..files.settings import quantity
+from ..files.settings import pairs, quantity
 from ..mechanism.description import Mechanism
 from ..runs.experiment import Experiment, experiment
 
@@ -52,3 +53,8 @@ def span(
     else:
         default = min(chosen.step, Experiment(duration).step) if duration > 0.0 else chosen.step
     return duration, default if step is None else quantity(step, "s", "--step")
+
+
+def given_inputs(options: argparse.Namespace) -> dict[str, str]:
+    """Return the signals that are given by --input, as texts by the names of the inputs."""
+    return pairs(options.input, "--input", '--input "force.x=step(1 N, 10 ms)"')

@@ -24,7 +24,8 @@ from ..fmu.unpack import unpacked
 from ..interface.variables import CLOCK
 from ..mechanism.description import Mechanism
 from ..plots.figures import response
-from ..runs.headline import FREQUENCY, headline
+from ..runs.headline import headline
+from ..runs.quantities import FREQUENCY
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
 
 

@@ -10,7 +10,7 @@ from ..base.errors import ParameterError
 from ..base.names import unknown
 from ..base.progress import reporter
 from ..files.mechanism_file import load, read_mechanism, shipped
-from ..files.settings import quantity, settings
+from ..files.settings import UserMistake, quantity, settings
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
 from ..plots.animation import AnimationError, check_encoder, write_film
@@ -20,7 +20,7 @@ from ..plots.picture import picture
 from ..plots.scene import Scene
 from ..runs.result import Columns, Result, ResultError, names, read_csv
 from ..runs.run import simulate
-from .duration import span
+from .duration import given_inputs, span
 
 
 def drawn(options: argparse.Namespace) -> None:
@@ -71,7 +71,12 @@ def _result(options: argparse.Namespace) -> Result:
             )
         changes = settings(mechanism, options.set)
         stop_time, step = span(mechanism, changes, options.stop_time, engine=options.engine)
-        return simulate(mechanism, changes, stop_time=stop_time, step=step, engine=options.engine)
+        return simulate(
+            mechanism, changes, inputs=given_inputs(options), stop_time=stop_time, step=step,
+            engine=options.engine,
+        )  # fmt: skip
+    if options.input:
+        raise UserMistake("--input: a result is shown; give a mechanism to simulate instead")
     if len(files) > 2:
         raise ParameterError(f"{len(files)} files are given; expected RESULT.csv OUT, or OUT")
     columns = read_csv(files[0])

@@ -19,7 +19,7 @@ from ..mechanism.description import Mechanism
 from ..runs.headline import headline
 from ..runs.result import Result, names
 from ..runs.run import communication_points, simulate
-from .duration import span
+from .duration import given_inputs, span
 from .output import Output
 from .systems import ZERO_RTOL
 
@@ -42,10 +42,15 @@ def simulated(options: argparse.Namespace) -> None:
     stop_time, step = span(mechanism, values, options.stop_time, options.step, options.engine)
     duration = quantity(options.spectrum_time, "s", "--spectrum-time")
     communication_points(stop_time, step)
-    tolerance = _tolerance(options.tolerance)
+    if options.input and options.spectrum == "first":
+        raise UserMistake(
+            "--spectrum first: the motion after the first impact is simulated without inputs over "
+            "time; use --spectrum last"
+        )
+    tolerance, inputs = _tolerance(options.tolerance), given_inputs(options)
     begin = time.perf_counter()
     result = simulate(
-        mechanism, values, stop_time=stop_time, step=step, tolerance=tolerance,
+        mechanism, values, inputs=inputs, stop_time=stop_time, step=step, tolerance=tolerance,
         progress=reporter(), engine=options.engine,
     )  # fmt: skip
     print(f"simulated            {stop_time:g} s in {time.perf_counter() - begin:.2f} s")

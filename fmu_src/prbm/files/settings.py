@@ -152,6 +152,37 @@ def settings(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, float]:
     return assigned(units_of(mechanism), texts)
 
 
+def pairs(texts: Sequence[str], option: str, example: str) -> dict[str, str]:
+    """Split NAME=VALUE pairs.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Values of the option.
+    option, example : str
+        Name of the option and an example of a pair, for messages.
+
+    Raises
+    ------
+    UserMistake
+        If a text is not such a pair, or a name is given twice.
+
+    Examples
+    --------
+    >>> pairs(["force.x = sine(1 N, 5 Hz, phase=1)"], "--input", "")
+    {'force.x': 'sine(1 N, 5 Hz, phase=1)'}
+    """
+    found: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not (name and equals and value):
+            raise UserMistake(f"{option} {text}: write NAME=VALUE, for instance {example}")
+        if name in found:
+            raise UserMistake(f"{option} {text}: {name} is given twice; remove one of them")
+        found[name] = value
+    return found
+
+
 def assigned(units: Mapping[str, str], texts: Sequence[str]) -> dict[str, float]:
     """Read NAME=VALUE pairs of variables with given units.
 

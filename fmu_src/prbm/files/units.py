@@ -49,6 +49,7 @@ hertz = 1 / second = Hz
 DEFINITIONS = f"""{MECHANICAL}tera- = 1e12 = T-
 """  # Pint's own list is not used: some of its units are likely misprints of these.
 KNOWN = "m, g, s, N, Nm, Pa, J, W, Hz, rad, deg, with SI prefixes, joined as in kg/m3 or N.m"
+STANDARD_GRAVITY = "9.80665"  # m/s2; the unit g of an acceleration, otherwise g is the gram.
 
 _NUMBER = r"(?>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"  # Atomic: 1e3 is not 1 with the unit e3.
 _POWER = r"[A-Za-zµμ°]+(?:\^?-?[0-9]+)?"
@@ -116,6 +117,8 @@ def number(written: object, unit: str) -> float:
 def converted(value: str, unit: str, wanted: str) -> float:
     """Return a number in another unit, correctly rounded.
 
+    The unit g of an acceleration is the standard gravity, 9.80665 m/s2.
+
     Raises
     ------
     MechanismError
@@ -125,7 +128,11 @@ def converted(value: str, unit: str, wanted: str) -> float:
     --------
     >>> converted("53.187", "g", "kg"), converted("1", "rad", "deg")
     (0.053187, 57.29577951308232)
+    >>> converted("2", "g", "m/s2")
+    19.6133
     """
+    if unit == "g" and same_dimension(wanted or "1", "m/s2"):
+        value, unit = str(Decimal(value) * Decimal(STANDARD_GRAVITY)), "m/s2"
     written = _unit(unit)
     if written.dimensionality != _unit(wanted).dimensionality:
         raise MechanismError(f"the unit {unit!r} has another dimension; {_advice(wanted)}")

@@ -11,9 +11,9 @@ from ..mechanics.system import System, unit
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from .marks import marks
+from .quantities import FREQUENCY, KINETIC, SETTLED_ENERGY_RTOL, settling
 from .result import Columns, column, moves, rest_time
 
-FREQUENCY = "mode.frequency"
 SECONDS_MIN = 0.1  # Times of shorter runs are printed in ms or µs [s].
 
 
@@ -79,7 +79,8 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
     time = column(columns, "time")
     span = float(time[-1] - time[0])
     lines = _free(columns, system)
-    if not moves(columns, mechanism, system.length):
+    moving = moves(columns, mechanism, system.length)
+    if not moving:
         lines.append(
             "motion               nothing moves: release the mechanism away from its equilibrium, "
             "or apply an input"
@@ -100,7 +101,21 @@ def headline(columns: Columns, mechanism: Mechanism, values: Mapping[str, float]
                 f"{_place(columns, system)}, pressed with "
                 f"{column(columns, f'{stop}.force')[-1]:.4g} N"
             )
-    return lines
+    return [*lines, _settled(columns, span)] if moving else lines
+
+
+def _settled(columns: Columns, span: float) -> str:
+    """Return the line about the end of the motion."""
+    for name in (KINETIC, FREQUENCY):
+        column(columns, name)  # Raises an error if it is missing.
+    when = settling(columns)
+    if math.isnan(when):
+        return "settled              not yet, or too late in the simulation to be certain"
+    share = f"{100 * SETTLED_ENERGY_RTOL:g} %"
+    return (
+        f"settled              at t = {instant(when, span, 3)}: the kinetic energy stays below "
+        f"{share} of its largest value"
+    )
 
 
 def _free(columns: Columns, system: System) -> list[str]:

@@ -9,8 +9,11 @@ from ..base.names import unknown
 from ..base.progress import Progress
 from ..hybrid.impacts import Impact
 from ..mechanism.description import Mechanism
+from .driving import Driver
 from .engine import Engine, simulation
 from .experiment import experiment
+from .inputs import Source as InputSource
+from .inputs import signals
 from .result import Result, structured
 
 Source = Callable[[float], Mapping[str, float]]
@@ -27,6 +30,7 @@ def simulate(
     mechanism: Mechanism,
     changes: Mapping[str, float | str] | None = None,
     *,
+    inputs: Mapping[str, InputSource] | None = None,
     stop_time: float | str | None = None,
     step: float | str | None = None,
     tolerance: float | None = None,
@@ -44,6 +48,9 @@ def simulate(
     changes : mapping or None
         Parameters and inputs that differ from their defaults: numbers in SI units, or texts with
         a unit, ``"-10 mm"``.
+    inputs : mapping or None
+        Inputs over time: texts such as ``"half-sine(500 g, 0.5 ms)"`` and the other forms of
+        :func:`prbm.runs.inputs.signals`.
     stop_time, step : float, str or None
         Duration and communication step, numbers [s] or texts, ``"20 ms"``; None: those
         of the default experiment, for most mechanisms 1 s and 1 ms.  The last step may be shorter.
@@ -69,8 +76,11 @@ def simulate(
 
     Raises
     ------
+    TypeError
+        If the mechanism is a name or a path: load it first.
     ParameterError
-        If a name is unknown, a value is not a number or out of bounds, or a time is not positive.
+        If a name is unknown, a value is not a number or out of bounds, a signal is invalid, or a
+        time is not positive.
     UserMistake
         If a text is not a quantity of the right dimension.
     EquilibriumError, SimulationError
@@ -87,8 +97,15 @@ def simulate(
     >>> result = simulate(load("PRBDM"), {"release.displacement": "-10 mm"}, stop_time="20 ms")
     >>> result.values["release.displacement"], float(result["time"][-1])
     (-0.01, 0.02)
+    >>> result = simulate(load("PRBDM"), inputs={"force.x": "step(1 N, 5 ms)"}, stop_time="20 ms")
+    >>> result["force.x"][[4, 5]].tolist()
+    [0.0, 1.0]
     """
+    if not isinstance(mechanism, Mechanism):
+        raise TypeError(f"mechanism = {mechanism!r} must be a Mechanism, as prbm.load returns")
     values = _values(mechanism, changes)
+    driver = Driver(mechanism, signals(mechanism, inputs or {}, values))
+    values = {**values, **driver.values(0.0)}
     duration, spacing = (
         None if x is None else _number(name, x, "s")
         for name, x in (("stop_time", stop_time), ("step", step))
@@ -104,16 +121,17 @@ def simulate(
     _check_effort(motion, spacing)
     impacts: list[Impact] = []
     motion.record = impacts
+    driver.sample(motion.frequency, motion.tolerance, times[-1])
     start = {**motion.values, **motion.given}
     rows = []
     for k, t in enumerate(times):
-        motion.advance(t)
+        driver.advance(motion, t)
         if steps_max is not None:
             _check_steps(motion, steps_max, k / (len(times) - 1))
         outputs = motion.outputs()
         if source is not None:
             motion.set(source(t))
-        rows.append({"time": t, **motion.given, **outputs})
+        rows.append({"time": t, **motion.given, **driver.values(t), **outputs})
         if progress is not None:
             progress(k / (len(times) - 1))
     return Result(mechanism, start, structured(rows), tuple(impacts), motion.engine)

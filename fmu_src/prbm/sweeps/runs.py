@@ -8,12 +8,11 @@ reset and with a new instance.  Unless both agree to the last bit, every run get
 import os
 import pickle
 import queue
-import re
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from ctypes import (
     c_bool,
     c_double,
@@ -46,7 +45,7 @@ from fmpy.simulation import (  # type: ignore[import-untyped]
 )
 from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from .outputs import Output, evaluate
 
 OK, ENDED, FAILED, CRASHED, TIMEOUT = "ok", "ended", "failed", "crashed", "timeout"
 """Status of a run: complete; ended early by the FMU; error; crash of the process; time limit."""
@@ -63,120 +62,6 @@ C_TYPES_3: dict[str, Any] = {
 IDLE_MAX = 600.0  # s without a run after which the process ends, in case its parent was killed
 MESSAGES_MAX = 5  # messages of the FMU in the message of a failed run
 LOGGED_MAX = 100  # messages in a run above which logging is switched off for the next runs
-
-
-class SpecificationError(ValueError):
-    """The text of an output is invalid; the message names the reason."""
-
-
-# --- outputs ------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Output:
-    """One number computed from the trajectory of a variable.
-
-    Parameters
-    ----------
-    column : str
-        Name of the column of the results.
-    variable : str
-        Name of the variable of the FMU.
-    reduction : str
-        ``final``, ``max``, ``min``, ``mean``, ``first`` or ``since``.
-    relation, bound : str, float
-        Condition of ``first`` and ``since``: ``>``, ``>=``, ``<`` or ``<=``, and a number.
-    """
-
-    column: str
-    variable: str
-    reduction: str = "final"
-    relation: str = ">"
-    bound: float = 0.0
-
-
-RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
-    ">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.less_equal,
-}  # fmt: skip
-_REDUCTION = re.compile(r"(final|max|min|mean|first|since)\((.*)\)", re.DOTALL)
-_CONDITION = re.compile(r"(.*)(<=|>=|<|>)([^<>=]+)", re.DOTALL)
-
-
-def parse_output(text: str, known: Container[str], column: str | None = None) -> Output:
-    """Parse an output such as ``max(shuttle.x)`` or ``since(stop.contact)``.
-
-    Raises
-    ------
-    SpecificationError
-        If the bound of a condition is not a number.
-
-    Examples
-    --------
-    >>> parse_output("shuttle.x", {"shuttle.x"})
-    Output(column='shuttle.x', variable='shuttle.x', reduction='final', relation='>', bound=0.0)
-    >>> parse_output("first(shuttle.x < -1e-3)", {"shuttle.x"}, "there").bound
-    -0.001
-    """
-    name = text if column is None else column
-    call = None if text in known else _REDUCTION.fullmatch(text.strip())
-    if call is None:
-        return Output(name, text)
-    reduction, inner = call[1], call[2].strip()
-    condition = _CONDITION.fullmatch(inner)
-    if reduction not in ("first", "since") or inner in known or condition is None:
-        return Output(name, inner, reduction)
-    limit = condition[3].strip()
-    try:
-        bound = float(limit)
-    except ValueError:
-        raise SpecificationError(
-            f"{text}: bound {limit!r} must be a number, as in first(shuttle.x > 0.001)"
-        ) from None
-    return Output(name, condition[1].rstrip(), reduction, condition[2], bound)
-
-
-def reduce(output: Output, t: Real, x: Real) -> float:
-    """Return the value of an output for a trajectory.
-
-    Parameters
-    ----------
-    output : Output
-        The reduction and its condition.
-    t : (m,)
-        Communication points [s].
-    x : (m,)
-        Values of the variable at these times.
-
-    Returns
-    -------
-    float
-        ``final``, ``max``, ``min``: in the unit of the variable.  ``mean``: average over time by
-        the trapezoidal rule.  ``first``: the first communication point at which the condition
-        holds [s]; ``since``: the first one from which on it holds to the end [s]; NaN if no point
-        qualifies.
-
-    Examples
-    --------
-    >>> t, x = np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.0, 2.0, 0.0, 2.0])
-    >>> [reduce(Output("", "x", how), t, x) for how in ("final", "max", "mean", "first", "since")]
-    [2.0, 2.0, 1.0, 1.0, 4.0]
-    """
-    match output.reduction:
-        case "final":
-            return float(x[-1])
-        case "max":
-            return float(x.max())
-        case "min":
-            return float(x.min())
-        case "mean":
-            span = float(t[-1] - t[0])
-            return float(np.diff(t) @ (x[1:] + x[:-1])) / (2 * span) if span > 0.0 else float(x[0])
-    holds = RELATIONS[output.relation](x, output.bound)
-    if output.reduction == "first":
-        return float(t[holds.argmax()]) if holds.any() else nan
-    broken = np.flatnonzero(~holds)
-    begin = int(broken[-1]) + 1 if len(broken) else 0
-    return float(t[begin]) if begin < len(t) else nan
 
 
 # --- one run ------------------------------------------------------------------------------------
@@ -283,8 +168,15 @@ class Runner:
             require_functions=False,
         )
         named = {variable.name: variable for variable in variables}
-        history = {o.variable: named[o.variable] for o in job.outputs if o.reduction != "final"}
-        final = {o.variable: named[o.variable] for o in job.outputs if o.reduction == "final"}
+        history, final = (
+            {
+                name: named[name]
+                for output in job.outputs
+                if (output.reduction == "final") == at_end
+                for name in output.variables(named)
+            }
+            for at_end in (False, True)
+        )
         self.history = _Recorder(self.fmu, history.values(), self.two)
         self.final = _Recorder(self.fmu, final.values(), self.two)
 
@@ -376,18 +268,10 @@ class Runner:
                 break
         last = self.final.named(self.final.read())
         self.fmu.terminate()
-        t, table = np.array(times), np.array(rows, dtype=np.float64).T
-        history = self.history.named(table)
-        return (
-            status,
-            message,
-            tuple(
-                float(last[output.variable])
-                if output.reduction == "final"
-                else reduce(output, t, history[output.variable])
-                for output in self.job.outputs
-            ),
-        )
+        history = self.history.named(np.array(rows, dtype=np.float64).T)
+        columns = {name: np.array([x], np.float64) for name, x in last.items()}
+        columns |= history | {"time": np.array(times)}
+        return status, message, tuple(evaluate(output, columns) for output in self.job.outputs)
 
     def _initialize(self, values: dict[str, float]) -> None:
         """Set start values and pass through initialization, in FMPy's order."""

@@ -20,7 +20,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
@@ -31,7 +31,8 @@ from ..base.archives import check_unpacked_size
 from ..base.errors import ParameterError, PrbmError
 from ..base.progress import Progress
 from ..runs.run import ROWS_MAX
-from .runs import CRASHED, GOOD, Job, Outcome, Output, SpecificationError, parse_output
+from .outputs import Output, SpecificationError, parse_output
+from .runs import CRASHED, GOOD, Job, Outcome
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -97,7 +98,9 @@ def sweep(
         * ``max(x)``, ``min(x)``, ``mean(x)`` over the communication points;
         * ``first(x)``, the first communication point at which x is true [s], and ``since(x)``, the
           point from which x is true to the end [s]; NaN if there is no such point.  Numbers are
-          compared, as in ``first(x > 0.001)``.
+          compared, as in ``first(x > 0.001)``;
+        * ``abs(x)`` in place of the variable x;
+        * a named quantity of :data:`prbm.runs.quantities.QUANTITIES`, for instance ``settling``.
 
         The keys of a mapping are the names of the columns.  None: the final values of all outputs
         of the FMU.
@@ -279,7 +282,7 @@ def _outputs(outputs: Outputs | None, variables: Mapping[str, Any]) -> tuple[Out
         raise ParameterError(f"output {error}") from None
     if not kept:
         raise ParameterError("no output is selected; name one, as in outputs=['shuttle.x']")
-    check_outputs(((output.column, output.variable) for output in kept), variables)
+    check_outputs(kept, variables)
     return kept
 
 
@@ -358,7 +361,7 @@ def _results(plan: Plan, folder: Path) -> "Results":
         "FMU": plan.digest,
         "model": plan.name,
         "parameters": plan.parameters,
-        "outputs": {o.column: [o.variable, o.reduction, o.relation, o.bound] for o in job.outputs},
+        "outputs": {o.column: list(astuple(o)[1:]) for o in job.outputs},
         "values": job.values,
         "start time [s]": job.start,
         "stop time [s]": job.stop,

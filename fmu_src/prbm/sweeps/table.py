@@ -16,6 +16,7 @@ from scipy.stats import qmc
 
 from ..base.errors import ParameterError
 from ..base.names import proposal
+from .outputs import Output
 
 Table = pd.DataFrame | str | Path
 METHODS = ("random", "latin", "sobol")
@@ -244,23 +245,35 @@ def _reject(name: str, x: NDArray[np.float64], wrong: NDArray[np.bool_], require
         raise ParameterError(f"row {row} of the table: {name} = {x[row]:g} must be {required}")
 
 
-def check_outputs(names: Iterable[tuple[str, str]], variables: Mapping[str, Any]) -> None:
-    """Reject outputs, given as (text, variable), whose variable is not a scalar number.
+def check_outputs(outputs: Iterable[Output], variables: Mapping[str, Any]) -> None:
+    """Reject outputs whose variables are not scalar numbers.
 
     Raises
     ------
     ParameterError
         If a variable is unknown, an array, or not a number.
     """
-    for text, name in names:
-        variable = variables.get(name)
-        if variable is None:
-            hint = proposal(name, variables)
-            hint = "fmpy info lists the variables" if len(hint) > HINT_LENGTH_MAX else hint
-            raise ParameterError(f"output {text}: the FMU has no variable {name!r}; {hint}")
-        if variable.type in ("String", "Binary", "Clock") or variable.shape:
+    for output in outputs:
+        lacking = output.lacking(variables)
+        if lacking:
             raise ParameterError(
-                f"output {text}: {name} is of type {variable.type}"
-                + (f" and shape {variable.shape}" if variable.shape else "")
-                + ", not one number; leave it out"
+                f"output {output.column}: the FMU has no variable {lacking}, from which "
+                f"{output.variable} is computed"
             )
+        for name in output.variables(variables):
+            _check_output(output.column, name, variables)
+
+
+def _check_output(text: str, name: str, variables: Mapping[str, Any]) -> None:
+    """Reject a variable that is unknown, an array, or not a number."""
+    variable = variables.get(name)
+    if variable is None:
+        hint = proposal(name, variables)
+        hint = "fmpy info lists the variables" if len(hint) > HINT_LENGTH_MAX else hint
+        raise ParameterError(f"output {text}: the FMU has no variable {name!r}; {hint}")
+    if variable.type in ("String", "Binary", "Clock") or variable.shape:
+        raise ParameterError(
+            f"output {text}: {name} is of type {variable.type}"
+            + (f" and shape {variable.shape}" if variable.shape else "")
+            + ", not one number; leave it out"
+        )

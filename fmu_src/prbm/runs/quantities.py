@@ -1,0 +1,156 @@
+"""Named quantities of a motion: settling time, impacts, speeds, lost energy.
+
+They are computed from the outputs at the communication points alone, so that results of the engine
+and of FMUs give the same numbers.
+"""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from math import nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+SETTLED_ENERGY_RTOL = 1e-4
+"""A motion has settled if its kinetic energy stays below this share of its largest value."""
+SETTLED_PERIODS = 0.5  # Least time without motion, in periods of the fundamental mode.
+
+KINETIC, FREQUENCY = "energy.kinetic", "mode.frequency"
+Table = Mapping[str, NDArray[Any]] | NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number that describes a motion.
+
+    Parameters
+    ----------
+    unit : str
+        SI unit; empty if dimensionless.
+    description : str
+        Phrase for help texts and axes.
+    suffixes : tuple of str
+        Variables with these names or with these ends of names are needed.
+    compute : callable
+        Returns the number from the columns by name, with ``time``.
+    """
+
+    unit: str
+    description: str
+    suffixes: tuple[str, ...]
+    compute: Callable[[Table], float]
+
+    def variables(self, names: Iterable[str]) -> list[str]:
+        """Return the variables among names that are needed.
+
+        Examples
+        --------
+        >>> QUANTITIES["impacts"].variables(["stop.impact_count", "stop.gap"])
+        ['stop.impact_count']
+        """
+        return [name for name in names if name in self.suffixes or name.endswith(self.suffixes)]
+
+    def lacking(self, names: Iterable[str]) -> str:
+        """Return a needed variable that is not among names; an empty text if there is none.
+
+        Variables of stops and bodies are needed only if no complete name is.
+
+        Examples
+        --------
+        >>> QUANTITIES["settling"].lacking(["stop.gap"]), QUANTITIES["impacts"].lacking(["y"])
+        ('energy.kinetic', '*.impact_count')
+        """
+        known = set(names)
+        complete = [name for name in self.suffixes if not name.startswith(".")]
+        if complete:
+            return next((name for name in complete if name not in known), "")
+        return "" if self.variables(known) else f"*{self.suffixes[0]}"
+
+
+def settling(columns: Table) -> float:
+    """Return the time from which on the kinetic energy stays small [s].
+
+    It is the last time at which the kinetic energy falls below :data:`SETTLED_ENERGY_RTOL` times
+    the largest kinetic energy of the run, interpolated between two communication points.  At the
+    end of the run the kinetic energy must have been small for half a period of the fundamental
+    mode, because it is also small where a vibration turns back; if a stop holds, any time suffices.
+
+    Parameters
+    ----------
+    columns : mapping
+        ``time``, ``energy.kinetic``, ``mode.frequency`` and ``contact`` of each stop, (m,) each.
+
+    Returns
+    -------
+    float
+        The time; NaN if the motion has not settled; the first time if nothing moves.
+
+    Examples
+    --------
+    >>> t, moving = np.arange(5.0), np.array([0.0, 1.0, 2e-4, 0.0, 0.0])
+    >>> settling({"time": t, "energy.kinetic": moving, "mode.frequency": np.ones(5)})
+    2.5
+    """
+    t, energy = np.asarray(columns["time"], float), np.asarray(columns[KINETIC], float)
+    limit = SETTLED_ENERGY_RTOL * float(energy.max())
+    moving = np.flatnonzero(energy > limit)
+    if not len(moving):
+        return float(t[0])
+    k = int(moving[-1])
+    if k == len(t) - 1:
+        return nan
+    share = (energy[k] - limit) / (energy[k] - energy[k + 1])
+    settled = float(t[k] + share * (t[k + 1] - t[k]))
+    frequency = float(np.max(columns[FREQUENCY][-1]))
+    held = any(columns[name][-1] for name in _named(columns, ".contact"))
+    wait = 0.0 if held or not frequency > 0.0 else SETTLED_PERIODS / frequency
+    return settled if float(t[-1]) - settled >= wait else nan
+
+
+def impacts(columns: Table) -> float:
+    """Return the number of impacts at all stops."""
+    return float(sum(columns[name][-1] for name in _named(columns, ".impact_count")))
+
+
+def impact_speed(columns: Table) -> float:
+    """Return the largest closing speed of an impact [m/s], 0 without impacts.
+
+    Of several impacts between two communication points only the last one counts.
+    """
+    return max((float(columns[n].max()) for n in _named(columns, ".approach_speed")), default=0.0)
+
+
+def peak_speed(columns: Table) -> float:
+    """Return the largest speed of a centre of mass at the communication points [m/s]."""
+    bodies = [name.removesuffix(".omega") for name in _named(columns, ".omega")]
+    moving = [body for body in bodies if f"{body}.vx" in _names(columns)]
+    return max(
+        (float(np.hypot(columns[f"{b}.vx"], columns[f"{b}.vy"]).max()) for b in moving), default=0.0
+    )
+
+
+def energy_lost(columns: Table) -> float:
+    """Return the energy dissipated by impacts, friction and damping [J]."""
+    return float(columns["energy.dissipated"][-1])
+
+
+def _names(columns: Table) -> list[str]:
+    """Return the names of columns of a mapping or a structured array."""
+    dtype = getattr(columns, "dtype", None)
+    return list(columns) if dtype is None else list(dtype.names)
+
+
+def _named(columns: Table, suffix: str) -> list[str]:
+    return [name for name in _names(columns) if name.endswith(suffix)]
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "settling": Quantity("s", "settling time", (KINETIC, FREQUENCY, ".contact"), settling),
+    "impacts": Quantity("", "number of impacts", (".impact_count",), impacts),
+    "impact_speed": Quantity(
+        "m/s", "largest closing speed of an impact", (".approach_speed",), impact_speed
+    ),
+    "peak_speed": Quantity("m/s", "largest speed of a body", (".vx", ".vy", ".omega"), peak_speed),
+    "energy_lost": Quantity("J", "dissipated energy", ("energy.dissipated",), energy_lost),
+}

@@ -1,0 +1,181 @@
+"""Outputs of a run: one number each, from the trajectories of variables or a named quantity.
+
+The module imports NumPy only, and so starts quickly.
+"""
+
+import re
+from collections.abc import Callable, Container, Iterable, Mapping
+from dataclasses import dataclass, replace
+from math import nan
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..runs.quantities import QUANTITIES
+
+Real = NDArray[np.float64]
+QUANTITY = "quantity"  # Reduction of a named quantity.
+
+
+class SpecificationError(ValueError):
+    """The text of an output is invalid; the message names the reason."""
+
+
+# --- outputs ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Output:
+    """One number computed from the trajectory of a variable.
+
+    Parameters
+    ----------
+    column : str
+        Name of the column of the results.
+    variable : str
+        Name of the variable of the FMU.
+    reduction : str
+        ``final``, ``max``, ``min``, ``mean``, ``first``, ``since``, or ``quantity`` for a named
+        quantity (:data:`prbm.runs.quantities.QUANTITIES`).
+    relation, bound : str, float
+        Condition of ``first`` and ``since``: ``>``, ``>=``, ``<`` or ``<=``, and a number.
+    absolute : bool
+        Whether the absolute value of the variable is reduced.
+    """
+
+    column: str
+    variable: str
+    reduction: str = "final"
+    relation: str = ">"
+    bound: float = 0.0
+    absolute: bool = False
+
+    def variables(self, names: Iterable[str]) -> list[str]:
+        """Return the variables among names that are needed."""
+        if self.reduction == QUANTITY:
+            return QUANTITIES[self.variable].variables(names)
+        return [self.variable]
+
+    def lacking(self, names: Iterable[str]) -> str:
+        """Return a variable that a named quantity needs and that is not among names, or ``""``."""
+        return QUANTITIES[self.variable].lacking(names) if self.reduction == QUANTITY else ""
+
+
+RELATIONS: dict[str, Callable[[Real, float], NDArray[np.bool_]]] = {
+    ">": np.greater, ">=": np.greater_equal, "<": np.less, "<=": np.less_equal,
+}  # fmt: skip
+_REDUCTION = re.compile(r"(final|max|min|mean|first|since)\((.*)\)", re.DOTALL)
+_ABSOLUTE = re.compile(r"abs\((.*)\)", re.DOTALL)
+_CONDITION = re.compile(r"(.*)(<=|>=|<|>)([^<>=]+)", re.DOTALL)
+
+
+def parse_output(text: str, known: Container[str], column: str | None = None) -> Output:
+    """Parse an output such as ``max(abs(shuttle.x))``, ``since(stop.contact)`` or ``settling``.
+
+    A variable takes precedence over a named quantity and over a reduction.
+
+    Raises
+    ------
+    SpecificationError
+        If the bound of a condition is not a number.
+
+    Examples
+    --------
+    >>> parse_output("since(stop.contact)", {"stop.contact"}).reduction
+    'since'
+    >>> parse_output("first(shuttle.x < -1e-3)", {"shuttle.x"}, "there").bound
+    -0.001
+    >>> parse_output("max(abs(shuttle.x))", {"shuttle.x"}).absolute
+    True
+    """
+    name = text if column is None else column
+    if text not in known and text.strip() in QUANTITIES:
+        return Output(name, text.strip(), QUANTITY)
+    call = None if text in known else _REDUCTION.fullmatch(text.strip())
+    if call is None:
+        return _absolute(Output(name, text), known)
+    reduction, inner = call[1], call[2].strip()
+    condition = _CONDITION.fullmatch(inner)
+    if reduction not in ("first", "since") or inner in known or condition is None:
+        return _absolute(Output(name, inner, reduction), known)
+    limit = condition[3].strip()
+    try:
+        bound = float(limit)
+    except ValueError:
+        raise SpecificationError(
+            f"{text}: bound {limit!r} must be a number, as in first(shuttle.x > 0.001)"
+        ) from None
+    return _absolute(Output(name, condition[1].rstrip(), reduction, condition[2], bound), known)
+
+
+def _absolute(output: Output, known: Container[str]) -> Output:
+    """Return an output with ``abs(...)`` removed from its variable."""
+    call = None if output.variable in known else _ABSOLUTE.fullmatch(output.variable.strip())
+    return output if call is None else replace(output, variable=call[1].strip(), absolute=True)
+
+
+def evaluate(output: Output, columns: Mapping[str, NDArray[Any]]) -> float:
+    """Return the value of an output.
+
+    Parameters
+    ----------
+    output : Output
+        The output.
+    columns : mapping
+        ``time`` and the variables of the output; only the last value is needed for ``final``.
+
+    Examples
+    --------
+    >>> columns = {"time": np.array([0.0, 1.0]), "x": np.array([-3.0, 2.0])}
+    >>> evaluate(parse_output("max(abs(x))", columns), columns)
+    3.0
+    """
+    if output.reduction == QUANTITY:
+        return QUANTITIES[output.variable].compute(columns)
+    x = np.asarray(columns[output.variable], np.float64)
+    return reduce(output, columns["time"], np.abs(x) if output.absolute else x)
+
+
+def reduce(output: Output, t: Real, x: Real) -> float:
+    """Return the value of an output for a trajectory.
+
+    Parameters
+    ----------
+    output : Output
+        The reduction and its condition.
+    t : (m,)
+        Communication points [s].
+    x : (m,)
+        Values of the variable at these times.
+
+    Returns
+    -------
+    float
+        ``final``, ``max``, ``min``: in the unit of the variable.  ``mean``: average over time by
+        the trapezoidal rule.  ``first``: the first communication point at which the condition
+        holds [s]; ``since``: the first one from which on it holds to the end [s]; NaN if no point
+        qualifies.
+
+    Examples
+    --------
+    >>> t, x = np.array([0.0, 1.0, 2.0, 4.0]), np.array([0.0, 2.0, 0.0, 2.0])
+    >>> [reduce(Output("", "x", how), t, x) for how in ("final", "max", "mean", "first", "since")]
+    [2.0, 2.0, 1.0, 1.0, 4.0]
+    """
+    match output.reduction:
+        case "final":
+            return float(x[-1])
+        case "max":
+            return float(x.max())
+        case "min":
+            return float(x.min())
+        case "mean":
+            span = float(t[-1] - t[0])
+            return float(np.diff(t) @ (x[1:] + x[:-1])) / (2 * span) if span > 0.0 else float(x[0])
+    holds = RELATIONS[output.relation](x, output.bound)
+    if output.reduction == "first":
+        return float(t[holds.argmax()]) if holds.any() else nan
+    broken = np.flatnonzero(~holds)
+    begin = int(broken[-1]) + 1 if len(broken) else 0
+    return float(t[begin]) if begin < len(t) else nan

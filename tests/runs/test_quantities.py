@@ -1,0 +1,97 @@
+"""Named quantities of motions: settling time, impacts, speeds, lost energy."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from prbm.runs.headline import headline
+from prbm.runs.quantities import QUANTITIES, SETTLED_ENERGY_RTOL, settling
+from prbm.runs.run import simulate
+
+DECAY, OMEGA = 4.0, 30.0  # 1/s, rad/s
+
+
+def vibration(end: float, decay: float = DECAY, step: float = 1e-4) -> dict[str, np.ndarray]:
+    """Return the columns of x = exp(-decay t) cos(omega t) with the kinetic energy x'^2 / 2."""
+    t = np.arange(0.0, end + 0.5 * step, step)
+    v = -np.exp(-decay * t) * (decay * np.cos(OMEGA * t) + OMEGA * np.sin(OMEGA * t))
+    frequency = np.full(len(t), OMEGA / (2 * math.pi))
+    return {"time": t, "energy.kinetic": v**2 / 2, "mode.frequency": frequency}
+
+
+def test_settling_of_a_damped_vibration_is_the_last_crossing_of_the_threshold():
+    columns = vibration(3.0)
+
+    def excess(t: float) -> float:
+        v = math.exp(-DECAY * t) * (DECAY * math.cos(OMEGA * t) + OMEGA * math.sin(OMEGA * t))
+        return v**2 / 2 - SETTLED_ENERGY_RTOL * float(columns["energy.kinetic"].max())
+
+    above = [t for t in np.arange(0.0, 3.0, 1e-4) if excess(t) > 0.0]
+    exact = brentq(excess, above[-1], above[-1] + 2e-4, xtol=1e-12)
+    assert settling(columns) == pytest.approx(exact, abs=1e-6)
+    assert all(excess(t) <= 0.0 for t in np.arange(exact + 1e-6, 3.0, 1e-5))
+
+
+def test_a_vibration_that_turns_back_at_the_end_has_not_settled():
+    """The kinetic energy is zero there, but not for half a period."""
+    period = 2 * math.pi / OMEGA
+    for end in (3 * period, 3.25 * period, 3.5 * period):
+        assert math.isnan(settling(vibration(end, decay=0.0, step=period / 1000)))
+
+
+def test_a_body_that_rests_on_a_stop_has_settled_at_once():
+    columns = vibration(0.1)
+    columns["energy.kinetic"] = np.where(columns["time"] < 0.05, 1.0, 0.0)
+    assert math.isnan(settling(columns))
+    columns["stop.contact"] = columns["time"] > 0.05
+    assert settling(columns) == pytest.approx(0.05, abs=1e-4)
+
+
+def test_settling_does_not_depend_on_the_rows_of_a_smooth_motion():
+    assert settling(vibration(3.0, step=1e-3)) == pytest.approx(settling(vibration(3.0)), abs=1e-4)
+
+
+def test_a_mechanism_at_rest_settles_at_the_start():
+    still = vibration(1.0)
+    still["energy.kinetic"] = np.zeros_like(still["time"])
+    assert settling(still) == 0.0
+
+
+def test_quantities_of_a_simulation_agree_with_its_impacts(mechanisms):
+    result = simulate(mechanisms["PRBDM"], stop_time=0.3)
+    found = {name: quantity.compute(result.columns) for name, quantity in QUANTITIES.items()}
+    speeds = [impact.latched.approach_speed for impact in result.impacts]
+    assert found["impacts"] == len(result.impacts)
+    assert found["impact_speed"] == pytest.approx(max(speeds), rel=1e-12)
+    assert found["peak_speed"] == pytest.approx(
+        np.hypot(result["shuttle.vx"], result["shuttle.vy"]).max(), rel=1e-12
+    )
+    start, end = (
+        sum(result[f"energy.{name}"][row] for name in ("kinetic", "elastic", "gravitational"))
+        for row in (0, -1)
+    )
+    assert found["energy_lost"] == pytest.approx(start - end, abs=1e-7 * start)
+    # The energy of the guide is proportional to the square of its speed.  The speed at an impact
+    # exceeds that in the rows by up to the acceleration times the step, 0.01 m/s.
+    slow = math.sqrt(SETTLED_ENERGY_RTOL) * found["peak_speed"] + 0.01
+    fast = [impact.time for impact in result.impacts if impact.latched.approach_speed > slow]
+    held = result["time"][np.flatnonzero(result["stop.contact"])[0]]
+    assert fast[-1] < found["settling"] < held
+
+
+@pytest.mark.parametrize(("stop_time", "words"), [(0.3, r"at t = 0\.2\d\d s"), (0.1, "not yet")])
+def test_the_headline_states_whether_the_motion_has_settled(mechanisms, stop_time, words):
+    result = simulate(mechanisms["PRBDM"], stop_time=stop_time)
+    (line,) = (
+        line for line in headline(result.columns, result.mechanism, result.values)
+        if line.startswith("settled")
+    )  # fmt: skip
+    assert re.search(words, line)
+
+
+def test_needed_variables_are_reported():
+    assert QUANTITIES["settling"].lacking(["energy.kinetic"]) == "mode.frequency"
+    assert QUANTITIES["impacts"].lacking(["stop.impact_count"]) == ""
