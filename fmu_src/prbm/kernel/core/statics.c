@@ -282,11 +282,11 @@ static bool releasable(const System *system, const double *M, int r, const doubl
     int n = system->n;
     const double *row = rows + (r - 1) * n;
     double *left = take(scratch, (size_t)n), *free = take(scratch, (size_t)n);
-    bool right = response(n, r - 1, 1, M, rows, row, left, scratch, problem) &&
-                 response(n, 0, 1, M, rows, row, free, scratch, problem);
-    double share = right ? dot(n, row, left) / dot(n, row, free) : 0.0;
+    bool ok = response(n, r - 1, 1, M, rows, row, left, scratch, problem) &&
+              response(n, 0, 1, M, rows, row, free, scratch, problem);
+    double share = ok ? dot(n, row, left) / dot(n, row, free) : 0.0;
     scratch->used = used;
-    if (right && !(share > RELEASE_MOBILITY_RTOL)) {
+    if (ok && !(share > RELEASE_MOBILITY_RTOL)) {
         const Mechanism *m = system->mechanism;
         return fail(problem,
                     "release.velocity = %g m/s: the body %s cannot move along the direction of the "
@@ -294,7 +294,7 @@ static bool releasable(const System *system, const double *M, int r, const doubl
                     "(axial = true)",
                     speed, m->bodies[m->release.body - 1].name);
     }
-    return right;
+    return ok;
 }
 
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,

@@ -318,10 +318,10 @@ static bool set_input(Simulation *sim, int i, double x, Problem *problem) {
 PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *problem) {
     Simulation *sim = simulation;
     const Mechanism *m = sim->configuration.mechanism;
-    bool right = slot < m->parameter_count ? set_parameter(sim, slot, x, problem)
-                                           : set_input(sim, slot - m->slots.inputs, x, problem);
+    bool ok = slot < m->parameter_count ? set_parameter(sim, slot, x, problem)
+                                        : set_input(sim, slot - m->slots.inputs, x, problem);
     forget_present(sim);
-    return right;
+    return ok;
 }
 
 /* --- start ------------------------------------------------------------------------------------ */
@@ -346,14 +346,14 @@ static bool start_state(Simulation *sim, Problem *problem) {
     double *front = sim->state.front;
     double *q = take(&sim->scratch, n);
     double speed = evaluate(m->release.velocity, sim->state.acting_values);
-    bool right = start_shape(system, sim->state.acting_values, q, &sim->scratch, problem);
-    if (right) {
+    bool ok = start_shape(system, sim->state.acting_values, q, &sim->scratch, problem);
+    if (ok) {
         zeros(state_size(sim), front);
         copy((int)n, q, front);
-        right = release_velocity(system, q, speed, front + n, &sim->scratch, problem);
+        ok = release_velocity(system, q, speed, front + n, &sim->scratch, problem);
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* Reject a penetrated wall at the start.  Apply the impact if a wall is struck at the start. */
