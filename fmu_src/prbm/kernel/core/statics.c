@@ -221,7 +221,7 @@ static bool unreachable(const System *system, bool held, double displacement, do
                     heavy ? "no static equilibrium under gravity was found: the flexures are too "
                             "weak for this load; reduce gravity or the masses, or stiffen the "
                             "flexures"
-                          : "no static equilibrium was found: the drawn shape is not in "
+                          : "no static equilibrium was found: the straight shape is not in "
                             "equilibrium, or the flexures are too weak to hold it");
     }
     const char *name = turns(system) ? "angle" : "displacement";

@@ -307,10 +307,11 @@ static bool set_input(Simulation *sim, int i, double x, Problem *problem) {
                     m->input_names[i], x);
     }
     sim->state.given[i] = x;
+    /* In model exchange, a set stop.velocity contains the change by the impulses. */
     int wall = i - m->input.walls;
-    if (sim->state.mode.exchange && wall >= 0 && i < m->input.impulses &&
-        wall % PER_WALL == PER_WALL - 1) {
-        sim->state.walls[wall / PER_WALL].excess = 0.0; /* The partner has received the impulses. */
+    bool velocity = wall >= 0 && i < m->input.impulses && wall % PER_WALL == PER_WALL - 1;
+    if (sim->state.mode.exchange && velocity) {
+        sim->state.walls[wall / PER_WALL].excess = 0.0;
     }
     return true;
 }
