@@ -13,9 +13,9 @@ from .experiment import experiment
 from .result import Result, structured
 
 Source = Callable[[float], Mapping[str, float]]
-ROWS_MAX = 10_000_000  # More communication points are a mistake in the unit of the step.
+ROWS_MAX = 10_000_000  # Most communication points; a larger number is likely a wrong unit.
 LAST_STEP_RTOL = 1e-9  # A last step below this fraction of a communication step is round-off.
-EARLY_SHARE = 0.2  # Share of the steps that may be taken early, where most impacts are.
+EARLY_SHARE = 0.2  # Share of steps_max that is permitted at the beginning, with most impacts.
 
 
 class SlowSimulationError(SimulationError):
@@ -53,8 +53,8 @@ def simulate(
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
     steps_max : float or None
-        Largest number of integration steps; the simulation ends early if it takes more than a
-        proportional part of them.  None: no limit.
+        Largest number of integration steps; None: no limit.  Until the time t, a proportional
+        part is permitted: t over the duration, or :data:`EARLY_SHARE` if that is more.
 
     Returns
     -------
@@ -71,7 +71,7 @@ def simulate(
     EquilibriumError, SimulationError
         As :class:`prbm.Simulation`.
     SlowSimulationError
-        If the simulation takes more than ``steps_max`` steps.
+        If the simulation takes more integration steps than permitted.
 
     Examples
     --------
@@ -114,9 +114,9 @@ def simulate(
 
 
 def _check_effort(simulation: Simulation, spacing: float) -> None:
-    """Reject a simulation that needs too many steps for a communication step [s].
+    """Reject a simulation that needs too many integration steps for a communication step.
 
-    The communication step is the given one, or that of the default experiment if it is shorter.
+    The check uses ``spacing`` [s], or the step of the default experiment if that is shorter.
     """
     try:
         simulation.check_effort(spacing)
@@ -125,7 +125,7 @@ def _check_effort(simulation: Simulation, spacing: float) -> None:
 
 
 def _check_steps(simulation: Simulation, steps_max: float, fraction: float) -> None:
-    """Reject a simulation that takes more than a proportional part of the steps."""
+    """Reject a simulation that takes more steps than are permitted until a fraction of its end."""
     if simulation.step_count > steps_max * max(fraction, EARLY_SHARE):
         raise SlowSimulationError(
             f"the simulation takes {simulation.step_count} integration steps until t = "
