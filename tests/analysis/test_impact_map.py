@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from prbm.analysis import impact_map
-from prbm.analysis.touching import impact_shape
+from prbm.analysis.touching import impact_shape, touching_shape
 from prbm.base.errors import EquilibriumError, ParameterError
 from prbm.data.series import RecordError
 from prbm.drawing.style import png
@@ -215,6 +215,18 @@ def test_the_fitted_restitution_is_lower_if_the_rebound_passes_the_straight_shap
     direct = impact_map.simulated(guide(), **point).restitution[0]
     assert outwards > direct[0] + 0.03
     assert through < direct[1] - 0.05
+
+
+@pytest.mark.parametrize(
+    ("gap", "message"),
+    [
+        (lambda x: 1e-3 + 0.0 * x, "does not change when the released body moves"),
+        (lambda x: 1e-3 + x * x, "no shape that touches the wall at 0.002 m was found"),
+    ],
+)
+def test_a_wall_that_no_held_shape_touches_is_an_error(gap, message):
+    with pytest.raises(EquilibriumError, match=message):
+        touching_shape(lambda x, _: x, gap, 2e-3, 0.1)
 
 
 def test_a_map_is_written_and_drawn(tmp_path):

@@ -22,7 +22,7 @@ from prbm.base.errors import MechanismError
 from prbm.commands import build_fmu as command
 from prbm.commands import building as cli
 from prbm.commands import fmu_report as report
-from prbm.drawing import icon as picture
+from prbm.drawing.icon import icon
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu import python_fmu
 from prbm.fmu.description import Heading, model_description
@@ -52,7 +52,7 @@ def _program_name(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.native
 @pytest.mark.slow
 def test_fmus_are_built_simulated_and_plotted_in_an_empty_folder(tmp_path):
-    """The equilibria are at 10.42 and 10.78 mm, the fundamentals at 4.957 and 4.889 Hz."""
+    """Rest positions are 10.42 and 10.78 mm, fundamental frequencies 4.957 and 4.889 Hz."""
     done = build(tmp_path, *GUIDES, "--simulate")
     assert done.returncode == 0, done.stderr
     frequencies = {"PRBDM": ("10.42", "4.957"), "PRBDM2R": ("10.78", "4.889")}
@@ -346,10 +346,10 @@ def test_source_date_epoch_sets_the_date(epoch, mechanisms, tmp_path, monkeypatc
 def test_the_icon_does_not_depend_on_matplotlibrc(mechanisms):
     mechanism = mechanisms["PRBDM"]
     sample = python_fmu.start_sample(mechanism, {})
-    plain = picture.icon(mechanism, sample)
+    plain = icon(mechanism, sample)
     settings = {"lines.linewidth": 5.0, "savefig.transparent": True, "lines.markersize": 20.0}
     with matplotlib.rc_context(settings):
-        assert picture.icon(mechanism, sample) == plain
+        assert icon(mechanism, sample) == plain
 
 
 def test_the_module_name_depends_on_the_script(mechanisms, monkeypatch):
@@ -403,7 +403,7 @@ def test_version_is_printed(capsys):
     assert re.fullmatch(r"prbm-impact \d+\.\d+\.\d+\n", capsys.readouterr().out)
 
 
-def headline(mechanisms, tmp_path, **changes: float) -> str:
+def summary_of(mechanisms, tmp_path, **changes: float) -> str:
     """Return the printed summary for other start values, ``stop__position=...``."""
     fmu = tmp_path / "PRBDM.fmu"
     values = {name.replace("__", "."): value for name, value in changes.items()}
@@ -412,7 +412,7 @@ def headline(mechanisms, tmp_path, **changes: float) -> str:
 
 
 def test_an_impact_at_the_start_is_counted(mechanisms, tmp_path):
-    summary = headline(
+    summary = summary_of(
         mechanisms, tmp_path,
         release__displacement=0.0, release__velocity=0.5, stop__restitution=0.0,
     )  # fmt: skip
@@ -422,7 +422,7 @@ def test_an_impact_at_the_start_is_counted(mechanisms, tmp_path):
 
 def test_an_unstable_equilibrium_is_reported_without_a_rest_position(mechanisms, tmp_path):
     """The flexures buckle under the weight of the shuttle."""
-    summary = headline(
+    summary = summary_of(
         mechanisms, tmp_path, gravity__x=0.0, gravity__y=-200.0, release__displacement=-1e-3
     )
     assert "the equilibrium under gravity is unstable" in summary
@@ -432,7 +432,7 @@ def test_an_unstable_equilibrium_is_reported_without_a_rest_position(mechanisms,
 
 @pytest.mark.skipif(os.name != "posix", reason="sends a signal to a group of processes")
 @pytest.mark.parametrize("moment", [0.3, 1.3], ids=["importing", "simulating"])
-def test_ctrl_c_ends_a_simulation_without_a_headline(fmus, tmp_path, moment):
+def test_ctrl_c_ends_a_simulation_without_a_summary(fmus, tmp_path, moment):
     """The summary of an interrupted simulation would be wrong."""
     fmu = tmp_path / "PRBDM2R.fmu"
     fmu.write_bytes(fmus["PRBDM2R"].read_bytes())
@@ -525,7 +525,7 @@ def test_a_missing_package_is_named(monkeypatch, capsys):
     assert "the Python package prbm.base.atomic is missing" in capsys.readouterr().err
 
 
-FILES = {
+FILE_MISTAKES = {
     ("title =", "titel ="): "unknown key titel; did you mean title?",
     ("mass = 0.053187", "mass = [1]"): "bodies.0.mass (of shuttle) = [1]: write a number, or an",
     ("mass = 0.053187", ""): "bodies.0.mass (of shuttle) is missing: add the key",
@@ -541,7 +541,7 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("change", FILES, ids=lambda change: change[1] or "nothing")
+@pytest.mark.parametrize("change", FILE_MISTAKES, ids=lambda change: change[1] or "nothing")
 def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, change):
     text = (ROOT / "fmu_src" / "prbm" / "shipped" / "PRBDM.toml").read_text()
     assert change[0] in text
@@ -549,7 +549,7 @@ def test_a_mistake_in_a_mechanism_file_names_file_key_and_remedy(tmp_path, chang
     path.write_text(text.replace(*change, 1))
     with pytest.raises(MechanismError) as error:
         read_mechanism(path)
-    assert FILES[change] in str(error.value)
+    assert FILE_MISTAKES[change] in str(error.value)
     for line in str(error.value).splitlines():
         assert line.startswith(f"{path}: ")
         assert "Value error" not in line

@@ -143,14 +143,14 @@ def test_a_held_1r_guide_is_a_crank_on_torsion_springs(capsys):
     stiffness = 4 * k / radius**2 * (1 / np.cos(turned) ** 2 + turned * np.tan(turned) /
                                      np.cos(turned) ** 2)  # fmt: skip
     np.testing.assert_allclose(found["stiffness [N/m]"], stiffness, rtol=1e-6)  # a difference
-    assert "equilibrium at 0 mm: stable" in capsys.readouterr().out
+    assert "rest position at 0 mm: stable" in capsys.readouterr().out
 
 
-def test_equilibria_and_snap_through_of_the_bistable_mechanism_are_symmetric(capsys):
-    """The struts rise by 12 mm: equilibria at 0, 12, 24 mm, snap-through mirrored about 12 mm."""
+def test_rest_positions_and_snap_through_of_the_bistable_mechanism_are_symmetric(capsys):
+    """The struts rise by 12 mm: rest positions at 0, 12, 24 mm, snap-through around 12 mm."""
     assert run("equilibrium Bistable --from -1mm --to 25mm --points 20 --out .") == cli.OK
     rows = table("Bistable-stability.csv")
-    stable, unstable, snap = "stable equilibrium", "unstable equilibrium", "snap-through"
+    stable, unstable, snap = "stable rest position", "unstable rest position", "snap-through"
     assert rows["kind"] == [stable, unstable, stable, snap, snap]
     places = np.array(rows["displacement [m]"], float)
     rise = load("Bistable").values()["strut.rise"]
@@ -506,12 +506,12 @@ end = "wheel.left"
 """
 
 
-def test_a_wheel_on_a_cross_pivot_has_an_equilibrium_but_no_stiffness(capsys):
+def test_a_wheel_on_a_cross_pivot_has_a_rest_position_but_no_stiffness(capsys):
     """No force on its centre of mass moves the wheel."""
     Path("cross.toml").write_text(CROSS)
     assert run("equilibrium cross.toml --out .") == cli.OK
     printed = capsys.readouterr().out
-    assert "equilibrium at 0 mm: stable" in printed
+    assert "rest position at 0 mm: stable" in printed
     assert "no stiffness: the centre of mass of the body wheel cannot move" in printed
     assert table("CrossPivot-equilibrium.csv")["stiffness [N/m]"] == ["nan"]
     assert run("equilibrium cross.toml --held 1mm") == cli.FAILED
@@ -562,11 +562,11 @@ def test_version_is_printed(capsys):
     assert re.fullmatch(r"prbm-impact \d+\.\d+\.\d+\n", capsys.readouterr().out)
 
 
-def test_the_range_in_the_help_of_equilibrium_contains_all_equilibria(capsys):
+def test_the_range_in_the_help_of_equilibrium_contains_all_rest_positions(capsys):
     assert run("equilibrium --help") == cli.OK
     line = re.search(r"prbm (equilibrium Bistable --from \S+ --to \S+)", capsys.readouterr().out)[1]
     assert run(line) == cli.OK
-    found = re.findall(r"equilibrium at (\S+) mm: (\w+)", capsys.readouterr().out)
+    found = re.findall(r"rest position at (\S+) mm: (\w+)", capsys.readouterr().out)
     assert found == [("0", "stable"), ("12", "unstable"), ("24", "stable")]
 
 

@@ -1,4 +1,7 @@
-"""Frequency and damping from records with the noise of the laser of the thesis."""
+"""Frequency, damping and impact times from records.
+
+The noise is that of the laser sensor in the thesis.
+"""
 
 import dataclasses
 import math
@@ -17,9 +20,9 @@ def vibration(zeta, rng, duration=10.0, amplitude=10e-3, noise=NOISE, frequency=
     """Return a record of a damped sine; the frequency is the undamped one."""
     t = np.arange(round(duration * RATE)) / RATE
     omega = 2 * np.pi * frequency
-    decay, turning = zeta * omega, omega * math.sqrt(1 - zeta**2)
+    decay, damped = zeta * omega, omega * math.sqrt(1 - zeta**2)
     phase = rng.uniform(0, 2 * np.pi)
-    x = 3e-3 + amplitude * np.exp(-decay * t) * np.cos(turning * t + phase)
+    x = 3e-3 + amplitude * np.exp(-decay * t) * np.cos(damped * t + phase)
     return Series(t, x + noise * rng.standard_normal(len(t)))
 
 
@@ -77,14 +80,14 @@ def test_damping_below_its_uncertainty_is_too_small_to_measure(zeta):
 def test_uncertainties_cover_the_true_values():
     """Each interval includes its true value in 68.3 % of 200 draws, -+ 3 standard deviations."""
     rng = np.random.default_rng(1)
-    hits = dict.fromkeys(("frequency", "zeta", "decrement", "its zeta"), 0)
+    hits = dict.fromkeys(("frequency", "zeta", "decrement", "zeta by decrement"), 0)
     for _ in range(200):
         found = free_vibration(vibration(2e-3, rng, 3.0, 1e-3))
         delta = 2 * np.pi * 2e-3
         hits["frequency"] += abs(found.frequency.value - FREQUENCY) < found.frequency.uncertainty
         hits["zeta"] += abs(found.zeta.value - 2e-3) < found.zeta.uncertainty
         by_peaks = found.decrement_zeta
-        hits["its zeta"] += abs(by_peaks.value - 2e-3) < by_peaks.uncertainty
+        hits["zeta by decrement"] += abs(by_peaks.value - 2e-3) < by_peaks.uncertainty
         hits["decrement"] += abs(found.decrement.value - delta) < found.decrement.uncertainty
     for name, count in hits.items():
         assert 0.585 < count / 200 < 0.781, name
@@ -101,7 +104,7 @@ def test_confidence_intervals_of_no_damping_include_zero_at_the_stated_level():
 
 @pytest.mark.parametrize("duration", [2.0, 5.3, 16.7])
 def test_the_spectral_peak_is_within_its_resolution(duration):
-    """The error of the highest line is half a line distance, that of the parabola 2 % of it."""
+    """The errors are up to 1/2 of a line distance for the highest line, 2 % for the parabola."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         frequency = FREQUENCY + rng.uniform(-0.5, 0.5)
@@ -113,14 +116,14 @@ def test_the_spectral_peak_is_within_its_resolution(duration):
         assert abs(found.interpolated - frequency) <= 0.02 * found.resolution
 
 
-def test_a_record_of_17_s_has_spectral_lines_006_hz_apart():
-    """The thesis states 4.82 Hz -+ 0.06 Hz."""
+def test_a_record_of_17_s_has_the_spectral_resolution_of_the_thesis():
+    """The spectral lines are 0.06 Hz apart; the thesis states 4.82 Hz -+ 0.06 Hz."""
     found = fourier_peak(vibration(1e-4, np.random.default_rng(4), 1 / 0.06))
     assert found.resolution == pytest.approx(0.06, rel=1e-3)
 
 
 def test_rounded_sampling_times_give_the_exact_frequency():
-    """The fit uses the rounded times, which are consistent with the values."""
+    """The values are those at the rounded times, which the fit uses."""
     rng = np.random.default_rng(5)
     t = np.round(np.arange(3000) / RATE, 3)
     x = 1e-2 * np.exp(-0.03 * t) * np.cos(2 * np.pi * FREQUENCY * t)

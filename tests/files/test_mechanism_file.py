@@ -158,7 +158,7 @@ def test_invalid_lengths_are_rejected(written, words):
     "text", ["12", " 1e-3 ", "+12", "-(3)", "24/2", "2*6", "3 mm + 1", "2*(a + 3 mm) - 0.5"]
 )
 def test_numbers_in_quotes_without_a_unit_are_rejected(text):
-    """The writer may have meant another unit than that of SI."""
+    """The author of the file may have meant another unit than the SI unit."""
     with pytest.raises(MechanismError, match="has no unit: write a unit after each number"):
         units.quantity(text, "m")
 
@@ -286,10 +286,10 @@ def test_keys_have_the_defaults_of_the_fields_of_the_parts(tmp_path):
         for name, field in table.model_fields.items():
             if not field.is_required() and name != "points":
                 assert field.default == own[name].default, (key, name)
-    made = {"materials"}
-    assert set(MechanismTable.model_fields) - made == {f.name for f in fields(Mechanism)} - {
-        "drawing"
-    }
+    without_field = {"materials"}
+    assert set(MechanismTable.model_fields) - without_field == {
+        f.name for f in fields(Mechanism)
+    } - {"drawing"}
 
 
 def test_the_shipped_guides_have_the_values_of_the_experimental_structure():

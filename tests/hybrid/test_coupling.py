@@ -67,7 +67,7 @@ def total(simulation):
 
 @pytest.mark.parametrize("name", GUIDES)
 def test_energy_is_balanced_with_a_mobile_wall(name):
-    """The work of the wall equals the loss of its kinetic energy by the impulses."""
+    """The energies without that of the wall, less the work of the wall, are constant."""
     found = mechanism(name)
     stop = found.stops[0].name
     simulation = Simulation(found, {f"{stop}.mobility": WALL})

@@ -1,4 +1,4 @@
-"""Orders of convergence of the integrator: in a fixed step, and in the tolerance."""
+"""Orders of the integrator: observed in the step and the tolerance, and of its coefficients."""
 
 import numpy as np
 import pytest
@@ -157,7 +157,7 @@ def test_order_conditions_hold_for_every_rooted_tree(order):
 @pytest.mark.parametrize("order", range(1, DENSE_ORDER + 1))
 @pytest.mark.parametrize("theta", [0.2, 0.5, 0.9])
 def test_dense_output_is_of_fifth_order(order, theta):
-    """The weights satisfy b(theta) . Phi(t) = theta^order/gamma(t) for trees t to order five."""
+    """The weights satisfy b(theta) . Phi(t) = theta^order/gamma(t) for trees t of order 1 to 5."""
     b = PAIR.dense @ theta ** np.arange(1, PAIR.dense.shape[1] + 1)
     for tree in trees(order):
         weight = float(b @ elementary(PAIR.a, tree))
@@ -165,7 +165,10 @@ def test_dense_output_is_of_fifth_order(order, theta):
 
 
 def test_dense_output_has_the_smallest_defects_of_order_six():
-    """The other interpolants use the same stages, have order five and a continuous slope."""
+    """The defects are compared with those of all interpolants of the same stages.
+
+    These have order five, and agree with the states and their rates at both ends of a step.
+    """
     a, powers = PAIR.a, np.arange(1, PAIR.dense.shape[1] + 1)
     shape = PAIR.dense.shape
     equations = []
@@ -217,7 +220,7 @@ def test_dense_output_equals_the_new_state_at_the_end_of_a_step():
 
 
 def test_last_stage_but_one_is_a_solution_of_third_order():
-    """It satisfies the conditions up to order three, not four."""
+    """The stage satisfies the conditions up to order three, but not those of order four."""
     assert PAIR.c[-2] == pytest.approx(1.0, abs=1e-14)
     defects = {
         order: [PAIR.coarse_error @ elementary(PAIR.a, tree) for tree in trees(order)]
@@ -230,17 +233,17 @@ def test_last_stage_but_one_is_a_solution_of_third_order():
 
 @pytest.mark.parametrize("z", np.linspace(0.2, 4.4, 22))
 def test_estimated_error_of_an_oscillation_is_close_to_its_error(z):
-    """It is 0.35 to 1.8 times the error of a step up to the limit of stability, h omega = 4.4."""
+    """The ratio of both errors is 0.35 to 1.8 up to the limit of stability, h omega = z = 4.4."""
     scales = Scales(length=1.0, rate=1.0, energy=1e-9)
     turn = np.array([[0.0, 1.0, 0.0, 0.0], [-1.0, 0.0, 0.0, 0.0], [0.0] * 4, [0.0] * 4])
-    estimated, squares = [], []
+    estimated, actual = [], []
     for phase in np.linspace(0.0, np.pi, 8, endpoint=False):
         y = np.array([np.cos(phase), -np.sin(phase), 0.0, 0.0])
         k, y1 = stages(PAIR, lambda _, x: turn @ x, 0.0, y, z, turn @ y)
         exact = np.array([np.cos(phase + z), -np.sin(phase + z), 0.0, 0.0])
         estimated.append(step_error(scales, z, k, y, y1))
-        squares.append(error_norm(scales, y1 - exact, y, y1))
-    assert 0.35 < np.linalg.norm(estimated) / np.linalg.norm(squares) < 1.8
+        actual.append(error_norm(scales, y1 - exact, y, y1))
+    assert 0.35 < np.linalg.norm(estimated) / np.linalg.norm(actual) < 1.8
 
 
 @pytest.mark.parametrize("field", ["a", "error", "dense"])

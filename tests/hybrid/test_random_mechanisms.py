@@ -60,7 +60,7 @@ def arms(system, q):
     return E
 
 
-def masses(system, q):
+def mass_points(system, q):
     """Return the positions of all mass points."""
     return system.A @ arms(system, q) + system.c
 
@@ -79,7 +79,10 @@ def body_point(system, body, drawn, q):
 
 
 def relative_displacement(system, stop, q):
-    """Return the displacement of a hit point from its wall: along u, and i times to the left."""
+    """Return the displacement of a hit point from the straight shape, relative to its wall's body.
+
+    The real part is along the direction of the stop, the imaginary part to its left.
+    """
     u = unit(stop.direction)
     drawn = complex(*stop.point) + value(stop, "offset", system.values) * 1j * u
     hit = body_point(system, stop.body, drawn, q)
@@ -112,13 +115,13 @@ def rubs(system, q):
     return np.array(found)
 
 
-def first(f, q):
+def gradient_of(f, q):
     """Return df/dq by central differences, (values, n)."""
     columns = [(f(q + d) - f(q - d)) / (2 * STEP) for d in STEP * np.eye(len(q))]
     return np.array(columns).T.reshape(-1, len(q))
 
 
-def second(f, q, v):
+def second_derivative(f, q, v):
     """Return the second derivative of f along q + t v at t = 0."""
     h = SECOND_STEP / np.abs(v).max()
     return (f(q + h * v) - 2 * f(q) + f(q - h * v)) / h**2
@@ -143,14 +146,16 @@ def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, se
     """
     system = assemble(mechanism, mechanism.values())
     q, v = random_state(system, seed)
-    T = first(lambda q: masses(system, q), q)
+    T = gradient_of(lambda q: mass_points(system, q), q)
     e, w = system.directions(q), system.turning(v)
     M, C = inertia(system.H, np.diag(system.J), e)
     expected = (T.conj().T @ (system.m[:, None] * T)).real + np.diag(system.J)
     np.testing.assert_allclose(M, expected, atol=1e-9 * np.abs(M).max())
     w2 = w * w
     quadratic = C @ w2.real - (M - np.diag(system.J)) @ w2.imag  # -Im(Hq w^2)
-    bent = (T.conj().T @ (system.m * second(lambda q: masses(system, q), q, v))).real
+    bent = (
+        T.conj().T @ (system.m * second_derivative(lambda q: mass_points(system, q), q, v))
+    ).real
     np.testing.assert_allclose(quadratic, bent, atol=2e-6 * np.abs(M).max() * v @ v)
 
 
@@ -180,10 +185,12 @@ def test_rows_are_the_derivatives_of_their_scalars(mechanism, seed):
 
         if shift is not None:
             np.testing.assert_allclose(rows.values(e) + shift, f(q), atol=1e-14)
-        gradient = first(f, q)
+        gradient = gradient_of(f, q)
         np.testing.assert_allclose(rows.jacobian(e), gradient, atol=1e-10)
         np.testing.assert_allclose(rows.rates(e, v), gradient @ v, atol=1e-9)
-        np.testing.assert_allclose(rows.convective(e, v), -second(f, q, v), atol=1e-6 * v @ v)
+        np.testing.assert_allclose(
+            rows.convective(e, v), -second_derivative(f, q, v), atol=1e-6 * v @ v
+        )
 
 
 @given(mechanisms(), SEEDS)
@@ -204,7 +211,10 @@ def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing
 
 
 def leaf_mass(mechanism):
-    """Return the mass of all flexures; the moving part is smaller if lumped or next to a clamp."""
+    """Return the mass of all flexures.
+
+    Less moves with a lumped model (1R), or with a link that is fixed to the ground.
+    """
     total = 0.0
     for flexure in mechanism.flexures:
         kind = next(k for k in mechanism.flexure_types if k.name == flexure.type)
@@ -221,7 +231,7 @@ def potential(sim, q):
     system, given = sim.system, sim.inputs
     V = 0.5 * (q - system.q0) @ system.K @ (q - system.q0)
     field = system.gravity - given.base
-    V -= (np.conj(field) * (system.m @ masses(system, q))).real
+    V -= (np.conj(field) * (system.m @ mass_points(system, q))).real
     for force, F, moment in zip(sim.mechanism.forces, given.forces, given.moments, strict=True):
         body = next(b for b in sim.mechanism.bodies if b.name == force.body)
         z = body_point(system, force.body, complex(*(force.point or body.centre)), q)
@@ -247,14 +257,14 @@ def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
     def scalars(q):
         return np.concatenate([closures(system, q), gaps(system, q)[holds]])
 
-    T, rows = first(lambda q: masses(system, q), q), first(scalars, q)
-    z2 = T @ a + second(lambda q: masses(system, q), q, v)
+    T, rows = gradient_of(lambda q: mass_points(system, q), q), gradient_of(scalars, q)
+    z2 = T @ a + second_derivative(lambda q: mass_points(system, q), q, v)
     inertial = (T.conj().T @ (system.m * z2)).real + system.J * a
-    torque = -first(lambda q: np.array([potential(sim, q)]), q)[0] + rows.T @ lam
+    torque = -gradient_of(lambda q: np.array([potential(sim, q)]), q)[0] + rows.T @ lam
     size = np.abs(torque).max() + np.abs(rows.T @ lam).max() + np.abs(system.J * a).max()
     np.testing.assert_allclose(inertial, torque, atol=1e-5 * size)
     if len(rows):
-        bend = second(scalars, q, v)
+        bend = second_derivative(scalars, q, v)
         np.testing.assert_allclose(
             rows @ a, -bend, atol=1e-8 * np.abs(rows @ np.diag(a)).max() + 1e-6
         )
@@ -277,12 +287,12 @@ def test_the_potential_energy_is_stationary_at_an_equilibrium(mechanism, seed):
         return np.array([potential(sim, q) - lam @ closures(system, q)])
 
     stiffest = np.abs(system.K).max()
-    np.testing.assert_allclose(first(lagrangian, q)[0], 0.0, atol=1e-9 * stiffest)
+    np.testing.assert_allclose(gradient_of(lagrangian, q)[0], 0.0, atol=1e-9 * stiffest)
     np.testing.assert_allclose(closures(system, q), 0.0, atol=1e-13)
     found = modes(system, shape)
     for phi, f in zip(found.shape.T, found.frequency, strict=True):
         unit_phi = phi / np.abs(phi).max()
-        omega2 = second(lagrangian, q, unit_phi)[0] / (unit_phi @ found.M @ unit_phi)
+        omega2 = second_derivative(lagrangian, q, unit_phi)[0] / (unit_phi @ found.M @ unit_phi)
         scale = np.abs(found.frequency).max() ** 2
         assert omega2 / (2 * math.pi) ** 2 == pytest.approx(f * abs(f), rel=1e-4, abs=1e-6 * scale)
 
@@ -323,7 +333,7 @@ def momentum(sim):
     """Return the linear momentum [N s], and the angular momentum about the anchor [N m s]."""
     system, y, n = sim.system, sim.state(), sim.system.n
     q, v = y[:n], y[n : 2 * n]
-    z = masses(system, q) - system.anchor
+    z = mass_points(system, q) - system.anchor
     p = system.m * (1j * (system.A @ (arms(system, q) * system.turning(v))))
     return p.sum(), float((z.conj() * p).imag.sum() + system.J @ v)
 
@@ -349,7 +359,7 @@ def check_momentum(mechanism, seed):
                 out, y = sim.outputs(), sim.state()
         if any(state != states[0] for state in states):
             continue  # An event between the three times makes the difference invalid.
-        z = masses(system, y[: system.n]) - system.anchor
+        z = mass_points(system, y[: system.n]) - system.anchor
         weight = system.m * (system.gravity - sim.inputs.base)
         force, moment = weight.sum(), (z.conj() * weight).imag.sum()
         for one, F, M in zip(mechanism.forces, sim.inputs.forces, sim.inputs.moments, strict=True):
@@ -385,14 +395,17 @@ def check_impacts(mechanism, seed):
     system = sim.system
     for impact in sim.record:
         q, jump = impact.q, impact.after - impact.before
-        T = first(lambda q: masses(system, q), q)
+        T = gradient_of(lambda q: mass_points(system, q), q)
         M = (T.conj().T @ (system.m[:, None] * T)).real + np.diag(system.J)
         touching = np.flatnonzero(np.abs(gaps(system, q)) < 1e-8)
         i = next(k for k, s in enumerate(mechanism.stops) if s.name == impact.stop)
         assert i in touching
-        G, loops = first(lambda q: gaps(system, q), q), first(lambda q: closures(system, q), q)
+        G, loops = (
+            gradient_of(lambda q: gaps(system, q), q),
+            gradient_of(lambda q: closures(system, q), q),
+        )
         rubbed = [k for k in touching if mechanism.stops[k].friction]
-        along = first(lambda q: slides(system, q), q)[rubbed]
+        along = gradient_of(lambda q: slides(system, q), q)[rubbed]
         rows = np.vstack([G[touching], along, loops])
         impulses = np.linalg.lstsq(rows.T, M @ jump, rcond=1e-12)[0]
         size = np.abs(M @ jump).max()
@@ -469,7 +482,7 @@ def free_pair(friction):
 @pytest.mark.parametrize("friction", [0.0, 0.2, 5.0])
 @pytest.mark.parametrize("restitution", [0.0, 0.6, 1.0])
 def test_an_eccentric_impact_of_two_free_bodies_conserves_momentum(friction, restitution):
-    """The mass of the threads is 1e-9 of that of the bodies, so that their momentum is negligible.
+    """The mass of the threads is below 1e-9 of that of the bodies: their momentum is negligible.
 
     Without friction, the impulse is (1 + eps) closing speed / W with
     W = sum of 1/m + (arm x n)^2/J.

@@ -346,7 +346,7 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
 
 
 @pytest.mark.parametrize(
-    ("name", "places", "number", "message"),
+    ("name", "index", "number", "message"),
     [
         ("knock", 1, 2, "a stop whose wall is on its own body"),
         ("knock", 1, 9, "an index out of range"),
@@ -360,12 +360,12 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
         ("tip", 0, 9, "an index out of range"),
     ],
 )
-def test_tables_of_an_invalid_mechanism_are_rejected(name, places, number, message):
-    """The number at index ``places`` after the name of a part is replaced."""
+def test_tables_of_an_invalid_mechanism_are_rejected(name, index, number, message):
+    """The number at ``index`` after the name of a part is replaced."""
     guide = elastic()
     written = bytearray(tables(guide, (), TOKEN, independent(guide)))
     at = written.index(struct.pack("<I", len(name)) + name.encode() + b"\0") + 5 + len(name)
-    struct.pack_into("<I", written, at + 4 * places, number)
+    struct.pack_into("<I", written, at + 4 * index, number)
     struct.pack_into("<I", written, 12, zlib.crc32(written[16:]))
     with pytest.raises(KernelError, match=message):
         kernel().mechanism_open(bytes(written), len(written))

@@ -114,5 +114,5 @@ def test_constraint_rows_equal_central_differences_of_the_constraints():
         [(value(q + d) - value(q - d)) / (2 * h) for d in h * np.eye(system.n)]
     ).T
     np.testing.assert_allclose(rows(q), differences, atol=1e-9)
-    turning = (rows(q + h * v) - rows(q - h * v)) @ v / (2 * h)
-    np.testing.assert_allclose(convective(B, np.exp(1j * q), v), -turning, atol=1e-9)
+    bent = (rows(q + h * v) - rows(q - h * v)) @ v / (2 * h)
+    np.testing.assert_allclose(convective(B, np.exp(1j * q), v), -bent, atol=1e-9)

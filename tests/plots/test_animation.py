@@ -21,7 +21,7 @@ from PIL import Image
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
 from prbm.drawing.shapes import curve
-from prbm.drawing.style import CHAIN
+from prbm.drawing.style import CURVED_PIVOTS_MAX
 from prbm.mechanism.description import Mechanism
 from prbm.plots import animation
 from prbm.plots.animation import AnimationError, animate, show
@@ -190,7 +190,7 @@ def test_results_of_fmpy_and_of_the_engine_give_equal_films(
 def test_shapes_at_impacts_known_from_columns_only_are_close(
     mechanisms: dict[str, Mechanism],
 ) -> None:
-    """The shape is interpolated between two rows and moved to the wall; it errs by half a pixel."""
+    """The shape is interpolated between two rows and moved to the wall; it errs by 0.6 pixels."""
     result = simulate(mechanisms["PRBDM2R"], stop_time=0.06)
     exact, estimated = motion(result), motion(replace(result, impacts=()))
     t = exact.marks[0].time
@@ -200,7 +200,7 @@ def test_shapes_at_impacts_known_from_columns_only_are_close(
     scene = Scene(exact, film(exact))
     scene.figure.canvas.draw()
     left, right = scene.stage.transData.transform([(0.0, 0.0), (scene.factor, 0.0)])[:, 0]
-    assert np.abs(apart[0] - apart[1]).max() * (right - left) < 0.6  # pixels
+    assert np.abs(apart[0] - apart[1]).max() * (right - left) < 0.6
 
 
 def test_a_clamped_flexure_is_drawn_as_the_elastic_line() -> None:
@@ -213,7 +213,7 @@ def test_a_clamped_flexure_is_drawn_as_the_elastic_line() -> None:
 
 
 def test_only_flexures_of_few_links_have_a_smooth_curve(result: Result) -> None:
-    assert all(len(line.c) - 2 <= CHAIN for line in motion(result).system.outlines)
+    assert all(len(line.c) - 2 <= CURVED_PIVOTS_MAX for line in motion(result).system.outlines)
     assert scene_of(result).curves.keys() == {"left_flexure", "right_flexure"}
 
 

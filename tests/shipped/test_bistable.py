@@ -47,7 +47,7 @@ def test_holding_force_is_that_of_four_struts() -> None:
 
 
 def test_there_are_two_stable_equilibria_and_an_unstable_one_between_them() -> None:
-    """The equilibria are the drawn shape, its mirror image, and that with the shortest struts."""
+    """They are the straight shape, its mirror image, and the shape with the shortest struts."""
     found = rest_positions(SYSTEM, np.array([-0.3, 0.4, 1.3, 2.3]) * RISE)
     assert [rest.stable for rest in found] == [True, False, True]
     np.testing.assert_allclose([r.displacement for r in found], [0, RISE, 2 * RISE], atol=1e-12)
@@ -93,7 +93,7 @@ def test_the_shuttle_comes_to_rest_on_the_far_stop_after_the_snap() -> None:
     assert 0.0 < first.latched.approach_speed < speed(0.0125, 0.022)
     assert y[-1] == pytest.approx(-0.022, abs=1e-12)
     assert result.outputs[-1]["far_stop.contact"]
-    # The struts press it against the stop, towards the second stable equilibrium.
+    # The struts press it against the stop, towards the second stable rest position.
     assert result.outputs[-1]["far_stop.force"] == pytest.approx(-force(0.022), rel=1e-8)
     assert result.outputs[-1]["energy.elastic"] == pytest.approx(energy(0.022), rel=1e-8)
 

@@ -68,7 +68,7 @@ def test_impacts_obey_newtons_law_and_conserve_momentum(default) -> None:
 
 
 def test_the_gap_is_the_distance_of_hammer_and_oscillator(default) -> None:
-    """The gap is the distance of the two bodies, 2 mm in the drawn shape, and never negative."""
+    """The gap is the distance of the two bodies, 2 mm in the straight shape, and never negative."""
     apart = default.column("oscillator.x") - default.column("hammer.x") + 2e-3
     np.testing.assert_allclose(default.column("impact.gap"), apart, atol=1e-12)
     assert apart.min() > -1e-12

@@ -364,7 +364,7 @@ CHANGES = {
     "both material and density": (
         'material = "steel"\naxial',
         'material = "steel"\ndensity = 1\naxial',
-        "right has material as well as density: remove either",
+        "right has material as well as density: remove one of them",
     ),
     "neither material nor density": (
         HANGER,
@@ -379,7 +379,7 @@ CHANGES = {
     "type and section": (
         'type = "leaf"',
         'type = "leaf"\nwidth = 1',
-        "left has type as well as width: remove either",
+        "left has type as well as width: remove one of them",
     ),
     "no type and no section": (
         'type = "leaf"\n',

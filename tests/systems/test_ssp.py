@@ -35,7 +35,10 @@ VALUES = {
 
 
 def fmus(fmi: int = 2) -> dict[str, Path]:
-    """Return an integrator (a spring), a guide on it, and a guide whose stop is on the first."""
+    """Return an integrator, a guide as carrier, and a guide whose stop is on the carrier.
+
+    The integrator is the law of a spring on the carrier.
+    """
     return {"sum": integrator(), "carrier": guide(fmi), "follower": guide(fmi)}
 
 

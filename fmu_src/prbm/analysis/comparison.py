@@ -4,7 +4,7 @@
 of the same file, and compares them with measured values and their uncertainties:
 
 * the equilibrium of the released body under gravity, and the lowest frequencies about that shape;
-* the holding force in the drawn shape, the stiffness and the frequencies there;
+* the holding force in the straight shape, the stiffness and the frequencies there;
 * the modal restitution of an arriving fundamental mode, for every wall that a force on the released
   body reaches.
 
@@ -187,7 +187,7 @@ def _frequencies(found: Modes, where: str) -> Quantities:
 
 
 def _straight(hold: Callable[[float], float], step: float) -> Quantities:
-    """Return holding force and stiffness in the drawn shape; ``step`` is a displacement [m]."""
+    """Return holding force and stiffness in the straight shape; ``step`` is a displacement [m]."""
     slope = (hold(step) - hold(-step)) / (2 * step)
     return {"holding force, straight": hold(0.0), "stiffness, straight": slope}
 
@@ -255,7 +255,7 @@ def compare(
     ParameterError
         If a value is out of bounds, or a measured quantity is not compared.
     EquilibriumError
-        If there is no equilibrium at rest, or none in the drawn shape.
+        If there is no equilibrium at rest, or none in the straight shape.
     """
     report = progress or (lambda _: None)
     given = dict(values or {}) | _without(mechanism)

@@ -37,7 +37,7 @@ class Held:
         Displacement of the released body along the direction of the release, from the straight
         shape [m]; its rotation [rad] if the release is by an angle.
     force : float
-        Holding force on the body along that direction [N], or moment [N m]; 0 at an equilibrium.
+        Holding force on the body along that direction [N], or moment [N m]; 0 at a rest position.
     stiffness : float
         Derivative of the force by the displacement [N/m], [N m/rad]; NaN where the loops prevent
         a further motion along that direction.

@@ -1,6 +1,5 @@
-"""Stops by name, and shapes held by a force in which a stop touches its wall."""
+"""The index of a stop by its name, and held shapes in which a stop touches its wall."""
 
-import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -11,7 +10,8 @@ from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.parts import value
 
-GAP_CLOSED_RTOL = 1e-9  # Gap at which a held shape touches the wall, relative to the size.
+GAP_CLOSED_RTOL = 1e-9  # Largest gap of a shape that touches the wall, over the size.
+SLOPE_MIN = 1e-9  # Change of the gap over the displacement of the released body; less is round-off.
 SECANT_STEPS_MAX = 20
 
 S = TypeVar("S")
@@ -32,16 +32,16 @@ def stop_index(mechanism: Mechanism, name: str | None) -> int:
     return 0 if name is None else names.index(name)
 
 
-def touching(
+def touching_shape(
     hold: Callable[[float, S | None], S],
     gap: Callable[[S], float],
     wall: float,
     size: float,
     near: S | None = None,
 ) -> S:
-    """Return the shape, held by a force on the released body, in which a stop touches its wall.
+    """Return the held shape in which a stop touches its wall.
 
-    The displacement of the released body is found by the secant method.
+    A force holds the released body; its displacement is found by the secant method.
 
     Parameters
     ----------
@@ -54,26 +54,32 @@ def touching(
     size : float
         Size of the mechanism [m].
     near : shape or None
-        Start of the search.
+        Shape near which the first shape is computed.
 
     Raises
     ------
     EquilibriumError
-        If no shape that touches the wall is found in :data:`SECANT_STEPS_MAX` steps.
+        If no shape that touches the wall is found in :data:`SECANT_STEPS_MAX` steps, or the gap
+        does not depend on the displacement of the released body.
     """
     x, shape = wall, hold(wall, near)
     g = gap(shape)
-    last_x, last_g = x - g, math.nan
+    slope = -1.0
     for _ in range(SECANT_STEPS_MAX):
         if abs(g) <= GAP_CLOSED_RTOL * size:
             return shape
-        slope = (g - last_g) / (x - last_x) if math.isfinite(last_g) else -1.0
-        last_x, last_g = x, g
-        x -= g / slope
-        shape = hold(x, shape)
-        g = gap(shape)
+        if abs(slope) <= SLOPE_MIN:
+            raise EquilibriumError(
+                f"the gap to the wall at {wall:g} m does not change when the released body moves: "
+                "release the body that hits the stop"
+            )
+        step = -g / slope
+        shape = hold(x + step, shape)
+        last_g, g = g, gap(shape)
+        x, slope = x + step, (g - last_g) / step
     raise EquilibriumError(
-        f"no shape held by a force on the released body touches the wall at {wall:g} m"
+        f"no shape that touches the wall at {wall:g} m was found: a force on the released body "
+        "holds the shapes; choose a wall position nearer to the straight shape"
     )
 
 
@@ -92,22 +98,22 @@ def impact_shape(system: System, stop: int, wall: float) -> Equilibrium:
     Raises
     ------
     EquilibriumError
-        If no shape that touches the wall is found.
+        As :func:`touching_shape`.
     """
     rows = system.gap_rows
 
     def gap(shape: Equilibrium) -> float:
         return float(rows.values(system.directions(shape.q))[stop]) + wall
 
-    # The search is in metres: a rotation is taken on the radius of the size.
-    share = 1.0 / system.length if system.mechanism.release.turns else 1.0
-    return touching(lambda x, _: equilibrium(system, share * x), gap, wall, system.length)
+    # The search is in metres.  A rotation is converted to the arc at a radius of system.length.
+    per_metre = 1.0 / system.length if system.mechanism.release.turns else 1.0
+    return touching_shape(lambda x, _: equilibrium(system, per_metre * x), gap, wall, system.length)
 
 
 def lever(system: System, stop: int) -> float:
-    """Return the distance from the centre of mass of a body to the line of an impact, signed [m].
+    """Return the signed distance from the centre of mass of a body to the line of an impact [m].
 
-    The distance is taken in the drawn shape, positive to the left of the direction of the stop.
+    It is the distance in the straight shape, positive to the left of the direction of the stop.
     """
     s = system.mechanism.stops[stop]
     point = complex(*(affine(coordinate)(system.values) for coordinate in s.point))

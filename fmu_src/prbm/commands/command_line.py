@@ -101,8 +101,8 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     p = _Parser(
         prog="prbm",
-        description="Analyse a compliant mechanism with stops: natural frequencies, equilibria, "
-        "motion\nthrough impacts, and parameters from measured data.",
+        description="Analyse a compliant mechanism with stops: natural frequencies, "
+        "rest positions,\nmotion through impacts, and parameters from measured data.",
         epilog=_examples(
             "prbm list",
             "prbm modes PRBDM2R",
@@ -149,7 +149,11 @@ def _out(parser: argparse.ArgumentParser) -> None:
 
 def _list(commands: Commands) -> None:
     _command(
-        commands, "list", "shipped:listed", "list the shipped mechanisms", _examples("prbm list")
+        commands,
+        "list",
+        "shipped:print_list",
+        "list the shipped mechanisms",
+        _examples("prbm list"),
     )
 
 
@@ -174,8 +178,8 @@ def _modes(commands: Commands) -> None:
 
 def _equilibrium(commands: Commands) -> None:
     parser = _command(
-        commands, "equilibrium", "rest:equilibria",
-        "equilibria under gravity, the force that holds the released body at other "
+        commands, "equilibrium", "rest:rest_positions",
+        "rest positions under gravity, the force that holds the released body at other "
         "displacements, and snap-through",
         _examples(
             "prbm equilibrium PRBDM2R",
@@ -199,7 +203,7 @@ def _equilibrium(commands: Commands) -> None:
 
 def _simulate(commands: Commands) -> None:
     parser = _command(
-        commands, "simulate", "simulation:simulated",
+        commands, "simulate", "simulation:run_simulation",
         "simulate the motion after the release, through all impacts",
         _examples(
             "prbm simulate PRBDM2R --set stop.restitution=0.5 --out results",
@@ -281,7 +285,7 @@ def _response(parser: argparse.ArgumentParser) -> None:
 
 def _fit(commands: Commands) -> None:
     parser = _command(
-        commands, "fit", "fitting:fitted",
+        commands, "fit", "fitting:run_fit",
         "fit parameters of a mechanism to natural frequencies, a response or a force curve",
         _examples(
             'prbm fit PRBDM --free flexure.K_theta --frequency "4.82 Hz +- 0.06"',
@@ -326,7 +330,7 @@ def _fit(commands: Commands) -> None:
 
 def _impact_map(commands: Commands) -> None:
     parser = _command(
-        commands, "impact-map", "maps:mapped",
+        commands, "impact-map", "maps:print_maps",
         "maps of the modal restitution over positions of the wall and offsets of the hit point",
         _examples(
             "prbm impact-map PRBDM2R --model 2R --axial",
@@ -376,7 +380,7 @@ def _impact_map(commands: Commands) -> None:
 
 def _sweep(commands: Commands) -> None:
     parser = _command(
-        commands, "sweep", "sweeps:swept",
+        commands, "sweep", "sweeps:run_sweep",
         "simulate an FMU once for each row of a table: parameter studies, Monte Carlo",
         _examples(
             "prbm sweep dist/fmi2/PRBDM2R.fmu table.csv --output stop.impact_count \\\n"
@@ -422,7 +426,7 @@ def _sweep(commands: Commands) -> None:
 
 def _picture(commands: Commands) -> None:
     parser = _command(
-        commands, "picture", "pictures:drawn",
+        commands, "picture", "pictures:write_picture",
         "draw a mechanism with the names of its parts, and its modes, as PNG",
         _examples("prbm picture FoldedSuspension --modes 3 --out folded.png"),
     )  # fmt: skip
@@ -431,7 +435,7 @@ def _picture(commands: Commands) -> None:
 
 def _animate(commands: Commands) -> None:
     parser = _command(
-        commands, "animate", "pictures:animated",
+        commands, "animate", "pictures:run_animation",
         "film of a result, or of a new simulation, as GIF or MP4",
         _examples(
             "prbm animate PRBDM2R motion.gif --stop-time 0.3",
@@ -444,7 +448,7 @@ def _animate(commands: Commands) -> None:
 
 def _validate(commands: Commands) -> None:
     parser = _command(
-        commands, "validate", "validation:validated",
+        commands, "validate", "validation:print_validation",
         "compare a mechanism with finite elements and measurements, or reproduce the thesis "
         "behind the models",
         _examples(

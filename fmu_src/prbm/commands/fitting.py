@@ -13,7 +13,7 @@ from .output import Output
 from .words import free, frequency
 
 
-def fitted(options: argparse.Namespace) -> None:
+def run_fit(options: argparse.Namespace) -> None:
     """Print the fitted parameters and their uncertainties; write tables and figures."""
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)

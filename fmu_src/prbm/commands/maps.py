@@ -20,12 +20,12 @@ from .output import Output
 from .systems import check_length
 
 # The default grid has about the proportions of the grid in the thesis, in round numbers.
-WALL_SHARE = 5 / 9  # Largest default wall position, as a share of the displacement at release.
-OFFSET_SHARE = 1 / 20  # Largest default offset, as a share of the size of the mechanism.
+WALL_SHARE = 5 / 9  # Largest default wall position over the displacement at release.
+OFFSET_SHARE = 1 / 20  # Largest default offset over the size of the mechanism.
 ROUND_RTOL = 1e-9  # A round number may exceed its limit by this share: round-off.
 GRID = (-1.0, -0.5, 0.0, 0.5, 1.0)  # Default positions and offsets, relative to the largest.
 POINTS_MAX = 400  # Points of a map.
-FLEXURE_METHODS = {"algebraic", "simulated", "fitted"}  # Methods that depend on flexure models.
+FLEXURE_METHODS = {"algebraic", "simulated", "fitted"}  # Methods with notes on flexure models.
 SIMULATED_METHODS = {"simulated", "fitted"}  # Methods that simulate.
 
 Method = Callable[..., ImpactMap]
@@ -39,7 +39,7 @@ METHODS: Mapping[str, Method] = {
 }
 
 
-def mapped(options: argparse.Namespace) -> None:
+def print_maps(options: argparse.Namespace) -> None:
     """Print the impact maps of all selected methods and flexure models."""
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
@@ -99,7 +99,9 @@ def _points(
 
 
 def rounded_down(x: float) -> float:
-    """Return the largest number 1, 2, 4, 6 or 8 times a power of ten up to x; 0 for 0.
+    """Return the largest round number that is not above x: 1, 2, 4, 6 or 8 times a power of ten.
+
+    The result for 0 is 0.
 
     Examples
     --------
@@ -120,20 +122,20 @@ def _jobs(
     positions: Sequence[float],
     offsets: Sequence[float],
 ) -> Iterator[Job]:
-    """Yield the function that computes each map."""
+    """Yield a function for each map, which computes it."""
     models = dict(_models(options, mechanism))
     for name in dict.fromkeys(options.method):
         for label, model in models.items():
             method = partial(METHODS[name], model, positions, offsets, values, stop=options.stop)
             if name == "elements":
-                yield partial(_computed, method, "finite elements", elements=options.elements)
+                yield partial(_compute, method, "finite elements", elements=options.elements)
                 break  # Finite elements do not depend on the flexure model.
             if name in SIMULATED_METHODS:
                 method = partial(method, engine=options.engine)
-            yield partial(_computed, method, f"{label}, {name}")
+            yield partial(_compute, method, f"{label}, {name}")
 
 
-def _computed(method: Method, label: str, progress: Progress, **more: object) -> ImpactMap:
+def _compute(method: Method, label: str, progress: Progress, **more: object) -> ImpactMap:
     return method(label=label, progress=progress, **more)
 
 
@@ -144,13 +146,14 @@ def _notes(
     positions: Sequence[float],
     offsets: Sequence[float],
 ) -> Iterator[str]:
-    """Yield notes on flexure models, for the hit farthest from the centre of mass.
+    """Yield notes on the accuracy of flexure models.
 
-    The positions of the wall are the nearest to the straight shape and both ends of the map.
+    They are for the offset that is farthest from the centre of mass, at three positions of the
+    wall: both ends of the map, and the position nearest to the straight shape.
     """
     if not FLEXURE_METHODS.intersection(options.method):
         return
-    stop, name = stop_index(mechanism, options.stop), None
+    stop = stop_index(mechanism, options.stop)
     name = mechanism.stops[stop].name
     walls = sorted({min(positions, key=abs), positions[0], positions[-1]}, key=abs)
     for label, model in _models(options, mechanism):

@@ -23,7 +23,7 @@ from ..runs.run import simulate
 from .duration import given_inputs, span
 
 
-def drawn(options: argparse.Namespace) -> None:
+def write_picture(options: argparse.Namespace) -> None:
     """Draw a mechanism to a PNG file."""
     mechanism = load(options.mechanism)
     path = options.out or Path(f"{mechanism.name}.png")
@@ -41,7 +41,7 @@ def drawn(options: argparse.Namespace) -> None:
             print(sentence)
 
 
-def animated(options: argparse.Namespace) -> None:
+def run_animation(options: argparse.Namespace) -> None:
     """Write a film of a result, or of a new simulation."""
     path = Path(options.files[-1])
     check_encoder(path)

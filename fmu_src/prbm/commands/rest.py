@@ -1,4 +1,4 @@
-"""``prbm equilibrium``: equilibria, holding forces and snap-through."""
+"""``prbm equilibrium``: rest positions, holding forces and snap-through."""
 
 import argparse
 import math
@@ -19,8 +19,8 @@ from .systems import HeldUnit, assembled, check_held, held_scale, held_unit, rou
 POINTS_MAX = 100_000
 
 
-def equilibria(options: argparse.Namespace) -> None:
-    """Print the equilibria, or the forces that hold the released body at displacements."""
+def rest_positions(options: argparse.Namespace) -> None:
+    """Print the rest positions, or the forces that hold the released body at displacements."""
     mechanism, _, system = assembled(options)
     output = Output(options.out)
     ranged = (options.start, options.end)
@@ -42,7 +42,7 @@ def equilibria(options: argparse.Namespace) -> None:
     else:
         rest = holding.free(system)
         _print(head, [rest], system)
-        _print_equilibrium(rest.displacement, rest.frequency > 0.0, system)
+        _print_rest(rest.displacement, rest.frequency > 0.0, system)
         output.table(f"{mechanism.name}-equilibrium.csv", _csv_head(unit), _rows([rest]))
     output.write()
 
@@ -50,7 +50,7 @@ def equilibria(options: argparse.Namespace) -> None:
 def _range(
     options: argparse.Namespace, mechanism: Mechanism, system: System, output: Output, head: str
 ) -> None:
-    """Print equilibria and snap-through in a range of displacements; write the force curve."""
+    """Print rest positions and snap-through in a range of displacements; write the force curve."""
     unit = held_unit(mechanism)
     low, high = (
         check_held(quantity(text, unit.si, option), system, option)
@@ -66,9 +66,9 @@ def _range(
     if every > 1:
         print(f"every {every}th of {options.points} points; write all with --out DIR")
     for rest in curve.rests:
-        _print_equilibrium(rest.displacement, rest.stable, system)
+        _print_rest(rest.displacement, rest.stable, system)
     if not curve.rests:
-        print("no equilibrium in this range")
+        print("no rest position in this range")
     for x, force in curve.snaps:
         effort = unit.si_effort.replace(".", " ")
         print(f"snap-through at {unit.factor * x:.6g} {unit.shown}, under {force:.5g} {effort}")
@@ -77,7 +77,7 @@ def _range(
         f"{mechanism.name}-stability.csv",
         ["kind", f"{unit.amount} [{unit.si}]", f"{unit.effort} [{unit.si_effort}]"],
         [
-            *([f"{_stability(x.stable)} equilibrium", x.displacement, 0.0]
+            *([f"{_stability(x.stable)} rest position", x.displacement, 0.0]
               for x in curve.rests),
             *(["snap-through", x, force] for x, force in curve.snaps),
         ],
@@ -93,10 +93,10 @@ def _stability(stable: bool) -> str:
     return "stable" if stable else "unstable"
 
 
-def _print_equilibrium(displacement: float, stable: bool, system: System) -> None:
+def _print_rest(displacement: float, stable: bool, system: System) -> None:
     unit = held_unit(system.mechanism)
     at = rounded(unit.factor * displacement, unit.factor * held_scale(system))
-    print(f"equilibrium at {at} {unit.shown}: {_stability(stable)}")
+    print(f"rest position at {at} {unit.shown}: {_stability(stable)}")
 
 
 def _held(mechanism: Mechanism) -> str:

@@ -5,7 +5,7 @@ import argparse
 from ..files.mechanism_file import read_mechanism, shipped
 
 
-def listed(options: argparse.Namespace) -> None:
+def print_list(options: argparse.Namespace) -> None:
     """Print name and title of each shipped mechanism."""
     files = shipped()
     width = max(map(len, files))

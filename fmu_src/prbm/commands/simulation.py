@@ -34,7 +34,7 @@ PEAKS_MAX = 6  # Printed peaks per signal.
 SPECTRUM_END = 1.5  # Upper end of a drawn spectrum, in multiples of its highest marked mode.
 
 
-def simulated(options: argparse.Namespace) -> None:
+def run_simulation(options: argparse.Namespace) -> None:
     """Simulate the motion after the release and print a summary."""
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)

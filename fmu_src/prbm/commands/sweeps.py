@@ -9,7 +9,7 @@ from ..files.settings import assigned, quantity
 from ..sweeps.sweep import read_fmu, summary, sweep
 
 
-def swept(options: argparse.Namespace) -> None:
+def run_sweep(options: argparse.Namespace) -> None:
     """Run a sweep and print a summary; results are written during the sweep."""
     found = sweep(
         options.fmu, options.table, options.out, outputs=options.output,

@@ -14,7 +14,7 @@ from .words import measured
 ELEMENTS = 32  # Finite elements per flexure.
 
 
-def validated(options: argparse.Namespace) -> None:
+def print_validation(options: argparse.Namespace) -> None:
     """Reproduce the thesis, or compare the given mechanism with references."""
     if options.mechanism is None:
         _thesis(options)

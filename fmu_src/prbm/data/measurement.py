@@ -31,12 +31,12 @@ from .uncertainty import CORRELATION_FACTOR, Estimate, EvaluationError, Line, li
 STIFFENING = 36 / 35  # Coefficient of (d/l)^2 for a force of constant direction (elastica).
 STIFFENING_MAX = 0.01  # Relative error of the theory of small deflections without a note.
 CYCLE_LOSS_MAX = 0.03  # Share of the work of a cycle that may be lost without a note.
-DEFLECTION_MAX = 1.0  # Of the length of a beam: a larger deflection is a mistake of units.
+DEFLECTION_MAX = 1.0  # Largest deflection over the length of a beam; more is a mistake of units.
 BEAM_LENGTH_MAX = 1.0  # m: the dimensions of a longer beam are likely in mm.
 MODULUS_RANGE = (1e5, 2e12)  # Pa, from gels to diamond and carbon nanotubes.
-TURN_RTOL = 0.2  # Of the range of the deflection: a smaller change of direction is noise.
-DIMENSIONS = ("length", "width", "thickness")  # Of a beam.
-DEFLECTION_RTOL = 1e-12  # Of the deflection: a smaller change is round-off.
+TURN_RTOL = 0.2  # Return of the deflection over its range; a smaller one is noise.
+DIMENSIONS = ("length", "width", "thickness")  # Dimensions of a beam.
+DEFLECTION_RTOL = 1e-12  # Change of the deflection, relative to it; a smaller one is round-off.
 SENSOR_ANGLE_MAX = 85.0  # deg, between the axis of the sensor and the force.
 
 

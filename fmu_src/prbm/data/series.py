@@ -1,4 +1,4 @@
-"""Signals over time, checked: finite, in order, without gaps."""
+"""Signals over time.  A signal is finite, and its times increase without gaps."""
 
 import math
 from dataclasses import dataclass, field
@@ -9,18 +9,18 @@ from numpy.typing import NDArray
 from ..base.errors import PrbmError
 from ..mechanics.arrays import Real
 
-SAMPLES_MIN = 16  # Samples of a signal over time.
-GAP_FACTOR = 1.8  # Of the usual step: a missing sample gives 2, rounding of times at most 1.5.
-LONG_STEP_FACTOR = 3.0  # Of the median step: longer steps are left out of the usual step.
+SAMPLES_MIN = 16  # Fewest samples of a signal.
+GAP_FACTOR = 1.8  # Step over the usual step, from which on a sample is missing.
+LONG_STEP_FACTOR = 3.0  # Step over the median step; longer ones do not count as usual steps.
 
 
 class RecordError(PrbmError, ValueError):
-    """A file of measured data cannot be read, or lacks a column, a unit or samples."""
+    """A record of measured data cannot be read, is incomplete, or is not a valid signal."""
 
 
 @dataclass(frozen=True)
 class Series:
-    """A signal over time, checked: finite, in order, without gaps.
+    """A signal over time.  Its values are finite, and its times increase without gaps.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from scipy import stats
 from ..base.errors import PrbmError
 from ..mechanics.arrays import Real
 
-CORRELATION_FACTOR = 3.0  # Of 1/sqrt(n), the scatter of r without correlation: larger r count.
+CORRELATION_FACTOR = 3.0  # Smallest r that counts, over 1/sqrt(n), its scatter without correlation.
 CONFIDENCE_LEVEL = 0.95  # Default level of confidence.
 POINTS_MIN = 3  # Points of a line with an uncertainty.
 

@@ -24,7 +24,7 @@ PERIODS_MIN = 3.0  # Periods in a record from which a frequency is evaluated.
 EXPLAINED_POWER_MIN = 0.25  # Least share of the signal's power that the fit must explain.
 PEAKS_MIN = 4  # Peaks from which a decrement is evaluated.
 PEAK_NOISE_MIN = 5.0  # Ratio of a peak to the noise: lower peaks are biased, and skipped.
-KINK_FACTOR = 6.0  # Of the usual second difference: larger ones are impacts.
+KINK_FACTOR = 6.0  # Second difference of an impact over the usual one.
 DEVIATION_PER_MAD = 1.4826  # Standard over median absolute deviation of Gaussian noise.
 START_DECAYS = (0.0, 0.3, 1.0, 3.0, 10.0, 30.0)  # Start values of the fit for lambda T.
 

@@ -14,7 +14,7 @@ from ..mechanism.description import Mechanism
 from ..mechanism.parts import value
 from .motion import angles, closed, stretched
 from .shapes import Shapes, corners, curve
-from .style import CHAIN, own_style, png
+from .style import CURVED_PIVOTS_MAX, own_style, png
 
 STEEL, BODY, WALL, GHOST = "#1f4e79", "#9dc3e6", "#595959", "#d0d0d0"
 PIXELS = 256
@@ -62,7 +62,7 @@ def draw(axes: Axes, shapes: Shapes, E: Complex, *, faint: bool = False) -> None
     thin = len(shapes.flexures) >= THIN_LINES_MIN
     for line in shapes.flexures:
         z = corners(line.outline, E)
-        z = z if len(z) - 2 > CHAIN else curve(z, line.guided)
+        z = z if len(z) - 2 > CURVED_PIVOTS_MAX else curve(z, line.guided)
         width = 1.0 if faint else 1.5 if thin else 2.2
         _line(axes, z, GHOST if faint else STEEL, width, 0.0 if faint else 3.0)
     for name in shapes.bodies:

@@ -25,7 +25,8 @@ COHERENT = ("1", "s", "m", "N", "V", "kg", "A", "Hz", "K", "rad", "Pa", "J", "W"
             "N/m", "N.m", "rad/s", "kg.m2", "kg/m3", "V/m", "m/V", "ohm")  # fmt: skip
 KNOWN = "m, in, g, s, min, hr, N, gf, lbf, Nm, Pa, bar, J, W, Hz, V, A, K, degC, rad, deg, % with "
 KNOWN += "SI prefixes, joined as in m/s2 or N.m, and - for dimensionless numbers"
-PLAIN = {"%": "pct", "°C": "degC", "-": "1", "": "1", "1": "1", "none": "1", "S": "s"}
+# Symbols that pint does not read or reads differently.
+SYMBOLS = {"%": "pct", "°C": "degC", "-": "1", "": "1", "1": "1", "none": "1", "S": "s"}
 
 _SUPERSCRIPTS = str.maketrans("¹²³⁴⁻", "1234-")
 
@@ -46,14 +47,14 @@ def _registry() -> Any:
 def _unit(text: str) -> Any:
     """Return pint's unit for a written unit, None if it is unknown."""
     written = text.strip().translate(_SUPERSCRIPTS)
-    written = PLAIN.get(written, written)
+    written = SYMBOLS.get(written, written)
     if written == "1":
         return _registry().parse_units("dimensionless")
     if len(text) > UNIT_LENGTH_MAX or not re.match(r"(1\s*/\s*)?[A-Za-zµμ°Ω]", written):
         return None
     powers = re.sub(r"(?<=[A-Za-zµμ°Ω])\^?(-?[0-9]+)", r"**\1", written)
     product = re.sub(r"\s*[·⋅.]\s*|(?<=[\wµμ°Ω])\s+(?=[A-Za-zµμ°Ω])", "*", powers)
-    lowered = len(product) > 2 and product.isalpha()  # Volts, Ohm
+    lowered = len(product) > 2 and product.isalpha()  # Names are read in lower case: Volts, Ohm.
     words = [product, product.lower()] if lowered else [product]
     units = (parsed_unit(_registry(), word) for word in words)
     return next((unit for unit in units if unit is not None), None)

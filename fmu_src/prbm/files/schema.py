@@ -38,7 +38,7 @@ from ..mechanism.parameters import NAME
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .units import check_coherent, number, quantity, si_unit
 
-NAME_LENGTH_MAX = 100  # characters; names become parts of file names.
+NAME_LENGTH_MAX = 100  # Characters; names become parts of file names.
 MATERIAL = ("youngs_modulus", "density")
 SECTION = ("thickness", "width")
 TEXT, LIST = TAGS = ("<text>", "<list>")  # Tags of the two forms of a point, or of the ends.
@@ -50,7 +50,7 @@ IDENTIFIER = "^[A-Za-z_][A-Za-z0-9_]*$"
 
 @dataclass(frozen=True)
 class Measured:
-    """Type of a quantity: a number in a unit, a number with a unit, or an expression.
+    """Type of a quantity: a plain number, a number with a unit, or an expression.
 
     Parameters
     ----------
@@ -249,7 +249,8 @@ class FlexureTable(Section):
     end: Reference = Field(description="End point, body.point or ground.point")
     ends: EndOrEnds = Field(
         (CLAMP, CLAMP),
-        description="Type of both ends, or a pair for start and end; free needs a clamp",
+        description="Type of both ends, or a pair for start and end; the other end of a free one "
+        "must be a clamp",
     )
 
 
@@ -456,7 +457,7 @@ def _referred(material: MaterialTable, key: str) -> Quantity:
 
 
 def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts.FlexureType:
-    """Return the flexure type of a table; the name of a flexure is that of its own type."""
+    """Return the flexure type of a table; the type of a flexure's own section has its name."""
     for key in ("model", *SECTION):
         if getattr(table, key) is None:
             raise MechanismError(
@@ -479,13 +480,11 @@ def _material(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> d
         return own
     if own:
         raise MechanismError(
-            f"{table.name} has material as well as {' and '.join(own)}: remove either"
+            f"{table.name} has material as well as {' and '.join(own)}: remove one of them"
         )
     if table.material not in materials:
-        raise MechanismError(
-            f"{table.name}.material = {table.material!r} is not defined; materials are "
-            f"{', '.join(materials) or 'none'}"
-        )
+        known = f"materials are {', '.join(materials)}" if materials else "add it to [[materials]]"
+        raise MechanismError(f"{table.name}.material = {table.material!r} is not defined; {known}")
     return materials[table.material]
 
 
@@ -493,7 +492,9 @@ def _flexure(table: FlexureTable) -> parts.Flexure:
     """Return the flexure of a table; without a type, its type has the name of the flexure."""
     own = [key for key in _OWN if key in table.model_fields_set]
     if table.type is not None and own:
-        raise MechanismError(f"{table.name} has type as well as {' and '.join(own)}: remove either")
+        raise MechanismError(
+            f"{table.name} has type as well as {' and '.join(own)}: remove one of them"
+        )
     ends = (table.ends, table.ends) if isinstance(table.ends, str) else table.ends
     kind = table.name if table.type is None else table.type
     return parts.Flexure(table.name, kind, table.start, table.end, ends)
@@ -515,9 +516,10 @@ def _attached(
         points = bodies.get(table.body, {})
         if body != table.body or name not in points:
             name = "release" if isinstance(table, ReleaseTable) else table.name
+            listed = ", ".join(f"{table.body}.{p}" for p in points)
             raise MechanismError(
                 f"{name}.point = {table.point!r} is not a point of the body {table.body}; "
-                f"its points are {', '.join(f'{table.body}.{p}' for p in points) or 'none'}"
+                + (f"its points are {listed}" if points else "define the points of this body")
             )
         given["point"] = points[name]
     return given

@@ -75,15 +75,15 @@ def build(
     compiled = libraries(platforms, progress)
     progress(f"collecting {len(native.variables)} variables and the tables")
     name, source = mechanism.name, f"{mechanism.name}.c"
-    run = experiment(mechanism, changes, engine=PYTHON)
-    heading = Heading(name, mechanism.title, "", LOG_CATEGORIES, run)
+    default = experiment(mechanism, changes, engine=PYTHON)
+    heading = Heading(name, mechanism.title, "", LOG_CATEGORIES, default)
     token = f"{{{uuid.uuid5(NAMESPACE, _digest(mechanism, native, fmi, source, heading))}}}"
     heading = replace(heading, guid=token)
-    table = tables(mechanism, native.variables, token, native.independent, run.step)
+    table = tables(mechanism, native.variables, token, native.independent, default.step)
     contents = {
         "modelDescription.xml": description(fmi, heading, mechanism, native, source),
         f"resources/{FILE}": table,
-        f"resources/{MODEL}": _model(mechanism, native, run.step),
+        f"resources/{MODEL}": _model(mechanism, native, default.step),
         f"sources/{source}": amalgamation(name, mechanism.title, fmi).encode(),
         f"sources/{TABLES}": tables_header(table).encode(),
     }
@@ -92,14 +92,14 @@ def build(
         contents["terminalsAndIcons/terminalsAndIcons.xml"] = terminals(mechanism)
     contents |= dict(_binaries(name, fmi, compiled))
     progress("computing the reference results")
-    results = reference(mechanism, changes, native.variables, run, progress)
+    results = reference(mechanism, changes, native.variables, default, progress)
     contents |= results
     progress("drawing the icon and writing the documentation")
     png = icon(mechanism, start_sample(mechanism, changes))
     contents["model.png" if fmi == 2 else "terminalsAndIcons/icon.png"] = png
     names = sorted(platform.name for platform in compiled)
     contents["documentation/index.html"] = documentation.native_page(
-        mechanism, native, fmi, names, run, bool(results)
+        mechanism, native, fmi, names, default, bool(results)
     ).encode()
     contents |= dict(_licenses(any(platform.system == "windows" for platform in compiled)))
     progress("packing")

@@ -79,7 +79,7 @@ def build(
     ----------
     mechanism : Mechanism
         The mechanism to export.
-    changes : mapping
+    changes : mapping or None
         Start values of parameters and inputs that replace those of the mechanism.
     progress : callable
         Called with a description of each stage of the build.
@@ -100,18 +100,18 @@ def build(
     progress("checking the start")
     listed = interface(mechanism, changes)
     progress(f"collecting {len(listed)} variables and the engine")
-    run = experiment(mechanism, changes, engine=PYTHON)
-    sources = dict(_sources(mechanism, listed, run.step))
+    default = experiment(mechanism, changes, engine=PYTHON)
+    sources = dict(_sources(mechanism, listed, default.step))
     token = f"{mechanism.name}_{_digest(sources | {'': SCRIPT.encode()})[:TOKEN_DIGITS]}"
     progress("drawing the icon and writing the documentation")
     contents = {f"resources/{path}": text for path, text in _named(mechanism, token, sources)}
     contents |= dict(_binaries(mechanism.name))
     contents |= dict(_licenses())
-    heading = Heading(mechanism.name, mechanism.title, "", MechanismSlave.log_categories, run)
+    heading = Heading(mechanism.name, mechanism.title, "", MechanismSlave.log_categories, default)
     anonymous = _digest(sources | {"": model_description(heading, listed)})
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
-    contents["documentation/index.html"] = documentation.page(mechanism, listed, run).encode()
+    contents["documentation/index.html"] = documentation.page(mechanism, listed, default).encode()
     contents["model.png"] = icon(mechanism, start_sample(mechanism, changes))
     progress("packing")
     return zipped(contents)

@@ -88,8 +88,8 @@ class StepSizeController:
 def rounded_step(h: float) -> float:
     """Return a step size rounded to four binary digits.
 
-    Round-off in the errors hence does not change the step sizes, except where it changes the
-    rounding.  Otherwise it would grow: a step size affects the next error.
+    Without rounding, round-off in the errors would grow, because a step size affects the next
+    error.  With it, round-off rarely changes a step size.
 
     Examples
     --------
@@ -199,7 +199,7 @@ def fixed_step(configuration: Configuration, front: Front, k1: Real) -> Step:
 
 
 def check_size(t: float, h: float) -> None:
-    """Reject a step size h at a time t that is too small [s].
+    """Reject a step size h [s] that is too small at a time t [s].
 
     Raises
     ------
@@ -292,9 +292,10 @@ def check_projection(configuration: Configuration, t: float, y: Real, projected:
 def step_error(scales: Scales, h: float, k: Real, y: Real, y1: Real) -> float:
     """Return the error of a step of size h from y to y1 with the stages k, in units of the scales.
 
-    The differences to solutions of orders 5 and 3 fall with h^6 and h^4.  The square of the first
-    over the second falls with h^8, as the error of the solution of order 7 does [3].  On linear
-    oscillations it is 0.4 to 1.8 times that error, up to the limit of stability.
+    The differences to solutions of orders 5 and 3, here fine and coarse, fall with h^6 and h^4.
+    The estimate fine^2/sqrt(fine^2 + coarse^2) falls with h^8, as the error of the solution of
+    order 7 does [3].  On linear oscillations it is 0.35 to 1.8 times that error, up to the limit of
+    stability.
     """
     fine = error_norm(scales, h * (PAIR.error @ k), y, y1)
     coarse = error_norm(scales, h * (PAIR.coarse_error @ k), y, y1)

@@ -75,8 +75,8 @@ def native_interface(
     sample : mapping
         All outputs at the start.
     magnitudes : Magnitudes
-        Of the motion.  The nominal values of states are the nearest powers of ten, as in the C
-        kernel.
+        Magnitudes of the motion.  The nominal values of states are the nearest powers of ten, as
+        in the C kernel.
     independent : sequence of int
         Indices of the independent coordinates, whose values and rates are states.
     time : bool

@@ -443,7 +443,8 @@ def _stop(stop: str, nominal: Scales) -> Iterator[Variable]:
     )  # fmt: skip
     yield _output(
         f"{stop}.point.displacement", "m", "Displacement of the hit point along the direction of "
-        f"the stop; the gap is closed if it equals {stop}.displacement", nominal,
+        f"the stop, from its place at contact with the wall at rest; the gap is closed if it "
+        f"equals {stop}.displacement", nominal,
     )  # fmt: skip
     yield _output(
         f"{stop}.point.velocity", "m/s", "Velocity of the hit point along the direction of the "

@@ -118,14 +118,14 @@ static void complete_rates(const Simulation *sim, Loops *x, double *v) {
 PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem) {
     size_t mark = sim->scratch.used;
     Loops loops = take_loops(sim);
-    bool right = complete_angles(sim, &loops, q);
-    if (right) {
+    bool ok = complete_angles(sim, &loops, q);
+    if (ok) {
         complete_rates(sim, &loops, v);
     }
     sim->scratch.used = mark;
-    return right || (system_of(sim)->r > 0
-                         ? singular_choice(sim, loops.dependent, problem)
-                         : fail(problem, "the states are not finite numbers"));
+    return ok || (system_of(sim)->r > 0
+                      ? singular_choice(sim, loops.dependent, problem)
+                      : fail(problem, "the states are not finite numbers"));
 }
 
 /* Copy the states of model exchange from y = (q, v, dissipated energy, work) to x. */

@@ -329,12 +329,12 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
         return false;
     }
     bool impulses = impulses_changed(sim), drifted = drift(sim, &now.at) > DRIFT_CORRECTED_RTOL;
-    bool right = receive_impulses(sim, problem) &&
-                 (impulses ? settle_moved(sim, problem)
-                           : follow_walls(sim, drifted, sim->state.time - sim->state.point,
-                                          problem));
+    bool ok = receive_impulses(sim, problem) &&
+              (impulses ? settle_moved(sim, problem)
+                        : follow_walls(sim, drifted, sim->state.time - sim->state.point,
+                                       problem));
     forget_outputs(sim);
-    return right;
+    return ok;
 }
 
 static bool too_many_events(const Simulation *sim, const Event *event, Problem *problem) {
@@ -365,9 +365,9 @@ static bool apply_due_events(Simulation *sim, Moment *now, Problem *problem) {
         } else if (event.kind == EVENT_REVERSAL && sliding_ends(sim, &now->at, event.contact)) {
             stop_sliding(sim, event.contact);
         }
-        bool right = apply_event(sim, &event, problem);
+        bool ok = apply_event(sim, &event, problem);
         forget_outputs(sim);
-        if (!right) {
+        if (!ok) {
             return false;
         }
     }
@@ -383,15 +383,15 @@ PRBM bool exchange_event(Simulation *simulation, bool *changed, Problem *problem
     copy(nx, state->states, before);
     keep_backup(sim);
     Moment now;
-    bool right = apply_inputs(sim, problem) && apply_due_events(sim, &now, problem);
-    if (right) {
+    bool ok = apply_inputs(sim, problem) && apply_due_events(sim, &now, problem);
+    if (ok) {
         arm(sim, &now.at);
         accept(sim);
         states_of(sim, state->front, state->states);
         *changed = memcmp(before, state->states, (size_t)nx * sizeof *before) != 0;
     }
     sim->scratch.used = mark;
-    return attempt(sim, right, problem);
+    return attempt(sim, ok, problem);
 }
 
 PRBM bool exchange_pending(Simulation *simulation, bool *pending, Problem *problem) {

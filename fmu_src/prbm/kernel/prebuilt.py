@@ -76,17 +76,18 @@ def prebuilt(name: str, sources: Mapping[str, bytes]) -> bytes | None:
     folder = files(__package__).joinpath(FOLDER)
     try:
         listed: dict[str, Any] = json.loads(folder.joinpath(LIST).read_bytes())
+        compiled, digests = listed["kernel"], dict(listed["libraries"])
     except (FileNotFoundError, NotADirectoryError):
         return None
-    except ValueError:
+    except (ValueError, TypeError, KeyError):
         raise _damaged(LIST) from None
-    if listed.get("kernel") != source_digest(sources):
+    if compiled != source_digest(sources):
         return None
     try:
         content = folder.joinpath(name).read_bytes()
     except OSError:
         raise _damaged(name) from None
-    if hashlib.sha256(content).hexdigest() != listed.get("libraries", {}).get(name):
+    if hashlib.sha256(content).hexdigest() != digests.get(name):
         raise _damaged(name)
     return content
 

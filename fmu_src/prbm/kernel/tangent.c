@@ -478,8 +478,8 @@ static bool mobility_change(const Tangent *t, int i, double *result, Problem *pr
     row_jacobian(&gaps, i, at.e, x);
     zeros(r, x + n);
     saddle(n, r, at.M, at.loops, at.loops, kkt);
-    bool right = solve(size, kkt, x, &sim->scratch, problem);
-    if (right) {
+    bool ok = solve(size, kkt, x, &sim->scratch, problem);
+    if (ok) {
         Tangent u = at_rates(t, x);
         double change = rate_change(&u, &gaps, i) - kinetic_change(&u);
         for (int k = 0; k < r; k++) {
@@ -488,7 +488,7 @@ static bool mobility_change(const Tangent *t, int i, double *result, Problem *pr
         *result = 2.0 * change;
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 static double dissipation_change(const Tangent *t) {
@@ -600,8 +600,8 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
     Tangent t = begin_tangent(sim, &now, du);
     double *dmoment = take(&sim->scratch, (size_t)system_of(sim)->n);
     Complex *dw = take_complex(&sim->scratch, system_of(sim)->n, 1);
-    bool right = tangent_coordinates(&t, dx, problem);
-    if (right) {
+    bool ok = tangent_coordinates(&t, dx, problem);
+    if (ok) {
         load_row_change(&t, dw, dmoment);
         arm_load_change(&t, dw);
         coordinate_load_change(&t, dmoment);
@@ -612,10 +612,10 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
         bend_arms(&t);
         all_changes(&t, dx, dw, dmoment, dvalues);
     }
-    for (int i = 0; right && i < system_of(sim)->s; i++) {
-        right = mobility_change(&t, i, dvalues + stops + PER_STOP * i + STOP_POINT_MOBILITY,
-                                problem);
+    for (int i = 0; ok && i < system_of(sim)->s; i++) {
+        ok = mobility_change(&t, i, dvalues + stops + PER_STOP * i + STOP_POINT_MOBILITY,
+                             problem);
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }

@@ -16,11 +16,11 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
     Simulation *sim = simulation;
     SimulationMode mode = {exchange, exchange ? LOWEST_BOUNCE_RTOL : 0.0};
     keep_backup(sim);
-    bool right = start_motion(sim, start_time, tolerance, mode, problem);
-    if (right && exchange) {
+    bool ok = start_motion(sim, start_time, tolerance, mode, problem);
+    if (ok && exchange) {
         exchange_begin(sim);
     }
-    return attempt(sim, right, problem);
+    return attempt(sim, ok, problem);
 }
 
 /* Compute y and e of the present state. */

@@ -236,7 +236,7 @@ def _unreachable(system: System, displacement: float | None, loaded: bool, done:
     if displacement is None:
         if not system.gravity:
             return (
-                "no static equilibrium was found: the drawn shape is not in equilibrium, or the "
+                "no static equilibrium was found: the straight shape is not in equilibrium, or the "
                 "flexures are too weak to hold it"
             )
         return (

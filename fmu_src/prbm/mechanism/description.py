@@ -275,9 +275,10 @@ class Mechanism:
         known = {c.name for c in self.model(kind).coefficients}
         for name in kind.coefficients:
             if name not in known:
+                listed = f"are {', '.join(sorted(known))}" if known else "cannot be changed"
                 raise MechanismError(
                     f"{kind.name}.{name} is not a coefficient of the {kind.model} model; its "
-                    f"coefficients are {', '.join(sorted(known)) or 'none'}"
+                    f"coefficients {listed}"
                 )
 
     def _check_flexure(self, flexure: Flexure, types: Mapping[str, FlexureType]) -> None:
@@ -353,7 +354,8 @@ class Mechanism:
 
 def _undefined(key: str, name: str, known: Iterable[str]) -> str:
     """Return the message for a key whose value is not the name of a known part."""
-    return f"{key} = {name!r} is not defined; choose one of {', '.join(known) or 'none'}"
+    remedy = f"choose one of {', '.join(known)}" if known else "define it"
+    return f"{key} = {name!r} is not defined; {remedy}"
 
 
 def _check_release(release: Release) -> None:

@@ -1,4 +1,4 @@
-"""Figure of a holding force over the displacement, with equilibria and snap-through."""
+"""Figure of a holding force over the displacement, with rest positions and snap-through."""
 
 import math
 
@@ -21,7 +21,7 @@ def holding_figure(curve: Curve, title: str, turns: bool = False) -> Figure:
 
     With ``turns``, a moment holds the body at rotations.
 
-    Stable equilibria are filled circles, unstable ones are open circles; diamonds mark the
+    Stable rest positions are filled circles, unstable ones are open circles; diamonds mark the
     displacements at which the mechanism snaps through under a force.
     """
     x = np.array([point.displacement for point in curve.points])
@@ -50,18 +50,18 @@ def _frequencies(curve: Curve) -> Real:
 
 
 def _draw_force(axes: Axes, curve: Curve, factor: float, turns: bool) -> None:
-    """Draw the holding force, the equilibria and the points of snap-through."""
+    """Draw the holding force, the rest positions and the points of snap-through."""
     scale, newton = _force_unit(max(abs(point.force) for point in curve.points))
     axes.plot(
         [factor * p.displacement for p in curve.points], [scale * p.force for p in curve.points],
         color=PAST, linewidth=1.4,
     )  # fmt: skip
     axes.axhline(0.0, color="#808080", linewidth=0.8)
-    for stable, label in ((True, "stable equilibrium"), (False, "unstable equilibrium")):
-        equilibria = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
-        if equilibria:
+    for stable, label in ((True, "stable rest position"), (False, "unstable rest position")):
+        rests = [factor * rest.displacement for rest in curve.rests if rest.stable is stable]
+        if rests:
             axes.plot(
-                equilibria, np.zeros(len(equilibria)), "o", color=REST, markersize=7,
+                rests, np.zeros(len(rests)), "o", color=REST, markersize=7,
                 markerfacecolor=REST if stable else "white", label=label,
             )  # fmt: skip
     if curve.snaps:

@@ -16,7 +16,17 @@ from ..base.errors import ParameterError, PrbmError
 from ..base.tolerances import RELEASE_PENETRATION_ATOL
 from ..base.unit_text import frequency_unit, length_unit
 from ..drawing.shapes import Shapes, corners, curve
-from ..drawing.style import BODY, CHAIN, FLEXURE, IMPACT, LINK, PROBE, STRAIGHT, WALL, own_style
+from ..drawing.style import (
+    BODY,
+    CURVED_PIVOTS_MAX,
+    FLEXURE,
+    IMPACT,
+    LINK,
+    PROBE,
+    STRAIGHT,
+    WALL,
+    own_style,
+)
 from ..mechanics.arrays import Complex
 from ..mechanics.assembly import assemble
 from ..mechanics.modal import Modes, modes
@@ -31,11 +41,11 @@ MODE_AMPLITUDE = 0.12  # Largest displacement in the picture of a mode, as a sha
 ARROW_LENGTH = 0.14  # Length of the arrows of forces, as a share of the size.
 MODES_MAX = 12  # Largest number of modes in a picture.
 COLUMNS = 3  # Modes per row.
-THIN_BODY = 0.12  # Bodies of a lower height, as a share of the size, have their names above.
+THIN_BODY = 0.12  # Height over the size below which the name of a body is above it.
 NAME_AT = 0.36  # Position of a name along its flexure, off the middle where flexures may cross.
 START = "#7a3fa0"  # Colour of the released shape.
-MOVED_RTOL = 1e-6  # Of the size: a released shape that differs by less is straight.
-VISIBLE_RTOL = 2e-3  # Of the size: a part that is released by less is drawn once.
+MOVED_RTOL = 1e-6  # Difference over the size below which a released shape is straight.
+VISIBLE_RTOL = 2e-3  # Displacement at release over the size below which a part is drawn once.
 CAPTION_WIDTH = 125  # Characters of a line of the caption.
 NAME, NAME_OFFSET = "#303030", 7.0  # Colour; distance of a flexure from its name [points].
 WIDTH, HEIGHT_MIN, HEIGHT_MAX, FRAME = 7.2, 2.4, 6.4, 0.9  # Sizes of the picture [inch].
@@ -251,7 +261,7 @@ class _Drawing:
         """Draw flexures, bodies and pins."""
         for line in self.shapes.flexures:
             z = corners(line.outline, E)
-            many = len(z) - 2 > CHAIN
+            many = len(z) - 2 > CURVED_PIVOTS_MAX
             self.line(z if many else curve(z, line.guided), FLEXURE, 3.6, 2.0)
             self.line(z, LINK, 0.9, 2.5)
             if pivots:
@@ -297,7 +307,7 @@ class _Drawing:
         shapes, system = self.shapes, self.shapes.system
         for line in shapes.flexures:
             z = corners(line.outline, E)
-            many = len(z) - 2 > CHAIN
+            many = len(z) - 2 > CURVED_PIVOTS_MAX
             if self.apart(z, corners(line.outline, shapes.straight)):
                 self.line(z if many else curve(z, line.guided), START, 1.0, 3.6, "--")
         for name in shapes.bodies:

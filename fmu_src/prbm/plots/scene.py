@@ -18,7 +18,7 @@ from ..base.unit_text import length_unit, time_unit
 from ..drawing.shapes import Shapes, corners, curve
 from ..drawing.style import (
     BODY,
-    CHAIN,
+    CURVED_PIVOTS_MAX,
     FLEXURE,
     FUTURE,
     GRID,
@@ -139,11 +139,11 @@ class Scene:
         self.curves, self.links = {}, {}
         for line in self.shapes.flexures:
             pivots, name = len(line.outline.c) - 2, line.flexure.name
-            if pivots <= CHAIN:
+            if pivots <= CURVED_PIVOTS_MAX:
                 self.curves[name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
             self.links[name] = self._moving_line(
-                LINK, 1.3, zorder=4.0, marker="o", markersize=4.2 if pivots <= CHAIN else 2.0,
-                markerfacecolor="white", markevery=slice(1, -1),
+                LINK, 1.3, zorder=4.0, marker="o", markerfacecolor="white", markevery=slice(1, -1),
+                markersize=4.2 if pivots <= CURVED_PIVOTS_MAX else 2.0,
             )  # fmt: skip
 
     def _set_bodies(self) -> None:

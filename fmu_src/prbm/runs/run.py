@@ -17,9 +17,9 @@ from .inputs import signals
 from .result import Result, structured
 
 Source = Callable[[float], Mapping[str, float]]
-ROWS_MAX = 10_000_000  # More communication points are a mistake in the unit of the step.
+ROWS_MAX = 10_000_000  # Most communication points; a larger number is likely a wrong unit.
 LAST_STEP_RTOL = 1e-9  # A last step below this fraction of a communication step is round-off.
-EARLY_SHARE = 0.2  # Share of the steps that may be taken early, where most impacts are.
+EARLY_SHARE = 0.2  # Share of steps_max that is permitted at the beginning, with most impacts.
 
 
 class SlowSimulationError(SimulationError):
@@ -62,8 +62,8 @@ def simulate(
     progress : callable or None
         Called with the completed fraction, from 0 to 1.
     steps_max : float or None
-        Largest number of integration steps; the simulation ends early if it takes more than a
-        proportional part of them.  None: no limit.
+        Largest number of integration steps; None: no limit.  Until the time t, a proportional
+        part is permitted: t over the duration, or :data:`EARLY_SHARE` if that is more.
     engine : str or None
         ``"kernel"``, the C kernel, or ``"python"``, the specification, which is slower.  None: the
         kernel if it can be compiled.
@@ -86,7 +86,7 @@ def simulate(
     EquilibriumError, SimulationError
         As :func:`prbm.Simulation`.
     SlowSimulationError
-        If the simulation takes more than ``steps_max`` steps.
+        If the simulation takes more integration steps than permitted.
 
     Examples
     --------
@@ -138,9 +138,9 @@ def simulate(
 
 
 def _check_effort(motion: Engine, spacing: float) -> None:
-    """Reject a simulation that needs too many steps for a communication step [s].
+    """Reject a simulation that needs too many integration steps for a communication step.
 
-    The communication step is the given one, or that of the default experiment if it is shorter.
+    The check uses ``spacing`` [s], or the step of the default experiment if that is shorter.
     """
     try:
         motion.check_effort(spacing)
@@ -150,7 +150,7 @@ def _check_effort(motion: Engine, spacing: float) -> None:
 
 
 def _check_steps(motion: Engine, steps_max: float, fraction: float) -> None:
-    """Reject a simulation that takes more than a proportional part of the steps."""
+    """Reject a simulation that takes more steps than are permitted until a fraction of its end."""
     if motion.step_count > steps_max * max(fraction, EARLY_SHARE):
         raise SlowSimulationError(
             f"the simulation takes {motion.step_count} integration steps until t = "

@@ -49,19 +49,19 @@ from .outputs import Output, evaluate
 
 OK, ENDED, FAILED, CRASHED, TIMEOUT = "ok", "ended", "failed", "crashed", "timeout"
 """Status of a run: complete; ended early by the FMU; error; crash of the process; time limit."""
-GOOD = OK, ENDED
+GOOD = OK, ENDED  # Runs with results.
 
-DISCARD, FATAL = 2, 4  # fmi2Status, fmi3Status
-LAST_TIME, TERMINATED = 2, 3  # fmi2StatusKind
+DISCARD, FATAL = 2, 4  # Values of fmi2Status and fmi3Status.
+LAST_TIME, TERMINATED = 2, 3  # Values of fmi2StatusKind.
 C_TYPES_2: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int}
 C_TYPES_3: dict[str, Any] = {
     "Float64": c_double, "Float32": c_float, "Boolean": c_bool,
     "Int8": c_int8, "Int16": c_int16, "Int32": c_int32, "Int64": c_int64,
     "UInt8": c_uint8, "UInt16": c_uint16, "UInt32": c_uint32, "UInt64": c_uint64,
 }  # fmt: skip
-IDLE_MAX = 600.0  # s without a run after which the process ends, in case its parent was killed
-MESSAGES_MAX = 5  # messages of the FMU in the message of a failed run
-LOGGED_MAX = 100  # messages in a run above which logging is switched off for the next runs
+IDLE_MAX = 600.0  # Time without a run after which the process ends [s]: its parent was killed.
+MESSAGES_MAX = 5  # Most messages of the FMU in the message of a failed run.
+LOGGED_MAX = 100  # More messages in a run switch logging off for the next runs.
 
 
 # --- one run ------------------------------------------------------------------------------------
@@ -152,6 +152,7 @@ class Runner:
     def __init__(self, folder: Path, job: Job) -> None:
         self.job, self.messages = job, list[tuple[int, str]]()
         self.description = fmpy.read_model_description(str(folder), validate=False)
+        # Whether the FMU is of FMI 2.0, not 3.0.
         self.two = self.description.fmiVersion.startswith("2")
         variables = self.description.modelVariables
         self.events = not self.two and any(v.type == "Clock" for v in variables)

@@ -20,7 +20,8 @@ from fmpy.model_description import (  # type: ignore[import-untyped]
 
 from .components import CouplingError, Value, check_wire, described, start_value
 
-NAMES3 = {"Real": "Float64", "Integer": "Int32"}  # names of types in FMI 3.0, by those in FMI 2.0
+# Types of FMI 3.0 by their names in FMI 2.0.
+NAMES3 = {"Real": "Float64", "Integer": "Int32"}
 KINDS = ("parameter", "input", "output")
 
 
@@ -88,7 +89,7 @@ def container(
                 instantiationToken=f"{{{uuid5(NAMESPACE_URL, repr((connections, values)))}}}",
                 generationTool="prbm-impact, FMPy",
                 coSimulation=CoSimulation(modelIdentifier="", fixedInternalStepSize=step),
-                modelVariables=[time, *mapped],  # value references count from 0, the time's
+                modelVariables=[time, *mapped],  # FMPy numbers them from 0, the reference of time.
                 defaultExperiment=DefaultExperiment(
                     startTime="0", stopTime=repr(stop_time), stepSize=repr(step)
                 ),

@@ -22,13 +22,13 @@ from ..mechanics.statics import equilibrium
 from ..references.finite_elements import FiniteElements
 from .common import (
     BLUE,
-    CELL,
     COVERAGE_ATOL,
     DRAWS,
+    FORCE_NOISE,
     GREY,
     K_THESIS,
-    LASER,
-    RATE,
+    LASER_NOISE,
+    LASER_RATE,
     RED,
     WEIGHTLESS,
     K,
@@ -37,7 +37,7 @@ from .common import (
     guide,
     legend,
     panels,
-    repeated,
+    peak_frequency,
 )
 from .side_by_side import Drawing, Number, Result
 from .synthetic_records import bent, vibration
@@ -142,12 +142,12 @@ def elements_of_steel(_: Progress) -> Result:
     t = np.linspace(0.0, 1.0, 1001)
     swing = response(guide("PRBDM"), {K: K_THESIS} | FREE_FALL, t)
     elements = FiniteElements(two, FREE_FALL, elements=8).transient(1.0, 5e-4, spectral_radius=0.9)
-    theirs = repeated(elements["time"], elements["shuttle.x"])
+    theirs = peak_frequency(elements["time"], elements["shuttle.x"])
     numbers += [
         Number("f1 measured, ± 0.06 Hz", None, "4.82", float(found[32][1]), within=0.0125),
         Number(
             "1R with K_Θ = 2.5449 released straight, Hz",
-            repeated(t, swing),
+            peak_frequency(t, swing),
             "4.8224",
             theirs,
             within=0.001,
@@ -179,11 +179,13 @@ def figure_5_4(_: Progress) -> Result:
     """Return Young's modulus from a synthetic bending test."""
     stiffness = E * WIDTH * THICKNESS**3 / (4 * LENGTH**3)
     rng = np.random.default_rng(0)
-    d, F = bent(rng, 12000, 10, stiffness, 3e-3, CELL)
+    d, F = bent(rng, 12000, 10, stiffness, 3e-3, FORCE_NOISE)
     found = youngs_modulus(d, F, steel_beam(), window=10)
     hits = 0
     for _draw in range(DRAWS):
-        one = youngs_modulus(*bent(rng, 600, 1, stiffness, 3e-3, CELL), steel_beam(), window=3)
+        one = youngs_modulus(
+            *bent(rng, 600, 1, stiffness, 3e-3, FORCE_NOISE), steel_beam(), window=3
+        )
         hits += abs(one.modulus.value - E) < one.modulus.uncertainty
     numbers = (
         Number("E, GPa", 1e-9 * found.modulus.value, "181.5", 1e-9 * E, "true", 0.01, form=".2f"),
@@ -273,10 +275,10 @@ def figure_5_6(progress: Progress) -> Result:
     """Return the restitution of a 1R fitted to a centred impact of a 2R that stretches."""
     one, axial = guide("PRBDM"), guide("PRBDM2RAxial")
     rng = np.random.default_rng(0)
-    t = np.arange(105) / RATE
+    t = np.arange(105) / LASER_RATE
     x = response(axial, {}, t)
     progress(0.2)
-    series = Series(t, x + LASER * rng.standard_normal(len(t)))
+    series = Series(t, x + LASER_NOISE * rng.standard_normal(len(t)))
     rest = Frequency(Estimate(float(frequencies(axial, {})[0]), 1e-4))
     values = {K: fit(one, [K], rest)[K].value, "release.displacement": -0.018}
     found = fitted_restitution(one, series, values)["stop.restitution"]
@@ -286,7 +288,7 @@ def figure_5_6(progress: Progress) -> Result:
     own = response(one, values, t)
     back = fitted_restitution(
         one,
-        Series(t, own + LASER * rng.standard_normal(len(t))),
+        Series(t, own + LASER_NOISE * rng.standard_normal(len(t))),
         values | {"stop.restitution": 0.5},
     )["stop.restitution"]
     numbers = (

@@ -31,11 +31,14 @@ from .common import (
     guide,
     legend,
     panels,
-    repeated,
+    peak_frequency,
 )
 from .side_by_side import Drawing, Number, Result
 
-OPTIMISED_SPAN, OPTIMISED_STEP = 1.0, 2 / 2**10  # s; half of the span of the thesis, and its step
+OPTIMISED_SPAN, OPTIMISED_STEP = (
+    1.0,
+    2 / 2**10,
+)  # Half of the span, and the step, of the thesis [s].
 UNSTABLE_MISFIT = 1e3  # mm; misfit that is assigned to a run that diverges
 TRIED = (7.889, 8.7614, 12.0)  # K_theta1: published value over gamma, thesis, a larger value
 
@@ -120,11 +123,11 @@ def figure_6_2(progress: Progress) -> Result:
             )
         valley.append((first, float(best.x), float(best.fun)))
         progress((i + 1) / (len(TRIED) + 1))
-    f = repeated(target.t, target.x)
+    f = peak_frequency(target.t, target.x)
     numbers = (
         Number(
             "re-fitted 2R, frequency, Hz",
-            repeated(refitted.t, refitted.x),
+            peak_frequency(refitted.t, refitted.x),
             None,
             f,
             "1R, 2.65",
@@ -132,14 +135,14 @@ def figure_6_2(progress: Progress) -> Result:
         ),
         Number(
             "start of the fit (factor γ, published K_Θ), Hz",
-            repeated(start.t, start.x),
+            peak_frequency(start.t, start.x),
             None,
             f,
             "1R, 2.65",
         ),
         Number(
             "published K_Θ without the factor, Hz",
-            repeated(right.t, right.x),
+            peak_frequency(right.t, right.x),
             None,
             f,
             "1R, 2.65",

@@ -13,7 +13,8 @@ from .side_by_side import Drawing, Number, Result
 from .synthetic_records import bent
 
 NANO = (2400e-6, 400e-6, 100e-6)  # l, b, h of listing A.6 [m]
-NANO_NOISE, NANO_LOSS = 20e-6, 0.1  # noise [N], 0.2 % of the range; share of a cycle's work [-]
+NANO_NOISE = 20e-6  # Noise of the force sensor [N], 0.2 % of its range.
+NANO_LOSS = 0.1  # Share of the work of a cycle that is lost.
 STRUCTURE_2 = (0.63e9, 0.79e9, 0.95e9, 1.11e9)  # Pa, over the printed range
 
 

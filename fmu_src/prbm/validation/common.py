@@ -19,14 +19,15 @@ from ..plots import figures
 from ..references import source_model
 
 K = "flexure.K_theta"
-K_HOWELL, K_THESIS = 2.65, 2.5449  # published; fitted in the thesis
-REFITTED = np.array([8.7614, 4.0104])  # K_theta1 and K_theta2 fitted in the thesis
-LASER, RATE, CELL = 4e-6, 750.0, 1e-3  # noise [m], rate [Hz]; noise [N], 0.2 % of the range
-DRAWS = 200  # number of synthetic records in a test of stated uncertainties
-COVERAGE_ATOL = 3 * math.sqrt(0.683 * 0.317 / DRAWS)  # three standard deviations of a coverage
+K_HOWELL = 2.65  # Published K_theta of the 1R.
+K_THESIS = 2.5449  # K_theta of the 1R fitted in the thesis.
+REFITTED = np.array([8.7614, 4.0104])  # K_theta1 and K_theta2 of the 2R fitted in the thesis.
+LASER_NOISE, LASER_RATE = 4e-6, 750.0  # Noise [m] and sampling rate [Hz] of the laser sensor.
+FORCE_NOISE = 1e-3  # Noise of the force sensor [N], 0.2 % of its range.
+DRAWS = 200  # Number of synthetic records in a test of stated uncertainties
+COVERAGE_ATOL = 3 * math.sqrt(0.683 * 0.317 / DRAWS)  # Three standard deviations of a coverage.
 WEIGHTLESS = {"gravity.x": 0.0}
 BLUE, RED, GREEN, PINK, GREY = "#1f4e79", "#d55e00", "#009e73", "#cc79a7", "#b4bcc6"
-Crossings = tuple[float, float]
 
 
 @cache
@@ -73,18 +74,18 @@ def frequencies(
     return modes(system, equilibrium(system, displacement)).frequency
 
 
-def crossings(t: Real, x: Real) -> Crossings:
+def crossings(t: Real, x: Real) -> tuple[float, float]:
     """Return the mean frequency between rising zeros [Hz] and the maximum of a free vibration."""
     rising, below = [0.0], False
     for i in range(len(x) - 1):
-        below = below or x[i] < -0.1 * x.max()  # Noise is not a swing.
+        below = below or x[i] < -0.1 * x.max()  # Noise does not reach this level.
         if below and x[i + 1] >= 0.0:
             rising.append(float(t[i] - x[i] * (t[i + 1] - t[i]) / (x[i + 1] - x[i])))
             below = False
     return float(1.0 / np.diff(rising).mean()), float(x.max())
 
 
-def repeated(t: Real, x: Real) -> float:
+def peak_frequency(t: Real, x: Real) -> float:
     """Return the frequency between the first and the last maximum of a free vibration [Hz].
 
     Maxima are those of parabolas through three samples.

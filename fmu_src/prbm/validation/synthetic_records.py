@@ -6,7 +6,7 @@ import numpy as np
 
 from ..data.series import Series
 from ..mechanics.arrays import Real
-from .common import LASER, RATE
+from .common import LASER_NOISE, LASER_RATE
 
 
 def bent(
@@ -39,8 +39,8 @@ def bent(
 
 def vibration(rng: np.random.Generator, zeta: float, duration: float, amplitude: float) -> Series:
     """Return a record of a damped sine of 4.82 Hz with the laser's noise."""
-    t = np.arange(round(duration * RATE)) / RATE
+    t = np.arange(round(duration * LASER_RATE)) / LASER_RATE
     omega = 2 * np.pi * 4.82
     turning = omega * math.sqrt(1 - zeta**2)
     x = amplitude * np.exp(-zeta * omega * t) * np.cos(turning * t + rng.uniform(0, 2 * np.pi))
-    return Series(t, x + LASER * rng.standard_normal(len(t)))
+    return Series(t, x + LASER_NOISE * rng.standard_normal(len(t)))

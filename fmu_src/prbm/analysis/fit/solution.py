@@ -237,7 +237,7 @@ def fit(
     """
     several = (targets,) if not isinstance(targets, Sequence) else tuple(targets)
     problem = stated_problem(mechanism, free, several, values or {})
-    report = progress or _unreported
+    report = progress or _no_report
     best = _best_start(problem, several, starts, lambda done: report(START_PROGRESS * done))
     rest = 1.0 - START_PROGRESS
     p, evaluations, converged = problem.minimised(
@@ -248,7 +248,7 @@ def fit(
     return found
 
 
-def _unreported(done: float) -> None:
+def _no_report(done: float) -> None:
     pass
 
 

@@ -23,7 +23,8 @@ class Valley:
     points : (n, k)
         Parameters of the best fits, one row per given value.
     misfit : (n,)
-        Sum of ((model - data)/u)^2 [-], with u = 1 for unknown uncertainties.
+        Sum of ((model - data)/u)^2 [-]; if the uncertainties u are unknown, of (model - data)^2 in
+        the squared unit of the data.
     best : (k,)
         Parameters of the fit with no value given.
     """
@@ -75,7 +76,9 @@ def valley(
     """
     problem = found.problem
     if len(problem.names) < 2:
-        raise EvaluationError("a valley needs two parameters or more")
+        raise EvaluationError(
+            f"a valley of {len(problem.names)} parameter: fit two parameters or more"
+        )
     if along is None:
         along = problem.names[int(np.argmax(np.abs(found.directions[-1])))]
     if along not in problem.names:

@@ -46,7 +46,7 @@ def closed_form(
     """Return the map of (1 + eps)/((1 + y'^2)(1 + m d^2/J)) - 1, with y(x) the path of the body.
 
     The path is that of the centre of mass along the held shapes, with x along the direction of the
-    stop; d is the distance from the centre of mass to the line of the impact in the drawn shape.
+    stop; d is the distance from the centre of mass to the line of the impact in the straight shape.
     Parameters as for :func:`prbm.analysis.impact_map.routes.algebraic`.
 
     Raises

@@ -32,7 +32,7 @@ from ...mechanism.parts import value
 from ...references.finite_elements import FiniteElements, Shape
 from ...runs.engine import simulation
 from ..flexure_models import with_flexures
-from ..touching import impact_shape, touching
+from ..touching import impact_shape, touching_shape
 from .impacts import first_impact, mode_energies
 from .maps import OFFSETS, WALLS, Hit, ImpactMap, MovedStop, map_of, point_counter
 from .responses import fit_response, response
@@ -164,7 +164,7 @@ def by_elements(
             def gap(shape: Shape, h: float = h) -> float:
                 return fe.gap(which.index, shape.q) + h
 
-            shape = touching(fe.equilibrium, gap, h, size, shape)
+            shape = touching_shape(fe.equilibrium, gap, h, size, shape)
             yield _hit(h, offset, fe.modes(shape), fe.gap_row(which.index, shape.q), eps)
             count()
 

@@ -1,4 +1,4 @@
-"""Messages of an instance: to the importer's log and, once each, to the standard error stream."""
+"""Messages of an instance, in the importer's log and on the standard error stream."""
 
 import sys
 from collections.abc import Callable
@@ -19,7 +19,8 @@ class Messages:
     """The messages of one instance.
 
     FMPy ends a simulation at ``fmi2Discard`` without a message, and pythonfmu forwards log messages
-    only if the importer requests logging.  The reason of a rejected step is therefore printed, too.
+    only if the importer requests logging.  Warnings and the reasons of rejected steps are therefore
+    printed, too, each text once.
 
     Parameters
     ----------
@@ -38,30 +39,30 @@ class Messages:
 
     def event(self, sentence: str) -> None:
         """Log an event."""
-        self._logged(sentence, Fmi2Status.ok, EVENTS)
+        self._log_text(sentence, Fmi2Status.ok, EVENTS)
 
     def warning(self, sentence: str) -> None:
         """Log and print a warning, unless it has been printed before."""
         if sentence not in self.printed:
-            self._logged(sentence, Fmi2Status.warning)
+            self._log_text(sentence, Fmi2Status.warning)
             self._print(sentence)
 
     def error(self, sentence: str) -> None:
-        """Log an error."""
-        self._logged(sentence, Fmi2Status.error)
+        """Log an error; it is not printed."""
+        self._log_text(sentence, Fmi2Status.error)
 
     def discard(self, sentence: str) -> None:
         """Log the reason of a rejected step, and print it once."""
-        self._logged(sentence, Fmi2Status.discard)
+        self._log_text(sentence, Fmi2Status.discard)
         self._print(sentence)
 
     def error_once(self, sentence: str) -> None:
-        """Log and print an error without further effect, unless it has been printed before."""
+        """Log and print an error, unless it has been printed before; the simulation continues."""
         if sentence not in self.printed:
             self.error(sentence)
             self._print(sentence)
 
-    def _logged(self, sentence: str, status: Fmi2Status, category: str | None = None) -> None:
+    def _log_text(self, sentence: str, status: Fmi2Status, category: str | None = None) -> None:
         log = self._log()
         if log is not None:
             log(sentence, status, category)

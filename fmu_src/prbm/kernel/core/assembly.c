@@ -235,17 +235,17 @@ static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Pro
 
 static bool walk_all(System *system, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
-    bool right = true;
+    bool ok = true;
     system->r = 0;
-    for (int i = 0; right && i < m->flexure_count + m->joint_count; i++) {
+    for (int i = 0; ok && i < m->flexure_count + m->joint_count; i++) {
         size_t mark = scratch->used;
         const Step *step = &m->steps[i];
-        right = step->flexure ? walk_flexure(system, step, scratch, problem)
-                              : walk_joint(system, step, scratch, problem);
+        ok = step->flexure ? walk_flexure(system, step, scratch, problem)
+                           : walk_joint(system, step, scratch, problem);
         scratch->used = mark;
     }
     system->r = m->loop_count;
-    return right;
+    return ok;
 }
 
 /* Set the frame of a point of a body, given by its drawn position. */
@@ -577,9 +577,9 @@ static bool stubs(System *system, Scratch *scratch, Problem *problem) {
         for (int k = 0; k < pivots; k++) {
             gamma[k] = evaluate(m->types[i].gamma[k], system->values);
         }
-        bool right = stub(pivots, gamma, &gamma0, problem);
+        bool ok = stub(pivots, gamma, &gamma0, problem);
         scratch->used = mark;
-        if (!right) {
+        if (!ok) {
             return false;
         }
         system->calculated[count++] = gamma0;
@@ -628,12 +628,12 @@ PRBM bool assemble(System *system, const double *values, Scratch *scratch, Probl
     system->gravity = complex_of(values[m->gravity[0]], values[m->gravity[1]]);
     clear(system);
     system->length = size_of(system, scratch);
-    bool right = stubs(system, scratch, problem) && walk_all(system, scratch, problem);
-    if (right) {
+    bool ok = stubs(system, scratch, problem) && walk_all(system, scratch, problem);
+    if (ok) {
         add_arrays(system, scratch);
-        right = check_loops(system, system->e0, scratch, problem) &&
-                check_masses(system, system->e0, scratch, problem);
+        ok = check_loops(system, system->e0, scratch, problem) &&
+             check_masses(system, system->e0, scratch, problem);
     }
     scratch->used = mark;
-    return right;
+    return ok;
 }

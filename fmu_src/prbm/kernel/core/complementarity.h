@@ -16,10 +16,10 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *
                   const double *fixed, const int *normal, double tolerance, double *P,
                   Scratch *scratch);
 /* Compute impulses P (k + m,) of an impact by the laws of coulomb.  Tangent j belongs to normal j;
- * m is k, or 0 without friction.  Normal impulses are at least least (k,). */
+ * m is k, or 0 without friction.  The normal impulses have the lower bounds least (k,). */
 PRBM bool impulses(int k, int m, const double *W, const double *u, const double *friction,
                    const double *least, double tolerance, double *P, Scratch *scratch);
-/* The largest violation of the laws, as a rate; limit (m,) of the tangential forces. */
+/* Return the largest violation of the laws, as a rate; limit (m,) are the friction limits. */
 PRBM double violation(int k, int m, const double *W, const double *u, const double *P,
                       const double *limit);
 

@@ -166,10 +166,10 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
     double *M = take(scratch, n * n), *C = take(scratch, n * n);
     double *kkt = take(scratch, size * size), *right = take(scratch, size);
     double best = INFINITY;
-    bool right_way = true, closed = false;
+    bool ok = true, closed = false;
     Rows now = *rows;
     now.c = c;
-    for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && right_way && !closed; step++) {
+    for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && ok && !closed; step++) {
         directions(system, q, e);
         scalars(&now, e, s);
         double error = largest(rows->count, s), length = system->length;
@@ -184,20 +184,20 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
             for (size_t k = 0; k < r; k++) {
                 right[n + k] = -s[k];
             }
-            right_way = solve((int)size, kkt, right, scratch, problem);
-            for (size_t i = 0; right_way && i < n; i++) {
+            ok = solve((int)size, kkt, right, scratch, problem);
+            for (size_t i = 0; ok && i < n; i++) {
                 q[i] += right[i];
             }
         }
     }
     scratch->used = mark;
-    if (right_way && !closed) {
+    if (ok && !closed) {
         return fail(problem,
                     "the loops of the mechanism cannot be closed in this shape: a distance of "
                     "%.3g m between parts that are connected remains",
                     best);
     }
-    return right_way;
+    return ok;
 }
 
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,

@@ -11,8 +11,8 @@ typedef struct {
     int count;
     const Complex *B;       /* (count, n) */
     const double *c;        /* (count,) */
-    const Complex *z;       /* (count,) */
-    const int *on;          /* (count,) coordinates of the bodies; FIXED: f = 1; NULL: all FIXED */
+    const Complex *z;       /* (count,), or NULL if on is NULL */
+    const int *on;          /* (count,) angles of the bodies, FIXED for the ground; NULL: all FIXED */
 } Rows;
 
 /* The message for equations without a unique solution. */
@@ -30,6 +30,7 @@ PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row);
 PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v);
 PRBM void scalars(const Rows *rows, const Complex *e, double *s);
 PRBM void jacobian(const Rows *rows, const Complex *e, double *result); /* (count, n) */
+/* Set kkt (n + r, n + r) to [[M, columns^T], [rows, 0]]. */
 PRBM void saddle(int n, int r, const double *M, const double *columns, const double *rows,
                  double *kkt);
 /* Solve a saddle-point system by LU; right (n + r,) is replaced by the solution. */
@@ -37,8 +38,9 @@ PRBM bool solve(int size, double *kkt, double *right, Scratch *scratch, Problem 
 /* Project q (n,) onto the rows with the constants c (count,), and set e to the directions of q. */
 PRBM bool project_positions(const System *system, const Rows *rows, double *q, const double *c,
                             Complex *e, Scratch *scratch, Problem *problem);
-/* v (n,) moves onto rows v + rates = 0 by impulses along the rows.  The impulses (r,), unless NULL,
- * are given as the mobilities by which they change the rates. */
+/* Move v (n,) onto rows v + rates = 0 by impulses along the rows.  The array impulses (r,) may be
+ * NULL.  On entry it has the mobilities [1/kg] of the walls: an impulse P changes the rate of its
+ * row by mobility times P.  On return it has the impulses [N s]. */
 PRBM bool project_velocities(int n, int r, const double *M, const double *rows,
                              const double *rates, double *v, double *impulses, Scratch *scratch,
                              Problem *problem);

@@ -158,7 +158,7 @@ typedef struct {
     const int *independent; /* Coordinates that are states of model exchange. */
     Release release;
     int gravity[2], tolerance, damping_zeta, damping_beta; /* Indices of parameters. */
-    double default_step; /* Of the default experiment [s]; 0: not known. */
+    double default_step; /* Step of the default experiment [s]; 0: unknown. */
     /* Sizes of the assembled system. */
     int coordinate_count, loop_count, link_count, stretch_count, mass_count, spring_count;
     int longest; /* Largest number of links of a flexure. */

@@ -116,8 +116,7 @@ SIZED void small_turn(Lanes d, Lanes *s, Lanes *c_less_1) {
     *c_less_1 = z * even;
 }
 
-/* Compute e = exp(i q) = e_start exp(i (q - start)) from e_start = exp(i start); return false
- * unless all angles are near their start. */
+/* The directions are e = e_start exp(i (q - start)). */
 SHARED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
                               Parts parts, Complex *e) {
     LaneBits near = ~(bits_of(lanes_at(q)) & 0);

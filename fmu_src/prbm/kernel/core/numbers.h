@@ -23,7 +23,7 @@ PRBM bool finite_number(double x);
 PRBM double largest(int n, const double *x);                /* max |x_i|; 0 if n = 0 */
 PRBM double greater(double a, double b); /* b unless a > b. */
 PRBM double lesser(double a, double b);  /* b unless a < b. */
-PRBM Complex unit(double degrees);
+PRBM Complex unit(double degrees);       /* exp(i angle) */
 PRBM Complex complex_of(double re, double im);
 PRBM Complex plus(Complex a, Complex b);
 PRBM Complex minus(Complex a, Complex b);
@@ -31,6 +31,8 @@ PRBM Complex product(Complex a, Complex b);
 PRBM Complex conjugate(Complex a);
 PRBM Complex scaled(double x, Complex a);
 PRBM double modulus(Complex a);
+/* Compute e = exp(i q) from e_start = exp(i start); return false unless all angles are near their
+ * start. */
 SHARED bool turned_directions(int even, const double *q, const double *start, Parts e_start,
                               Parts parts, Complex *e);
 

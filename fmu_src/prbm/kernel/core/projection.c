@@ -39,15 +39,15 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
     }
     Rows positions = q->active;
     positions.count = q->first_stick;
-    bool right = project_positions(q->system, &positions, y, c, e, scratch, problem);
-    if (right) {
+    bool ok = project_positions(q->system, &positions, y, c, e, scratch, problem);
+    if (ok) {
         jacobian(&q->active, e, rows);
         inertia((int)n, q->system->H, q->system->J, e, M, C);
-        right = project_velocities((int)n, q->r, M, rows, rates, y + n, impulses, scratch,
-                                   problem);
+        ok = project_velocities((int)n, q->r, M, rows, rates, y + n, impulses, scratch,
+                                problem);
     }
     scratch->used = mark;
-    return right;
+    return ok;
 }
 
 PRBM bool project(const Equations *equations, double t, double *y, Scratch *scratch,

@@ -5,13 +5,15 @@
 #include "core/memory.h"
 
 typedef struct {
-    const unsigned char *at;
-    size_t left;
+    const unsigned char *at; /* the next byte */
+    size_t left;             /* bytes that are left */
     const char *wrong; /* the first defect of the tables, or NULL */
     Memory memory;
-    size_t room;
+    size_t room; /* bytes of the memory */
 } Reader;
+/* Return memory of the mechanism for count items of a size, or NULL if there is too little. */
 PRBM void *kept(Reader *reader, size_t count, size_t size);
+/* At a defect, each function sets reader->wrong and returns the smallest value or an empty text. */
 PRBM uint32_t read_u32(Reader *reader);
 PRBM double read_bound(Reader *reader);
 PRBM double read_finite(Reader *reader);

@@ -221,7 +221,7 @@ static bool unreachable(const System *system, bool held, double displacement, do
                     heavy ? "no static equilibrium under gravity was found: the flexures are too "
                             "weak for this load; reduce gravity or the masses, or stiffen the "
                             "flexures"
-                          : "no static equilibrium was found: the drawn shape is not in "
+                          : "no static equilibrium was found: the straight shape is not in "
                             "equilibrium, or the flexures are too weak to hold it");
     }
     const char *name = turns(system) ? "angle" : "displacement";
@@ -282,11 +282,11 @@ static bool releasable(const System *system, const double *M, int r, const doubl
     int n = system->n;
     const double *row = rows + (r - 1) * n;
     double *left = take(scratch, (size_t)n), *free = take(scratch, (size_t)n);
-    bool right = response(n, r - 1, 1, M, rows, row, left, scratch, problem) &&
-                 response(n, 0, 1, M, rows, row, free, scratch, problem);
-    double share = right ? dot(n, row, left) / dot(n, row, free) : 0.0;
+    bool ok = response(n, r - 1, 1, M, rows, row, left, scratch, problem) &&
+              response(n, 0, 1, M, rows, row, free, scratch, problem);
+    double share = ok ? dot(n, row, left) / dot(n, row, free) : 0.0;
     scratch->used = used;
-    if (right && !(share > RELEASE_MOBILITY_RTOL)) {
+    if (ok && !(share > RELEASE_MOBILITY_RTOL)) {
         const Mechanism *m = system->mechanism;
         return fail(problem,
                     "release.velocity = %g m/s: the body %s cannot move along the direction of the "
@@ -294,7 +294,7 @@ static bool releasable(const System *system, const double *M, int r, const doubl
                     "(axial = true)",
                     speed, m->bodies[m->release.body - 1].name);
     }
-    return right;
+    return ok;
 }
 
 PRBM bool release_velocity(const System *system, const double *q, double speed, double *v,

@@ -83,7 +83,6 @@ PRBM int arm_of(const System *system, int j) {
     return system->mechanism->coordinates[j].arm;
 }
 
-/* Replace the unit vectors e by the arms, and by -i times the arms for stretches. */
 PRBM void stretch(const System *system, const double *q, Complex *e) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);

@@ -4,7 +4,8 @@
 
 #include "core/mechanism.h"
 
-enum { NOWHERE = -2, FIXED = -1 }; /* In place of a coordinate: body without a place yet, ground */
+/* Values in place of the coordinate of a body: not yet placed by the assembly, or the ground. */
+enum { NOWHERE = -2, FIXED = -1 };
 
 /* A point of a body, z = c + A E, with the coordinate of the body and the drawn position. */
 typedef struct {
@@ -76,6 +77,7 @@ typedef struct {
 } System;
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory);
+/* Return the index of the arm that the coordinate j turns or stretches. */
 PRBM int arm_of(const System *system, int j);
 /* Compute e (n,): the arms exp(s + i theta), and -i times the arm for stretches. */
 PRBM void directions(const System *system, const double *q, Complex *e);
@@ -86,6 +88,7 @@ PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e,
                  Complex *displacement, Complex *velocity);
 /* Copy B (r, n) to rows, and repeat the column of each arm for its stretch.  rows may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
+/* Replace the unit vectors e (n,) by the directions of the coordinates. */
 PRBM void stretch(const System *system, const double *q, Complex *e);
 
 #endif

@@ -34,10 +34,10 @@ PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *eva
     size_t mark = sim->scratch.used;
     double *interpolated = take(&sim->scratch, (size_t)state_size(sim));
     copy(state_size(sim), y, interpolated);
-    bool right = factor_equations(&sim->equations, y, y + system->n, near, evaluation, problem) &&
-                 project_near(&sim->equations, evaluation, near, state->time, y, &sim->correction,
-                              &sim->scratch, problem) &&
-                 check_projection(sim, state->time, interpolated, y, problem);
+    bool ok = factor_equations(&sim->equations, y, y + system->n, near, evaluation, problem) &&
+              project_near(&sim->equations, evaluation, near, state->time, y, &sim->correction,
+                           &sim->scratch, problem) &&
+              check_projection(sim, state->time, interpolated, y, problem);
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }

@@ -84,9 +84,9 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
     double *row = take(&sim->scratch, (size_t)system_of(sim)->n);
     double zero = zero_acceleration(&sim->configuration);
     Complex *e = directions_at(sim, q);
-    bool right = evaluate_equations(equations, sim->state.front_time, q, v, NULL,
-                                    &sim->trial.evaluation, problem);
-    *result = right;
+    bool ok = evaluate_equations(equations, sim->state.front_time, q, v, NULL,
+                                 &sim->trial.evaluation, problem);
+    *result = ok;
     for (int k = 0; *result && k < touching->count; k++) {
         int i = touching->stops[k];
         *result = sim->trial.contacts.modes[i] != CONTACT_OPEN
@@ -98,7 +98,7 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
         *result = obeys_coulomb(sim, rest->contacts[j], zero / found->mobility[j], e, v, row);
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* --- stops ------------------------------------------------------------------------------------ */
@@ -178,11 +178,11 @@ static bool is_mobile(Simulation *sim, int contact, const ContactMode *modes, bo
     tangential_row(system, contact, at.e, row);
     double *held = take_matrix(&sim->scratch, q->r, system->n);
     jacobian(&q->active, at.e, held);
-    bool right = mobility(sim, &at, q->r, held, row, &left, problem) &&
-                 mobility(sim, &at, system->r, at.loops, row, &own, problem);
+    bool ok = mobility(sim, &at, q->r, held, row, &left, problem) &&
+              mobility(sim, &at, system->r, at.loops, row, &own, problem);
     *result = left > DEPENDENT_FRICTION_RTOL * own;
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* Return the slip mode of a contact.  Return CONTACT_FRICTIONLESS if its speed is zero within the
@@ -225,20 +225,20 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
                           const FrictionEvent *event, ContactMode *modes, Problem *problem) {
     enum { BELOW_LIMIT, NO_FRICTION, AT_LIMIT };
     double zero = zero_acceleration(&sim->configuration);
-    bool right = true;
+    bool ok = true;
     for (int turn = BELOW_LIMIT; turn <= AT_LIMIT; turn++) {
-        for (int j = 0; right && j < rest->count; j++) {
+        for (int j = 0; ok && j < rest->count; j++) {
             int contact = rest->contacts[j];
             double slack = zero / found->mobility[j], size = fabs(found->friction[j]);
             bool at_limit = size >= found->limit[j] - slack;
             int order = at_limit ? AT_LIMIT : size <= slack ? NO_FRICTION : BELOW_LIMIT;
             if (order == turn && modes[contact] != CONTACT_OPEN) {
                 bool slipped = event->slips && event->contact == contact;
-                right = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, problem);
+                ok = mode_of_forces(sim, found, j, contact, at_limit, slipped, modes, problem);
             }
         }
     }
-    return right;
+    return ok;
 }
 
 /* Collect the given stops, and the contacts with friction at rest.  Contacts that cannot move
@@ -247,9 +247,9 @@ static bool stick_or_slip(Simulation *sim, const RestContacts *rest, const RestF
 static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEvent *event,
                       const ContactMode *modes, RestContacts *rest,
                       ContactMode *sliding, Problem *problem) {
-    bool right = true, mobile = false;
+    bool ok = true, mobile = false;
     rest->stop_count = rest->count = 0;
-    for (int contact = 0; right && contact < contact_count(sim); contact++) {
+    for (int contact = 0; ok && contact < contact_count(sim); contact++) {
         bool stop = is_stop(system_of(sim), contact);
         sliding[contact] = CONTACT_FRICTIONLESS;
         if (stop && !has_contact(stops->count, stops->stops, contact)) {
@@ -263,12 +263,12 @@ static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEv
             rest->slips[rest->stop_count++] = slip_sign(sliding[contact]);
         }
         if (friction_of(sim, contact) > 0.0 && sliding[contact] == CONTACT_FRICTIONLESS) {
-            right = is_mobile(sim, contact, modes, &mobile, problem);
+            ok = is_mobile(sim, contact, modes, &mobile, problem);
             rest->contacts[rest->count] = contact;
-            rest->count += right && mobile;
+            rest->count += ok && mobile;
         }
     }
-    return right;
+    return ok;
 }
 
 static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Problem *problem) {

@@ -60,7 +60,7 @@ static bool find_events(Simulation *sim, EventKind kind, Event *first, Problem *
 
 PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {
     const Event none = {EVENT_NONE, 0, 0.0};
-    bool near[EVENT_KINDS], samples = false, right = true;
+    bool near[EVENT_KINDS], samples = false, ok = true;
     *first = none;
     for (EventKind kind = EVENT_NONE + 1; kind < EVENT_KINDS; kind++) {
         near[kind] = transition(kind)->near(sim);
@@ -69,10 +69,10 @@ PRBM bool first_event(Simulation *sim, Event *first, Problem *problem) {
     if (samples) {
         sample_arc(sim);
     }
-    for (EventKind kind = EVENT_NONE + 1; right && kind < EVENT_KINDS; kind++) {
-        right = !near[kind] || find_events(sim, kind, first, problem);
+    for (EventKind kind = EVENT_NONE + 1; ok && kind < EVENT_KINDS; kind++) {
+        ok = !near[kind] || find_events(sim, kind, first, problem);
     }
-    return right;
+    return ok;
 }
 
 /* --- applying events -------------------------------------------------------------------------- */

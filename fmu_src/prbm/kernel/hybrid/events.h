@@ -4,6 +4,7 @@
 
 #include "hybrid/guards.h"
 
+/* Detect and Reset return false on failure, with the reason in *problem. */
 typedef bool Watched(const Equations *equations, int contact);
 typedef bool Near(Simulation *sim);
 typedef bool Detect(Simulation *sim, const Guard *guard, int contact, Fall *fall,
@@ -16,7 +17,7 @@ typedef struct {
     Watched *watched; /* whether the event may occur at a contact */
     Near *near;       /* whether the event may occur in the latest step */
     bool samples;     /* whether detect needs sample_arc */
-    Detect *detect;
+    Detect *detect;   /* finds the fall of the guard of a contact in the latest step */
     Reset *reset;     /* the change of state at the event */
 } Transition;
 
@@ -24,6 +25,7 @@ typedef struct {
 PRBM const Transition *transition(EventKind kind);
 /* Find the first event within the latest step; its kind is EVENT_NONE if there is no event. */
 PRBM bool first_event(Simulation *sim, Event *first, Problem *problem);
+/* Count an event and apply its reset.  It fails if events follow each other without end. */
 PRBM bool apply_event(Simulation *sim, const Event *event, Problem *problem);
 
 #endif

@@ -30,10 +30,10 @@ PRBM bool mobility(Simulation *sim, const Inertia *at, int r, const double *held
     size_t mark = sim->scratch.used;
     int n = system_of(sim)->n;
     double *X = take(&sim->scratch, (size_t)n);
-    bool right = response(n, r, 1, at->M, held, row, X, &sim->scratch, problem);
-    *result = right ? dot(n, row, X) : 0.0;
+    bool ok = response(n, r, 1, at->M, held, row, X, &sim->scratch, problem);
+    *result = ok ? dot(n, row, X) : 0.0;
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* The inverse mass in contact space, W = rows X (k, k), of rows (k, n) and their response X. */
@@ -142,10 +142,10 @@ static bool reaction_impulses(Simulation *sim, const Approach *approach, const d
             columns[j * r + a] = rows[a * n + j];
         }
     }
-    bool right = r == 0 || least_squares(n, r, columns, left, REACTION_RANK_RTOL, reaction,
-                                         &sim->scratch, problem);
+    bool ok = r == 0 || least_squares(n, r, columns, left, REACTION_RANK_RTOL, reaction,
+                                      &sim->scratch, problem);
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* Set the normal and tangential rows GT (2 k, n) of the stops struck, their rates before the
@@ -239,15 +239,15 @@ static bool impulses_with_friction(Simulation *sim, const Approach *approach, Hi
 /* Repeat impulses_with_friction until no kept stop would pull. */
 static bool rounds_with_friction(Simulation *sim, const Approach *approach, Hits *hits,
                                  int *kept_count, int *kept, Problem *problem) {
-    bool pulling = true, right = true;
+    bool pulling = true, ok = true;
     *kept_count = hits->held_count;
     memcpy(kept, hits->held, (size_t)hits->held_count * sizeof(int));
-    while (right && pulling) {
+    while (ok && pulling) {
         size_t mark = sim->scratch.used;
-        right = impulses_with_friction(sim, approach, hits, kept_count, kept, &pulling, problem);
+        ok = impulses_with_friction(sim, approach, hits, kept_count, kept, &pulling, problem);
         sim->scratch.used = mark;
     }
-    return right;
+    return ok;
 }
 
 /* Compute impulses with friction.  If a held stop that was removed would close, all held stops are
@@ -279,10 +279,10 @@ static bool with_released_stops(Simulation *sim, Approach *approach, Hits *hits,
     }
     hits->struck_count = k + held_count;
     hits->held_count = 0;
-    bool right = rounds_with_friction(sim, approach, hits, &kept_count, kept, problem);
+    bool ok = rounds_with_friction(sim, approach, hits, &kept_count, kept, problem);
     hits->struck_count = k;
     hits->held_count = held_count;
-    return right;
+    return ok;
 }
 
 /* Name the stops that take part in an impact that has no solution. */
@@ -318,10 +318,10 @@ static bool impact_impulses(Simulation *sim, const double *q, const double *v, H
         approach.friction[a] = field_value(sim, stop->friction);
         rough = rough || approach.friction[a] != 0.0;
     }
-    bool right = rough ? with_released_stops(sim, &approach, hits, problem)
-                       : impulses_without_friction(sim, &approach, hits, problem);
+    bool ok = rough ? with_released_stops(sim, &approach, hits, problem)
+                    : impulses_without_friction(sim, &approach, hits, problem);
     sim->scratch.used = mark;
-    return right || name_partners(sim, hits, problem);
+    return ok || name_partners(sim, hits, problem);
 }
 
 /* --- captures --------------------------------------------------------------------------------- */
@@ -374,19 +374,19 @@ static bool captured(Simulation *sim, int stop, const Hits *hits, const double *
     candidates[0] = stop;
     memcpy(candidates + 1, hits->held, (size_t)hits->held_count * sizeof(int));
     bool rests = false;
-    bool right = impact_impulses(sim, q, v, &soft, problem) &&
-                 find_holding_stops(sim, 1 + hits->held_count, candidates, q, soft.after,
-                                    &resting, problem);
-    for (int k = 0; right && resting.found && k < resting.count; k++) {
+    bool ok = impact_impulses(sim, q, v, &soft, problem) &&
+              find_holding_stops(sim, 1 + hits->held_count, candidates, q, soft.after,
+                                 &resting, problem);
+    for (int k = 0; ok && resting.found && k < resting.count; k++) {
         rests = rests || resting.stops[k] == stop;
     }
-    if (right && rests) {
+    if (ok && rests) {
         *result = speed < field_value(sim, sim->configuration.mechanism->stops[stop].rest_speed);
-        right = *result || bounce_vanishes(sim, stop, &resting, q, soft.after, speed, result,
-                                           problem);
+        ok = *result || bounce_vanishes(sim, stop, &resting, q, soft.after, speed, result,
+                                        problem);
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* --- bookkeeping ------------------------------------------------------------------------------ */
@@ -458,11 +458,11 @@ static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *acco
     for (int i = 0; i < system->s; i++) {
         any = any || counted[i];
     }
-    bool right = !any || fundamental_at(system, q, phi, M, &sim->scratch, problem);
-    if (any && right) {
+    bool ok = !any || fundamental_at(system, q, phi, M, &sim->scratch, problem);
+    if (any && ok) {
         modal = simulated_restitution(n, phi, M, v, hits->after);
     }
-    for (int i = 0; right && i < system->s; i++) {
+    for (int i = 0; ok && i < system->s; i++) {
         if (counted[i]) {
             Latched *latched = &sim->state.latched[i];
             latched->count += latched->count < IMPACT_COUNT_MAX;
@@ -476,7 +476,7 @@ static bool latch_impacts(Simulation *sim, const Hits *hits, const Account *acco
         }
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* --- impacts ---------------------------------------------------------------------------------- */
@@ -505,19 +505,19 @@ static void find_partners(Simulation *sim, int hit, const double *q, const doubl
 static bool choose_restitutions(Simulation *sim, const double *q, const double *v,
                                 const double *rates, Hits *hits, bool *counted,
                                 Problem *problem) {
-    bool right = true;
+    bool ok = true;
     for (int i = 0; i < system_of(sim)->s; i++) {
         counted[i] = false;
     }
-    for (int k = 0; right && k < hits->struck_count; k++) {
+    for (int k = 0; ok && k < hits->struck_count; k++) {
         int i = hits->struck[k];
         const Stop *stop = &sim->configuration.mechanism->stops[i];
         bool soft = false;
-        right = captured(sim, i, hits, q, v, -rates[i], &soft, problem);
+        ok = captured(sim, i, hits, q, v, -rates[i], &soft, problem);
         counted[i] = !soft;
         hits->restitution[k] = soft ? 0.0 : field_value(sim, stop->restitution);
     }
-    return right;
+    return ok;
 }
 
 /* Open all stops.  List those that took part and do not separate; return their number. */
@@ -558,17 +558,17 @@ PRBM bool impact(Simulation *sim, int hit, Problem *problem) {
         return settle(sim, &hit, fabs(rates[hit]) <= zero_speed(&sim->configuration), NULL,
                       problem);
     }
-    bool right = choose_restitutions(sim, q, v, rates, &hits, counted, problem) &&
-                 impact_impulses(sim, q, v, &hits, problem);
-    if (right) {
+    bool ok = choose_restitutions(sim, q, v, rates, &hits, counted, problem) &&
+              impact_impulses(sim, q, v, &hits, problem);
+    if (ok) {
         book_energies(sim, &hits, q, v, &account);
-        right = latch_impacts(sim, &hits, &account, counted, q, v, problem);
+        ok = latch_impacts(sim, &hits, &account, counted, q, v, problem);
     }
-    if (right) {
+    if (ok) {
         touching_count = open_all(sim, &hits, touching);
     }
     sim->scratch.used = mark;
-    return right && settle(sim, touching, touching_count, NULL, problem);
+    return ok && settle(sim, touching, touching_count, NULL, problem);
 }
 
 /* --- impulses of the inputs ------------------------------------------------------------------- */
@@ -602,8 +602,8 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
     double *after = take(&sim->scratch, (size_t)n);
     Inertia at = inertia_at(sim, front);
     load_rows(system, &system->pushed[i], at.e, rows, &sim->scratch);
-    bool right = response(n, system->r, LOADS, at.M, at.loops, rows, X, &sim->scratch, problem);
-    if (right) {
+    bool ok = response(n, system->r, LOADS, at.M, at.loops, rows, X, &sim->scratch, problem);
+    if (ok) {
         add_impulses(LOADS, n, v, X, P, after);
         for (int k = 0; k < LOADS; k++) {
             front[2 * n + 1] += P[k] * (dot(n, rows + k * n, v) + dot(n, rows + k * n, after)) / 2;
@@ -611,7 +611,7 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
         copy(n, after, v);
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* Apply the changes of the impulses since they were last received.  The loops transmit them;
@@ -620,18 +620,18 @@ static bool apply_impulses(Simulation *sim, int i, const double *P, Problem *pro
 PRBM bool receive_impulses(Simulation *sim, Problem *problem) {
     int forces = sim->configuration.mechanism->force_count;
     const double *given = given_impulses(sim);
-    bool right = true;
+    bool ok = true;
     if (!impulses_changed(sim)) {
         return true;
     }
-    for (int i = 0; right && i < forces; i++) {
+    for (int i = 0; ok && i < forces; i++) {
         double grown[LOADS];
         for (int k = 0; k < LOADS; k++) {
             grown[k] = given[LOADS * i + k] - sim->state.received[LOADS * i + k];
         }
-        right = apply_impulses(sim, i, grown, problem);
+        ok = apply_impulses(sim, i, grown, problem);
     }
     copy(LOADS * forces, given, sim->state.received);
     free_sticking(sim);
-    return right;
+    return ok;
 }

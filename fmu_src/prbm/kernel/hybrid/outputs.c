@@ -154,14 +154,14 @@ static bool output_mobilities(Simulation *sim, Problem *problem) {
     double *G = take(&sim->scratch, (size_t)system->n);
     Inertia at = inertia_at(sim, sim->present.y);
     Rows gaps = gap_rows(system);
-    bool right = true;
-    for (int i = 0; right && i < system->s; i++) {
+    bool ok = true;
+    for (int i = 0; ok && i < system->s; i++) {
         row_jacobian(&gaps, i, at.e, G);
-        right = mobility(sim, &at, system->r, at.loops, G, out + PER_STOP * i + STOP_POINT_MOBILITY,
-                         problem);
+        ok = mobility(sim, &at, system->r, at.loops, G, out + PER_STOP * i + STOP_POINT_MOBILITY,
+                      problem);
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* Compute groups of outputs at the present y and e. */

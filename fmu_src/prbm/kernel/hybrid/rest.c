@@ -76,13 +76,13 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
     double *u = take(&sim->scratch, (size_t)size), *P = take(&sim->scratch, (size_t)size);
     double *friction = take(&sim->scratch, (size_t)m), *fixed = take(&sim->scratch, (size_t)m);
     int *normal = take_integers(&sim->scratch, m);
-    bool right = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL,
-                                    &sim->trial.evaluation, problem);
+    bool ok = evaluate_equations(&sim->trial.equations, sim->state.front_time, q, v, NULL,
+                                 &sim->trial.evaluation, problem);
     rest_rows(sim, rest, at.e, rows, pushes);
-    right = right &&
-            response(n, system->r, size, at.M, at.loops, pushes, X, &sim->scratch, problem);
+    ok = ok &&
+         response(n, system->r, size, at.M, at.loops, pushes, X, &sim->scratch, problem);
     found->solved = false;
-    if (right) {
+    if (ok) {
         contact_mobility(size, n, rows, X, W);
         rest_accelerations(sim, rest, at.e, v, rows, u);
         rest_laws(sim, rest, at.e, friction, fixed, normal);
@@ -102,7 +102,7 @@ PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
         found->slide[j] = dot(size, W + i * size, P) + u[i];
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* --- messages --------------------------------------------------------------------------------- */

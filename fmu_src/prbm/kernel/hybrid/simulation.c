@@ -311,10 +311,11 @@ static bool set_input(Simulation *sim, int i, double x, Problem *problem) {
                     m->input_names[i], x);
     }
     sim->state.given[i] = x;
+    /* In model exchange, a set stop.velocity contains the change by the impulses. */
     int wall = i - m->input.walls;
-    if (sim->state.mode.exchange && wall >= 0 && i < m->input.impulses &&
-        wall % PER_WALL == PER_WALL - 1) {
-        sim->state.walls[wall / PER_WALL].excess = 0.0; /* The partner has received the impulses. */
+    bool velocity = wall >= 0 && i < m->input.impulses && wall % PER_WALL == PER_WALL - 1;
+    if (sim->state.mode.exchange && velocity) {
+        sim->state.walls[wall / PER_WALL].excess = 0.0;
     }
     return true;
 }
@@ -322,10 +323,10 @@ static bool set_input(Simulation *sim, int i, double x, Problem *problem) {
 PRBM bool simulation_set(Simulation *simulation, int slot, double x, Problem *problem) {
     Simulation *sim = simulation;
     const Mechanism *m = sim->configuration.mechanism;
-    bool right = slot < m->parameter_count ? set_parameter(sim, slot, x, problem)
-                                           : set_input(sim, slot - m->slots.inputs, x, problem);
+    bool ok = slot < m->parameter_count ? set_parameter(sim, slot, x, problem)
+                                        : set_input(sim, slot - m->slots.inputs, x, problem);
     forget_present(sim);
-    return right;
+    return ok;
 }
 
 /* --- start ------------------------------------------------------------------------------------ */
@@ -350,14 +351,14 @@ static bool start_state(Simulation *sim, Problem *problem) {
     double *front = sim->state.front;
     double *q = take(&sim->scratch, n);
     double speed = evaluate(m->release.velocity, sim->state.acting_values);
-    bool right = start_shape(system, sim->state.acting_values, q, &sim->scratch, problem);
-    if (right) {
+    bool ok = start_shape(system, sim->state.acting_values, q, &sim->scratch, problem);
+    if (ok) {
         zeros(state_size(sim), front);
         copy((int)n, q, front);
-        right = release_velocity(system, q, speed, front + n, &sim->scratch, problem);
+        ok = release_velocity(system, q, speed, front + n, &sim->scratch, problem);
     }
     sim->scratch.used = mark;
-    return right;
+    return ok;
 }
 
 /* Reject a penetrated wall at the start.  Apply the impact if a wall is struck at the start. */

@@ -186,19 +186,19 @@ PRBM void keep_backup(Simulation *sim) {
     simulation_save(sim, sim->backup);
 }
 
-PRBM bool attempt(Simulation *sim, bool right, Problem *problem) {
+PRBM bool attempt(Simulation *sim, bool ok, Problem *problem) {
     if (sim->scratch.exceeded) {
-        right = fail(problem, "the working memory of the simulation is too small; report this");
+        ok = fail(problem, "the working memory of the simulation is too small; report this");
         sim->scratch.exceeded = false;
     }
-    if (!right) {
+    if (!ok) {
         Problem ignored;
         (void)read_state(sim, sim->backup);
         sim->scratch.used = 0;
         forget_present(sim);
         (void)rebuild(sim, &ignored);
     }
-    return right;
+    return ok;
 }
 
 PRBM bool simulation_restore(Simulation *simulation, const double *state, Problem *problem) {
@@ -206,13 +206,13 @@ PRBM bool simulation_restore(Simulation *simulation, const double *state, Proble
     const Mechanism *m = sim->configuration.mechanism;
     Problem ignored;
     keep_backup(sim);
-    bool right = read_state(sim, state) && consistent(sim) &&
-                 check_values(m, sim->state.values, &ignored) &&
-                 (!sim->state.started || check_values(m, sim->state.acting_values, &ignored)) &&
-                 rebuild(sim, &ignored);
+    bool ok = read_state(sim, state) && consistent(sim) &&
+              check_values(m, sim->state.values, &ignored) &&
+              (!sim->state.started || check_values(m, sim->state.acting_values, &ignored)) &&
+              rebuild(sim, &ignored);
     forget_present(sim);
-    if (!right) {
+    if (!ok) {
         fail(problem, "the saved state is damaged: its numbers are not a state of this mechanism");
     }
-    return attempt(sim, right, problem);
+    return attempt(sim, ok, problem);
 }

@@ -6,6 +6,6 @@
 
 PRBM void keep_backup(Simulation *sim);
 /* End an attempt: return whether it was successful, and restore the backup if it was not. */
-PRBM bool attempt(Simulation *sim, bool right, Problem *problem);
+PRBM bool attempt(Simulation *sim, bool ok, Problem *problem);
 
 #endif

@@ -170,21 +170,21 @@ PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *prob
     double *P = take(&sim->scratch, (size_t)q->r), *after = take(&sim->scratch, (size_t)ny);
     bool moved = drifted, follows = true;
     copy(ny, y, after);
-    bool right = evaluate_equations(q, t, y, y + n, NULL, at, problem) &&
-                 project_with_impulses(q, t, after, P, &sim->scratch, problem);
-    for (int k = 0; right && k < q->held_count; k++) {
+    bool ok = evaluate_equations(q, t, y, y + n, NULL, at, problem) &&
+              project_with_impulses(q, t, after, P, &sim->scratch, problem);
+    for (int k = 0; ok && k < q->held_count; k++) {
         speed[k] = gap_rate(q, q->held[k], t, at->at.e, y + n);
         bool jumps = fabs(speed[k]) > zero_speed(&sim->configuration);
         moved = moved || jumps;
         follows = follows && fabs(speed[k]) <= jump_allowed(sim, q->held[k]) &&
                   (!jumps || P[h + k] >= -greater(at->lam[h + k], 0.0) * time);
     }
-    bool captures = right && moved && follows;
+    bool captures = ok && moved && follows;
     for (int k = 0; captures && k < q->held_count; k++) {
         after[2 * n] -= P[h + k] * speed[k] / 2;
         after[2 * n + 1] += push_wall(sim, q->held[k], P[h + k]);
     }
     copy(captures ? ny : 0, after, y);
     sim->scratch.used = mark;
-    return right && (!moved || follows || settle_moved(sim, problem));
+    return ok && (!moved || follows || settle_moved(sim, problem));
 }

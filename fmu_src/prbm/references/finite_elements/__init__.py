@@ -10,7 +10,7 @@ integrates.  Statics and modes are solved here:
     f(q) + C mu + r F = 0,    Phi(q) = 0,
     (K - d(C mu)/dq) phi = omega^2 M phi,    C^T phi = 0,
 
-with q the displacements of the nodes from the drawn shape, f elastic forces and loads,
+with q the displacements of the nodes from the straight shape, f elastic forces and loads,
 K = -df/dq, C the transposed Jacobian of the constraints Phi, and r F the holding force.
 
 Modules: ``model`` builds the elements, ``equations`` evaluates them, ``statics`` solves for shapes

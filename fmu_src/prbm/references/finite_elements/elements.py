@@ -99,7 +99,7 @@ class FiniteElements:
             kept by a force along it [m]; None: no holding force.
         near : Shape or None
             Start of the iteration: a shape under the same loads; None: loads and displacement are
-            raised together from the drawn shape.
+            raised together from the straight shape.
 
         Raises
         ------

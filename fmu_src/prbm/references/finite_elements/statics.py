@@ -28,7 +28,7 @@ class Shape:
     Parameters
     ----------
     q : (n,)
-        Changes from the drawn shape: displacements [m], slopes [-], rotations of bodies [rad].
+        Changes from the straight shape: displacements [m], slopes [-], rotations of bodies [rad].
     mu : (r,)
         Multipliers of the constraints [N], [N m].
     force : float
@@ -61,7 +61,7 @@ def equilibrium(
         Displacement of the released body, kept by a holding force [m]; None: no holding force.
     near : Shape or None
         Start of the iteration: a shape under the same loads; None: loads and displacement are
-        raised together from the drawn shape.
+        raised together from the straight shape.
 
     Raises
     ------

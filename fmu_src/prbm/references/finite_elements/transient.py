@@ -20,10 +20,10 @@ from .statics import Shape
 if TYPE_CHECKING:
     from .elements import FiniteElements
 
-PENETRATION_ATOL = 1e-9  # m
+PENETRATION_ATOL = 1e-9  # Penetration of a wall that is round-off [m].
 GAP_CLOSED_RTOL = 1e-10  # Gap at which an impact is located, relative to the size.
-SECANTS_MAX = 12  # Iterations of the location of an impact before it bisects.
-LOCATIONS_MAX = 60  # Iterations of the location of an impact.
+SECANTS_MAX = 12  # Secant steps of the location of an impact; bisection follows.
+LOCATIONS_MAX = 60  # Secant steps and bisections of the location of an impact.
 LOCATING_STEPS = (1, 4, 16, 64)  # Divisions of a step that does not converge.
 SHORT_STEPS = 8  # Short steps in succession after a step that failed.
 STEP_RATIO_MIN = 1 / 4096  # Shortest step, relative to the requested one.
@@ -66,15 +66,14 @@ class Transient:
         self.fe, self.step, self.radius = fe, step, spectral_radius
         stops = fe.mechanism.stops
         self.held: set[int] = set()
-        self.armed = [False] * len(stops)
+        self.armed = [False] * len(stops)  # Whether the gap has opened since the last impact.
         self.latched = [Latched() for _ in stops]
         self.log = _Log()
-        self.largest = (
-            fe.model.energy
-        )  # Largest kinetic energy so far [J]; at first a small reference energy.
+        # Largest kinetic energy so far [J]; at first a small reference energy.
+        self.kinetic_max = fe.model.energy
 
-    def run(self, stop_time: float, most: int | None) -> Result:
-        """Integrate from the release to the end, or to a number of impacts."""
+    def run(self, stop_time: float, impacts_max: int | None) -> Result:
+        """Integrate from the release to the stop time [s], or until a number of impacts."""
         t = 0.0
         q, v = self.fe.release()
         for i, stop in enumerate(self.fe.mechanism.stops):
@@ -88,7 +87,7 @@ class Transient:
         self._keep(t, q, v)
         try:
             while stop_time - t > END_TIME_RTOL * self.step and (
-                most is None or len(self.log.impacts) < most
+                impacts_max is None or len(self.log.impacts) < impacts_max
             ):
                 t, q, v, struck = self._fly(t, q, v, stop_time)
                 if struck is not None:
@@ -229,7 +228,7 @@ class Transient:
             return look(*state)
 
         fe.model.mbs.SetPostStepUserFunction(after_step)
-        talks, fe.model.exu.config.printToConsole = fe.model.exu.config.printToConsole, False
+        printing, fe.model.exu.config.printToConsole = fe.model.exu.config.printToConsole, False
         try:
             fe.model.mbs.SolveDynamic(settings)
         except Exception as error:
@@ -238,7 +237,7 @@ class Transient:
             ) from None
         finally:
             fe.model.mbs.SetPostStepUserFunction(0)
-            fe.model.exu.config.printToConsole = talks
+            fe.model.exu.config.printToConsole = printing
         if gains:
             raise StepError(
                 f"a step of Exudyn from t = {state[0]:.6g} s gained energy: it did not converge; "
@@ -254,9 +253,9 @@ class Transient:
         kinetic = float(v @ self.fe.M @ v) / 2
         grown = kinetic - float(before[2] @ self.fe.M @ before[2]) / 2
         work = float(twice_force @ (q - before[1])) / 2
-        if grown - work > ENERGY_GAIN_RTOL * self.largest:
+        if grown - work > ENERGY_GAIN_RTOL * self.kinetic_max:
             return True
-        self.largest = max(self.largest, kinetic)
+        self.kinetic_max = max(self.kinetic_max, kinetic)
         return False
 
     # -- contact --
@@ -303,11 +302,11 @@ class Transient:
     # -- results --
 
     def _keep(self, t: float, q: Real, v: Real) -> None:
-        run = self.log
-        run.times.append(t)
-        run.q.append(np.array([q[j] for j in self._columns]))
-        run.v.append(np.array([v[j] for j in self._columns]))
-        run.held.append(tuple(i in self.held for i in range(len(self.armed))))
+        log = self.log
+        log.times.append(t)
+        log.q.append(np.array([q[j] for j in self._columns]))
+        log.v.append(np.array([v[j] for j in self._columns]))
+        log.held.append(tuple(i in self.held for i in range(len(self.armed))))
 
     @cached_property
     def _columns(self) -> list[int]:
@@ -315,10 +314,10 @@ class Transient:
         return [first + k for first in firsts if first is not None for k in range(3)]
 
     def _result(self) -> Result:
-        fe, run = self.fe, self.log
+        fe, log = self.fe, self.log
         rows = []
         full = np.zeros(fe.n)
-        for t, q, v, held in zip(run.times, run.q, run.v, run.held, strict=True):
+        for t, q, v, held in zip(log.times, log.q, log.v, log.held, strict=True):
             row: dict[str, float | int | bool] = {"time": t}
             for k, body in enumerate(fe.mechanism.bodies):
                 for j, name in enumerate(("x", "y", "angle")):
@@ -330,4 +329,4 @@ class Transient:
                 row[f"{stop.name}.gap"] = fe.gap(i, full)
                 row[f"{stop.name}.contact"] = held[i]
             rows.append(row)
-        return Result(fe.mechanism, fe.values, structured(rows), tuple(run.impacts))
+        return Result(fe.mechanism, fe.values, structured(rows), tuple(log.impacts))
