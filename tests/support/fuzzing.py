@@ -5,6 +5,7 @@ mutate tables and choose calls at random.  Both run with sanitizers.
 """
 
 import os
+import re
 import shutil
 import subprocess
 from collections.abc import Sequence
@@ -54,12 +55,20 @@ MEMORY_MAX = 2048  # MB
 TIMEOUT_MARGIN = 120.0  # s; a search that runs this much too long is stopped.
 
 
+TABLE_COUNTS = re.compile(r"^(\d+) tables, (\d+) accepted, (\d+) started$", re.MULTILINE)
+
+
 @dataclass(frozen=True)
 class Found:
     """The result of a fuzzer: its exit status (0 for success) and its output."""
 
     status: int
     output: str
+
+    def table_counts(self) -> tuple[int, int, int]:
+        """Return the numbers of tables, of those accepted, and of simulations started."""
+        tried, accepted, started = map(int, TABLE_COUNTS.search(self.output).groups())
+        return tried, accepted, started
 
 
 def sanitized_library() -> Path:
@@ -88,6 +97,7 @@ def _target(name: str) -> Path:
     flags = [
         *SANITIZERS, "-fsanitize=fuzzer" if clang else "-DSTANDALONE", *POSIX,
         "-DPRBM=",  # Makes the functions of the kernel visible instead of static.
+        "-Wno-unused-function",  # Headers of the kernel declare functions of its single file.
         "-I", str(SOURCES),
     ]  # fmt: skip
     compiler = "clang" if clang else "cc"

@@ -14,20 +14,35 @@
 #include <string.h>
 #include <time.h>
 
+#include "bytes.h"
+#include "generated.h"
 #include "motion.h"
 
 enum {
     HEAD = 16,
+    VERSION_AT = 4,
     SIZE_AT = 8,
     CHECKSUM_AT = 12,
-    SIMULATED_COORDINATES_MAX = 24 /* larger mechanisms are not simulated: it takes too long */
+    SIMULATED_COORDINATES_MAX = 24, /* larger mechanisms are not simulated: it takes too long */
+    ROOM_FOR_TABLES = 1 << 18,
+    VALID_MAX = 16
 };
 
+int LLVMFuzzerInitialize(int *count, char ***words);
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most);
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed);
 
-static unsigned long opened, started; /* mechanisms that were read; simulations that started */
+/* Inputs; mechanisms that were read; simulations that started. */
+static unsigned long tried, opened, started;
+
+/* Tables that could be simulated: mutations of them often can be, too. */
+static uint8_t valid[VALID_MAX][ROOM_FOR_TABLES];
+static size_t valid_sizes[VALID_MAX], valid_count;
+
+static void print_counts(void) {
+    printf("%lu tables, %lu accepted, %lu started\n", tried, opened, started);
+}
 
 /* --- test of an input --- */
 
@@ -89,6 +104,16 @@ static void exchange_some(Simulation *simulation) {
     free(z);
 }
 
+/* Keep tables as a start of mutations: the first ones for ever, the last ones in turn. */
+static void keep(const uint8_t *data, size_t size) {
+    size_t place = valid_count < VALID_MAX ? valid_count : VALID_MAX / 2 + tried % (VALID_MAX / 2);
+    if (size <= ROOM_FOR_TABLES) {
+        memcpy(valid[place], data, size);
+        valid_sizes[place] = size;
+        valid_count += valid_count < VALID_MAX;
+    }
+}
+
 static void start(const Mechanism *mechanism, bool for_exchange) {
     Problem problem = {{0}};
     Simulation *simulation = simulation_open(mechanism);
@@ -104,10 +129,17 @@ static void start(const Mechanism *mechanism, bool for_exchange) {
     simulation_close(simulation);
 }
 
+int LLVMFuzzerInitialize(int *count, char ***words) {
+    (void)count, (void)words;
+    atexit(print_counts);
+    return 0;
+}
+
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     Problem problem = {{0}};
     uint8_t *bytes = malloc(size ? size : 1); /* of the exact size: sanitizers see reads beyond */
     must(bytes, "no memory");
+    tried++;
     memcpy(bytes, data, size);
     Mechanism *mechanism = mechanism_open(bytes, size, &problem);
     free(bytes);
@@ -117,9 +149,13 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
         return 0;
     }
     opened++;
+    unsigned long before = started;
     if (mechanism->coordinate_count <= SIMULATED_COORDINATES_MAX) {
         start(mechanism, false);
         start(mechanism, true);
+    }
+    if (started > before) {
+        keep(data, size);
     }
     mechanism_close(mechanism);
     return 0;
@@ -127,27 +163,10 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
 
 /* --- mutations --- */
 
-static void put_u32(uint8_t *at, uint32_t x) {
-    for (int i = 0; i < 4; i++) {
-        at[i] = (uint8_t)(x >> 8 * i);
-    }
-}
-
-/* The CRC-32 of zlib. */
-static uint32_t crc(const uint8_t *bytes, size_t size) {
-    uint32_t c = 0xFFFFFFFFu;
-    for (size_t i = 0; i < size; i++) {
-        c ^= bytes[i];
-        for (int k = 0; k < 8; k++) {
-            c = c >> 1 ^ (c & 1 ? 0xEDB88320u : 0);
-        }
-    }
-    return ~c;
-}
-
 static void correct_header(uint8_t *data, size_t size) {
     if (size >= HEAD) {
-        memcpy(data, "PRBM\2\0\0", SIZE_AT);
+        memcpy(data, "PRBM", VERSION_AT);
+        put_u32(data + VERSION_AT, TABLES_VERSION);
         put_u32(data + SIZE_AT, (uint32_t)size);
         put_u32(data + CHECKSUM_AT, crc(data + HEAD, size - HEAD));
     }
@@ -227,6 +246,11 @@ static size_t mutated(uint8_t *data, size_t size, size_t most) {
 
 size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned seed) {
     generator = seed * 0x9E3779B97F4A7C15u + 1;
+    size_t which = valid_count ? arbitrary((uint32_t)valid_count) : 0;
+    if (valid_count && valid_sizes[which] <= most && arbitrary(2)) {
+        size = valid_sizes[which];
+        memcpy(data, valid[which], size);
+    }
     size = arbitrary(2) && size > HEAD ? mutated(data, size, most)
                                        : LLVMFuzzerMutate(data, size, most);
     if (arbitrary(10)) {
@@ -237,7 +261,7 @@ size_t LLVMFuzzerCustomMutator(uint8_t *data, size_t size, size_t most, unsigned
 
 #if defined(STANDALONE)
 
-enum { ROOM_FOR_TABLES = 1 << 18, MOST_FILES = 16 };
+enum { MOST_FILES = 16 };
 
 size_t LLVMFuzzerMutate(uint8_t *data, size_t size, size_t most) {
     (void)most;
@@ -252,7 +276,6 @@ int main(int count, char **words) {
     size_t sizes[MOST_FILES];
     int given = 0;
     unsigned seed = count > 2 ? (unsigned)strtoul(words[2], NULL, 10) : 0;
-    unsigned long tried = 0;
     time_t end = time(NULL) + (count > 1 ? atol(words[1]) : 0);
     for (int i = 3; i < count && given < MOST_FILES; i++, given++) {
         FILE *file = fopen(words[i], "rb");
@@ -262,7 +285,8 @@ int main(int count, char **words) {
         (void)LLVMFuzzerTestOneInput(files[given], sizes[given]);
     }
     must(given && started == 2 * (unsigned long)given, "an unchanged file was rejected");
-    for (; time(NULL) < end; tried++) {
+    LLVMFuzzerInitialize(&count, &words);
+    while (time(NULL) < end) {
         size_t which = tried % (size_t)given, size = sizes[which];
         memcpy(data, files[which], size);
         size = LLVMFuzzerCustomMutator(data, size, ROOM_FOR_TABLES, seed + (unsigned)tried);
@@ -274,7 +298,6 @@ int main(int count, char **words) {
         }
         (void)LLVMFuzzerTestOneInput(data, size);
     }
-    printf("%lu tables, %lu accepted, %lu started\n", tried, opened, started);
     return 0;
 }
 

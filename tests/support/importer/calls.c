@@ -196,18 +196,6 @@ static void messages_switch(Fuzz *fuzz) {
     }
 }
 
-static void ignore2(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
-                    fmi2String category, fmi2String message, ...) {
-    (void)name, (void)status, (void)category;
-    instance_log(environment, message);
-}
-
-static void ignore3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
-                    fmi3String message) {
-    (void)status, (void)category;
-    instance_log(environment, message);
-}
-
 static void update3(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean set,
                     fmi3Boolean get, fmi3Boolean finished, fmi3Boolean may_return,
                     fmi3Boolean *requested, fmi3Float64 *at) {
@@ -243,11 +231,11 @@ static void instantiate(Fuzz *fuzz) {
     } else if (fuzz->exchange) {
         fuzz->component = F3->InstantiateModelExchange(name, token, resources, false, logging,
                                                        &fuzz->instance,
-                                                       once_in(fuzz, 20) ? NULL : ignore3);
+                                                       once_in(fuzz, 20) ? NULL : logger3);
     } else {
         fuzz->component = F3->InstantiateCoSimulation(
             name, token, resources, false, logging, fuzz->with_events, once_in(fuzz, 2), NULL, 0,
-            &fuzz->instance, once_in(fuzz, 20) ? NULL : ignore3,
+            &fuzz->instance, once_in(fuzz, 20) ? NULL : logger3,
             once_in(fuzz, 2) ? NULL : update3);
     }
 }
@@ -552,7 +540,7 @@ static void rare3(Fuzz *fuzz) {
     default:
         c = F3->InstantiateScheduledExecution(fuzz->job->name, fuzz->job->token,
                                               fuzz->job->resources, false, true, &fuzz->instance,
-                                              ignore3, NULL, NULL, NULL);
+                                              logger3, NULL, NULL, NULL);
         if (c) {
             F3->FreeInstance(c);
         }
@@ -752,7 +740,7 @@ static Call *anything(Fuzz *fuzz) {
 
 void arbitrary_calls(const Library *library, const Job *job, Source *source, size_t count) {
     Fuzz state, *fuzz = &state;
-    fmi2CallbackFunctions callbacks = {ignore2, calloc, free, NULL, &state.instance};
+    fmi2CallbackFunctions callbacks = {logger2, calloc, free, NULL, &state.instance};
     memset(fuzz, 0, sizeof *fuzz);
     fuzz->library = library;
     fuzz->job = job;

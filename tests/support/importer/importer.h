@@ -157,7 +157,11 @@ bool instance_forget(Instance *instance, void **state);
 /* Return the bytes of a state, to be freed by the caller; NULL after a failure. */
 uint8_t *instance_serialize(Instance *instance, void *state, size_t *size);
 bool instance_deserialize(Instance *instance, const uint8_t *bytes, size_t size, void **state);
-void instance_log(void *instance, const char *message);
+/* Callbacks for messages of FMI 2.0 and 3.0; the environment is an Instance or NULL. */
+void logger2(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+             fmi2String category, fmi2String message, ...);
+void logger3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
+             fmi3String message);
 
 /* --- motion.c --------------------------------------------------------------------------------- */
 

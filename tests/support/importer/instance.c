@@ -8,28 +8,28 @@
 
 /* --- messages of the FMU --- */
 
-void instance_log(void *environment, const char *message) {
+static void keep(void *environment, const char *message) {
     Instance *instance = environment;
     if (instance && message) {
         snprintf(instance->message, sizeof instance->message, "%s", message);
     }
 }
 
-static void logger2(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
-                 fmi2String category, fmi2String message, ...) {
+void logger2(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
+             fmi2String category, fmi2String message, ...) {
     char text[MESSAGE_LENGTH];
     va_list arguments;
     (void)name, (void)status, (void)category;
     va_start(arguments, message);
     vsnprintf(text, sizeof text, message, arguments);
     va_end(arguments);
-    instance_log(environment, text);
+    keep(environment, text);
 }
 
-static void logger3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
-                 fmi3String message) {
+void logger3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
+             fmi3String message) {
     (void)status, (void)category;
-    instance_log(environment, message);
+    keep(environment, message);
 }
 
 /* Return whether a status of either version is OK (0) or a warning (1); print any other. */

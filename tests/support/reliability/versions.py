@@ -25,11 +25,16 @@ SECONDS_MAX = 1800.0
 
 
 def python(version: str) -> str | None:
-    """Return the interpreter of a version, from the PATH or from pyenv; None if there is none."""
-    found = shutil.which(f"python{version}")
+    """Return the interpreter of a version, from the PATH or from pyenv; None if there is none.
+
+    pyenv has programs on the PATH for all installed versions, which fail for inactive ones.
+    """
     installed = Path.home() / ".pyenv" / "versions"
-    paths = sorted(installed.glob(f"{version}.*/bin/python"))
-    return found or (str(paths[-1]) if paths else None)
+    found = [str(path) for path in sorted(installed.glob(f"{version}.*/bin/python"))]
+    for path in (shutil.which(f"python{version}"), *reversed(found)):
+        if path and _call([path, "-c", ""]).returncode == 0:
+            return path
+    return None
 
 
 def requirements(which: str) -> list[str]:
@@ -51,10 +56,13 @@ def tried(interpreter: str, which: str) -> tuple[list[str], list[str]]:
     """Return the results that the simulations print, and the failures."""
     with tempfile.TemporaryDirectory(prefix="prbm_versions_") as name:
         own = str(Path(name) / "venv" / "bin" / "python")
-        _call([interpreter, "-m", "venv", str(Path(name) / "venv")])
-        done = _call([own, "-m", "pip", "install", "-q", *requirements(which)])
-        if done.returncode:
-            return [], [f"installation: {done.stderr[-500:]}"]
+        for words in (
+            [interpreter, "-m", "venv", str(Path(name) / "venv")],
+            [own, "-m", "pip", "install", "-q", *requirements(which)],
+        ):
+            done = _call(words)
+            if done.returncode:
+                return [], [f"{' '.join(words[1:4])}: {(done.stdout + done.stderr)[-500:]}"]
         done = _call(
             [own, "build_fmu.py", "--model", "PRBDM", "--simulate", "--out", str(Path(name) / "d")]
         )

@@ -1,4 +1,5 @@
 /* Damaged saved states: truncated, with flipped bits, of another version, forged. */
+#include "bytes.h"
 #include "driver.h"
 
 #include <math.h>
@@ -8,24 +9,6 @@
 enum { VERSION_AT = 8, CHECKSUM_AT = 16, CHECKED_FROM = 20, CONTENT_FROM = 72, STEPS = 3 };
 
 typedef enum { TRUNCATED, FLIPPED, OTHER_VERSION, FORGED, DAMAGES } Damage;
-
-/* The CRC-32 of zlib. */
-static uint32_t crc(const uint8_t *bytes, size_t size) {
-    uint32_t c = 0xFFFFFFFFu;
-    for (size_t i = 0; i < size; i++) {
-        c ^= bytes[i];
-        for (int k = 0; k < 8; k++) {
-            c = c >> 1 ^ (c & 1 ? 0xEDB88320u : 0);
-        }
-    }
-    return ~c;
-}
-
-static void put_u32(uint8_t *at, uint32_t x) {
-    for (int i = 0; i < 4; i++) {
-        at[i] = (uint8_t)(x >> 8 * i);
-    }
-}
 
 static void forge(Subject *s, uint8_t *bytes, size_t size) {
     static const double choices[] = {0.0, 1.0, -1.0, 1e-300, 1e300, 1e9, -1e9, 1e-9, NAN, INFINITY};

@@ -63,23 +63,6 @@ int call_ends(Subject *s, const char *name, int status) {
 
 /* --- opening --- */
 
-static void logger2(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
-                    fmi2String category, fmi2String message, ...) {
-    char text[MESSAGE_LENGTH];
-    va_list arguments;
-    (void)name, (void)status, (void)category;
-    va_start(arguments, message);
-    vsnprintf(text, sizeof text, message, arguments);
-    va_end(arguments);
-    instance_log(environment, text);
-}
-
-static void logger3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category,
-                    fmi3String message) {
-    (void)status, (void)category;
-    instance_log(environment, message);
-}
-
 /* List the outputs of a type; return their number. */
 static size_t list_outputs(Subject *s, char type, size_t first) {
     size_t at = first;
