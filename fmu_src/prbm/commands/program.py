@@ -1,10 +1,28 @@
-"""Exit statuses of the commands, and the name under which the FMU builder was started."""
+"""Exit statuses, threads and names of the commands."""
 
+import os
 import sys
 from pathlib import Path
 
 OK, FAILED, MISTAKE, INTERRUPTED = 0, 1, 2, 130
 BUILDER = "build_fmu"  # Module that python -m runs.
+
+# Threads of linear algebra cost more time than they save on matrices of fewer than 300 rows.
+THREADS = (
+    "MKL_NUM_THREADS",
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "VECLIB_MAXIMUM_THREADS",
+)
+
+
+def limit_threads() -> None:
+    """Limit linear algebra to one thread, unless the environment has a number of threads.
+
+    The function has no effect after the import of NumPy, which reads the variables.
+    """
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
 
 
 def command_name() -> str:
