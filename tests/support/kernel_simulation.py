@@ -65,7 +65,7 @@ def _compile(folder: Path, changes: Changes = ()) -> None:
         text = (folder / file).read_text()
         assert text.count(old) == 1, f"{old} in {file}"
         (folder / file).write_text(text.replace(old, new))
-    kernel = (folder / "prbm_fmu.c").read_text().partition('#include "fmi/')[0]
+    kernel = (folder / "prbm_fmu.c").read_text().partition("#ifdef PRBM_ENGINE")[0]
     source, built = folder / "kernel.c", folder / "kernel.so"
     source.write_text(kernel)
     flags = [flag for flag in FLAGS if not flag.startswith("-I")]

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
-from scipy.optimize import brentq
-
 from ..base.errors import SimulationError
 from ..base.tolerances import (
     CONSTRAINT_RTOL,
@@ -284,6 +282,8 @@ def fall_time(z: Scalar, a: float, b: float) -> float:
         return float(a)
     if z(b) > 0.0:
         return float(b)
+    from scipy.optimize import brentq  # imported here: it takes 0.15 s
+
     try:
         return float(brentq(z, a, b, xtol=EVENT_TIME_ATOL, maxiter=LOCATION_ITERATIONS_MAX))
     except SimulationError:

@@ -121,7 +121,7 @@ class Mechanism:
 
     # -- parameters --
 
-    @property
+    @cached_property
     def parameters(self) -> tuple[Parameter, ...]:
         """All parameters, in the order of the FMU interface."""
         return tuple(self._parameters())

@@ -4,10 +4,13 @@ import ast
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 from ..base.errors import MechanismError
 
 Quantity = float | str
+
+EXPRESSIONS_KEPT = 4096  # Number of parsed expressions that are kept.
 
 
 # --- values -----------------------------------------------------------------------------------
@@ -56,10 +59,7 @@ def affine(quantity: Quantity) -> Affine:
     2.5
     """
     try:
-        if not isinstance(quantity, str):
-            result = Affine(float(quantity))
-        else:
-            result = _affine(ast.parse(quantity.strip(), mode="eval").body)
+        result = _parsed(quantity) if isinstance(quantity, str) else Affine(float(quantity))
     except (
         TypeError,
         SyntaxError,
@@ -76,6 +76,12 @@ def affine(quantity: Quantity) -> Affine:
     if not all(map(math.isfinite, (result.constant, *result.terms.values()))):
         raise MechanismError(f"cannot read the expression {quantity!r}: its numbers are not finite")
     return result
+
+
+@lru_cache(EXPRESSIONS_KEPT)
+def _parsed(text: str) -> Affine:
+    """Return the expression in a text."""
+    return _affine(ast.parse(text.strip(), mode="eval").body)
 
 
 def _affine(node: ast.expr) -> Affine:
