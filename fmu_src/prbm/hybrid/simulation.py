@@ -272,9 +272,8 @@ class Simulation:
     def _restart(self, moved: tuple[Wall, ...]) -> None:
         """Continue from the present state with the present inputs, walls and parameters."""
         y, configuration = self.state(), self.prepared
-        moved = walls.keeping_gaps(
-            self.configuration, configuration, self.course, moved, self.time, y
-        )
+        if configuration is not self.configuration:
+            moved = walls.keeping_gaps(self.system, configuration.system, y, moved)
         inputs = Inputs.of(self.mechanism, self.given, moved)
         equations = configuration.equations(inputs, self.contacts)
         front = Front(self.time, y, equations, self.latched)
