@@ -14,15 +14,13 @@
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
-/* Make the present state the front, from which the integration continues. */
+/* End the latest step at the present time, from which the integration continues. */
 static bool leave_arc(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
-    if (!arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem)) {
-        return false;
-    }
-    state->front_time = state->time;
+    bool within = state->arc.valid && state->time < state->front_time;
+    bool right = !within || end_step(sim, state->time, problem);
     state->arc.valid = state->has_k1 = false;
-    return true;
+    return right;
 }
 
 /* Let the inputs act that have been set. */
