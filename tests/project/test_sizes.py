@@ -13,6 +13,22 @@ def test_files_classes_and_functions_are_within_their_limits():
     assert sizes.violations(found) == []
 
 
+def test_code_for_moving_walls_is_within_its_limit():
+    """All functions with a wall in their names are counted, except the check of the start."""
+    found = list(sizes.wall_functions())
+    assert sum(x.size for x in found) <= sizes.WALLS_MAX
+    others = {x.name for x in sizes.measured().functions if x.place.split(":")[0].endswith(".c")}
+    named = {name for name in others if "wall" in name} - {"check_walls"}
+    assert named | set(sizes.WALL_FUNCTIONS) <= {x.name for x in found}
+
+
+def test_length_of_c_code_excludes_comments_and_blank_lines(tmp_path):
+    path = tmp_path / sizes.WALLS_FILE
+    path.parent.mkdir(parents=True)
+    path.write_text("int x;\n/* A\n * comment. */\nint\nf(void) {\n\n    return 1; /* one */\n}\n")
+    assert [(x.size, x.name) for x in sizes.wall_functions(tmp_path)] == [(4, "f")]
+
+
 def test_length_of_a_python_body_excludes_signature_and_docstring():
     text = dedent('''\
         class Pair:

@@ -1,9 +1,11 @@
 """Sizes of files, classes and functions, in Python and C.
 
-``python tests/support/sizes.py`` prints the ten largest of each.
+``python tests/support/sizes.py`` prints the ten largest of each, and the functions of the kernel
+that exist only for moving walls.
 
 The body of a Python function begins after its signature and docstring.  The body of a C function
-consists of the lines between its braces.
+consists of the lines between its braces.  The code of a C function consists of its lines from the
+signature to the last brace, without blank lines and comments.
 """
 
 import ast
@@ -22,6 +24,11 @@ CLASS_MAX = 30  # Methods.
 BODY_MAX = 60  # Lines.
 PAGE_BODY_MAX = 100  # Lines of a function that writes a page.
 PAGES = "fmu_src/prbm/validation/"
+WALLS_MAX = 120  # Lines of code of all C functions that exist only for moving walls.
+
+WALLS_FILE = "fmu_src/prbm/kernel/hybrid/walls.c"
+WALL_FUNCTIONS = ("wall_motion", "wall_inputs", "walls_changed")
+"""Functions of other C files that exist only for moving walls."""
 
 C_NOISE = re.compile(
     r"""
@@ -92,6 +99,28 @@ def python_functions(text: str, place: str) -> Iterator[Size]:
 
 def c_functions(text: str, place: str) -> Iterator[Size]:
     """Yield the functions of a C file with the lengths of their bodies."""
+    for name, plain, begin, end in _c_functions(text):
+        length = max(plain.count("\n", begin, end) - 1, 0)
+        yield Size(length, name, f"{place}:{plain.count(chr(10), 0, begin) + 1}")
+
+
+def wall_functions(root: Path = ROOT) -> Iterator[Size]:
+    """Yield the C functions that exist only for moving walls with the lengths of their code."""
+    for path in sorted((root / "fmu_src/prbm/kernel").rglob("*.c")):
+        place = path.relative_to(root).as_posix()
+        for name, text, begin, end in _c_functions(path.read_text(encoding="utf-8")):
+            if name in WALL_FUNCTIONS or place == WALLS_FILE:
+                head = max(text.rfind(mark, 0, text.rfind(name, 0, begin)) for mark in "};")
+                lines = text[head + 1 : end + 1].splitlines()
+                yield Size(sum(bool(line.strip()) for line in lines), name, place)
+
+
+def _c_functions(text: str) -> Iterator[tuple[str, str, int, int]]:
+    """Yield the functions of a C file.
+
+    Each item consists of the name, the text with blanks for comments and strings, and the places
+    of the braces of the function.
+    """
     text = C_NOISE.sub(lambda found: re.sub(r"[^\n]", " ", found[0]), text)
     depth, begin, name, since = 0, 0, "", 0
     for found in re.finditer(r"[{};]", text):
@@ -104,8 +133,7 @@ def c_functions(text: str, place: str) -> Iterator[Size]:
         elif brace == "}":
             depth -= 1
             if depth == 0 and name:
-                length = max(text.count("\n", begin, at) - 1, 0)
-                yield Size(length, name, f"{place}:{text.count(chr(10), 0, begin) + 1}")
+                yield name, text, begin, at
         if depth == 0:
             since = at + 1
 
@@ -128,6 +156,8 @@ def report(sizes: Sizes, count: int = SHOWN) -> str:
     for kind, unit in units.items():
         lines.append(f"{kind} [{unit}]")
         lines += map(str, sorted(getattr(sizes, kind), reverse=True)[:count])
+    walls = list(wall_functions())
+    lines += [f"moving walls in C [lines]: {sum(x.size for x in walls)}", *map(str, walls)]
     return "\n".join(lines)
 
 

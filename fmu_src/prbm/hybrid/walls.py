@@ -24,7 +24,7 @@ from ..base.tolerances import (
 )
 from ..mechanics.arrays import Real
 from ..mechanics.inputs import Wall
-from ..mechanism.parts import value
+from ..mechanics.system import System
 from .configuration import Configuration
 from .front import Front
 
@@ -64,13 +64,8 @@ def _given_reference(
 ) -> Wall:
     """Return the reference that the inputs of a stop define at a time [s]."""
     name = configuration.mechanism.stops[stop].name
-    position = _position(configuration, stop) + given[f"{name}.displacement"]
+    position = configuration.stop_value(stop, "position") + given[f"{name}.displacement"]
     return Wall(position, given[f"{name}.velocity"], time)
-
-
-def _position(configuration: Configuration, stop: int) -> float:
-    """Return ``stop.position`` [m]."""
-    return value(configuration.mechanism.stops[stop], "position", configuration.values)
 
 
 def join(
@@ -85,7 +80,8 @@ def join(
     """Return the walls from a communication point on.
 
     A wall whose reference has not changed moves on as before.  Before the first step, the velocity
-    of a wall is that of its reference.
+    of a wall is that of its reference.  A wall whose hit point moves by a change of ``stop.offset``
+    joins its reference anew, see :func:`keeping_gaps`.
 
     Parameters
     ----------
@@ -110,53 +106,39 @@ def join(
         off = line.position - wall.reference(now)
         driven[i] = driven[i] or line.rate != 0.0
         if not driven[i]:
-            moved = off - (_position(configuration, i) - _position(acting, i)) if last else 0.0
-            line = replace(line, rate=_mean_rate(wall.rate, moved, recent, following))
-        if abs(off) + abs(line.rate - wall.rate) * span > round_off:
+            shift = configuration.stop_value(i, "position") - acting.stop_value(i, "position")
+            rate = _mean_rate(wall.rate, off - shift if last else 0.0, recent, following)
+            line = replace(line, rate=rate)
+        same = abs(off) + abs(line.rate - wall.rate) * span <= round_off
+        if not same or configuration.stop_value(i, "offset") != acting.stop_value(i, "offset"):
             velocity = float(wall.motion(now)[1]) if last else line.rate
             joined[i] = wall.joining(line, velocity, span)
     return Course(now, longest, tuple(driven)), tuple(joined)
 
 
-def keeping_gaps(
-    acting: Configuration,
-    configuration: Configuration,
-    course: Course,
-    walls: tuple[Wall, ...],
-    now: float,
-    y: Real,
-) -> tuple[Wall, ...]:
-    """Return walls that have moved with the hit points after a change of ``stop.offset``.
+def keeping_gaps(old: System, new: System, y: Real, walls: tuple[Wall, ...]) -> tuple[Wall, ...]:
+    """Return walls that take up the jumps of the gaps after a change of parameters.
 
-    The gaps and their rates do not jump.  Each wall then joins its reference along a cubic.
+    The gaps and their rates do not jump: the walls move with the hit points.
 
     Parameters
     ----------
-    acting, configuration : Configuration
-        Configurations with the parameter values up to now, and from now on.
-    course : Course
-        Past communication steps.
-    walls : (s,) tuple of Wall
-        Motions of the walls.
-    now : float
-        The present time [s].
+    old, new : System
+        Constant arrays up to now, and from now on.
     y : (2 n + 2,)
         The present state.
+    walls : (s,) tuple of Wall
+        Motions of the walls, which join their references from now on if their gaps jump.
     """
-    n, system = configuration.system.n, configuration.system
-    e, v = system.directions(y[:n]), y[n : 2 * n]
-    old, new = acting.system.gap_rows, system.gap_rows
-    jumps = new.values(e) - old.values(e)
-    turns = new.rates(e, v) - old.rates(e, v)
-    span = 2.0 * (course.longest or WALL_LONGEST_RTOL * configuration.scales.time)
-    kept = list(walls)
-    for i, (wall, jump, turn) in enumerate(zip(walls, jumps, turns, strict=True)):
-        if abs(jump) + abs(turn) * span > WALL_PATH_RTOL * system.length:
-            x, velocity, _ = wall.motion(now)
-            line = wall.reference(now)
-            offset, excess = float(x - jump) - line, float(velocity - turn) - wall.rate
-            kept[i] = Wall(line, wall.rate, now, offset, excess, span)
-    return tuple(kept)
+    e, v, before, after = new.directions(y[: new.n]), y[new.n : -2], old.gap_rows, new.gap_rows
+    jumps = after.values(e) - before.values(e)
+    turns = after.rates(e, v) - before.rates(e, v)
+    return tuple(
+        replace(wall, offset=wall.offset - float(jump), excess=wall.excess - float(turn))
+        if wall.span
+        else wall
+        for wall, jump, turn in zip(walls, jumps, turns, strict=True)
+    )
 
 
 def _mean_rate(rate: float, off: float, longest: float, following: float) -> float:

@@ -14,15 +14,13 @@
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
-/* Make the present state the front, from which the integration continues. */
+/* End the latest step at the present time, from which the integration continues. */
 static bool leave_arc(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
-    if (!arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem)) {
-        return false;
-    }
-    state->front_time = state->time;
+    bool within = state->arc.valid && state->time < state->front_time;
+    bool right = !within || end_step(sim, state->time, problem);
     state->arc.valid = state->has_k1 = false;
-    return true;
+    return right;
 }
 
 /* Let the inputs act that have been set. */
@@ -31,22 +29,8 @@ static void take_inputs(Simulation *sim) {
     set_inputs(sim);
 }
 
-/* Let the parameters act that have been set.  The gaps do not jump. */
-static bool take_parameters(Simulation *sim, Problem *problem) {
-    double gaps[STOPS_MAX], rates[STOPS_MAX];
-    gaps_and_rates(sim, gaps, rates);
-    if (!take_values(sim, problem)) {
-        return false;
-    }
-    keep_gaps(sim, gaps, rates);
-    return true;
-}
-
-/* Continue from the present state with the inputs and parameters that have been set. */
+/* Continue from the front with the inputs that have been set. */
 static bool restart(Simulation *sim, Problem *problem) {
-    if (!leave_arc(sim, problem) || (values_changed(sim) && !take_parameters(sim, problem))) {
-        return false;
-    }
     take_inputs(sim);
     return receive_impulses(sim, problem) && settle_moved(sim, problem);
 }
@@ -84,13 +68,24 @@ static bool check_time(const Simulation *sim, double time, Problem *problem) {
  * parameters.  A step that was interrupted at an event keeps its references, unless an input of a
  * wall or a parameter has changed. */
 static bool begin_step(Simulation *sim, double time, Problem *problem) {
-    bool goes_on = sim->state.interrupted && !walls_changed(sim) && !values_changed(sim);
-    bool joined = !goes_on && join_walls(sim, time);
-    if (joined || values_changed(sim) || inputs_changed(sim)) {
-        return restart(sim, problem);
+    State *state = &sim->state;
+    size_t bytes = (size_t)system_of(sim)->s * sizeof(Wall);
+    Wall joined[STOPS_MAX];
+    bool set = values_changed(sim);
+    if (set || !state->interrupted || walls_changed(sim)) {
+        join_walls(sim, time, set, joined);
+    } else {
+        memcpy(joined, state->walls, bytes);
     }
-    copy(sim->configuration.mechanism->input_count, sim->state.given, sim->state.acting_given);
-    return true;
+    if (!set && !inputs_changed(sim) && memcmp(joined, state->walls, bytes) == 0) {
+        copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
+        return true;
+    }
+    if (!leave_arc(sim, problem) || (set && !keep_gaps(sim, joined, problem))) {
+        return false;
+    }
+    memcpy(state->walls, joined, bytes);
+    return restart(sim, problem);
 }
 
 /* Whether to return before the end of a communication step: after an internal step, at an event. */
@@ -183,13 +178,14 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
 /* Let changed velocities of walls and impulses act, and apply the pending event, if any.  Held
  * stops follow their walls unless impulses act on the body, too. */
 static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *problem) {
+    bool moved = walls_changed(sim);
     if (!event && !leave_arc(sim, problem)) {
         return false;
     }
-    sim->state.interrupted = sim->state.interrupted && !walls_changed(sim);
+    sim->state.interrupted = sim->state.interrupted && !moved;
     turn_walls(sim);
     take_inputs(sim);
-    if ((event || !impulses) && !follow_walls(sim, false, HUGE_VAL, problem)) {
+    if (moved && (event || !impulses) && !follow_walls(sim, NULL, 0.0, problem)) {
         return false;
     }
     return (!event || apply_pending(sim, problem)) &&

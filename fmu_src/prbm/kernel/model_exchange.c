@@ -328,11 +328,12 @@ static bool apply_inputs(Simulation *sim, Problem *problem) {
     if (!exchange_moment(sim, &now, problem)) {
         return false;
     }
-    bool impulses = impulses_changed(sim), drifted = drift(sim, &now.at) > DRIFT_CORRECTED_RTOL;
-    bool ok = receive_impulses(sim, problem) &&
-              (impulses ? settle_moved(sim, problem)
-                        : follow_walls(sim, drifted, sim->state.time - sim->state.point,
-                                       problem));
+    bool ok = true;
+    if (impulses_changed(sim)) {
+        ok = receive_impulses(sim, problem) && settle_moved(sim, problem);
+    } else if (sim->equations.walls_move || drift(sim, &now.at) > DRIFT_CORRECTED_RTOL) {
+        ok = follow_walls(sim, now.at.lam, sim->state.time - sim->state.point, problem);
+    }
     forget_outputs(sim);
     return ok;
 }

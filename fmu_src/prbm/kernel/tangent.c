@@ -344,26 +344,21 @@ static void link_changes(const Tangent *t, double *links, double *stretches_out)
     }
 }
 
-/* Changes of displacement and velocity of a wall. */
-static const double *wall_change(const Tangent *t, int i) {
-    return wall_inputs(t->q->system->mechanism, t->du, i);
-}
-
 PRBM double gap_change(const Tangent *t, int i) {
     const System *system = t->q->system;
     Rows gaps = gap_rows(system);
-    return value_change(t, &gaps, i) + wall_change(t, i)[0];
+    return value_change(t, &gaps, i) + wall_inputs(system->mechanism, t->du, i)[0];
 }
 
 PRBM double gap_rate_change(const Tangent *t, int i) {
     const System *system = t->q->system;
     Rows gaps = gap_rows(system);
-    return rate_change(t, &gaps, i) + wall_change(t, i)[1];
+    return rate_change(t, &gaps, i) + wall_inputs(system->mechanism, t->du, i)[1];
 }
 
 static void stop_changes(const Tangent *t, double *out) {
     for (int i = 0; i < t->q->system->s; i++) {
-        const double *wall = wall_change(t, i);
+        const double *wall = wall_inputs(t->q->system->mechanism, t->du, i);
         double *d = out + PER_STOP * i;
         d[STOP_GAP] = gap_change(t, i);
         d[STOP_GAP_RATE] = gap_rate_change(t, i);
@@ -527,7 +522,7 @@ static double power_change(const Tangent *t, const Complex *dw, const double *dm
     }
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k], h = q->first_hold + k;
-        double velocity = wall_change(t, i)[1];
+        double velocity = wall_inputs(system->mechanism, t->du, i)[1];
         double w = wall_motion(&q->inputs.walls[i], t->at->time).v;
         sum -= t->dlam[h] * w + t->lam[h] * velocity;
     }

@@ -187,14 +187,12 @@ PRBM void set_equations(Equations *equations, const Inputs *inputs,
  *     x = reference + (1 - s)^2 (offset + (2 offset + excess span) s).
  * At the end of the cubic the wall is to be replaced by its reference. */
 PRBM WallMotion wall_motion(const Wall *wall, double t) {
-    double tau = t - wall->since, T = wall->span;
-    WallMotion result = {wall->position + wall->rate * tau, wall->rate, 0.0};
-    if (T > 0.0) {
-        double s = tau / T, left = 1.0 - s;
-        double slope = 2.0 * wall->offset + wall->excess * T, ahead = wall->offset + slope * s;
-        result.x += left * left * ahead;
-        result.v += left * (left * slope - 2.0 * ahead) / T;
-        result.a = (2.0 * ahead - 4.0 * left * slope) / (T * T);
+    double tau = t - wall->since, T = wall->span, x = wall->position + wall->rate * tau;
+    if (T == 0.0) {
+        return (WallMotion){x, wall->rate, 0.0};
     }
-    return result;
+    double s = tau / T, left = 1.0 - s, slope = 2.0 * wall->offset + wall->excess * T;
+    double ahead = wall->offset + slope * s;
+    double v = wall->rate + left * (left * slope - 2.0 * ahead) / T;
+    return (WallMotion){x + left * left * ahead, v, (2.0 * ahead - 4.0 * left * slope) / (T * T)};
 }

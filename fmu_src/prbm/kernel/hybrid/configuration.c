@@ -73,3 +73,7 @@ PRBM bool walls_changed(const Simulation *sim) {
 PRBM double field_value(const Simulation *sim, Expression field) {
     return evaluate(field, sim->state.acting_values);
 }
+
+PRBM double field_change(const Simulation *sim, Expression field) {
+    return evaluate(field, sim->state.values) - evaluate(field, sim->state.acting_values);
+}

@@ -12,5 +12,6 @@ PRBM bool walls_changed(const Simulation *sim);  /* inputs that move walls */
 PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
 PRBM double zero_acceleration(const Configuration *configuration); /* lower ones are round-off */
 PRBM double field_value(const Simulation *sim, Expression field);
+PRBM double field_change(const Simulation *sim, Expression field); /* not yet in the field value */
 
 #endif

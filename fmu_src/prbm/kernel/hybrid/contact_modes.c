@@ -7,7 +7,6 @@
 #include "hybrid/impacts.h"
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
-#include "hybrid/walls.h"
 
 /* --- trial equations -------------------------------------------------------------------------- */
 
@@ -470,6 +469,17 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
         }
     }
     return contacts_unsettled(sim, count, candidates, problem);
+}
+
+PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates) {
+    size_t mark = sim->scratch.used;
+    double *front = sim->state.front, t = sim->state.front_time;
+    Complex *e = directions_at(sim, front);
+    for (int i = 0; i < system_of(sim)->s; i++) {
+        gaps[i] = gap(&sim->equations, i, t, e);
+        rates[i] = gap_rate(&sim->equations, i, t, e, front + system_of(sim)->n);
+    }
+    sim->scratch.used = mark;
 }
 
 /* Open the closed stops whose gaps have a rate after a change of a wall's velocity or an impulse.

@@ -394,7 +394,7 @@ static bool release_mechanism(Simulation *sim, Problem *problem) {
         every[i] = i;
     }
     clear_stops(sim);
-    start_walls(sim);
+    place_walls(sim);
     copy(LOADS * sim->configuration.mechanism->force_count, given_impulses(sim), state->received);
     set_inputs(sim);
     return start_state(sim, problem) &&

@@ -182,6 +182,26 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
 
 /* --- steps ------------------------------------------------------------------------------------ */
 
+/* Project the end of a step, which is the front. */
+static bool project_end(Simulation *sim, Problem *problem) {
+    State *state = &sim->state;
+    double *y = sim->stepping.end;
+    copy(state_size(sim), state->front, y);
+    return project(&sim->equations, state->front_time, state->front, &sim->scratch, problem) &&
+           check_projection(sim, state->front_time, y, state->front, problem);
+}
+
+PRBM bool end_step(Simulation *sim, double t, Problem *problem) {
+    State *state = &sim->state;
+    state->front_time = t;
+    if (t <= state->arc.start) {
+        copy(state_size(sim), state->arc.y, state->front);
+        return true;
+    }
+    state->arc.h = t - state->arc.start;
+    return arc_cut(sim, t, state->arc.k, state->front, problem) && project_end(sim, problem);
+}
+
 /* End the step at an event. */
 static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     State *state = &sim->state;
@@ -189,18 +209,11 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     state->front_time = event->time;
     state->pending = *event;
     state->has_k1 = false;
-    if (event->kind != EVENT_IMPACT || event->time <= state->arc.start) {
-        arc_at(sim, event->time, state->front);
-    } else {
-        if (!arc_cut(sim, event->time, state->arc.k, state->front, problem)) {
-            return false;
-        }
-        state->arc.h = event->time - state->arc.start;
+    if (event->kind == EVENT_IMPACT && event->time > state->arc.start) {
+        return end_step(sim, event->time, problem);
     }
-    double *y = sim->stepping.end;
-    copy(state_size(sim), state->front, y);
-    return project(&sim->equations, event->time, state->front, &sim->scratch, problem) &&
-           check_projection(sim, event->time, y, state->front, problem);
+    arc_at(sim, event->time, state->front);
+    return project_end(sim, problem);
 }
 
 /* Take one step from the front, up to its first event. */

@@ -4,19 +4,15 @@
 
 #include "hybrid/state.h"
 
-PRBM void start_walls(Simulation *sim);
+/* Set the position and velocity of each wall to those of its reference. */
 PRBM void place_walls(Simulation *sim);
-PRBM bool join_walls(Simulation *sim, double time);
+/* Compute the walls (s,) from the present time on. */
+PRBM void join_walls(Simulation *sim, double time, bool set, Wall *joined);
+PRBM bool keep_gaps(Simulation *sim, Wall *joined, Problem *problem);
 PRBM double jump_allowed(const Simulation *sim, int i);
 PRBM void turn_walls(Simulation *sim);
 PRBM double push_wall(Simulation *sim, int i, double P);
 PRBM double follow_cubics(Simulation *sim);
-PRBM bool follow_walls(Simulation *sim, bool drifted, double time, Problem *problem);
-
-/* Compute the gaps of all stops at the present time and front, and their rates. */
-PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates);
-/* After a change of stop.offset, move each wall so that its gap and rate are the given ones.  The
- * wall then joins its reference along a cubic. */
-PRBM void keep_gaps(Simulation *sim, const double *gaps, const double *rates);
+PRBM bool follow_walls(Simulation *sim, const double *lam, double time, Problem *problem);
 
 #endif
