@@ -12,7 +12,7 @@ from prbm.base.errors import MechanismError
 from prbm.files.mechanism_file import read_mechanism, shipped
 from prbm.fmu.native_fmu import described
 from prbm.hybrid.simulation import Simulation
-from prbm.interface.tables import HEAD, slots, tables
+from prbm.interface.tables import HEAD, VERSION, slots, tables
 from prbm.interface.variables import CLOCK
 from prbm.mechanics.independent import independent
 from prbm.mechanics.inputs import input_names
@@ -135,7 +135,7 @@ def written(mechanism) -> bytes:
 
 def test_the_head_contains_version_size_and_checksum(written):
     magic, version, size, check = struct.unpack_from("<4sIII", written)
-    assert (magic, version, size) == (b"PRBM", 3, len(written))
+    assert (magic, version, size) == (b"PRBM", VERSION, len(written))
     assert check == zlib.crc32(written[16:])
 
 

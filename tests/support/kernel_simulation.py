@@ -110,7 +110,7 @@ class KernelSimulation:
     ) -> None:
         self.library = library(changes)
         self.sentence = ctypes.create_string_buffer(SENTENCE)
-        self.inner, self.states_of = None, None
+        self.tables, self.inner, self.states_of = None, None, None
         self.stops, self.points = mechanism.stops, len(mechanism.frictions)
         chosen = independent(mechanism)
         self.slots = slots(mechanism, chosen)
@@ -127,8 +127,8 @@ class KernelSimulation:
         if self.tables:
             self.library.mechanism_close(self.tables)
 
-    def _check(self, right: bool) -> None:
-        if not right:
+    def _check(self, ok: bool) -> None:
+        if not ok:
             raise KernelMistake(self.sentence.value.decode())
 
     def call(self, name, *arguments) -> None:

@@ -164,7 +164,7 @@ static void set_loads(Equations *q) {
         q->walls_move = q->walls_move || wall->rate != 0.0 || wall->span > 0.0;
     }
     q->driven = q->driven || q->walls_move;
-    q->special = q->walls_move || q->slipping_count > 0;
+    q->friction_or_walls = q->walls_move || q->slipping_count > 0;
 }
 
 PRBM void set_equations(Equations *equations, const Inputs *inputs,

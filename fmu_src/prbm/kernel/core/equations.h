@@ -47,7 +47,7 @@ typedef struct {
     double *moment;         /* (even,) */
     bool walls_move;
     bool driven;            /* inputs or walls do work */
-    bool special;           /* walls move, or contacts slip */
+    bool friction_or_walls; /* whether contacts slip or walls move */
     Parts B_conjugate;      /* (r, even) */
     Parts w_parts;          /* (even,) */
 } Equations;

@@ -395,7 +395,7 @@ PRBM double rub_force(const Equations *q, int i, const Complex *e) {
 }
 
 /* Add slipping friction points, and the accelerations of the walls of held stops. */
-RARE void add_special(const Equations *q, Evaluation *result) {
+RARE void add_friction_and_walls(const Equations *q, Evaluation *result) {
     Rows rubs = rub_rows(q->system);
     for (int k = q->slipping_stops; k < q->slipping_count; k++) {
         int i = q->slipping[k] - q->system->s;
@@ -458,8 +458,8 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
     find_loads(even, q, result);
     add_springs(even, q, result);
     rows_dispatch(even, q, &result->at, result->factors.Z, result->lam);
-    if (q->special) {
-        add_special(q, result);
+    if (q->friction_or_walls) {
+        add_friction_and_walls(q, result);
     }
     if (!factor_motion(even, q, result)) {
         return false;
