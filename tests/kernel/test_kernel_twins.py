@@ -1291,6 +1291,18 @@ def test_steps_of_the_integration_are_the_same(name):
             assert_same(middle, runge_kutta.interpolate(PAIR, y, expected, h, theta))
 
 
+@twin(hermite_weights=runge_kutta.hermite_weights)
+def test_weights_of_the_interpolation_through_three_states_are_the_same():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        nodes, t = rng.permutation([0.0, *rng.uniform([0.2, -5.0], [1.0, -0.2])]), rng.uniform()
+        value, rate = np.full((3, 3), np.nan), np.full((3, 3), np.nan)
+        kernel().hermite_weights(nodes, t, value, rate)
+        expected = runge_kutta.hermite_weights(nodes.tolist(), t)
+        assert_same(value, expected[0], scale=np.abs(expected[0]).max())
+        assert_same(rate, expected[1], scale=np.abs(expected[1]).max())
+
+
 # --- functions of the kernel only ----------------------------------------------------------------
 
 

@@ -126,3 +126,26 @@ PRBM void interpolate(int n, const double *y, const double *k, double h, double 
     weights(theta, b);
     combine(n, STAGES, h, b, k, y, result);
 }
+
+PRBM void step_end(int n, const double *y, const double *k, double h, double *end) {
+    combine(n, STAGES - 1, h, STAGE[STAGES - 1], k, y, end);
+}
+
+PRBM void hermite_weights(const double *nodes, double t, double *value, double *rate) {
+    for (int i = 0; i < NODES; i++) {
+        double node = nodes[i], a = nodes[(i + 1) % NODES], b = nodes[(i + 2) % NODES];
+        double product = (node - a) * (node - b), x = t - node;
+        /* With u = (t - a) (t - b)/product, the polynomials of the node are u^3 times the first
+         * three terms of 1/u^3 (1, x, x^2/2) = (1 - c x + d x^2) (1, x, x^2/2). */
+        double u = (t - a) * (t - b) / product, slope = ((t - a) + (t - b)) / product;
+        double cube = u * u * u, cube_slope = 3.0 * u * u * slope;
+        double sum = 1.0 / (node - a) + 1.0 / (node - b);
+        double c = 3.0 * sum, d = 6.0 * sum * sum - 3.0 / product;
+        double basis[NODES] = {1.0 - c * x + d * x * x, x - c * x * x, 0.5 * x * x};
+        double slopes[NODES] = {2.0 * d * x - c, 1.0 - 2.0 * c * x, x};
+        for (int k = 0; k < NODES; k++) {
+            value[i * NODES + k] = cube * basis[k];
+            rate[i * NODES + k] = cube_slope * basis[k] + cube * slopes[k];
+        }
+    }
+}

@@ -37,11 +37,18 @@ typedef struct {
     double impulse_sum; /* of all impulses so far, captures included */
 } Latched;
 
+/* A state of the motion through which an interpolation passes. */
+typedef struct {
+    double time;
+    double *y, *a; /* (2 n,) angles and rates, (n,) accelerations */
+} Node;
+
 /* The latest step with its dense output. */
 typedef struct {
     bool valid;
     double start, h;
     double *y, *k; /* (ny,), (STAGES, ny) */
+    Node before;   /* start of the previous step; at start if the motion is not smooth from there */
 } Arc;
 
 /* The controller of the step size. */
@@ -118,6 +125,8 @@ typedef struct {
     double *sample_y;      /* (2 n,) of each sample */
     Complex *sample_e;     /* (n,) of each sample */
     Located located;
+    Node middle;           /* of the latest step */
+    bool has_middle;       /* whether the middle has been computed */
     double *reach;         /* (n,) bounds of the changes of the arms */
     double *torques;       /* (even + 2,) of the springs in the fastest mode */
     double *response;      /* (even + 2,) accelerations by these torques */

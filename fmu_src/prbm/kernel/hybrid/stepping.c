@@ -117,17 +117,21 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
-PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
-                           Problem *problem) {
+PRBM double difference(Simulation *sim, const double *y, const double *z) {
     size_t mark = sim->scratch.used;
     int ny = state_size(sim);
     double *change = take(&sim->scratch, (size_t)ny), means[2];
     for (int i = 0; i < ny; i++) {
-        change[i] = projected[i] - y[i];
+        change[i] = z[i] - y[i];
     }
-    mean_squares(sim, change, change, y, projected, means);
+    mean_squares(sim, change, change, y, z, means);
     sim->scratch.used = mark;
-    double size = sqrt(means[0]), most = PROJECTION_FACTOR * sqrt(sim->state.tolerance);
+    return sqrt(means[0]);
+}
+
+PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
+                           Problem *problem) {
+    double size = difference(sim, y, projected), most = PROJECTION_FACTOR * sqrt(sim->state.tolerance);
     if (!(size <= most)) {
         return fail(problem,
                     "at t = %.9g s closing the loops would change the motion by %.3g of its size, "
@@ -156,6 +160,18 @@ static double projected_error(Simulation *sim, double h, Problem *problem) {
     return closed ? error : HUGE_VAL;
 }
 
+/* Store the start of the latest step for interpolations in the next one, if the motion is smooth
+ * from there. */
+static void remember_start(State *state, int n) {
+    Node *before = &state->arc.before;
+    bool smooth = state->arc.valid && state->has_k1;
+    before->time = smooth ? state->arc.start : state->front_time;
+    if (smooth) {
+        copy(2 * n, state->arc.y, before->y);
+        copy(n, state->arc.k + n, before->a);
+    }
+}
+
 /* Compute a step within the tolerance and no longer than longest [s].  Its stages are stored in the
  * arc, its projected end in the front. */
 static bool find_step(Simulation *sim, double longest, double *h, Problem *problem) {
@@ -164,6 +180,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
     wanted = rounded_step(lesser(wanted, lesser(longest_step(sim), stable_step(sim))));
     StepSizeController controller = {lesser(wanted, longest), state->log_of_error, STEP_GROWTH_MAX};
+    remember_start(state, ny / 2 - 1);
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
     do {
@@ -177,6 +194,9 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
         state->step_size = greater(controller.h, wanted);
     }
     state->log_of_error = controller.log_of_error;
+    if (state->front_time - state->arc.before.time < NODE_RATIO_MIN * *h) {
+        state->arc.before.time = state->front_time;
+    }
     return true;
 }
 
@@ -219,6 +239,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     double start = state->front_time, end = start + h;
     state->arc.start = start;
     state->arc.h = h;
+    stepping->has_middle = false;
     state->pending.kind = EVENT_NONE;
     if (h > STABLE_STEP_WATCH_FACTOR * stable_step(sim)) {
         refine_fastest(sim);

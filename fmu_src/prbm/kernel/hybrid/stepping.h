@@ -7,6 +7,8 @@
 PRBM double longest_step(const Simulation *sim);
 PRBM bool take_step(Simulation *sim, Problem *problem);
 
+/* Return the root mean square of the difference of two states, relative to the larger of them. */
+PRBM double difference(Simulation *sim, const double *y, const double *z);
 /* Fail if a projection at time t has changed a state y too much. */
 PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
                            Problem *problem);
