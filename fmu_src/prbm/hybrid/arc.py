@@ -56,7 +56,7 @@ class Arc:
     h : float
         Size of the whole step [s].
     end : float
-        End of the step, or the time of the event that ends it [s].
+        End of the step, or the time of the event that ends it, which may be slightly later [s].
     y : (2 n + 2,)
         State at the start.
     k : (stages, 2 n + 2)

@@ -322,17 +322,17 @@ class Simulation:
         if step.h > STABLE_STEP_WATCH_FACTOR * self.fastest.longest_step(equations):
             self.fastest = self.fastest.refined(equations, step.factors)
         arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k).following(last)
-        event = events.first_event(StepView(configuration.scales, equations, arc, step.forces))
+        view = StepView(configuration.scales, equations, arc, step.forces)
+        event = events.first_event(view)
         if event is None:
             y, self.k1 = step.y, step.k[-1]
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
             if event.kind is EventKind.IMPACT and event.time > arc.start:
-                arc, y = arc.cut(equations.rate, event.time)
-            else:
-                arc, y = replace(arc, end=event.time), arc.at(event.time)
-            cut, self.k1 = y, None
+                arc = view.cut(event.contact, event.time)
+            arc, self.k1 = replace(arc, end=event.time), None
+            cut = arc.at(event.time)
             y = equations.project(event.time, cut)
             check_projection(configuration, event.time, cut, y)
         self.front = Front(arc.end, y, equations, front.latched)

@@ -8,6 +8,12 @@ PRBM void arc_at(const Simulation *sim, double t, double *y) {
     interpolate(state_size(sim), arc->y, arc->k, arc->h, (t - arc->start) / arc->h, y);
 }
 
+PRBM void arc_located(const Simulation *sim, double t, double *y) {
+    const Arc *arc = &sim->state.arc;
+    const Located *located = &sim->stepping.located;
+    interpolate(state_size(sim), arc->y, located->k, located->h, (t - arc->start) / located->h, y);
+}
+
 PRBM bool arc_cut(Simulation *sim, double t, double *k, double *y, Problem *problem) {
     const Arc *arc = &sim->state.arc;
     Stepping *stepping = &sim->stepping;

@@ -112,6 +112,8 @@ typedef struct {
     Evaluation evaluation; /* of guards that need forces */
     ForceRange forces;     /* of a step that ends there */
     double *k;             /* (STAGES, ny) of that step */
+    double h;              /* size of the step to the impact that was located last [s] */
+    int stop;              /* the stop of this impact; -1: none in this step */
 } Located;
 
 /* Working memory of a step and of the location of events in it. */

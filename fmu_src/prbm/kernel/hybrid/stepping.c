@@ -209,14 +209,18 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     state->front_time = event->time;
     state->pending = *event;
     state->has_k1 = false;
-    if (event->kind != EVENT_IMPACT || event->time <= state->arc.start) {
-        arc_at(sim, event->time, state->front);
-    } else {
-        if (!arc_cut(sim, event->time, state->arc.k, state->front, problem)) {
-            return false;
+    if (event->kind == EVENT_IMPACT && event->time > state->arc.start) {
+        Located *located = &sim->stepping.located;
+        if (located->stop != event->contact) {
+            located->h = event->time - state->arc.start;
+            if (!arc_cut(sim, event->time, located->k, state->front, problem)) {
+                return false;
+            }
         }
-        state->arc.h = event->time - state->arc.start;
+        copy(STAGES * state_size(sim), located->k, state->arc.k);
+        state->arc.h = located->h;
     }
+    arc_at(sim, event->time, state->front);
     double *y = sim->stepping.end;
     copy(state_size(sim), state->front, y);
     return project(&sim->equations, event->time, state->front, &sim->scratch, problem) &&
@@ -240,6 +244,7 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     state->arc.start = start;
     state->arc.h = h;
     stepping->has_middle = false;
+    stepping->located.stop = -1;
     state->pending.kind = EVENT_NONE;
     if (h > STABLE_STEP_WATCH_FACTOR * stable_step(sim)) {
         refine_fastest(sim);
