@@ -1269,7 +1269,7 @@ def test_steps_of_the_integration_are_the_same(name):
     count = constants()["STAGES"]
     for theirs, mine, y, _ in equations(name, 1):
         h, size = 1e-5, len(y)
-        k, error = np.full((count, size), np.nan), np.full(size, np.nan)
+        k, fine, coarse = (np.full(shape, np.nan) for shape in ((count, size), size, size))
         t = theirs.inputs.walls[0].since + 2e-4
         k[0] = theirs.rate(t, y)
         expected, y1_expected = runge_kutta.stages(PAIR, theirs.rate, t, y, h, k[0])
@@ -1279,10 +1279,9 @@ def test_steps_of_the_integration_are_the_same(name):
         assert_same(k, expected, rel)
         assert_same(y1, y1_expected, rel)
         assert np.all(forces[0] <= forces[1])
-        kernel().error_of(size, expected, h, error)
-        assert_same(error, h * (PAIR.error @ expected), scale=h * np.abs(expected).max())
-        kernel().coarse_error_of(size, expected, h, error)
-        assert_same(error, h * (PAIR.coarse_error @ expected), scale=h * np.abs(expected).max())
+        kernel().errors_of(size, expected, h, fine, coarse)
+        assert_same(fine, h * (PAIR.error @ expected), scale=h * np.abs(expected).max())
+        assert_same(coarse, h * (PAIR.coarse_error @ expected), scale=h * np.abs(expected).max())
         for theta in (0.0, 0.3, 1.0):
             b, middle = np.full(count, np.nan), np.full(size, np.nan)
             kernel().weights(theta, b)

@@ -17,8 +17,7 @@ PRBM bool stages(const Equations *equations, double t, int n, const double *y, d
                  double *k, double *y1, Reference *reference, Evaluation *evaluation, ForceRange *forces,
                  Problem *problem);
 /* The differences between the solution and those of orders 5 and 3. */
-PRBM void error_of(int n, const double *k, double h, double *error);
-PRBM void coarse_error_of(int n, const double *k, double h, double *error);
+PRBM void errors_of(int n, const double *k, double h, double *fine, double *coarse);
 PRBM void weights(double theta, double *b);
 /* Compute the state at the end of a step from its stages. */
 PRBM void step_end(int n, const double *y, const double *k, double h, double *end);

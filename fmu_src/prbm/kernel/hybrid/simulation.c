@@ -137,6 +137,8 @@ static void place_all(Simulation *sim, Memory *memory) {
     place_state(&sim->state, m, memory);
     sim->backup = place(memory, simulation_state_count(sim), sizeof(double));
     system_place(system, m, memory);
+    sim->configuration.least = place(memory, 2 * (size_t)m->coordinate_count + 2, sizeof(double));
+    sim->configuration.share = place(memory, 2 * (size_t)m->coordinate_count + 2, sizeof(double));
     equations_place(&sim->equations, system, memory);
     equations_place(&sim->trial.equations, system, memory);
     sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim),

@@ -21,6 +21,7 @@ typedef struct {
     System system;
     double omega; /* of the fundamental mode; 0 without one */
     Scales scales;
+    double *least, *share; /* (ny,): errors are relative to max(least, share |y|) */
     bool assembled; /* whether the system has been assembled from the acting values */
 } Configuration;
 

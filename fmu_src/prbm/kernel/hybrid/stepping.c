@@ -1,6 +1,7 @@
 /* Steps of variable size: the twin of hybrid/stepping.py. */
 #include <math.h>
 
+#include "core/vectors.h"
 #include "hybrid/arc.h"
 #include "hybrid/events.h"
 #include "hybrid/simulation.h"
@@ -13,30 +14,22 @@
 
 /* --- errors ----------------------------------------------------------------------------------- */
 
-/* Add the squares of the errors x and z, each divided by the largest of |y|, |y1| and least, to two
- * sums. */
-static void add_squares(int n, const double *x, const double *z, const double *y, const double *y1,
-                        double least, double *sums) {
-    for (int i = 0; i < n; i++) {
-        double scale = 1.0 / greater(least, greater(fabs(y[i]), fabs(y1[i])));
-        double fine = x[i] * scale, coarse = z[i] * scale;
-        sums[0] += fine * fine;
-        sums[1] += coarse * coarse;
-    }
-}
-
 /* Compute the mean squares of the errors x and z.  Those of angles are in rad, those of rates and
- * energies relative to their size. */
+ * energies relative to their size in y and y1. */
 static void mean_squares(const Simulation *sim, const double *x, const double *z, const double *y,
                          const double *y1, double *means) {
-    const Scales *scales = &sim->configuration.scales;
-    int n = system_of(sim)->n;
-    means[0] = dot(n, x, x);
-    means[1] = dot(n, z, z);
-    add_squares(n, x + n, z + n, y + n, y1 + n, scales->rate, means);
-    add_squares(2, x + 2 * n, z + 2 * n, y + 2 * n, y1 + 2 * n, scales->energy, means);
-    means[0] /= state_size(sim);
-    means[1] /= state_size(sim);
+    const double *least = sim->configuration.least, *share = sim->configuration.share;
+    int ny = state_size(sim);
+    Lanes fine[SUMS] = {NO_LANES}, coarse[SUMS] = {NO_LANES};
+    for (int j = 0; j < ny; j += LANES) {
+        Lanes size = larger(magnitudes(lanes_at(y + j)), magnitudes(lanes_at(y1 + j)));
+        Lanes scale = 1.0 / larger(lanes_at(least + j), lanes_at(share + j) * size);
+        Lanes a = lanes_at(x + j) * scale, b = lanes_at(z + j) * scale;
+        fine[SUM_OF(j)] += a * a;
+        coarse[SUM_OF(j)] += b * b;
+    }
+    means[0] = total(fine) / ny;
+    means[1] = total(coarse) / ny;
 }
 
 /* --- step sizes ------------------------------------------------------------------------------- */
@@ -109,8 +102,7 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
                 &stepping->reference, &stepping->evaluation, &stepping->forces, problem)) {
         return HUGE_VAL;
     }
-    error_of(ny, arc->k, h, stepping->error);
-    coarse_error_of(ny, arc->k, h, stepping->coarse_error);
+    errors_of(ny, arc->k, h, stepping->error, stepping->coarse_error);
     double means[2];
     mean_squares(sim, stepping->error, stepping->coarse_error, arc->y, stepping->end, means);
     double size = sqrt(means[0] + means[1]), error = size > 0.0 ? means[0] / size : size;
