@@ -1269,7 +1269,7 @@ def test_steps_of_the_integration_are_the_same(name):
     count = constants()["STAGES"]
     for theirs, mine, y, _ in equations(name, 1):
         h, size = 1e-5, len(y)
-        k, error = np.full((count, size), np.nan), np.full(size, np.nan)
+        k, fine, coarse = (np.full(shape, np.nan) for shape in ((count, size), size, size))
         t = theirs.inputs.walls[0].since + 2e-4
         k[0] = theirs.rate(t, y)
         expected, y1_expected = runge_kutta.stages(PAIR, theirs.rate, t, y, h, k[0])
@@ -1279,16 +1279,27 @@ def test_steps_of_the_integration_are_the_same(name):
         assert_same(k, expected, rel)
         assert_same(y1, y1_expected, rel)
         assert np.all(forces[0] <= forces[1])
-        kernel().error_of(size, expected, h, error)
-        assert_same(error, h * (PAIR.error @ expected), scale=h * np.abs(expected).max())
-        kernel().coarse_error_of(size, expected, h, error)
-        assert_same(error, h * (PAIR.coarse_error @ expected), scale=h * np.abs(expected).max())
+        kernel().errors_of(size, expected, h, fine, coarse)
+        assert_same(fine, h * (PAIR.error @ expected), scale=h * np.abs(expected).max())
+        assert_same(coarse, h * (PAIR.coarse_error @ expected), scale=h * np.abs(expected).max())
         for theta in (0.0, 0.3, 1.0):
             b, middle = np.full(count, np.nan), np.full(size, np.nan)
             kernel().weights(theta, b)
             assert_same(b, runge_kutta.powers(PAIR, np.array([theta]))[0], scale=1.0)
             kernel().interpolate(size, y, expected, h, theta, middle)
             assert_same(middle, runge_kutta.interpolate(PAIR, y, expected, h, theta))
+
+
+@twin(hermite_weights=runge_kutta.hermite_weights)
+def test_weights_of_the_interpolation_through_three_states_are_the_same():
+    rng = np.random.default_rng(0)
+    for _ in range(50):
+        nodes, t = rng.permutation([0.0, *rng.uniform([0.2, -5.0], [1.0, -0.2])]), rng.uniform()
+        value, rate = np.full((3, 3), np.nan), np.full((3, 3), np.nan)
+        kernel().hermite_weights(nodes, t, value, rate)
+        expected = runge_kutta.hermite_weights(nodes.tolist(), t)
+        assert_same(value, expected[0], scale=np.abs(expected[0]).max())
+        assert_same(rate, expected[1], scale=np.abs(expected[1]).max())
 
 
 # --- functions of the kernel only ----------------------------------------------------------------

@@ -1,15 +1,48 @@
-"""A step of the integration as a function of time."""
+"""A step of the integration as a function of time.
 
-from dataclasses import dataclass
+There are two interpolations.  The dense output of the pair costs least, and events are detected
+with it.  Outputs and restarts need the accuracy of the method.  The polynomial of degree eight
+through positions, rates and accelerations at three times has it: at both ends of the step, and at
+the start of the previous step.  If the motion is not smooth there, a step to half the time
+computes the third state.
+"""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.tolerances import GUARD_INTERVALS
+from ..base.tolerances import GUARD_INTERVALS, NODE_RATIO_MIN
 from ..mechanics.arrays import Real
-from .runge_kutta import TSITOURAS_PAPAKOSTAS, Rate, interpolate, powers, stages
+from .runge_kutta import (
+    TSITOURAS_PAPAKOSTAS,
+    Rate,
+    hermite_weights,
+    interpolate,
+    powers,
+    stages,
+)
 
 FRACTIONS = np.linspace(0.0, 1.0, GUARD_INTERVALS + 1)
 GRID = powers(TSITOURAS_PAPAKOSTAS, FRACTIONS)
+
+
+@dataclass(frozen=True)
+class Node:
+    """A state of the motion through which an interpolation passes.
+
+    Parameters
+    ----------
+    time : float
+        Time [s].
+    y : (2 n + 2,)
+        State.
+    rates : (2 n + 2,)
+        Rates of the state.
+    """
+
+    time: float
+    y: Real
+    rates: Real
 
 
 @dataclass(frozen=True)
@@ -23,11 +56,13 @@ class Arc:
     h : float
         Size of the whole step [s].
     end : float
-        End of the step, or the time of the event that ends it [s].
+        End of the step, or the time of the event that ends it, which may be slightly later [s].
     y : (2 n + 2,)
         State at the start.
     k : (stages, 2 n + 2)
         Rates of the stages.
+    before : Node or None
+        The start of the previous step, if the motion is smooth from there.
     """
 
     start: float
@@ -35,6 +70,34 @@ class Arc:
     end: float
     y: Real
     k: Real
+    before: Node | None = None
+
+    def following(self, last: "Arc | None") -> "Arc":
+        """Return the step with the start of the previous step, from which the motion is smooth."""
+        if last is None or last.h < NODE_RATIO_MIN * self.h:
+            return self
+        return replace(self, before=Node(last.start, last.y, last.k[0]))
+
+    def middle(self, rate: Rate) -> Node:
+        """Return the state at half the time of the step, by a step of that size."""
+        half, y = self.cut(rate, self.start + 0.5 * self.h)
+        return Node(half.end, y, half.k[-1])
+
+    def through(self, third: Node, t: float) -> Real:
+        """Return the state at time t by the polynomial through a third node, not projected.
+
+        The energies are those of :meth:`at`.
+        """
+        y, n = self.at(t), len(self.y) // 2 - 1
+        end = self.y + self.h * (TSITOURAS_PAPAKOSTAS.weights @ self.k)
+        nodes = (Node(self.start, self.y, self.k[0]), Node(self.start + self.h, end, self.k[-1]))
+        data = np.array([[x.y[:n], x.y[n:-2], x.rates[n:-2]] for x in (*nodes, third)])
+        value, rate = hermite_weights(
+            [x.time - self.start for x in (*nodes, third)], t - self.start
+        )
+        y[:n] = np.tensordot(value, data, 2)
+        y[n:-2] = np.tensordot(rate, data, 2)
+        return y
 
     def at(self, t: float) -> Real:
         """Return the state at time t, not projected."""
@@ -55,7 +118,7 @@ class Arc:
         """
         h = t - self.start
         k, y = stages(TSITOURAS_PAPAKOSTAS, rate, self.start, self.y, h, self.k[0])
-        return Arc(self.start, h, t, self.y, k), y
+        return Arc(self.start, h, t, self.y, k, self.before), y
 
     def samples(self) -> tuple[Real, Real]:
         """Return the times at which guards are evaluated, and the states there.

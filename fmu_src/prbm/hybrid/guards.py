@@ -5,7 +5,7 @@ at a step and returns the time at which the guard of one contact falls through z
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 
@@ -86,12 +86,24 @@ class StepView:
         The step.
     forces : (stages, r)
         Constraint forces of all stages but the first [N].
+    cuts : dict
+        The step that ends close to the impact that was located last, by the index of its stop.
     """
 
     scales: Scales
     equations: Equations
     arc: Arc
     forces: Real
+    cuts: dict[int, Arc] = field(default_factory=dict)
+
+    def located(self, stop: int, t: float) -> Arc:
+        """Return the step to a time close to an impact, and keep it for this impact."""
+        self.cuts.clear()
+        return self.cuts.setdefault(stop, self.arc.cut(self.equations.rate, t)[0])
+
+    def cut(self, stop: int, t: float) -> Arc:
+        """Return the step that was kept for an impact, or else the step to its time."""
+        return self.cuts.get(stop) or self.arc.cut(self.equations.rate, t)[0]
 
     @cached_property
     def samples(self) -> tuple[Real, Complex, Real]:
@@ -206,18 +218,21 @@ def _gap_rate(equations: Equations, stop: int, t: float, y: Real) -> float:
 def _corrected_time(view: StepView, stop: int, t: float, earliest: float) -> float:
     """Return the time at which a gap closes, from the approximate time t by the dense output.
 
-    The gap is that of a step that ends at the time, see :meth:`prbm.hybrid.arc.Arc.cut`.
+    The gap is that of a step that ends close to this time, see :meth:`prbm.hybrid.arc.Arc.cut`.
     The time is never before the apex: the gap is opening there, so that the impact would have no
     effect and be located again and again.
     """
     equations = view.equations
+    if t <= view.arc.start:
+        return t
+    cut = view.located(stop, t)
     for _ in range(EVENT_CORRECTIONS_MAX):
-        y = equations.project(t, view.arc.cut(equations.rate, t)[1])
+        y = equations.project(t, cut.at(t))
         size, rate = gap(equations, stop, t, y), _gap_rate(equations, stop, t, y)
         if rate >= 0.0 or abs(size) <= EVENT_TIME_ATOL * abs(rate):
             break
         change = -size / rate
-        if abs(change) > EVENT_CORRECTION_RTOL * view.arc.h:
+        if abs(change) > EVENT_CORRECTION_RTOL * cut.h:
             break  # At grazing, the time by the dense output is better.
         t = max(earliest, t + change)
     return t

@@ -6,7 +6,7 @@ Sources
 .. [2] E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, II.4-II.6.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -180,6 +180,50 @@ def interpolate(tableau: Tableau, y: Real, k: Real, h: float, theta: float) -> R
     b = tableau.dense @ theta ** np.arange(1, tableau.dense.shape[1] + 1)
     result: Real = y + h * (b @ k)
     return result
+
+
+def hermite_weights(nodes: Sequence[float], t: float) -> tuple[Real, Real]:
+    """Return the weights of the data at three nodes in a polynomial of degree eight at t.
+
+    Parameters
+    ----------
+    nodes : (3,)
+        Different times [s].
+    t : float
+        Time [s].
+
+    Returns
+    -------
+    value : (3, 3)
+        Weights of value, first and second derivative at each node in the value at t.
+    rate : (3, 3)
+        Their weights in the first derivative at t.
+
+    Examples
+    --------
+    t^8 is reproduced, here at 3, where it is 6561 and its derivative 17496:
+
+    >>> t = np.array([0.0, 1.0, 2.0])
+    >>> data = np.array([t**8, 8 * t**7, 56 * t**6]).T
+    >>> [float(round((w * data).sum(), 6)) for w in hermite_weights([0.0, 1.0, 2.0], 3.0)]
+    [6561.0, 17496.0]
+    """
+    value, rate = np.empty((3, 3)), np.empty((3, 3))
+    for i, node in enumerate(nodes):
+        a, b = nodes[(i + 1) % 3], nodes[(i + 2) % 3]
+        product, x = (node - a) * (node - b), t - node
+        # With u = (t - a) (t - b)/product, the polynomials of the node are u^3 times the first
+        # three terms of 1/u^3 (1, x, x^2/2) = (1 - c x + d x^2) (1, x, x^2/2).
+        u, slope = (t - a) * (t - b) / product, ((t - a) + (t - b)) / product
+        cube, cube_slope = u * u * u, 3.0 * u * u * slope
+        sum_ = 1.0 / (node - a) + 1.0 / (node - b)
+        c, d = 3.0 * sum_, 6.0 * sum_ * sum_ - 3.0 / product
+        basis = (1.0 - c * x + d * x * x, x - c * x * x, 0.5 * x * x)
+        slopes = (2.0 * d * x - c, 1.0 - 2.0 * c * x, x)
+        for k in range(3):
+            value[i, k] = cube * basis[k]
+            rate[i, k] = cube_slope * basis[k] + cube * slopes[k]
+    return value, rate
 
 
 def rk4(f: Rate, t: float, y: Real, h: float) -> Real:

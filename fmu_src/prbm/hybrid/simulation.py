@@ -16,7 +16,13 @@ import numpy as np
 
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
-from ..base.tolerances import EFFORT_MAX, STABLE_STEP_WATCH_FACTOR, STEPS_MAX
+from ..base.tolerances import (
+    EFFORT_MAX,
+    INTERPOLATION_FACTOR,
+    NODE_STEP_RTOL,
+    STABLE_STEP_WATCH_FACTOR,
+    STEPS_MAX,
+)
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactState
 from ..mechanics.dynamics import Equations
@@ -24,7 +30,7 @@ from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from . import contact_modes, events, impacts, snapshot, walls
-from .arc import Arc
+from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
@@ -34,7 +40,7 @@ from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
 from .release import released
 from .stability import FastestMode
-from .stepping import StepSizeController, check_projection, take_step
+from .stepping import StepSizeController, check_projection, error_norm, take_step
 
 
 class Simulation:
@@ -103,6 +109,7 @@ class Simulation:
         self.record: list[Impact] | None = None
         self.step_count = 0  # Integration steps since the start, for limits of the effort.
         self._output_cache: tuple[float, Outputs] | None = None
+        self._middle: tuple[Arc, Node] | None = None  # The middle of a step.
 
     # -- mechanism and equations --
 
@@ -296,23 +303,24 @@ class Simulation:
         if front is not self.front:
             self._set_front(front, [])
         configuration, equations = self.configuration, front.equations
+        last = self.arc
         if self.k1 is None:
             self.k1 = equations.rate(front.time, front.y)
         step, controller = take_step(configuration, front, self.k1, self.controller, self.fastest)
         if step.h > STABLE_STEP_WATCH_FACTOR * self.fastest.longest_step(equations):
             self.fastest = self.fastest.refined(equations, step.factors)
-        arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k)
-        event = events.first_event(StepView(configuration.scales, equations, arc, step.forces))
+        arc = Arc(front.time, step.h, front.time + step.h, front.y, step.k).following(last)
+        view = StepView(configuration.scales, equations, arc, step.forces)
+        event = events.first_event(view)
         if event is None:
             y, self.k1 = step.y, step.k[-1]
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
             if event.kind is EventKind.IMPACT and event.time > arc.start:
-                arc, y = arc.cut(equations.rate, event.time)
-            else:
-                arc, y = replace(arc, end=event.time), arc.at(event.time)
-            cut, self.k1 = y, None
+                arc = view.cut(event.contact, event.time)
+            arc, self.k1 = replace(arc, end=event.time), None
+            cut = arc.at(event.time)
             y = equations.project(event.time, cut)
             check_projection(configuration, event.time, cut, y)
         self.front = Front(arc.end, y, equations, front.latched)
@@ -335,11 +343,31 @@ class Simulation:
         if self.arc is None or self.time >= self.front.time:
             return self.front.y
         # The present equations are those of the step that passes the present time.
-        n, y = self.system.n, self.arc.at(self.time)
+        n, y = self.system.n, self._interpolated(self.arc)
         evaluation = self.equations.evaluate(self.time, y[:n], y[n : 2 * n])
         projected = self.equations.project_near(self.time, y, evaluation.factors)
         check_projection(self.configuration, self.time, y, projected)
         return projected
+
+    def _interpolated(self, arc: Arc) -> Real:
+        """Return the state at the present time in a step, not projected.
+
+        If the two interpolations differ too much, a step to the present time replaces them.
+        """
+        dense, scales = arc.at(self.time), self.configuration.scales
+        if arc.h < NODE_STEP_RTOL * scales.time:
+            return dense
+        y = arc.through(arc.before or self._middle_of(arc), self.time)
+        difference = error_norm(scales, y - dense, dense, y)
+        if difference <= INTERPOLATION_FACTOR * self.configuration.tolerance:
+            return y
+        return arc.cut(self.equations.rate, self.time)[1]
+
+    def _middle_of(self, arc: Arc) -> Node:
+        """Return the state at half the time of a step, which is computed once."""
+        if self._middle is None or self._middle[0] is not arc:
+            self._middle = (arc, arc.middle(self.equations.rate))
+        return self._middle[1]
 
     def magnitudes(self) -> Magnitudes:
         """Return typical magnitudes of a motion that starts with the present state."""

@@ -9,7 +9,7 @@ import numpy as np
 from ..mechanics.arrays import Real
 from ..mechanics.contact_state import ContactMode, ContactState
 from ..mechanics.inputs import Inputs, Wall
-from .arc import Arc
+from .arc import Arc, Node
 from .configuration import Configuration
 from .events import Event, EventKind
 from .front import Front, Latched
@@ -75,6 +75,7 @@ def plain_arc(arc: Arc | None) -> Plain | None:
         return None
     return {
         "start": arc.start, "h": arc.h, "end": arc.end, "y": arc.y.tolist(), "k": arc.k.tolist(),
+        "before": plain_node(arc.before),
     }  # fmt: skip
 
 
@@ -83,7 +84,18 @@ def arc_of(plain: Mapping[str, Any] | None) -> Arc | None:
     if plain is None:
         return None
     start, h, end = plain["start"], plain["h"], plain["end"]
-    return Arc(start, h, end, np.array(plain["y"]), np.array(plain["k"]))
+    before = plain["before"]
+    node = (
+        Node(before["time"], np.array(before["y"]), np.array(before["rates"])) if before else None
+    )
+    return Arc(start, h, end, np.array(plain["y"]), np.array(plain["k"]), node)
+
+
+def plain_node(node: Node | None) -> Plain | None:
+    """Return a node of an interpolation as plain values."""
+    if node is None:
+        return None
+    return {"time": node.time, "y": node.y.tolist(), "rates": node.rates.tolist()}
 
 
 def plain_event(event: Event | None) -> list[float] | None:

@@ -52,6 +52,16 @@ static inline Lanes magnitudes(Lanes x) {
     return from_bits(bits_of(x) & (UINT64_MAX >> 1));
 }
 
+/* The larger of two numbers; b if one of them is NaN. */
+static inline Lanes larger(Lanes a, Lanes b) {
+#if VECTORS
+    LaneBits first = (LaneBits)(a > b);
+    return from_bits((bits_of(a) & first) | (bits_of(b) & ~first));
+#else
+    return a > b ? a : b;
+#endif
+}
+
 /* The even and the odd terms of a sum are summed separately and added at the end.  For Lanes
  * sum[SUMS], term i is added to sum[SUM_OF(i)]. */
 #define SUM_OF(i) ((i) / LANES % SUMS)

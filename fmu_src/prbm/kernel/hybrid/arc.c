@@ -8,6 +8,12 @@ PRBM void arc_at(const Simulation *sim, double t, double *y) {
     interpolate(state_size(sim), arc->y, arc->k, arc->h, (t - arc->start) / arc->h, y);
 }
 
+PRBM void arc_located(const Simulation *sim, double t, double *y) {
+    const Arc *arc = &sim->state.arc;
+    const Located *located = &sim->stepping.located;
+    interpolate(state_size(sim), arc->y, located->k, located->h, (t - arc->start) / located->h, y);
+}
+
 PRBM bool arc_cut(Simulation *sim, double t, double *k, double *y, Problem *problem) {
     const Arc *arc = &sim->state.arc;
     Stepping *stepping = &sim->stepping;
@@ -20,6 +26,71 @@ PRBM bool arc_cut(Simulation *sim, double t, double *k, double *y, Problem *prob
                   problem);
 }
 
+/* Compute the state at half the time of the step, by a step of that size. */
+static bool find_middle(Simulation *sim, Problem *problem) {
+    const Arc *arc = &sim->state.arc;
+    Located *located = &sim->stepping.located;
+    Node *middle = &sim->stepping.middle;
+    int ny = state_size(sim), n = ny / 2 - 1;
+    middle->time = arc->start + 0.5 * arc->h;
+    if (!arc_cut(sim, middle->time, located->k, located->y, problem)) {
+        return false;
+    }
+    copy(2 * n, located->y, middle->y);
+    copy(n, located->k + (STAGES - 1) * ny + n, middle->a);
+    sim->stepping.has_middle = true;
+    return true;
+}
+
+/* Interpolate positions and rates through both ends of the step and a third node. */
+static void through(Simulation *sim, const Node *third, double t, double *y) {
+    const Arc *arc = &sim->state.arc;
+    int ny = state_size(sim), n = ny / 2 - 1;
+    double *end = sim->stepping.located.y, value[NODES * NODES], rate[NODES * NODES];
+    double times[NODES] = {0.0, arc->h, third->time - arc->start};
+    step_end(ny, arc->y, arc->k, arc->h, end);
+    hermite_weights(times, t - arc->start, value, rate);
+    const double *data[NODES * NODES] = {
+        arc->y, arc->y + n, arc->k + n,
+        end, end + n, arc->k + (STAGES - 1) * ny + n,
+        third->y, third->y + n, third->a,
+    };
+    for (int j = 0; j < n; j++) {
+        double position = 0.0, speed = 0.0;
+        for (int i = 0; i < NODES * NODES; i++) {
+            position += value[i] * data[i][j];
+            speed += rate[i] * data[i][j];
+        }
+        y[j] = position;
+        y[n + j] = speed;
+    }
+}
+
+/* Compute the state y at time t in the step by a polynomial of degree eight: through both ends of
+ * the step, and the start of the previous step or the middle of this one.  The energies are those
+ * of the dense output.  If it differs too much from the dense output, a step to the time replaces
+ * it. */
+static bool interpolated(Simulation *sim, double t, double *y, Problem *problem) {
+    const Arc *arc = &sim->state.arc;
+    Located *located = &sim->stepping.located;
+    int ny = state_size(sim);
+    arc_at(sim, t, y);
+    if (arc->h < NODE_STEP_RTOL * sim->configuration.scales.time) {
+        return true;
+    }
+    bool before = arc->before.time < arc->start;
+    if (!before && !sim->stepping.has_middle && !find_middle(sim, problem)) {
+        return false;
+    }
+    size_t mark = sim->scratch.used;
+    double *dense = take(&sim->scratch, (size_t)ny);
+    copy(ny, y, dense);
+    through(sim, before ? &arc->before : &sim->stepping.middle, t, y);
+    bool close = difference(sim, dense, y) <= INTERPOLATION_FACTOR * sim->state.tolerance;
+    sim->scratch.used = mark;
+    return close || arc_cut(sim, t, located->k, y, problem);
+}
+
 PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *evaluation,
                     Problem *problem) {
     const State *state = &sim->state;
@@ -29,7 +100,9 @@ PRBM bool arc_state(Simulation *sim, double *y, Reference *near, Evaluation *eva
         set_reference(near, system, y);
         return true;
     }
-    arc_at(sim, state->time, y);
+    if (!interpolated(sim, state->time, y, problem)) {
+        return false;
+    }
     set_reference(near, system, y);
     size_t mark = sim->scratch.used;
     double *interpolated = take(&sim->scratch, (size_t)state_size(sim));

@@ -5,6 +5,8 @@
 #include "hybrid/state.h"
 
 PRBM void arc_at(const Simulation *sim, double t, double *y);
+/* Compute the state by the dense output of the step to the impact that was located last. */
+PRBM void arc_located(const Simulation *sim, double t, double *y);
 /* Compute a step from the start of the latest step to time t: its stages k (STAGES, ny) and the
  * state y at its end, which is not projected. */
 PRBM bool arc_cut(Simulation *sim, double t, double *k, double *y, Problem *problem);

@@ -264,11 +264,20 @@ static double locate(const ArcGuard *guard, double a, double b) {
 static bool polish_impact(const Search *search, double apex, double *time) {
     Simulation *sim = search->sim;
     int n = system_of(sim)->n, stop = search->contact;
-    double t = *time, *y = sim->stepping.located.y;
-    Complex *e = sim->stepping.located.e;
+    Located *located = &sim->stepping.located;
+    double t = *time, *y = located->y;
+    Complex *e = located->e;
+    if (t <= sim->state.arc.start) {
+        return true;
+    }
+    located->h = t - sim->state.arc.start;
+    located->stop = stop;
+    if (!arc_cut(sim, t, located->k, y, search->problem)) {
+        return false;
+    }
     for (int step = 0; step < EVENT_CORRECTIONS_MAX; step++) {
-        if (!arc_cut(sim, t, sim->stepping.located.k, y, search->problem) ||
-            !project(&sim->equations, t, y, &sim->scratch, search->problem)) {
+        arc_located(sim, t, y);
+        if (!project(&sim->equations, t, y, &sim->scratch, search->problem)) {
             return false;
         }
         directions(system_of(sim), y, e);
@@ -276,7 +285,7 @@ static bool polish_impact(const Search *search, double apex, double *time) {
         double speed = gap_rate(&sim->equations, stop, t, e, y + n);
         double change = -distance / speed;
         if (speed >= 0.0 || fabs(distance) <= EVENT_TIME_ATOL * fabs(speed) ||
-            fabs(change) > EVENT_CORRECTION_RTOL * sim->state.arc.h) {
+            fabs(change) > EVENT_CORRECTION_RTOL * located->h) {
             break; /* Converged, or grazing, where the time by the dense output is better. */
         }
         t = greater(apex, t + change);

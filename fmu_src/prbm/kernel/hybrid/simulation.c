@@ -48,6 +48,7 @@ static void place_numbers(State *state, const Mechanism *m, Memory *memory) {
         {&state->received, LOADS * (size_t)m->force_count},
         {&state->front, ny},         {&state->k1, ny},
         {&state->arc.y, ny},         {&state->arc.k, STAGES * ny},
+        {&state->arc.before.y, ny - 2}, {&state->arc.before.a, (size_t)m->coordinate_count},
         {&state->fastest, (size_t)m->coordinate_count},
         {&state->floors, s},         {&state->accepted, (size_t)m->coordinate_count},
         {&state->states, 2 * (size_t)m->independent_count + 2},
@@ -110,6 +111,8 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     stepping->located.forces.least = place(memory, s, d);
     stepping->located.forces.largest = place(memory, s, d);
     stepping->located.k = place(memory, STAGES * ny, d);
+    stepping->middle.y = place(memory, 2 * n, d);
+    stepping->middle.a = place(memory, n, d);
     stepping->reach = place(memory, n, d);
     stepping->torques = place(memory, (size_t)system->even + 2, d);
     stepping->response = place(memory, (size_t)system->even + 2, d);
@@ -134,6 +137,8 @@ static void place_all(Simulation *sim, Memory *memory) {
     place_state(&sim->state, m, memory);
     sim->backup = place(memory, simulation_state_count(sim), sizeof(double));
     system_place(system, m, memory);
+    sim->configuration.least = place(memory, 2 * (size_t)m->coordinate_count + 2, sizeof(double));
+    sim->configuration.share = place(memory, 2 * (size_t)m->coordinate_count + 2, sizeof(double));
     equations_place(&sim->equations, system, memory);
     equations_place(&sim->trial.equations, system, memory);
     sim->trial.contacts.modes = place(memory, (size_t)contact_count(sim),
@@ -254,7 +259,7 @@ static void clear_progress(State *state, double start_time) {
     state->started = state->has_k1 = state->arc.valid = state->interrupted = false;
     state->time = state->front_time = state->window_since = start_time;
     state->point = start_time;
-    state->longest = state->arc.start = state->arc.h = 0.0;
+    state->longest = state->arc.start = state->arc.h = state->arc.before.time = 0.0;
     state->step_size = state->log_of_error = state->fastest_rate = 0.0;
     state->tolerance = state->frequency = state->angle = state->energy = 0.0;
     state->window_count = 0;

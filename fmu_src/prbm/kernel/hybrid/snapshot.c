@@ -7,7 +7,7 @@
 #include "hybrid/simulation.h"
 #include "hybrid/snapshot.h"
 
-enum { SCALARS = 24, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
+enum { SCALARS = 25, PER_STOP_STATE = 16 }; /* numbers of a simulation and of a stop */
 
 PRBM size_t simulation_state_count(const Simulation *simulation) {
     const Mechanism *m = simulation->configuration.mechanism;
@@ -42,6 +42,7 @@ PRBM void simulation_save(const Simulation *simulation, double *to) {
         state->step_size,    state->log_of_error,   state->front_time,   state->arc.start,
         state->arc.h,        state->window_since,   state->point,        state->longest,
         state->mode.lowest_bounce, state->angle,     state->energy,         state->fastest_rate,
+        state->arc.before.time,
     };
     memcpy(to, scalars, sizeof scalars);
     to += SCALARS;
@@ -104,6 +105,7 @@ static void get_scalars(State *state, StateReader *reader) {
     state->angle = get_number(reader);
     state->energy = get_number(reader);
     state->fastest_rate = get_number(reader);
+    state->arc.before.time = get_number(reader);
 }
 
 static void get_stop(State *state, int i, StateReader *reader) {
@@ -162,7 +164,8 @@ static bool consistent(const Simulation *sim) {
     return !state->started ||
            (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_USED_MAX &&
             state->frequency >= 0.0 && state->fastest_rate >= 0.0 &&
-            (!state->arc.valid || state->arc.h > 0.0) && state->front_time >= state->time &&
+            (!state->arc.valid ||
+             (state->arc.h > 0.0 && state->arc.before.time <= state->arc.start)) && state->front_time >= state->time &&
             (!state->mode.exchange ||
              (state->angle >= NOMINAL_ANGLE_MIN && state->energy > 0.0)));
 }
@@ -172,6 +175,7 @@ static bool consistent(const Simulation *sim) {
 /* Compute the configuration and the equations from a state that has been read. */
 static bool rebuild(Simulation *sim, Problem *problem) {
     Configuration *configuration = &sim->configuration;
+    sim->stepping.has_middle = false;
     if (!sim->state.started) {
         return true;
     }

@@ -21,6 +21,7 @@ typedef struct {
     System system;
     double omega; /* of the fundamental mode; 0 without one */
     Scales scales;
+    double *least, *share; /* (ny,): errors are relative to max(least, share |y|) */
     bool assembled; /* whether the system has been assembled from the acting values */
 } Configuration;
 
@@ -37,11 +38,18 @@ typedef struct {
     double impulse_sum; /* of all impulses so far, captures included */
 } Latched;
 
+/* A state of the motion through which an interpolation passes. */
+typedef struct {
+    double time;
+    double *y, *a; /* (2 n,) angles and rates, (n,) accelerations */
+} Node;
+
 /* The latest step with its dense output. */
 typedef struct {
     bool valid;
     double start, h;
     double *y, *k; /* (ny,), (STAGES, ny) */
+    Node before;   /* start of the previous step; at start if the motion is not smooth from there */
 } Arc;
 
 /* The controller of the step size. */
@@ -105,6 +113,8 @@ typedef struct {
     Evaluation evaluation; /* of guards that need forces */
     ForceRange forces;     /* of a step that ends there */
     double *k;             /* (STAGES, ny) of that step */
+    double h;              /* size of the step to the impact that was located last [s] */
+    int stop;              /* the stop of this impact; -1: none in this step */
 } Located;
 
 /* Working memory of a step and of the location of events in it. */
@@ -118,6 +128,8 @@ typedef struct {
     double *sample_y;      /* (2 n,) of each sample */
     Complex *sample_e;     /* (n,) of each sample */
     Located located;
+    Node middle;           /* of the latest step */
+    bool has_middle;       /* whether the middle has been computed */
     double *reach;         /* (n,) bounds of the changes of the arms */
     double *torques;       /* (even + 2,) of the springs in the fastest mode */
     double *response;      /* (even + 2,) accelerations by these torques */

@@ -1,6 +1,7 @@
 /* Steps of variable size: the twin of hybrid/stepping.py. */
 #include <math.h>
 
+#include "core/vectors.h"
 #include "hybrid/arc.h"
 #include "hybrid/events.h"
 #include "hybrid/simulation.h"
@@ -13,30 +14,22 @@
 
 /* --- errors ----------------------------------------------------------------------------------- */
 
-/* Add the squares of the errors x and z, each divided by the largest of |y|, |y1| and least, to two
- * sums. */
-static void add_squares(int n, const double *x, const double *z, const double *y, const double *y1,
-                        double least, double *sums) {
-    for (int i = 0; i < n; i++) {
-        double scale = 1.0 / greater(least, greater(fabs(y[i]), fabs(y1[i])));
-        double fine = x[i] * scale, coarse = z[i] * scale;
-        sums[0] += fine * fine;
-        sums[1] += coarse * coarse;
-    }
-}
-
 /* Compute the mean squares of the errors x and z.  Those of angles are in rad, those of rates and
- * energies relative to their size. */
+ * energies relative to their size in y and y1. */
 static void mean_squares(const Simulation *sim, const double *x, const double *z, const double *y,
                          const double *y1, double *means) {
-    const Scales *scales = &sim->configuration.scales;
-    int n = system_of(sim)->n;
-    means[0] = dot(n, x, x);
-    means[1] = dot(n, z, z);
-    add_squares(n, x + n, z + n, y + n, y1 + n, scales->rate, means);
-    add_squares(2, x + 2 * n, z + 2 * n, y + 2 * n, y1 + 2 * n, scales->energy, means);
-    means[0] /= state_size(sim);
-    means[1] /= state_size(sim);
+    const double *least = sim->configuration.least, *share = sim->configuration.share;
+    int ny = state_size(sim);
+    Lanes fine[SUMS] = {NO_LANES}, coarse[SUMS] = {NO_LANES};
+    for (int j = 0; j < ny; j += LANES) {
+        Lanes size = larger(magnitudes(lanes_at(y + j)), magnitudes(lanes_at(y1 + j)));
+        Lanes scale = 1.0 / larger(lanes_at(least + j), lanes_at(share + j) * size);
+        Lanes a = lanes_at(x + j) * scale, b = lanes_at(z + j) * scale;
+        fine[SUM_OF(j)] += a * a;
+        coarse[SUM_OF(j)] += b * b;
+    }
+    means[0] = total(fine) / ny;
+    means[1] = total(coarse) / ny;
 }
 
 /* --- step sizes ------------------------------------------------------------------------------- */
@@ -109,25 +102,28 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
                 &stepping->reference, &stepping->evaluation, &stepping->forces, problem)) {
         return HUGE_VAL;
     }
-    error_of(ny, arc->k, h, stepping->error);
-    coarse_error_of(ny, arc->k, h, stepping->coarse_error);
+    errors_of(ny, arc->k, h, stepping->error, stepping->coarse_error);
     double means[2];
     mean_squares(sim, stepping->error, stepping->coarse_error, arc->y, stepping->end, means);
     double size = sqrt(means[0] + means[1]), error = size > 0.0 ? means[0] / size : size;
     return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
-PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
-                           Problem *problem) {
+PRBM double difference(Simulation *sim, const double *y, const double *z) {
     size_t mark = sim->scratch.used;
     int ny = state_size(sim);
     double *change = take(&sim->scratch, (size_t)ny), means[2];
     for (int i = 0; i < ny; i++) {
-        change[i] = projected[i] - y[i];
+        change[i] = z[i] - y[i];
     }
-    mean_squares(sim, change, change, y, projected, means);
+    mean_squares(sim, change, change, y, z, means);
     sim->scratch.used = mark;
-    double size = sqrt(means[0]), most = PROJECTION_FACTOR * sqrt(sim->state.tolerance);
+    return sqrt(means[0]);
+}
+
+PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
+                           Problem *problem) {
+    double size = difference(sim, y, projected), most = PROJECTION_FACTOR * sqrt(sim->state.tolerance);
     if (!(size <= most)) {
         return fail(problem,
                     "at t = %.9g s closing the loops would change the motion by %.3g of its size, "
@@ -156,6 +152,18 @@ static double projected_error(Simulation *sim, double h, Problem *problem) {
     return closed ? error : HUGE_VAL;
 }
 
+/* Store the start of the latest step for interpolations in the next one, if the motion is smooth
+ * from there. */
+static void remember_start(State *state, int n) {
+    Node *before = &state->arc.before;
+    bool smooth = state->arc.valid && state->has_k1;
+    before->time = smooth ? state->arc.start : state->front_time;
+    if (smooth) {
+        copy(2 * n, state->arc.y, before->y);
+        copy(n, state->arc.k + n, before->a);
+    }
+}
+
 /* Compute a step within the tolerance and no longer than longest [s].  Its stages are stored in the
  * arc, its projected end in the front. */
 static bool find_step(Simulation *sim, double longest, double *h, Problem *problem) {
@@ -164,6 +172,7 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
     double wanted = state->step_size > 0.0 ? state->step_size : first_step(sim);
     wanted = rounded_step(lesser(wanted, lesser(longest_step(sim), stable_step(sim))));
     StepSizeController controller = {lesser(wanted, longest), state->log_of_error, STEP_GROWTH_MAX};
+    remember_start(state, ny / 2 - 1);
     copy(ny, state->front, state->arc.y);
     copy(ny, state->k1, state->arc.k);
     do {
@@ -177,6 +186,9 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
         state->step_size = greater(controller.h, wanted);
     }
     state->log_of_error = controller.log_of_error;
+    if (state->front_time - state->arc.before.time < NODE_RATIO_MIN * *h) {
+        state->arc.before.time = state->front_time;
+    }
     return true;
 }
 
@@ -199,6 +211,7 @@ PRBM bool end_step(Simulation *sim, double t, Problem *problem) {
         return true;
     }
     state->arc.h = t - state->arc.start;
+    sim->stepping.has_middle = false;
     return arc_cut(sim, t, state->arc.k, state->front, problem) && project_end(sim, problem);
 }
 
@@ -210,7 +223,15 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     state->pending = *event;
     state->has_k1 = false;
     if (event->kind == EVENT_IMPACT && event->time > state->arc.start) {
-        return end_step(sim, event->time, problem);
+        Located *located = &sim->stepping.located;
+        if (located->stop != event->contact) {
+            located->h = event->time - state->arc.start;
+            if (!arc_cut(sim, event->time, located->k, state->front, problem)) {
+                return false;
+            }
+        }
+        copy(STAGES * state_size(sim), located->k, state->arc.k);
+        state->arc.h = located->h;
     }
     arc_at(sim, event->time, state->front);
     return project_end(sim, problem);
@@ -233,6 +254,8 @@ PRBM bool take_step(Simulation *sim, Problem *problem) {
     double start = state->front_time, end = start + h;
     state->arc.start = start;
     state->arc.h = h;
+    stepping->has_middle = false;
+    stepping->located.stop = -1;
     state->pending.kind = EVENT_NONE;
     if (h > STABLE_STEP_WATCH_FACTOR * stable_step(sim)) {
         refine_fastest(sim);

@@ -10,6 +10,8 @@ PRBM bool take_step(Simulation *sim, Problem *problem);
  * step, which is below that of the dense output. */
 PRBM bool end_step(Simulation *sim, double t, Problem *problem);
 
+/* Return the root mean square of the difference of two states, relative to the larger of them. */
+PRBM double difference(Simulation *sim, const double *y, const double *z);
 /* Fail if a projection at time t has changed a state y too much. */
 PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
                            Problem *problem);
