@@ -11,6 +11,7 @@ import re
 import reprlib
 from decimal import Decimal
 from functools import cache
+from itertools import chain
 from typing import Any
 
 from ..base.errors import MechanismError
@@ -22,6 +23,15 @@ EXPONENT_MAX = 20  # Exponent of a base unit; no quantity of mechanics has a lar
 COHERENT = (
     "m", "kg", "s", "rad", "N", "Pa", "kg/m3", "kg.m2", "N/m", "N.m", "m/s", "m/s2", "Hz", "rad/s",
 )  # fmt: skip
+COMMON = {
+    "m": {"m": 0, "cm": -2, "mm": -3, "um": -6, "µm": -6, "μm": -6, "nm": -9},
+    "kg": {"kg": 0, "g": -3, "mg": -6},
+    "kg/m3": {"kg/m3": 0, "g/cm3": 3},
+    "kg.m2": {"kg.m2": 0, "kg m2": 0, "kg.mm2": -6, "kg mm2": -6, "g.mm2": -9, "g mm2": -9},
+    "Pa": {"Pa": 0, "kPa": 3, "MPa": 6, "GPa": 9},
+    "s": {"s": 0, "ms": -3, "us": -6, "µs": -6, "μs": -6},
+}
+"""Powers of ten by SI unit and written unit.  Without other units, pint is not imported."""
 PREFIXES = """
 femto- = 1e-15 = f-
 pico- = 1e-12 = p-
@@ -131,6 +141,9 @@ def converted(value: str, unit: str, wanted: str) -> float:
     >>> converted("2", "g", "m/s2")
     19.6133
     """
+    common = COMMON.get(wanted, {}).get(unit)
+    if common is not None:
+        return _scaled(value, common)
     if unit == "g" and same_dimension(wanted or "1", "m/s2"):
         value, unit = str(Decimal(value) * Decimal(STANDARD_GRAVITY)), "m/s2"
     written = _unit(unit)
@@ -141,6 +154,14 @@ def converted(value: str, unit: str, wanted: str) -> float:
     except ArithmeticError:
         result = math.inf
     return _finite(result)
+
+
+def _scaled(value: str, power: int) -> float:
+    """Return a decimal number times a power of ten, correctly rounded."""
+    try:
+        return _finite(Decimal(value).scaleb(power))
+    except ArithmeticError:
+        return _finite(math.inf)
 
 
 def same_dimension(unit: str, other: str) -> bool:
@@ -168,8 +189,11 @@ def si_unit(written: str) -> str:
     ('m', 'N.m', '')
     """
     plain = _PLAIN.fullmatch(_short(written))
-    near = (unit for unit in COHERENT if plain and same_dimension(plain[2], unit))
-    return next(near, "")
+    if plain is None:
+        return ""
+    common = (unit for unit, known in COMMON.items() if plain[2] in known)
+    near = (unit for unit in COHERENT if same_dimension(plain[2], unit))
+    return next(chain(common, near), "")
 
 
 def check_coherent(unit: str) -> None:

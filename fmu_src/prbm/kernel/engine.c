@@ -1,4 +1,5 @@
 /* The library of the Python package: simulations with a record of their impacts. */
+#include <limits.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -7,7 +8,7 @@
 #include "hybrid/simulation.h"
 #include "values.h"
 
-enum { FIRST_IMPACTS = 64, IMPACTS_MAX = 1 << 24 };
+enum { FIRST_IMPACTS = 16 }; /* number of impacts for which there is memory at first */
 
 struct Engine {
     Simulation *simulation;
@@ -68,11 +69,13 @@ static bool make_room(Engine *engine) {
     if (engine->count < engine->room) {
         return true;
     }
+    if (engine->room > INT_MAX / 2) {
+        return false;
+    }
     int room = engine->room ? 2 * engine->room : FIRST_IMPACTS;
     size_t size = impact_size(engine) * sizeof(double);
-    double *record = room <= IMPACTS_MAX && (size_t)room < SIZE_MAX / size
-                         ? realloc(engine->record, (size_t)room * size)
-                         : NULL;
+    bool fits = (size_t)room < SIZE_MAX / size;
+    double *record = fits ? realloc(engine->record, (size_t)room * size) : NULL;
     if (!record) {
         return false;
     }
