@@ -91,6 +91,29 @@ def animation_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def study_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of ``prbm study``."""
+    add = parser.add_argument
+    add(
+        "--vary", action="append", required=True, metavar="NAME=LOW:HIGH:COUNT",
+        help="parameter or input and its samples; a unit of HIGH holds for both; once or twice",
+    )  # fmt: skip
+    add(
+        "--of", nargs="+", metavar="OUTPUT",
+        help="outputs: settling, impacts, impact_speed, peak_speed, energy_lost; a variable, for "
+        "its final value; max(x), min(x), mean(x), first(x > 0), since(x > 0), also of abs(x)",
+    )  # fmt: skip
+    optimum = parser.add_mutually_exclusive_group()
+    optimum.add_argument("--minimise", metavar="OUTPUT", help="output whose minimum is searched")
+    optimum.add_argument("--maximise", metavar="OUTPUT", help="output whose maximum is searched")
+    add("--step", metavar="T", help="time between samples of a motion [s] (default: 1/4000 of it)")
+    add(
+        "--tolerance", metavar="X",
+        help="relative tolerance of the integration (default: solver.tolerance)",
+    )  # fmt: skip
+    add("--workers", type=int, metavar="N", help="number of processes (default: one per core)")
+
+
 def stop_time_argument(parser: ArgumentParser) -> None:
     """Add --stop-time."""
     parser.add_argument(

@@ -27,6 +27,7 @@ from .arguments import (
     picture_arguments,
     set_argument,
     stop_time_argument,
+    study_arguments,
 )
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
 from .remedies import in_options
@@ -125,6 +126,7 @@ def parser() -> argparse.ArgumentParser:
     _fit(commands)
     _impact_map(commands)
     _sweep(commands)
+    _study(commands)
     _measure(commands)
     _picture(commands)
     _animate(commands)
@@ -414,6 +416,23 @@ def _sweep(commands: Commands) -> None:
     add("--timeout", metavar="T", help="longest duration of a run [s] (default: no limit)")
     add("--overwrite", action="store_true", help="delete earlier results")
     add("--retry-failed", action="store_true", help="repeat runs that failed earlier")
+
+
+def _study(commands: Commands) -> None:
+    parser = _command(
+        commands, "study", "study:studied",
+        "simulate over one or two parameters, and find the optimum of an output",
+        _examples(
+            'prbm study PRBDM2R --vary "stop.position=-4:2 mm:25" --stop-time 0.5 \\\n'
+            '      --of settling "max(abs(shuttle.vx))" --minimise settling --out results',
+        ),
+    )  # fmt: skip
+    _mechanism(parser)
+    study_arguments(parser)
+    set_argument(parser, "value of a parameter or input in all simulations")
+    input_argument(parser)
+    stop_time_argument(parser)
+    _out(parser)
 
 
 def _picture(commands: Commands) -> None:
