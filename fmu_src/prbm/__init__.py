@@ -18,18 +18,17 @@ if TYPE_CHECKING:
     from .files.mechanism_file import load as load
     from .hybrid.simulation import Simulation
     from .mechanism.description import Mechanism
-    from .runs.result import Result
-    from .runs.run import simulate
+    from .plots.shown import Result, simulate
 
 __all__ = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate"]
 
 _MODULES = {
     "Mechanism": ("mechanism.description", "Mechanism"),
-    "Result": ("runs.result", "Result"),
+    "Result": ("plots.shown", "Result"),
     "Simulation": ("hybrid.simulation", "Simulation"),
     "__version__": ("base.version", "__version__"),
     "load": ("files.mechanism_file", "load"),
-    "simulate": ("runs.run", "simulate"),
+    "simulate": ("plots.shown", "simulate"),
 }
 
 
