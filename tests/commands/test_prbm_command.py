@@ -31,7 +31,7 @@ PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
     "list", "modes", "equilibrium", "simulate", "fit", "impact-map", "sweep", "study", "picture",
     "animate", "validate", "measure youngs-modulus", "measure calibration", "measure frequency",
-    "measure restitution",
+    "measure restitution", "completion",
 )  # fmt: skip
 
 
