@@ -17,19 +17,18 @@ if TYPE_CHECKING:
     from .base.version import __version__ as __version__
     from .files.mechanism_file import load as load
     from .mechanism.description import Mechanism
+    from .plots.shown import Result, simulate
     from .runs.engine import simulation as Simulation
-    from .runs.result import Result
-    from .runs.run import simulate
 
 __all__ = ["Mechanism", "Result", "Simulation", "__version__", "load", "simulate"]
 
 _MODULES = {
     "Mechanism": ("mechanism.description", "Mechanism"),
-    "Result": ("runs.result", "Result"),
+    "Result": ("plots.shown", "Result"),
     "Simulation": ("runs.engine", "simulation"),
     "__version__": ("base.version", "__version__"),
     "load": ("files.mechanism_file", "load"),
-    "simulate": ("runs.run", "simulate"),
+    "simulate": ("plots.shown", "simulate"),
 }
 
 

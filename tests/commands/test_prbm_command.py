@@ -29,9 +29,9 @@ from support import ROOT, SUPPORT
 
 PAGE = (ROOT / "docs" / "command-line.md").read_text(encoding="utf-8")
 COMMANDS = (
-    "list", "modes", "equilibrium", "simulate", "fit", "impact-map", "sweep", "picture", "animate",
-    "validate", "measure youngs-modulus", "measure calibration", "measure frequency",
-    "measure restitution",
+    "list", "modes", "equilibrium", "simulate", "fit", "impact-map", "sweep", "study", "picture",
+    "animate", "validate", "measure youngs-modulus", "measure calibration", "measure frequency",
+    "measure restitution", "completion",
 )  # fmt: skip
 
 
@@ -63,6 +63,24 @@ def test_a_signal_of_the_command_line_is_that_of_python(capsys):
     columns = simulate(load("PRBDM"), inputs=inputs, stop_time=8e-3, step=8e-6).columns
     assert written["base.acceleration.x"].max() == pytest.approx(20 * 9.80665, rel=1e-3)
     np.testing.assert_array_equal(written["shuttle.x"], columns["shuttle.x"])
+
+
+def test_a_study_writes_its_samples_and_prints_its_optimum(capsys):
+    """The gap of the released shape grows with the position of the wall by the same amount."""
+    line = "study PRBDM --vary 'stop.position=0:2 mm:3' --of stop.gap --maximise stop.gap"
+    assert run(f"{line} --stop-time 1ms --step 1ms --workers 1 --out .") == cli.OK
+    written = table("PRBDM-study.csv")
+    assert written["stop.position [m]"] == ["0.0", "0.001", "0.002"]
+    gaps = np.array(written["stop.gap [m]"], float)
+    np.testing.assert_allclose(np.diff(gaps), 1e-3, rtol=1e-9)
+    printed = capsys.readouterr().out
+    assert "3 simulations, 0 failed" in printed
+    found = re.search(r"largest stop\.gap: ([\d.]+) mm at stop\.position = ([\d.]+) mm", printed)
+    assert float(found[2]) == pytest.approx(2.0, abs=2e-3)
+    assert float(found[1]) == pytest.approx(1e3 * gaps[-1], abs=2e-3)
+    assert "it reaches the end of the samples" in printed
+    with Image.open("PRBDM-study.png") as image:
+        assert image.format == "PNG"
 
 
 @pytest.mark.slow
@@ -404,6 +422,15 @@ MISTAKES = [
     ("simulate PRBDM --input force.x=1 --input force.x=2", "force.x is given twice"),
     ("simulate PRBDM --input force.x=1 --set force.x=1", "both as a constant and over time"),
     ("simulate PRBDM --input 'force.x=step(1 N)' --spectrum", "use --spectrum last"),
+    ("study PRBDM", "the following arguments are required: --vary"),
+    ("study PRBDM --vary stop.position=0:1mm", "write LOW:HIGH:COUNT with a count of at least 2"),
+    ("study PRBDM --vary stop.position=0:1mm:1", "write LOW:HIGH:COUNT"),
+    ("study PRBDM --vary stop.position=1:0mm:3", "the lower end must be below the upper one"),
+    ("study PRBDM --vary stop.position=0:1s:3", "the unit 's' has another dimension"),
+    ("study PRBDM --vary stop.positoin=0:1mm:3", "did you mean stop.position"),
+    ("study PRBDM --vary stop.position=0:1mm:3", "no output is selected; name one"),
+    ("study PRBDM --vary stop.position=0:1mm:3 --of setling", "did you mean settling"),
+    ("study PRBDM --vary a=0:1:2 --minimise x --maximise y", "not allowed with argument"),
     ("animate a.csv a.gif --model PRBDM --input force.x=1", "--input: a result is shown"),
     ("fit PRBDM --free flexure.K_theta", "no measured data: give"),
     ("fit PRBDM --frequency '5 +- 1'", "required: --free"),

@@ -92,6 +92,68 @@ def animation_arguments(parser: ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def sweep_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of ``prbm sweep``."""
+    add = parser.add_argument
+    add("fmu", metavar="FMU", help="FMU of FMI 2.0 or 3.0 with co-simulation")
+    add(
+        "table", metavar="TABLE",
+        help="CSV or Parquet file with one column per variable and one row per run, in SI units",
+    )  # fmt: skip
+    add(
+        "--out", default="results.parquet", metavar="DIR",
+        help="folder of the results (default: %(default)s)",
+    )  # fmt: skip
+    add(
+        "--output", action="append", metavar="OUTPUT",
+        help="recorded output: a variable, for its final value; 'max(shuttle.x)', or min, mean; "
+        "'first(shuttle.x > 0)', the first time of a condition; 'since(stop.contact)', the time "
+        "from which it holds to the end; repeatable (default: all outputs)",
+    )  # fmt: skip
+    set_argument(parser, "start value of all runs")
+    add("--stop-time", metavar="T", help="end of the runs [s] (default: that of the FMU)")
+    add("--step", metavar="T", help="communication step [s] (default: that of the FMU)")
+    add(
+        "--tolerance", metavar="X",
+        help="relative tolerance of the integration (default: that of the FMU)",
+    )  # fmt: skip
+    add("--workers", type=int, metavar="N", help="number of parallel runs (default: one per core)")
+    add(
+        "--scheduler", metavar="ADDRESS",
+        help="Dask scheduler that runs the sweep, e.g. tcp://host:8786 (default: this machine)",
+    )  # fmt: skip
+    add(
+        "--retries", type=int, default=1, metavar="N",
+        help="number of repetitions of a run that crashed (default: %(default)s)",
+    )  # fmt: skip
+    add("--timeout", metavar="T", help="longest duration of a run [s] (default: no limit)")
+    add("--overwrite", action="store_true", help="delete earlier results")
+    add("--retry-failed", action="store_true", help="repeat runs that failed earlier")
+
+
+def study_arguments(parser: ArgumentParser) -> None:
+    """Add the arguments of ``prbm study``."""
+    add = parser.add_argument
+    add(
+        "--vary", action="append", required=True, metavar="NAME=LOW:HIGH:COUNT",
+        help="parameter or input and its samples; a unit of HIGH holds for both; once or twice",
+    )  # fmt: skip
+    add(
+        "--of", nargs="+", metavar="OUTPUT",
+        help="outputs: settling, impacts, impact_speed, peak_speed, energy_lost; a variable, for "
+        "its final value; max(x), min(x), mean(x), first(x > 0), since(x > 0), also of abs(x)",
+    )  # fmt: skip
+    optimum = parser.add_mutually_exclusive_group()
+    optimum.add_argument("--minimise", metavar="OUTPUT", help="output whose minimum is searched")
+    optimum.add_argument("--maximise", metavar="OUTPUT", help="output whose maximum is searched")
+    add("--step", metavar="T", help="time between samples of a motion [s] (default: 1/4000 of it)")
+    add(
+        "--tolerance", metavar="X",
+        help="relative tolerance of the integration (default: solver.tolerance)",
+    )  # fmt: skip
+    add("--workers", type=int, metavar="N", help="number of processes (default: one per core)")
+
+
 def stop_time_argument(parser: ArgumentParser) -> None:
     """Add --stop-time."""
     parser.add_argument(

@@ -28,6 +28,8 @@ from .arguments import (
     picture_arguments,
     set_argument,
     stop_time_argument,
+    study_arguments,
+    sweep_arguments,
 )
 from .program import FAILED, INTERRUPTED, MISTAKE, OK
 from .remedies import in_options
@@ -126,10 +128,12 @@ def parser() -> argparse.ArgumentParser:
     _fit(commands)
     _impact_map(commands)
     _sweep(commands)
+    _study(commands)
     _measure(commands)
     _picture(commands)
     _animate(commands)
     _validate(commands)
+    _completion(commands)
     return p
 
 
@@ -387,41 +391,24 @@ def _sweep(commands: Commands) -> None:
             '      --output "max(shuttle.x)" --stop-time 500ms --out settling.parquet'
         ),
     )  # fmt: skip
-    add = parser.add_argument
-    add("fmu", metavar="FMU", help="FMU of FMI 2.0 or 3.0 with co-simulation")
-    add(
-        "table", metavar="TABLE",
-        help="CSV or Parquet file with one column per variable and one row per run, in SI units",
+    sweep_arguments(parser)
+
+
+def _study(commands: Commands) -> None:
+    parser = _command(
+        commands, "study", "study:studied",
+        "simulate over one or two parameters, and find the optimum of an output",
+        _examples(
+            'prbm study PRBDM2R --vary "stop.position=-4:2 mm:25" --stop-time 0.5 \\\n'
+            '      --of settling "max(abs(shuttle.vx))" --minimise settling --out results',
+        ),
     )  # fmt: skip
-    add(
-        "--out", default="results.parquet", metavar="DIR",
-        help="folder of the results (default: %(default)s)",
-    )  # fmt: skip
-    add(
-        "--output", action="append", metavar="OUTPUT",
-        help="recorded output: a variable, for its final value; 'max(shuttle.x)', or min, mean; "
-        "'first(shuttle.x > 0)', the first time of a condition; 'since(stop.contact)', the time "
-        "from which it holds to the end; repeatable (default: all outputs)",
-    )  # fmt: skip
-    set_argument(parser, "start value of all runs")
-    add("--stop-time", metavar="T", help="end of the runs [s] (default: that of the FMU)")
-    add("--step", metavar="T", help="communication step [s] (default: that of the FMU)")
-    add(
-        "--tolerance", metavar="X",
-        help="relative tolerance of the integration (default: that of the FMU)",
-    )  # fmt: skip
-    add("--workers", type=int, metavar="N", help="number of parallel runs (default: one per core)")
-    add(
-        "--scheduler", metavar="ADDRESS",
-        help="Dask scheduler that runs the sweep, e.g. tcp://host:8786 (default: this machine)",
-    )  # fmt: skip
-    add(
-        "--retries", type=int, default=1, metavar="N",
-        help="number of repetitions of a run that crashed (default: %(default)s)",
-    )  # fmt: skip
-    add("--timeout", metavar="T", help="longest duration of a run [s] (default: no limit)")
-    add("--overwrite", action="store_true", help="delete earlier results")
-    add("--retry-failed", action="store_true", help="repeat runs that failed earlier")
+    _mechanism(parser)
+    study_arguments(parser)
+    set_argument(parser, "value of a parameter or input in all simulations")
+    input_argument(parser)
+    stop_time_argument(parser)
+    _out(parser)
 
 
 def _picture(commands: Commands) -> None:
@@ -478,6 +465,16 @@ def _validate(commands: Commands) -> None:
     )  # fmt: skip
     set_argument(parser)
     _out(parser)
+
+
+def _completion(commands: Commands) -> None:
+    parser = _command(
+        commands, "completion", "completion:printed",
+        "print a script for tab completion of commands, options and mechanisms",
+        _examples("prbm completion bash"),
+        details='In bash, eval "$(prbm completion bash)" in ~/.bashrc switches it on.',
+    )  # fmt: skip
+    parser.add_argument("shell", choices=("bash",), help="the shell")
 
 
 # --- measure ----------------------------------------------------------------------------------

@@ -19,8 +19,11 @@ own_style = partial(matplotlib.style.context, "default")  # Independent of the u
 
 
 @own_style()
-def png(figure: Figure) -> bytes:
-    """Return a figure as a PNG file; equal figures give equal bytes."""
+def png(figure: Figure, dpi: float | None = None) -> bytes:
+    """Return a figure as a PNG file; equal figures give equal bytes.
+
+    ``dpi`` is the resolution [1/inch] (default: that of the figure).
+    """
     buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", metadata={"Software": None})
+    figure.savefig(buffer, format="png", dpi=dpi or "figure", metadata={"Software": None})
     return buffer.getvalue()

@@ -15,7 +15,7 @@ from .contact_modes import equations_holding, find_holding_stops, mobility, sett
 from .front import Front, Latched
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Impact:
     """An impact in a record.
 
@@ -42,6 +42,10 @@ class Impact:
     after: Real
     impulse: float
     latched: Latched
+
+    def __repr__(self) -> str:
+        closing, opening = self.latched.approach_speed, self.latched.rebound_speed
+        return f"<Impact on {self.stop} at {self.time:.6g} s: {closing:.4g} to {opening:.4g} m/s>"
 
 
 @dataclass(frozen=True)

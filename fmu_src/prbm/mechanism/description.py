@@ -43,7 +43,7 @@ from .parts import (
 RESERVED = (GROUND, "base", "damping", "energy", "gravity", "link", "mode", "release", "solver")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Mechanism:
     """Description of a mechanism: parts, parameters and their defaults.
 
@@ -93,6 +93,9 @@ class Mechanism:
     damping_beta: float = 0.0
     description: str = ""
     drawing: str = ""
+
+    def __repr__(self) -> str:
+        return f"<Mechanism {self.name}: {self.title}>"
 
     def __post_init__(self) -> None:
         if not re.fullmatch(r"[A-Za-z_]\w*", self.name, re.ASCII) or iskeyword(self.name):

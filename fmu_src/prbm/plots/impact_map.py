@@ -25,12 +25,12 @@ CELL = (0.42, 0.16)  # Least width and height of a cell with a number [inch].
 X_LABEL_WIDTH, Y_LABEL_HEIGHT = 0.55, 0.2  # Room for a label of an axis [inch].
 
 
-def _edges(x: Real) -> Real:
+def edges(x: Real) -> Real:
     """Return the edges of cells around increasing points.
 
     Examples
     --------
-    >>> _edges(np.array([0.0, 2.0, 4.0])), _edges(np.array([5.0]))
+    >>> edges(np.array([0.0, 2.0, 4.0])), edges(np.array([5.0]))
     (array([-1.,  1.,  3.,  5.]), array([4.5, 5.5]))
     """
     if len(x) == 1:
@@ -63,12 +63,12 @@ def heat_map(maps: Sequence[ImpactMap], columns: int = 3, title: str = "") -> Fi
     for axes, one in zip(every, maps, strict=False):
         x, y = factor * one.walls, factor * one.offsets
         mesh = axes.pcolormesh(
-            _edges(x), _edges(y), one.restitution, vmin=low, vmax=high, cmap="viridis"
+            edges(x), edges(y), one.restitution, vmin=low, vmax=high, cmap="viridis"
         )
         _write_numbers(axes, x, y, one.restitution, (low + high) / 2)
         axes.set_title(one.label, fontsize=10)
-        _label(axes.xaxis, x, X_LABEL_WIDTH * float(np.ptp(_edges(x))) / PANEL[0])
-        _label(axes.yaxis, y, Y_LABEL_HEIGHT * float(np.ptp(_edges(y))) / PANEL[1])
+        _label(axes.xaxis, x, X_LABEL_WIDTH * float(np.ptp(edges(x))) / PANEL[0])
+        _label(axes.yaxis, y, Y_LABEL_HEIGHT * float(np.ptp(edges(y))) / PANEL[1])
         axes.tick_params(length=0)
     for axes in every[len(maps) :]:
         axes.set_visible(False)
@@ -104,8 +104,8 @@ def _label(axis: Axis, x: Real, distance: float) -> None:
 
 def _write_numbers(axes: Axes, x: Real, y: Real, restitution: Real, middle: float) -> None:
     """Write the restitution in each cell that is large enough for a number."""
-    width = PANEL[0] * np.diff(_edges(x)) / np.ptp(_edges(x))
-    height = PANEL[1] * np.diff(_edges(y)) / np.ptp(_edges(y))
+    width = PANEL[0] * np.diff(edges(x)) / np.ptp(edges(x))
+    height = PANEL[1] * np.diff(edges(y)) / np.ptp(edges(y))
     for i, j in np.ndindex(*restitution.shape):
         if width[j] >= CELL[0] and height[i] >= CELL[1]:
             c = restitution[i, j]
@@ -146,5 +146,5 @@ def _bars(axes: Axes, x: Real, parts: Real, names: Sequence[str], colours: Seque
         axes.bar(x, part, width, bottom, color=colour, label=name)
         bottom += part
     axes.set_ylim(0.0, 1.05)
-    _label(axes.xaxis, x, X_LABEL_WIDTH * float(np.ptp(_edges(x))) / BARS_WIDTH)
+    _label(axes.xaxis, x, X_LABEL_WIDTH * float(np.ptp(edges(x))) / BARS_WIDTH)
     plain(axes, axis="y")

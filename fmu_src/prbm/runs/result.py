@@ -4,15 +4,20 @@ import csv
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.errors import PrbmError
+from ..base.names import proposal
 from ..hybrid.impacts import Impact
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
+from .quantities import QUANTITIES
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Columns = NDArray[Any]
 ZERO_MOTION_RTOL = 1e-9  # Smaller motions, relative to the size of the mechanism, are round-off.
@@ -23,7 +28,7 @@ class ResultError(PrbmError, ValueError):
     """A result lacks a column, cannot be read, or belongs to another mechanism."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Result:
     """The result of a simulation.
 
@@ -52,6 +57,45 @@ class Result:
     def __getitem__(self, name: str) -> Columns:
         """Return a column by name."""
         return column(self.columns, name)
+
+    def __repr__(self) -> str:
+        rows, end = len(self.columns), float(self.columns["time"][-1])
+        return (
+            f"<Result of {self.mechanism.name}: {end:g} s in {rows} rows, "
+            f"{len(names(self.columns))} columns, impacts: {len(self.impacts)}>"
+        )
+
+    def quantity(self, name: str) -> float:
+        """Return a named quantity: ``settling``, ``impacts``, ``peak_speed`` and the like.
+
+        Raises
+        ------
+        ResultError
+            If the name is unknown, or a needed column is missing.
+        """
+        if name not in QUANTITIES:
+            raise ResultError(f"unknown quantity {name!r}; {proposal(name, QUANTITIES)}")
+        lacking = QUANTITIES[name].lacking(names(self.columns))
+        if lacking:
+            raise ResultError(f"{name}: the result has no column {lacking}; record it")
+        return QUANTITIES[name].compute(self.columns)
+
+    def to_pandas(self) -> "pd.DataFrame":
+        """Return the columns as a pandas DataFrame over the time.
+
+        Raises
+        ------
+        ResultError
+            If pandas is not installed.
+        """
+        try:
+            import pandas  # imported here: an extra, and it takes half a second
+        except ModuleNotFoundError:
+            raise ResultError(
+                "pandas is not installed; install it with: python -m pip install "
+                "'prbm-impact[notebook]'"
+            ) from None
+        return pandas.DataFrame.from_records(self.columns, index="time")
 
 
 def column(columns: Columns, name: str) -> Columns:

@@ -15,6 +15,10 @@ from numpy.typing import NDArray
 from ..runs.quantities import QUANTITIES
 
 Real = NDArray[np.float64]
+OK, ENDED, FAILED, CRASHED, TIMEOUT = "ok", "ended", "failed", "crashed", "timeout"
+"""Status of a run: complete; ended early by the FMU; error; crash of the process; time limit."""
+GOOD = OK, ENDED
+
 QUANTITY = "quantity"  # Reduction of a named quantity.
 
 
@@ -179,3 +183,18 @@ def reduce(output: Output, t: Real, x: Real) -> float:
     broken = np.flatnonzero(~holds)
     begin = int(broken[-1]) + 1 if len(broken) else 0
     return float(t[begin]) if begin < len(t) else nan
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """The result of a run.
+
+    ``values`` are the outputs in the order of the job, empty for a failed run.  ``seconds`` is the
+    duration of the computation.  ``spent``: the process must not be used for further runs.
+    """
+
+    status: str
+    message: str = ""
+    seconds: float = nan
+    values: tuple[float, ...] = ()
+    spent: bool = False

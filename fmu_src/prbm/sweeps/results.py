@@ -21,7 +21,7 @@ import pyarrow.parquet as pq  # type: ignore[import-untyped]
 
 from ..base.errors import ParameterError
 from ..base.lock import LockedError, locked
-from .runs import GOOD, Outcome
+from .outputs import GOOD, Outcome
 
 SETTINGS, LOCK = "_sweep.json", "_sweep.lock"
 ROW, STATUS, MESSAGE, SECONDS = "row", "status", "message", "seconds"

@@ -30,7 +30,7 @@ from ctypes import (
 )
 from dataclasses import dataclass
 from itertools import pairwise
-from math import isclose, nan
+from math import isclose
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -45,11 +45,7 @@ from fmpy.simulation import (  # type: ignore[import-untyped]
 )
 from numpy.typing import NDArray
 
-from .outputs import Output, evaluate
-
-OK, ENDED, FAILED, CRASHED, TIMEOUT = "ok", "ended", "failed", "crashed", "timeout"
-"""Status of a run: complete; ended early by the FMU; error; crash of the process; time limit."""
-GOOD = OK, ENDED  # Runs with results.
+from .outputs import ENDED, FAILED, OK, Outcome, Output, evaluate
 
 DISCARD, FATAL = 2, 4  # Values of fmi2Status and fmi3Status.
 LAST_TIME, TERMINATED = 2, 3  # Values of fmi2StatusKind.
@@ -92,21 +88,6 @@ class Job:
     values: Mapping[str, float]
     outputs: tuple[Output, ...]
     reuse: bool = True
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """The result of a run.
-
-    ``values`` are the outputs in the order of the job, empty for a failed run.  ``seconds`` is the
-    duration of the computation.  ``spent``: the process must not be used for further runs.
-    """
-
-    status: str
-    message: str = ""
-    seconds: float = nan
-    values: tuple[float, ...] = ()
-    spent: bool = False
 
 
 def communication_points(start: float, stop: float, step: float) -> list[float]:

@@ -31,8 +31,8 @@ from ..base.archives import check_unpacked_size
 from ..base.errors import ParameterError, PrbmError
 from ..base.progress import Progress
 from ..runs.run import ROWS_MAX
-from .outputs import Output, SpecificationError, parse_output
-from .runs import CRASHED, GOOD, Job, Outcome
+from .outputs import CRASHED, GOOD, Outcome, Output, SpecificationError, parse_output
+from .runs import Job
 
 if TYPE_CHECKING:
     import pandas as pd

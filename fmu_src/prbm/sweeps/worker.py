@@ -22,7 +22,8 @@ from typing import Any
 from distributed import WorkerPlugin, get_worker
 
 from ..fmu.unpack import unpacked
-from .runs import CRASHED, TIMEOUT, Job, Outcome
+from .outputs import CRASHED, TIMEOUT, Outcome
+from .runs import Job
 
 EXIT_TIMEOUT = 5.0  # Longest wait for the exit of a process before it is killed [s].
 STOPPED = "the sweep was stopped"

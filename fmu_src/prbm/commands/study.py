@@ -1,0 +1,149 @@
+"""``prbm study``: simulations over one or two parameters, and the optimum of an output."""
+
+import argparse
+import re
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..base.names import unknown
+from ..base.progress import reporter
+from ..base.unit_text import prefixed_unit
+from ..files.mechanism_file import load
+from ..files.settings import UserMistake, has_unit, pairs, quantity, settings, units_of
+from ..mechanics.arrays import Real
+from ..mechanism.description import Mechanism
+from ..sweeps.study import FLAT_RTOL, Optimum, Study, study
+from .duration import given_inputs
+from .output import Output, aligned
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+EXAMPLE = '--vary "stop.position=-4:2 mm:25"'
+ROWS_PRINTED_MAX = 45  # Longer tables are only written.
+DIGITS = 5  # Significant digits of printed numbers.
+
+
+def studied(options: argparse.Namespace) -> None:
+    """Run a study, print its table and its optimum."""
+    mechanism = load(options.mechanism)
+    values = settings(mechanism, options.set)
+    output = Output(options.out)
+    varied = _varied(mechanism, options.vary)
+    tolerance = _optional(options.tolerance, "", "--tolerance")
+    found = study(
+        mechanism, varied, options.of or [], minimise=options.minimise, maximise=options.maximise,
+        values={name: x for name, x in values.items()}, inputs=given_inputs(options),
+        stop_time=_optional(options.stop_time, "s", "--stop-time"),
+        step=_optional(options.step, "s", "--step"), tolerance=tolerance,
+        workers=options.workers, progress=reporter(),
+    )  # fmt: skip
+    columns = dict(zip(found.varied, found.points.T, strict=True)) | dict(found.outputs)
+    _print_table(columns, found.units)
+    failed = [message for message in found.messages if message]
+    print(f"{len(found.points)} simulations, {len(failed)} failed")
+    for message in dict.fromkeys(failed[:3]):
+        print(f"failed: {message}")
+    if found.optimum is not None:
+        verb = "least" if options.maximise is None else "largest"
+        for line in _optimum_lines(found.optimum, found.units, verb):
+            print(line)
+    head = [f"{name} [{found.units[name] or '-'}]" for name in columns]
+    rows = zip(*(x.tolist() for x in columns.values()), found.messages, strict=True)
+    output.table(f"{mechanism.name}-study.csv", [*head, "error"], list(rows))
+    output.figure(f"{mechanism.name}-study.png", lambda: _figure(mechanism, found))
+    output.write()
+
+
+def _optional(text: str | None, unit: str, option: str) -> float | None:
+    return None if text is None else quantity(text, unit, option)
+
+
+def _varied(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, Real]:
+    """Return the samples of the parameters given by --vary."""
+    units = units_of(mechanism)
+    found = {}
+    for name, text in pairs(texts, "--vary", EXAMPLE).items():
+        option = f"--vary {name}="
+        if name not in units:
+            raise UserMistake(f"--vary {name}: {unknown(name, units)}")
+        parts = [part.strip() for part in text.split(":")]
+        if len(parts) != 3 or not re.fullmatch(r"\d{1,6}", parts[2]) or int(parts[2]) < 2:
+            raise UserMistake(
+                f"{option}{text}: write LOW:HIGH:COUNT with a count of at least 2, for instance "
+                f"{EXAMPLE}"
+            )
+        low, high = _ends(parts[0], parts[1], units[name], option)
+        if not low < high:
+            raise UserMistake(f"{option}{text}: the lower end must be below the upper one")
+        found[name] = np.linspace(low, high, int(parts[2]))
+    return found
+
+
+def _ends(low: str, high: str, unit: str, option: str) -> tuple[float, float]:
+    """Return the ends of a range; the unit of the upper one holds for both.
+
+    Examples
+    --------
+    >>> _ends("-4", "2 mm", "m", "--vary")
+    (-0.004, 0.002)
+    """
+    if has_unit(high) and not has_unit(low):
+        written = re.sub(r"^[+-]?[\d.]+([eE][+-]?\d+)?", "", high).strip()
+        low = f"{low} {written}"
+    return quantity(low, unit, option), quantity(high, unit, option)
+
+
+def _text(x: float, unit: str) -> str:
+    """Return a number with its display unit."""
+    if not unit:
+        return f"{x:.{DIGITS}g}"
+    factor, shown = prefixed_unit(abs(x), unit)
+    return f"{factor * x:.{DIGITS}g} {shown}"
+
+
+def _print_table(columns: Mapping[str, Real], units: Mapping[str, str]) -> None:
+    """Print the samples, unless there are many."""
+    if len(next(iter(columns.values()))) > ROWS_PRINTED_MAX:
+        return
+    head, cells = [], []
+    for name, x in columns.items():
+        known = np.abs(x[np.isfinite(x)])
+        largest = float(known.max()) if len(known) else 0.0
+        factor, shown = prefixed_unit(largest, units[name]) if units[name] else (1.0, "-")
+        head.append(f"{name} [{shown}]")
+        cells.append([f"{factor * value:.{DIGITS}g}" for value in x])
+    print(aligned(head, list(zip(*cells, strict=True))))
+
+
+def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> list[str]:
+    """Return the lines about an optimum."""
+    place = ", ".join(f"{name} = {_text(x, units[name])}" for name, x in optimum.point.items())
+    lines = [
+        f"{verb} {optimum.output}: {_text(optimum.value, units[optimum.output])} at {place}, with "
+        f"{len(optimum.values)} more simulations"
+    ]
+    for name, (low, high) in optimum.flat.items():
+        ends = "" if all(optimum.bounded[name]) else "; it reaches the end of the samples"
+        lines.append(
+            f"within {100 * FLAT_RTOL:g} % of it: {name} from {_text(low, units[name])} to "
+            f"{_text(high, units[name])}{ends}"
+        )
+    return lines
+
+
+def _figure(mechanism: Mechanism, found: Study) -> "Figure":
+    from ..plots.study import curves, maps  # imported here: it takes a second
+
+    best = found.optimum
+    if len(found.varied) == 2:
+        marked = None if best is None else (best.output, [*best.point.values()], best.value)
+        return maps(mechanism.title, found.varied, found.outputs, found.units, marked)
+    ((name, samples),) = found.varied.items()
+    if best is None:
+        return curves(mechanism.title, (name, samples), found.outputs, found.units, {}, None)
+    further = {best.output: (best.points[:, 0], best.values)}
+    shown = (best.output, best.point[name], best.value, best.flat[name])
+    return curves(mechanism.title, (name, samples), found.outputs, found.units, further, shown)

@@ -1,0 +1,130 @@
+"""Figures of parameter studies: outputs over one parameter, maps over two."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..base.unit_text import prefixed_unit
+from ..drawing.style import BODY, IMPACT, PAST, own_style
+from ..mechanics.arrays import Real
+from .figures import panels
+from .impact_map import edges
+from .scene import plain
+
+PANEL_HEIGHT, WIDTH = 2.2, 7.0  # Of an output over one parameter [inch].
+MAP = (4.6, 3.6)  # Width and height of a map [inch].
+MAP_COLUMNS = 2
+
+
+class Scaled:
+    """A quantity in its display unit.
+
+    Parameters
+    ----------
+    name, unit : str
+        Name and SI unit.
+    x : array
+        Values in SI; NaN for missing ones.
+    """
+
+    def __init__(self, name: str, unit: str, x: Real) -> None:
+        known = np.abs(x[np.isfinite(x)])
+        largest = float(known.max()) if len(known) else 0.0
+        self.factor, shown = prefixed_unit(largest, unit) if unit else (1.0, "-")
+        self.label, self.x = f"{name} [{shown}]", self.factor * x
+
+
+@own_style()
+def curves(
+    title: str,
+    varied: tuple[str, Real],
+    outputs: Mapping[str, Real],
+    units: Mapping[str, str],
+    further: Mapping[str, tuple[Real, Real]],
+    optimum: tuple[str, float, float, tuple[float, float]] | None,
+) -> Figure:
+    """Draw outputs over one parameter.
+
+    Parameters
+    ----------
+    title : str
+        Title of the figure.
+    varied : (str, (n,))
+        Name and samples of the parameter.
+    outputs : mapping
+        Values (n,) of each output; failed simulations (NaN) are gaps.
+    units : mapping
+        SI units of the parameter and the outputs.
+    further : mapping
+        Parameter and values (m,) of the simulations that refine an output.
+    optimum : (str, float, float, (float, float)) or None
+        Output, parameter and value of the optimum, and the range in which it is flat.
+    """
+    name, samples = varied
+    x = Scaled(name, units[name], samples)
+    figure, every = panels(len(outputs), 1, (WIDTH, 0.6 + PANEL_HEIGHT * len(outputs)))
+    for axes, (output, values) in zip(every, outputs.items(), strict=True):
+        y = Scaled(output, units[output], values)
+        axes.plot(x.x, y.x, "o-", color=PAST, markersize=3.5, linewidth=1.0, label="samples")
+        if output in further:
+            at, found = further[output]
+            axes.plot(x.factor * at, y.factor * found, ".", color=BODY, label="refinement")
+        if optimum is not None and optimum[0] == output:
+            _, best, value, (low, high) = optimum
+            axes.axvspan(x.factor * low, x.factor * high, color=IMPACT, alpha=0.15, linewidth=0,
+                         label="within 5 %")  # fmt: skip
+            axes.plot(x.factor * best, y.factor * value, "v", color=IMPACT, label="optimum")
+            axes.legend(loc="best", fontsize=9, frameon=False)
+        axes.set_ylabel(y.label)
+    every[0].set_title(title, fontsize=11, loc="left")
+    every[-1].set_xlabel(x.label)
+    figure.align_ylabels(every)
+    return figure
+
+
+@own_style()
+def maps(
+    title: str,
+    varied: Mapping[str, Real],
+    outputs: Mapping[str, Real],
+    units: Mapping[str, str],
+    optimum: tuple[str, Sequence[float], float] | None,
+) -> Figure:
+    """Draw outputs over two parameters as maps of colours.
+
+    Parameters
+    ----------
+    title : str
+        Title of the figure.
+    varied : mapping
+        Samples of both parameters.
+    outputs : mapping
+        Values (n,) of each output on the grid, the second parameter varying fastest.
+    units : mapping
+        SI units of the parameters and the outputs.
+    optimum : (str, (float, float), float) or None
+        Output, parameters and value of the optimum.
+    """
+    columns = min(MAP_COLUMNS, len(outputs))
+    rows = -(-len(outputs) // columns)
+    figure = Figure((MAP[0] * columns, 0.4 + MAP[1] * rows), dpi=120, layout="constrained")
+    every: list[Axes] = [*np.atleast_1d(figure.subplots(rows, columns)).flat]
+    x, y = (Scaled(name, units[name], samples) for name, samples in varied.items())
+    for axes, (output, values) in zip(every, outputs.items(), strict=False):
+        z = Scaled(output, units[output], values)
+        grid = np.ma.masked_invalid(z.x.reshape(len(x.x), len(y.x)).T)
+        mesh = axes.pcolormesh(edges(x.x), edges(y.x), grid, cmap="viridis")
+        figure.colorbar(mesh, ax=axes, pad=0.02).set_label(z.label)
+        if optimum is not None and optimum[0] == output:
+            a, b = optimum[1]
+            axes.plot(x.factor * a, y.factor * b, "v", color=IMPACT, label="optimum")
+            axes.legend(loc="best", fontsize=9)
+        axes.set_xlabel(x.label)
+        axes.set_ylabel(y.label)
+        plain(axes)
+    for axes in every[len(outputs) :]:
+        axes.set_visible(False)
+    figure.suptitle(title, fontsize=11)
+    return figure

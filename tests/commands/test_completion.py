@@ -1,0 +1,63 @@
+"""Tab completion in bash."""
+
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from prbm.commands.command_line import main, parser
+from prbm.commands.completion import script
+from prbm.files.mechanism_file import shipped
+
+pytestmark = pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+
+
+def completed(line: str) -> list[str]:
+    """Return what bash proposes for the last word of a line; a space at its end begins a word."""
+    words = [*shlex.split(line), *([""] if line.endswith(" ") else [])]
+    array = " ".join(map(shlex.quote, words))
+    program = (
+        f"{script(parser())}\nCOMP_WORDS=({array}); COMP_CWORD={len(words) - 1}; _prbm\n"
+        'printf "%s\\n" "${COMPREPLY[@]}"'
+    )
+    done = subprocess.run(["bash", "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("prbm simu", ["simulate"]),
+        ("prbm m", ["modes", "measure"]),
+        ("prbm measure yo", ["youngs-modulus"]),
+        ("prbm measure youngs-modulus --le", ["--length"]),
+        ("prbm simulate --sto", ["--stop-time"]),
+        ("prbm simulate PRBDM --inp", ["--input"]),
+        ("prbm simulate Bi", ["Bistable"]),
+        ("prbm simulate PRBDM --spectrum ", ["first", "last"]),
+        ("prbm impact-map PRBDM --method al", ["algebraic"]),
+        ("prbm impact-map --h", ["--help"]),
+        ("prbm completion ", ["--help", "bash"]),
+        ("prbm study PRBDM --mi", ["--minimise"]),
+        ("prbm nonsense --s", []),
+    ],
+)
+def test_words_are_completed(line, words):
+    assert completed(line) == words
+
+
+def test_mechanism_files_of_the_folder_are_proposed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.toml").write_text("")
+    Path("mine.csv").write_text("")
+    assert completed("prbm modes mi") == ["mine.toml"]
+    names = [word for word in completed("prbm modes ") if not word.startswith("--")]
+    assert names == [*shipped(), "mine.toml"]
+
+
+def test_the_command_prints_the_script(capsys):
+    assert main(["completion", "bash"]) == 0
+    assert capsys.readouterr().out == script(parser())

@@ -1,0 +1,99 @@
+"""Results in notebooks: short texts, figures, films, tables of pandas."""
+
+import base64
+import inspect
+import io
+import pickle
+import re
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import prbm
+from prbm.runs import run
+from prbm.runs.result import Result as BareResult
+from prbm.runs.result import ResultError
+
+PREVIEW_SIZE_MAX = 80_000  # Characters; a notebook keeps one for each shown result.
+
+
+@pytest.fixture(scope="module")
+def result() -> prbm.Result:
+    guide = prbm.load("PRBDM")
+    return prbm.simulate(guide, {"stop.position": "-1 mm"}, stop_time="0.06 s")
+
+
+def picture(content: bytes) -> Image.Image:
+    return Image.open(io.BytesIO(content))
+
+
+def test_the_public_function_simulates_as_the_module_does(result):
+    bare = run.simulate(result.mechanism, {"stop.position": -1e-3}, stop_time=0.06)
+    np.testing.assert_array_equal(result.columns, bare.columns)
+    assert result.values == bare.values
+    assert type(result) is prbm.Result
+    assert isinstance(result, BareResult)
+    assert inspect.signature(prbm.simulate) == inspect.signature(run.simulate)
+
+
+def test_texts_of_objects_fit_on_a_line(result):
+    text = repr(result)
+    assert text == "<Result of PRBDM: 0.06 s in 61 rows, 46 columns, impacts: 1>"
+    assert repr(result.mechanism).startswith("<Mechanism PRBDM: Parallel guide")
+    for thing in (result, result.mechanism, *result.impacts):
+        assert len(repr(thing)) < 120
+        assert "\n" not in repr(thing)
+
+
+def test_a_notebook_shows_the_summary_and_a_small_figure(result):
+    shown = result._repr_html_()
+    assert len(shown) < PREVIEW_SIZE_MAX
+    assert "impacts at stop      1, the first at" in shown
+    assert "&lt;Result of PRBDM" in shown
+    (content,) = re.findall(r"base64,([\w+/=]+)", shown)
+    assert picture(base64.b64decode(content)).size[0] <= 500
+
+
+def test_a_figure_is_shown_changed_and_saved(result, tmp_path):
+    shown = result.plot()
+    shown.figure.axes[0].set_title("changed")
+    assert picture(shown._repr_png_()).format == "PNG"
+    assert shown.save(tmp_path / "motion.png").read_bytes() == shown._repr_png_()
+
+
+def test_a_film_is_shown_and_saved(result, tmp_path):
+    film = result.animate(slow=20.0, fps=5.0)
+    assert repr(film) == f"<Film of {len(film.content)} bytes>"
+    saved = picture(film.save(tmp_path / "motion.gif").read_bytes())
+    assert saved.format == "GIF"
+    assert saved.n_frames == pytest.approx(0.06 * 20 * 5, abs=1)
+    assert base64.b64encode(film.content).decode() in film._repr_html_()
+
+
+def test_columns_are_those_of_the_data_frame(result):
+    frame = result.to_pandas()
+    assert frame.index.name == "time"
+    assert [*frame] == [name for name in result.columns.dtype.names if name != "time"]
+    for name in frame:
+        np.testing.assert_array_equal(frame[name], result[name])
+    np.testing.assert_array_equal(frame.index, result["time"])
+
+
+def test_a_missing_pandas_is_reported_with_a_remedy(result, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    with pytest.raises(ResultError, match=r"install it with: .*prbm-impact\[notebook\]"):
+        result.to_pandas()
+
+
+def test_quantities_of_a_result(result):
+    assert result.quantity("impacts") == len(result.impacts)
+    with pytest.raises(ResultError, match="unknown quantity 'setling'; did you mean settling"):
+        result.quantity("setling")
+
+
+def test_a_result_is_restored_from_a_pickle(result):
+    back = pickle.loads(pickle.dumps(result))
+    assert type(back) is prbm.Result
+    np.testing.assert_array_equal(back.columns, result.columns)

@@ -1,0 +1,204 @@
+"""Parameter studies: grids, optima, flat ranges, failed simulations, mistakes."""
+
+import math
+import os
+import subprocess
+import sys
+from concurrent.futures import Future
+
+import numpy as np
+import pytest
+
+from prbm.base.errors import ParameterError
+from prbm.plots.study import curves, maps
+from prbm.runs.run import simulate
+from prbm.sweeps import study as module
+from prbm.sweeps.outputs import FAILED, OK, Outcome
+from prbm.sweeps.study import FLAT_RTOL, Study, _Search, study
+from support import ROOT
+
+
+def searched(function, *samples: np.ndarray, sign: float = 1.0) -> module.Optimum:
+    """Return the optimum of a function of the parameters, sampled on a grid."""
+    names = ["a", "b"][: len(samples)]
+    points = np.array(np.meshgrid(*samples, indexing="ij")).reshape(len(samples), -1).T
+
+    def run(values):
+        future = Future()
+        x = function(*values.values())
+        failed = not math.isfinite(x)
+        future.set_result(Outcome(FAILED, "no") if failed else Outcome(OK, "", 0.0, (x,)))
+        return future
+
+    varied = dict(zip(names, samples, strict=True))
+    values = np.array([function(*point) for point in points])
+    found = Study(varied, points, {"f": values}, {"f": ""}, ("",) * len(points))
+    return _Search(run, found, "f", 0, sign).optimum()
+
+
+def test_the_optimum_of_a_parabola_and_its_flat_range_are_exact():
+    """2 + (x - c)^2 is within 5 % of 2 up to a distance of sqrt(0.1) from c."""
+    c, width = 0.313, math.sqrt(2 * FLAT_RTOL)
+    best = searched(lambda x: 2.0 + (x - c) ** 2, np.linspace(-1.0, 1.0, 11))
+    assert best.point["a"] == pytest.approx(c, abs=1e-3)
+    assert best.value == pytest.approx(2.0, abs=1e-6)
+    assert best.flat["a"] == pytest.approx((c - width, c + width), abs=0.02 * 0.2)
+    assert best.bounded["a"] == (True, True)
+
+
+def test_a_maximum_is_the_minimum_of_the_negative():
+    best = searched(lambda x: 3.0 - x * x, np.linspace(-0.9, 1.0, 8), sign=-1.0)
+    assert best.value == pytest.approx(3.0, abs=1e-5)
+    width = math.sqrt(3 * FLAT_RTOL)
+    assert best.flat["a"] == pytest.approx((-width, width), abs=0.02 * 0.3)
+
+
+def test_an_optimum_at_the_end_of_the_samples_is_reported_as_unbounded():
+    best = searched(lambda x: 10.0 + x, np.linspace(0.0, 5.0, 6))
+    assert best.point["a"] == pytest.approx(0.0, abs=1e-2)
+    assert best.bounded["a"] == (False, True)
+    assert best.flat["a"][1] == pytest.approx(0.5, abs=0.03)
+
+
+def test_the_optimum_is_never_worse_than_any_computed_value():
+    """The output jumps; the search for the flat range meets values that the refinement missed."""
+    computed = []
+
+    def rough(x: float) -> float:
+        computed.append(2.0 + (x - 0.2) ** 2 + 0.3 * math.sin(300.0 * x) ** 2)
+        return computed[-1]
+
+    best = searched(rough, np.linspace(-1.0, 1.0, 12))
+    assert best.value == min(computed)
+
+
+def test_failed_simulations_bound_the_flat_range():
+    best = searched(
+        lambda x: math.nan if x > 0.51 else 1.0 + 1e-3 * (x - 0.4) ** 2, np.linspace(0.0, 1.0, 11)
+    )
+    low, high = best.flat["a"]
+    assert (low, best.bounded["a"]) == (0.0, (False, True))
+    assert high == pytest.approx(0.51, abs=2e-3)
+
+
+def test_the_optimum_of_two_parameters_is_refined():
+    best = searched(
+        lambda x, y: 1.0 + (x - 0.13) ** 2 + 4 * (y - 0.4) ** 2 + (x - 0.13) * (y - 0.4),
+        np.linspace(-1.0, 1.0, 5), np.linspace(0.0, 1.0, 6),
+    )  # fmt: skip
+    assert [*best.point.values()] == pytest.approx([0.13, 0.4], abs=0.02)
+    assert best.value == pytest.approx(1.0, abs=1e-3)
+
+
+# --- simulations ----------------------------------------------------------------------------------
+
+
+def test_rows_are_those_of_single_simulations(mechanisms):
+    guide = mechanisms["PRBDM"]
+    positions = np.array([-0.03, 0.0, 2e-3])  # The first one is behind the release.
+    outputs = ["settling", "impacts", "max(abs(shuttle.vx))", "shuttle.x"]
+    found = study(
+        guide, {"stop.position": positions}, outputs, stop_time="0.25 s", step=1e-3,
+        values={"stop.restitution": 0.4}, inputs={"force.x": "step(10 mN, 50 ms)"}, workers=1,
+    )  # fmt: skip
+    assert "the wall stop is penetrated" in found.messages[0]
+    assert all(math.isnan(x[0]) for x in found.outputs.values())
+    assert found.messages[1:] == ("", "")
+    for k in (1, 2):
+        single = simulate(
+            guide, {"stop.restitution": 0.4, "stop.position": positions[k]}, stop_time=0.25,
+            step=1e-3, inputs={"force.x": "step(10 mN, 50 ms)"},
+        )  # fmt: skip
+        assert found.outputs["impacts"][k] == single["stop.impact_count"][-1]
+        assert found.outputs["max(abs(shuttle.vx))"][k] == np.abs(single["shuttle.vx"]).max()
+        assert found.outputs["shuttle.x"][k] == single["shuttle.x"][-1]
+    assert found.units == {
+        "stop.position": "m", "settling": "s", "impacts": "", "max(abs(shuttle.vx))": "m/s",
+        "shuttle.x": "m",
+    }  # fmt: skip
+
+
+@pytest.mark.slow
+def test_processes_and_a_single_process_give_the_same_bits():
+    """The second parameter varies fastest."""
+    script = """
+import numpy as np, prbm
+from prbm.sweeps.study import study
+if __name__ == "__main__":
+    vary = {"stop.position": [0.0, 1e-3], "stop.restitution": [0.2, 0.3, 0.4]}
+    guide = prbm.load("PRBDM")
+    one, two = (study(guide, vary, ["impacts", "shuttle.vx"], stop_time=0.08, step=1e-3, workers=n)
+                for n in (1, 2))
+    assert one.points[:, 1].tolist() == [0.2, 0.3, 0.4] * 2
+    for name, x in one.outputs.items():
+        assert x.tolist() == two.outputs[name].tolist()
+"""
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "fmu_src")}
+    code = subprocess.run(
+        [sys.executable, "-c", script], env=environment, check=False, capture_output=True, text=True
+    )
+    assert code.returncode == 0, code.stderr
+
+
+def test_the_impact_speed_is_greatest_where_the_guide_passes_its_equilibrium(mechanisms):
+    """Without gravity the 1R guide is fastest in its straight shape."""
+    found = study(
+        mechanisms["PRBDM"], {"stop.position": np.linspace(-8e-3, 8e-3, 5)}, [],
+        maximise="impact_speed", values={"gravity.x": 0.0}, stop_time=0.06, step=2e-3, workers=1,
+    )  # fmt: skip
+    assert found.optimum is not None
+    assert found.optimum.point["stop.position"] == pytest.approx(0.0, abs=1e-4)
+
+
+MISTAKES = [
+    ({"vary": {"stop.positon": [0, 1e-3]}}, r"unknown variable 'stop\.positon'; did you mean"),
+    ({"vary": {"stop.position": [1e-3]}}, "at least two samples are needed"),
+    ({"vary": {"stop.position": [1e-3, 0.0]}}, "finite and increasing, in m"),
+    ({"vary": {}}, "0 parameters are varied; vary one or two"),
+    ({"vary": {"stop.position": np.arange(200_000)}}, "the study has 200000 simulations"),
+    ({"outputs": []}, "no output is selected; name one, for instance settling"),
+    ({"outputs": ["setling"]}, "output setling: unknown variable 'setling'; did you mean settling"),
+    ({"outputs": ["first(shuttle.x > a)"]}, "bound 'a' must be a number"),
+    ({"minimise": "impacts", "maximise": "impacts"}, "minimise and maximise are both given"),
+    ({"values": {"stop.position": 0.0}}, "is varied and has a fixed value"),
+    ({"minimise": "settling"}, "no simulation has a value of settling; simulate longer"),
+    ({"workers": 0}, "workers = 0 must be 1 or more"),
+    ({"workers": 2, "inputs": {"force.x": math.sin}}, "a function cannot be sent to other proc"),
+    ({"stop_time": "1 m"}, "another dimension"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "sentence"), MISTAKES)
+def test_mistakes_in_studies_are_reported(mechanisms, arguments, sentence):
+    given = {
+        "vary": {"stop.position": [0.0, 1e-3]}, "outputs": ["impacts"], "stop_time": 0.01,
+        "step": 1e-3, "workers": 1,
+    }  # fmt: skip
+    with pytest.raises((ParameterError, ValueError), match=sentence):
+        study(mechanisms["PRBDM"], **(given | arguments))
+
+
+def test_quantities_that_a_mechanism_does_not_have_are_rejected(mechanisms):
+    with pytest.raises(ParameterError, match=r"unknown variable .stop\.x."):
+        study(mechanisms["PRBDM"], {"stop.position": [0.0, 1e-3]}, ["max(stop.x)"])
+
+
+# --- figures --------------------------------------------------------------------------------------
+
+
+def test_figures_show_all_outputs_and_the_optimum():
+    x = np.linspace(-2e-3, 2e-3, 5)
+    y = np.array([0.3, 0.2, np.nan, 0.25, 0.3])
+    units = {"a": "m", "b": "", "f": "s"}
+    further = {"f": (np.array([-9e-4]), np.array([0.19]))}
+    figure = curves("title", ("a", x), {"f": y}, units, further, ("f", -9e-4, 0.19, (-1e-3, -8e-4)))
+    (axes,) = figure.axes
+    assert axes.get_xlabel() == "a [mm]"
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["samples", "refinement", "within 5 %", "optimum"]
+    grid = np.arange(15.0)
+    drawn = maps("title", {"a": x, "b": np.arange(3.0)}, {"f": grid}, units, ("f", [0.0, 1.0], 0.0))
+    mesh = drawn.axes[0].collections[0].get_array()
+    assert mesh.shape == (3, 5)
+    assert mesh[1, 2] == grid[2 * 3 + 1]
+    drawn.draw_without_rendering()
