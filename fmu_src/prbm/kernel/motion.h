@@ -19,8 +19,8 @@ typedef void ImpactListener(void *listener, const Impact *impact);
  * memory.  simulation_start starts the motion. */
 PRBM Simulation *simulation_open(const Mechanism *mechanism);
 PRBM void simulation_close(Simulation *simulation);
-/* Call hear(listener, impact) at each impact. */
-PRBM void simulation_listen(Simulation *simulation, ImpactListener *hear, void *listener);
+/* Call on_impact(listener, impact) at each impact. */
+PRBM void simulation_listen(Simulation *simulation, ImpactListener *on_impact, void *listener);
 PRBM const Mechanism *simulation_mechanism(const Simulation *simulation);
 PRBM size_t simulation_bytes(const Simulation *simulation); /* size of its block */
 /* Restore the state after simulation_open. */
@@ -51,7 +51,7 @@ PRBM bool simulation_start(Simulation *simulation, double start_time, double tol
 /* Reject a start whose communication step of the default experiment, in co-simulation, needs too
  * many integration steps. */
 PRBM bool simulation_check_effort(const Simulation *simulation, Problem *problem);
-/* The tolerance that solver.tolerance or an importer's tolerance (not 0) requests. */
+/* Return the importer's tolerance, or solver.tolerance if the importer's is 0. */
 PRBM double simulation_requested(const Simulation *simulation, double tolerance);
 
 /* --- co-simulation --- */

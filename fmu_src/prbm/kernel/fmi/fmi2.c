@@ -238,7 +238,7 @@ fmi2Status fmi2GetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
     return status;
 }
 
-/* Log the type of each variable: none is of type String. */
+/* Reject the get, with the type of each variable: no variable is a String. */
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                          fmi2String value[]) {
     Instance *instance = accessed2(c, RULE2_GetString, vr, nvr, value);

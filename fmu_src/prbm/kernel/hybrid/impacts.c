@@ -400,8 +400,8 @@ static void report_impact(const Simulation *sim, int i) {
                      last->impulse,
                      last->energy_lost,
                      last->count};
-    if (sim->hear) {
-        sim->hear(sim->listener, &report);
+    if (sim->on_impact) {
+        sim->on_impact(sim->listener, &report);
     }
 }
 

@@ -155,7 +155,7 @@ struct Simulation {
     Evaluation at_front;   /* at the front, while contacts change */
     Correction correction; /* working memory of projections */
     Scratch scratch;
-    ImpactListener *hear;
+    ImpactListener *on_impact;
     void *listener;
     size_t bytes;
 };
