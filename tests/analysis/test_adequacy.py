@@ -150,7 +150,7 @@ def test_stretching_chains_of_many_links_are_their_own_reference():
 
 
 def test_a_mechanism_of_many_flexures_is_skipped_with_a_reason():
-    """Its finer model would have more than the permitted number of coordinates."""
+    """The finer model would have more than the permitted number of coordinates."""
     most = COORDINATES_MAX // (2 * LINKS_MIN)
     first = FINGER.flexures[0]
     more = tuple(replace(first, name=f"leaf{i}") for i in range(most - 1))

@@ -14,7 +14,7 @@ from support import around_first_impact, case, each_shipped
 STEP = 2.5e-3
 TIMES = STEP * np.arange(1, 49)  # up to 0.12 s; four impacts, the first at 0.041 s
 BEFORE, AFTER = TIMES[:16], TIMES[16:]
-EVERY = (*INTERFACES, (3, "late"))
+EVERY = (*INTERFACES, (3, "late"))  # "late": event mode without early return.
 interfaces = pytest.mark.parametrize(("fmi", "kind"), EVERY)
 
 pytestmark = [pytest.mark.fmu, pytest.mark.native]

@@ -44,7 +44,7 @@ def exchanged(path, tolerance: float, *output: str) -> np.ndarray:
     ],
 )
 def test_the_default_experiment_is_reproduced(native, model, impacts, tolerance, error):
-    """All impacts are found, and the error is a fraction of the amplitude after them."""
+    """All impacts are found.  The error is relative to the range of the displacement."""
     it = case(model)
     output = (f"{it.body}.x", f"{it.stop}.impact_count")
     exact = simulate_fmu(

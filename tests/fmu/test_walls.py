@@ -11,12 +11,11 @@ from native_host import OK, Instance, Integrator
 from prbm.systems.cosimulation import simulate
 from support import energy_balance, simulation
 
-WAYS = [(2, "cs"), (3, "cs"), (3, "events"), (3, "late")]
+CO_SIMULATIONS = [(2, "cs"), (3, "cs"), (3, "events"), (3, "late")]
 """Versions and interfaces of co-simulation with native FMUs."""
-ways = pytest.mark.parametrize(("fmi", "kind"), WAYS)
-all_ways = pytest.mark.parametrize(("fmi", "kind"), [("python", "cs"), *WAYS])
+every_co_simulation = pytest.mark.parametrize(("fmi", "kind"), [("python", "cs"), *CO_SIMULATIONS])
 every_interface = pytest.mark.parametrize(
-    ("fmi", "kind"), [("python", "cs"), *WAYS, (2, "me"), (3, "me")]
+    ("fmi", "kind"), [("python", "cs"), *CO_SIMULATIONS, (2, "me"), (3, "me")]
 )
 PRESSED = {"release.displacement": 0.0}
 AMPLITUDE, RATE = 1e-3, 10 * math.pi
@@ -90,7 +89,7 @@ def place(found):
     return found["stop.gap"] + found["stop.point.displacement"]
 
 
-@all_ways
+@every_co_simulation
 @pytest.mark.parametrize("longest", [1e-3, 1e-2])
 def test_a_wall_is_within_twice_the_acceleration_times_the_step_squared(opened, fmi, kind, longest):
     grid = points(0.25, longest)
@@ -104,7 +103,7 @@ def test_a_wall_is_within_twice_the_acceleration_times_the_step_squared(opened, 
                 assert abs(off) < 2 * AMPLITUDE * RATE**2 * longest**2
 
 
-@all_ways
+@every_co_simulation
 def test_position_error_of_a_wall_after_a_jump_is_at_most_the_jump(opened, fmi, kind):
     jump = -1e-3
     with opened("PRBDM", fmi, kind).initialize(values=AWAY) as instance:
@@ -177,7 +176,7 @@ def impact_time(instance, kind, motion, step):
 def test_impact_times_of_an_accelerated_wall_converge_with_the_square_of_the_step(
     opened, fmi, kind
 ):
-    """They are within 2 a h^2 over the closing speed; in model exchange they are exact."""
+    """The errors are below 2 a h^2 over the closing speed; in model exchange there are none."""
     acceleration, distance = 1.0, 2e-3
 
     def motion(t):
@@ -284,7 +283,7 @@ def test_momentum_and_energy_are_exchanged_with_a_free_mass(opened, fmi, kind):
         assert velocity == pytest.approx(mass.speed, abs=1e-12)
 
 
-@all_ways
+@every_co_simulation
 def test_uniform_motion_is_followed_exactly(opened, fmi, kind):
     speed, distance = -0.1, 5e-3
     values = AWAY | {"stop.position": distance, "stop.velocity": speed}
@@ -300,7 +299,7 @@ def test_uniform_motion_is_followed_exactly(opened, fmi, kind):
     assert found["stop.approach_speed"] == pytest.approx(-speed, rel=1e-9)
 
 
-@all_ways
+@every_co_simulation
 @pytest.mark.parametrize("model", ["PRBDM", "PRBDM2R"])
 def test_a_pressed_body_stays_on_its_wall(opened, model, fmi, kind):
     with opened(model, fmi, kind).initialize(values=PRESSED) as instance:
@@ -320,7 +319,7 @@ def test_a_pressed_body_stays_on_its_wall(opened, model, fmi, kind):
     assert energy_balance(found) == pytest.approx(start, abs=1e-9)
 
 
-@all_ways
+@every_co_simulation
 def test_work_of_a_wall_under_a_body_is_force_times_velocity_of_the_true_wall(opened, fmi, kind):
     """The difference is within the force times the error of the wall's velocity, a h/4."""
     step, rows = 1e-3, []
@@ -364,7 +363,7 @@ def test_a_pressed_body_stays_on_a_wall_whose_inputs_are_set_in_events(native, k
 def test_a_jump_below_rest_speed_keeps_a_stop_closed_and_is_a_capture(
     native, kind, speed, mobility
 ):
-    """Its impulse -speed/(W + w) acts on the body and, by the sum of impulses, on the partner."""
+    """The impulse -speed/(W + w) acts on the body and, by the sum of impulses, on the partner."""
     values = PRESSED | {"stop.mobility": mobility}
     with Instance(native["PRBDM", 3], kind).initialize(values=values) as instance:
         instance.advance(1e-3)

@@ -25,7 +25,10 @@ FRICTION = {
 
 @each_shipped
 def test_the_loops_determine_the_dependent_coordinates_at_every_shape(model):
-    """Their columns of the Jacobian have a conditioning above 1/30, up to the release shape."""
+    """The conditioning of the dependent columns of the Jacobian is above 1/30.
+
+    The shapes are held at displacements up to that at release, in both directions.
+    """
     guide = mechanism(model)
     system = assemble(guide, guide.values())
     chosen = independent(guide)

@@ -21,9 +21,10 @@ STRAIGHT = {"gravity.y": 0.0}
 
 
 def residual(omega: float) -> float:
-    """Return the determinant of w = a (cos - cosh) + b (sin - sinh) at the tip body.
+    """Return the determinant of the conditions at the tip for w = a (cos - cosh) + b (sin - sinh).
 
-    EI w''' = -omega^2 M w_c and EI w'' = omega^2 (J w' + C M w_c), w_c = w + C w' of its centre.
+    The conditions are EI w''' = -omega^2 M w_c and EI w'' = omega^2 (J w' + C M w_c), with
+    w_c = w + C w' at the centre of mass of the body.
     """
     k = (MASS_PER_LENGTH * omega**2 / EI) ** 0.25
     c, s, ch, sh = math.cos(k * L), math.sin(k * L), math.cosh(k * L), math.sinh(k * L)
@@ -87,7 +88,7 @@ def test_static_deflection_is_that_of_a_beam() -> None:
 
 
 def test_force_at_rest_on_the_stop_is_weight_less_bending_force() -> None:
-    """The deflection is 3 mm: (M g - P) times compliance plus that by the weight of the beam.
+    """With the force P of the stop, the sag under M g - P and the weight of the beam is 3 mm.
 
     The slope of the tip, 4 degrees, which shifts the contact point, and the softer 3R model cause
     a difference of 1.3 %.

@@ -37,7 +37,8 @@ def test_frequency_of_the_straight_guide_without_gravity_equals_its_reference_va
 def test_energy_of_a_conservative_second_drifts_less_than_3e_8():
     """The drift is relative to the largest kinetic energy; no damping, no wall within reach.
 
-    At this tolerance the drift is that of the dense output, which the error of a step excludes.
+    At this tolerance the error of the dense output dominates.  It is not part of the error that
+    controls the step size.
     """
     values = {"damping.beta": 0.0, "stop.position": 0.05}
     sim = simulation("PRBDM2R", values, tolerance=1e-10)

@@ -38,7 +38,8 @@ def stretching(mechanism: Mechanism) -> Mechanism:
     Raises
     ------
     MechanismError
-        If a flexure has one link, which its free end fixes to a body.
+        If the only link of a flexure is fixed to the body at its free end, so that no link can
+        stretch.
     """
     kinds = tuple(replace(kind, axial=True) for kind in mechanism.flexure_types)
     return replace(mechanism, flexure_types=kinds)

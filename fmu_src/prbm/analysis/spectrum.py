@@ -192,9 +192,12 @@ def spectrum(time: Real, signal: Real) -> tuple[Real, Real]:
     (50.0, 3.0)
     """
     steps = np.diff(time)
-    if len(time) < SAMPLES_MIN or np.ptp(steps) > STEP_RTOL * abs(float(steps.mean())):
+    if len(time) < SAMPLES_MIN:
+        raise ParameterError(f"a spectrum needs at least {SAMPLES_MIN} samples, not {len(time)}")
+    if np.ptp(steps) > STEP_RTOL * abs(float(steps.mean())):
         raise ParameterError(
-            f"a spectrum needs at least {SAMPLES_MIN} samples in equal steps, not {len(time)}"
+            f"a spectrum needs equal steps, not {steps.min():.6g} s to {steps.max():.6g} s: "
+            "interpolate the signal, or record it in equal steps"
         )
     window = hann(len(time), sym=False)
     lines = np.fft.rfft(window * detrend(signal))

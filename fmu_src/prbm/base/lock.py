@@ -27,8 +27,8 @@ def locked(path: Path, *, wait: bool = True) -> Iterator[None]:
     """Hold a lock during a ``with`` block.
 
     The system releases the lock when its process ends in any way, so that no stale lock remains.
-    The file stays; it is empty while nobody holds the lock.  If it cannot be opened, or its file
-    system has no locks, the block runs without a lock.
+    The file stays; it is empty while no process holds the lock.  If it cannot be opened, or its
+    file system has no locks, the block runs without a lock.
 
     Parameters
     ----------

@@ -83,8 +83,8 @@ def quantity(written: object, unit: str) -> Quantity:
     Raises
     ------
     MechanismError
-        If ``written`` is none of these, its unit has another dimension, or a number in quotes has
-        no unit although the quantity has a dimension.
+        If ``written`` cannot be read as a quantity, its unit has another dimension, or a number in
+        quotes has no unit although the quantity has a dimension.
 
     Examples
     --------

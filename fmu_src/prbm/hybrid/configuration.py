@@ -163,7 +163,7 @@ class Configuration:
     step : float or None
         Fixed step size [s]; None: adaptive.
     frequency : float
-        Fundamental frequency at the start [Hz]; 0 if there is none.
+        Fundamental frequency at the start [Hz]; 0 if no mode vibrates.
     scales : Scales
         Scales of lengths, rates and energies.
     """

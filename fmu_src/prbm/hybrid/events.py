@@ -16,8 +16,8 @@ from .impacts import Impact
 class EventKind(IntEnum):
     """The kind of an event; in the C kernel, 0 is no event.
 
-    Events at one time are applied in this order.  Impacts come last, so that the contact modes are
-    valid when they are resolved.
+    Events at one time are applied in this order.  Impacts come last, because their resolution needs
+    valid contact modes.
     """
 
     RELEASE = 1

@@ -1,7 +1,7 @@
 """The fastest mode, whose rate limits the steps of an explicit method.
 
-A step is stable if its size times the rate of the fastest mode is below 4.4, whatever the damping
-of that mode.  In longer steps round-off grows until the error of the step reaches the tolerance.
+A step is stable if its size times the rate of the fastest mode is below 4.4, with any damping of
+that mode.  In longer steps round-off grows until the error of the step reaches the tolerance.
 The mode is computed with the springs, the mass matrix and the active constraints; the stiffness
 from loads is neglected.
 """

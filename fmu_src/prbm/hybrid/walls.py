@@ -6,9 +6,8 @@ At a communication point t0 the inputs define the reference
 
 where v is the input ``stop.velocity``.  Until this input has been non-zero, v is the mean rate of
 the displacement.  From its position and velocity at t0, the wall joins the reference within T = 2 H
-(:class:`prbm.mechanics.inputs.Wall`).  H is the recent longest communication step, but at most a
-tenth of the period.  Position and velocity are therefore continuous, and the acceleration is
-finite.
+(:class:`prbm.mechanics.inputs.Wall`): both are continuous, and the acceleration is finite.  H is
+the recent longest communication step, but at most a tenth of the period.
 """
 
 from collections.abc import Mapping, Sequence
@@ -167,7 +166,7 @@ def step_limit(walls: Sequence[Wall], t: float) -> float:
 
 
 def arrived(front: Front) -> Front:
-    """Return the front after replacing each wall whose cubic ends there by its reference."""
+    """Return the front with each wall whose cubic has ended replaced by its reference."""
     walls = tuple(
         wall.arrived() if wall.span and wall.end - front.time <= EVENT_TIME_ATOL else wall
         for wall in front.inputs.walls

@@ -22,8 +22,8 @@ typedef void ImpactListener(void *listener, const Impact *impact);
  * memory.  simulation_start starts the motion. */
 PRBM Simulation *simulation_open(const Mechanism *mechanism);
 PRBM void simulation_close(Simulation *simulation);
-/* Call hear(listener, impact) at each impact. */
-PRBM void simulation_listen(Simulation *simulation, ImpactListener *hear, void *listener);
+/* Call on_impact(listener, impact) at each impact. */
+PRBM void simulation_listen(Simulation *simulation, ImpactListener *on_impact, void *listener);
 PRBM const Mechanism *simulation_mechanism(const Simulation *simulation);
 PRBM size_t simulation_bytes(const Simulation *simulation); /* size of its block */
 /* Restore the state after simulation_open. */
@@ -58,7 +58,7 @@ PRBM bool simulation_check_effort(const Simulation *simulation, Problem *problem
 PRBM bool simulation_check_step(const Simulation *simulation, double step, Problem *problem);
 /* Number of integration steps since simulation_open. */
 PRBM double simulation_steps(const Simulation *simulation);
-/* The tolerance that solver.tolerance or an importer's tolerance (not 0) requests. */
+/* Return the importer's tolerance, or solver.tolerance if the importer's is 0. */
 PRBM double simulation_requested(const Simulation *simulation, double tolerance);
 
 /* --- co-simulation --- */

@@ -398,7 +398,7 @@ class _Assembler:
         return [self.on(name, self.at(point)) for point in body.points.values()]
 
     def anchor(self) -> complex:
-        """Return the first flexure end on the ground, or the origin if there is none [m]."""
+        """Return the first flexure end on the ground, otherwise the origin [m]."""
         for flexure in self.mechanism.flexures:
             for end in (flexure.start, flexure.end):
                 if body_of(end) == GROUND:

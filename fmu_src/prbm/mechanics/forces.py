@@ -52,7 +52,7 @@ def force_row(A: Complex, force: complex) -> Complex:
 
     Examples
     --------
-    A force across a lever of 2 m, along +x, turned by 90 degrees (the lever points to +y):
+    A force along +x at the end of a lever of 2 m that points to +y:
 
     >>> w = force_row(np.array([2.0 + 0j]), 3.0 + 0j)
     >>> float((w @ np.array([1j])).real)

@@ -120,9 +120,9 @@ class Inputs:
 
     Parameters
     ----------
-    forces : (b,) tuple of complex
+    forces : (k,) tuple of complex
         Forces on points of bodies, in the order of ``mechanism.forces`` [N].
-    moments : (b,) tuple of float
+    moments : (k,) tuple of float
         Moments on these bodies, positive counter-clockwise [N m].
     base : complex
         Acceleration of the base [m/s^2].

@@ -18,9 +18,9 @@ The chain of n equal links (nR, Hencky) has no coefficients, and other rules for
 springs are n EI/L between links.  At each end that is clamped or free, a spring 2 n EI/L connects
 the last link with the body.
 
-With axial compliance, one link of a flexure stretches with the stiffness EA/L: the middle one, or
-of an even number the one after the middle, counted from the start.  In a chain all links stretch,
-each with the stiffness n EA/L.
+With axial compliance, one link of a flexure stretches with the stiffness EA/L: the middle one.  If
+the number of links is even, it is the one after the middle, counted from the start.  In a chain
+all links stretch, each with the stiffness n EA/L.
 
 Each model in :data:`MODELS` names its publications.
 """

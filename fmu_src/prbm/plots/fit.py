@@ -102,7 +102,7 @@ def valley_figure(valley: Valley) -> Figure:
             scale = 1.0 if len(valley.names) == 2 else valley.best[j] or 1.0
             left.plot(x, valley.points[:, j] / scale, ".-", linewidth=1.2, label=name)
     others = [name for name in valley.names if name != valley.along]
-    left.set_ylabel(others[0] if len(others) == 1 else "others over their best")
+    left.set_ylabel(others[0] if len(others) == 1 else "other parameters over their best values")
     if len(others) > 1:
         left.legend(fontsize=9, frameon=False)
     right.plot(x, valley.misfit, ".-", color=IMPACT, linewidth=1.2)

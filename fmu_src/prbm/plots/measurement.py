@@ -59,11 +59,11 @@ def calibration_figure(sensor: Calibration, quantity: Real, reading: Real) -> Fi
     )  # fmt: skip
     upper.set_ylabel(f"reading [{sensor.reading_unit}]")
     upper.legend(fontsize=9, frameon=False)
-    rest = sensor(reading) - quantity
-    small, name = length_unit(float(np.abs(rest).max()) or 1.0) if sensor.unit == "m" else (
+    residual = sensor(reading) - quantity
+    small, name = length_unit(float(np.abs(residual).max()) or 1.0) if sensor.unit == "m" else (
         1.0, sensor.unit,
     )  # fmt: skip
-    lower.plot(x, small * rest, ".", color=LINK, markersize=4)
+    lower.plot(x, small * residual, ".", color=LINK, markersize=4)
     lower.set_ylabel(f"calibrated - true [{name}]")
     lower.set_xlabel(f"quantity [{unit}]")
     return figure

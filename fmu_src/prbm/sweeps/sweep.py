@@ -486,7 +486,7 @@ class _Sweep:
         from distributed import as_completed
 
         running: dict[Any, list[int]] = {}
-        crashes: dict[int, int] = {}  # Crashed workers per row.
+        crashes: dict[int, int] = {}  # Crashes of workers that ran a row, after the first one.
         suspects: deque[int] = deque()
         completed = as_completed(loop=self.client.loop)  # type: ignore[no-untyped-call]
         self._submit(rest, running, completed)

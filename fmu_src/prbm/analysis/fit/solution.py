@@ -49,7 +49,8 @@ class Direction:
         lead = next(iter(part))
         moves = [f"{name} by {x / part[lead]:+.3g} %" for name, x in part.items()]
         effect = "has no effect" if math.isinf(self.uncertainty) else (
-            f"has less effect than their uncertainty (relative {self.uncertainty:.2g})"
+            f"has less effect than the uncertainty of the data (relative uncertainty "
+            f"{self.uncertainty:.2g})"
         )  # fmt: skip
         return (
             f"these data cannot separate {' and '.join(part)}: changing {', '.join(moves)} {effect}"
@@ -124,7 +125,7 @@ class Fit:
 
     @property
     def reduced(self) -> float:
-        """Root mean square of (model - data)/uncertainty with the degrees of freedom [-]."""
+        """Residuals relative to their uncertainties [-]: sqrt(sum ((model - data)/u)^2/freedom)."""
         rest = (self.model - self.problem.data) / self.problem.uncertainty
         return math.sqrt(float(rest @ rest) / self.freedom) if self.freedom > 0 else 0.0
 

@@ -200,8 +200,8 @@ static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Pro
         reversed(&pieces);
     }
     Span span = span_of(system, step);
-    Complex along_it = minus(span.z_end, span.z_start);
-    Complex direction = scaled(1.0 / modulus(along_it), along_it);
+    Complex vector_to_end = minus(span.z_end, span.z_start);
+    Complex direction = scaled(1.0 / modulus(vector_to_end), vector_to_end);
     Place spot = new_place(n, scratch), spare = new_place(n, scratch);
     on_body(system, span.root, span.z_start, &spot);
     int *owners = take_integers(scratch, pieces.n + 2), next = step->first;
@@ -211,7 +211,7 @@ static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Pro
         next = lay_link(system, direction, pieces.lengths[i], pieces.axial[i - 1],
                         is_stretch(system, next + 1), next);
     }
-    int last_one = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
+    int far = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
     for (int i = 0; i <= pieces.n; i++) {
         /* In the drawing the angle of a body is 0, that of a link its direction. */
         Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
@@ -227,9 +227,9 @@ static bool walk_flexure(System *system, const Step *step, Scratch *scratch, Pro
         close_loop(system, &spot, &spare);
         copy_place(n, &spot, &spare); /* The last stub is part of the far body. */
     } else {
-        reach(system, span.far, &spot, minus(span.z_end, last), last_one);
+        reach(system, span.far, &spot, minus(span.z_end, last), far);
     }
-    add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
+    add_rod(system, pieces.rods[pieces.n + 1], &spot, far, last, &spare);
     return true;
 }
 
@@ -458,23 +458,23 @@ static bool check_masses(const System *system, const Complex *e0, Scratch *scrat
     double *M = take(scratch, n * n), *C = take(scratch, n * n), *w = take(scratch, n);
     double *scale = take(scratch, n);
     inertia(system->n, system->H, system->J, e0, M, C);
-    bool sound = true;
+    bool regular = true;
     for (size_t i = 0; i < n; i++) {
         scale[i] = sqrt(M[i * n + i]);
-        sound = sound && scale[i] > 0.0;
+        regular = regular && scale[i] > 0.0;
     }
-    for (size_t i = 0; sound && i < n * n; i++) {
+    for (size_t i = 0; regular && i < n * n; i++) {
         M[i] /= scale[i / n] * scale[i % n];
     }
-    if (sound) {
+    if (regular) {
         if (!symmetric_eigen(system->n, M, w, NULL, problem)) {
             scratch->used = mark;
             return false;
         }
-        sound = w[0] > MASSLESS_RTOL;
+        regular = w[0] > MASSLESS_RTOL;
     }
     scratch->used = mark;
-    if (!sound) {
+    if (!regular) {
         return fail(problem,
                     "a part that can move has no mass: give the flexures a density and the bodies "
                     "a mass and an inertia");
@@ -564,6 +564,7 @@ static bool check_loops(const System *system, const Complex *e0, Scratch *scratc
                         names);
 }
 
+/* Compute gamma0, the relative length of the stub, of each type with several pivots. */
 static bool stubs(System *system, Scratch *scratch, Problem *problem) {
     const Mechanism *m = system->mechanism;
     int count = 0;

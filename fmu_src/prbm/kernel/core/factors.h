@@ -11,7 +11,7 @@ typedef struct {
     const Block *blocks;
     double *L;                  /* lower triangles of the blocks, consecutive */
     double *inverse;            /* (even,) 1/D */
-    double *Z, *Z_columns;      /* (r, even); L^-1 columns^T, or Z if symmetric */
+    double *Z, *Z_columns;      /* (r, even); Z_columns = L^-1 columns^T, Z itself if symmetric */
     double *S;                  /* (r, r), and memory for its factor */
     int *pivots;                /* (r,) */
     bool symmetric;             /* S is symmetric and small: factor L D L^T, else LU */

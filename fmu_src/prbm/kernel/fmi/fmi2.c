@@ -238,7 +238,7 @@ EXPORTED fmi2Status FMI2(GetBoolean)(fmi2Component c, const fmi2ValueReference v
     return status;
 }
 
-/* Log the type of each variable: none is of type String. */
+/* Reject the get, with the type of each variable: no variable is a String. */
 EXPORTED fmi2Status FMI2(GetString)(fmi2Component c, const fmi2ValueReference vr[], size_t nvr,
                                     fmi2String value[]) {
     Instance *instance = accessed2(c, RULE2_GetString, vr, nvr, value);

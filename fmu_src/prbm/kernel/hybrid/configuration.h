@@ -5,7 +5,8 @@
 #include "hybrid/state.h"
 
 PRBM void set_scales(Configuration *configuration, double frequency);
-PRBM bool take_values(Simulation *sim, Problem *problem); /* assemble */
+/* Let the values that were set act: copy, check and assemble them. */
+PRBM bool take_values(Simulation *sim, Problem *problem);
 PRBM bool values_changed(const Simulation *sim);
 PRBM bool inputs_changed(const Simulation *sim); /* other than those of walls */
 PRBM bool walls_changed(const Simulation *sim);  /* inputs that move walls */

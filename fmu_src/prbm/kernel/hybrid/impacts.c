@@ -408,8 +408,8 @@ static void report_impact(const Simulation *sim, int i, const double *q, const d
                      q,
                      v,
                      after};
-    if (sim->hear) {
-        sim->hear(sim->listener, &report);
+    if (sim->on_impact) {
+        sim->on_impact(sim->listener, &report);
     }
 }
 

@@ -179,8 +179,8 @@ PRBM void simulation_close(Simulation *simulation) {
     free(simulation);
 }
 
-PRBM void simulation_listen(Simulation *simulation, ImpactListener *hear, void *listener) {
-    simulation->hear = hear;
+PRBM void simulation_listen(Simulation *simulation, ImpactListener *on_impact, void *listener) {
+    simulation->on_impact = on_impact;
     simulation->listener = listener;
 }
 

@@ -20,8 +20,9 @@ static void spring_torques(const System *system, const double *w, double *torque
     }
 }
 
-/* One power iteration with the factors of the equations: w becomes the accelerations by the torques
- * K w, of which the rate is the Rayleigh quotient. */
+/* Make one power iteration with the factors of the equations.  The new direction is that of the
+ * accelerations x by the torques K w of the old direction w; the square of the rate is
+ * x.K w / w.K w. */
 PRBM void refine_fastest(Simulation *sim) {
     State *state = &sim->state;
     Stepping *stepping = &sim->stepping;

@@ -167,7 +167,7 @@ struct Simulation {
     Evaluation at_front;   /* at the front, while contacts change */
     Correction correction; /* working memory of projections */
     Scratch scratch;
-    ImpactListener *hear;
+    ImpactListener *on_impact;
     void *listener;
     double steps; /* integration steps since the simulation was opened */
     size_t bytes;
