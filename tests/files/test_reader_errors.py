@@ -1,7 +1,6 @@
 """Readers of mechanism files, records and units raise only errors of the package."""
 
 import contextlib
-import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from changed_texts import CHANGES, FRAGMENTS, REMOVED_MAX, change, pieces_of
 from measurement_layouts import LAYOUTS, lvm
 from mechanism_mistakes import EXAMPLE
 from prbm.base.errors import PrbmError
@@ -19,33 +19,15 @@ from prbm.files import record_units, units
 from prbm.files.mechanism_file import load, read_mechanism
 from prbm.files.settings import quantities, quantity
 
-FRAGMENTS = (
-    "", " ", "\t", "\n", "\r", "\0", "\x1a", "\ufeff", "\u2028", "\u0663", "\U0001f600", "é", "µ",
-    "=", "[", "]", "[[", "]]", "{", "}", "(", ")", '"', "'", '"""', "\\", "#", ".", ",", ";", "*",
-    "/", "**", "^", "-", "+", "e", "e9", "1e999", "9" * 5000, "0", "1", "nan", "inf", "true", "m)",
-    "( m", "m**-", "furlong", "degC2", "km99", "m*" * 300, "name", "body", "stops", "1979-05-27",
-    "***End_of_Header***", "X_Columns\t", "Channels\t-1", "Decimal_Separator\t;", "LabVIEW", "No",
-)  # fmt: skip
-PIECES = re.compile(r"\w+|\s|.", re.DOTALL)
-
 
 @st.composite
 def changed(draw: st.DrawFn, texts: list[str]) -> str:
     """Return a text in which some pieces are replaced, removed, repeated or exchanged."""
-    pieces = PIECES.findall(draw(st.sampled_from(texts)))
+    pieces = pieces_of(draw(st.sampled_from(texts)))
     for _ in range(draw(st.integers(1, 4))):
         i, j = (draw(st.integers(0, max(0, len(pieces) - 1))) for _ in range(2))
-        change = draw(st.integers(0, 4))
-        if change == 0:
-            pieces[i:i] = [draw(st.sampled_from(FRAGMENTS))]
-        elif change == 1:
-            pieces[i : i + 1] = [draw(st.sampled_from(FRAGMENTS) | st.text(max_size=5))]
-        elif change == 2:
-            pieces[i : i + draw(st.integers(1, 20))] = []
-        elif change == 3:
-            pieces[i:i] = pieces[j : j + 5]
-        elif pieces:
-            pieces[i], pieces[j] = pieces[j], pieces[i]
+        kind, count = draw(st.integers(0, CHANGES - 1)), draw(st.integers(1, REMOVED_MAX))
+        change(pieces, kind, i, j, count, draw(st.sampled_from(FRAGMENTS) | st.text(max_size=5)))
     return "".join(pieces)
 
 

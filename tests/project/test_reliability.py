@@ -1,15 +1,18 @@
 """Short runs of the campaign in ``docs/reliability.md``."""
 
+import re
+
 import pytest
 
 from c_importer import ANVIL, needs
-from reliability import calls, draws, faults, states, texts, threads
+from reliability import calls, draws, faults, states, texts, threads, versions
 from reliability.driver import drive
 from reliability.report import Part
 
 pytestmark = pytest.mark.native
 
 QUICK = [ANVIL, "PRBDM2R"]
+OFFLINE = re.compile("NewConnectionError|NameResolutionError|ConnectTimeoutError|ProxyError")
 
 
 @pytest.mark.slow
@@ -84,6 +87,18 @@ def test_instances_in_threads_have_no_data_races():
     needs("cc")
     for fmi, kind in calls.INTERFACES:
         assert threads.races(ANVIL, fmi, kind, 4) == ""
+
+
+@pytest.mark.slow
+def test_lowest_versions_of_dependencies_export_and_simulate():
+    """The first environment of the campaign is that of the oldest Python."""
+    if versions.python(versions.ENVIRONMENTS[0][0]) is None:
+        pytest.skip(f"needs Python {versions.ENVIRONMENTS[0][0]}")
+    part = versions.run(1)
+    if any(OFFLINE.search(line) for line in part.failures):
+        pytest.skip("no connection to the index of packages")
+    assert part.failures == []
+    assert len(part.rows) == 1
 
 
 def test_tables_have_a_row_of_sums():

@@ -112,6 +112,21 @@ def test_invalid_arguments_are_rejected(
         simulate(mechanisms["PRBDM"], **settings)
 
 
+@pytest.mark.parametrize(
+    ("given", "logged"),
+    [
+        ({"tolerance": 1e-3}, True),
+        ({"changes": {"solver.tolerance": 1e-3}}, True),
+        ({"tolerance": 1e-5}, False),
+    ],
+)
+def test_a_replaced_tolerance_is_logged(
+    mechanisms: dict[str, Mechanism], caplog: pytest.LogCaptureFixture, given, logged: bool
+) -> None:
+    simulate(mechanisms["PRBDM"], stop_time=1e-3, **given)
+    assert ("tolerance = 0.001 is replaced by 1e-05" in caplog.text) == logged
+
+
 def test_texts_with_units_equal_numbers_in_si(mechanisms: dict[str, Mechanism]) -> None:
     guide = mechanisms["PRBDM"]
     texts = simulate(guide, {"release.displacement": "-10 mm"}, stop_time="20 ms", step="2 ms")

@@ -11,6 +11,9 @@ import math
 # --- description -------------------------------------------------------------------------------
 JOINT_DISTANCE_RTOL = 1e-9  # Of the size: largest distance of two points that a joint connects.
 MASSLESS_RTOL = 1e-13  # Smallest eigenvalue of the mass matrix, scaled to a unit diagonal.
+INERTIA_RATIO_MIN = (
+    1e-12  # Of the largest inertia of a coordinate: the motion of less is round-off.
+)
 DEPENDENT_LOOP_RTOL = 1e-9  # Of the loop Jacobian's largest entry: smaller pivots are round-off.
 STUB_RTOL = 1e-12  # Of a cantilever's length: excess of the sum of its links that is round-off.
 

@@ -12,7 +12,6 @@ from ..base.progress import reporter
 from ..base.unit_text import frequency_text
 from ..files.mechanism_file import load
 from ..files.settings import UserMistake, quantity, settings
-from ..hybrid.configuration import replaced_tolerance
 from ..mechanics.arrays import Real
 from ..mechanics.assembly import assemble
 from ..mechanism.description import Mechanism
@@ -61,10 +60,8 @@ def run_simulation(options: argparse.Namespace) -> None:
     output.table(f"{mechanism.name}-impacts.csv", IMPACT_HEAD, _impacts(result))
     output.figure(f"{mechanism.name}.png", lambda: _figure(result))
     output.write()
-    given = result.values["solver.tolerance"] if tolerance is None else tolerance
-    for sentence in (replaced_tolerance(given), *_notes(result.mechanism, values)):
-        if sentence:
-            print(sentence)
+    for sentence in _notes(result.mechanism, values):
+        print(sentence)
     if options.spectrum is not None:
         _spectrum(options, result, values, duration)
 

@@ -10,6 +10,7 @@ from ..base.errors import ParameterError
 from ..base.tolerances import (
     NOMINAL_ANGLE_MIN,
     NOMINAL_STRAIN_FACTOR,
+    RELEASE_PENETRATION_ATOL,
     SPRINGLESS_RATE,
     STEP_MAX_RTOL,
     TOLERANCE_MAX,
@@ -88,6 +89,11 @@ class Scales:
     def touching(self) -> float:
         """Gap below which a stop closes together with others [m]."""
         return TOUCHING_RTOL * self.length
+
+    @property
+    def depth(self) -> float:
+        """Penetration at which a stop that was released too early closes again [m]."""
+        return min(self.touching, RELEASE_PENETRATION_ATOL)
 
     @property
     def step_max(self) -> float:

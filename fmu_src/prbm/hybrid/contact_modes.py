@@ -172,11 +172,20 @@ def find_holding_stops(
     if found is None:
         return None
     pressing = zip(every, found.normal, strict=True)
-    holding = [i for i, press in pressing if press > scales.zero_acceleration]
+    holding = [i for i, press in pressing if press > _least_pressing(scales, front, i)]
     contacts = equations_holding(scales, front, holding).contacts
     # Only the rows of several stops may be dependent: check these.
     agrees = len(every) == 1 or _agrees(scales, front, contacts, every, {})
     return holding if agrees else None
+
+
+def _least_pressing(scales: Scales, front: Front, stop: int) -> float:
+    """Return the acceleration of a gap by its normal force above which a stop holds [m/s^2].
+
+    A stop that was released because its force was round-off, and then penetrated, was pressed.
+    """
+    gaps, _ = front.gaps_and_rates()
+    return scales.zero_acceleration if gaps[stop] > -scales.depth / 2 else 0.0
 
 
 def _unsettled(configuration: Configuration, front: Front, contacts: Iterable[int]) -> str:
@@ -300,7 +309,7 @@ def _modes_of(
     if found is None:
         return None
     for i, press in zip(stops, found.normal, strict=True):
-        if press > scales.zero_acceleration:
+        if press > _least_pressing(scales, front, i):
             contacts = contacts.with_mode(i, modes[i] if i in rubbing else FRICTIONLESS)
     contacts = _sticking_or_slipping(scales, front, contacts, at_rest, found, slipped)
     slack = dict(zip(at_rest, scales.zero_acceleration / found.mobility, strict=True))

@@ -181,12 +181,12 @@ def closing_time(view: StepView, guard: Guard, stop: int) -> float | None:
 
 def _closing_time_between(view: StepView, guard: Guard, stop: int, j: int) -> float | None:
     """Return when a gap closes in an interval at whose end, or within which, it is not positive."""
-    z, near = view.along(guard, stop), view.scales.touching
+    z, depth = view.along(guard, stop), view.scales.depth
     a, b = view.samples[0][j : j + 2].tolist()
     (gap_a, gap_b), (rate_a, rate_b) = (x[j : j + 2, stop] for x in view.gaps_and_rates)
-    if abs(rate_a) <= view.scales.zero_speed and abs(gap_a) <= _round_off(view):
+    if abs(rate_a) <= view.scales.zero_speed and gap_a <= _round_off(view):
         # The stop was released too early, and is pressed again.
-        return fall_time(lambda t: z(t) + near, a, b) if gap_b < -near else None
+        return _deep_time(z, depth, a, b) if gap_b < min(gap_a, -depth) else None
     if rate_a > 0.0:
         if rate_b >= 0.0:
             return None  # The gap opens throughout the interval.
@@ -194,13 +194,20 @@ def _closing_time_between(view: StepView, guard: Guard, stop: int, j: int) -> fl
         if z(a) <= 0.0:
             return a  # The flight is lower than the resolution of a position.
     elif gap_a <= 0.0:
-        # This is an impact only if the penetration increases.
-        return a if gap_b < gap_a - near else None
+        # This is an impact only if the penetration increases, at once or over several intervals.
+        if gap_b < gap_a - depth:
+            return float(a)
+        return _deep_time(z, depth, a, b) if gap_b < min(gap_a, -depth) else None
     if rate_a < 0.0 < rate_b:
         b = fall_time(view.along(_gap_rate, stop, sign=-1.0), a, b)
         if z(b) > 0.0:
             return None
     return _corrected_time(view, stop, fall_time(z, a, b), earliest=a)
+
+
+def _deep_time(z: Scalar, depth: float, a: float, b: float) -> float:
+    """Return when a penetration -z reaches a depth [m] between two times."""
+    return fall_time(lambda t: z(t) + depth, a, b)
 
 
 def _round_off(view: StepView) -> float:

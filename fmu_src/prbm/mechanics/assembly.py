@@ -15,7 +15,12 @@ import numpy as np
 from scipy.linalg import qr
 
 from ..base.errors import MechanismError, ParameterError
-from ..base.tolerances import DEPENDENT_LOOP_RTOL, JOINT_DISTANCE_RTOL, MASSLESS_RTOL
+from ..base.tolerances import (
+    DEPENDENT_LOOP_RTOL,
+    INERTIA_RATIO_MIN,
+    JOINT_DISTANCE_RTOL,
+    MASSLESS_RTOL,
+)
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import affine
 from ..mechanism.flexure import Segments, segments, stub
@@ -162,7 +167,9 @@ class _Assembler:
         result = self.arrays()
         e = result.directions(result.q0)
         check_loops(result.spread(result.loops), e, [name for name, _ in self.loops])
-        check_masses((e.conj()[:, None] * result.H * e).real, self.J)
+        bodies = {j: f"body {name}" for name, j in self.index.items()}
+        parts = [bodies.get(j, "a flexure link") for j in range(len(self.J))]
+        check_masses((e.conj()[:, None] * result.H * e).real, self.J, parts)
         return result
 
     def body(self, name: str) -> None:
@@ -437,8 +444,8 @@ def calculated(mechanism: Mechanism, values: Mapping[str, float]) -> dict[str, f
     return result
 
 
-def check_masses(M: Real, J: Sequence[float]) -> None:
-    """Reject a mechanism with massless moving parts.
+def check_masses(M: Real, J: Sequence[float], names: Sequence[str]) -> None:
+    """Reject a mechanism with moving parts that have no mass, or hardly any.
 
     Parameters
     ----------
@@ -446,14 +453,25 @@ def check_masses(M: Real, J: Sequence[float]) -> None:
         Mass matrix of the mass points at the straight shape [kg m^2].
     J : (n,)
         Rotary inertias [kg m^2].
+    names : sequence of str
+        Names of the parts that move with the n coordinates.
 
     Raises
     ------
     ParameterError
-        If the mass matrix is singular.
+        If the mass matrix is singular, or inertias differ by more than ``INERTIA_RATIO_MIN``.
     """
     full = M + np.diag(J)
-    scale = np.sqrt(np.diag(full))
+    inertias = np.diag(full)
+    light, heavy = int(np.argmin(inertias)), int(np.argmax(inertias))
+    if 0.0 < inertias[light] < INERTIA_RATIO_MIN * inertias[heavy]:
+        raise ParameterError(
+            f"the inertia of {names[light]}, {inertias[light]:.3g} kg m2, is less than "
+            f"{INERTIA_RATIO_MIN:g} of that of {names[heavy]}, {inertias[heavy]:.3g} kg m2, so "
+            "that round-off would change the motion: check the units of masses, inertias, "
+            "densities and lengths, and make the light part heavier"
+        )
+    scale = np.sqrt(inertias)
     if np.all(scale > 0.0):
         scaled = full / np.outer(scale, scale)
         if np.linalg.eigvalsh(scaled)[0] > MASSLESS_RTOL:

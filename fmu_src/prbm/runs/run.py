@@ -1,5 +1,6 @@
 """Simulation of a mechanism without an FMU; the columns are those that FMPy returns for an FMU."""
 
+import logging
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -7,6 +8,7 @@ from typing import Any
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.progress import Progress
+from ..hybrid.configuration import replaced_tolerance
 from ..hybrid.impacts import Impact
 from ..mechanism.description import Mechanism
 from .driving import Driver
@@ -20,6 +22,8 @@ Source = Callable[[float], Mapping[str, float]]
 ROWS_MAX = 10_000_000  # Most communication points; a larger number is likely a wrong unit.
 LAST_STEP_RTOL = 1e-9  # A last step below this fraction of a communication step is round-off.
 EARLY_SHARE = 0.2  # Share of steps_max that is permitted at the beginning, with most impacts.
+
+_log = logging.getLogger(__name__)
 
 
 class SlowSimulationError(SimulationError):
@@ -55,7 +59,8 @@ def simulate(
         Duration and communication step, numbers [s] or texts, ``"20 ms"``; None: those
         of the default experiment, for most mechanisms 1 s and 1 ms.  The last step may be shorter.
     tolerance : float or None
-        Relative tolerance of the integration; None: ``solver.tolerance``.
+        Relative tolerance of the integration; None: ``solver.tolerance``.  A value above 1e-5 is
+        replaced by 1e-5, with a warning in the log.
     source : callable or None
         Function of time that returns inputs and tunable parameters by name, for the step that
         begins at that time [s].
@@ -118,6 +123,9 @@ def simulate(
     if tolerance is not None:
         tolerance = _number("tolerance", tolerance, "")
     motion = simulation(mechanism, values, tolerance=tolerance, engine=engine)
+    wanted = motion.values["solver.tolerance"] if tolerance is None else tolerance
+    if replaced := replaced_tolerance(wanted):
+        _log.warning("%s", replaced)
     _check_effort(motion, spacing)
     impacts: list[Impact] = []
     motion.record = impacts

@@ -4,7 +4,6 @@ A text is a valid one in which pieces are replaced, removed, repeated, exchanged
 must be read or rejected with an error of the package, within a limit of CPU time.
 """
 
-import re
 import signal
 import tempfile
 import traceback
@@ -19,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from c_importer import host_fmu
+from changed_texts import CHANGES, FRAGMENTS, REMOVED_MAX, change, pieces_of
 from measurement_layouts import LAYOUTS, lvm
 from mechanism_mistakes import EXAMPLE
 from prbm.base.errors import PrbmError
@@ -30,15 +30,6 @@ from prbm.systems import ssp
 
 from .report import Part
 
-FRAGMENTS = (
-    "", " ", "\t", "\n", "\r", "\0", "\x1a", "\ufeff", "\u2028", "\u0663", "\U0001f600", "é", "µ",
-    "=", "[", "]", "[[", "]]", "{", "}", "(", ")", '"', "'", '"""', "\\", "#", ".", ",", ";", "*",
-    "/", "**", "^", "-", "+", "e", "e9", "1e999", "9" * 5000, "0", "1", "nan", "inf", "true", "m)",
-    "( m", "m**-", "furlong", "degC2", "km99", "m*" * 300, "name", "body", "stops", "1979-05-27",
-    "***End_of_Header***", "X_Columns\t", "Channels\t-1", "Decimal_Separator\t;", "LabVIEW", "No",
-    "<", ">", "</", "<!--", "&", "&lt;", "<!DOCTYPE x>", "xmlns", "NaN", "-1e300", " " * 3000,
-)  # fmt: skip
-PIECES = re.compile(r"\w+|\s|.", re.DOTALL)
 UNITS = (
     "12 mm", "1.5e-3 N*m/rad", "7800 kg/m^3", "181.5 GPa", "3 m/s**2", "90 deg", "1 1/s", "5 %",
     "2 mm2", "0.1 kg.m2", "(3 + 4) mm", "1 in", "20 degC", "4 lbf/in^2", "1 J/(kg*K)",
@@ -62,21 +53,12 @@ class TooSlowError(BaseException):
 
 def changed(rng: np.random.Generator, text: str) -> str:
     """Return a text with one to four changes."""
-    pieces = PIECES.findall(text)
+    pieces = pieces_of(text)
     for _ in range(rng.integers(1, 5)):
         i, j = (int(rng.integers(0, max(1, len(pieces)))) for _ in range(2))
         fragment = FRAGMENTS[rng.integers(len(FRAGMENTS))]
-        change = rng.integers(5)
-        if change == 0:
-            pieces[i:i] = [fragment]
-        elif change == 1:
-            pieces[i : i + 1] = [fragment]
-        elif change == 2:
-            pieces[i : i + int(rng.integers(1, 21))] = []
-        elif change == 3:
-            pieces[i:i] = pieces[j : j + 5]
-        elif pieces:
-            pieces[i], pieces[j] = pieces[j], pieces[i]
+        kind, count = int(rng.integers(CHANGES)), int(rng.integers(1, REMOVED_MAX + 1))
+        change(pieces, kind, i, j, count, fragment)
     return "".join(pieces)
 
 

@@ -452,12 +452,45 @@ static Complex first_ground_end(const System *system) {
 
 /* --- checks ----------------------------------------------------------------------------------- */
 
+/* The name of the part that turns or stretches with a coordinate. */
+static const char *part_of(const System *system, int j) {
+    for (int body = 1; body <= system->b; body++) {
+        if (system->origins[body].j == j) {
+            return system->mechanism->bodies[body - 1].name;
+        }
+    }
+    return NULL;
+}
+
+static bool check_ratio(const System *system, const double *M, Problem *problem) {
+    int n = system->n, light = 0, heavy = 0;
+    for (int i = 1; i < n; i++) {
+        light = M[i * n + i] < M[light * n + light] ? i : light;
+        heavy = M[i * n + i] > M[heavy * n + heavy] ? i : heavy;
+    }
+    double least = M[light * n + light], most = M[heavy * n + heavy];
+    if (!(0.0 < least && least < INERTIA_RATIO_MIN * most)) {
+        return true;
+    }
+    const char *first = part_of(system, light), *second = part_of(system, heavy);
+    return fail(problem,
+                "the inertia of %s%s, %.3g kg m2, is less than %g of that of %s%s, %.3g kg m2, so "
+                "that round-off would change the motion: check the units of masses, inertias, "
+                "densities and lengths, and make the light part heavier",
+                first ? "body " : "a flexure link", first ? first : "", least, INERTIA_RATIO_MIN,
+                second ? "body " : "a flexure link", second ? second : "", most);
+}
+
 static bool check_masses(const System *system, const Complex *e0, Scratch *scratch,
                          Problem *problem) {
     size_t mark = scratch->used, n = (size_t)system->n;
     double *M = take(scratch, n * n), *C = take(scratch, n * n), *w = take(scratch, n);
     double *scale = take(scratch, n);
     inertia(system->n, system->H, system->J, e0, M, C);
+    if (!check_ratio(system, M, problem)) {
+        scratch->used = mark;
+        return false;
+    }
     bool regular = true;
     for (size_t i = 0; i < n; i++) {
         scale[i] = sqrt(M[i * n + i]);

@@ -14,6 +14,10 @@ PRBM double zero_acceleration(const Configuration *configuration) {
     return ZERO_RATE_RTOL * scales->rate * scales->rate * scales->length;
 }
 
+PRBM double closing_depth(const Configuration *configuration) {
+    return lesser(TOUCHING_RTOL * configuration->scales.length, RELEASE_PENETRATION_ATOL);
+}
+
 /* The scale of rates is the fundamental angular frequency; if it is zero, that of the stiffest
  * spring with the largest inertia.  The scale of energies is the torque of the stiffest torsion
  * spring at one radian; without torsion springs, the largest inertia times the square of the

@@ -11,6 +11,8 @@ PRBM bool values_changed(const Simulation *sim);
 PRBM bool inputs_changed(const Simulation *sim); /* other than those of walls */
 PRBM bool walls_changed(const Simulation *sim);  /* inputs that move walls */
 PRBM double zero_speed(const Configuration *configuration); /* lower speeds are round-off */
+/* Penetration at which a stop that was released too early closes again [m]. */
+PRBM double closing_depth(const Configuration *configuration);
 PRBM double zero_acceleration(const Configuration *configuration); /* lower ones are round-off */
 PRBM double field_value(const Simulation *sim, Expression field);
 PRBM double field_change(const Simulation *sim, Expression field); /* not yet in the field value */

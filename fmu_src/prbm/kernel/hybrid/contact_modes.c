@@ -102,6 +102,16 @@ static bool modes_agree(Simulation *sim, const double *q, const double *v,
 
 /* --- stops ------------------------------------------------------------------------------------ */
 
+/* Return the acceleration of a gap by its normal force above which a stop holds [m/s^2].  A stop
+ * that was released because its force was round-off, and then penetrated, was pressed. */
+static double least_pressing(Simulation *sim, int stop, const double *q) {
+    size_t mark = sim->scratch.used;
+    double distance = gap(&sim->equations, stop, sim->state.front_time, directions_at(sim, q));
+    const Configuration *configuration = &sim->configuration;
+    sim->scratch.used = mark;
+    return distance > -closing_depth(configuration) / 2.0 ? zero_acceleration(configuration) : 0.0;
+}
+
 /* Find the stops at rest that hold: these are pressed, and the others open.  In this search
  * contacts with a sliding velocity slip, and contacts at rest are frictionless.  If stops can move
  * only together, a subset with independent rows holds. */
@@ -132,7 +142,7 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
         return false;
     }
     for (int k = 0; found.solved && k < every.count; k++) {
-        if (found.normal[k] > zero_acceleration(&sim->configuration)) {
+        if (found.normal[k] > least_pressing(sim, every.stops[k], q)) {
             holding->stops[holding->count++] = every.stops[k];
         }
     }
@@ -315,7 +325,7 @@ static bool modes_by_forces(Simulation *sim, const HoldingSet *stops, const Hold
     for (int k = 0; k < rest.stop_count; k++) {
         int i = rest.stops[k];
         ContactMode closed = friction_of(sim, i) > 0.0 ? sliding[i] : CONTACT_FRICTIONLESS;
-        bool pressed = found.normal[k] > zero_acceleration(&sim->configuration);
+        bool pressed = found.normal[k] > least_pressing(sim, i, q);
         modes[i] = pressed ? closed : CONTACT_OPEN;
     }
     if (!stick_or_slip(sim, &rest, &found, event, modes, problem)) {

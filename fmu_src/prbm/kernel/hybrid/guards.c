@@ -341,7 +341,7 @@ typedef struct {
 static bool detect_closing(Search *search, const double *gaps, const double *rates, int k,
                            Closing *closing) {
     Simulation *sim = search->sim;
-    double length = system_of(sim)->length, near = TOUCHING_RTOL * length;
+    double length = system_of(sim)->length, depth = closing_depth(&sim->configuration);
     ArcGuard guard = arc_guard(search), rate = {search, gap_rate_guard, false, 1.0, 0.0};
     bool dips = rates[0] < 0.0 && 0.0 < rates[1];
     closing->a = sample_time(sim, k);
@@ -351,9 +351,9 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
         return false;
     }
     if (fabs(rates[0]) <= zero_speed(&sim->configuration) &&
-        fabs(gaps[0]) <= CONSTRAINT_RTOL * length) {
+        gaps[0] <= CONSTRAINT_RTOL * length) {
         closing->pressed = true;
-        return gaps[1] < -near;
+        return gaps[1] < lesser(gaps[0], -depth);
     }
     if (rates[0] > 0.0) {
         if (rates[1] >= 0.0) {
@@ -365,8 +365,10 @@ static bool detect_closing(Search *search, const double *gaps, const double *rat
             return true;
         }
     } else if (gaps[0] <= 0.0) {
-        closing->at_a = true; /* An impact only if the penetration increases. */
-        return gaps[1] < gaps[0] - near;
+        /* An impact only if the penetration increases, at once or over several intervals. */
+        closing->at_a = gaps[1] < gaps[0] - depth;
+        closing->pressed = !closing->at_a;
+        return closing->at_a || gaps[1] < lesser(gaps[0], -depth);
     }
     if (dips) {
         rate.sign = -1.0;
@@ -383,7 +385,7 @@ static bool locate_closing(Search *search, const Closing *closing, double *time)
         return true;
     }
     if (closing->pressed) {
-        guard.offset = TOUCHING_RTOL * system_of(search->sim)->length;
+        guard.offset = closing_depth(&search->sim->configuration);
         *time = locate(&guard, closing->a, closing->b);
         return true;
     }
