@@ -410,14 +410,10 @@ RARE void add_friction_and_walls(const Equations *q, Evaluation *result) {
 
 /* Set the columns of slipping stops.  Coulomb's law adds a force along the wall to the normal
  * force, so that the column of such a stop differs from its row. */
-static void set_columns(const Equations *q, Evaluation *result) {
+RARE void set_columns(const Equations *q, Evaluation *result) {
     const System *system = q->system;
     int n = system->n, even = system->even;
     Rows walls = slide_rows(system);
-    result->factors.Z_columns = result->factors.Z;
-    if (q->slipping_stops == 0) {
-        return;
-    }
     result->factors.Z_columns = result->columns;
     copy(q->r * even, result->factors.Z, result->columns);
     for (int k = 0; k < q->slipping_stops; k++) {
@@ -440,7 +436,10 @@ SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
     if (!blocks_motion(q, result)) {
         return false;
     }
-    set_columns(q, result);
+    result->factors.Z_columns = result->factors.Z;
+    if (q->slipping_stops > 0) {
+        set_columns(q, result);
+    }
     return schur_dispatch(even, &result->factors);
 }
 
