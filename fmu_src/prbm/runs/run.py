@@ -4,6 +4,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.progress import Progress
@@ -11,7 +13,7 @@ from ..hybrid.impacts import Impact
 from ..mechanism.description import Mechanism
 from .engine import Engine, simulation
 from .experiment import experiment
-from .result import Result, structured
+from .result import Columns, Result, row_type
 
 Source = Callable[[float], Mapping[str, float]]
 ROWS_MAX = 10_000_000  # More communication points are a mistake in the unit of the step.
@@ -105,7 +107,7 @@ def simulate(
     impacts: list[Impact] = []
     motion.record = impacts
     start = {**motion.values, **motion.given}
-    rows = []
+    columns: Columns = np.empty(0)
     for k, t in enumerate(times):
         motion.advance(t)
         if steps_max is not None:
@@ -113,10 +115,13 @@ def simulate(
         outputs = motion.outputs()
         if source is not None:
             motion.set(source(t))
-        rows.append({"time": t, **motion.given, **outputs})
+        row = {"time": t, **motion.given, **outputs}
+        if k == 0:
+            columns = np.empty(len(times), row_type(row))
+        columns[k] = tuple(row.values())
         if progress is not None:
             progress(k / (len(times) - 1))
-    return Result(mechanism, start, structured(rows), tuple(impacts), motion.engine)
+    return Result(mechanism, start, columns, tuple(impacts), motion.engine)
 
 
 def _check_effort(motion: Engine, spacing: float) -> None:
