@@ -167,11 +167,10 @@ EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *v
 }
 
 EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int count,
-                         const int *slots, double *values, int *done, char *message) {
-    for (*done = 0; *done < samples; ++*done) {
-        bool later = times[*done] != simulation_time(engine->simulation);
-        double *row = values + (size_t)*done * (size_t)count;
-        if ((later && prbm_advance(engine, times[*done], message) < 0) ||
+                         const int *slots, double *values, char *message) {
+    for (int i = 0; i < samples; i++) {
+        double *row = values + (size_t)i * (size_t)count;
+        if (prbm_advance(engine, times[i], message) < 0 ||
             !prbm_values(engine, count, slots, row, message)) {
             return -1;
         }
@@ -187,6 +186,10 @@ EXPORTED bool prbm_state(Engine *engine, double *y, char *message) {
         copy(state_size(sim), sim->present.y, y);
     }
     return succeed(right, &problem, message);
+}
+
+EXPORTED double prbm_time(const Engine *engine) {
+    return simulation_time(engine->simulation);
 }
 
 EXPORTED double prbm_steps(const Engine *engine) {

@@ -37,11 +37,12 @@ EXPORTED int prbm_advance(Engine *engine, double time, char *message);
 EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *values,
                           char *message);
 /* Simulate to each of several times, and get the values of slots (samples, count) there.  Return
- * the number of recorded impacts, -1 on failure; *done is the number of times reached. */
+ * the number of recorded impacts, -1 on failure at a time; the times before have been reached. */
 EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int count,
-                         const int *slots, double *values, int *done, char *message);
+                         const int *slots, double *values, char *message);
 /* Get the present state (2 n + 2,): angles, rates, dissipated energy and work. */
 EXPORTED bool prbm_state(Engine *engine, double *y, char *message);
+EXPORTED double prbm_time(const Engine *engine);  /* present time [s] */
 EXPORTED double prbm_steps(const Engine *engine); /* integration steps so far */
 EXPORTED int prbm_coordinates(const Engine *engine); /* n */
 

@@ -31,9 +31,10 @@ FUNCTIONS = {
     "prbm_advance": (_int, _address, _double, _bytes),
     "prbm_values": (_bool, _address, _int, _address, _address, _bytes),
     "prbm_sample": (
-        _int, _address, _int, _address, _int, _address, _address, _address, _bytes,
+        _int, _address, _int, _address, _int, _address, _address, _bytes,
     ),
     "prbm_state": (_bool, _address, _address, _bytes),
+    "prbm_time": (_double, _address),
     "prbm_steps": (_double, _address),
     "prbm_coordinates": (_int, _address),
     "prbm_record": (None, _address, _bool),

@@ -11,6 +11,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
@@ -29,6 +30,7 @@ from ..mechanics.system import System
 from ..mechanism.description import Mechanism
 from .library import MESSAGE_LENGTH, library
 
+Slots = NDArray[np.intc]
 IMPACT = 9  # Numbers of a recorded impact before its states, ENGINE_IMPACT in C.
 MOTION_GROUPS = ("bodies", "probes")
 OUTPUT_GROUPS = (
@@ -61,7 +63,7 @@ class Tables:
         slots = {name: k for k, name in enumerate(n for names in groups.values() for n in names)}
         self.slots = {name: slots[name] for group in OUTPUT_GROUPS for name in groups[group]}
         self.motions = [name for group in MOTION_GROUPS for name in groups[group]]
-        self.inputs = slots[groups["inputs"][0]]
+        self.outputs_and_time = np.array([*self.slots.values(), slots["time"]], np.intc)
         self.counts = [f"{stop.name}.impact_count" for stop in mechanism.stops]
         self.contacts = [f"{stop.name}.contact" for stop in mechanism.stops]
 
@@ -102,7 +104,7 @@ class KernelSimulation:
         start_time: float = 0.0,
         tolerance: float | None = None,
     ) -> None:
-        self.values, self.given, self.time = start_values(mechanism, values, start_time)
+        self.values, self.given, start = start_values(mechanism, values, start_time)
         if tolerance is not None:
             tolerance = checked_tolerance(tolerance)
         self.mechanism = mechanism
@@ -110,7 +112,7 @@ class KernelSimulation:
         self._open()
         self._set({**self.values, **self.given})
         if not self._library.prbm_start(
-            self._address, self.time, tolerance or 0.0, self._message
+            self._address, start, tolerance or 0.0, self._message
         ):  # fmt: skip
             # The specification distinguishes the kinds of errors.
             Simulation(mechanism, values, start_time=start_time, tolerance=tolerance)
@@ -128,7 +130,7 @@ class KernelSimulation:
         closing = weakref.finalize(self, self._library.prbm_close, self._address)
         closing.atexit = False
         self._record: list[Impact] | None = None
-        self._outputs: Outputs | None = None
+        self._outputs: tuple[float, Outputs] | None = None
 
     def _error(self) -> SimulationError:
         """Return the error that the kernel reports."""
@@ -165,6 +167,11 @@ class KernelSimulation:
         return Configuration(
             self.mechanism, values, system, known, self.tolerance, None, frequency, scales
         )
+
+    @property
+    def time(self) -> float:
+        """Present time [s]."""
+        return float(self._library.prbm_time(self._address))
 
     @property
     def step_count(self) -> int:
@@ -207,13 +214,6 @@ class KernelSimulation:
             count = self._library.prbm_advance(self._address, time, self._message)
             if count < 0:
                 raise self._error()
-            self._reached(float(time), count)
-
-    def _reached(self, time: float, count: int) -> None:
-        """Store the time and the number of recorded impacts after an advance."""
-        if time != self.time:
-            self.time, self._outputs = time, None
-        if count:
             self._take_impacts(count)
 
     def check_effort(self, step: float) -> None:
@@ -241,11 +241,12 @@ class KernelSimulation:
             self._library.prbm_record(self._address, record is not None)
 
     def _take_impacts(self, count: int) -> None:
-        """Append the impacts that the kernel has recorded."""
+        """Append the impacts that the kernel has recorded to the record."""
+        if count == 0 or self._record is None:
+            return
         n = self._size
         numbers = np.empty((count, IMPACT + 3 * n))
         self._library.prbm_impacts(self._address, numbers.ctypes.data)
-        assert self._record is not None
         for row in numbers:
             q, before, after = row[IMPACT:].reshape(3, n)
             stop, hits, time, approach, rebound, impulse, lost, modal, total = row[:IMPACT].tolist()
@@ -273,17 +274,16 @@ class KernelSimulation:
 
         They are in SI units and rad.  Displacements and energies are zero at the straight shape.
         """
-        if self._outputs is None:
-            found: Outputs = dict(zip(self._tables.slots, self._all_values(), strict=True))
+        now = self.time
+        if self._outputs is None or self._outputs[0] != now:
+            *numbers, now = self._at(self._tables.outputs_and_time).tolist()
+            found: Outputs = dict(zip(self._tables.slots, numbers, strict=True))
             for name in self._tables.counts:
                 found[name] = int(found[name])
             for name in self._tables.contacts:
                 found[name] = bool(found[name])
-            self._outputs = found
-        return dict(self._outputs)
-
-    def _all_values(self) -> list[float]:
-        return [*self._values(list(self._tables.slots)).tolist()]
+            self._outputs = now, found
+        return dict(self._outputs[1])
 
     def motions(self) -> dict[str, float]:
         """Return only the positions and velocities of bodies and probes, by name of the output."""
@@ -292,7 +292,10 @@ class KernelSimulation:
 
     def _values(self, names: Sequence[str]) -> Real:
         """Return outputs by name, (k,)."""
-        slots = self._slots(names)
+        return self._at(self._slots(names))
+
+    def _at(self, slots: Slots) -> Real:
+        """Return values by slot, (k,)."""
         x = np.empty(len(slots))
         with self._lock:
             if not self._library.prbm_values(
@@ -301,7 +304,8 @@ class KernelSimulation:
                 raise self._error()
         return x
 
-    def _slots(self, names: Sequence[str]) -> "np.ndarray[tuple[int], np.dtype[np.int32]]":
+    def _slots(self, names: Sequence[str]) -> Slots:
+        """Return the slots of outputs by name, (k,)."""
         known = self._tables.slots
         for name in names:
             if name not in known:
@@ -313,18 +317,16 @@ class KernelSimulation:
 
         Parameters and errors as for :meth:`prbm.hybrid.simulation.Simulation.sample`.
         """
-        t, slots, done = np.array(times, float), self._slots(names), ctypes.c_int()
+        t, slots = np.array(times, float), self._slots(names)
         x = np.empty((len(t), len(slots)))
         with self._lock:
             count = self._library.prbm_sample(
                 self._address, len(t), t.ctypes.data, len(slots), slots.ctypes.data,
-                x.ctypes.data, ctypes.addressof(done), self._message,
+                x.ctypes.data, self._message,
             )  # fmt: skip
-            error = self._error() if count < 0 else None
-            if done.value:
-                self._reached(float(t[done.value - 1]), 0)
-        if error is not None:
-            raise error
+            if count < 0:
+                raise self._error()
+            self._take_impacts(count)
         return x
 
     # -- saving and restoring --
@@ -336,7 +338,7 @@ class KernelSimulation:
             self._library.prbm_save(self._address, numbers.ctypes.data)
         return {
             "engine": self.engine, "values": dict(self.values), "given": dict(self.given),
-            "time": self.time, "tolerance": self._wanted, "numbers": numbers.tolist(),
+            "tolerance": self._wanted, "numbers": numbers.tolist(),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -357,7 +359,7 @@ class KernelSimulation:
             if not self._library.prbm_restore(self._address, numbers.ctypes.data, self._message):
                 raise ParameterError(self._message.value.decode(errors="replace"))
             self.values, self.given = dict(saved["values"]), dict(saved["given"])
-            self.time, self._wanted, self._outputs = saved["time"], saved["tolerance"], None
+            self._wanted, self._outputs = saved["tolerance"], None
             vars(self).pop("_configuration", None)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -29,9 +29,12 @@ class Engine(Protocol):
     """
 
     engine: str
-    time: float
     given: dict[str, float]
     record: list[Impact] | None
+
+    @property
+    def time(self) -> float:
+        """Present time [s]."""
 
     @property
     def mechanism(self) -> Mechanism:

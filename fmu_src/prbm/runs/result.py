@@ -129,9 +129,13 @@ def structured(rows: Iterable[Mapping[str, float | int | bool]]) -> Columns:
     array([ True])
     """
     table = list(rows)
+    return np.array([tuple(row.values()) for row in table], row_type(table[0]))
+
+
+def row_type(row: Mapping[str, float | int | bool]) -> np.dtype[Any]:
+    """Return the type of a row of values by name, with FMPy's types."""
     kinds = {bool: np.bool_, int: np.int32}
-    dtype = [(name, kinds.get(type(x), np.float64)) for name, x in table[0].items()]
-    return np.array([tuple(row.values()) for row in table], dtype)
+    return np.dtype([(name, kinds.get(type(x), np.float64)) for name, x in row.items()])
 
 
 def read_csv(path: str | Path) -> Columns:

@@ -5,6 +5,8 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.progress import Progress
@@ -16,7 +18,7 @@ from .engine import Engine, simulation
 from .experiment import experiment
 from .inputs import Source as InputSource
 from .inputs import signals
-from .result import Result, structured
+from .result import Columns, Result, row_type
 
 Source = Callable[[float], Mapping[str, float]]
 ROWS_MAX = 10_000_000  # Most communication points; a larger number is likely a wrong unit.
@@ -131,7 +133,7 @@ def simulate(
     motion.record = impacts
     driver.sample(motion.frequency, motion.tolerance, times[-1])
     start = {**motion.values, **motion.given}
-    rows = []
+    columns: Columns = np.empty(0)
     for k, t in enumerate(times):
         driver.advance(motion, t)
         if steps_max is not None:
@@ -139,10 +141,13 @@ def simulate(
         outputs = motion.outputs()
         if source is not None:
             motion.set(source(t))
-        rows.append({"time": t, **motion.given, **driver.values(t), **outputs})
+        row = {"time": t, **motion.given, **driver.values(t), **outputs}
+        if k == 0:
+            columns = np.empty(len(times), row_type(row))
+        columns[k] = tuple(row.values())
         if progress is not None:
             progress(k / (len(times) - 1))
-    return Result(mechanism, start, structured(rows), tuple(impacts), motion.engine)
+    return Result(mechanism, start, columns, tuple(impacts), motion.engine)
 
 
 def _check_effort(motion: Engine, spacing: float) -> None:
