@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 from collections.abc import Callable, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
@@ -33,6 +34,7 @@ SHAPES: dict[str, Arguments] = {  # Arguments with their units and default value
     },
 }  # fmt: skip
 FILE = "csv"
+PLACEHOLDER = re.compile(r"\{([\w.]+)\}")
 
 
 def signals(
@@ -82,6 +84,33 @@ def signals(
         if displacement in found and velocity not in found and velocity not in constants:
             found[velocity] = Slope(found[displacement])
     return found
+
+
+def placeholders(inputs: Mapping[str, Source]) -> set[str]:
+    """Return the names in braces in the texts of signals, which stand for numbers.
+
+    Examples
+    --------
+    >>> sorted(placeholders({"force.x": "pulse({height} mN, {width} ms)", "force.y": 1.0}))
+    ['height', 'width']
+    """
+    texts = [source for source in inputs.values() if isinstance(source, str)]
+    return {name for text in texts for name in PLACEHOLDER.findall(text)}
+
+
+def filled(inputs: Mapping[str, Source], numbers: Mapping[str, float]) -> dict[str, Source]:
+    """Return inputs with numbers in place of the names in braces.
+
+    Examples
+    --------
+    >>> filled({"force.x": "pulse({height} mN, 2 ms)"}, {"height": 3.0})
+    {'force.x': 'pulse(3.0 mN, 2 ms)'}
+    """
+
+    def text(source: str) -> str:
+        return PLACEHOLDER.sub(lambda m: repr(float(numbers[m[1]])), source)
+
+    return {name: text(x) if isinstance(x, str) else x for name, x in inputs.items()}
 
 
 def _signal(name: str, source: Source, unit: str) -> Signal:
