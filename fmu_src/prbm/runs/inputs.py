@@ -3,7 +3,7 @@
 import csv
 import math
 import re
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -38,7 +38,7 @@ PLACEHOLDER = re.compile(r"\{([\w.]+)\}")
 
 
 def signals(
-    mechanism: Mechanism, inputs: Mapping[str, Source], constants: Container[str] = ()
+    mechanism: Mechanism, inputs: Mapping[str, Source], constants: Collection[str] = ()
 ) -> dict[str, Signal]:
     """Return the signals of inputs by name.
 
@@ -53,7 +53,7 @@ def signals(
         For each input a text in the form of :func:`read_signal`, a number in SI, a
         :class:`~prbm.runs.signals.Signal`, a function of time [s], or a pair of arrays of times [s]
         and values, which are joined by straight lines.
-    constants : container of str
+    constants : collection of str
         Names of inputs with constant values.
 
     Raises
@@ -79,11 +79,26 @@ def signals(
                 f"{name} is given both as a constant and over time; remove one of them"
             )
         found[name] = _signal(name, source, units[name])
-    for stop in mechanism.stops:
-        displacement, velocity = f"{stop.name}.displacement", f"{stop.name}.velocity"
-        if displacement in found and velocity not in found and velocity not in constants:
-            found[velocity] = Slope(found[displacement])
-    return found
+    return with_velocities(found, units.keys() - set(constants))
+
+
+def with_velocities(found: Mapping[str, Signal], free: Container[str]) -> dict[str, Signal]:
+    """Return signals together with the velocities of walls whose displacement is a signal.
+
+    Parameters
+    ----------
+    found : mapping
+        Signals by the names of inputs.
+    free : container of str
+        Names of inputs that have no constant value.
+    """
+    derived = {}
+    for name, signal in found.items():
+        stop, _, last = name.rpartition(".")
+        velocity = f"{stop}.velocity"
+        if last == "displacement" and velocity in free and velocity not in found:
+            derived[velocity] = Slope(signal)
+    return {**found, **derived}
 
 
 def placeholders(inputs: Mapping[str, Source]) -> set[str]:
