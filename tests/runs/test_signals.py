@@ -48,7 +48,7 @@ def response(
     guide: Mechanism, signal: Signal, times: np.ndarray, tolerance: float, omega: float = OMEGA
 ) -> np.ndarray:
     """Return displacement and velocity of the oscillator at increasing times, (m, 2)."""
-    driver, oscillator = Driver(guide, {"force.x": signal}), Oscillator(omega)
+    driver, oscillator = Driver({"force.x": signal}), Oscillator(omega)
     driver.sample(omega / (2 * math.pi), tolerance, float(times[-1]))
     rows = []
     for t in times:
@@ -124,7 +124,7 @@ def test_jumps_between_rows_are_boundaries_of_the_integration(guide):
 
 def test_straight_lines_of_a_table_are_integrated_between_its_points(guide):
     """The response of a free mass to a ramp is cubic; constant parts take one step each."""
-    driver, mass = Driver(guide, {"force.x": Table((0.1, 0.3), (0.0, 2.0))}), Oscillator(0.0)
+    driver, mass = Driver({"force.x": Table((0.1, 0.3), (0.0, 2.0))}), Oscillator(0.0)
     driver.sample(0.0, 1e-8, 0.5)
     driver.advance(mass, 0.25)
     assert mass.x == pytest.approx(10.0 / 6.0 * 0.15**3, rel=1e-12)
@@ -139,7 +139,7 @@ def test_straight_lines_of_a_table_are_integrated_between_its_points(guide):
 def test_the_last_piece_before_a_row_has_the_value_there(guide):
     """Contact and base forces depend on the present input; at a jump it is the value before."""
     signal = Table((0.0, 0.1, 0.1, 0.2), (1.0, 3.0, -5.0, -6.0))
-    driver, oscillator = Driver(guide, {"force.x": signal}), Oscillator()
+    driver, oscillator = Driver({"force.x": signal}), Oscillator()
     driver.sample(5.0, 1e-4, 0.2)
     for t, force in ((0.05, 2.0), (0.1, 3.0), (0.15, -5.5)):
         driver.advance(oscillator, t)
@@ -150,7 +150,7 @@ def test_the_last_piece_before_a_row_has_the_value_there(guide):
 
 def test_walls_get_their_displacement_and_velocity_at_the_start_of_each_piece(guide):
     found = signals(guide, {"stop.displacement": "sine(1 mm, 5 Hz)"})
-    driver = Driver(guide, found)
+    driver = Driver(found)
     driver.sample(5.0, 1e-6, 0.1)
     given: list[tuple[float, dict[str, float]]] = []
 

@@ -150,7 +150,22 @@ def test_the_impact_speed_is_greatest_where_the_guide_passes_its_equilibrium(mec
     assert found.optimum.point["stop.position"] == pytest.approx(0.0, abs=1e-4)
 
 
+def test_numbers_in_the_texts_of_inputs_are_varied(mechanisms):
+    """The speed of the guide after a short push is proportional to the height of the push."""
+    found = study(
+        mechanisms["PRBDM"], {"height": [1.0, 2.0, 3.0]}, ["shuttle.vx"],
+        values={"release.displacement": 0.0, "gravity.x": 0.0, "stop.position": 0.02},
+        inputs={"force.x": "half-sine({height} mN, 0.1 ms)"}, stop_time="0.1 ms", step=1e-4,
+        workers=1,
+    )  # fmt: skip
+    speed = found.outputs["shuttle.vx"]
+    np.testing.assert_allclose(speed / speed[0], [1.0, 2.0, 3.0], rtol=1e-5)
+    assert found.units["height"] == ""
+
+
 MISTAKES = [
+    ({"inputs": {"force.x": "stpe(1 N)"}}, "unknown shape 'stpe'; did you mean step"),
+    ({"inputs": {"force.x": "step({height} N)"}}, r"\{height\} in an input has no value; vary he"),
     ({"vary": {"stop.positon": [0, 1e-3]}}, r"unknown variable 'stop\.positon'; did you mean"),
     ({"vary": {"stop.position": [1e-3]}}, "at least two samples are needed"),
     ({"vary": {"stop.position": [1e-3, 0.0]}}, "finite and increasing, in m"),

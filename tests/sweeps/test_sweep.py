@@ -25,8 +25,6 @@ from mishap import CRASHES, CRASHES_ONCE, EXITS, FINE, HANGS, KILLS_WORKER, RAIS
 from native_host import clocked
 from prbm.base.errors import ParameterError
 from prbm.commands.command_line import main
-from prbm.runs.quantities import QUANTITIES
-from prbm.runs.run import simulate
 from prbm.sweeps import sweep as sweeps
 from prbm.sweeps.outputs import Output, evaluate, parse_output, reduce
 from prbm.sweeps.results import OWN
@@ -167,18 +165,9 @@ def test_absolute_values_are_reduced_as_their_variable():
     assert parse_output("abs(x)", {"abs(x)"}).absolute is False
 
 
-@pytest.mark.fmu
-@pytest.mark.native
-def test_named_quantities_of_fmus_are_those_of_the_engine(native, mechanisms):
-    names = [*QUANTITIES, "max(abs(shuttle.vx))"]
-    table = pd.DataFrame({"stop.position": [0.0, 2e-3]})
-    found = sweep(native["PRBDM", 2], table, outputs=names, stop_time=0.3, step=1e-3)
-    for row, position in enumerate(table["stop.position"]):
-        result = simulate(mechanisms["PRBDM"], {"stop.position": position}, stop_time=0.3)
-        for name, quantity in QUANTITIES.items():
-            assert found[name][row] == pytest.approx(quantity.compute(result.columns), rel=1e-6)
-        largest = np.abs(result["shuttle.vx"]).max()
-        assert found["max(abs(shuttle.vx))"][row] == pytest.approx(largest, rel=1e-6)
+def test_inputs_over_time_need_variable_steps(mishap):
+    with pytest.raises(ParameterError, match=r"the FMU has no input .force.|fixed steps"):
+        sweep(mishap, pd.DataFrame({"x": [1.0]}), inputs={"force": "step(1)"})
 
 
 def test_a_named_quantity_of_an_fmu_without_its_variables_is_rejected(mishap):

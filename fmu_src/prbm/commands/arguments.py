@@ -111,6 +111,7 @@ def sweep_arguments(parser: ArgumentParser) -> None:
         "from which it holds to the end; repeatable (default: all outputs)",
     )  # fmt: skip
     set_argument(parser, "start value of all runs")
+    input_argument(parser)
     add("--stop-time", metavar="T", help="end of the runs [s] (default: that of the FMU)")
     add("--step", metavar="T", help="communication step [s] (default: that of the FMU)")
     add(

@@ -14,6 +14,7 @@ from ..files.mechanism_file import load
 from ..files.settings import UserMistake, has_unit, pairs, quantity, settings, units_of
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
+from ..runs.inputs import placeholders
 from ..sweeps.study import FLAT_RTOL, Optimum, Study, study
 from .duration import given_inputs
 from .output import Output, aligned
@@ -31,11 +32,14 @@ def studied(options: argparse.Namespace) -> None:
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)
     output = Output(options.out)
-    varied = _varied(mechanism, options.vary)
+    inputs = given_inputs(options)
+    varied = _varied(
+        {**units_of(mechanism), **dict.fromkeys(placeholders(inputs), "")}, options.vary
+    )
     tolerance = _optional(options.tolerance, "", "--tolerance")
     found = study(
         mechanism, varied, options.of or [], minimise=options.minimise, maximise=options.maximise,
-        values={name: x for name, x in values.items()}, inputs=given_inputs(options),
+        values={name: x for name, x in values.items()}, inputs=inputs,
         stop_time=_optional(options.stop_time, "s", "--stop-time"),
         step=_optional(options.step, "s", "--step"), tolerance=tolerance,
         workers=options.workers, progress=reporter(),
@@ -61,9 +65,8 @@ def _optional(text: str | None, unit: str, option: str) -> float | None:
     return None if text is None else quantity(text, unit, option)
 
 
-def _varied(mechanism: Mechanism, texts: Sequence[str]) -> dict[str, Real]:
-    """Return the samples of the parameters given by --vary."""
-    units = units_of(mechanism)
+def _varied(units: Mapping[str, str], texts: Sequence[str]) -> dict[str, Real]:
+    """Return the samples of the parameters given by --vary, from the units of all parameters."""
     found = {}
     for name, text in pairs(texts, "--vary", EXAMPLE).items():
         option = f"--vary {name}="

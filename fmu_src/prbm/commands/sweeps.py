@@ -7,13 +7,14 @@ from pathlib import Path
 from ..base.progress import reporter
 from ..files.settings import assigned, quantity
 from ..sweeps.sweep import read_fmu, summary, sweep
+from .duration import given_inputs
 
 
 def run_sweep(options: argparse.Namespace) -> None:
     """Run a sweep and print a summary; results are written during the sweep."""
     found = sweep(
         options.fmu, options.table, options.out, outputs=options.output,
-        values=_values(options.fmu, options.set),
+        values=_values(options.fmu, options.set), inputs=given_inputs(options),
         stop_time=_optional(options.stop_time, "s", "--stop-time"),
         step=_optional(options.step, "s", "--step"),
         tolerance=_optional(options.tolerance, "", "--tolerance"),

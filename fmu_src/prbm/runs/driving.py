@@ -22,11 +22,11 @@ from itertools import pairwise
 from typing import Protocol
 
 from ..base.errors import ParameterError
-from ..mechanics.inputs import MOBILITY, WALL_INPUTS, impulse_names
-from ..mechanism.description import Mechanism
+from ..mechanics.inputs import LOADS, MOBILITY, WALL_INPUTS
 from .signals import Signal, after
 
 SAMPLING_ERROR_FACTOR = 720.0  # A harmonic oscillation has the relative error (omega h)^4 / 720.
+IMPULSE = "impulse"  # Group of the inputs that are impulses, as in force.impulse.x.
 SAMPLING_TOLERANCE_MIN = 1e-12
 LAST_PIECE_RTOL = 1e-6  # Duration of the last piece before a row, relative to the row spacing.
 SAMPLING_STEPS_MAX = 10_000_000  # More steps are a mistake in the unit of a frequency or a time.
@@ -43,25 +43,34 @@ class Driveable(Protocol):
         """Continue the motion to a time [s]."""
 
 
+def _is_sampled(name: str) -> bool:
+    """Return whether an input acts by its values at single times: a wall or an impulse.
+
+    Examples
+    --------
+    >>> _is_sampled("force.impulse.x"), _is_sampled("stop.velocity"), _is_sampled("force.x")
+    (True, True, False)
+    """
+    *_, group, last = ["", *name.split(".")]
+    return last in (*WALL_INPUTS, MOBILITY) or (group == IMPULSE and last in LOADS)
+
+
 class Driver:
     """Advances a simulation whose inputs are signals.
 
     Parameters
     ----------
-    mechanism : Mechanism
-        The mechanism.
     signals : mapping
         Signals by the names of the inputs.
+    start : float
+        Time at the start [s].
     """
 
-    def __init__(self, mechanism: Mechanism, signals: Mapping[str, Signal]) -> None:
+    def __init__(self, signals: Mapping[str, Signal], start: float = 0.0) -> None:
         self.signals = dict(signals)
-        self.omega, self.share, self.now = 0.0, 1.0, 0.0
-        self.breaks = sorted({t for signal in signals.values() for t in signal.breaks if t > 0.0})
-        self.sampled = {
-            *impulse_names(mechanism),
-            *(f"{stop.name}.{x}" for stop in mechanism.stops for x in (*WALL_INPUTS, MOBILITY)),
-        }
+        self.omega, self.share, self.now = 0.0, 1.0, start
+        self.breaks = sorted({t for signal in signals.values() for t in signal.breaks if t > start})
+        self.sampled = {name for name in signals if _is_sampled(name)}
 
     def values(self, t: float) -> dict[str, float]:
         """Return the values of the signals from time t [s] on."""
@@ -89,7 +98,7 @@ class Driver:
         """
         self.omega = 2.0 * math.pi * frequency
         self.share = (SAMPLING_ERROR_FACTOR * max(tolerance, SAMPLING_TOLERANCE_MIN)) ** 0.25
-        points = [0.0, *self._between(0.0, stop_time), stop_time]
+        points = [self.now, *self._between(self.now, stop_time), stop_time]
         for name, signal in self.signals.items():
             steps = sum((b - a) / self._step((signal,), a, b) for a, b in pairwise(points))
             if steps > SAMPLING_STEPS_MAX:

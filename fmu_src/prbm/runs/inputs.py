@@ -2,7 +2,8 @@
 
 import csv
 import math
-from collections.abc import Callable, Container, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Container, Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -33,10 +34,11 @@ SHAPES: dict[str, Arguments] = {  # Arguments with their units and default value
     },
 }  # fmt: skip
 FILE = "csv"
+PLACEHOLDER = re.compile(r"\{([\w.]+)\}")
 
 
 def signals(
-    mechanism: Mechanism, inputs: Mapping[str, Source], constants: Container[str] = ()
+    mechanism: Mechanism, inputs: Mapping[str, Source], constants: Collection[str] = ()
 ) -> dict[str, Signal]:
     """Return the signals of inputs by name.
 
@@ -51,7 +53,7 @@ def signals(
         For each input a text in the form of :func:`read_signal`, a number in SI, a
         :class:`~prbm.runs.signals.Signal`, a function of time [s], or a pair of arrays of times [s]
         and values, which are joined by straight lines.
-    constants : container of str
+    constants : collection of str
         Names of inputs with constant values.
 
     Raises
@@ -77,11 +79,53 @@ def signals(
                 f"{name} is given both as a constant and over time; remove one of them"
             )
         found[name] = _signal(name, source, units[name])
-    for stop in mechanism.stops:
-        displacement, velocity = f"{stop.name}.displacement", f"{stop.name}.velocity"
-        if displacement in found and velocity not in found and velocity not in constants:
-            found[velocity] = Slope(found[displacement])
-    return found
+    return with_velocities(found, units.keys() - set(constants))
+
+
+def with_velocities(found: Mapping[str, Signal], free: Container[str]) -> dict[str, Signal]:
+    """Return signals together with the velocities of walls whose displacement is a signal.
+
+    Parameters
+    ----------
+    found : mapping
+        Signals by the names of inputs.
+    free : container of str
+        Names of inputs that have no constant value.
+    """
+    derived = {}
+    for name, signal in found.items():
+        stop, _, last = name.rpartition(".")
+        velocity = f"{stop}.velocity"
+        if last == "displacement" and velocity in free and velocity not in found:
+            derived[velocity] = Slope(signal)
+    return {**found, **derived}
+
+
+def placeholders(inputs: Mapping[str, Source]) -> set[str]:
+    """Return the names in braces in the texts of signals, which stand for numbers.
+
+    Examples
+    --------
+    >>> sorted(placeholders({"force.x": "pulse({height} mN, {width} ms)", "force.y": 1.0}))
+    ['height', 'width']
+    """
+    texts = [source for source in inputs.values() if isinstance(source, str)]
+    return {name for text in texts for name in PLACEHOLDER.findall(text)}
+
+
+def filled(inputs: Mapping[str, Source], numbers: Mapping[str, float]) -> dict[str, Source]:
+    """Return inputs with numbers in place of the names in braces.
+
+    Examples
+    --------
+    >>> filled({"force.x": "pulse({height} mN, 2 ms)"}, {"height": 3.0})
+    {'force.x': 'pulse(3.0 mN, 2 ms)'}
+    """
+
+    def text(source: str) -> str:
+        return PLACEHOLDER.sub(lambda m: repr(float(numbers[m[1]])), source)
+
+    return {name: text(x) if isinstance(x, str) else x for name, x in inputs.items()}
 
 
 def _signal(name: str, source: Source, unit: str) -> Signal:

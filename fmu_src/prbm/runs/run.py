@@ -111,7 +111,7 @@ def simulate(
     if not isinstance(mechanism, Mechanism):
         raise TypeError(f"mechanism = {mechanism!r} must be a Mechanism, as prbm.load returns")
     values = _values(mechanism, changes)
-    driver = Driver(mechanism, signals(mechanism, inputs or {}, values))
+    driver = Driver(signals(mechanism, inputs or {}, values))
     values = {**values, **driver.values(0.0)}
     duration, spacing = (
         None if x is None else _number(name, x, "s")

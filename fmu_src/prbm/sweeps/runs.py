@@ -28,11 +28,11 @@ from ctypes import (
     c_uint32,
     c_uint64,
 )
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from math import isclose
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import fmpy  # type: ignore[import-untyped]
 import numpy as np
@@ -45,8 +45,13 @@ from fmpy.simulation import (  # type: ignore[import-untyped]
 )
 from numpy.typing import NDArray
 
+from ..runs.quantities import FREQUENCY
 from .outputs import ENDED, FAILED, OK, Outcome, Output, evaluate
 
+if TYPE_CHECKING:
+    from ..runs.driving import Driver
+
+SAMPLING_TOLERANCE = 1e-6  # Of inputs over time, if the FMU proposes no tolerance.
 DISCARD, FATAL = 2, 4  # Values of fmi2Status and fmi3Status.
 LAST_TIME, TERMINATED = 2, 3  # Values of fmi2StatusKind.
 C_TYPES_2: dict[str, Any] = {"Real": c_double, "Integer": c_int, "Boolean": c_int}
@@ -77,6 +82,8 @@ class Job:
         Start values of all runs.
     outputs : tuple of Output
         Recorded outputs.
+    inputs : mapping
+        Texts and units of inputs over time by name.  Names in braces are columns of the table.
     reuse : bool
         Reset the instance between runs if its reset works (default: True).
     """
@@ -87,6 +94,7 @@ class Job:
     tolerance: float | None
     values: Mapping[str, float]
     outputs: tuple[Output, ...]
+    inputs: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     reuse: bool = True
 
 
@@ -178,7 +186,7 @@ class Runner:
         begin = time.perf_counter()
         try:
             self._prepare(renew)
-            status, message, found = self._simulate({**self.job.values, **values})
+            status, message, found = self._simulate(*self._driven(values))
             return Outcome(status, message, time.perf_counter() - begin, found)
         except Exception as error:
             seconds, message = time.perf_counter() - begin, self._reason(error)
@@ -237,12 +245,41 @@ class Runner:
                 eventModeUsed=self.events, logMessage=self._log3, loggingOn=self.logging
             )
 
-    def _simulate(self, values: dict[str, float]) -> tuple[str, str, tuple[float, ...]]:
+    def _driven(self, row: Mapping[str, float]) -> tuple[dict[str, float], "Driver | None"]:
+        """Return the start values of a run, and the driver of its inputs over time."""
+        if not self.job.inputs:
+            return {**self.job.values, **row}, None
+        from ..runs.driving import Driver  # imported here: few sweeps need it
+        from ..runs.inputs import filled, placeholders, read_signal, with_velocities
+
+        texts = {name: text for name, (text, _) in self.job.inputs.items()}
+        within = placeholders(texts)
+        signals = {
+            name: read_signal(name, str(text), self.job.inputs[name][1])
+            for name, text in filled(texts, row).items()
+        }
+        others = {name: x for name, x in row.items() if name not in within}
+        known = {v.name for v in self.description.modelVariables if v.causality == "input"}
+        constants = {*others, *self.job.values}
+        driver = Driver(with_velocities(signals, known - constants), self.job.start)
+        return {**self.job.values, **driver.values(self.job.start), **others}, driver
+
+    def _simulate(
+        self, values: dict[str, float], driver: "Driver | None"
+    ) -> tuple[str, str, tuple[float, ...]]:
         self._initialize(values)
+        driven = _Driven(self, self.job.start)
+        if driver is not None:
+            frequency = driven.frequency()
+            driver.sample(frequency, self.job.tolerance or SAMPLING_TOLERANCE, self.job.stop)
         times, rows = [self.points[0]], [self.history.read()]
         status, message = OK, ""
         for begin, end in pairwise(self.points):
-            ended = self._step(begin, end - begin)
+            if driver is None:
+                ended = self._step(begin, end - begin)
+            else:
+                driver.advance(driven, end)
+                ended = driven.ended
             times.append(end if ended is None else ended)
             rows.append(self.history.read())
             if ended is not None:
@@ -299,6 +336,44 @@ class Runner:
         if not ended:
             self.fmu.enterStepMode()
         return bool(ended)
+
+
+class _Driven:
+    """An FMU whose inputs change during a communication step.
+
+    Parameters
+    ----------
+    runner : Runner
+        The FMU.
+    time : float
+        Time at the start [s].
+    """
+
+    def __init__(self, runner: Runner, time: float) -> None:
+        self.runner, self.time = runner, time
+        self.ended: float | None = None
+        self.references = {v.name: v.valueReference for v in runner.description.modelVariables}
+
+    def frequency(self) -> float:
+        """Return the fundamental frequency [Hz]; 0 if the FMU has no such variable."""
+        if FREQUENCY not in self.references:
+            return 0.0
+        fmu, reference = self.runner.fmu, [self.references[FREQUENCY]]
+        found = fmu.getReal(reference) if self.runner.two else fmu.getFloat64(reference)
+        return float(found[0])
+
+    def set(self, changes: Mapping[str, float]) -> None:
+        """Set inputs."""
+        references, values = [self.references[name] for name in changes], list(changes.values())
+        if self.ended is None:
+            setter = self.runner.fmu.setReal if self.runner.two else self.runner.fmu.setFloat64
+            setter(references, values)
+
+    def advance(self, time: float) -> None:
+        """Step to a time [s], unless the FMU has ended the simulation."""
+        if self.ended is None:
+            self.ended = self.runner._step(self.time, time - self.time)
+            self.time = time
 
 
 class _Recorder:

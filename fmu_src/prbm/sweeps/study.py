@@ -29,7 +29,7 @@ from ..interface.variables import variables
 from ..mechanics.arrays import Real
 from ..mechanism.description import Mechanism
 from ..runs.experiment import experiment
-from ..runs.inputs import Source
+from ..runs.inputs import Source, filled, placeholders, signals
 from ..runs.quantities import QUANTITIES
 from ..runs.result import names
 from ..runs.run import simulate
@@ -77,10 +77,13 @@ class Setup:
     def run(self, values: Mapping[str, float]) -> Outcome:
         """Simulate once; errors of the simulation are returned as outcomes."""
         begin = perf_counter()
+        within = placeholders(self.inputs)
+        others = {name: x for name, x in values.items() if name not in within}
         try:
             result = simulate(
-                self.mechanism, {**self.values, **values}, inputs=self.inputs, **self.options
-            )
+                self.mechanism, {**self.values, **others}, inputs=filled(self.inputs, values),
+                **self.options,
+            )  # fmt: skip
         except PrbmError as error:
             return Outcome(FAILED, str(error), perf_counter() - begin)
         found = tuple(evaluate(output, _by_name(result.columns)) for output in self.outputs)
@@ -180,7 +183,8 @@ def study(
     mechanism : Mechanism
         The mechanism.
     vary : mapping
-        Increasing samples of one or two parameters or inputs by name, in SI.
+        Increasing samples of one or two parameters or inputs by name, in SI; or of numbers that
+        are written as ``{name}`` in the texts of inputs.
     outputs : sequence of str
         Outputs as of :func:`prbm.sweeps.sweep.sweep`: ``settling``, ``max(abs(shuttle.vx))``.
     minimise, maximise : str or None
@@ -199,7 +203,8 @@ def study(
     ParameterError
         If an argument is invalid, or no simulation has a value of the output to be optimised.
     """
-    samples = _checked(mechanism, vary)
+    within = placeholders(inputs or {})
+    samples = _checked(mechanism, vary, within)
     if minimise is not None and maximise is not None:
         raise ParameterError("minimise and maximise are both given; omit one of them")
     wanted = minimise if maximise is None else maximise
@@ -210,6 +215,8 @@ def study(
         mechanism, _outputs(texts, units), given, dict(inputs or {}),
         {"stop_time": end, "step": end / STEPS if step is None else step, "tolerance": tolerance},
     )  # fmt: skip
+    first = {name: float(x[0]) for name, x in samples.items()}
+    signals(mechanism, filled(setup.inputs, first), {**setup.values, **first})  # Report mistakes.
     for name in setup.values.keys() & samples.keys():
         raise ParameterError(f"{name} is varied and has a fixed value; remove one of them")
     points = np.array(list(itertools.product(*samples.values())))
@@ -219,7 +226,7 @@ def study(
         table = np.array([o.values or (math.nan,) * len(texts) for o in outcomes])
         found = Study(
             samples, points, dict(zip(texts, table.T, strict=True)),
-            {**{n: units[n] for n in samples}, **_output_units(setup.outputs, units)},
+            {**{n: units.get(n, "") for n in samples}, **_output_units(setup.outputs, units)},
             tuple(outcome.message for outcome in outcomes),
         )  # fmt: skip
         if wanted is None:
@@ -242,8 +249,10 @@ def _duration(mechanism: Mechanism, stop_time: float | str | None) -> float:
 # --- checks ---------------------------------------------------------------------------------------
 
 
-def _checked(mechanism: Mechanism, vary: Mapping[str, Sequence[float] | Real]) -> dict[str, Real]:
-    """Return the samples of each parameter as arrays."""
+def _checked(
+    mechanism: Mechanism, vary: Mapping[str, Sequence[float] | Real], within: set[str]
+) -> dict[str, Real]:
+    """Return the samples of each parameter or placeholder as arrays."""
     if len(vary) not in (1, 2):
         raise ParameterError(f"{len(vary)} parameters are varied; vary one or two")
     known = _units(mechanism)
@@ -251,14 +260,18 @@ def _checked(mechanism: Mechanism, vary: Mapping[str, Sequence[float] | Real]) -
     settable = {**mechanism.values(), **inputs}
     samples = {}
     for name, sequence in vary.items():
-        if name not in settable:
+        if name not in settable and name not in within:
             raise ParameterError(f"unknown variable {name!r}; {proposal(name, settable)}")
         x = np.array(sequence, float).ravel()
         if len(x) < 2 or not (np.isfinite(x).all() and (np.diff(x) > 0.0).all()):
             raise ParameterError(
-                f"{name}: at least two samples are needed, finite and increasing, in {known[name]}"
+                f"{name}: at least two samples are needed, finite and increasing"
+                + (f", in {known[name]}" if known.get(name) else "")
             )
         samples[name] = x
+    for name in sorted(within):
+        if name not in samples:
+            raise ParameterError(f"{{{name}}} in an input has no value; vary {name}")
     count = math.prod(map(len, samples.values()))
     if count > RUNS_MAX:
         raise ParameterError(f"the study has {count} simulations; reduce them to {RUNS_MAX}")

@@ -17,7 +17,7 @@ import os
 import time
 import uuid
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Container, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import astuple, dataclass
@@ -29,7 +29,9 @@ import fmpy  # type: ignore[import-untyped]
 
 from ..base.archives import check_unpacked_size
 from ..base.errors import ParameterError, PrbmError
+from ..base.names import proposal
 from ..base.progress import Progress
+from ..runs.inputs import filled, placeholders, read_signal
 from ..runs.run import ROWS_MAX
 from .outputs import CRASHED, GOOD, Outcome, Output, SpecificationError, parse_output
 from .runs import Job
@@ -68,6 +70,7 @@ def sweep(
     *,
     outputs: Outputs | None = None,
     values: Mapping[str, float] | None = None,
+    inputs: Mapping[str, str] | None = None,
     stop_time: float | None = None,
     step: float | None = None,
     tolerance: float | None = None,
@@ -106,6 +109,9 @@ def sweep(
         of the FMU.
     values : mapping
         Start values of all runs.
+    inputs : mapping
+        Inputs over time of all runs: texts such as ``"half-sine({height} g, 0.5 ms)"``.  A name in
+        braces is a column of the table with numbers.
     stop_time, step, tolerance : float
         End of the runs [s], communication step [s], relative tolerance; None: those of the FMU's
         default experiment, or else 1 s, a thousandth of the run, no tolerance.
@@ -145,7 +151,7 @@ def sweep(
     """
     _check_packages()
     _check_name(Path(out))
-    plan = _make_plan(fmu, table, outputs, values, stop_time, step, tolerance)
+    plan = _make_plan(fmu, table, outputs, values, inputs or {}, stop_time, step, tolerance)
     _check_counts(workers, retries, timeout)
     results = _results(plan, Path(out))
     report = progress or (lambda fraction: None)
@@ -214,6 +220,7 @@ def _make_plan(
     table: "pd.DataFrame | str | Path",
     outputs: Outputs | None,
     values: Mapping[str, float] | None,
+    inputs: Mapping[str, str],
     stop_time: float | None,
     step: float | None,
     tolerance: float | None,
@@ -222,7 +229,8 @@ def _make_plan(
 
     data, description = read_fmu(Path(fmu))
     variables = {v.name: v for v in description.modelVariables}
-    frame = checked(read_table(table), variables)
+    within = placeholders(inputs)
+    frame = checked(read_table(table), variables, within)
     fixed = {name: float(x) for name, x in (values or {}).items()}
     for name, x in fixed.items():
         check_settable(name, variables)
@@ -234,11 +242,46 @@ def _make_plan(
     _unambiguous([*frame.columns], [output.column for output in kept])
     times = _times(description, stop_time, step, tolerance)
     rows = frame.to_dict("records")
-    job = Job(**times, values=fixed, outputs=kept)
+    driven = _inputs(inputs, within, description, rows[0], {*frame, *fixed})  # type: ignore[arg-type]
+    job = Job(**times, values=fixed, outputs=kept, inputs=driven)
     return Plan(
         description.modelName, data, hashlib.sha256(data).hexdigest(), job,
         tuple(frame.columns), rows,  # type: ignore[arg-type]
     )  # fmt: skip
+
+
+def _inputs(
+    inputs: Mapping[str, str],
+    within: Collection[str],
+    description: Any,
+    row: Mapping[str, float],
+    given: Container[str],
+) -> dict[str, tuple[str, str]]:
+    """Return checked texts and units of inputs over time by name."""
+    variables = {
+        v.name: v for v in description.modelVariables
+        if v.causality == "input" and v.type in ("Real", "Float64") and not v.shape
+    }  # fmt: skip
+    if inputs and not description.coSimulation.canHandleVariableCommunicationStepSize:
+        raise ParameterError(
+            "inputs over time need an FMU with variable communication steps; this one has fixed "
+            "steps: leave the inputs out"
+        )
+    for name in within:
+        if name not in row:
+            raise ParameterError(f"{{{name}}} in an input has no value; add a column {name}")
+    found = {}
+    for name, text in inputs.items():
+        if name not in variables:
+            raise ParameterError(f"the FMU has no input {name!r}; {proposal(name, variables)}")
+        if name in given:
+            raise ParameterError(
+                f"{name} is given both as a start value and over time; remove one of them"
+            )
+        unit = variables[name].unit or getattr(variables[name].declaredType, "unit", None) or ""
+        read_signal(name, str(filled({name: text}, row)[name]), unit)  # Report mistakes.
+        found[name] = text, unit
+    return found
 
 
 def read_fmu(path: Path) -> tuple[bytes, Any]:
@@ -363,6 +406,9 @@ def _results(plan: Plan, folder: Path) -> "Results":
         "parameters": plan.parameters,
         "outputs": {o.column: list(astuple(o)[1:]) for o in job.outputs},
         "values": job.values,
+        **(
+            {"inputs": {name: text for name, (text, _) in job.inputs.items()}} if job.inputs else {}
+        ),
         "start time [s]": job.start,
         "stop time [s]": job.stop,
         "step [s]": job.step,

@@ -1,7 +1,7 @@
 """Tables of parameters: read from files, drawn at random, compared with the variables of an FMU."""
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -149,7 +149,9 @@ def _read_file(path: Path) -> pd.DataFrame:
         raise ParameterError(f"{path} cannot be read as a table: {reason}") from None
 
 
-def checked(table: pd.DataFrame, variables: Mapping[str, Any]) -> pd.DataFrame:
+def checked(
+    table: pd.DataFrame, variables: Mapping[str, Any], numbers: Container[str] = ()
+) -> pd.DataFrame:
     """Check a table against the variables of an FMU; return it as float64.
 
     Parameters
@@ -158,6 +160,8 @@ def checked(table: pd.DataFrame, variables: Mapping[str, Any]) -> pd.DataFrame:
         From :func:`read_table`.
     variables : mapping
         The variables of the FMU as FMPy describes them, by name.
+    numbers : container of str
+        Names of columns that are numbers in inputs over time, not variables.
 
     Raises
     ------
@@ -166,6 +170,9 @@ def checked(table: pd.DataFrame, variables: Mapping[str, Any]) -> pd.DataFrame:
     """
     columns = {}
     for name in table.columns:
+        if name in numbers and name not in variables:
+            columns[name] = _numbers(name, table[name], "Real")
+            continue
         _check_separator(name, variables)
         check_settable(name, variables)
         columns[name] = _numbers(name, table[name], variables[name].type)
