@@ -90,3 +90,24 @@ def test_energy_is_balanced_up_to_an_error_at_the_flat_shape(velocity, engine):
         scale = max(scale, out["energy.kinetic"], out["energy.elastic"])
         assert energy_balance(out) == pytest.approx(start, abs=4e-5 * scale)
     assert "straight line" in message
+
+
+@each_engine
+@pytest.mark.parametrize("velocity", [-7.0, -10.0])
+def test_friction_reverses_at_the_flat_shape(velocity, engine):
+    """The shuttle turns where the flexures are flat, at x = -gamma L.
+
+    The work of friction is mu N times the path.
+    """
+    guide, force = mechanism("PRBDM"), 20.0
+    values = {"release.displacement": 0.0, "release.velocity": velocity, "damping.beta": 0.0}
+    values |= {"friction.coefficient": 0.3, "friction.normal_force": force, "stop.position": 1.0}
+    turn = guide.values()["flexure.gamma"] * guide.values()["flexure.length"]
+    sim = engine(guide, values)
+    start = energy_balance(sim.outputs())
+    sim.advance(-1.5 * 0.06 / velocity)
+    out = sim.outputs()
+    assert out["shuttle.vx"] > 1.0
+    path = 2 * turn + out["shuttle.x"]
+    assert out["energy.dissipated"] == pytest.approx(0.3 * force * path, rel=1e-6)
+    assert energy_balance(out) == pytest.approx(start, abs=1e-6 * out["energy.kinetic"])

@@ -79,6 +79,7 @@ RELEASE_WATCH_FACTOR = 0.5  # Of the largest stop force in a step: a lower force
 LOCATION_ITERATIONS_MAX = 100  # Iterations of Brent's search; about ten are usual.
 GUARD_INTERVALS = 8  # Intervals of a step in which the guards are evaluated.
 
+REVERSAL_DELAY_RTOL = 1e-3  # Of the step: delay of a reversal where the motion is not unique.
 EVENT_CORRECTIONS_MAX = 3  # Newton steps of a closing gap on projected states.
 EVENT_CORRECTION_RTOL = 1e-2  # Of the step: a larger correction indicates grazing; not applied.
 

@@ -76,7 +76,7 @@ def settle(
     SimulationError
         If no forces satisfy the laws of all contacts, or the equations are singular.
     """
-    slow = {} if reversing is None else {reversing: _residual_speed(front, reversing)}
+    turning = {} if reversing is None else {reversing: _slide_acceleration(front, reversing)}
     gaps, rates = front.gaps_and_rates()
     near = configuration.scales.touching + RELEASE_PENETRATION_ATOL
     zero = configuration.scales.zero_speed
@@ -86,7 +86,7 @@ def settle(
     ]
     before = None
     for _ in range(SETTLE_ITERATIONS_MAX):
-        front = _chosen(configuration, front, candidates, slipped, slow)
+        front = _chosen(configuration, front, candidates, slipped, turning)
         if front.contacts == before or not front.contacts.held:
             return front
         # The projection closes gaps of round-off, which changes the forces of stiff flexures.
@@ -99,13 +99,13 @@ def _chosen(
     front: Front,
     candidates: Sequence[int],
     slipped: int | None,
-    slow: Mapping[int, float],
+    turning: Mapping[int, float],
 ) -> Front:
     """Return the front with the modes that its forces choose; not projected."""
     holding = holding_stops(configuration, front, candidates)
     contacts = ContactState.holding(holding, front.contacts.stops, front.contacts.points)
     front = front.with_contacts(contacts)
-    return _with_friction(configuration, front, candidates, slipped, slow)
+    return _with_friction(configuration, front, candidates, slipped, turning)
 
 
 def release_moving(configuration: Configuration, front: Front) -> tuple[Front, int | None]:
@@ -234,11 +234,10 @@ def slip_mode(scales: Scales, speed: float, slow: float = 0.0) -> ContactMode:
     return ContactMode.slipping(speed)
 
 
-def _residual_speed(front: Front, contact: int) -> float:
-    """Return the sliding speed at a reversal that the error of the event time causes [m/s]."""
+def _slide_acceleration(front: Front, contact: int) -> float:
+    """Return the sliding acceleration of a contact in its present mode [m/s^2]."""
     a = front.equations.evaluate(front.time, front.q, front.v).a
-    rate = front.equations.slip_acceleration(contact, front.e, front.v, a)
-    return abs(rate) * time_resolution(front.time)
+    return front.equations.slip_acceleration(contact, front.e, front.v, a)
 
 
 def time_resolution(time: float) -> float:
@@ -251,7 +250,7 @@ def _with_friction(
     front: Front,
     candidates: Sequence[int],
     slipped: int | None,
-    slow: Mapping[int, float],
+    turning: Mapping[int, float],
 ) -> Front:
     """Return the front with the modes of all contacts with friction.
 
@@ -265,8 +264,8 @@ def _with_friction(
         Stops that touch, held or not.
     slipped : int or None
         A contact that has reached the limit of friction: it cannot stick.
-    slow : mapping
-        Sliding speeds that are round-off, by contact [m/s].
+    turning : mapping
+        Sliding acceleration of a contact whose sliding velocity has fallen to zero [m/s^2].
 
     Raises
     ------
@@ -275,7 +274,7 @@ def _with_friction(
     """
     held, every = list(front.contacts.held), sorted(set(candidates))
     for stops in (held, every) if len(held) < len(every) else (held,):
-        found = _modes_of(configuration.scales, front, stops, every, slipped, slow)
+        found = _modes_of(configuration.scales, front, stops, every, slipped, turning)
         if found is not None:
             return front.with_contacts(found)
     raise SimulationError(
@@ -289,16 +288,21 @@ def _modes_of(
     stops: Sequence[int],
     every: Sequence[int],
     slipped: int | None,
-    slow: Mapping[int, float],
+    turning: Mapping[int, float],
 ) -> ContactState | None:
     """Return the modes that follow from the forces of ``stops`` and the contacts with friction.
 
     Return None if no forces satisfy their laws, or if another stop that touches would close.
     """
     contacts, rubbing = front.contacts, _with_coefficients(front.equations, stops)
+    slow = {c: abs(rate) * time_resolution(front.time) for c, rate in turning.items()}
     modes = {c: _sliding_mode(scales, front, c, slow.get(c, 0.0)) for c in {*stops, *rubbing}}
     # Contacts that cannot move independently are left out: loops and held stops carry their load.
     at_rest = [c for c in rubbing if modes[c] is FRICTIONLESS and _mobile(front, contacts, c)]
+    for c, rate in turning.items():
+        if modes[c] is FRICTIONLESS and c not in at_rest and abs(rate) > scales.zero_acceleration:
+            # The other parts impose the motion, as where the links of a loop form a straight line.
+            modes[c] = ContactMode.slipping(rate)
     for c in rubbing:
         contacts = contacts.with_mode(c, modes[c]) if contacts.modes[c].closed else contacts
     if not at_rest:

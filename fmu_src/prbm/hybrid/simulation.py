@@ -20,6 +20,7 @@ from ..base.tolerances import (
     EFFORT_MAX,
     INTERPOLATION_FACTOR,
     NODE_STEP_RTOL,
+    REVERSAL_DELAY_RTOL,
     STABLE_STEP_WATCH_FACTOR,
     STEPS_MAX,
 )
@@ -280,10 +281,7 @@ class Simulation:
         arc, t = self.arc, self.time
         if arc is None or not arc.start < t < self.front.time:
             return self.state()
-        _, cut = arc.cut(self.equations.rate, t)
-        y = self.equations.project(t, cut)
-        check_projection(self.configuration, t, cut, y)
-        return y
+        return self._closed(t, arc.cut(self.equations.rate, t)[1])
 
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
@@ -317,14 +315,34 @@ class Simulation:
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
-            if event.kind is EventKind.IMPACT and event.time > arc.start:
-                arc = view.cut(event.contact, event.time)
-            arc, self.k1 = replace(arc, end=event.time), None
-            cut = arc.at(event.time)
-            y = equations.project(event.time, cut)
-            check_projection(configuration, event.time, cut, y)
+            event, arc, y = self._cut(event, view)
+            self.k1 = None
         self.front = Front(arc.end, y, equations, front.latched)
         self.arc, self.pending, self.controller = arc, event, controller
+
+    def _cut(self, event: Event, view: StepView) -> tuple[Event, Arc, Real]:
+        """Return an event, the step up to it, and the state at its end.
+
+        A reversal is delayed where the links of a loop form a straight line, because the motion is
+        not unique there.
+        """
+        arc = view.arc
+        if event.kind is EventKind.IMPACT and event.time > arc.start:
+            arc = view.cut(event.contact, event.time)
+        try:
+            y = self._closed(event.time, arc.at(event.time))
+        except SimulationError:
+            if event.kind is not EventKind.REVERSAL:
+                raise
+            event = replace(event, time=event.time + REVERSAL_DELAY_RTOL * arc.h)
+            y = self._closed(event.time, arc.at(event.time))
+        return event, replace(arc, end=event.time), y
+
+    def _closed(self, t: float, y: Real) -> Real:
+        """Return a state at a time t [s], projected onto the constraints."""
+        projected = self.equations.project(t, y)
+        check_projection(self.configuration, t, y, projected)
+        return projected
 
     def check_effort(self, step: float) -> None:
         """Reject a communication step [s] of the default experiment that needs too many steps.

@@ -163,11 +163,12 @@ static bool holding_stops(Simulation *sim, int count, const int *candidates, con
 /* --- friction --------------------------------------------------------------------------------- */
 
 /* A slip (slips is true) or reversal at a contact; contact is -1 without such an event.  After a
- * reversal, sliding speeds of the contact up to slow [m/s] count as zero. */
+ * reversal, sliding speeds of the contact up to slow [m/s] count as zero; rate is its sliding
+ * acceleration. */
 typedef struct {
     int contact;
     bool slips;
-    double slow;
+    double slow, rate;
 } FrictionEvent;
 
 /* Whether a contact can slide while all other held and sticking contacts rest. */
@@ -203,6 +204,14 @@ static ContactMode sliding_mode(Simulation *sim, int contact, const FrictionEven
     double slow = event->contact == contact ? event->slow : 0.0;
     sim->scratch.used = mark;
     return fabs(speed) > slow ? slip_mode(sim, speed) : CONTACT_FRICTIONLESS;
+}
+
+/* Return the mode of a contact at rest that cannot move independently.  After a reversal it slides
+ * if the other parts impose the motion, as where the links of a loop form a straight line. */
+static ContactMode turning_mode(const Simulation *sim, int contact, const FrictionEvent *event) {
+    bool slides = event->contact == contact && !event->slips &&
+                  fabs(event->rate) > zero_acceleration(&sim->configuration);
+    return slides ? slipping_mode(event->rate) : CONTACT_FRICTIONLESS;
 }
 
 /* Choose by its force whether a contact at rest begins to slip, sticks, has friction at its limit,
@@ -267,14 +276,15 @@ static bool find_rest(Simulation *sim, const HoldingSet *stops, const FrictionEv
         if (friction_of(sim, contact) > 0.0) {
             sliding[contact] = sliding_mode(sim, contact, event);
         }
-        if (stop) {
-            rest->stops[rest->stop_count] = contact;
-            rest->slips[rest->stop_count++] = slip_sign(sliding[contact]);
-        }
         if (friction_of(sim, contact) > 0.0 && sliding[contact] == CONTACT_FRICTIONLESS) {
             ok = is_mobile(sim, contact, modes, &mobile, problem);
             rest->contacts[rest->count] = contact;
             rest->count += ok && mobile;
+            sliding[contact] = mobile ? CONTACT_FRICTIONLESS : turning_mode(sim, contact, event);
+        }
+        if (stop) {
+            rest->stops[rest->stop_count] = contact;
+            rest->slips[rest->stop_count++] = slip_sign(sliding[contact]);
         }
     }
     return ok;
@@ -369,8 +379,8 @@ static double time_resolution(double time) {
     return EVENT_TIME_FACTOR * EVENT_TIME_ATOL + EVENT_TIME_ULPS * spacing(time);
 }
 
-/* Compute the sliding speed [m/s] at the end of sliding that the error of the event time causes. */
-static bool residual_speed(Simulation *sim, int contact, double *result, Problem *problem) {
+/* Compute the sliding acceleration of a contact in its present mode [m/s^2]. */
+static bool slide_acceleration(Simulation *sim, int contact, double *result, Problem *problem) {
     size_t mark = sim->scratch.used;
     const System *system = system_of(sim);
     Evaluation *evaluation = &sim->at_front;
@@ -382,22 +392,24 @@ static bool residual_speed(Simulation *sim, int contact, double *result, Problem
     double *row = take(&sim->scratch, (size_t)system->n);
     Complex *e = directions_at(sim, q);
     tangential_row(system, contact, e, row);
-    double rate = dot(system->n, row, evaluation->a) - tangential_convective(system, contact, e, v);
-    *result = fabs(rate) * time_resolution(sim->state.front_time);
+    *result = dot(system->n, row, evaluation->a) - tangential_convective(system, contact, e, v);
     sim->scratch.used = mark;
     return true;
 }
 
 static bool friction_event(Simulation *sim, const Event *event, FrictionEvent *result,
                            Problem *problem) {
-    FrictionEvent none = {-1, false, 0.0};
+    FrictionEvent none = {-1, false, 0.0, 0.0};
     *result = none;
     if (!event) {
         return true;
     }
     result->contact = event->contact;
     result->slips = event->kind == EVENT_SLIP;
-    return result->slips || residual_speed(sim, event->contact, &result->slow, problem);
+    bool right = result->slips ||
+                 slide_acceleration(sim, event->contact, &result->rate, problem);
+    result->slow = fabs(result->rate) * time_resolution(sim->state.front_time);
+    return right;
 }
 
 /* List the closed stops, and the open stops in touching whose gaps are zero and do not open. */

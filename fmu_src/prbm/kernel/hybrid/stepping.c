@@ -215,11 +215,18 @@ PRBM bool end_step(Simulation *sim, double t, Problem *problem) {
     return arc_cut(sim, t, state->arc.k, state->front, problem) && project_end(sim, problem);
 }
 
-/* End the step at an event. */
+/* End the step at a time of its dense output. */
+static bool end_on_arc(Simulation *sim, double t, Problem *problem) {
+    sim->state.front_time = t;
+    arc_at(sim, t, sim->state.front);
+    return project_end(sim, problem);
+}
+
+/* End the step at an event.  A reversal is delayed where the links of a loop form a straight line,
+ * because the motion is not unique there. */
 static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
     State *state = &sim->state;
     state->step_size = state->arc.h; /* The event does not shorten the next step. */
-    state->front_time = event->time;
     state->pending = *event;
     state->has_k1 = false;
     if (event->kind == EVENT_IMPACT && event->time > state->arc.start) {
@@ -233,8 +240,11 @@ static bool cut_step(Simulation *sim, const Event *event, Problem *problem) {
         copy(STAGES * state_size(sim), located->k, state->arc.k);
         state->arc.h = located->h;
     }
-    arc_at(sim, event->time, state->front);
-    return project_end(sim, problem);
+    if (end_on_arc(sim, event->time, problem)) {
+        return true;
+    }
+    state->pending.time += REVERSAL_DELAY_RTOL * state->arc.h;
+    return event->kind == EVENT_REVERSAL && end_on_arc(sim, state->pending.time, problem);
 }
 
 /* Take one step from the front, up to its first event. */
