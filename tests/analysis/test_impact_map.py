@@ -167,7 +167,7 @@ def test_energies_of_a_simulated_impact_add_up():
 
 
 def test_modes_by_gauss_principle_equal_the_static_modes_at_a_held_shape():
-    """There the multipliers of Gauss' principle are the static ones."""
+    """At a held shape, the multipliers of Gauss' principle are the static ones."""
     system = assemble(m := guide(axial=True), m.values(WEIGHTLESS))
     shape = impact_shape(system, 0, -5e-3)
     np.testing.assert_allclose(

@@ -224,7 +224,7 @@ def test_a_parameter_has_the_si_unit_of_its_value(striker):
 
 
 def test_a_material_has_two_parameters_that_flexure_types_refer_to(striker):
-    """They are steel.youngs_modulus [Pa] and steel.density [kg/m3], with the bounds of the type."""
+    """The parameters are steel.youngs_modulus [Pa] and steel.density [kg/m3], with usual bounds."""
     known = {p.name: p for p in striker.parameters}
     for name, value in (("youngs_modulus", 181.5e9), ("density", 7800.0)):
         unit, _, minimum, maximum, nominal, _ = FIELDS[FlexureType][name]

@@ -24,7 +24,7 @@ def kind_of(name: str) -> str:
 
 @each_shipped
 def test_nominal_values_are_of_the_order_of_the_motion(native, model):
-    """They are compared with the largest change of a state of their kind."""
+    """Each is compared with the largest change of a state of the same kind."""
     it = case(model)
     rows = []
     with Instance(native[model, 3], "cs").initialize() as instance:

@@ -67,7 +67,7 @@ def test_the_kernel_releases_as_the_engine_does(name):
 @pytest.mark.parametrize("degrees", [-20.0, 5.0, 60.0])
 @pytest.mark.parametrize("model", [PIVOT, stretching(PIVOT)])
 def test_a_moment_holds_the_body_at_the_angle(model, degrees):
-    """It is the derivative of the elastic energy by the angle."""
+    """The moment is the derivative of the elastic energy by the angle."""
     _, system = released(model, replace(PIVOT.release, angle=0.0))
 
     def energy(angle):

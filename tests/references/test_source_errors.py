@@ -139,7 +139,7 @@ def test_projection_closes_the_loop_after_every_step():
 
 @pytest.mark.parametrize("wall", [np.inf, 0.0], ids=["no wall", "wall"])
 def test_the_missing_term_cancels_in_the_1R_parallelogram(wall):
-    """Its equal links 1 and 3 have opposite directions e and equal rates v, and v_2 = 0.
+    """The equal links 1 and 3 have opposite directions e and equal rates v, and v_2 = 0.
 
     Hence the missing term e_1 v_1^2 + e_3 v_3^2 is zero.
     """

@@ -47,7 +47,7 @@ def test_holding_force_is_that_of_four_struts() -> None:
 
 
 def test_there_are_two_stable_equilibria_and_an_unstable_one_between_them() -> None:
-    """They are the straight shape, its mirror image, and the shape with the shortest struts."""
+    """The shapes are the straight one, its mirror image, and that with the shortest struts."""
     found = rest_positions(SYSTEM, np.array([-0.3, 0.4, 1.3, 2.3]) * RISE)
     assert [rest.stable for rest in found] == [True, False, True]
     np.testing.assert_allclose([r.displacement for r in found], [0, RISE, 2 * RISE], atol=1e-12)

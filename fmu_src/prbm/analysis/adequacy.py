@@ -47,7 +47,7 @@ COORDINATES_MAX = 240  # Coordinates of the flexures of the finer model.
 
 @dataclass(frozen=True)
 class Vibration:
-    """Small vibrations about the rest under gravity, or about a held shape.
+    """Small vibrations about the rest position under gravity, or about a held shape.
 
     Parameters
     ----------

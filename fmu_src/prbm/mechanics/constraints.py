@@ -114,8 +114,8 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
         right[n:] = -s
         q = q + solve(saddle(inertia(system.H, J, e)[0], G, G), right)[:n]
     raise SimulationError(
-        "the loops of the mechanism cannot be closed in this shape: a distance of "
-        f"{best:.3g} m between parts that are connected remains"
+        "the loops of the mechanism could not be closed near this shape: connected parts remain "
+        f"{best:.3g} m apart; release nearer to the straight shape, or check the lengths"
     )
 
 

@@ -41,7 +41,7 @@ def start_shape(system: System, values: Mapping[str, float], fraction: float = 1
 
 
 def mode_shape(system: System, mode: int, amplitude: float) -> Real:
-    """Return the rest under gravity displaced along a mode, (n,).
+    """Return the rest position under gravity displaced along a mode, (n,).
 
     The change of the coordinates is the mode, plus the least mass-weighted change that closes the
     loops and gives the released point the displacement exactly.
@@ -53,7 +53,8 @@ def mode_shape(system: System, mode: int, amplitude: float) -> Real:
     mode : int
         Number of the mode, from 1.
     amplitude : float
-        Displacement of the released point along the direction of the release, from the rest [m].
+        Displacement of the released point along the direction of the release, from the rest
+        position [m].
 
     Raises
     ------

@@ -192,7 +192,7 @@ class Release:
 
     * ``displacement``: a force on a point of a body along a direction holds it (default).
     * ``angle``: a moment on the body holds it.
-    * ``amplitude``: the mechanism is displaced from its rest under gravity along a mode.
+    * ``amplitude``: the mechanism is displaced from its rest position under gravity along a mode.
 
     Parameters
     ----------
@@ -212,7 +212,7 @@ class Release:
     mode : int or None
         Number of the mode, from 1.
     amplitude : Quantity or None
-        Displacement of the point along the direction by the mode, from the rest [m].
+        Displacement of the point along the direction by the mode, from the rest position [m].
     """
 
     name: ClassVar[str] = "release"
@@ -317,7 +317,7 @@ FIELDS: dict[type, dict[str, tuple[str, str, float, float, float | None, bool]]]
             -ANGLE_MAX, ANGLE_MAX, 0.1,
         ),
         "amplitude": _meta(
-            "m", "Displacement along a mode, from the rest, at which the body is released",
+            "m", "Displacement along a mode, from the rest position, at which the body is released",
             -LENGTH_MAX, LENGTH_MAX, 1e-2,
         ),
         "velocity": _meta("m/s", "Velocity at release", -1e4, 1e4),

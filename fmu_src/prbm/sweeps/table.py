@@ -189,7 +189,7 @@ def _check_separator(name: str, variables: Mapping[str, Any]) -> None:
 
 
 def check_settable(name: str, variables: Mapping[str, Any]) -> None:
-    """Reject a variable without a start value.
+    """Reject a variable that a table cannot set.
 
     Raises
     ------

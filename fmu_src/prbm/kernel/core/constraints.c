@@ -193,8 +193,9 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
     scratch->used = mark;
     if (ok && !closed) {
         return fail(problem,
-                    "the loops of the mechanism cannot be closed in this shape: a distance of "
-                    "%.3g m between parts that are connected remains",
+                    "the loops of the mechanism could not be closed near this shape: connected "
+                    "parts remain %.3g m apart; release nearer to the straight shape, or check the "
+                    "lengths",
                     best);
     }
     return ok;

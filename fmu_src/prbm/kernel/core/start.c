@@ -6,8 +6,8 @@
 #include "core/modal.h"
 #include "core/start.h"
 
-/* Displace q, at rest, along a mode phi, column k of (n, count), which moves the released point by
- * moved; then close the loops such that the point has the displacement amplitude. */
+/* Displace the rest shape q along a mode, column k of phi (n, count), by which the released point
+ * moves by moved.  Then close the loops with the displacement amplitude of this point. */
 static bool displace(const System *system, const double *phi, int k, double moved,
                      double amplitude, double *q, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
@@ -49,7 +49,7 @@ static bool moved_by(const System *system, const double *q, const double *phi, i
     return fabs(*moved) > RELEASE_MODE_RTOL * system->length * turn;
 }
 
-/* Displace the rest under gravity along the mode of the release. */
+/* Displace the rest shape under gravity along the mode of the release. */
 static bool mode_shape(const System *system, double amplitude, double *q, Scratch *scratch,
                        Problem *problem) {
     size_t used = scratch->used;
