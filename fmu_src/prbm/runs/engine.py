@@ -5,13 +5,12 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, Protocol
 
-from ..base.errors import MechanismError, ParameterError
+from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..hybrid.configuration import Configuration
 from ..hybrid.impacts import Impact
 from ..hybrid.outputs import Outputs
 from ..hybrid.simulation import Simulation
-from ..kernel.compiler import CompilerError
-from ..kernel.library import LibraryError, library
+from ..kernel.library import library
 from ..kernel.simulation import KernelSimulation
 from ..mechanics.arrays import Real
 from ..mechanics.system import System
@@ -153,7 +152,7 @@ def kernel_available() -> bool:
     """Return whether the kernel can be loaded; log the reason if it cannot."""
     try:
         library()
-    except (CompilerError, LibraryError) as error:
+    except PrbmError as error:
         _warn(f"the Python engine is used, which is slower: {error}")
         return False
     return True
