@@ -15,7 +15,7 @@ pytestmark = pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash
 
 
 def completed(line: str) -> list[str]:
-    """Return what bash proposes for the last word of a line; a space at its end begins a word."""
+    """Return the proposals of bash for the last word of a line, empty after a space."""
     words = [*shlex.split(line), *([""] if line.endswith(" ") else [])]
     array = " ".join(map(shlex.quote, words))
     program = (

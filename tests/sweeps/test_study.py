@@ -72,6 +72,18 @@ def test_the_optimum_is_never_worse_than_any_computed_value():
     assert best.value == min(computed)
 
 
+def test_five_neighbouring_samples_avoid_a_narrow_optimum():
+    """The parabola has its minimum at 0.6; one sample at -0.5 is far below it."""
+    x = np.linspace(-1.0, 1.0, 41)
+    best = searched(lambda a: 0.1 if abs(a + 0.5) < 0.01 else 1.0 + (a - 0.6) ** 2, x)
+    assert best.value == 0.1
+    assert best.flat["a"] == pytest.approx((-0.5, -0.5), abs=0.011)
+    low, high, worst = best.robust
+    assert (low, high) == pytest.approx((0.5, 0.7), abs=1e-9)
+    assert worst == pytest.approx(1.01, abs=1e-9)
+    assert searched(lambda a: a, np.linspace(0.0, 1.0, 4)).robust is None
+
+
 def test_failed_simulations_bound_the_flat_range():
     best = searched(
         lambda x: math.nan if x > 0.51 else 1.0 + 1e-3 * (x - 0.4) ** 2, np.linspace(0.0, 1.0, 11)

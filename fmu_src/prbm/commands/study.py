@@ -134,6 +134,14 @@ def _optimum_lines(optimum: Optimum, units: Mapping[str, str], verb: str) -> lis
             f"within {100 * FLAT_RTOL:g} % of it: {name} from {_text(low, units[name])} to "
             f"{_text(high, units[name])}{ends}"
         )
+    if optimum.robust is not None:
+        ((name, _),) = optimum.point.items()
+        low, high, worst = optimum.robust
+        bound = "most" if verb == "least" else "least"
+        lines.append(
+            f"best five neighbouring samples: at {bound} {_text(worst, units[optimum.output])} "
+            f"with {name} from {_text(low, units[name])} to {_text(high, units[name])}"
+        )
     return lines
 
 

@@ -1,6 +1,6 @@
 """Results with figures and films, for notebooks.
 
-Notebooks show what a cell returns: a result as a summary with a small figure, a figure as a PNG, a
+Notebooks show the value of a cell: a result as a summary with a small figure, a figure as a PNG, a
 film as a GIF.  No window is opened.
 """
 
@@ -128,7 +128,7 @@ class Result(results.Result):
         return f"<pre>{html.escape(text)}</pre>{self._preview()}"
 
     def _preview(self) -> str:
-        """Return a small figure as HTML, nothing if there is none."""
+        """Return a small figure as HTML; an empty text if the result has nothing to plot."""
         from ..drawing.style import png  # imported here: Matplotlib takes half a second
 
         try:

@@ -52,7 +52,7 @@ class Quantity:
         return [name for name in names if name in self.suffixes or name.endswith(self.suffixes)]
 
     def lacking(self, names: Iterable[str]) -> str:
-        """Return a needed variable that is not among names; an empty text if there is none.
+        """Return a needed variable that is not among names, or an empty text.
 
         Variables of stops and bodies are needed only if no complete name is.
 

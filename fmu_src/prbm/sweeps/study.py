@@ -39,6 +39,7 @@ from .outputs import parse_output as parse
 
 STEPS = 4000  # Communication steps of a simulation, which resolve the vibration after impacts.
 RUNS_MAX = 100_000  # More simulations are a mistake in the number of samples.
+NEIGHBOURS = 5  # Samples of a range whose worst output is compared with that of other ranges.
 FLAT_RTOL = 0.05  # An optimum is flat where the output is within this share of it.
 REFINED_RTOL = 1e-3  # Tolerance of the refined parameters, relative to the distance of samples.
 ROUNDS_MAX = 4  # Repetitions of the refinement.
@@ -115,6 +116,10 @@ class Optimum:
         Parameters of all simulations of the refinement.
     values : (m,)
         The output there; NaN for a failed simulation.
+    robust : (float, float, float) or None
+        First and last of the five neighbouring samples of one parameter whose worst output is best,
+        and this output.  None with two parameters, with fewer samples, or if all ranges have failed
+        simulations.
     """
 
     output: str
@@ -124,6 +129,7 @@ class Optimum:
     bounded: Mapping[str, tuple[bool, bool]]
     points: Real
     values: Real
+    robust: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -459,7 +465,20 @@ class _Search:
             {name: (low, high) for name, ((_, low), (_, high)) in ends.items()},
             np.array(self.points).reshape(-1, len(names)),
             self.sign * np.array(self.values),
+            self._robust() if len(names) == 1 else None,
         )
+
+    def _robust(self) -> tuple[float, float, float] | None:
+        """Return the neighbouring samples whose worst output is best, and this output."""
+        x = self.samples[0]
+        if len(x) < NEIGHBOURS:
+            return None
+        windows = np.lib.stride_tricks.sliding_window_view(self.grid, NEIGHBOURS)
+        worst = windows.max(axis=1)  # NaN if a simulation has failed.
+        if not np.isfinite(worst).any():
+            return None
+        k = int(np.nanargmin(worst))
+        return float(x[k]), float(x[k + NEIGHBOURS - 1]), float(self.sign * worst[k])
 
     def _every(self) -> tuple[Real, Real]:
         """Return all points so far, (n, p), and the values there with their sign, (n,)."""
