@@ -29,6 +29,17 @@ from .rest import RestForces, rest_forces
 
 FRICTIONLESS, STICK = ContactMode.FRICTIONLESS, ContactMode.STICK
 
+JAMMED = (
+    "no forces satisfy the laws of contact and friction",
+    "friction jams the mechanism; reduce the coefficients of friction",
+)
+"""Cause and remedy of a choice of modes without a solution."""
+UNSETTLED = (
+    "the choice of closed contacts does not converge",
+    "the forces of the contacts are round-off; separate the stops, or change the load",
+)
+"""Cause and remedy of modes that change with each projection."""
+
 
 # --- resets -----------------------------------------------------------------------------------
 
@@ -91,7 +102,7 @@ def settle(
             return front
         # The projection closes gaps of round-off, which changes the forces of stiff flexures.
         front, before = front.projected(), front.contacts
-    raise SimulationError(_unsettled(configuration, front, candidates))
+    raise SimulationError(_failure(configuration, front, candidates, UNSETTLED))
 
 
 def _chosen(
@@ -149,7 +160,7 @@ def holding_stops(
     """
     holding = find_holding_stops(configuration, front, candidates)
     if holding is None:
-        raise SimulationError(_jammed(configuration, front, candidates))
+        raise SimulationError(_failure(configuration, front, candidates, JAMMED))
     return holding
 
 
@@ -188,22 +199,12 @@ def _least_pressing(scales: Scales, front: Front, stop: int) -> float:
     return scales.zero_acceleration if gaps[stop] > -scales.depth / 2 else 0.0
 
 
-def _unsettled(configuration: Configuration, front: Front, contacts: Iterable[int]) -> str:
-    """Return the message for contacts whose modes change with each projection."""
-    names = contact_names(configuration.mechanism, contacts)
-    return (
-        f"the choice of closed contacts does not converge at t = {front.time:.9g} s ({names}): "
-        "the forces of the contacts are round-off; separate the stops, or change the load"
-    )
-
-
-def _jammed(configuration: Configuration, front: Front, contacts: Iterable[int]) -> str:
-    """Return the message for contacts whose laws no forces satisfy."""
-    names = contact_names(configuration.mechanism, contacts)
-    return (
-        f"no forces satisfy the laws of contact and friction at t = {front.time:.9g} s ({names}): "
-        "friction jams the mechanism; reduce the coefficients of friction"
-    )
+def _failure(
+    configuration: Configuration, front: Front, contacts: Iterable[int], failure: tuple[str, str]
+) -> str:
+    """Return the message of a failure at some contacts, from its cause and its remedy."""
+    names, (cause, remedy) = contact_names(configuration.mechanism, contacts), failure
+    return f"{cause} at t = {front.time:.9g} s ({names}): {remedy}"
 
 
 def equations_holding(scales: Scales, front: Front, stops: Sequence[int]) -> Equations:
@@ -277,9 +278,8 @@ def _with_friction(
         found = _modes_of(configuration.scales, front, stops, every, slipped, turning)
         if found is not None:
             return front.with_contacts(found)
-    raise SimulationError(
-        _jammed(configuration, front, {*every, *_with_coefficients(front.equations, every)})
-    )
+    rubbing = _with_coefficients(front.equations, every)
+    raise SimulationError(_failure(configuration, front, {*every, *rubbing}, JAMMED))
 
 
 def _modes_of(

@@ -8,6 +8,16 @@
 #include "hybrid/rest.h"
 #include "hybrid/simulation.h"
 
+static const ContactFailure JAMMED = {
+    "no forces satisfy the laws of contact and friction",
+    "friction jams the mechanism; reduce the coefficients of friction",
+};
+/* The modes change with each projection. */
+static const ContactFailure UNSETTLED = {
+    "the choice of closed contacts does not converge",
+    "the forces of the contacts are round-off; separate the stops, or change the load",
+};
+
 /* --- trial equations -------------------------------------------------------------------------- */
 
 /* Set up the trial equations in a contact state. */
@@ -157,7 +167,7 @@ PRBM bool find_holding_stops(Simulation *sim, int count, const int *candidates, 
 static bool holding_stops(Simulation *sim, int count, const int *candidates, const double *q,
                           const double *v, HoldingSet *holding, Problem *problem) {
     return find_holding_stops(sim, count, candidates, q, v, holding, problem) &&
-           (holding->found || contacts_jammed(sim, count, candidates, problem));
+           (holding->found || contacts_fail(sim, &JAMMED, count, candidates, problem));
 }
 
 /* --- friction --------------------------------------------------------------------------------- */
@@ -298,7 +308,7 @@ static bool friction_jams(const Simulation *sim, const HoldingSet *touching, Pro
         count += stop ? has_contact(touching->count, touching->stops, contact)
                       : friction_of(sim, contact) > 0.0;
     }
-    return contacts_jammed(sim, count, all, problem);
+    return contacts_fail(sim, &JAMMED, count, all, problem);
 }
 
 /* Choose the modes by the forces of some stops and of the contacts with friction.  *agree is false
@@ -490,7 +500,7 @@ PRBM bool settle(Simulation *sim, const int *touching, int touching_count, const
             return false;
         }
     }
-    return contacts_unsettled(sim, count, candidates, problem);
+    return contacts_fail(sim, &UNSETTLED, count, candidates, problem);
 }
 
 PRBM void gaps_and_rates(Simulation *sim, double *gaps, double *rates) {

@@ -138,22 +138,10 @@ PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, Cont
     }
 }
 
-PRBM bool contacts_jammed(const Simulation *sim, int count, const int *contacts,
-                          Problem *problem) {
+PRBM bool contacts_fail(const Simulation *sim, const ContactFailure *failure, int count,
+                        const int *contacts, Problem *problem) {
     ContactNames names;
     list_contacts(sim->configuration.mechanism, count, contacts, &names);
-    return fail(problem,
-                "no forces satisfy the laws of contact and friction at t = %.9g s (%s): friction "
-                "jams the mechanism; reduce the coefficients of friction",
-                sim->state.front_time, names.text);
-}
-
-PRBM bool contacts_unsettled(const Simulation *sim, int count, const int *contacts,
-                             Problem *problem) {
-    ContactNames names;
-    list_contacts(sim->configuration.mechanism, count, contacts, &names);
-    return fail(problem,
-                "the choice of closed contacts does not converge at t = %.9g s (%s): the forces of "
-                "the contacts are round-off; separate the stops, or change the load",
-                sim->state.front_time, names.text);
+    return fail(problem, "%s at t = %.9g s (%s): %s", failure->cause, sim->state.front_time,
+                names.text, failure->remedy);
 }

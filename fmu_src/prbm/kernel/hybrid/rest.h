@@ -26,6 +26,11 @@ typedef struct {
     char text[NAMES_LENGTH];
 } ContactNames;
 
+/* A failure of the choice of contact modes. */
+typedef struct {
+    const char *cause, *remedy;
+} ContactFailure;
+
 /* Compute the forces that satisfy the laws of all contacts; solved is false if there are none.  In
  * the trial equations all stops must be open, and friction points at rest without friction. */
 PRBM bool rest_forces(Simulation *sim, const double *q, const double *v,
@@ -34,10 +39,8 @@ PRBM const char *contact_name(const Mechanism *m, int contact);
 PRBM bool has_contact(int count, const int *contacts, int contact);
 /* List the names of contacts; names that do not fit are replaced by "...". */
 PRBM void list_contacts(const Mechanism *m, int count, const int *contacts, ContactNames *names);
-/* Set the problem of contacts whose laws no forces satisfy; return false. */
-PRBM bool contacts_jammed(const Simulation *sim, int count, const int *contacts, Problem *problem);
-/* Set the problem of contacts whose modes change with each projection; return false. */
-PRBM bool contacts_unsettled(const Simulation *sim, int count, const int *contacts,
-                             Problem *problem);
+/* Set the problem of contacts; return false. */
+PRBM bool contacts_fail(const Simulation *sim, const ContactFailure *failure, int count,
+                        const int *contacts, Problem *problem);
 
 #endif
