@@ -7,6 +7,9 @@
 PRBM double longest_step(const Simulation *sim);
 PRBM bool take_step(Simulation *sim, Problem *problem);
 
+/* Return the difference of the solution of lower order at the end of the latest step, relative to
+ * the state. */
+PRBM double embedded_error(Simulation *sim);
 /* Return the root mean square of the difference of two states, relative to the larger of them. */
 PRBM double difference(Simulation *sim, const double *y, const double *z);
 /* Fail if a projection at time t has changed a state y too much. */
