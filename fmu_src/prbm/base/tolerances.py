@@ -102,6 +102,7 @@ FASTEST_ITERATIONS_MAX = 100  # At the start of the motion; about ten are usual.
 STEP_ERROR_MIN = 1e-4  # Of the tolerance: smallest error that the controller remembers.
 STEP_MAX_RTOL = 0.08  # Of the period: longest step.
 NODE_STEP_RTOL = 1e-5  # Of the period: shorter steps are interpolated by their stages only.
+DENSE_FACTOR = 1.0  # Of the tolerance: embedded error up to which the dense output is used.
 INTERPOLATION_FACTOR = 10.0  # Of the tolerance: largest difference of two interpolations.
 NODE_RATIO_MIN = 1 / 6  # Of a step: shortest previous step whose start is a node.
 STEP_MIN_ATOL = 1e-13  # s; shortest step.

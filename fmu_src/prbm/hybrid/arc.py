@@ -78,6 +78,12 @@ class Arc:
             return self
         return replace(self, before=Node(last.start, last.y, last.k[0]))
 
+    @property
+    def embedded_error(self) -> Real:
+        """Difference of the solution of lower order at the end of the step, (2 n + 2,)."""
+        result: Real = self.h * (TSITOURAS_PAPAKOSTAS.error @ self.k)
+        return result
+
     def middle(self, rate: Rate) -> Node:
         """Return the state at half the time of the step, by a step of that size."""
         half, y = self.cut(rate, self.start + 0.5 * self.h)

@@ -17,6 +17,7 @@ import numpy as np
 from ..base.errors import ParameterError, SimulationError
 from ..base.names import unknown
 from ..base.tolerances import (
+    DENSE_FACTOR,
     EFFORT_MAX,
     INTERPOLATION_FACTOR,
     NODE_STEP_RTOL,
@@ -370,10 +371,14 @@ class Simulation:
     def _interpolated(self, arc: Arc) -> Real:
         """Return the state at the present time in a step, not projected.
 
-        If the two interpolations differ too much, a step to the present time replaces them.
+        The dense output, whose error is below that of the embedded solution, is used if that is
+        small; not in fixed steps, which have no tolerance.  If the two interpolations differ too
+        much, a step to the present time replaces them.
         """
         dense, scales = arc.at(self.time), self.configuration.scales
-        if arc.h < NODE_STEP_RTOL * scales.time:
+        embedded = error_norm(scales, arc.embedded_error, arc.y, arc.y)
+        exact = embedded <= DENSE_FACTOR * self.configuration.tolerance
+        if (exact and not self.configuration.step) or arc.h < NODE_STEP_RTOL * scales.time:
             return dense
         y = arc.through(arc.before or self._middle_of(arc), self.time)
         difference = error_norm(scales, y - dense, dense, y)

@@ -132,6 +132,12 @@ PRBM void errors_of(int n, const double *k, double h, double *fine, double *coar
     }
 }
 
+PRBM void fine_error_of(int n, const double *k, double h, double *fine) {
+    for (int j = 0; j < n; j += LANES) {
+        set_lanes(fine + j, h * weighted(STAGES, ERROR_WEIGHT, n, k + j));
+    }
+}
+
 /* Bound the distance of the first n components of the dense output from their values at the start
  * of the step. */
 PRBM void furthest(int n, int ny, const double *k, double h, double *distance) {

@@ -18,6 +18,8 @@ PRBM bool stages(const Equations *equations, double t, int n, const double *y, d
                  Problem *problem);
 /* The differences between the solution and those of orders 5 and 3. */
 PRBM void errors_of(int n, const double *k, double h, double *fine, double *coarse);
+/* The first of them only. */
+PRBM void fine_error_of(int n, const double *k, double h, double *fine);
 PRBM void weights(double theta, double *b);
 /* Compute the state at the end of a step from its stages. */
 PRBM void step_end(int n, const double *y, const double *k, double h, double *end);

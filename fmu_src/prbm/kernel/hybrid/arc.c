@@ -68,14 +68,16 @@ static void through(Simulation *sim, const Node *third, double t, double *y) {
 
 /* Compute the state y at time t in the step by a polynomial of degree eight: through both ends of
  * the step, and the start of the previous step or the middle of this one.  The energies are those
- * of the dense output.  If it differs too much from the dense output, a step to the time replaces
+ * of the dense output, whose error is below that of the embedded solution: it is used if that is
+ * small.  If the polynomial differs too much from the dense output, a step to the time replaces
  * it. */
 static bool interpolated(Simulation *sim, double t, double *y, Problem *problem) {
     const Arc *arc = &sim->state.arc;
     Located *located = &sim->stepping.located;
     int ny = state_size(sim);
     arc_at(sim, t, y);
-    if (arc->h < NODE_STEP_RTOL * sim->configuration.scales.time) {
+    if (embedded_error(sim) <= DENSE_FACTOR * sim->state.tolerance ||
+        arc->h < NODE_STEP_RTOL * sim->configuration.scales.time) {
         return true;
     }
     bool before = arc->before.time < arc->start;

@@ -109,6 +109,15 @@ static double step_error(Simulation *sim, double h, Problem *problem) {
     return error / (STEP_ERROR_FACTOR * sim->state.tolerance);
 }
 
+PRBM double embedded_error(Simulation *sim) {
+    Stepping *stepping = &sim->stepping;
+    const Arc *arc = &sim->state.arc;
+    double means[2];
+    fine_error_of(state_size(sim), arc->k, arc->h, stepping->error);
+    mean_squares(sim, stepping->error, stepping->error, arc->y, arc->y, means);
+    return sqrt(means[0]);
+}
+
 PRBM double difference(Simulation *sim, const double *y, const double *z) {
     size_t mark = sim->scratch.used;
     int ny = state_size(sim);

@@ -10,6 +10,9 @@ PRBM bool take_step(Simulation *sim, Problem *problem);
  * step, which is below that of the dense output. */
 PRBM bool end_step(Simulation *sim, double t, Problem *problem);
 
+/* Return the difference of the solution of lower order at the end of the latest step, relative to
+ * the state. */
+PRBM double embedded_error(Simulation *sim);
 /* Return the root mean square of the difference of two states, relative to the larger of them. */
 PRBM double difference(Simulation *sim, const double *y, const double *z);
 /* Fail if a projection at time t has changed a state y too much. */
