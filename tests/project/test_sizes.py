@@ -14,11 +14,11 @@ def test_files_classes_and_functions_are_within_their_limits():
 
 
 def test_code_for_moving_walls_is_within_its_limit():
-    """All functions with a wall in their names are counted, except the check of the start."""
+    """Functions with a wall in their names are counted, except those that do not move walls."""
     found = list(sizes.wall_functions())
     assert sum(x.size for x in found) <= sizes.WALLS_MAX
     others = {x.name for x in sizes.measured().functions if x.place.split(":")[0].endswith(".c")}
-    named = {name for name in others if "wall" in name} - {"check_walls"}
+    named = {name for name in others if "wall" in name} - {"check_walls", "add_friction_and_walls"}
     assert named | set(sizes.WALL_FUNCTIONS) <= {x.name for x in found}
 
 

@@ -42,7 +42,7 @@ from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
 from .release import released
 from .stability import FastestMode
-from .stepping import StepSizeController, check_projection, error_norm, take_step
+from .stepping import StepSizeController, check_projection, closed, error_norm, take_step
 
 
 class Simulation:
@@ -282,7 +282,7 @@ class Simulation:
         arc, t = self.arc, self.time
         if arc is None or not arc.start < t < self.front.time:
             return self.state()
-        return self._closed(t, arc.cut(self.equations.rate, t)[1])
+        return closed(self.configuration, self.equations, t, arc.cut(self.equations.rate, t)[1])
 
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
@@ -316,34 +316,10 @@ class Simulation:
         else:
             # The event does not shorten the next step.
             controller = StepSizeController(step.h, controller.last_error)
-            event, arc, y = self._cut(event, view)
+            event, arc, y = _cut(configuration, event, view)
             self.k1 = None
         self.front = Front(arc.end, y, equations, front.latched)
         self.arc, self.pending, self.controller = arc, event, controller
-
-    def _cut(self, event: Event, view: StepView) -> tuple[Event, Arc, Real]:
-        """Return an event, the step up to it, and the state at its end.
-
-        A reversal is delayed where the links of a loop form a straight line, because the motion is
-        not unique there.
-        """
-        arc = view.arc
-        if event.kind is EventKind.IMPACT and event.time > arc.start:
-            arc = view.cut(event.contact, event.time)
-        try:
-            y = self._closed(event.time, arc.at(event.time))
-        except SimulationError:
-            if event.kind is not EventKind.REVERSAL:
-                raise
-            event = replace(event, time=event.time + REVERSAL_DELAY_RTOL * arc.h)
-            y = self._closed(event.time, arc.at(event.time))
-        return event, replace(arc, end=event.time), y
-
-    def _closed(self, t: float, y: Real) -> Real:
-        """Return a state at a time t [s], projected onto the constraints."""
-        projected = self.equations.project(t, y)
-        check_projection(self.configuration, t, y, projected)
-        return projected
 
     def check_effort(self, step: float) -> None:
         """Reject a communication step [s] of the default experiment that needs too many steps.
@@ -495,3 +471,22 @@ class Simulation:
         self.pending = snapshot.event_of(saved["pending"])
         self.k1 = snapshot.array_of(saved["k1"])
         self._output_cache = None
+
+
+def _cut(configuration: Configuration, event: Event, view: StepView) -> tuple[Event, Arc, Real]:
+    """Return an event, the step up to it, and the state at its end.
+
+    A reversal is delayed where the links of a loop form a straight line, because the motion is not
+    unique there.
+    """
+    arc, equations = view.arc, view.equations
+    if event.kind is EventKind.IMPACT and event.time > arc.start:
+        arc = view.cut(event.contact, event.time)
+    try:
+        y = closed(configuration, equations, event.time, arc.at(event.time))
+    except SimulationError:
+        if event.kind is not EventKind.REVERSAL:
+            raise
+        event = replace(event, time=event.time + REVERSAL_DELAY_RTOL * arc.h)
+        y = closed(configuration, equations, event.time, arc.at(event.time))
+    return event, replace(arc, end=event.time), y

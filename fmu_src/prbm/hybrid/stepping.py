@@ -289,6 +289,19 @@ def check_projection(configuration: Configuration, t: float, y: Real, projected:
         )
 
 
+def closed(configuration: Configuration, equations: Equations, t: float, y: Real) -> Real:
+    """Return a state y (2 n + 2,) at time t [s], projected onto the constraints.
+
+    Raises
+    ------
+    SimulationError
+        As :func:`check_projection`.
+    """
+    projected = equations.project(t, y)
+    check_projection(configuration, t, y, projected)
+    return projected
+
+
 def step_error(scales: Scales, h: float, k: Real, y: Real, y1: Real) -> float:
     """Return the error of a step of size h from y to y1 with the stages k, in units of the scales.
 
