@@ -27,9 +27,6 @@ ENDS = {
 }  # fmt: skip
 """Tags of variables by the end of their names; the driver's oracles read them."""
 
-WALLS = ("displacement", "velocity")
-WALL_SHARE = 0.1  # Of the nominal value: jumps of walls that the interpolant follows.
-
 GAP_ATOL = 1e-8  # m: largest penetration of a rigid stop.
 ENERGY_RTOL = 1e-5  # Of the largest energy in a run: bound of its balance at tolerance 0.
 ENERGY_FACTOR = 3e3  # Of the tolerance of the integration, added to ENERGY_RTOL.
@@ -106,8 +103,6 @@ def _line(variable: Any, kind: str) -> str:
     start = float(v.start or 0.0)
     nominal = float(v.nominal or (v.declaredType and v.declaredType.nominal) or 0.0)
     scale = nominal or abs(start) or 1.0
-    if role == "u" and end in WALLS:
-        scale *= WALL_SHARE
     low, high = (
         limit if value is None else float(value)
         for value, limit in ((v.min, -math.inf), (v.max, math.inf))
