@@ -257,6 +257,19 @@ def test_energies_balance_and_results_do_not_depend_on_the_rows(guide):
         np.testing.assert_allclose(many[name][::10], result[name], atol=limit, err_msg=name)
 
 
+def test_a_wall_follows_its_signal_within_twice_its_acceleration_times_the_piece_squared(guide):
+    """The gap and the displacement of the hit point add up to the displacement of the wall."""
+    w, amplitude, tolerance = 2 * math.pi * 20.0, 1e-3, 1e-8
+    result = simulate(
+        guide, {"stop.position": 0.02}, inputs={"stop.displacement": "sine(1 mm, 20 Hz)"},
+        stop_time=0.05, step=1e-3, tolerance=tolerance,
+    )  # fmt: skip
+    wall = result["stop.gap"] + result["stop.point.displacement"]
+    piece = 0.5 * (720 * tolerance) ** 0.25 / w
+    error = np.abs(wall - amplitude * np.sin(w * result["time"]))
+    assert error.max() < 2 * amplitude * w**2 * piece**2
+
+
 def test_forms_of_a_signal_are_equivalent(guide):
     t = np.linspace(0.0, 0.02, 21)
     values = np.where(t < 0.01, 0.0, 0.1 * (t - 0.01))
