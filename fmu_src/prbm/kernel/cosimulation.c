@@ -18,9 +18,9 @@
 static bool leave_arc(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     bool within = state->arc.valid && state->time < state->front_time;
-    bool right = !within || end_step(sim, state->time, problem);
+    bool ok = !within || end_step(sim, state->time, problem);
     state->arc.valid = state->has_k1 = false;
-    return right;
+    return ok;
 }
 
 /* Let the inputs act that have been set. */

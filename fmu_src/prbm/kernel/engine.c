@@ -18,11 +18,11 @@ struct Engine {
     bool incomplete;  /* an impact could not be recorded */
 };
 
-static bool succeed(bool right, const Problem *problem, char *message) {
-    if (!right) {
+static bool succeed(bool ok, const Problem *problem, char *message) {
+    if (!ok) {
         memcpy(message, problem->text, sizeof problem->text);
     }
-    return right;
+    return ok;
 }
 
 /* --- mechanisms ------------------------------------------------------------------------------- */
@@ -122,17 +122,17 @@ EXPORTED void prbm_impacts(Engine *engine, double *numbers) {
 EXPORTED bool prbm_set(Engine *engine, int first, int count, const double *values,
                        char *message) {
     Problem problem = {""};
-    bool right = true;
-    for (int i = 0; right && i < count; i++) {
-        right = simulation_set(engine->simulation, first + i, values[i], &problem);
+    bool ok = true;
+    for (int i = 0; ok && i < count; i++) {
+        ok = simulation_set(engine->simulation, first + i, values[i], &problem);
     }
-    return succeed(right, &problem, message);
+    return succeed(ok, &problem, message);
 }
 
 EXPORTED bool prbm_start(Engine *engine, double start_time, double tolerance, char *message) {
     Problem problem = {""};
-    bool right = simulation_start(engine->simulation, start_time, tolerance, false, &problem);
-    return succeed(right, &problem, message);
+    bool ok = simulation_start(engine->simulation, start_time, tolerance, false, &problem);
+    return succeed(ok, &problem, message);
 }
 
 EXPORTED bool prbm_check_step(const Engine *engine, double step, char *message) {
@@ -144,12 +144,12 @@ EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
     Problem problem = {""};
     int before = engine->count;
     engine->incomplete = false;
-    bool right = simulation_advance(engine->simulation, time, &problem);
-    if (right && engine->incomplete) {
-        right = fail(&problem, "there is not enough memory to record the impacts up to "
-                               "t = %.9g s: simulate in shorter parts", time);
+    bool ok = simulation_advance(engine->simulation, time, &problem);
+    if (ok && engine->incomplete) {
+        ok = fail(&problem, "there is not enough memory to record the impacts up to "
+                            "t = %.9g s: simulate in shorter parts", time);
     }
-    if (!succeed(right, &problem, message)) {
+    if (!succeed(ok, &problem, message)) {
         engine->count = before;
         return -1;
     }
@@ -159,11 +159,11 @@ EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
 EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *values,
                           char *message) {
     Problem problem = {""};
-    bool right = true;
-    for (int i = 0; right && i < count; i++) {
-        right = simulation_get(engine->simulation, slots[i], &values[i], &problem);
+    bool ok = true;
+    for (int i = 0; ok && i < count; i++) {
+        ok = simulation_get(engine->simulation, slots[i], &values[i], &problem);
     }
-    return succeed(right, &problem, message);
+    return succeed(ok, &problem, message);
 }
 
 EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int count,
@@ -181,11 +181,11 @@ EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int c
 EXPORTED bool prbm_state(Engine *engine, double *y, char *message) {
     Problem problem = {""};
     Simulation *sim = engine->simulation;
-    bool right = present_outputs(sim, PLACES, &problem) != NULL;
-    if (right) {
+    bool ok = present_outputs(sim, PLACES, &problem) != NULL;
+    if (ok) {
         copy(state_size(sim), sim->present.y, y);
     }
-    return succeed(right, &problem, message);
+    return succeed(ok, &problem, message);
 }
 
 EXPORTED double prbm_time(const Engine *engine) {

@@ -416,10 +416,10 @@ static bool friction_event(Simulation *sim, const Event *event, FrictionEvent *r
     }
     result->contact = event->contact;
     result->slips = event->kind == EVENT_SLIP;
-    bool right = result->slips ||
-                 slide_acceleration(sim, event->contact, &result->rate, problem);
+    bool ok = result->slips ||
+              slide_acceleration(sim, event->contact, &result->rate, problem);
     result->slow = fabs(result->rate) * time_resolution(sim->state.front_time);
-    return right;
+    return ok;
 }
 
 /* List the closed stops, and the open stops in touching whose gaps are zero and do not open. */

@@ -72,13 +72,13 @@ PRBM void join_walls(Simulation *sim, double time, bool set, Wall *joined) {
 PRBM bool keep_gaps(Simulation *sim, Wall *joined, Problem *problem) {
     double gaps[STOPS_MAX], rates[STOPS_MAX], after[STOPS_MAX], rates_after[STOPS_MAX];
     gaps_and_rates(sim, gaps, rates);
-    bool right = take_values(sim, problem);
+    bool ok = take_values(sim, problem);
     gaps_and_rates(sim, after, rates_after);
     for (int i = 0; i < system_of(sim)->s; i++) {
         joined[i].offset += gaps[i] - after[i];
         joined[i].excess += rates[i] - rates_after[i];
     }
-    return right;
+    return ok;
 }
 
 /* Give walls whose stop.velocity has changed in event mode this velocity, in their places. */
