@@ -522,7 +522,7 @@ def test_a_missing_package_is_named(monkeypatch, capsys):
     monkeypatch.delattr(sys.modules["prbm.commands"], "building")
     monkeypatch.setitem(sys.modules, "prbm.base.atomic", None)
     assert command.main() == cli.MISTAKE
-    assert "the Python package prbm.base.atomic is missing" in capsys.readouterr().err
+    assert "the Python package prbm is missing; install it with" in capsys.readouterr().err
 
 
 FILE_MISTAKES = {

@@ -259,7 +259,7 @@ class Simulation:
 
     def _restart(self, moved: tuple[Wall, ...]) -> None:
         """Continue from the present state with the present inputs, walls and parameters."""
-        y, configuration = self._end_of_step(), self.prepared
+        y, configuration = self.state(), self.prepared
         if configuration is not self.configuration:
             moved = walls.keeping_gaps(self.system, configuration.system, y, moved)
         inputs = Inputs.of(self.mechanism, self.given, moved)
@@ -276,13 +276,6 @@ class Simulation:
             front, counted = impacts.impact(configuration, front, struck)
         self.configuration, self.changed, self.received = configuration, False, given
         self._set_front(front, counted)
-
-    def _end_of_step(self) -> Real:
-        """Return the present state as the end of a step: its error is below that of the arc."""
-        arc, t = self.arc, self.time
-        if arc is None or not arc.start < t < self.front.time:
-            return self.state()
-        return closed(self.configuration, self.equations, t, arc.cut(self.equations.rate, t)[1])
 
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""

@@ -14,13 +14,16 @@
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
-/* End the latest step at the present time, from which the integration continues. */
+/* Make the present state the front, from which the integration continues.  It is the state that
+ * outputs show, so that no momentum is lost in a coupling. */
 static bool leave_arc(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
-    bool within = state->arc.valid && state->time < state->front_time;
-    bool ok = !within || end_step(sim, state->time, problem);
+    if (!arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem)) {
+        return false;
+    }
+    state->front_time = state->time;
     state->arc.valid = state->has_k1 = false;
-    return ok;
+    return true;
 }
 
 /* Let the inputs act that have been set. */
