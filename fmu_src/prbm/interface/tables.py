@@ -15,7 +15,7 @@ from ..mechanics.assembly import assemble
 from ..mechanics.inputs import input_names
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
-from ..mechanism.flexure import ENDS  # of a chain; also pivots of a flexure
+from ..mechanism.flexure import BEAM, ENDS  # of a chain; also pivots of a flexure
 from ..mechanism.parts import (
     GROUND,
     Flexure,
@@ -29,7 +29,7 @@ from ..mechanism.parts import (
     body_of,
     fields_of,
 )
-from .native import coordinate_variables, counter_of, state_derivatives
+from .native import counter_of, state_derivatives
 from .variables import (
     BASE_OUTPUTS,
     BODY_OUTPUTS,
@@ -37,8 +37,6 @@ from .variables import (
     ENERGIES,
     INDICATORS,
     LATCHED,
-    LINK_ANGLE,
-    LINK_STRAIN,
     PROBE_OUTPUTS,
     STOP_OUTPUTS,
     Variable,
@@ -97,14 +95,20 @@ def tables(
 
 
 def check_size(mechanism: Mechanism) -> None:
-    """Check the numbers of parts of a mechanism against the limits of the C kernel.
+    """Check the parts of a mechanism against the limits of the C kernel.
 
     Raises
     ------
     MechanismError
-        If a number is above its limit.
+        If a number is above its limit, or a flexure is a beam.
     """
     m = mechanism
+    beams = [kind.name for kind in m.flexure_types if kind.model == BEAM]
+    if beams:
+        raise MechanismError(
+            f'{beams[0]}.model = "{BEAM}": native FMUs do not support beams yet; build the Python '
+            "FMU (--flavour python), or choose another model"
+        )
     for parts, count, limit in (
         ("coordinates", assemble(m, m.values()).n, COORDINATES_MAX),
         ("stops", len(m.stops), STOPS_MAX),
@@ -134,10 +138,10 @@ def _names(mechanism: Mechanism, independent: Sequence[int]) -> Iterator[str]:
 def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Iterable[str]]:
     """Return the names of the values in each group."""
     stops = [stop.name for stop in mechanism.stops]
-    coordinates = coordinate_variables(mechanism)
+    system = assemble(mechanism, mechanism.values())
+    coordinates = system.variables
     links, stretches = (
-        [name for pair in coordinates if group.search(pair[0]) for name in pair]
-        for group in (LINK_ANGLE, LINK_STRAIN)
+        [name for j in group for name in coordinates[j]] for group in (system.links, system.strains)
     )
     several = [k.name for k in mechanism.flexure_types if len(mechanism.model(k).gamma) > 1]
     return {

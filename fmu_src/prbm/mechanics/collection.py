@@ -95,6 +95,11 @@ class Collection:
         self.owners.append(owner)
         return len(self.q0) - 1
 
+    def angle_of_flexure(self, owner: str, start: float = 0.0) -> int:
+        """Add a coordinate that is an angle of a flexure, and return its index."""
+        self.links.append(self.coordinate(owner, start))
+        return self.links[-1]
+
     def direction(self, changes: dict[int, float], arm: int | None = None) -> int:
         """Add the angle of an arm, or the stretch of the given arm, and return its index.
 
