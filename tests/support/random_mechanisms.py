@@ -44,8 +44,7 @@ Choose = Callable[[Sequence], object]
 """Function that picks an element of a sequence; the first element is the simplest."""
 
 CELL = 0.06  # m; bodies are within a fifth of this length of the points of a lattice.
-LINKED = tuple(name for name in flexure.MODELS if name != flexure.BEAM)
-MODELS = tuple((name, n) for name in LINKED for n in ((1, 2, 4) if name == "nR" else (0,)))
+MODELS = tuple((name, n) for name in flexure.MODELS for n in ((1, 2, 4) if name == "nR" else (0,)))
 ENDS = ((CLAMP, CLAMP), (CLAMP, PIN), (PIN, CLAMP), (CLAMP, FREE), (FREE, CLAMP), (PIN, PIN))
 RUBBER = {"thickness": (2e-3, 3e-3), "modulus": (5e6, 4e7)}  # Axial modes of some hundred Hz.
 STEEL = {"thickness": (2e-4, 3e-4), "modulus": (1e9, 1e10)}

@@ -10,12 +10,14 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
 from ..base.errors import MechanismError
 from ..mechanics.assembly import assemble
 from ..mechanics.inputs import input_names
 from ..mechanism.description import Mechanism
 from ..mechanism.expressions import Affine, Quantity, affine
-from ..mechanism.flexure import BEAM, ENDS  # of a chain; also pivots of a flexure
+from ..mechanism.flexure import ENDS  # of a chain; also pivots of a flexure
 from ..mechanism.parts import (
     GROUND,
     Flexure,
@@ -43,11 +45,13 @@ from .variables import (
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 3
+MAGIC, VERSION = b"PRBM", 4
 HEAD = 16  # Bytes before those that the checksum covers.
 STARTS = ("displacement", "angle", "amplitude")  # The starts of a release.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
 COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
+DIRECTIONS_MAX = 1024  # The mass matrix of the directions then has 16 MB.
+DIRECTION_MAP_MAX = 16384  # Changes of directions with coordinates.
 STOPS_MAX = 64  # Largest number of stops, and of friction points.
 PLACES_MAX = 1024  # Largest number of forces, and of probes.
 GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
@@ -95,22 +99,22 @@ def tables(
 
 
 def check_size(mechanism: Mechanism) -> None:
-    """Check the parts of a mechanism against the limits of the C kernel.
+    """Check the numbers of parts of a mechanism against the limits of the C kernel.
 
     Raises
     ------
     MechanismError
-        If a number is above its limit, or a flexure is a beam.
+        If a number is above its limit.
     """
-    m = mechanism
-    beams = [kind.name for kind in m.flexure_types if kind.model == BEAM]
-    if beams:
-        raise MechanismError(
-            f'{beams[0]}.model = "{BEAM}": native FMUs do not support beams yet; build the Python '
-            "FMU (--flavour python), or choose another model"
-        )
+    m, system = mechanism, assemble(mechanism, mechanism.values())
     for parts, count, limit in (
-        ("coordinates", assemble(m, m.values()).n, COORDINATES_MAX),
+        ("coordinates", system.n, COORDINATES_MAX),
+        ("directions of links, nodes and bodies", system.d, DIRECTIONS_MAX),
+        (
+            "changes of directions with coordinates",
+            np.count_nonzero(system.Phi.Phi),
+            DIRECTION_MAP_MAX,
+        ),
         ("stops", len(m.stops), STOPS_MAX),
         ("frictions", len(m.frictions), STOPS_MAX),
         ("forces", len(m.forces), PLACES_MAX),
@@ -298,7 +302,7 @@ class _Writer:
             for c in model.coefficients
         )
         flags = _u32(model.lumped, model.rate_with_gamma, kind.axial)
-        numbers = flags + _u32(len(model.gamma), model.links)
+        numbers = flags + _u32(len(model.gamma), model.links, model.order, model.nodes)
         return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
 
     def _between(self, part: Flexure | Joint) -> bytes:

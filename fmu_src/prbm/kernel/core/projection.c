@@ -2,7 +2,6 @@
  * Equations.project_near in mechanics/dynamics.py. */
 #include <math.h>
 
-#include "core/kinetics.h"
 #include "core/matrix.h"
 #include "core/projection.h"
 #include "core/vectors.h"
@@ -27,8 +26,8 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
     const Equations *q = equations;
     size_t mark = scratch->used, n = (size_t)q->system->n, r = (size_t)q->r;
     double *c = take(scratch, r), *rates = take(scratch, r), *rows = take(scratch, r * n);
-    double *M = take(scratch, n * n), *C = take(scratch, n * n);
-    Complex *e = (Complex *)take(scratch, 2 * n);
+    double *M = take(scratch, n * n);
+    Complex *e = take_complex(scratch, q->system->d, 1);
     for (int k = 0; k < q->r; k++) {
         c[k] = offset(q, k, t);
         rates[k] = prescribed(q, k, t);
@@ -42,7 +41,7 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
     bool right = project_positions(q->system, &positions, y, c, e, scratch, problem);
     if (right) {
         jacobian(&q->active, e, rows);
-        inertia((int)n, q->system->H, q->system->J, e, M, C);
+        mass_matrix(q->system, e, M, scratch);
         right = project_velocities((int)n, q->r, M, rows, rates, y + n, impulses, scratch,
                                    problem);
     }
@@ -68,7 +67,7 @@ PRBM void correction_place(Correction *correction, const System *system, Memory 
 
 /* The value of an active row without its constant. */
 SIZED double active_value(int even, const Equations *q, const Kinematics *at, int k) {
-    if (q->system->stretch_count > 0 || q->on[k] != FIXED) {
+    if (q->system->stretch_count > 0 || q->system->mapped || q->on[k] != FIXED) {
         return row_value(&q->active, k, at->e);
     }
     Parts B = parts_from(q->B_conjugate, k * even), e = at->e_parts;
@@ -93,8 +92,19 @@ SIZED double position_residuals(int even, const Equations *q, const Kinematics *
     return worst;
 }
 
+/* Compute the rows by the coordinates, if they are not the directions. */
+RARE void mapped_rows(const Equations *q, const Kinematics *at, double *rows) {
+    for (int k = 0; k < q->r; k++) {
+        row_jacobian(&q->active, k, at->e, rows + k * q->system->even);
+    }
+}
+
 SIZED void velocity_residuals(int even, const Equations *q, double t, Correction *c) {
-    rows_dispatch(even, q, &c->at, c->rows, c->convective);
+    if (q->system->mapped) {
+        mapped_rows(q, &c->at, c->rows);
+    } else {
+        rows_dispatch(even, q, &c->at, c->rows, c->convective);
+    }
     for (int k = 0; k < q->r; k++) {
         double rate = even_dot(even, c->rows + k * even, c->at.speed);
         c->residual[k] = -(rate + prescribed(q, k, t));
@@ -121,7 +131,7 @@ SIZED bool corrected_of_length(int even, const Equations *q, const Evaluation *e
     position_residuals(even, q, &evaluation->at, t, c->residual);
     correct(even, q, &evaluation->factors, c, y);
     pad_of(even, n, y, c->at.angle);
-    directions_of(even, q->system, near, &c->at);
+    arms_at(even, q->system, near, &c->at);
     double worst = position_residuals(even, q, &c->at, t, c->residual);
     if (!(worst <= CONSTRAINT_RTOL * q->system->length)) {
         return false;
