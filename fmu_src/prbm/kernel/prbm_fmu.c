@@ -21,6 +21,7 @@
 #include "core/collection.c"
 #include "core/beam.c"
 #include "core/flexures.c"
+#include "core/block_map.c"
 #include "core/assembly.c"
 #include "core/factors.c"
 #include "core/forces.c"

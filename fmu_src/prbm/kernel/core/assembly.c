@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "core/assembly.h"
+#include "core/block_map.h"
 #include "core/constraints.h"
 #include "core/flexure.h"
 #include "core/flexures.h"
@@ -241,6 +242,7 @@ static void add_moments(System *system, Scratch *scratch) {
         add_moments_of(system, system->m[k], system->A + (size_t)k * d);
     }
     find_all_blocks(system, scratch);
+    set_block_maps(system, scratch);
     pack_blocks(system);
 }
 

@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/block_map.h"
 #include "core/evaluation.h"
 #include "core/forces.h"
 #include "core/kinetics.h"
@@ -28,6 +29,7 @@ PRBM Kinematics place_kinematics(const System *system, Memory *memory) {
     at.turn = system->mapped ? place(memory, wide, sizeof(double)) : at.speed;
     at.squares = place(memory, wide, sizeof(double));
     at.own = place(memory, (size_t)system->d, sizeof(double));
+    at.local = place(memory, system->mapped ? (wide + 1) * even : 0, sizeof(double));
     at.e = place(memory, wide, sizeof(Complex));
     at.e_parts = place_parts(memory, wide);
     return at;
@@ -111,9 +113,7 @@ SHARED void directions_of(int even, const System *system, const Reference *near,
 
 /* Compute the directions and the arms, if the coordinates are not the directions. */
 RARE void mapped_directions(const System *system, const Reference *near, Kinematics *at) {
-    for (int j = 0; j < system->d; j++) {
-        at->theta[j] = direction_of(system, at->angle, j);
-    }
+    map_directions(system, at->angle, at->local, at->theta);
     directions_of(system->wide, system, near, at);
 }
 
@@ -243,8 +243,8 @@ SIZED void rows_padded(int even, const Equations *q, const Kinematics *at, doubl
     }
 }
 
-static void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
-                                double *convective) {
+PRBM void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
+                              double *convective) {
     rows_padded(q->system->wide, q, at, rows, convective);
 }
 
@@ -350,21 +350,32 @@ SIZED bool small_block_motion(const Equations *q, Evaluation *result, int size, 
     return true;
 }
 
-/* Factor the blocks of the mass matrix in result->mass. */
-RARE bool mapped_blocks_motion(const Equations *q, Evaluation *result) {
+/* Factor a block of the mass matrix in result->mass. */
+SIZED bool mapped_block_motion(const Equations *q, Evaluation *result, int size, int start,
+                               double *L) {
     const int n = q->system->n;
+    for (int i = 0; i < size; i++) {
+        copy(i + 1, result->mass + (start + i) * n + start, result->block + i * size);
+    }
+    if (q->mass_damping != 0.0) {
+        damp_mass(size, q->mass_damping, result->block, result->at.speed + start,
+                  result->a + start);
+    }
+    return factor_any_block(q, result, size, start, L);
+}
+
+/* Factor the blocks of the mass matrix in result->mass.  The sizes of guides on two beams of the
+ * orders 3 and 5 are compiled separately. */
+RARE bool mapped_blocks_motion(const Equations *q, Evaluation *result) {
     bool regular = true;
     double *L = result->factors.L;
     for (int k = 0; k < result->factors.block_count; k++) {
         int start = result->factors.blocks[k].start, size = result->factors.blocks[k].size;
-        for (int i = 0; i < size; i++) {
-            copy(size, result->mass + (start + i) * n + start, result->block + i * size);
+        switch (size) {
+        case 7: regular = mapped_block_motion(q, result, 7, start, L) && regular; break;
+        case 11: regular = mapped_block_motion(q, result, 11, start, L) && regular; break;
+        default: regular = mapped_block_motion(q, result, size, start, L) && regular;
         }
-        if (q->mass_damping != 0.0) {
-            damp_mass(size, q->mass_damping, result->block, result->at.speed + start,
-                      result->a + start);
-        }
-        regular = factor_any_block(q, result, size, start, L) && regular;
         L += size * size;
     }
     return regular;
@@ -415,14 +426,19 @@ static void find_shift(const System *system, const Kinematics *at, double *shift
     }
 }
 
-/* Add the mass matrix of a block of directions, of which the lower triangle is given, to M. */
-static void pull_mass(const System *system, int start, int size, const double *block, double *M) {
-    for (int i = 0; i < size; i++) {
-        for (int j = 0; j < i; j++) {
-            pull_both(system, start + i, start + j, block[i * size + j], M);
-            pull_both(system, start + j, start + i, block[i * size + j], M);
-        }
-        pull_both(system, start + i, start + i, block[i * size + i], M);
+/* Compute the mass matrix of a block of directions, and add its quadratic velocity terms to the loads.
+ * The sizes of beams of the order 3 with 5 or 6 nodes are compiled separately. */
+static void mapped_block_inertia(const System *system, int size, int start, const Complex *H,
+                                 Evaluation *result) {
+    const Kinematics *at = &result->at;
+    const double *own = own_inertia(system, at) + start, *squares = at->squares + start;
+    Parts e = parts_from(at->e_parts, start);
+    double *load = result->load + start;
+    switch (size) {
+    case 5: block_inertia(5, H, own, e, squares, result->block, load); break;
+    case 6: block_inertia(6, H, own, e, squares, result->block, load); break;
+    case 7: block_inertia(7, H, own, e, squares, result->block, load); break;
+    default: block_inertia(size, H, own, e, squares, result->block, load);
     }
 }
 
@@ -430,18 +446,18 @@ static void pull_mass(const System *system, int start, int size, const double *b
 static void mapped_mass(const Equations *q, Evaluation *result) {
     const System *system = q->system;
     const Kinematics *at = &result->at;
-    const double *own = own_inertia(system, at);
     const Complex *H = system->coupling;
-    find_shift(system, at, result->shift);
+    if (system->stretch_count > 0) {
+        find_shift(system, at, result->shift);
+    }
     zeros(system->n * system->n, result->mass);
     for (int k = 0; k < system->block_count; k++) {
         int start = system->blocks[k].start, size = system->blocks[k].size;
-        block_inertia(size, H, own + start, parts_from(at->e_parts, start), at->squares + start,
-                      result->block, result->load + start);
+        mapped_block_inertia(system, size, start, H, result);
         if (system->stretch_count > 0) {
             pull_shift(size, result->block, result->shift + start, result->load + start);
         }
-        pull_mass(system, start, size, result->block, result->mass);
+        pull_mass(system, &system->maps[k], result->block, at->local, result->mass);
         H += size * size;
     }
 }
@@ -452,20 +468,18 @@ RARE void mapped_terms(const Equations *q, const Reference *near, Evaluation *re
     const int even = system->even, wide = system->wide;
     Kinematics *at = &result->at;
     double *Z = result->factors.Z;
-    for (int j = 0; j < system->d; j++) {
-        at->turn[j] = direction_of(system, at->speed, j);
-    }
+    map_directions(system, at->speed, at->local, at->turn);
     mapped_directions(system, near, at);
     find_loads(wide, q, result);
     rows_and_convection(q, at, result->rows, result->lam);
     mapped_mass(q, result);
     zeros(even, result->a);
     zeros(q->r * even, Z);
-    for (int j = 0; j < system->d; j++) {
-        pull(system, j, result->load[j], result->a);
-        for (int k = 0; k < q->r; k++) {
-            pull(system, j, result->rows[k * wide + j], Z + k * even);
-            result->lam[k] += result->rows[k * wide + j] * result->shift[j];
+    pull_directions(system, result->load, at->local, result->a);
+    for (int k = 0; k < q->r; k++) {
+        pull_directions(system, result->rows + k * wide, at->local, Z + k * even);
+        if (system->stretch_count > 0) {
+            result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);
         }
     }
 }

@@ -21,6 +21,7 @@ typedef struct {
     double *squares;         /* (wide,): turn^2 */
     Complex *e;              /* (wide,) */
     Parts e_parts;           /* (wide,) */
+    double *local;           /* (wide + 1, even) working memory, if mapped */
     double *own;             /* (d,) the diagonal of the mass of the directions, if arms stretch */
 } Kinematics;
 
@@ -52,6 +53,9 @@ PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *eval
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
 SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at);
 SHARED void arms_at(int even, const System *system, const Reference *near, Kinematics *at);
+/* Compute the derivatives of the active rows by the directions, and their convective terms. */
+PRBM void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
+                              double *convective);
 SHARED void rows_dispatch(int even, const Equations *q, const Kinematics *at, double *rows,
                            double *convective);
 SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,

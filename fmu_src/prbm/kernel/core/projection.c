@@ -4,6 +4,7 @@
 
 #include "core/matrix.h"
 #include "core/projection.h"
+#include "core/block_map.h"
 #include "core/vectors.h"
 
 /* The constant part of an active constraint at time t. */
@@ -59,17 +60,16 @@ PRBM void correction_place(Correction *correction, const System *system, Memory 
     size_t r = (size_t)system->r + 2 * (size_t)system->s + (size_t)system->f;
     correction->at = place_kinematics(system, memory);
     correction->rows = place(memory, r * even, sizeof(double));
+    correction->by_direction =
+        place(memory, system->mapped ? r * (size_t)system->wide : 0, sizeof(double));
     correction->convective = place(memory, r, sizeof(double));
     correction->residual = place(memory, r, sizeof(double));
     correction->change = place(memory, even + 2, sizeof(double));
     zero_placed(memory, begin);
 }
 
-/* The value of an active row without its constant. */
-SIZED double active_value(int even, const Equations *q, const Kinematics *at, int k) {
-    if (q->system->stretch_count > 0 || q->system->mapped || q->on[k] != FIXED) {
-        return row_value(&q->active, k, at->e);
-    }
+/* The value of an active row on the ground without its constant, if no arm stretches. */
+SIZED double active_sum(int even, const Equations *q, const Kinematics *at, int k) {
     Parts B = parts_from(q->B_conjugate, k * even), e = at->e_parts;
     Lanes sum[SUMS] = {NO_LANES};
     UNROLLED_BY_LANES
@@ -79,6 +79,14 @@ SIZED double active_value(int even, const Equations *q, const Kinematics *at, in
         sum[SUM_OF(j)] += re + im;
     }
     return total(sum);
+}
+
+/* The value of an active row without its constant. */
+SIZED double active_value(int even, const Equations *q, const Kinematics *at, int k) {
+    if (q->system->stretch_count > 0 || q->on[k] != FIXED) {
+        return row_value(&q->active, k, at->e);
+    }
+    return q->system->mapped ? active_sum(q->system->wide, q, at, k) : active_sum(even, q, at, k);
 }
 
 /* Compute the residuals of the positions, and return the largest magnitude. */
@@ -93,15 +101,19 @@ SIZED double position_residuals(int even, const Equations *q, const Kinematics *
 }
 
 /* Compute the rows by the coordinates, if they are not the directions. */
-RARE void mapped_rows(const Equations *q, const Kinematics *at, double *rows) {
+RARE void mapped_rows(const Equations *q, Correction *c) {
+    const System *system = q->system;
+    rows_and_convection(q, &c->at, c->by_direction, c->convective);
+    zeros(q->r * system->even, c->rows);
     for (int k = 0; k < q->r; k++) {
-        row_jacobian(&q->active, k, at->e, rows + k * q->system->even);
+        pull_directions(system, c->by_direction + k * system->wide, c->at.local,
+                        c->rows + k * system->even);
     }
 }
 
 SIZED void velocity_residuals(int even, const Equations *q, double t, Correction *c) {
     if (q->system->mapped) {
-        mapped_rows(q, &c->at, c->rows);
+        mapped_rows(q, c);
     } else {
         rows_dispatch(even, q, &c->at, c->rows, c->convective);
     }

@@ -29,6 +29,17 @@ static Place *place_origins(Memory *memory, size_t count, size_t d) {
     return origins;
 }
 
+/* Place the memory for the maps of all blocks, which belongs to the first map until it is divided. */
+static void place_maps(BlockMap *maps, const Mechanism *m, Memory *memory) {
+    size_t n = (size_t)m->coordinate_count, d = (size_t)m->direction_count;
+    int *coordinate = place(memory, (size_t)m->map.count, sizeof *coordinate);
+    double *change = place(memory, m->map.mapped ? d * (n + 1) : 0, sizeof *change);
+    if (memory->base) {
+        maps[0].coordinate = coordinate;
+        maps[0].change = change;
+    }
+}
+
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
     const Mechanism *m = mechanism;
     size_t n = (size_t)m->coordinate_count, r = (size_t)m->loop_count;
@@ -76,6 +87,8 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
     result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
     result.factors = place(memory, (size_t)m->map.count, sizeof(double));
     result.blocks = place(memory, d, sizeof(Block));
+    result.maps = place(memory, d, sizeof(BlockMap));
+    place_maps(result.maps, m, memory);
     result.mass_blocks = place(memory, n, sizeof(Block));
     result.coupling = place(memory, d * d, sizeof(Complex));
     result.own = place(memory, d, sizeof(double));

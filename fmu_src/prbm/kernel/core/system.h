@@ -35,6 +35,14 @@ typedef struct {
     int start, size;
 } Block;
 
+/* The map from coordinates to the directions of a block of the mass matrix of the directions. */
+typedef struct {
+    int start, size; /* The directions. */
+    int count, even; /* The number of coordinates that they depend on, and its padded length. */
+    int *coordinate; /* (count,) in ascending order */
+    double *change;  /* (size, even) changes of the directions with these coordinates */
+} BlockMap;
+
 /* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r loop
  * rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the rows are
  * zero at stretches, see spread.  Vectors with the shape (even,) or (wide,) have n or d elements, and
@@ -71,6 +79,7 @@ typedef struct {
     Spring *spring;           /* the springs whose rates make up K */
     int block_count;
     Block *blocks;            /* of the mass matrix of the directions */
+    BlockMap *maps;           /* of the blocks, if mapped */
     int mass_block_count;
     Block *mass_blocks;       /* of M: the same, unless mapped */
     Complex *coupling;        /* the blocks of H, one after the other */
