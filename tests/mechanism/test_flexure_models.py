@@ -142,11 +142,11 @@ def test_frequencies_of_a_chain_converge_to_those_of_the_beam_at_second_order(ti
 
 
 def test_an_axial_force_stretches_a_flexure_by_the_elongation_of_a_bar():
-    """The elongation is P L/EA.  One link of the 2R and 3R stretches, all links of a chain do."""
+    """The elongation is P L/EA: of one link of the 2R and 3R, all links of a chain, or a beam."""
     models = script()
     EA = models.MODULUS * models.WIDTH * models.THICKNESS
     pull = 1e-4 * EA  # The logarithmic strain is linear in the force: the error is of second order.
-    for model in ("2R", "3R", "10R"):
+    for model in ("2R", "3R", "10R", "beam"):
         system = models.cantilever(model, axial=True)
         q = equilibrium(system, loads={"force.x": pull}).q
         probe = system.probes[0]
