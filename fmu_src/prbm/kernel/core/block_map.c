@@ -63,10 +63,11 @@ SIZED void gather(int even, const BlockMap *map, const double *x, double *local)
     }
 }
 
-SIZED void map_block(int even, const BlockMap *map, const double *x, double *ALONE local,
-                     double *ALONE out) {
+SIZED void map_block(int even, int size, const BlockMap *map, const double *x,
+                     double *ALONE local, double *ALONE out) {
     gather(even, map, x, local);
-    for (int i = 0; i < map->size; i++) {
+    UNROLLED
+    for (int i = 0; i < size; i++) {
         const double *change = map->change + i * even;
         Lanes sum[SUMS] = {NO_LANES};
         UNROLLED_BY_LANES
@@ -77,13 +78,20 @@ SIZED void map_block(int even, const BlockMap *map, const double *x, double *ALO
     }
 }
 
+/* Return the size of a block of up to four coordinates whose code is compiled separately: that of a beam
+ * of the order 3 with 5 or 6 nodes, with or without a body; 0 for other blocks. */
+static int kind_of_block(const BlockMap *map) {
+    return map->even == 4 && map->size >= 5 && map->size <= 7 ? map->size : 0;
+}
+
 PRBM void map_directions(const System *system, const double *x, double *local, double *out) {
     for (int k = 0; k < system->block_count; k++) {
         const BlockMap *map = &system->maps[k];
-        switch (map->even) {
-        case 4: map_block(4, map, x, local, out); break;
-        case 6: map_block(6, map, x, local, out); break;
-        default: map_block(map->even, map, x, local, out);
+        switch (kind_of_block(map)) {
+        case 5: map_block(4, 5, map, x, local, out); break;
+        case 6: map_block(4, 6, map, x, local, out); break;
+        case 7: map_block(4, 7, map, x, local, out); break;
+        default: map_block(map->even, map->size, map, x, local, out);
         }
     }
 }
@@ -94,6 +102,7 @@ SIZED void sum_changes(int even, int size, const double *change, const double *A
     UNROLLED_BY_LANES
     for (int c = 0; c < even; c += LANES) {
         Lanes sum = NO_LANES;
+        UNROLLED
         for (int i = 0; i < size; i++) {
             sum += x[i] * lanes_at(change + i * even + c);
         }
@@ -101,8 +110,9 @@ SIZED void sum_changes(int even, int size, const double *change, const double *A
     }
 }
 
-SIZED void pull_block(int even, const BlockMap *map, const double *x, double *local, double *out) {
-    sum_changes(even, map->size, map->change, x + map->start, local);
+SIZED void pull_block(int even, int size, const BlockMap *map, const double *x, double *local,
+                      double *out) {
+    sum_changes(even, size, map->change, x + map->start, local);
     for (int c = 0; c < map->count; c++) {
         out[map->coordinate[c]] += local[c];
     }
@@ -111,24 +121,25 @@ SIZED void pull_block(int even, const BlockMap *map, const double *x, double *lo
 PRBM void pull_directions(const System *system, const double *x, double *local, double *out) {
     for (int k = 0; k < system->block_count; k++) {
         const BlockMap *map = &system->maps[k];
-        switch (map->even) {
-        case 4: pull_block(4, map, x, local, out); break;
-        case 6: pull_block(6, map, x, local, out); break;
-        default: pull_block(map->even, map, x, local, out);
+        switch (kind_of_block(map)) {
+        case 5: pull_block(4, 5, map, x, local, out); break;
+        case 6: pull_block(4, 6, map, x, local, out); break;
+        case 7: pull_block(4, 7, map, x, local, out); break;
+        default: pull_block(map->even, map->size, map, x, local, out);
         }
     }
 }
 
 /* Set turned (size, even) to the mass matrix of a block times the changes. */
-SIZED void turn_mass(int even, const BlockMap *map, const double *ALONE block,
+SIZED void turn_mass(int even, int size, const double *change, const double *ALONE block,
                      double *ALONE turned) {
-    const double *change = map->change;
-    for (int i = 0; i < map->size; i++) {
+    UNROLLED
+    for (int i = 0; i < size; i++) {
         UNROLLED_BY_LANES
         for (int c = 0; c < even; c += LANES) {
-            Lanes own = lanes_at(change + i * even + c), sum = block[i * map->size + i] * own;
+            Lanes own = lanes_at(change + i * even + c), sum = block[i * size + i] * own;
             for (int j = 0; j < i; j++) {
-                double mass = block[i * map->size + j];
+                double mass = block[i * size + j];
                 sum += mass * lanes_at(change + j * even + c);
                 double *other = turned + j * even + c;
                 set_lanes(other, lanes_at(other) + mass * own);
@@ -138,15 +149,16 @@ SIZED void turn_mass(int even, const BlockMap *map, const double *ALONE block,
     }
 }
 
-SIZED void pull_mass_of_length(int even, int n, const BlockMap *map, const double *block,
-                               double *ALONE local, double *ALONE M) {
+SIZED void pull_mass_of_size(int even, int size, int n, const BlockMap *map, const double *block,
+                             double *ALONE local, double *ALONE M) {
     double *turned = local + even;
-    turn_mass(even, map, block, turned);
+    turn_mass(even, size, map->change, block, turned);
     for (int a = 0; a < map->count; a++) {
         UNROLLED_BY_LANES
         for (int c = 0; c < even; c += LANES) {
             Lanes sum = NO_LANES;
-            for (int i = 0; i < map->size; i++) {
+            UNROLLED
+            for (int i = 0; i < size; i++) {
                 sum += map->change[i * even + a] * lanes_at(turned + i * even + c);
             }
             set_lanes(local + c, sum);
@@ -159,9 +171,11 @@ SIZED void pull_mass_of_length(int even, int n, const BlockMap *map, const doubl
 
 PRBM void pull_mass(const System *system, const BlockMap *map, const double *block, double *local,
                     double *M) {
-    switch (map->even) {
-    case 4: pull_mass_of_length(4, system->n, map, block, local, M); break;
-    case 6: pull_mass_of_length(6, system->n, map, block, local, M); break;
-    default: pull_mass_of_length(map->even, system->n, map, block, local, M);
+    int n = system->n;
+    switch (kind_of_block(map)) {
+    case 5: pull_mass_of_size(4, 5, n, map, block, local, M); break;
+    case 6: pull_mass_of_size(4, 6, n, map, block, local, M); break;
+    case 7: pull_mass_of_size(4, 7, n, map, block, local, M); break;
+    default: pull_mass_of_size(map->even, map->size, n, map, block, local, M);
     }
 }
