@@ -10,7 +10,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from kernel_simulation import KernelSimulation
-from many_parts import anvil, elastic
+from many_parts import anvil, beams, elastic
 from prbm.fmu import native_fmu, python_fmu
 from prbm.fmu.native_description import terminals
 from prbm.fmu.slave.resolved import mechanism_from, resolved
@@ -135,7 +135,7 @@ def test_a_contact_whose_force_touches_zero_does_not_chatter():
     assert simulation.outputs()["face.impact_count"] > 0
 
 
-@pytest.mark.parametrize("guide", [anvil(), elastic()], ids=lambda guide: guide.name)
+@pytest.mark.parametrize("guide", [anvil(), elastic(), beams()], ids=["anvil", "links", "beams"])
 def test_a_mechanism_is_equal_after_a_round_trip_through_json(guide):
     data = json.loads(json.dumps(resolved(guide, ())["mechanism"]))
     assert mechanism_from(data) == guide

@@ -54,10 +54,19 @@ def laws(count, *, shrink=True):
 
 def arms(system, q):
     """Return exp(s + i theta) of every arm; the entries of stretches are not used."""
-    E = np.exp(1j * q)
+    theta = system.Phi.Phi @ q
+    E = np.exp(1j * theta)
     for k in system.stretches:
-        E[system.arm[k]] *= np.exp(q[k])
+        E[system.arm[k]] *= np.exp(theta[k])
     return E
+
+
+def rotary(system):
+    """Return the matrix of the moments of inertia of the bodies about their centres, (n, n)."""
+    J = np.zeros((system.n, system.n))
+    for frame in system.bodies.values():
+        J[frame.j, frame.j] = system.J[frame.arm]
+    return J
 
 
 def mass_points(system, q):
@@ -130,7 +139,7 @@ def second_derivative(f, q, v):
 def random_state(system, seed):
     """Return random coordinates away from the straight shape, and rates."""
     rng = np.random.default_rng(seed)
-    size = np.where(system.arm == np.arange(system.n), 0.3, 0.05)
+    size = np.where(np.isin(np.arange(system.n), system.strains), 0.05, 0.3)
     return system.q0 + size * rng.normal(size=system.n), rng.normal(size=system.n)
 
 
@@ -148,11 +157,12 @@ def test_mass_matrix_and_quadratic_terms_follow_from_the_positions(mechanism, se
     q, v = random_state(system, seed)
     T = gradient_of(lambda q: mass_points(system, q), q)
     e, w = system.directions(q), system.turning(v)
-    M, C = inertia(system.H, np.diag(system.J), e)
-    expected = (T.conj().T @ (system.m[:, None] * T)).real + np.diag(system.J)
+    M = system.mass_matrix(e)
+    expected = (T.conj().T @ (system.m[:, None] * T)).real + rotary(system)
     np.testing.assert_allclose(M, expected, atol=1e-9 * np.abs(M).max())
     w2 = w * w
-    quadratic = C @ w2.real - (M - np.diag(system.J)) @ w2.imag  # -Im(Hq w^2)
+    M_d, C = inertia(system.H, np.diag(0 * system.J), e)
+    quadratic = system.Phi.pull(C @ w2.real - M_d @ w2.imag)  # -Im(Hq w^2)
     bent = (
         T.conj().T @ (system.m * second_derivative(lambda q: mass_points(system, q), q, v))
     ).real
@@ -201,9 +211,9 @@ def test_loops_gaps_and_positions_of_the_straight_shape_are_those_of_the_drawing
     The moving mass is at most the mass of all bodies and flexures.
     """
     system = assemble(mechanism, mechanism.values())
-    np.testing.assert_allclose(closures(system, system.q0), 0.0, atol=1e-15)
+    np.testing.assert_allclose(closures(system, system.q0), 0.0, atol=1e-14)
     places = [value(s, "position", system.values) for s in mechanism.stops]
-    np.testing.assert_allclose(gaps(system, system.q0), places, atol=1e-15)
+    np.testing.assert_allclose(gaps(system, system.q0), places, atol=1e-14)
     for body in mechanism.bodies:
         frame = system.bodies[body.name]
         assert complex(frame.A @ arms(system, system.q0)) + frame.c == pytest.approx(frame.drawn)
@@ -259,9 +269,9 @@ def test_accelerations_satisfy_lagrange_equations(mechanism, seed, held):
 
     T, rows = gradient_of(lambda q: mass_points(system, q), q), gradient_of(scalars, q)
     z2 = T @ a + second_derivative(lambda q: mass_points(system, q), q, v)
-    inertial = (T.conj().T @ (system.m * z2)).real + system.J * a
+    inertial = (T.conj().T @ (system.m * z2)).real + rotary(system) @ a
     torque = -gradient_of(lambda q: np.array([potential(sim, q)]), q)[0] + rows.T @ lam
-    size = np.abs(torque).max() + np.abs(rows.T @ lam).max() + np.abs(system.J * a).max()
+    size = np.abs(torque).max() + np.abs(rows.T @ lam).max() + np.abs(rotary(system) @ a).max()
     np.testing.assert_allclose(inertial, torque, atol=1e-5 * size)
     if len(rows):
         bend = second_derivative(scalars, q, v)
@@ -335,7 +345,7 @@ def momentum(sim):
     q, v = y[:n], y[n : 2 * n]
     z = mass_points(system, q) - system.anchor
     p = system.m * (1j * (system.A @ (arms(system, q) * system.turning(v))))
-    return p.sum(), float((z.conj() * p).imag.sum() + system.J @ v)
+    return p.sum(), float((z.conj() * p).imag.sum() + rotary(system).sum(axis=0) @ v)
 
 
 @given(mechanisms(starting=True), SEEDS)
@@ -396,7 +406,7 @@ def check_impacts(mechanism, seed):
     for impact in sim.record:
         q, jump = impact.q, impact.after - impact.before
         T = gradient_of(lambda q: mass_points(system, q), q)
-        M = (T.conj().T @ (system.m[:, None] * T)).real + np.diag(system.J)
+        M = (T.conj().T @ (system.m[:, None] * T)).real + rotary(system)
         touching = np.flatnonzero(np.abs(gaps(system, q)) < 1e-8)
         i = next(k for k, s in enumerate(mechanism.stops) if s.name == impact.stop)
         assert i in touching
@@ -416,7 +426,7 @@ def check_impacts(mechanism, seed):
         assert u[0] < 0.0
         parts = np.abs(G[i]) @ np.abs(impact.before)  # G is a difference: its error is 1e-8.
         assert u[1] >= -1e-7 * abs(u[0]) - 1e-8 * parts
-        assert kinetic[1] <= kinetic[0] * (1 + 1e-9)
+        assert kinetic[1] <= kinetic[0] * (1 + 1e-8)
         assert impact.latched.approach_speed == pytest.approx(-u[0], rel=1e-7, abs=1e-8 * parts)
         if len(touching) == 1 and not rubbed:
             assert impact.impulse == pytest.approx(impulses[0], rel=1e-6)

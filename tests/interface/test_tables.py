@@ -226,6 +226,7 @@ class Comparison:
             assert r.text() == kind.name
             assert r.take("III") == (model.lumped, model.rate_with_gamma, kind.axial)
             assert r.take("II") == (len(model.gamma), kind.n)
+            assert r.take("II") == (model.order, model.nodes)
             self.fields(kind)
             for c in (*model.gamma, *model.K_theta):
                 given = kind.coefficients.get(c.name, 0.0)
@@ -350,8 +351,11 @@ def test_mechanisms_too_large_for_the_kernel_are_not_written(parts, counted):
     [
         ("knock", 1, 2, "a stop whose wall is on its own body"),
         ("knock", 1, 9, "an index out of range"),
-        ("leaf", 3, 0, "a flexure type with neither pivots nor links, or both"),
-        ("leaf", 4, 3, "a flexure type with neither pivots nor links, or both"),
+        ("leaf", 3, 0, "a flexure type without a model, or with several"),
+        ("leaf", 4, 3, "a flexure type without a model, or with several"),
+        ("leaf", 5, 3, "a flexure type without a model, or with several"),
+        ("leaf", 6, 3, "a flexure type without a model, or with several"),
+        ("leaf", 5, 13, "an index out of range"),
         ("leaf", 2, 2, "an index out of range"),
         ("chain", 4, 100000, "an index out of range"),
         ("chain", 4, 200, "a wrong number of independent coordinates"),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from kernel_simulation import KernelMistake, KernelSimulation, library
-from many_parts import anvil, elastic, two_stops
+from many_parts import anvil, beams, elastic, two_stops
 from prbm.base.errors import PrbmError
 from prbm.fmu.python_fmu import interface
 from prbm.hybrid.simulation import Simulation
@@ -134,10 +134,11 @@ def test_impacts_and_rest_between_bodies_in_the_kernel_equal_those_in_the_engine
     assert found["face.impact_count"] + found["face.contact"] > 0.0
 
 
-def test_the_motion_with_all_kinds_of_parts_in_the_kernel_equals_that_in_the_engine():
+@pytest.mark.parametrize("guide", [elastic(), beams()], ids=["links", "beams"])
+def test_the_motion_with_all_kinds_of_parts_in_the_kernel_equals_that_in_the_engine(guide):
     """A chain, a free end, bars, joints and walls on bodies, over the first impacts."""
     compared(
-        elastic(),
+        guide,
         {"L": 0.05, "solver.tolerance": 1e-10},
         {2: {"pull.x": 0.05, "push.moment": 0.01}},
         end=0.02,

@@ -29,7 +29,7 @@ def tip_deflection(model, force):
     e = np.exp(1j * shape.q)
     frame = system.bodies["tip"]
     lever = complex(0.01, 0.004)
-    pin = complex(frame.A @ e) + frame.c - lever * e[frame.j]
+    pin = complex(frame.A @ e) + frame.c - lever * e[frame.arm]
     return pin.imag / (force * L**3 / EI)
 
 

@@ -76,7 +76,7 @@ def test_points_move_with_their_bodies() -> None:
     """Pins, the hit point, the wall and the probe are fixed to their bodies."""
     shapes, E = shapes_of(CRANK, -4e-3)
     at = {name: shapes.centre(name, E) for name in shapes.bodies}
-    turn = {name: E[shapes.system.bodies[name].j] for name in at}
+    turn = {name: E[shapes.system.bodies[name].arm] for name in at}
     np.testing.assert_allclose(np.abs([*turn.values()]), 1.0, rtol=1e-14)
     ear = at["stage"] + turn["stage"] * (0.01 + 0.01j)
     upper, lower, pivot = shapes.pins(E)

@@ -328,37 +328,56 @@ class KernelSystem:
 
     def _shapes(self) -> dict[str, tuple[Any, ...]]:
         x = self.structure
-        n, r, p, s, f = x.n, x.r, x.p, x.s, x.f
+        n, d, r, p, s, f = x.n, x.d, x.r, x.p, x.s, x.f
         return {
-            "q0": ("double", n), "J": ("double", n), "K": ("double", n, n),
-            "H": ("Complex", n, n), "A": ("Complex", p, n), "c": ("Complex", p),
-            "m": ("double", p), "S": ("Complex", n),
-            "loops": ("Complex", r, n), "loops_c": ("double", r),
-            "gaps": ("Complex", s, n), "slides": ("Complex", s, n), "gaps_c": ("double", s),
+            "q0": ("double", n), "J": ("double", d), "K": ("double", n, n),
+            "H": ("Complex", d, d), "A": ("Complex", p, d), "c": ("Complex", p),
+            "m": ("double", p), "S": ("Complex", d),
+            "loops": ("Complex", r, d), "loops_c": ("double", r),
+            "gaps": ("Complex", s, d), "slides": ("Complex", s, d), "gaps_c": ("double", s),
             "gaps_z": ("Complex", s), "slides_z": ("Complex", s), "on": ("int", s),
-            "rubs": ("Complex", f, n), "lifts": ("Complex", f, n), "lifts_c": ("double", f),
-            "release": ("Complex", n), "stretches": ("int", x.stretch_count),
+            "rubs": ("Complex", f, d), "lifts": ("Complex", f, d), "lifts_c": ("double", f),
+            "release": ("Complex", d), "stretches": ("int", x.stretch_count),
         }  # fmt: skip
 
     def links(self) -> np.ndarray:
-        """Return the coordinate of each link."""
+        """Return the coordinates that are angles of flexures."""
         return array(self.mechanism.links, self.mechanism.link_count, kind="int")
 
     def arm(self) -> np.ndarray:
-        """Return, for each coordinate, the link whose arm it turns or stretches."""
-        return array(self.mechanism.coordinates, self.structure.n, 3, kind="int")[:, 2]
+        """Return the arm that each direction turns or stretches."""
+        return array(self.mechanism.arms, self.structure.d, kind="int")
+
+    def strains(self) -> np.ndarray:
+        """Return the coordinates that are strains of flexures."""
+        return array(self.mechanism.strains, self.mechanism.strain_count, kind="int")
+
+    def map(self) -> np.ndarray:
+        """Return the map from coordinates to directions, (d, n)."""
+        columns = np.eye(self.structure.n)
+        return np.array(
+            [
+                [self.kernel.direction_of(self.structure, column, j) for column in columns]
+                for j in range(self.structure.d)
+            ]
+        )
 
     def blocks(self) -> np.ndarray:
-        """Return the starts and sizes of the blocks of the mass matrix."""
+        """Return the starts and sizes of the blocks of the mass matrix of the directions."""
         return array(self.structure.blocks, self.structure.block_count, 2, kind="int")
 
-    def frame(self, group: str, i: int) -> tuple[int, complex, complex, np.ndarray]:
-        """Return ``(j, c, drawn, A)`` of the i-th point of a group, fixed to a body.
+    def mass_blocks(self) -> np.ndarray:
+        """Return the starts and sizes of the blocks of the mass matrix."""
+        return array(self.structure.mass_blocks, self.structure.mass_block_count, 2, kind="int")
 
-        j is the coordinate of the body's rotation.  The position of the point is c + A e, and
-        ``drawn`` at the straight shape.  The group is ``bodies``, ``pushed`` or ``probes``.
+    def frame(self, group: str, i: int) -> tuple[int, int, complex, complex, np.ndarray]:
+        """Return ``(j, arm, c, drawn, A)`` of the i-th point of a group, fixed to a body.
+
+        j and arm are the coordinate and the direction of the body's rotation.  The position of the
+        point is c + A e, and ``drawn`` at the straight shape.  The group is ``bodies``, ``pushed``
+        or ``probes``.
         """
         kind = structures()["BodyFrame"]
         frame = kind.from_address(getattr(self.structure, group) + i * ctypes.sizeof(kind))
         c, drawn = (complex(z.re, z.im) for z in (frame.c, frame.drawn))
-        return frame.j, c, drawn, array(frame.A, self.structure.n, kind="Complex")
+        return frame.j, frame.arm, c, drawn, array(frame.A, self.structure.d, kind="Complex")

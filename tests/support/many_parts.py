@@ -183,3 +183,27 @@ def cantilever(model="2R", **parts):
         gravity=(1.0, -9.81),
         **parts,
     )
+
+
+def beams(*, axial: bool = True) -> Mechanism:
+    """Return a mechanism of beams with all types of ends, from either end."""
+    links = elastic()
+    orders = {"leaf": (3, None), "chain": (4, 8), "bar": (1, 3)}
+    kinds = tuple(
+        dataclasses.replace(
+            kind, model="beam", n=0, order=order, nodes=nodes, axial=axial or order == 1
+        )
+        for kind in links.flexure_types
+        for order, nodes in [orders[kind.name]]
+    )
+    return dataclasses.replace(links, flexure_types=kinds)
+
+
+def links_and_beams() -> Mechanism:
+    """Return a mechanism of beams that do not stretch, and of links."""
+    links = rich()
+    kinds = tuple(
+        dataclasses.replace(kind, model="beam", order=3) if kind.name == "leaf" else kind
+        for kind in links.flexure_types
+    )
+    return dataclasses.replace(links, flexure_types=kinds)

@@ -134,3 +134,7 @@ GAP_CLOSED_RTOL = 1e-12  # Of the size: depth below zero at which a gap closes.
 LOWEST_BOUNCE_RTOL = 1e-10  # Of the size: height of the lowest bounce that is resolved in time.
 INDICATOR_LEAD_RTOL = 0.01  # Of the period: time that multiplies an opening rate in an indicator.
 DEPENDENT_PIVOT_RTOL = 1e-7  # Of the largest pivot: smaller pivots make the states singular.
+
+# --- beams ---
+
+GAUSS_ITERATIONS_MAX = 8  # The nodes of Gauss' quadrature need four iterations of Newton's method.

@@ -59,7 +59,7 @@ def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> 
     EquilibriumError
         If the iteration does not converge.
     """
-    k, arms = system.stretches, system.stretched
+    k = system.strains
     if not len(k):
         return q
     q = q.copy()
@@ -74,7 +74,8 @@ def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> 
     for _ in range(STRETCH_ITERATIONS_MAX):
         E = system.directions(q)
         x = (E @ rows.T).real + constants
-        change = np.linalg.pinv((rows[:, arms] * E[:, None, arms]).real) @ x[:, :, None]
+        slopes = system.gradient(rows, E[:, None, :])[..., k]
+        change = np.linalg.pinv(slopes) @ x[:, :, None]
         q[:, k] -= change[:, :, 0]
         if not np.abs(change).max() > STRETCH_RTOL:
             return q
@@ -86,5 +87,5 @@ def stretched(system: System, q: Real, displacements: Mapping[str, Complex]) -> 
 
 def angles(system: System) -> dict[str, int]:
     """Return the indices of the angles among the coordinates, by the names of their outputs."""
-    links = {f"link[{i}].angle": j for i, j in enumerate(system.links, start=1)}
-    return links | {f"{name}.angle": frame.j for name, frame in system.bodies.items()}
+    bodies = (frame.j for frame in system.bodies.values())
+    return {system.variables[j][0]: j for j in (*system.links, *bodies)}

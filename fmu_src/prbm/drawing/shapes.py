@@ -219,7 +219,7 @@ class Shapes:
         if body == GROUND:
             return drawn
         frame = self.system.bodies[body]
-        return complex(frame.c + frame.A @ E + E[frame.j] * (drawn - frame.drawn))
+        return complex(frame.c + frame.A @ E + E[frame.arm] * (drawn - frame.drawn))
 
     def centre(self, name: str, E: Complex) -> complex:
         """Return the centre of mass of a body in a shape [m]."""
@@ -229,7 +229,7 @@ class Shapes:
     def body(self, name: str, E: Complex) -> Complex:
         """Return the corners of a body in a shape [m]."""
         frame = self.system.bodies[name]
-        result: Complex = self.centre(name, E) + E[frame.j] * self.bodies[name]
+        result: Complex = self.centre(name, E) + E[frame.arm] * self.bodies[name]
         return result
 
     def hit(self, i: int, E: Complex) -> complex:

@@ -33,7 +33,7 @@ from ..base.errors import MechanismError
 from ..mechanism import parameters, parts
 from ..mechanism.description import RESERVED, Mechanism
 from ..mechanism.expressions import Quantity, affine
-from ..mechanism.flexure import CLAMP, ENDS, LINKS_MAX, MODELS
+from ..mechanism.flexure import CLAMP, ENDS, LINKS_MAX, MODELS, NODES_MAX, ORDER_DEFAULT, ORDER_MAX
 from ..mechanism.parameters import NAME
 from ..mechanism.parts import FIELDS, GROUND, LENGTH_MAX, LENGTH_MIN
 from .units import check_coherent, number, quantity, si_unit
@@ -198,10 +198,20 @@ class MaterialTable(Named):
 class Section(Named):
     """Section, material and model of flexures."""
 
-    model: Model | None = Field(None, description="Pseudo-rigid-body model")
+    model: Model | None = Field(None, description="Model")
     n: Annotated[StrictInt, Field(ge=1, json_schema_extra={"maximum": LINKS_MAX})] | None = Field(
         None, description="Number of links, for the model nR only"
     )
+    order: (
+        Annotated[StrictInt, Field(json_schema_extra={"minimum": 1, "maximum": ORDER_MAX})] | None
+    ) = Field(
+        None,
+        description="Order of the polynomial of the bending moment, for the model beam only "
+        f"(default: {ORDER_DEFAULT})",
+    )
+    nodes: (
+        Annotated[StrictInt, Field(json_schema_extra={"minimum": 3, "maximum": NODES_MAX})] | None
+    ) = Field(None, description="Number of nodes, for the model beam only (default: order + 3)")
     thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")] | None = None
     width: Annotated[Quantity, measured(parts.FlexureType, "width")] | None = None
     material: StrictStr | None = Field(
@@ -215,7 +225,7 @@ class Section(Named):
     )
 
 
-_OWN = ("model", "n", *SECTION, "material", *MATERIAL, "axial", "coefficients")
+_OWN = ("model", "n", "order", "nodes", *SECTION, "material", *MATERIAL, "axial", "coefficients")
 _NO_MATERIAL_TWICE: list[Any] = [{"not": {"required": ["material", key]}} for key in MATERIAL]
 _MADE_OF: Any = {"anyOf": [{"required": ["material"]}, {"required": [*MATERIAL]}]}
 _OF_A_TYPE: Any = {"required": ["type"]}
@@ -228,7 +238,7 @@ class FlexureTypeTable(Section):
 
     model_config = ConfigDict(json_schema_extra={"allOf": [_MADE_OF, *_NO_MATERIAL_TWICE]})
 
-    model: Model = Field(description="Pseudo-rigid-body model")
+    model: Model = Field(description="Model")
     thickness: Annotated[Quantity, measured(parts.FlexureType, "thickness")]
     width: Annotated[Quantity, measured(parts.FlexureType, "width")]
 
@@ -463,7 +473,7 @@ def _type(table: Section, materials: Mapping[str, dict[str, Quantity]]) -> parts
             raise MechanismError(
                 f"{table.name}.{key} is missing: add the key, or the type of the flexure"
             )
-    keys = ("name", "model", *SECTION, "axial", "coefficients")
+    keys = ("name", "model", "order", "nodes", *SECTION, "axial", "coefficients")
     given: dict[str, Any] = {key: getattr(table, key) for key in keys}
     return parts.FlexureType(**given | _material(table, materials), n=table.n or 0)
 

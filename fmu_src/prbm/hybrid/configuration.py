@@ -60,7 +60,7 @@ class Scales:
     def of(cls, system: System, omega: float) -> "Scales":
         """Return the scales of a system with a fundamental angular frequency [rad/s], or 0."""
         K, inertia = np.abs(system.K), float(np.abs(system.H).max())
-        turns = np.setdiff1d(np.arange(system.n), system.stretches)
+        turns = np.setdiff1d(np.arange(system.n), system.strains)
         rate = omega or math.sqrt(float(K.max()) / inertia) or SPRINGLESS_RATE
         energy = float(K[np.ix_(turns, turns)].max()) or inertia * rate**2
         return cls(system.length, rate, energy)
@@ -141,11 +141,11 @@ class Magnitudes:
         """Return the magnitudes of the motion that starts with the state y, (2 n + 2,)."""
         n, K = system.n, system.K
         amplitude = y[:n] - system.q0 + y[n : 2 * n] / scales.rate
-        turns = np.setdiff1d(np.arange(n), system.stretches)
+        turns = np.setdiff1d(np.arange(n), system.strains)
         angle = max(float(np.abs(amplitude[turns]).max()), NOMINAL_ANGLE_MIN)
         least = scales.energy * NOMINAL_ANGLE_MIN**2
         energy = max(float(amplitude @ K @ amplitude) / 2, least)
-        stiffest = float(K.diagonal()[list(system.stretches)].max(initial=0.0))
+        stiffest = float(K.diagonal()[list(system.strains)].max(initial=0.0))
         strain = math.sqrt(2 * NOMINAL_STRAIN_FACTOR * energy / stiffest) if stiffest else 0.0
         return cls(angle, angle * scales.rate, strain, energy)
 

@@ -8,7 +8,7 @@ from ..mechanics import contact, forces
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.dynamics import Equations, base_reaction
 from ..mechanics.kinetics import kinetic_energy
-from ..mechanics.system import System
+from ..mechanics.system import ANGLE, STRAIN, System
 from ..mechanism.parts import value
 from .front import Latched
 
@@ -92,13 +92,10 @@ def _stops(
 
 
 def _links(system: System, q: Real, v: Real) -> dict[str, float]:
-    """Return the angles and strains of the links, and their rates."""
+    """Return the angles and strains of the flexures, and their rates."""
     out = {}
-    for number, j in enumerate(system.links, start=1):
-        out[f"link[{number}].angle"] = float(q[j])
-        out[f"link[{number}].omega"] = float(v[j])
-    for j, link in zip(system.stretches, system.stretched, strict=True):
-        number = system.links.index(link) + 1
-        out[f"link[{number}].strain"] = float(q[j])
-        out[f"link[{number}].strain_rate"] = float(v[j])
+    for group, names in ((system.links, ANGLE), (system.strains, STRAIN)):
+        for j in group:
+            for name, x in zip(names, (q, v), strict=True):
+                out[f"{system.owners[j]}.{name}"] = float(x[j])
     return out

@@ -123,14 +123,8 @@ def native_interface(
 
 
 def coordinate_variables(mechanism: Mechanism) -> tuple[tuple[str, str], ...]:
-    """Return the names of each coordinate and its rate: an angle, or the strain of a link."""
-    system = assemble(mechanism, mechanism.values())
-    names = {j: f"link[{number}]" for number, j in enumerate(system.links, start=1)}
-    names |= {frame.j: name for name, frame in system.bodies.items()}
-    pairs = {j: (f"{name}.angle", f"{name}.omega") for j, name in names.items()}
-    for j, link in zip(system.stretches, system.stretched, strict=True):
-        pairs[j] = (f"{names[link]}.strain", f"{names[link]}.strain_rate")
-    return tuple(pairs[j] for j in range(system.n))
+    """Return the names of each coordinate and its rate: an angle or a strain."""
+    return assemble(mechanism, mechanism.values()).variables
 
 
 def state_derivatives(

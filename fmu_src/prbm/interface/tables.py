@@ -10,6 +10,8 @@ import struct
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
 from ..base.errors import MechanismError
 from ..mechanics.assembly import assemble
 from ..mechanics.inputs import input_names
@@ -29,7 +31,7 @@ from ..mechanism.parts import (
     body_of,
     fields_of,
 )
-from .native import coordinate_variables, counter_of, state_derivatives
+from .native import counter_of, state_derivatives
 from .variables import (
     BASE_OUTPUTS,
     BODY_OUTPUTS,
@@ -37,19 +39,19 @@ from .variables import (
     ENERGIES,
     INDICATORS,
     LATCHED,
-    LINK_ANGLE,
-    LINK_STRAIN,
     PROBE_OUTPUTS,
     STOP_OUTPUTS,
     Variable,
 )
 
 FILE = "mechanism.bin"
-MAGIC, VERSION = b"PRBM", 3
+MAGIC, VERSION = b"PRBM", 4
 HEAD = 16  # Bytes before those that the checksum covers.
 STARTS = ("displacement", "angle", "amplitude")  # The starts of a release.
 TYPES = {"Real": 0, "Integer": 1, "Boolean": 2, CLOCK: 3}
 COORDINATES_MAX = 512  # The mass matrix then has 2 MB.
+DIRECTIONS_MAX = 1024  # The mass matrix of the directions then has 16 MB.
+DIRECTION_MAP_MAX = 16384  # Changes of directions with coordinates.
 STOPS_MAX = 64  # Largest number of stops, and of friction points.
 PLACES_MAX = 1024  # Largest number of forces, and of probes.
 GROUND_POINTS_MAX = 4096  # The kernel computes the distance of every pair of points.
@@ -104,9 +106,15 @@ def check_size(mechanism: Mechanism) -> None:
     MechanismError
         If a number is above its limit.
     """
-    m = mechanism
+    m, system = mechanism, assemble(mechanism, mechanism.values())
     for parts, count, limit in (
-        ("coordinates", assemble(m, m.values()).n, COORDINATES_MAX),
+        ("coordinates", system.n, COORDINATES_MAX),
+        ("directions of links, nodes and bodies", system.d, DIRECTIONS_MAX),
+        (
+            "changes of directions with coordinates",
+            np.count_nonzero(system.Phi.Phi),
+            DIRECTION_MAP_MAX,
+        ),
         ("stops", len(m.stops), STOPS_MAX),
         ("frictions", len(m.frictions), STOPS_MAX),
         ("forces", len(m.forces), PLACES_MAX),
@@ -134,10 +142,10 @@ def slot_groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, t
 def _groups(mechanism: Mechanism, independent: Sequence[int]) -> dict[str, Iterable[str]]:
     """Return the names of the values in each group."""
     stops = [stop.name for stop in mechanism.stops]
-    coordinates = coordinate_variables(mechanism)
+    system = assemble(mechanism, mechanism.values())
+    coordinates = system.variables
     links, stretches = (
-        [name for pair in coordinates if group.search(pair[0]) for name in pair]
-        for group in (LINK_ANGLE, LINK_STRAIN)
+        [name for j in group for name in coordinates[j]] for group in (system.links, system.strains)
     )
     several = [k.name for k in mechanism.flexure_types if len(mechanism.model(k).gamma) > 1]
     return {
@@ -294,7 +302,7 @@ class _Writer:
             for c in model.coefficients
         )
         flags = _u32(model.lumped, model.rate_with_gamma, kind.axial)
-        numbers = flags + _u32(len(model.gamma), model.links)
+        numbers = flags + _u32(len(model.gamma), model.links, model.order, model.nodes)
         return _text(kind.name) + numbers + self._fields(kind) + b"".join(coefficients)
 
     def _between(self, part: Flexure | Joint) -> bytes:

@@ -41,8 +41,8 @@ LATCHED = (
 )  # fmt: skip
 LINK_OUTPUTS = ("angle", "omega")
 STRETCH_OUTPUTS = ("strain", "strain_rate")
-LINK_ANGLE = re.compile(r"^link\[\d+\]\.angle$")
-LINK_STRAIN = re.compile(r"^link\[\d+\]\.strain$")
+FLEXURE_ANGLE = re.compile(r"^(link\[\d+\]|\w+\.(bend\[\d+\]|start|end))\.angle$")
+FLEXURE_STRAIN = re.compile(r"^\w+(\[\d+\])?\.strain$")
 INDICATORS = ("impact", "release", "slip")  # Event indicators of a stop.
 
 
@@ -274,10 +274,7 @@ def _variables(
         yield from _stop(stop.name, nominal)
     yield from _base(nominal)
     yield from _energies(nominal)
-    for link in (n.removesuffix(".angle") for n in sample if LINK_ANGLE.search(n)):
-        yield from _link(link, nominal)
-        if f"{link}.strain" in sample:
-            yield from _strain(link)
+    yield from _flexures(sample, nominal)
     yield Variable(
         "mode.frequency",
         "Fundamental frequency about the static equilibrium under gravity, without stops",
@@ -512,32 +509,61 @@ def _energies(nominal: Scales) -> Iterator[Variable]:
     yield _output("energy.work", "J", "Work of the inputs and of the moving walls so far", nominal)
 
 
-def _link(link: str, nominal: Scales) -> Iterator[Variable]:
-    number = link.removeprefix("link[").removesuffix("]")
+def _flexures(sample: Mapping[str, Number], nominal: Scales) -> Iterator[Variable]:
+    """Yield the angles and strains of the flexures."""
+    for owner in (n.removesuffix(".angle") for n in sample if FLEXURE_ANGLE.search(n)):
+        yield from _flexure_angle(owner, nominal)
+        if f"{owner}.strain" in sample:
+            yield from _strain(owner)
+    for owner in (n.removesuffix(".strain") for n in sample if FLEXURE_STRAIN.search(n)):
+        if f"{owner}.angle" not in sample:
+            yield from _strain(owner)
+
+
+def _number(owner: str) -> str:
+    """Return the number in the name of a link or of a coefficient."""
+    return owner.rpartition("[")[2].removesuffix("]")
+
+
+def _flexure_angle(owner: str, nominal: Scales) -> Iterator[Variable]:
+    """Yield the angle of a link, a coefficient of a beam or the rotation of a pinned end."""
+    flexure, _, part = owner.rpartition(".")
+    if not flexure:
+        description = f"Angle of link {_number(owner)} of the flexures, counter-clockwise from +x"
+        rate = f"Angular velocity of link {_number(owner)}"
+    elif part in ("start", "end"):
+        description = f"Rotation of the pinned {part} of the flexure {flexure} from the drawing"
+        rate = f"Angular velocity of the pinned {part} of the flexure {flexure}"
+    else:
+        description = (
+            f"Coefficient of the Legendre polynomial {_number(owner)} in the bending moment of the "
+            f"flexure {flexure}, divided by EI/length"
+        )
+        rate = f"Rate of coefficient {_number(owner)} of the flexure {flexure}"
     angle = replace(
-        _output(
-            f"{link}.angle", "rad",
-            f"Angle of link {number} of the flexures, counter-clockwise from +x", nominal,
-        ),
+        _output(f"{owner}.angle", "rad", description, nominal),
         causality="local",
-        nominal=1.0,  # An absolute angle, not a deflection.
-    )  # fmt: skip
+        nominal=1.0,  # The scale of absolute angles, not of a deflection.
+    )
     yield angle
     yield replace(
-        angle, name=f"{link}.omega", description=f"Angular velocity of link {number}",
+        angle, name=f"{owner}.omega", description=rate,
         unit="rad/s", nominal=nominal("rad/s"), derivative_of=angle.name,
     )  # fmt: skip
 
 
-def _strain(link: str) -> Iterator[Variable]:
-    number = link.removeprefix("link[").removesuffix("]")
+def _strain(owner: str) -> Iterator[Variable]:
+    """Yield the strain of a link or of a beam."""
+    link = owner.startswith("link[")
+    part = f"link {_number(owner)}" if link else f"the flexure {owner}"
+    of = f"{part} of the flexures" if link else part
     strain = Variable(
-        f"{link}.strain",
-        f"Logarithmic strain of link {number} of the flexures: ln(length / length when straight)",
+        f"{owner}.strain",
+        f"Logarithmic strain of {of}: ln(length / length when straight)",
         "local", "continuous", "calculated", "1",
     )  # fmt: skip
     yield strain
     yield replace(
-        strain, name=f"{link}.strain_rate", description=f"Rate of the strain of link {number}",
+        strain, name=f"{owner}.strain_rate", description=f"Rate of the strain of {part}",
         unit="1/s", derivative_of=strain.name,
     )  # fmt: skip

@@ -4,7 +4,6 @@
  * by mechanics/independent.py, are states of model exchange.  A solver that does not support
  * constraints can therefore integrate them without opening the loops. */
 #include <math.h>
-#include <stdio.h>
 
 #include "hybrid/simulation.h"
 #include "dependents.h"
@@ -21,24 +20,34 @@ static void dependents(const Mechanism *m, int *result) {
     }
 }
 
-static const char *coordinate_name(const Mechanism *m, int j, char *text, size_t size) {
-    const Coordinate *coordinate = &m->coordinates[j];
-    if (coordinate->link >= 0) {
-        const char *quantity = coordinate->arm == j ? "angle" : "strain";
-        (void)snprintf(text, size, "link[%d].%s", coordinate->link + 1, quantity);
-    } else {
-        (void)snprintf(text, size, "%s.angle", m->bodies[coordinate->body - 1].name);
+PRBM int coordinate_slot(const Mechanism *m, int j, bool rate) {
+    const Coordinate *c = &m->coordinates[j];
+    if (c->strain >= 0) {
+        int quantity = rate ? STRETCH_STRAIN_RATE : STRETCH_STRAIN;
+        return m->slots.stretches + PER_STRETCH * c->strain + quantity;
     }
-    return text;
+    if (c->link >= 0) {
+        return m->slots.links + PER_LINK * c->link + (rate ? LINK_OMEGA : LINK_ANGLE);
+    }
+    return m->slots.bodies + PER_BODY * (c->body - 1) + (rate ? BODY_OMEGA : BODY_ANGLE);
+}
+
+static const char *coordinate_name(const Mechanism *m, int j) {
+    int slot = coordinate_slot(m, j, false);
+    for (int i = 0; i < m->variable_count; i++) {
+        if (m->variables[i].slot == slot) {
+            return m->variables[i].name;
+        }
+    }
+    return "an angle";
 }
 
 PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *problem) {
-    char name[80] = "";
     return fail(problem,
                 "the states of model exchange do not determine the other coordinates (%s and %d "
                 "more) at t = %.9g s: the shape is too far from the initial shape, or the solver's "
                 "error is too large; shorten the solver's steps, or use co-simulation",
-                coordinate_name(sim->configuration.mechanism, dependent[0], name, sizeof name),
+                coordinate_name(sim->configuration.mechanism, dependent[0]),
                 system_of(sim)->r - 1, sim->state.time);
 }
 
@@ -78,7 +87,7 @@ static bool complete_angles(Simulation *sim, Loops *x, double *q) {
     double best = HUGE_VAL, length = system->length;
     bool closed = false, regular = true;
     Rows loops = plain_rows(system, r, system->loops, system->loops_c);
-    Complex *e = take_complex(&sim->scratch, system->n, 1);
+    Complex *e = take_complex(&sim->scratch, system->d, 1);
     for (int step = 0; step < CONSTRAINT_ITERATIONS_MAX && regular && !closed; step++) {
         directions(system, q, e);
         scalars(&loops, e, x->s);

@@ -17,4 +17,7 @@ PRBM bool singular_choice(const Simulation *sim, const int *dependent, Problem *
 PRBM bool complete(Simulation *sim, double *q, double *v, Problem *problem);
 PRBM void states_of(const Simulation *sim, const double *y, double *x);
 
+/* Return the slot of a coordinate (angle or strain), or of its rate. */
+PRBM int coordinate_slot(const Mechanism *m, int j, bool rate);
+
 #endif

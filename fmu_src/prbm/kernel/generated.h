@@ -112,6 +112,7 @@ enum { EFFORT_MAX = 1000000 };
 #define LOWEST_BOUNCE_RTOL 1e-10
 #define INDICATOR_LEAD_RTOL 0.01
 #define DEPENDENT_PIVOT_RTOL 1e-07
+enum { GAUSS_ITERATIONS_MAX = 8 };
 
 /* --- prbm.mechanics.contact_state --------------------------------------------------------------- */
 
@@ -146,12 +147,17 @@ typedef enum {
     FREE = 2,
 } End;
 enum { LINKS_MAX = 200 };
+enum { ORDER_MAX = 12 };
+enum { NODES_EXTRA_MIN = 2 };
+enum { NODES_MAX = 24 };
 
 /* --- prbm.interface.tables ---------------------------------------------------------------------- */
 
-enum { TABLES_VERSION = 3 };
+enum { TABLES_VERSION = 4 };
 enum { TABLES_HEAD = 16 };
 enum { COORDINATES_MAX = 512 };
+enum { DIRECTIONS_MAX = 1024 };
+enum { DIRECTION_MAP_MAX = 16384 };
 enum { STOPS_MAX = 64 };
 enum { PLACES_MAX = 1024 };
 enum { GROUND_POINTS_MAX = 4096 };

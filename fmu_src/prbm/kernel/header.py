@@ -34,7 +34,7 @@ from ..interface.variables import (
 )
 from ..mechanics.contact_state import ContactMode
 from ..mechanics.inputs import BASE_AXES, INPUT_GROUPS, LOADS, WALL_INPUTS
-from ..mechanism.flexure import ENDS, LINKS_MAX
+from ..mechanism.flexure import ENDS, LINKS_MAX, NODES_EXTRA_MIN, NODES_MAX, ORDER_MAX
 from ..mechanism.parts import LENGTH_MIN
 
 PATH = Path(__file__).with_name("generated.h")
@@ -66,7 +66,13 @@ def header() -> str:
         _section("prbm.mechanism.parts", [_constant("LENGTH_MIN", LENGTH_MIN)]),
         _section(
             "prbm.mechanism.flexure",
-            [_enumeration("End", "", _numbers(ENDS)), _constant("LINKS_MAX", LINKS_MAX)],
+            [
+                _enumeration("End", "", _numbers(ENDS)),
+                _constant("LINKS_MAX", LINKS_MAX),
+                _constant("ORDER_MAX", ORDER_MAX),
+                _constant("NODES_EXTRA_MIN", NODES_EXTRA_MIN),
+                _constant("NODES_MAX", NODES_MAX),
+            ],
         ),
         _section(tables, _tables()),
         _section("prbm.interface.variables", _groups()),

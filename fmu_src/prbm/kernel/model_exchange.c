@@ -25,29 +25,13 @@ PRBM int exchange_states(const Simulation *simulation) {
     return 2 * simulation->configuration.mechanism->independent_count + 2;
 }
 
-/* The slot of a coordinate (angle or strain), or of its rate. */
-static int slot_of(const Mechanism *m, int j, bool rate) {
-    const Coordinate *coordinate = &m->coordinates[j];
-    if (coordinate->arm != j) {
-        int k = 0;
-        while (m->stretches[k] != j) {
-            k++;
-        }
-        return m->slots.stretches + PER_STRETCH * k + (rate ? STRETCH_STRAIN_RATE : STRETCH_STRAIN);
-    }
-    if (coordinate->link >= 0) {
-        return m->slots.links + PER_LINK * coordinate->link + (rate ? LINK_OMEGA : LINK_ANGLE);
-    }
-    return m->slots.bodies + PER_BODY * (coordinate->body - 1) + (rate ? BODY_OMEGA : BODY_ANGLE);
-}
-
 PRBM int exchange_slot(const Simulation *simulation, int k) {
     const Mechanism *m = simulation->configuration.mechanism;
     int count = m->independent_count;
     if (k >= 2 * count) {
         return m->slots.energies + ENERGY_DISSIPATED + (k - 2 * count);
     }
-    return slot_of(m, m->independent[k % count], k >= count);
+    return coordinate_slot(m, m->independent[k % count], k >= count);
 }
 
 /* --- time, states, inputs --------------------------------------------------------------------- */
@@ -133,6 +117,7 @@ PRBM void exchange_get(const Simulation *simulation, double *x) {
 /* Store the typical angle and energy of a motion that starts with the present state. */
 static void measure_motion(Simulation *sim) {
     const System *system = system_of(sim);
+    const Mechanism *m = system->mechanism;
     const Scales *scales = &sim->configuration.scales;
     size_t mark = sim->scratch.used;
     int n = system->n;
@@ -140,7 +125,7 @@ static void measure_motion(Simulation *sim) {
     double *amplitude = take(&sim->scratch, (size_t)n), energy = 0.0, angle = NOMINAL_ANGLE_MIN;
     for (int j = 0; j < n; j++) {
         amplitude[j] = q[j] - system->q0[j] + v[j] / scales->rate;
-        angle = arm_of(system, j) == j ? greater(angle, fabs(amplitude[j])) : angle;
+        angle = m->coordinates[j].strain < 0 ? greater(angle, fabs(amplitude[j])) : angle;
     }
     for (int j = 0; j < n; j++) {
         energy += amplitude[j] * dot(n, system->K + j * n, amplitude) / 2.0;
@@ -155,7 +140,7 @@ static double typical_strain(const Simulation *sim) {
     const System *system = system_of(sim);
     double stiffest = 0.0;
     for (int j = 0; j < system->n; j++) {
-        bool stretches = arm_of(system, j) != j;
+        bool stretches = system->mechanism->coordinates[j].strain >= 0;
         stiffest = stretches ? greater(stiffest, system->K[j * system->n + j]) : stiffest;
     }
     return sqrt(2.0 * NOMINAL_STRAIN_FACTOR * sim->state.energy / stiffest);
@@ -184,7 +169,7 @@ PRBM void exchange_nominals(const Simulation *simulation, double *x) {
     int count = m->independent_count;
     double rate = nearest_power_of_ten(state->angle * simulation->configuration.scales.rate);
     for (int k = 0; k < count; k++) {
-        bool turns = m->coordinates[m->independent[k]].arm == m->independent[k];
+        bool turns = m->coordinates[m->independent[k]].strain < 0;
         x[k] = nearest_power_of_ten(turns ? state->angle : typical_strain(simulation));
         x[count + k] = rate;
     }

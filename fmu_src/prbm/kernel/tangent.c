@@ -30,17 +30,17 @@ static Arm arm_at(const Tangent *t, int j) {
     return arm;
 }
 
-/* Compute term j of row i: f B_j E_j for j < n, f z for j = n, with f = conj(E) of the body that
+/* Compute term j of row i: f B_j E_j for j < d, f z for j = d, with f = conj(E) of the body that
  * carries the wall, or f = 1 on the ground.  Return false if the term is zero. */
 static bool seen_part(const Tangent *t, const Rows *rows, int i, int j, Arm *seen) {
-    int n = rows->system->n, on = seen_from(rows, i);
+    int d = rows->system->d, on = seen_from(rows, i);
     Complex size = {0.0, 0.0};
-    if (j < n) {
-        size = rows->B[i * n + j];
+    if (j < d) {
+        size = rows->B[i * d + j];
     } else if (on != FIXED) {
         size = rows->z[i];
     }
-    Arm arm = arm_at(t, j < n ? j : FIXED), body = arm_at(t, on);
+    Arm arm = arm_at(t, j < d ? j : FIXED), body = arm_at(t, on);
     seen->E = product(product(conjugate(body.E), arm.E), size);
     seen->w = minus(arm.w, body.w);
     seen->alpha = minus(arm.alpha, body.alpha);
@@ -68,7 +68,7 @@ static Complex bend_change(const Arm *arm) {
 static double value_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
-    for (int j = 0; j <= rows->system->n; j++) {
+    for (int j = 0; j <= rows->system->d; j++) {
         sum -= seen_part(t, rows, i, j, &part) ? product(part.E, part.dphi).im : 0.0;
     }
     return sum;
@@ -77,7 +77,7 @@ static double value_change(const Tangent *t, const Rows *rows, int i) {
 PRBM double rate_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
-    for (int j = 0; j <= rows->system->n; j++) {
+    for (int j = 0; j <= rows->system->d; j++) {
         sum -= seen_part(t, rows, i, j, &part) ? swing_change(&part).im : 0.0;
     }
     return sum;
@@ -87,7 +87,7 @@ PRBM double rate_change(const Tangent *t, const Rows *rows, int i) {
 static double second_change(const Tangent *t, const Rows *rows, int i) {
     double sum = 0.0;
     Arm part;
-    for (int j = 0; j <= rows->system->n; j++) {
+    for (int j = 0; j <= rows->system->d; j++) {
         sum += seen_part(t, rows, i, j, &part) ? bend_change(&part).re : 0.0;
     }
     return sum;
@@ -96,12 +96,12 @@ static double second_change(const Tangent *t, const Rows *rows, int i) {
 /* Add the change of the load of a constant force along row i, as the gradient of the row turns with
  * the arms.  The opposite load acts on the body that carries the wall. */
 static void add_pull(const Tangent *t, const Rows *rows, int i, double force) {
-    int n = rows->system->n, on = seen_from(rows, i);
+    int d = rows->system->d, on = seen_from(rows, i);
     Arm part;
-    for (int j = 0; j <= n; j++) {
+    for (int j = 0; j <= d; j++) {
         if (seen_part(t, rows, i, j, &part)) {
             Complex change = scaled(force, product(part.E, part.dphi));
-            if (j < n) {
+            if (j < d) {
                 t->pull[j] = minus(t->pull[j], change);
             }
             if (on != FIXED) {
@@ -118,7 +118,7 @@ static void move_arms(const Tangent *t) {
     const System *system = t->q->system;
     turning(system, t->dq, t->dphi);
     turning(system, t->dv, t->dw);
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->d; j++) {
         Arm arm = arm_at(t, j);
         t->dE[j] = times_i(product(arm.E, arm.dphi));
         t->swing[j] = product(arm.E, arm.w);
@@ -172,28 +172,28 @@ static bool tangent_coordinates(Tangent *t, const double *dx, Problem *problem) 
 
 /* Element i of the product H x, for x of the arms */
 static Complex through_mass(const Tangent *t, int i, const Complex *x) {
-    int n = t->q->system->n;
-    return along_arms(n, t->q->system->H + i * n, x);
+    int d = t->q->system->d;
+    return along_arms(d, t->q->system->H + i * d, x);
 }
 
-/* Compute the changes of the loads of the inputs: dw on the arms, dmoment on the coordinates. */
+/* Compute the changes of the loads of the inputs on the arms: dw, and the moments dmoment. */
 static void load_row_change(const Tangent *t, Complex *dw, double *dmoment) {
     const System *system = t->q->system;
     const Mechanism *m = system->mechanism;
     const double *base = t->du + m->input.base;
-    int n = system->n;
+    int d = system->d;
     size_t mark = t->sim->scratch.used;
-    Complex *one = take_complex(&t->sim->scratch, n, 1);
-    field_row(n, system->S, complex_of(-base[0], -base[1]), dw);
-    zeros(n, dmoment);
+    Complex *one = take_complex(&t->sim->scratch, d, 1);
+    field_row(d, system->S, complex_of(-base[0], -base[1]), dw);
+    zeros(d, dmoment);
     for (int i = 0; i < m->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
         const double *given = t->du + LOADS * i;
-        force_row(n, frame->A, complex_of(given[0], given[1]), one);
-        for (int j = 0; j < n; j++) {
+        force_row(d, frame->A, complex_of(given[0], given[1]), one);
+        for (int j = 0; j < d; j++) {
             dw[j] = plus(dw[j], one[j]);
         }
-        dmoment[frame->j] += given[2];
+        dmoment[frame->arm] += given[2];
     }
     t->sim->scratch.used = mark;
 }
@@ -213,29 +213,28 @@ static Complex inertial_change(const Tangent *t, int j) {
     return scaled(-1.0, times_i(change));
 }
 
-/* Compute the change of the loads on the arms: forces, inertia, mass-proportional damping. */
-static void arm_load_change(const Tangent *t, const Complex *dw) {
+/* Compute the change of the loads on the arms: forces, moments, inertia, mass-proportional damping. */
+static void arm_load_change(const Tangent *t, const Complex *dw, const double *dmoment) {
     const Equations *q = t->q;
-    for (int j = 0; j < q->system->n; j++) {
+    for (int j = 0; j < q->system->d; j++) {
         if (arm_of(q->system, j) == j) {
             Complex load = plus(product(dw[j], t->e[j]), product(q->w[j], t->dE[j]));
+            load.re += dmoment[j] - q->mass_damping * q->system->J[j] * t->dw[j].re;
             Complex lost = scaled(-q->mass_damping, momentum_change(t, j));
             t->pull[j] = plus(plus(load, inertial_change(t, j)), lost);
         }
     }
 }
 
-/* Add the change of the loads on coordinates: springs, moments, damping of rotary inertia. */
-static void coordinate_load_change(const Tangent *t, const double *dmoment) {
+/* Add the change of the loads of the springs and their damping. */
+static void spring_change(const Tangent *t) {
     const Equations *q = t->q;
     const System *system = q->system;
     int n = system->n;
     for (int i = 0; i < n; i++) {
-        double sum = dmoment[i] - q->mass_damping * system->J[i] * t->dv[i];
         for (int j = 0; j < n; j++) {
-            sum -= system->K[i * n + j] * (t->dq[j] + q->beta * t->dv[j]);
+            t->dx[i] -= system->K[i * n + j] * (t->dq[j] + q->beta * t->dv[j]);
         }
-        t->dx[i] += sum;
     }
 }
 
@@ -290,9 +289,9 @@ static void row_change(const Tangent *t) {
 /* Add the pull to the loads: its real part for an angle, its imaginary part for a stretch. */
 static void apply_pull(const Tangent *t) {
     const System *system = t->q->system;
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->d; j++) {
         int a = arm_of(system, j);
-        t->dx[j] += a == j ? t->pull[j].re : t->pull[a].im;
+        pull(system, j, a == j ? t->pull[j].re : t->pull[a].im, t->dx);
     }
 }
 
@@ -300,9 +299,9 @@ static void apply_pull(const Tangent *t) {
 
 static void point_changes(const Tangent *t, const BodyFrame *frame, Complex *moved,
                           Complex *speed) {
-    int n = t->q->system->n;
-    *moved = along_arms(n, frame->A, t->dE);
-    *speed = times_i(along_arms(n, frame->A, t->dswing));
+    int d = t->q->system->d;
+    *moved = along_arms(d, frame->A, t->dE);
+    *speed = times_i(along_arms(d, frame->A, t->dswing));
 }
 
 static void body_changes(const Tangent *t, double *out) {
@@ -338,9 +337,9 @@ static void link_changes(const Tangent *t, double *links, double *stretches_out)
         links[PER_LINK * k + LINK_ANGLE] = t->dq[m->links[k]];
         links[PER_LINK * k + LINK_OMEGA] = t->dv[m->links[k]];
     }
-    for (int k = 0; k < m->stretch_count; k++) {
-        stretches_out[PER_STRETCH * k + STRETCH_STRAIN] = t->dq[m->stretches[k]];
-        stretches_out[PER_STRETCH * k + STRETCH_STRAIN_RATE] = t->dv[m->stretches[k]];
+    for (int k = 0; k < m->strain_count; k++) {
+        stretches_out[PER_STRETCH * k + STRETCH_STRAIN] = t->dq[m->strains[k]];
+        stretches_out[PER_STRETCH * k + STRETCH_STRAIN_RATE] = t->dv[m->strains[k]];
     }
 }
 
@@ -375,7 +374,7 @@ static void stop_changes(const Tangent *t, double *out) {
 static void bend_arms(const Tangent *t) {
     Complex *dalpha = t->pull; /* The pull has been applied: reuse its memory. */
     turning(t->q->system, t->dx, dalpha);
-    for (int j = 0; j < t->q->system->n; j++) {
+    for (int j = 0; j < t->q->system->d; j++) {
         t->dbend[j] = plus(t->dbend[j], times_i(product(t->e[j], dalpha[j])));
     }
 }
@@ -383,27 +382,27 @@ static void bend_arms(const Tangent *t) {
 static void base_changes(const Tangent *t, double *out) {
     const System *system = t->q->system;
     const Mechanism *m = system->mechanism;
-    int n = system->n;
+    int d = system->d;
     const double *base = t->du + m->input.base, *given = t->q->inputs.forces;
     Complex field = minus(system->gravity, t->q->inputs.base), force = {0.0, 0.0};
     double moment = 0.0;
     for (int i = 0; i < system->p; i++) {
-        const Complex *A = system->A + i * n;
-        Complex z = plus(along_arms(n, A, t->e), minus(system->c[i], system->anchor));
-        Complex dz = along_arms(n, A, t->dE), dbend = along_arms(n, A, t->dbend);
-        Complex load = scaled(system->m[i], minus(field, along_arms(n, A, t->bend)));
+        const Complex *A = system->A + i * d;
+        Complex z = plus(along_arms(d, A, t->e), minus(system->c[i], system->anchor));
+        Complex dz = along_arms(d, A, t->dE), dbend = along_arms(d, A, t->dbend);
+        Complex load = scaled(system->m[i], minus(field, along_arms(d, A, t->bend)));
         Complex change = scaled(-system->m[i], plus(complex_of(base[0], base[1]), dbend));
         force = plus(force, change);
         moment += product(conjugate(dz), load).im + product(conjugate(z), change).im;
     }
-    for (int j = 0; j < n; j++) {
-        moment -= system->J[j] * t->dx[j];
+    for (int j = 0; j < d; j++) {
+        moment -= system->J[j] * direction_of(system, t->dx, j);
     }
     for (int i = 0; i < m->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
         const double *df = t->du + LOADS * i, *f = given + LOADS * i;
-        Complex z = plus(along_arms(n, frame->A, t->e), minus(frame->c, system->anchor));
-        Complex dz = along_arms(n, frame->A, t->dE);
+        Complex z = plus(along_arms(d, frame->A, t->e), minus(frame->c, system->anchor));
+        Complex dz = along_arms(d, frame->A, t->dE);
         force = plus(force, complex_of(df[0], df[1]));
         moment += product(conjugate(dz), complex_of(f[0], f[1])).im +
                   product(conjugate(z), complex_of(df[0], df[1])).im + df[2];
@@ -416,9 +415,9 @@ static void base_changes(const Tangent *t, double *out) {
 /* Change of the kinetic energy, Re(d(E w)^H H (E w)), plus that of the rotary inertias J. */
 static double kinetic_change(const Tangent *t) {
     double sum = 0.0;
-    for (int i = 0; i < t->q->system->n; i++) {
+    for (int i = 0; i < t->q->system->d; i++) {
         sum += product(conjugate(t->dswing[i]), through_mass(t, i, t->swing)).re;
-        sum += t->q->system->J[i] * t->v[i] * t->dv[i];
+        sum += t->q->system->J[i] * t->w[i].re * t->dw[i].re;
     }
     return sum;
 }
@@ -432,7 +431,7 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
             out[ENERGY_ELASTIC] += (t->y[i] - system->q0[i]) * system->K[i * n + j] * t->dq[j];
         }
     }
-    Complex moved = along_arms(n, system->S, t->dE);
+    Complex moved = along_arms(system->d, system->S, t->dE);
     out[ENERGY_GRAVITATIONAL] = -product(conjugate(system->gravity), moved).re;
     out[ENERGY_DISSIPATED] = dx[2 * count];
     out[ENERGY_WORK] = dx[2 * count + 1];
@@ -441,18 +440,18 @@ static void energy_changes(const Tangent *t, const double *dx, double *out) {
 /* Return a copy of t whose coordinates have the constant rates x (n,). */
 static Tangent at_rates(const Tangent *t, const double *x) {
     Scratch *scratch = &t->sim->scratch;
-    int n = t->q->system->n;
+    int n = t->q->system->n, d = t->q->system->d;
     Tangent u = *t;
     Complex **arrays[] = {&u.w, &u.dw, &u.swing, &u.dswing};
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
-        *arrays[i] = take_complex(scratch, n, 1);
+        *arrays[i] = take_complex(scratch, d, 1);
     }
     u.v = x;
     u.dv = take(scratch, (size_t)n);
     zeros(n, u.dv);
     turning(t->q->system, x, u.w);
     turning(t->q->system, u.dv, u.dw);
-    for (int j = 0; j < n; j++) {
+    for (int j = 0; j < d; j++) {
         Arm arm = arm_at(&u, j);
         u.swing[j] = product(arm.E, arm.w);
         u.dswing[j] = swing_change(&arm);
@@ -515,10 +514,10 @@ static double dissipation_change(const Tangent *t) {
 static double power_change(const Tangent *t, const Complex *dw, const double *dmoment) {
     const Equations *q = t->q;
     const System *system = q->system;
-    int n = system->n;
-    double sum = along_arms(n, dw, t->swing).re + along_arms(n, q->w_input, t->dswing).re;
-    for (int j = 0; j < n; j++) {
-        sum += dmoment[j] * t->v[j] + q->moment[j] * t->dv[j];
+    int d = system->d;
+    double sum = along_arms(d, dw, t->swing).re + along_arms(d, q->w_input, t->dswing).re;
+    for (int j = 0; j < d; j++) {
+        sum += dmoment[j] * t->w[j].re + q->moment[j] * t->dw[j].re;
     }
     for (int k = 0; k < q->held_count; k++) {
         int i = q->held[k], h = q->first_hold + k;
@@ -555,7 +554,7 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
     const System *system = system_of(sim);
     const Evaluation *at = now->evaluation;
     Scratch *scratch = &sim->scratch;
-    int n = system->n;
+    int n = system->n, d = system->d;
     Tangent t = {0};
     Complex **arrays[] = {&t.w, &t.alpha, &t.dphi, &t.dw, &t.dE,
                           &t.swing, &t.dswing, &t.bend, &t.dbend, &t.pull};
@@ -570,14 +569,14 @@ static Tangent begin_tangent(Simulation *sim, const Moment *now, const double *d
     t.lam = at->lam;
     t.du = du;
     for (size_t i = 0; i < sizeof arrays / sizeof *arrays; i++) {
-        *arrays[i] = take_complex(scratch, n, 1);
+        *arrays[i] = take_complex(scratch, d, 1);
     }
     t.dq = take(scratch, (size_t)n);
     t.dv = take(scratch, (size_t)n);
     t.dx = take(scratch, (size_t)system->even);
     t.dlam = take(scratch, (size_t)t.q->r);
     zeros(system->even, t.dx);
-    memset(t.pull, 0, (size_t)n * sizeof *t.pull);
+    memset(t.pull, 0, (size_t)d * sizeof *t.pull);
     turning(system, t.v, t.w);
     turning(system, t.a, t.alpha);
     return t;
@@ -593,13 +592,13 @@ PRBM bool exchange_directional(Simulation *simulation, const double *dx, const d
         return false;
     }
     Tangent t = begin_tangent(sim, &now, du);
-    double *dmoment = take(&sim->scratch, (size_t)system_of(sim)->n);
-    Complex *dw = take_complex(&sim->scratch, system_of(sim)->n, 1);
+    double *dmoment = take(&sim->scratch, (size_t)system_of(sim)->d);
+    Complex *dw = take_complex(&sim->scratch, system_of(sim)->d, 1);
     bool ok = tangent_coordinates(&t, dx, problem);
     if (ok) {
         load_row_change(&t, dw, dmoment);
-        arm_load_change(&t, dw);
-        coordinate_load_change(&t, dmoment);
+        arm_load_change(&t, dw, dmoment);
+        spring_change(&t);
         rub_change(&t);
         row_change(&t);
         apply_pull(&t);

@@ -14,11 +14,11 @@ typedef struct {
     const Instant *at;
     const double *y, *v, *a, *lam, *du;
     double *dq, *dv, *dx, *dlam;    /* (n,), (n,), (even,), (r,); dx ends as da */
-    Complex *w, *alpha, *dphi, *dw; /* (n,) of the arms: rates, accelerations, changes */
-    Complex *dE;                    /* (n,) i E dphi */
-    Complex *swing, *dswing;        /* (n,) E w */
-    Complex *bend, *dbend;          /* (n,) E (i w' - w^2); bend_arms adds the change of w' */
-    Complex *pull;                  /* (n,) of the arms: torques, + i times forces along them */
+    Complex *w, *alpha, *dphi, *dw; /* (d,) of the arms: rates, accelerations, changes */
+    Complex *dE;                    /* (d,) i E dphi */
+    Complex *swing, *dswing;        /* (d,) E w */
+    Complex *bend, *dbend;          /* (d,) E (i w' - w^2); bend_arms adds the change of w' */
+    Complex *pull;                  /* (d,) of the arms: torques, + i times forces along them */
 } Tangent;
 
 PRBM double rate_change(const Tangent *t, const Rows *rows, int i);

@@ -37,7 +37,7 @@ static bool load_present(Simulation *sim, Problem *problem) {
     }
     pad(system->n, present->y, present->evaluation.at.angle);
     find_directions(system, &present->reference, &present->evaluation.at);
-    memcpy(present->e, present->evaluation.at.e, (size_t)system->n * sizeof *present->e);
+    memcpy(present->e, present->evaluation.at.e, (size_t)system->d * sizeof *present->e);
     return true;
 }
 

@@ -16,7 +16,6 @@ from ..base.tolerances import (
     CONSTRAINT_STALLED_RTOL,
 )
 from .arrays import Complex, Real
-from .kinetics import inertia
 from .system import Rows, System
 
 Factors = tuple[Real, NDArray[np.int32]]
@@ -91,7 +90,7 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
     q : (n,)
         Coordinates on the constraints, with residuals of at most
         :data:`prbm.base.tolerances.CONSTRAINT_RTOL` times the length, unless round-off is larger.
-    e : (n,) complex
+    e : (d,) complex
         Directions of the coordinates.
 
     Raises
@@ -99,7 +98,7 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
     SimulationError
         If the iteration does not converge.
     """
-    n, J = len(q), np.diag(system.J)
+    n = len(q)
     best = np.inf
     for _ in range(CONSTRAINT_ITERATIONS_MAX):
         e = system.directions(q)
@@ -112,7 +111,7 @@ def project_positions(system: System, rows: Rows, q: Real, c: Real) -> tuple[Rea
         G = rows.jacobian(e)
         right = np.zeros(n + len(c))
         right[n:] = -s
-        q = q + solve(saddle(inertia(system.H, J, e)[0], G, G), right)[:n]
+        q = q + solve(saddle(system.mass_matrix(e), G, G), right)[:n]
     raise SimulationError(
         "the loops of the mechanism could not be closed near this shape: connected parts remain "
         f"{best:.3g} m apart; release nearer to the straight shape, or check the lengths"

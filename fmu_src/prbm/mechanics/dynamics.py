@@ -4,9 +4,11 @@ r"""The equations of motion for one state of the contacts.
     [ R     0  ] [ -lam ] = [ Re(B e) v^2 ]
 
 M is the mass matrix, a the accelerations, lam the multipliers and Q the loads.  R has the rows of
-the loops, of the held stops and of the sticking contacts.  If links stretch, w^2 replaces v^2, see
-:mod:`prbm.mechanics.system`.  The force of a held stop that slips acts along its gap and, by
-Coulomb's law, along its wall; its column in R^T therefore differs from its row in R.
+the loops, of the held stops and of the sticking contacts.  The terms are formed for the directions,
+with the squares w^2 of the rates of the arms in place of v^2 (:mod:`prbm.mechanics.system`).  Then
+they are pulled back to the coordinates (:mod:`prbm.mechanics.direction_map`).  The force of a held
+stop that slips acts along its gap and, by Coulomb's law, along its wall; its column in R^T
+therefore differs from its row in R.
 """
 
 from typing import NamedTuple
@@ -18,7 +20,7 @@ from . import constraints, forces
 from .arrays import Complex, Real
 from .contact_state import ContactMode, ContactState
 from .inputs import Inputs
-from .kinetics import inertia, kinetic_energy, mass_accelerations
+from .kinetics import kinetic_energy, mass_accelerations
 from .system import FIXED, Rows, System
 
 
@@ -74,8 +76,7 @@ class Equations:
     ) -> None:
         self.system, self.inputs, self.contacts, self.omega = system, inputs, contacts, omega
         values, mechanism = system.values, system.mechanism
-        self.n = system.n
-        self.J = np.diag(system.J)
+        self.n, self.d = system.n, system.d
         self.beta = values["damping.beta"]
         self.mass_damping = 2.0 * values["damping.zeta"] * omega
         self.stop_friction = [value(s, "friction", values) for s in mechanism.stops]
@@ -88,8 +89,8 @@ class Equations:
         self._stack_rows()
         # One product with e gives loads, inertia and constraints: see _solve.
         self._stack: Complex = np.vstack([self.w, system.H, 1j * self.rows.spread])
-        self._J_stack = np.zeros((self.n + len(self.rows), self.n))
-        self._J_stack[: self.n] = self.J
+        self._J_stack = np.zeros((self.d + len(self.rows), self.d))
+        self._J_stack[: self.d] = np.diag(system.J)
         # Springs and their damping in one product with (q, v): see torques.
         damping = self.beta * system.K
         self._K_y = np.block([[system.K, damping], [0 * system.K, damping]])
@@ -195,27 +196,30 @@ class Equations:
             G = [w e;  diag(e)^H H diag(e);  i B e],
 
         whose real parts are the load, M - J and the constraint rows, and whose imaginary parts
-        are -C (:func:`prbm.mechanics.kinetics.inertia`) and the convective terms Re(B e).
+        are -C (:func:`prbm.mechanics.kinetics.inertia`) and the convective terms Re(B e), all of
+        the directions.
         """
-        n = self.n
+        n, d, Phi = self.n, self.d, self.system.Phi
         e, w = self.system.directions(q), self.system.turning(v)
         G = self._stack * e
-        G[1 : n + 1] *= e.conj()[:, None]
-        carried = n + self.rows.carried
+        G[1 : d + 1] *= e.conj()[:, None]
+        carried = d + self.rows.carried
         if len(carried):
-            G.real[1 + carried] = self.rows.jacobian(e)[self.rows.carried]
-        size = len(self._J_stack)
+            G.real[1 + carried] = self.rows.by_direction(e)[self.rows.carried]
+        size = n + len(self.rows)
         kkt = np.zeros((size, size), order="F")
-        np.add(G.real[1:], self._J_stack, out=kkt[:, :n])
+        kkt[:, :n] = Phi.fold(Phi.pull(G.real[1:] + self._J_stack))
         kkt[:n, n:] = kkt[n:, :n].T
         M = kkt[:n, :n]
-        right: Real = (G[1:] @ (w * w)).imag if np.iscomplexobj(w) else G.imag[1:] @ (v * v)
+        squares = w * w
+        right: Real = (G[1:] @ squares).imag if np.iscomplexobj(w) else G.imag[1:] @ squares.real
         if len(carried):
-            right[carried] = self.rows.carried_convective(e, v, w)
+            right[carried] = self.rows.carried_convective(e, w)
+        right[:d] += G.real[0]
+        right = Phi.fold(right)
         if self.moving_walls:
             right[n + self.first_hold : n + self.first_stick] -= self.held_motions(t)[2]
         Q = right[:n]
-        Q += G.real[0]
         Q -= torques
         if self.driven:
             Q += self.moment
@@ -232,8 +236,7 @@ class Equations:
     def mass_and_loops(self, q: Real) -> tuple[Complex, Real, Real]:
         """Return e, the mass matrix (n, n) and the Jacobian of the loops (r, n) at a position."""
         e = self.system.directions(q)
-        M, _ = inertia(self.system.H, self.J, e)
-        return e, M, self.system.loop_rows.jacobian(e)
+        return e, self.system.mass_matrix(e), self.system.loop_rows.jacobian(e)
 
     # -- rates of the state --
 
@@ -279,7 +282,8 @@ class Equations:
         power = 0.0
         if self.driven:
             e = self.system.directions(q)
-            power += float((forces.generalised(self.w_input, e) + self.moment) @ v)
+            load = self.system.Phi.pull(forces.generalised(self.w_input, e))
+            power += float((load + self.moment) @ v)
         if self.moving_walls:
             power -= float(lam[self.first_hold : self.first_stick] @ self.held_motions(t)[1])
         return power
@@ -319,7 +323,7 @@ class Equations:
             rates[self.first_hold : r] = self.held_motions(t)[1]
         result = y.copy()
         result[:n] = q
-        M, _ = inertia(self.system.H, self.J, e)
+        M = self.system.mass_matrix(e)
         result[n : 2 * n] = constraints.project_velocities(M, rows, rates, y[n : 2 * n])
         return result
 
@@ -360,7 +364,7 @@ class Equations:
     # -- stops --
 
     def gaps(self, t: float | Real, e: Complex) -> Real:
-        """Return the gaps of all stops [m]; ``e`` may be a stack (m, n), one row per time t."""
+        """Return the gaps of all stops [m]; ``e`` may be a stack (m, d), one row per time t."""
         walls = np.array([wall.motion(t)[0] for wall in self.inputs.walls]).T
         result: Real = self.system.gap_rows.values(e) + walls
         return result
@@ -442,7 +446,7 @@ def base_reaction(equations: Equations, q: Real, v: Real, a: Real) -> tuple[comp
     speed, change = system.turning(v), system.turning(a)
     load = system.m * (field - mass_accelerations(system.A, e, speed, change))
     force = complex(load.sum())
-    moment = float((z.conj() * load).imag.sum() - system.J @ a)
+    moment = float((z.conj() * load).imag.sum() - system.J @ change.real)
     for f, m, frame in zip(inputs.forces, inputs.moments, system.pushed, strict=True):
         place = complex(frame.A @ e) + frame.c - system.anchor
         force += f

@@ -1,8 +1,8 @@
 r"""Generalised forces of springs, damping, gravity, inputs and friction, along increasing q [N m].
 
-A force F (complex, [N]) at the point z = c + A E has the generalised force Q = Re(conj(F) i A e),
-with the columns of A repeated for stretches.  All forces together are one complex row
-w = i sum conj(F) A, with Q = Re(w e).
+A force F (complex, [N]) at the point z = c + A E has the generalised force Re(conj(F) i A e) along
+each direction, with the columns of A repeated for stretches.  All forces together are one complex
+row w = i sum conj(F) A.  Their generalised forces are Q = Phi^T Re(w e).
 """
 
 import numpy as np
@@ -39,7 +39,7 @@ def field_row(S: Complex, acceleration: complex) -> Complex:
 
     Parameters
     ----------
-    S : (n,) complex
+    S : (d,) complex
         First mass moments m^T A [kg m].
     acceleration : complex
         Acceleration of gravity, or minus that of the base [m/s^2].
@@ -68,13 +68,13 @@ def load_rows(system: System, frame: BodyFrame, e: Complex) -> Real:
     """
     rows = np.zeros((3, system.n))
     for k, force in enumerate((1.0 + 0.0j, 1.0j)):
-        rows[k] = generalised(system.spread(force_row(frame.A, force)), e)
+        rows[k] = system.Phi.pull(generalised(system.spread(force_row(frame.A, force)), e))
     rows[2, frame.j] = 1.0
     return rows
 
 
 def generalised(w: Complex, e: Complex) -> Real:
-    """Return Q = Re(w e), component by component [N m]."""
+    """Return Re(w e), the generalised force along each direction [N m]."""
     return (w * e).real
 
 

@@ -2,8 +2,9 @@ r"""Mass matrix, quadratic velocities, kinetic energy and momentum.
 
 This is the TMT method (Newton-Euler in generalised coordinates) for absolute angles and stretches.
 The positions are z = c + A E (see :mod:`prbm.mechanics.system`), and their Jacobian is
-T = dz/dq = i A diag(e), with the columns of A repeated for stretches.  Then the mass matrix is
-M = Re(T^H diag(m) T) + J, in which H = A^H diag(m) A is constant.
+T = dz/dtheta = i A diag(e), with the columns of A repeated for stretches.  Then the mass matrix of
+the directions is M = Re(T^H diag(m) T) + J, in which H = A^H diag(m) A is constant.  That of the
+coordinates is Phi^T M Phi.
 
 Sources
 -------
@@ -26,18 +27,18 @@ def inertia(H: Complex, J: Real, e: Complex) -> tuple[Real, Real]:
 
     Parameters
     ----------
-    H : (n, n) complex
+    H : (d, d) complex
         A^H diag(m) A [kg m^2]; Hermitian.
-    J : (n, n)
-        Rotary inertia of each coordinate about its own mass centres, diagonal [kg m^2].
-    e : (n,) complex
+    J : (d, d)
+        Rotary inertia of each direction about its own mass centres, diagonal [kg m^2].
+    e : (d,) complex
         Directions [-].
 
     Returns
     -------
-    M : (n, n)
+    M : (d, d)
         Symmetric; positive definite iff no motion is massless [kg m^2].
-    C : (n, n)
+    C : (d, d)
         Antisymmetric [kg m^2].
 
     Examples

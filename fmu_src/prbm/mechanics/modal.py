@@ -9,9 +9,8 @@ from ..base.tolerances import ZERO_FREQUENCY_RTOL, ZERO_MODE_RTOL
 from . import constraints
 from .arrays import Complex, Real
 from .forces import field_row, springs
-from .kinetics import inertia
 from .statics import Equilibrium, equilibrium, tangent_stiffness
-from .system import System, jacobian
+from .system import System
 
 
 @dataclass(frozen=True)
@@ -55,11 +54,11 @@ def modes(system: System, shape: Equilibrium) -> Modes:
 def _modes(system: System, q: Real, B: Complex, lam: Real, w: Complex) -> Modes:
     """Solve K_t phi = omega^2 M phi for phi on the tangent space of the loops.
 
-    The tangent stiffness K_t is that of the loads Re(w e) and of the multipliers lam along B.
+    The tangent stiffness K_t is that of the loads w and of the multipliers lam along B.
     """
     e = system.directions(q)
-    M, _ = inertia(system.H, np.diag(system.J), e)
-    K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm)
+    M = system.mass_matrix(e)
+    K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
     rows = system.loop_rows.jacobian(e)
     Z = null_space(rows) if len(rows) else np.eye(system.n)
     omega2, reduced = eigh(Z.T @ K_t @ Z, Z.T @ M @ Z)
@@ -100,11 +99,12 @@ def modes_at(system: System, q: Real) -> Modes:
     the choice of the coordinates, and some may be unstable; unstable modes come first.
     """
     e = system.directions(q)
-    M, _ = inertia(system.H, np.diag(system.J), e)
+    M = system.mass_matrix(e)
     B = np.vstack([system.loops, system.holding_row(q)])
-    rows = jacobian(system.spread(B), e)
+    rows = system.gradient(B, e)
     w = field_row(system.spread(system.S), system.gravity)
-    right = np.concatenate([springs(system.K, q - system.q0) + (w * e).real, np.zeros(len(B))])
+    load = springs(system.K, q - system.q0) + system.Phi.pull((w * e).real)
+    right = np.concatenate([load, np.zeros(len(B))])
     lam = -constraints.solve(constraints.saddle(M, rows, rows), right)[system.n :]
     return _modes(system, q, B, lam, w)
 

@@ -11,7 +11,7 @@ from .arrays import Real
 from .constraints import project_positions
 from .modal import modes
 from .statics import equilibrium
-from .system import Rows, System, jacobian
+from .system import Rows, System
 
 
 def start_shape(system: System, values: Mapping[str, float], fraction: float = 1.0) -> Real:
@@ -72,7 +72,7 @@ def mode_shape(system: System, mode: int, amplitude: float) -> Real:
             "flexure model with more pivots"
         )
     phi = found.shape[:, mode - 1]
-    row = jacobian(system.spread(system.release[None]), system.directions(rest.q))[0]
+    row = system.gradient(system.release, system.directions(rest.q))
     moved = float(row @ phi)
     if abs(moved) <= RELEASE_MODE_RTOL * system.length * float(np.abs(phi).max()):
         raise ParameterError(

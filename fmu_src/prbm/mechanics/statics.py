@@ -2,12 +2,12 @@ r"""Static equilibrium under gravity, loads and a holding force, and the tangent
 
 At rest the torques balance,
 
-    K (q - q0) - Re(w e) - Q - J^T lam - r^T F = 0,
+    K (q - q0) - Phi^T Re(w e) - Q - J^T lam - r^T F = 0,
 
 with the springs K, the row w of gravity and the forces, the moments Q, the Jacobian J of the loops
 and their forces lam, the Jacobian r of the held displacement and the holding force F.  Second
-derivatives couple at most an angle and the stretch of the same link, because every position is
-linear in the arms.
+derivatives by the directions couple at most the angle and the stretch of one arm, because every
+position is linear in the arms.
 """
 
 import math
@@ -33,9 +33,9 @@ from ..base.tolerances import (
 from ..mechanism.parameters import finite
 from . import constraints, contact
 from .arrays import Complex, Real, Whole
+from .direction_map import DirectionMap
 from .forces import field_row, force_row, springs
-from .kinetics import inertia
-from .system import System, jacobian, values
+from .system import System, values
 
 
 @dataclass(frozen=True)
@@ -51,8 +51,8 @@ class Equilibrium:
     force : float
         Holding force on the released body along the direction of the release [N], or its holding
         moment [N m] if the release is by an angle; 0 if free.
-    load : (n,) complex
-        Row w of gravity and the forces that act, Q = Re(w e) [N m].
+    load : (d,) complex
+        Row w of gravity and the forces that act, Q = Phi^T Re(w e) [N m].
     """
 
     q: Real
@@ -62,25 +62,33 @@ class Equilibrium:
 
 
 def tangent_stiffness(
-    K: Real, w: Complex, B: Complex, lam: Real, e: Complex, arm: Whole | None = None
+    K: Real,
+    w: Complex,
+    B: Complex,
+    lam: Real,
+    e: Complex,
+    arm: Whole | None = None,
+    Phi: DirectionMap | None = None,
 ) -> Real:
-    r"""Stiffness about a shape, K + diag(Im(w e) + Re(lam^T B e)) [N m/rad].
+    r"""Stiffness about a shape, K + Phi^T D Phi with D = diag(Im(w e) + Re(lam^T B e)) [N m/rad].
 
-    A link with g = Im(w e) + Re(lam^T B e) and h = Im(lam^T B e) - Re(w e) has the diagonal entries
+    An arm with g = Im(w e) + Re(lam^T B e) and h = Im(lam^T B e) - Re(w e) has the diagonal entries
     g for its angle and -g for its stretch, and h couples both.
 
     Parameters
     ----------
     K : (n, n)
         Torsion springs [N m/rad].
-    w : (n,) complex
-        Row of the dead loads, Q = Re(w e) [N m].
-    B, lam : (r, n) complex, (r,)
+    w : (d,) complex
+        Row of the dead loads, Q = Phi^T Re(w e) [N m].
+    B, lam : (r, d) complex, (r,)
         Constraints and their multipliers [m], [N].
-    e : (n,) complex
+    e : (d,) complex
         Directions.
-    arm : (n,) int or None
-        Index of the arm that each coordinate turns or stretches; None: coordinate j turns arm j.
+    arm : (d,) int or None
+        Index of the arm that each direction turns or stretches; None: direction j turns arm j.
+    Phi : DirectionMap or None
+        Map from coordinates to directions; None: the directions are the coordinates.
 
     Examples
     --------
@@ -93,14 +101,13 @@ def tangent_stiffness(
     6.0
     """
     pull = (lam @ B - 1j * w) * e
-    result: Real = K + np.diag(pull.real)
+    D: Real = np.diag(pull.real)
     if arm is not None:
         k = np.flatnonzero(arm != np.arange(len(arm)))
         a = arm[k]
-        result[k, k] = K[k, k] - pull[a].real
-        result[k, a] += pull[a].imag
-        result[a, k] += pull[a].imag
-    return result
+        D[k, k] = -pull[a].real
+        D[k, a] = D[a, k] = pull[a].imag
+    return K + (D if Phi is None else Phi.congruence(D))
 
 
 def equilibrium(
@@ -204,8 +211,9 @@ def _newton(
     for _ in range(STATICS_ITERATIONS_MAX):
         q, lam = state[:n], state[n:]
         e = system.directions(q)
-        rows = jacobian(system.spread(B), e)
-        torque = springs(system.K, q - system.q0) + (w * e).real + moment + lam @ rows
+        rows = system.gradient(B, e)
+        loads = system.Phi.pull((w * e).real) + moment
+        torque = springs(system.K, q - system.q0) + loads + lam @ rows
         open_by = values(B, c, e)
         closed = (
             not len(open_by) or np.abs(open_by).max() <= STATICS_CONSTRAINT_RTOL * system.length
@@ -213,7 +221,8 @@ def _newton(
         balanced = closed and np.abs(torque).max() <= scale
         if balanced and turn <= STATICS_STEP_ATOL:
             return state
-        kkt = constraints.saddle(tangent_stiffness(system.K, w, B, lam, e, system.arm), rows, rows)
+        K_t = tangent_stiffness(system.K, w, B, lam, e, system.arm, system.Phi)
+        kkt = constraints.saddle(K_t, rows, rows)
         try:
             change = constraints.solve(kkt, np.concatenate([torque, -open_by]))
         except SimulationError:
@@ -268,7 +277,7 @@ def _given(system: System, amount: float) -> str:
 def held_by_loops(system: System) -> bool:
     """Return whether the loops keep the released body, as drawn, from moving along the release."""
     e = system.directions(system.q0)
-    along = jacobian(system.spread(system.holding_row(system.q0)[None]), e)
+    along = system.gradient(system.holding_row(system.q0)[None], e)
     return _left_by_loops(system, e, along) <= RELEASE_ROW_RTOL * system.length
 
 
@@ -281,7 +290,7 @@ def turns_about_point(system: System) -> bool:
     if system.mechanism.release.turns:
         return False
     e = system.directions(system.q0)
-    row = jacobian(system.spread(system.release[None]), e)[0]
+    row = system.gradient(system.release, e)
     loops = system.loop_rows.jacobian(e)
     try:
         kkt = constraints.saddle(system.K, loops, loops)
@@ -331,7 +340,7 @@ def _immovable(system: System, remedy: str) -> str:
 def _on_pivot(system: System, name: str) -> bool:
     """Return whether a body, as drawn, can turn while its centre of mass is fixed."""
     e, frame = system.directions(system.q0), system.bodies[name]
-    both = jacobian(system.spread(np.vstack([system.release, -1j * system.release])), e)
+    both = system.gradient(np.vstack([system.release, -1j * system.release]), e)
     turn = np.eye(system.n)[[frame.j]]
     return _left_by_loops(system, e, both) <= RELEASE_ROW_RTOL * system.length and (
         _left_by_loops(system, e, turn) > RELEASE_ROW_RTOL
@@ -368,8 +377,8 @@ def release_velocity(system: System, q: Real, speed: float) -> Real:
     if speed == 0.0:
         return np.zeros(system.n)
     e = system.directions(q)
-    M, _ = inertia(system.H, np.diag(system.J), e)
-    rows = jacobian(system.spread(np.vstack([system.loops, system.release])), e)
+    M = system.mass_matrix(e)
+    rows = system.gradient(np.vstack([system.loops, system.release]), e)
     loops, row = rows[:-1], rows[-1:]
     left, free = ((row @ contact.response(M, held, row)).item() for held in (loops, loops[:0]))
     if left <= RELEASE_MOBILITY_RTOL * free:

@@ -1,7 +1,9 @@
 r"""The constant arrays of a mechanism, and the scalars that they define (gaps, loop closures).
 
-A coordinate is the absolute angle theta of a link or a body, or the stretch s of a link, which is
-the logarithm of its length divided by its drawn length.  Each link and body has one *arm*,
+A direction is the absolute angle theta of an arm, or its stretch s, which is the logarithm of its
+length divided by its drawn length.  Directions are a constant linear map of the coordinates, see
+:mod:`prbm.mechanics.direction_map`.  Each link and body has one arm; its directions are coordinates
+themselves.  An arm is
 
     E = exp(s + i theta),       E' = i w E,     w = theta' - i s',
 
@@ -15,9 +17,10 @@ A scalar that is measured relative to a moving body, for example a gap to a wall
 
     x = Re(f (B E + z)) + c,    f = conj(E of that body).
 
-Arrays have a column for every coordinate.  The vector e contains E for the angle of an arm and
--i E for its stretch, so that dE/dq = i e for both.  The columns of A and B at stretches are zero;
-:meth:`System.spread` replaces them by the columns of the arms.  Then dx/dq = -Im(spread(B) e).
+Arrays have a column for every direction.  The vector e contains E for the angle of an arm and
+-i E for its stretch, so that the derivative of E by its direction is i e for both.  The columns of
+A and B at stretches are zero; :meth:`System.spread` replaces them by the columns of the arms.  Then
+dx/dtheta = -Im(spread(B) e), and dx/dq = dx/dtheta Phi.
 """
 
 import cmath
@@ -30,8 +33,12 @@ import numpy as np
 
 from ..mechanism.description import Mechanism
 from .arrays import Complex, Real, Whole
+from .direction_map import DirectionMap
+from .kinetics import inertia
 
-FIXED = -1  # In place of a coordinate: fixed to the ground.
+ANGLE = ("angle", "omega")  # Names of the variables of a coordinate that is an angle.
+STRAIN = ("strain", "strain_rate")  # Those of a coordinate that is a stretch.
+FIXED = -1  # In place of a direction: fixed to the ground.
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,7 @@ class Place:
     A: Mapping[int, complex] = field(default_factory=dict)
 
     def plus(self, j: int | None, vector: complex) -> "Place":
-        """Return the place at the end of a vector fixed to coordinate j (None: the ground)."""
+        """Return the place at the end of a vector fixed to direction j (None: the ground)."""
         if j is None:
             return Place(self.c + vector, self.A)
         return Place(self.c, {**self.A, j: self.A.get(j, 0j) + vector})
@@ -62,9 +69,9 @@ class Place:
             A[j] = A.get(j, 0j) - vector
         return Place(self.c - other.c, A)
 
-    def row(self, n: int) -> Complex:
-        """Return A as a row of n columns."""
-        row = np.zeros(n, complex)
+    def row(self, d: int) -> Complex:
+        """Return A as a row of d columns."""
+        row = np.zeros(d, complex)
         for j, vector in self.A.items():
             row[j] = vector
         return row
@@ -80,7 +87,9 @@ class BodyFrame:
         Name of the body, the force or the probe.
     j : int
         The body's coordinate; :data:`FIXED`: the ground.
-    c, A : complex, (n,) complex
+    arm : int
+        The body's direction, the index of its arm; :data:`FIXED`: the ground.
+    c, A : complex, (d,) complex
         Position z = c + A E of the point [m].
     drawn : complex
         Position of the point in the straight shape [m].
@@ -88,6 +97,7 @@ class BodyFrame:
 
     name: str
     j: int
+    arm: int
     c: complex
     A: Complex
     drawn: complex
@@ -110,12 +120,12 @@ def values(B: Complex, c: Real, e: Complex) -> Real:
 
 
 def jacobian(B: Complex, e: Complex) -> Real:
-    """Return dx/dq = -Im(B e) [m/rad], (r, n), of rows B that are spread over the stretches."""
+    """Return dx/dtheta = -Im(B e) [m/rad], (r, d), of rows B, spread over the stretches."""
     return -(B * e).imag
 
 
 def convective(B: Complex, e: Complex, w: Real | Complex) -> Real:
-    """Return -(d/dt dx/dq) v = Re(B e w^2), the right side of (dx/dq) a = ... for x'' = 0."""
+    """Return -(d/dt dx/dtheta) theta' = Re(B e w^2), which equals -(d/dt dx/dq) v."""
     result: Real = ((B * e) @ (w * w)).real
     return result
 
@@ -127,10 +137,10 @@ class Rows:
     ----------
     system : System
         The mechanism.
-    B, c : (r, n) complex, (r,)
+    B, c : (r, d) complex, (r,)
         Coefficients of the arms, constants [m].
     z, on : (r,) complex, (r,) int, or None
-        Fixed part [m] and coordinate of the body that a row is relative to.  With :data:`FIXED` or
+        Fixed part [m] and direction of the body that a row is relative to.  With :data:`FIXED` or
         None it is relative to the ground, with f = 1 and z = 0.
     """
 
@@ -162,7 +172,7 @@ class Rows:
         return Rows(self.system, self.B[:r], self.c[:r], z[:r], on[:r])
 
     def values(self, e: Complex, c: Real | None = None) -> Real:
-        """Return x [m], (..., r); e may be a stack (..., n); ``c`` replaces the constants."""
+        """Return x [m], (..., r); e may be a stack (..., d); ``c`` replaces the constants."""
         x = e @ self.B.T
         if len(self.carried):
             x[..., self.carried] = self._carried_values(x, e)
@@ -176,6 +186,10 @@ class Rows:
 
     def jacobian(self, e: Complex) -> Real:
         """Return dx/dq [m/rad], (r, n)."""
+        return self.system.Phi.pull(self.by_direction(e))
+
+    def by_direction(self, e: Complex) -> Real:
+        """Return dx/dtheta [m/rad], (r, d)."""
         result = jacobian(self.spread, e)
         if len(self.carried):
             f = e[self.on].conj()
@@ -184,11 +198,12 @@ class Rows:
         return result
 
     def rates(self, e: Complex, v: Real) -> Real:
-        """Return x' [m/s], (..., r); e and v may be stacks (..., n)."""
-        y: Complex = (e * self.system.turning(v)) @ self.B.T
+        """Return x' [m/s], (..., r); e and v may be stacks (..., d), (..., n)."""
+        w = self.system.turning(v)
+        y: Complex = (e * w) @ self.B.T
         if len(self.carried):
             f = e[..., self.on].conj()
-            turned = v[..., self.on] * self._carried_values(e @ self.B.T, e)
+            turned = w[..., self.on].real * self._carried_values(e @ self.B.T, e)
             y[..., self.carried] = f * y[..., self.carried] - turned
         return -y.imag
 
@@ -197,12 +212,12 @@ class Rows:
         w = self.system.turning(v)
         result = convective(self.B, e, w)
         if len(self.carried):
-            result[self.carried] = self.carried_convective(e, v, w)
+            result[self.carried] = self.carried_convective(e, w)
         return result
 
-    def carried_convective(self, e: Complex, v: Real, w: Real | Complex) -> Real:
+    def carried_convective(self, e: Complex, w: Real | Complex) -> Real:
         """Return the convective terms of the carried rows [m/s^2]."""
-        f, turn = e[self.on].conj(), v[self.on]
+        f, turn = e[self.on].conj(), w[self.on].real
         B = self.B[self.carried]
         bent = ((w - turn[:, None]) ** 2 * (B * e)).sum(axis=1) + turn**2 * self.z
         result: Real = (f * bent).real
@@ -211,35 +226,37 @@ class Rows:
 
 @dataclass(frozen=True)
 class System:
-    """The constant arrays of a mechanism for given parameters: n coordinates, r loop rows.
+    """The constant arrays of a mechanism: n coordinates, d directions, r loop rows.
 
     Parameters
     ----------
     q0 : (n,)
         Coordinates of the straight shape: absolute angles, counter-clockwise from +x [rad], and
         stretches, which are zero there [-].
-    arm : (n,) int
-        Index of the arm that a coordinate turns or stretches.
-    H : (n, n) complex
+    Phi : DirectionMap
+        The map from coordinates to directions.
+    arm : (d,) int
+        Index of the arm that a direction turns or stretches.
+    H : (d, d) complex
         A^H diag(m) A with the columns of A spread, Hermitian [kg m^2].
-    J : (n,)
+    J : (d,)
         Rotary inertia of each body about the mass centres of its parts [kg m^2].
     K : (n, n)
         Springs: elastic energy (q - q0)^T K (q - q0) / 2 [N m/rad], [N m].
-    A, c, m : (p, n) complex, (p,) complex, (p,)
+    A, c, m : (p, d) complex, (p,) complex, (p,)
         Mass points z = c + A E [m] and their masses [kg].
-    loops, loops_c : (r, n) complex, (r,)
+    loops, loops_c : (r, d) complex, (r,)
         Loop closures Phi = Re(loops E) + loops_c [m].
-    gaps, gaps_c, gaps_z : (s, n) complex, (s,), (s,) complex
+    gaps, gaps_c, gaps_z : (s, d) complex, (s,), (s,) complex
         Gaps of the stops, without the wall's position [m]: gap = wall + Re(f (gaps E + gaps_z)) +
         gaps_c, with f = 1 for a wall on the ground, and f = conj(E) for a wall on a body.
-    slides, slides_z : (s, n) complex, (s,) complex
+    slides, slides_z : (s, d) complex, (s,) complex
         Displacement of the hit points along their walls, to the left of the direction [m].
     on : (s,) int
-        The coordinate of the body that a wall is fixed to; :data:`FIXED`: the ground.
-    rubs, lifts, lifts_c : (f, n) complex, (f, n) complex, (f,)
+        The direction of the body that a wall is fixed to; :data:`FIXED`: the ground.
+    rubs, lifts, lifts_c : (f, d) complex, (f, d) complex, (f,)
         Displacement along and to the left of the direction of each friction point [m].
-    release, release_c : (n,) complex, float
+    release, release_c : (d,) complex, float
         Displacement of the released point along the direction of the release [m].
     bodies : dict of BodyFrame
         The bodies by name: their centres of mass.
@@ -248,7 +265,10 @@ class System:
     probes : tuple of BodyFrame
         The points whose motion is reported.
     links : tuple of int
-        The coordinates of the flexures' links, in the order of their names link[1], ...
+        The coordinates that are angles of flexures, in the order of the interface.
+    owners : (n,) tuple of str
+        The link, body or other part of the mechanism that each coordinate belongs to, as in the
+        names of its variables: link[1], link[2], ...
     outlines : tuple of Outline
         Lines to draw.
     anchor : complex
@@ -261,6 +281,7 @@ class System:
     mechanism: Mechanism
     values: Mapping[str, float]
     q0: Real
+    Phi: DirectionMap
     arm: Whole
     H: Complex
     J: Real
@@ -285,6 +306,7 @@ class System:
     pushed: tuple[BodyFrame, ...]
     probes: tuple[BodyFrame, ...]
     links: tuple[int, ...]
+    owners: tuple[str, ...]
     outlines: tuple[Outline, ...]
     anchor: complex
     length: float
@@ -294,9 +316,14 @@ class System:
         """Number of coordinates."""
         return len(self.q0)
 
+    @property
+    def d(self) -> int:
+        """Number of directions."""
+        return len(self.arm)
+
     @cached_property
     def S(self) -> Complex:
-        """First mass moments m^T A, (n,) complex [kg m]."""
+        """First mass moments m^T A, (d,) complex [kg m]."""
         result: Complex = self.m @ self.A
         return result
 
@@ -322,9 +349,25 @@ class System:
 
     @cached_property
     def stretches(self) -> Whole:
-        """The coordinates that are stretches."""
-        result: Whole = np.flatnonzero(self.arm != np.arange(self.n))
+        """The directions that are stretches."""
+        result: Whole = np.flatnonzero(self.arm != np.arange(self.d))
         return result
+
+    @cached_property
+    def strains(self) -> Whole:
+        """The coordinates that are stretches: those that stretch arms, and turn none."""
+        result: Whole = np.flatnonzero(self.Phi.Phi[self.stretches].any(axis=0))
+        return result
+
+    @property
+    def variables(self) -> tuple[tuple[str, str], ...]:
+        """The names of each coordinate and its rate, such as link[1].angle and link[1].omega."""
+        strains = set(self.strains.tolist())
+        return tuple(
+            (f"{owner}.{x}", f"{owner}.{rate}")
+            for j, owner in enumerate(self.owners)
+            for x, rate in [STRAIN if j in strains else ANGLE]
+        )
 
     @cached_property
     def stretched(self) -> Whole:
@@ -338,7 +381,11 @@ class System:
         Parameters
         ----------
         q : (..., n)
-            Angles [rad] and stretches [-].
+            Coordinates [rad], [-].
+
+        Returns
+        -------
+        (..., d) complex
 
         Examples
         --------
@@ -346,30 +393,41 @@ class System:
 
         >>> class Bar:
         ...     stretches, stretched = np.array([1]), np.array([0])
+        ...     Phi = DirectionMap(np.eye(2))
         >>> e = System.directions(Bar, np.array([np.pi / 2, np.log(1.01)]))
         >>> bool(abs(e - [1.01j, 1.01]).max() < 1e-15)
         True
         """
+        theta = self.Phi.of(q)
         if not len(self.stretches):
-            turned: Complex = np.exp(1j * q)
+            turned: Complex = np.exp(1j * theta)
             return turned
-        w = 1j * q
-        w[..., self.stretched] += q[..., self.stretches]
+        w = 1j * theta
+        w[..., self.stretched] += theta[..., self.stretches]
         e: Complex = np.exp(w)
         e[..., self.stretches] = -1j * e[..., self.stretched]
         return e
 
     def turning(self, v: Real) -> Real | Complex:
-        """Return the rates w = theta' - i s' of the arms; the entries of stretches are zero [1/s].
+        """Return the rates w = theta' - i s' of the arms (..., d) for rates v (..., n) [1/s].
 
-        Without stretches the result is v.
+        The entries of stretches are zero.  Without stretches the result is real.
         """
+        turned = self.Phi.of(v)
         if not len(self.stretches):
-            return v
-        w = v.astype(complex)
-        w[..., self.stretched] -= 1j * v[..., self.stretches]
+            return turned
+        w = turned.astype(complex)
+        w[..., self.stretched] -= 1j * turned[..., self.stretches]
         w[..., self.stretches] = 0.0
         return w
+
+    def mass_matrix(self, e: Complex) -> Real:
+        """Return the mass matrix M, (n, n) [kg m^2]."""
+        return self.Phi.congruence(inertia(self.H, np.diag(self.J), e)[0])
+
+    def gradient(self, B: Complex, e: Complex) -> Real:
+        """Return dx/dq [m/rad], (..., n), of rows x = Re(B E) + c, (..., d)."""
+        return self.Phi.pull(jacobian(self.spread(B), e))
 
     def motion(self, frame: BodyFrame, e: Complex, v: Real) -> tuple[complex, complex]:
         """Return the displacement from the straight shape [m] and the velocity [m/s] of a point."""
@@ -400,9 +458,9 @@ class System:
         """
         if not self.mechanism.release.turns:
             return self.release, self.release_c - amount
-        j = self.released.j
-        row = np.zeros(self.n, complex)
-        row[j] = -1j * self.length * np.exp(-1j * (self.q0[j] + amount))
+        j, arm = self.released.j, self.released.arm
+        row = np.zeros(self.d, complex)
+        row[arm] = -1j * self.length * np.exp(-1j * (self.q0[j] + amount))
         return row, 0.0
 
     def amount(self, q: Real) -> float:
@@ -434,6 +492,6 @@ def unit(degrees: float) -> complex:
     return complex(1j ** int(quarter % 4)) * (cmath.exp(1j * math.radians(rest)) if rest else 1.0)
 
 
-def stacked(rows: list[Complex], n: int) -> Complex:
-    """Return rows of n columns as an array (k, n); k may be 0."""
-    return np.array(rows, complex).reshape(-1, n)
+def stacked(rows: list[Complex], d: int) -> Complex:
+    """Return rows of d columns as an array (k, d); k may be 0."""
+    return np.array(rows, complex).reshape(-1, d)

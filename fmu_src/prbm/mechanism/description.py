@@ -21,7 +21,22 @@ from ..base.errors import MechanismError, ParameterError
 from ..base.names import proposal, unknown
 from ..base.tolerances import TOLERANCE_MAX, TOLERANCE_MIN, TOLERANCE_USED_MAX
 from .expressions import Quantity, affine
-from .flexure import CLAMP, ENDS, FREE, LINKS_MAX, MODELS, FlexureModel
+from .flexure import (
+    BEAM,
+    CHAIN,
+    CLAMP,
+    ENDS,
+    FREE,
+    LINKS_MAX,
+    LOCKING_ORDER_MAX,
+    MODELS,
+    NODES_EXTRA,
+    NODES_EXTRA_MIN,
+    NODES_MAX,
+    ORDER_DEFAULT,
+    ORDER_MAX,
+    FlexureModel,
+)
 from .parameters import Parameter
 from .parts import (
     GROUND,
@@ -172,7 +187,11 @@ class Mechanism:
 
     def model(self, kind: FlexureType) -> FlexureModel:
         """Return the flexure model of a type."""
-        return replace(MODELS[kind.model], links=kind.n)
+        if kind.model != BEAM:
+            return replace(MODELS[kind.model], links=kind.n)
+        order = ORDER_DEFAULT if kind.order is None else kind.order
+        nodes = order + NODES_EXTRA if kind.nodes is None else kind.nodes
+        return replace(MODELS[BEAM], order=order, nodes=nodes)
 
     def values(self, changes: Mapping[str, float] | None = None) -> dict[str, float]:
         """Return the values of all parameters: the defaults, or the given changes.
@@ -266,7 +285,8 @@ class Mechanism:
             raise MechanismError(
                 f"{kind.name}.model = {kind.model!r} is unknown: choose one of {', '.join(MODELS)}"
             )
-        chain = not MODELS[kind.model].gamma
+        self._check_order(kind)
+        chain = kind.model == CHAIN
         if chain and not 1 <= kind.n <= LINKS_MAX:
             raise MechanismError(
                 f"{kind.name}.n = {kind.n} must be the number of links of the chain, from 1 to "
@@ -286,12 +306,39 @@ class Mechanism:
                     f"coefficients {listed}"
                 )
 
+    def _check_order(self, kind: FlexureType) -> None:
+        """Reject an order or a number of nodes that a model does not have, or out of bounds."""
+        if kind.model != BEAM:
+            for name in ("order", "nodes"):
+                if getattr(kind, name) is not None:
+                    raise MechanismError(
+                        f"{kind.name}.{name} = {getattr(kind, name)}: only the model beam has it; "
+                        f'remove {name}, or choose model = "beam"'
+                    )
+            return
+        model = self.model(kind)
+        if not 1 <= model.order <= ORDER_MAX:
+            raise MechanismError(
+                f"{kind.name}.order = {model.order} must lie between 1 and {ORDER_MAX}; 3, 5 and 7 "
+                "are useful"
+            )
+        least = model.order + NODES_EXTRA_MIN
+        if not least <= model.nodes <= NODES_MAX:
+            raise MechanismError(
+                f"{kind.name}.nodes = {model.nodes} must lie between {least} (the order + "
+                f"{NODES_EXTRA_MIN}) and {NODES_MAX}"
+            )
+
     def _check_flexure(self, flexure: Flexure, types: Mapping[str, FlexureType]) -> None:
         """Reject a flexure with an undefined type or point, or with inconsistent ends."""
         kind = types.get(flexure.type)
         if kind is None:
             raise MechanismError(_undefined(f"{flexure.name}.type", flexure.type, types))
         self._check_connection("flexure", flexure)
+        self._check_ends(flexure, kind)
+
+    def _check_ends(self, flexure: Flexure, kind: FlexureType) -> None:
+        """Reject types of ends that are unknown, or that a model does not permit."""
         ends = flexure.ends
         if len(ends) != 2 or any(end not in ENDS for end in ends):
             raise MechanismError(
@@ -300,6 +347,18 @@ class Mechanism:
         if FREE in ends and CLAMP not in ends:
             raise MechanismError(
                 f"{flexure.name}.ends = {ends!r}: a free end needs a clamp at the other end"
+            )
+        if (
+            kind.model == BEAM
+            and not kind.axial
+            and ends == (CLAMP, CLAMP)
+            and self.model(kind).order <= LOCKING_ORDER_MAX
+        ):
+            raise MechanismError(
+                f"{kind.name}.order = {self.model(kind).order}: a beam between two clamps that "
+                f"does not stretch is too stiff with an order below {LOCKING_ORDER_MAX + 1}; "
+                f"choose order = 3, or axial = true, or the end free if {flexure.name} is a "
+                "cantilever"
             )
         if kind.axial and FREE in ends and len(MODELS[kind.model].gamma) == 1:
             raise MechanismError(

@@ -1,7 +1,7 @@
-"""Pseudo-rigid-body models as data: flexures of rigid segments and torsion springs.
+"""Models of flexures as data: rigid segments with torsion springs, and beams.
 
-A model is a set of published coefficients for a cantilever of length h.  Common rules give the
-segments of a flexure of length L:
+A pseudo-rigid-body model is a set of published coefficients for a cantilever of length h.  Common
+rules give the segments of a flexure of length L:
 
 * Clamped at one end: one cantilever, h = L.  The other end is a pin, or free.  The body at a free
   end is fixed to the last link, which is the link at the tip of the model.
@@ -21,6 +21,9 @@ the last link with the body.
 With axial compliance, one link of a flexure stretches with the stiffness EA/L: the middle one.  If
 the number of links is even, it is the one after the middle, counted from the start.  In a chain
 all links stretch, each with the stiffness n EA/L.
+
+A beam has no coefficients either: its bending moment is a polynomial, see
+:mod:`prbm.mechanics.beam`.  A free end of a beam is the same as a clamp.
 
 Each model in :data:`MODELS` names its publications.
 """
@@ -45,12 +48,12 @@ class Coefficient:
 
 @dataclass(frozen=True)
 class FlexureModel:
-    """Coefficients of a pseudo-rigid-body model of a cantilever.
+    """Coefficients of a model of a cantilever.
 
     Parameters
     ----------
     name : str
-        Number of pivots of the cantilever: 1R, 2R, 3R; nR for a chain.
+        Number of pivots of the cantilever: 1R, 2R, 3R; nR for a chain; beam.
     gamma : tuple of Coefficient
         Lengths of the moving links, from the clamp to the tip, in units of h [-].
     K_theta : tuple of Coefficient
@@ -67,6 +70,9 @@ class FlexureModel:
     links : int
         Number of equal links of a chain, set from the flexure type; 0 in :data:`MODELS`, and for
         the other models.
+    order, nodes : int
+        Order of the polynomial of the bending moment of a beam, and number of its nodes, set from
+        the flexure type; 0 in :data:`MODELS`, and for the other models.
     """
 
     name: str
@@ -77,6 +83,8 @@ class FlexureModel:
     source: str
     references: tuple[str, ...]
     links: int = 0
+    order: int = 0
+    nodes: int = 0
 
     @property
     def coefficients(self) -> tuple[Coefficient, ...]:
@@ -87,7 +95,8 @@ class FlexureModel:
     def end_slope(self) -> float:
         """Tip slope of a cantilever under an end moment, over the slope of the beam [-].
 
-        Every spring carries the whole moment.  The value is 0 for a chain, whose slope is exact.
+        Every spring carries the whole moment.  The value is 0 for chains and beams, whose slopes
+        are exact.
 
         Examples
         --------
@@ -108,6 +117,8 @@ def _K_theta(name: str, value: float, which: str) -> Coefficient:
     """Return the stiffness coefficient of a pivot."""
     return Coefficient(name, value, f"Stiffness coefficient of {which}")
 
+
+BEAM, CHAIN = "beam", "nR"
 
 MODELS = {
     model.name: model
@@ -163,7 +174,7 @@ MODELS = {
             ),
         ),
         FlexureModel(
-            "nR",
+            CHAIN,
             (),
             (),
             rate_with_gamma=False,
@@ -174,12 +185,31 @@ MODELS = {
                 "der elastischen Gelenkkette, Der Eisenbau 11 (1920) 437 (nR).",
             ),
         ),
+        FlexureModel(
+            BEAM,
+            (),
+            (),
+            rate_with_gamma=False,
+            lumped=False,
+            source="Boyer et al. 2021",
+            references=(
+                "F. Boyer, V. Lebastard, F. Candelier, F. Renda, Dynamics of continuum and soft "
+                "robots: a strain parameterization based approach, IEEE Trans. Robotics 37 (2021) "
+                "847 (beam).",
+            ),
+        ),
     )
 }
 
 CLAMP, PIN, FREE = "clamp", "pin", "free"
 ENDS = (CLAMP, PIN, FREE)
 LINKS_MAX = 200  # Links of a chain.
+ORDER_DEFAULT = 3  # Order of a beam.
+ORDER_MAX = 12
+NODES_EXTRA = 3  # Nodes of a beam beyond its order.
+NODES_EXTRA_MIN = 2  # With fewer nodes a pinned beam has a motion without mass.
+NODES_MAX = 24
+LOCKING_ORDER_MAX = 2  # Up to this order, an inextensible beam between two clamps is too stiff.
 
 
 @dataclass(frozen=True)

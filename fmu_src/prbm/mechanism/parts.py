@@ -40,14 +40,14 @@ class Body:
 
 @dataclass(frozen=True)
 class FlexureType:
-    """Section, material and pseudo-rigid-body model of flexures.
+    """Section, material and model of flexures.
 
     Parameters
     ----------
     name : str
         Prefix of the parameters, for instance ``flexure``.
     model : str
-        Pseudo-rigid-body model, a key of :data:`prbm.mechanism.flexure.MODELS`.
+        Model, a key of :data:`prbm.mechanism.flexure.MODELS`.
     thickness, width : Quantity
         Dimensions of the section in the plane of motion and across it [m].
     youngs_modulus : Quantity
@@ -58,6 +58,10 @@ class FlexureType:
         Values that replace the published coefficients of the model, by name [-].
     n : int
         Number of links of the model nR; 0 for other models.
+    order : int or None
+        Order of the polynomial of the bending moment of a beam; None: the default.
+    nodes : int or None
+        Number of nodes of a beam; None: its order + 3.
     axial : bool
         Whether the flexures can stretch.
     """
@@ -70,6 +74,8 @@ class FlexureType:
     density: Quantity
     coefficients: Mapping[str, Quantity] = field(default_factory=dict)
     n: int = 0
+    order: int | None = None
+    nodes: int | None = None
     axial: bool = False
 
 
@@ -82,7 +88,7 @@ class Flexure:
     * ``clamp``: fixed to the body;
     * ``pin``: free to rotate about the point;
     * ``free``: the tip of a cantilever; the body at this end is fixed to the last link of the model
-      1R, 2R or 3R.  In a chain (nR) it is the same as a clamp.
+      1R, 2R or 3R.  In a chain (nR) and a beam it is the same as a clamp.
     """
 
     name: str

@@ -87,7 +87,7 @@ def needed(mechanism: Mechanism) -> list[str]:
     positions = [f"{name}.{axis}" for name in system.bodies for axis in "xy"]
     return (
         list(angles(system))
-        + (positions if len(system.stretches) else [])
+        + (positions if len(system.strains) else [])
         + [
             f"{stop.name}.{variable}"
             for stop in mechanism.stops

@@ -5,7 +5,6 @@
 #include <string.h>
 
 #include "core/constraints.h"
-#include "core/kinetics.h"
 #include "core/matrix.h"
 
 /* --- rows ------------------------------------------------------------------------------------- */
@@ -35,23 +34,23 @@ PRBM int seen_from(const Rows *rows, int i) {
 
 /* Return f (B E + z) of row i, which is measured relative to a body. */
 PRBM Complex seen_value(const Rows *rows, int i, const Complex *e) {
-    int n = rows->system->n;
-    const Complex *B = rows->B + i * n;
+    int d = rows->system->d;
+    const Complex *B = rows->B + i * d;
     Complex sum = rows->z[i];
-    for (int j = 0; j < n; j++) {
+    for (int j = 0; j < d; j++) {
         sum = plus(sum, product(B[j], e[j]));
     }
     return product(conjugate(e[rows->on[i]]), sum);
 }
 
 PRBM double row_value(const Rows *rows, int i, const Complex *e) {
-    int n = rows->system->n;
-    const Complex *B = rows->B + i * n;
+    int d = rows->system->d;
+    const Complex *B = rows->B + i * d;
     if (seen_from(rows, i) != FIXED) {
         return seen_value(rows, i, e).re;
     }
     double sum = 0.0;
-    for (int j = 0; j < n; j++) {
+    for (int j = 0; j < d; j++) {
         sum += B[j].re * e[j].re - B[j].im * e[j].im;
     }
     return sum;
@@ -60,14 +59,15 @@ PRBM double row_value(const Rows *rows, int i, const Complex *e) {
 /* Return B E w of row i, with the complex rates w of the arms. */
 PRBM Complex swing(const Rows *rows, int i, const Complex *e, const double *v) {
     const System *system = rows->system;
-    const Complex *B = rows->B + i * system->n;
+    const Complex *B = rows->B + i * system->d;
     Complex sum = {0.0, 0.0};
-    for (int j = 0; j < system->n; j++) {
-        sum = plus(sum, scaled(v[j], product(B[j], e[j])));
+    for (int j = 0; j < system->d; j++) {
+        sum = plus(sum, scaled(direction_of(system, v, j), product(B[j], e[j])));
     }
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k];
-        sum = plus(sum, scaled(v[j], product(B[arm_of(system, j)], e[j])));
+        Complex arm = product(B[arm_of(system, j)], e[j]);
+        sum = plus(sum, scaled(direction_of(system, v, j), arm));
     }
     return sum;
 }
@@ -78,23 +78,34 @@ PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v)
     if (on == FIXED) {
         return -speed.im;
     }
-    return v[on] * seen_value(rows, i, e).im - product(conjugate(e[on]), speed).im;
+    double turn = direction_of(rows->system, v, on);
+    return turn * seen_value(rows, i, e).im - product(conjugate(e[on]), speed).im;
+}
+
+/* Return the derivative of row i by direction j. */
+static double slope(const Rows *rows, int i, const Complex *e, int j) {
+    const System *system = rows->system;
+    Complex B = rows->B[i * system->d + arm_of(system, j)];
+    int on = seen_from(rows, i);
+    Complex f = on == FIXED ? complex_of(1.0, 0.0) : conjugate(e[on]);
+    return -product(f, product(B, e[j])).im + (j == on ? seen_value(rows, i, e).im : 0.0);
+}
+
+PRBM void row_by_direction(const Rows *rows, int i, const Complex *e, double *row) {
+    for (int j = 0; j < rows->system->d; j++) {
+        row[j] = slope(rows, i, e, j);
+    }
 }
 
 PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row) {
     const System *system = rows->system;
-    const Complex *B = rows->B + i * system->n;
-    int on = seen_from(rows, i);
-    Complex f = on == FIXED ? complex_of(1.0, 0.0) : conjugate(e[on]);
-    for (int j = 0; j < system->n; j++) {
-        row[j] = -product(f, product(B[j], e[j])).im;
+    if (!system->mapped) {
+        row_by_direction(rows, i, e, row);
+        return;
     }
-    for (int k = 0; k < system->stretch_count; k++) {
-        int j = system->stretches[k];
-        row[j] = -product(f, product(B[arm_of(system, j)], e[j])).im;
-    }
-    if (on != FIXED) {
-        row[on] += seen_value(rows, i, e).im;
+    zeros(system->n, row);
+    for (int j = 0; j < system->d; j++) {
+        pull(system, j, slope(rows, i, e, j), row);
     }
 }
 
@@ -102,16 +113,18 @@ PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row) {
  * body that the row is measured relative to. */
 PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v) {
     const System *system = rows->system;
-    const Complex *B = rows->B + i * system->n;
+    const Complex *B = rows->B + i * system->d;
     int on = seen_from(rows, i);
-    double turn = on == FIXED ? 0.0 : v[on];
+    double turn = on == FIXED ? 0.0 : direction_of(system, v, on);
     Complex sum = on == FIXED ? complex_of(0.0, 0.0) : scaled(turn * turn, rows->z[i]);
-    for (int j = 0; j < system->n; j++) {
-        sum = plus(sum, scaled((v[j] - turn) * (v[j] - turn), product(B[j], e[j])));
+    for (int j = 0; j < system->d; j++) {
+        double rate = direction_of(system, v, j) - turn;
+        sum = plus(sum, scaled(rate * rate, product(B[j], e[j])));
     }
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);
-        Complex more = complex_of(-v[j] * v[j], -2.0 * (v[a] - turn) * v[j]);
+        double rate = direction_of(system, v, a) - turn, strain = direction_of(system, v, j);
+        Complex more = complex_of(-strain * strain, -2.0 * rate * strain);
         sum = plus(sum, product(more, product(B[a], e[a])));
     }
     return on == FIXED ? sum.re : product(conjugate(e[on]), sum).re;
@@ -163,7 +176,7 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
                             Complex *e, Scratch *scratch, Problem *problem) {
     size_t mark = scratch->used, n = (size_t)system->n, r = (size_t)rows->count, size = n + r;
     double *s = take(scratch, r), *G = take(scratch, r * n);
-    double *M = take(scratch, n * n), *C = take(scratch, n * n);
+    double *M = take(scratch, n * n);
     double *kkt = take(scratch, size * size), *right = take(scratch, size);
     double best = INFINITY;
     bool ok = true, closed = false;
@@ -178,7 +191,7 @@ PRBM bool project_positions(const System *system, const Rows *rows, double *q, c
         best = error < best ? error : best;
         if (!closed) {
             jacobian(rows, e, G);
-            inertia(system->n, system->H, system->J, e, M, C);
+            mass_matrix(system, e, M, scratch);
             saddle(system->n, rows->count, M, G, G, kkt);
             zeros(system->n, right);
             for (size_t k = 0; k < r; k++) {

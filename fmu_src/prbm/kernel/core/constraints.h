@@ -9,10 +9,10 @@
 typedef struct {
     const System *system;
     int count;
-    const Complex *B;       /* (count, n) */
+    const Complex *B;       /* (count, d) */
     const double *c;        /* (count,) */
     const Complex *z;       /* (count,), or NULL if on is NULL */
-    const int *on;          /* (count,) angles of the bodies, FIXED for the ground; NULL: all FIXED */
+    const int *on;          /* (count,) directions of the bodies; FIXED: the ground; NULL: all FIXED */
 } Rows;
 
 /* The message for equations without a unique solution. */
@@ -26,6 +26,8 @@ PRBM Rows slide_rows(const System *system);
 PRBM Rows rub_rows(const System *system);
 PRBM double row_value(const Rows *rows, int i, const Complex *e); /* Without c. */
 PRBM double row_rate(const Rows *rows, int i, const Complex *e, const double *v);
+/* Compute the derivatives of row i by the directions, row (d,). */
+PRBM void row_by_direction(const Rows *rows, int i, const Complex *e, double *row);
 PRBM void row_jacobian(const Rows *rows, int i, const Complex *e, double *row);
 PRBM double row_convective(const Rows *rows, int i, const Complex *e, const double *v);
 PRBM void scalars(const Rows *rows, const Complex *e, double *s);

@@ -25,10 +25,11 @@ static double rubbing_power(const Equations *q, const Evaluation *at, const doub
 
 /* The power of the inputs and of the moving walls of closed stops. */
 static double input_power(const Equations *q, const Evaluation *at, const double *v) {
-    int n = q->system->n;
+    const System *system = q->system;
     double power = 0.0;
-    for (int j = 0; j < n; j++) {
-        power += (product(q->w_input[j], at->at.e[j]).re + q->moment[j]) * v[j];
+    for (int j = 0; j < system->d; j++) {
+        double load = product(q->w_input[j], at->at.e[j]).re + q->moment[j];
+        power += load * direction_of(system, v, j);
     }
     for (int k = 0; k < q->held_count; k++) {
         double velocity = wall_motion(&q->inputs.walls[q->held[k]], at->at.time).v;
@@ -115,11 +116,11 @@ PRBM double gap_acceleration(const Equations *equations, int i, double t, const 
 static void arm_accelerations(const System *system, const Complex *e, const double *v,
                               const double *a, Complex *result, Scratch *scratch) {
     size_t mark = scratch->used;
-    int n = system->n;
-    Complex *w = take_complex(scratch, n, 1), *dw = take_complex(scratch, n, 1);
+    int d = system->d;
+    Complex *w = take_complex(scratch, d, 1), *dw = take_complex(scratch, d, 1);
     turning(system, v, w);
     turning(system, a, dw);
-    for (int j = 0; j < n; j++) {
+    for (int j = 0; j < d; j++) {
         Complex change = minus(complex_of(-dw[j].im, dw[j].re), product(w[j], w[j]));
         result[j] = product(e[j], change);
     }
@@ -127,9 +128,9 @@ static void arm_accelerations(const System *system, const Complex *e, const doub
 }
 
 /* Return the product A E of a row of A. */
-PRBM Complex along_arms(int n, const Complex *A, const Complex *e) {
+PRBM Complex along_arms(int d, const Complex *A, const Complex *e) {
     Complex sum = {0.0, 0.0};
-    for (int j = 0; j < n; j++) {
+    for (int j = 0; j < d; j++) {
         sum = plus(sum, product(A[j], e[j]));
     }
     return sum;
@@ -139,27 +140,27 @@ PRBM void base_reaction(const Equations *equations, const Complex *e, const doub
                         const double *a, Complex *force, double *moment, Scratch *scratch) {
     const System *system = equations->system;
     size_t mark = scratch->used;
-    int n = system->n;
+    int d = system->d;
     Complex field = minus(system->gravity, equations->inputs.base);
-    Complex *bend = take_complex(scratch, n, 1);
+    Complex *bend = take_complex(scratch, d, 1);
     arm_accelerations(system, e, v, a, bend, scratch);
     *force = complex_of(0.0, 0.0);
     *moment = 0.0;
     for (int i = 0; i < system->p; i++) {
-        const Complex *A = system->A + i * n;
-        Complex z = plus(along_arms(n, A, e), minus(system->c[i], system->anchor));
-        Complex load = scaled(system->m[i], minus(field, along_arms(n, A, bend)));
+        const Complex *A = system->A + i * d;
+        Complex z = plus(along_arms(d, A, e), minus(system->c[i], system->anchor));
+        Complex load = scaled(system->m[i], minus(field, along_arms(d, A, bend)));
         *force = plus(*force, load);
         *moment += product(conjugate(z), load).im;
     }
-    for (int j = 0; j < n; j++) {
-        *moment -= system->J[j] * a[j];
+    for (int j = 0; j < d; j++) {
+        *moment -= system->J[j] * direction_of(system, a, j);
     }
     for (int i = 0; i < system->mechanism->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
         const double *given = equations->inputs.forces + LOADS * i;
         Complex f = complex_of(given[0], given[1]);
-        Complex z = plus(along_arms(n, frame->A, e), minus(frame->c, system->anchor));
+        Complex z = plus(along_arms(d, frame->A, e), minus(frame->c, system->anchor));
         *force = plus(*force, f);
         *moment += product(conjugate(z), f).im + given[2];
     }

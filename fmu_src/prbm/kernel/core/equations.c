@@ -15,8 +15,8 @@ PRBM Parts place_parts(Memory *memory, size_t count) {
 }
 
 PRBM void equations_place(Equations *equations, const System *system, Memory *memory) {
-    size_t n = (size_t)system->n, s = (size_t)system->s, f = (size_t)system->f;
-    size_t r = (size_t)system->r + 2 * s + f, even = (size_t)system->even;
+    size_t s = (size_t)system->s, f = (size_t)system->f;
+    size_t r = (size_t)system->r + 2 * s + f, d = (size_t)system->d, wide = (size_t)system->wide;
     Equations q = {0};
     q.system = system;
     q.contacts.modes = place(memory, s + f, sizeof(ContactMode));
@@ -25,16 +25,16 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
     q.slipping = place(memory, s + f, sizeof(int));
     q.stop_friction = place(memory, s, sizeof(double));
     q.rub_law = place(memory, 3 * f, sizeof(double));
-    q.B = place(memory, r * n, sizeof(Complex));
+    q.B = place(memory, r * d, sizeof(Complex));
     q.z = place(memory, r, sizeof(Complex));
     q.c = place(memory, r, sizeof(double));
     q.on = place(memory, r, sizeof(int));
     q.carried = place(memory, r, sizeof(int));
-    q.w = place(memory, n, sizeof(Complex));
-    q.w_input = place(memory, n, sizeof(Complex));
-    q.moment = place(memory, even, sizeof(double));
-    q.B_conjugate = place_parts(memory, r * even);
-    q.w_parts = place_parts(memory, even);
+    q.w = place(memory, d, sizeof(Complex));
+    q.w_input = place(memory, d, sizeof(Complex));
+    q.moment = place(memory, wide, sizeof(double));
+    q.B_conjugate = place_parts(memory, r * wide);
+    q.w_parts = place_parts(memory, wide);
     *equations = q;
 }
 
@@ -42,8 +42,8 @@ PRBM void equations_place(Equations *equations, const System *system, Memory *me
 
 /* Append row i of some rows to the active rows, with the constant c. */
 static void add_row(Equations *q, const Rows *rows, int i, double c) {
-    int n = q->system->n, on = seen_from(rows, i);
-    memcpy(q->B + q->r * n, rows->B + i * n, (size_t)n * sizeof *rows->B);
+    int d = q->system->d, on = seen_from(rows, i);
+    memcpy(q->B + q->r * d, rows->B + i * d, (size_t)d * sizeof *rows->B);
     q->c[q->r] = c;
     q->on[q->r] = on;
     if (on != FIXED) {
@@ -94,12 +94,12 @@ PRBM Parts parts_from(Parts parts, int start) {
 
 /* Set the real and imaginary parts of the rows, with columns for stretches, padded. */
 static void set_row_parts(Equations *q) {
-    int n = q->system->n, even = q->system->even;
+    int d = q->system->d, wide = q->system->wide;
     for (int k = 0; k < q->r; k++) {
-        spread(q->system, 1, q->B + k * n, q->w); /* w is free memory here. */
-        pad_parts(n, q->w, parts_from(q->B_conjugate, k * even));
+        spread(q->system, 1, q->B + k * d, q->w); /* w is free memory here. */
+        pad_parts(d, q->w, parts_from(q->B_conjugate, k * wide));
     }
-    for (int i = 0; i < q->r * even; i++) {
+    for (int i = 0; i < q->r * wide; i++) {
         q->B_conjugate.im[i] = -q->B_conjugate.im[i];
     }
 }
@@ -136,28 +136,28 @@ static void set_laws(Equations *q) {
 static void set_loads(Equations *q) {
     const System *system = q->system;
     const Mechanism *m = system->mechanism;
-    int n = system->n;
-    zeros(system->even, q->moment);
-    field_row(n, system->S, scaled(-1.0, q->inputs.base), q->w_input);
+    int d = system->d;
+    zeros(system->wide, q->moment);
+    field_row(d, system->S, scaled(-1.0, q->inputs.base), q->w_input);
     for (int i = 0; i < m->force_count; i++) {
         const BodyFrame *frame = &system->pushed[i];
         const double *given = q->inputs.forces + LOADS * i;
-        force_row(n, frame->A, complex_of(given[0], given[1]), q->w);
-        for (int j = 0; j < n; j++) {
+        force_row(d, frame->A, complex_of(given[0], given[1]), q->w);
+        for (int j = 0; j < d; j++) {
             q->w_input[j] = plus(q->w_input[j], q->w[j]);
         }
-        q->moment[frame->j] += given[2];
+        q->moment[frame->arm] += given[2];
     }
     spread(system, 1, q->w_input, q->w_input);
-    field_row(n, system->S, system->gravity, q->w);
+    field_row(d, system->S, system->gravity, q->w);
     spread(system, 1, q->w, q->w);
     q->driven = false;
-    for (int j = 0; j < n; j++) {
+    for (int j = 0; j < d; j++) {
         q->w[j] = plus(q->w_input[j], q->w[j]);
         q->driven = q->driven || q->w_input[j].re != 0.0 || q->w_input[j].im != 0.0 ||
                     q->moment[j] != 0.0;
     }
-    pad_parts(n, q->w, q->w_parts);
+    pad_parts(d, q->w, q->w_parts);
     q->walls_move = false;
     for (int i = 0; i < system->s; i++) {
         const Wall *wall = &q->inputs.walls[i];

@@ -38,18 +38,18 @@ typedef struct {
     int slipping_stops;
     double *stop_friction;  /* (s,) */
     double *rub_law;        /* (f, 3): coefficient, normal force, normal stiffness */
-    Complex *B, *z;         /* (r, n), (r,) of the active rows */
+    Complex *B, *z;         /* (r, d), (r,) of the active rows */
     double *c;              /* (r,) */
     int *on, *carried;      /* (r,), (carried_count,) rows relative to a moving body */
     int carried_count;
     Rows active;
-    Complex *w, *w_input;   /* (n,) */
-    double *moment;         /* (even,) */
+    Complex *w, *w_input;   /* (d,) */
+    double *moment;         /* (wide,) */
     bool walls_move;
     bool driven;            /* inputs or walls do work */
     bool friction_or_walls; /* whether contacts slip or walls move */
-    Parts B_conjugate;      /* (r, even) */
-    Parts w_parts;          /* (even,) */
+    Parts B_conjugate;      /* (r, wide) */
+    Parts w_parts;          /* (wide,) */
 } Equations;
 
 PRBM void equations_place(Equations *equations, const System *system, Memory *memory);

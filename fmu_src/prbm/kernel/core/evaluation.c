@@ -3,6 +3,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "core/block_map.h"
 #include "core/evaluation.h"
 #include "core/forces.h"
 #include "core/kinetics.h"
@@ -12,22 +13,25 @@
 /* --- memory ----------------------------------------------------------------------------------- */
 
 PRBM void reference_place(Reference *reference, const System *system, Memory *memory) {
-    size_t even = (size_t)system->even;
-    reference->angle = place(memory, even, sizeof(double));
-    reference->e = place(memory, even, sizeof(Complex));
-    reference->e_parts = place_parts(memory, even);
+    size_t wide = (size_t)system->wide;
+    reference->theta = place(memory, wide, sizeof(double));
+    reference->e = place(memory, wide, sizeof(Complex));
+    reference->e_parts = place_parts(memory, wide);
 }
 
 PRBM Kinematics place_kinematics(const System *system, Memory *memory) {
-    size_t even = (size_t)system->even;
+    size_t even = (size_t)system->even, wide = (size_t)system->wide;
     Kinematics at;
     at.time = 0.0;
     at.angle = place(memory, even, sizeof(double));
     at.speed = place(memory, even + 2, sizeof(double));
-    at.squares = place(memory, even, sizeof(double));
-    at.own = place(memory, (size_t)system->n, sizeof(double));
-    at.e = place(memory, even, sizeof(Complex));
-    at.e_parts = place_parts(memory, even);
+    at.theta = system->mapped ? place(memory, wide, sizeof(double)) : at.angle;
+    at.turn = system->mapped ? place(memory, wide, sizeof(double)) : at.speed;
+    at.squares = place(memory, wide, sizeof(double));
+    at.own = place(memory, (size_t)system->d, sizeof(double));
+    at.local = place(memory, system->mapped ? (wide + 1) * even : 0, sizeof(double));
+    at.e = place(memory, wide, sizeof(Complex));
+    at.e_parts = place_parts(memory, wide);
     return at;
 }
 
@@ -39,7 +43,8 @@ PRBM void zero_placed(const Memory *memory, size_t begin) {
 }
 
 PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory *memory) {
-    size_t n = (size_t)system->n, even = (size_t)system->even, begin = memory->used;
+    size_t n = (size_t)system->n, even = (size_t)system->even, wide = (size_t)system->wide;
+    size_t begin = memory->used;
     size_t r = (size_t)system->r + 2 * (size_t)system->s + (size_t)system->f;
     Evaluation result = {0};
     result.at = place_kinematics(system, memory);
@@ -48,14 +53,18 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
     result.columns = place(memory, r * even, sizeof(double));
     result.a = place(memory, even + 2, sizeof(double));
     result.lam = place(memory, r, sizeof(double));
-    result.block = place(memory, n * n, sizeof(double));
+    result.block = place(memory, wide * wide, sizeof(double));
     result.factors.even = (int)even;
-    result.factors.blocks = system->blocks;
+    result.factors.blocks = system->mass_blocks;
     result.factors.L = place(memory, n * n, sizeof(double));
     result.factors.inverse = place(memory, even, sizeof(double));
     result.factors.Z = place(memory, r * even, sizeof(double));
     result.factors.S = place(memory, 2 * r * r + r, sizeof(double));
     result.factors.pivots = place(memory, r, sizeof(int));
+    result.load = system->mapped ? place(memory, wide, sizeof(double)) : result.a;
+    result.rows = system->mapped ? place(memory, r * wide, sizeof(double)) : result.factors.Z;
+    result.mass = place(memory, system->mapped ? n * n : 0, sizeof(double));
+    result.shift = place(memory, system->mapped ? wide : 0, sizeof(double));
     zero_placed(memory, begin);
     *evaluation = result;
 }
@@ -63,18 +72,21 @@ PRBM void evaluation_place(Evaluation *evaluation, const System *system, Memory 
 /* --- position and velocity -------------------------------------------------------------------- */
 
 PRBM void set_reference(Reference *reference, const System *system, const double *angle) {
-    int even = system->even;
-    pad(system->n, angle, reference->angle);
-    unit_vectors(even, reference->angle, reference->e);
-    pad_parts(even, reference->e, reference->e_parts);
-    stretch(system, reference->angle, reference->e);
+    int wide = system->wide;
+    for (int j = 0; j < system->d; j++) {
+        reference->theta[j] = direction_of(system, angle, j);
+    }
+    reference->theta[wide - 1] = system->d < wide ? 0.0 : reference->theta[wide - 1];
+    unit_vectors(wide, reference->theta, reference->e);
+    pad_parts(wide, reference->e, reference->e_parts);
+    stretch(system, reference->theta, reference->e);
 }
 
 /* Set the arms of links that stretch, and the diagonal of M, which is proportional to |E|^2. */
 RARE void stretch_links(const System *system, Kinematics *at) {
-    stretch(system, at->angle, at->e);
-    pad_parts(system->even, at->e, at->e_parts);
-    copy(system->n, system->own, at->own);
+    stretch(system, at->theta, at->e);
+    pad_parts(system->wide, at->e, at->e_parts);
+    copy(system->d, system->own, at->own);
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);
         double square = at->e[a].re * at->e[a].re + at->e[a].im * at->e[a].im;
@@ -82,7 +94,7 @@ RARE void stretch_links(const System *system, Kinematics *at) {
     }
 }
 
-/* Return the diagonal of M.  It is constant unless links stretch. */
+/* Return the diagonal of the mass matrix of the directions.  It is constant unless arms stretch. */
 static const double *own_inertia(const System *system, const Kinematics *at) {
     return system->stretch_count > 0 ? at->own : system->own;
 }
@@ -90,8 +102,8 @@ static const double *own_inertia(const System *system, const Kinematics *at) {
 /* Compute the directions at the angles, from those of a nearby reference if possible. */
 SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at) {
     if (near == NULL ||
-        !turned_directions(even, at->angle, near->angle, near->e_parts, at->e_parts, at->e)) {
-        unit_vectors(even, at->angle, at->e);
+        !turned_directions(even, at->theta, near->theta, near->e_parts, at->e_parts, at->e)) {
+        unit_vectors(even, at->theta, at->e);
         pad_parts(even, at->e, at->e_parts);
     }
     if (system->stretch_count > 0) {
@@ -99,8 +111,23 @@ SHARED void directions_of(int even, const System *system, const Reference *near,
     }
 }
 
+/* Compute the directions and the arms, if the coordinates are not the directions. */
+RARE void mapped_directions(const System *system, const Reference *near, Kinematics *at) {
+    map_directions(system, at->angle, at->local, at->theta);
+    directions_of(system->wide, system, near, at);
+}
+
+/* Compute the arms at the angles. */
+SHARED void arms_at(int even, const System *system, const Reference *near, Kinematics *at) {
+    if (system->mapped) {
+        mapped_directions(system, near, at);
+    } else {
+        directions_of(even, system, near, at);
+    }
+}
+
 PRBM void find_directions(const System *system, const Reference *near, Kinematics *at) {
-    directions_of(system->even, system, near, at);
+    arms_at(system->even, system, near, at);
 }
 
 /* Replace the squares of the rates by Re(w^2), with the complex rates w = theta' - i s' of arms. */
@@ -112,10 +139,10 @@ RARE void stretch_squares(const System *system, double *squares) {
     }
 }
 
-/* Compute the loads Re(w e) + moment, stored in a, and the squares of the rates. */
+/* Compute the loads Re(w e) + moment of the directions, and the squares of their rates. */
 SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
-    const double *moment = q->moment, *v = result->at.speed;
-    double *x = result->a, *squares = result->at.squares;
+    const double *moment = q->moment, *v = result->at.turn;
+    double *x = result->load, *squares = result->at.squares;
     Parts w = q->w_parts, e = result->at.e_parts;
     UNROLLED_BY_LANES
     for (int j = 0; j < even; j += LANES) {
@@ -131,10 +158,11 @@ SIZED void find_loads(int even, const Equations *q, Evaluation *result) {
 
 /* --- loads and rows --------------------------------------------------------------------------- */
 
-/* Return Im(w^2) = -2 theta' s' of a link that stretches.  The equations without these terms give
- * the angular acceleration minus Im(w^2); add_coriolis adds Im(w^2) to the solution. */
-static double coriolis(const System *system, const double *v, int stretch_coordinate) {
-    return -2.0 * v[arm_of(system, stretch_coordinate)] * v[stretch_coordinate];
+/* Return Im(w^2) = -2 theta' s' of an arm that stretches.  The equations without these terms give
+ * the angular acceleration minus Im(w^2).  If the coordinates are the directions, add_coriolis adds
+ * Im(w^2) to the solution; otherwise pull_shift adds its loads to the right side. */
+static double coriolis(const System *system, const double *turn, int stretch_direction) {
+    return -2.0 * turn[arm_of(system, stretch_direction)] * turn[stretch_direction];
 }
 
 /* Subtract the forces of springs and their damping from the loads, x -= K (q - q0 + beta v), and
@@ -187,12 +215,12 @@ RARE void carried_rows(const Equations *q, const Kinematics *at, double *rows,
     const System *system = q->system;
     for (int c = 0; c < q->carried_count; c++) {
         int k = q->carried[c];
-        double *row = rows + k * system->even;
-        row_jacobian(&q->active, k, at->e, row);
+        double *row = rows + k * system->wide;
+        row_by_direction(&q->active, k, at->e, row);
         convective[k] = row_convective(&q->active, k, at->e, at->speed);
         for (int l = 0; l < system->stretch_count; l++) {
             int j = system->stretches[l];
-            convective[k] -= row[arm_of(system, j)] * coriolis(system, at->speed, j);
+            convective[k] -= row[arm_of(system, j)] * coriolis(system, at->turn, j);
         }
     }
 }
@@ -215,9 +243,9 @@ SIZED void rows_padded(int even, const Equations *q, const Kinematics *at, doubl
     }
 }
 
-static void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
-                                double *convective) {
-    rows_padded(q->system->even, q, at, rows, convective);
+PRBM void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
+                              double *convective) {
+    rows_padded(q->system->wide, q, at, rows, convective);
 }
 
 SHARED void rows_dispatch(int even, const Equations *q, const Kinematics *at, double *rows,
@@ -322,7 +350,41 @@ SIZED bool small_block_motion(const Equations *q, Evaluation *result, int size, 
     return true;
 }
 
+/* Factor a block of the mass matrix in result->mass. */
+SIZED bool mapped_block_motion(const Equations *q, Evaluation *result, int size, int start,
+                               double *L) {
+    const int n = q->system->n;
+    for (int i = 0; i < size; i++) {
+        copy(i + 1, result->mass + (start + i) * n + start, result->block + i * size);
+    }
+    if (q->mass_damping != 0.0) {
+        damp_mass(size, q->mass_damping, result->block, result->at.speed + start,
+                  result->a + start);
+    }
+    return factor_any_block(q, result, size, start, L);
+}
+
+/* Factor the blocks of the mass matrix in result->mass.  The sizes of guides on two beams of the
+ * orders 3 and 5 are compiled separately. */
+RARE bool mapped_blocks_motion(const Equations *q, Evaluation *result) {
+    bool regular = true;
+    double *L = result->factors.L;
+    for (int k = 0; k < result->factors.block_count; k++) {
+        int start = result->factors.blocks[k].start, size = result->factors.blocks[k].size;
+        switch (size) {
+        case 7: regular = mapped_block_motion(q, result, 7, start, L) && regular; break;
+        case 11: regular = mapped_block_motion(q, result, 11, start, L) && regular; break;
+        default: regular = mapped_block_motion(q, result, size, start, L) && regular;
+        }
+        L += size * size;
+    }
+    return regular;
+}
+
 static bool blocks_motion(const Equations *q, Evaluation *result) {
+    if (q->system->mapped) {
+        return mapped_blocks_motion(q, result);
+    }
     bool regular = true;
     const Complex *H = q->system->coupling;
     double *L = result->factors.L;
@@ -341,6 +403,89 @@ static bool blocks_motion(const Equations *q, Evaluation *result) {
     return regular;
 }
 
+/* --- directions that are not coordinates ------------------------------------------------------- */
+
+/* Add the loads of the shift, Im(w^2) of the arms that stretch, to those of a block of directions:
+ * the mass matrix of the block, of which the lower triangle is given, times the shift. */
+static void pull_shift(int size, const double *block, const double *shift, double *load) {
+    for (int i = 0; i < size; i++) {
+        load[i] += block[i * size + i] * shift[i];
+        for (int j = 0; j < i; j++) {
+            load[i] += block[i * size + j] * shift[j];
+            load[j] += block[i * size + j] * shift[i];
+        }
+    }
+}
+
+/* Compute Im(w^2) of all arms. */
+static void find_shift(const System *system, const Kinematics *at, double *shift) {
+    zeros(system->wide, shift);
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k];
+        shift[arm_of(system, j)] = coriolis(system, at->turn, j);
+    }
+}
+
+/* Compute the mass matrix of a block of directions, and add its quadratic velocity terms to the loads.
+ * The sizes of beams of the order 3 with 5 or 6 nodes are compiled separately. */
+static void mapped_block_inertia(const System *system, int size, int start, const Complex *H,
+                                 Evaluation *result) {
+    const Kinematics *at = &result->at;
+    const double *own = own_inertia(system, at) + start, *squares = at->squares + start;
+    Parts e = parts_from(at->e_parts, start);
+    double *load = result->load + start;
+    switch (size) {
+    case 5: block_inertia(5, H, own, e, squares, result->block, load); break;
+    case 6: block_inertia(6, H, own, e, squares, result->block, load); break;
+    case 7: block_inertia(7, H, own, e, squares, result->block, load); break;
+    default: block_inertia(size, H, own, e, squares, result->block, load);
+    }
+}
+
+/* Compute M, and add the quadratic velocity terms to the loads of the directions. */
+static void mapped_mass(const Equations *q, Evaluation *result) {
+    const System *system = q->system;
+    const Kinematics *at = &result->at;
+    const Complex *H = system->coupling;
+    if (system->stretch_count > 0) {
+        find_shift(system, at, result->shift);
+    }
+    zeros(system->n * system->n, result->mass);
+    for (int k = 0; k < system->block_count; k++) {
+        int start = system->blocks[k].start, size = system->blocks[k].size;
+        mapped_block_inertia(system, size, start, H, result);
+        if (system->stretch_count > 0) {
+            pull_shift(size, result->block, result->shift + start, result->load + start);
+        }
+        pull_mass(system, &system->maps[k], result->block, at->local, result->mass);
+        H += size * size;
+    }
+}
+
+/* Compute loads, rows and mass matrix of the directions, and pull them back to the coordinates. */
+RARE void mapped_terms(const Equations *q, const Reference *near, Evaluation *result) {
+    const System *system = q->system;
+    const int even = system->even, wide = system->wide;
+    Kinematics *at = &result->at;
+    double *Z = result->factors.Z;
+    map_directions(system, at->speed, at->local, at->turn);
+    mapped_directions(system, near, at);
+    find_loads(wide, q, result);
+    rows_and_convection(q, at, result->rows, result->lam);
+    mapped_mass(q, result);
+    zeros(even, result->a);
+    zeros(q->r * even, Z);
+    pull_directions(system, result->load, at->local, result->a);
+    for (int k = 0; k < q->r; k++) {
+        pull_directions(system, result->rows + k * wide, at->local, Z + k * even);
+        if (system->stretch_count > 0) {
+            result->lam[k] += even_dot(wide, result->rows + k * wide, result->shift);
+        }
+    }
+}
+
+/* --- energy ----------------------------------------------------------------------------------- */
+
 /* Return the kinetic energy v^T diag(e)^H H diag(e) v / 2. */
 PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *evaluation,
                               const double *v) {
@@ -351,12 +496,13 @@ PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *eval
     for (int k = 0; k < system->block_count; k++) {
         int start = system->blocks[k].start, end = start + system->blocks[k].size;
         for (int i = start; i < end; i++) {
-            double row = 0.5 * own[i] * v[i];
+            double turn = direction_of(system, v, i), row = 0.5 * own[i] * turn;
             for (int j = start; j < i; j++) {
-                Complex h = system->H[i * system->n + j];
-                row += product(product(conjugate(e[i]), h), e[j]).re * v[j];
+                Complex h = system->H[i * system->d + j];
+                double mass = product(product(conjugate(e[i]), h), e[j]).re;
+                row += mass * direction_of(system, v, j);
             }
-            sum += row * v[i];
+            sum += row * turn;
         }
     }
     return sum;
@@ -432,7 +578,7 @@ RARE void set_columns(const Equations *q, Evaluation *result) {
 /* Compute the factors from the rows in Z, and replace a by L^-1 a. */
 SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
     result->factors.r = q->r;
-    result->factors.block_count = q->system->block_count;
+    result->factors.block_count = q->system->mass_block_count;
     if (!blocks_motion(q, result)) {
         return false;
     }
@@ -446,17 +592,21 @@ SIZED bool factor_motion(int even, const Equations *q, Evaluation *result) {
 RARE void add_coriolis(const System *system, Evaluation *result) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k];
-        result->a[arm_of(system, j)] += coriolis(system, result->at.speed, j);
+        result->a[arm_of(system, j)] += coriolis(system, result->at.turn, j);
     }
 }
 
 /* Solve for a and lam at the time, angles and rates of the evaluation. */
 SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,
                             Evaluation *result) {
-    directions_of(even, q->system, near, &result->at);
-    find_loads(even, q, result);
+    if (q->system->mapped) {
+        mapped_terms(q, near, result);
+    } else {
+        directions_of(even, q->system, near, &result->at);
+        find_loads(even, q, result);
+        rows_dispatch(even, q, &result->at, result->rows, result->lam);
+    }
     add_springs(even, q, result);
-    rows_dispatch(even, q, &result->at, result->factors.Z, result->lam);
     if (q->friction_or_walls) {
         add_friction_and_walls(q, result);
     }
@@ -464,7 +614,7 @@ SHARED bool motion_of_length(int even, const Equations *q, const Reference *near
         return false;
     }
     finish_dispatch(even, &result->factors, result->a, result->lam);
-    if (q->system->stretch_count > 0) {
+    if (q->system->stretch_count > 0 && !q->system->mapped) {
         add_coriolis(q->system, result);
     }
     return true;
@@ -485,9 +635,13 @@ PRBM bool factor_equations(const Equations *equations, const double *q, const do
     const System *system = equations->system;
     pad(system->n, q, result->at.angle);
     pad(system->n, v, result->at.speed);
-    find_directions(system, near, &result->at);
-    find_loads(system->even, equations, result);
-    rows_and_convection(equations, &result->at, result->factors.Z, result->lam);
+    if (system->mapped) {
+        mapped_terms(equations, near, result);
+    } else {
+        find_directions(system, near, &result->at);
+        find_loads(system->even, equations, result);
+        rows_and_convection(equations, &result->at, result->rows, result->lam);
+    }
     return factor_motion(system->even, equations, result) ||
            fail(problem, "%s", SINGULAR);
 }

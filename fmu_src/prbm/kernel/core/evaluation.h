@@ -5,20 +5,24 @@
 #include "core/equations.h"
 #include "core/factors.h"
 
-/* Angles and their directions, from which the directions at nearby angles are computed. */
+/* Directions, from which the arms at nearby directions are computed. */
 typedef struct {
-    double *angle; /* (even,) */
-    Complex *e;    /* (even,) */
-    Parts e_parts; /* (even,) unit vectors, without stretch */
+    double *theta; /* (wide,) */
+    Complex *e;    /* (wide,) */
+    Parts e_parts; /* (wide,) unit vectors, without stretch */
 } Reference;
 
-/* Position and velocity of a system.  The coordinates come first, then the ground. */
+/* Position and velocity of a system.  The coordinates come first, then the ground.  Unless the map
+ * to the directions is not the identity, theta is angle and turn is speed. */
 typedef struct {
-    double time;                     /* used if the walls of held stops move */
-    double *angle, *speed, *squares; /* (even,), (even + 2,), (even,): speed^2 */
-    Complex *e;                      /* (n,) */
-    Parts e_parts;                   /* (even,) */
-    double *own;                     /* (n,) the diagonal of M, if links stretch */
+    double time;             /* used if the walls of held stops move */
+    double *angle, *speed;   /* (even,), (even + 2,) coordinates and their rates */
+    double *theta, *turn;    /* (wide,) directions and their rates */
+    double *squares;         /* (wide,): turn^2 */
+    Complex *e;              /* (wide,) */
+    Parts e_parts;           /* (wide,) */
+    double *local;           /* (wide + 1, even) working memory, if mapped */
+    double *own;             /* (d,) the diagonal of the mass of the directions, if arms stretch */
 } Kinematics;
 
 /* The equations of motion, evaluated at a state. */
@@ -27,6 +31,8 @@ typedef struct {
     double *turns;                   /* (even + 2,) deflections and damping of the springs */
     double *row, *columns;           /* (even,), (r, even) */
     double *a, *lam;                 /* (even + 2,) accelerations; (r,) */
+    double *load, *rows;             /* (wide,), (r, wide) of the directions: a and Z, unless mapped */
+    double *mass, *shift;            /* (n, n), (wide,) M and Im(w^2), if mapped */
     double *block;                   /* of M, below its diagonal */
     double spring_loss;              /* the power that the springs dissipate */
     Factors factors;
@@ -46,6 +52,10 @@ PRBM double kinetic_energy_of(const Equations *equations, const Evaluation *eval
                               const double *v);
 PRBM double rub_limit(const Equations *equations, int i, const Complex *e);
 SHARED void directions_of(int even, const System *system, const Reference *near, Kinematics *at);
+SHARED void arms_at(int even, const System *system, const Reference *near, Kinematics *at);
+/* Compute the derivatives of the active rows by the directions, and their convective terms. */
+PRBM void rows_and_convection(const Equations *q, const Kinematics *at, double *rows,
+                              double *convective);
 SHARED void rows_dispatch(int even, const Equations *q, const Kinematics *at, double *rows,
                            double *convective);
 SHARED bool motion_of_length(int even, const Equations *q, const Reference *near,

@@ -36,14 +36,14 @@ PRBM void force_row(int n, const Complex *A, Complex force, Complex *w) {
 PRBM void load_rows(const System *system, const BodyFrame *frame, const Complex *e, double *rows,
                     Scratch *scratch) {
     size_t mark = scratch->used;
-    int n = system->n;
-    Complex *w = take_complex(scratch, n, 1);
+    int n = system->n, d = system->d;
+    Complex *w = take_complex(scratch, d, 1);
+    zeros(3 * n, rows);
     for (int k = 0; k < 2; k++) {
-        force_row(n, frame->A, complex_of(k == 0, k == 1), w);
+        force_row(d, frame->A, complex_of(k == 0, k == 1), w);
         spread(system, 1, w, w);
-        generalised(n, w, e, rows + k * n);
+        add_loads(system, w, e, rows + k * n);
     }
-    zeros(n, rows + 2 * n);
     rows[2 * n + frame->j] = 1.0;
     scratch->used = mark;
 }
@@ -54,9 +54,15 @@ PRBM void generalised(int n, const Complex *w, const Complex *e, double *Q) {
     }
 }
 
+PRBM void add_loads(const System *system, const Complex *w, const Complex *e, double *Q) {
+    for (int j = 0; j < system->d; j++) {
+        pull(system, j, product(w[j], e[j]).re, Q);
+    }
+}
+
 PRBM double gravitational_energy(const System *system, const Complex *e) {
     Complex fall = {0.0, 0.0};
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->d; j++) {
         fall = plus(fall, product(system->S[j], minus(e[j], system->e0[j])));
     }
     return -product(conjugate(system->gravity), fall).re;

@@ -3,6 +3,7 @@
 
 #include "core/flexure.h"
 #include "core/layout.h"
+#include "core/system.h"
 #include "core/tables.h"
 
 static const FlexureType *kind_of(const Mechanism *m, const Flexure *flexure) {
@@ -13,22 +14,60 @@ static int link_count(const Mechanism *m, const Flexure *flexure) {
     return links_of(kind_of(m, flexure), flexure->type_at_start, flexure->type_at_end);
 }
 
-PRBM void count_coordinates(Reader *reader, Mechanism *m) {
-    long long links = 0, stretching = 0;
-    for (int i = 0; i < m->flexure_count && !reader->wrong; i++) {
-        int count = link_count(m, &m->flexures[i]);
-        links += count;
-        m->longest = count > m->longest ? count : m->longest;
-        for (int k = 0; k < count; k++) {
-            stretching += stretches(kind_of(m, &m->flexures[i]), k, count);
-        }
+/* The numbers that a flexure adds. */
+typedef struct {
+    int links, strains;       /* coordinates */
+    int arms, stretches;      /* directions */
+    int springs, masses, map; /* map: changes of directions with coordinates */
+} Addition;
+
+static int pin_count(const Flexure *flexure) {
+    return (flexure->type_at_start == PIN) + (flexure->type_at_end == PIN);
+}
+
+static Addition beam_addition(const FlexureType *kind, const Flexure *flexure) {
+    int nodes = kind->nodes, stretches = kind->axial ? nodes : 0;
+    Addition result = {kind->order + pin_count(flexure), kind->axial, nodes, stretches,
+                       1 + kind->order + kind->axial, nodes, nodes * (kind->order + 2) + stretches};
+    return result;
+}
+
+static Addition links_addition(const Mechanism *m, const Flexure *flexure) {
+    int links = link_count(m, flexure), strains = 0;
+    for (int k = 0; k < links; k++) {
+        strains += stretches(kind_of(m, flexure), k, links);
     }
-    long long parts = (long long)m->flexure_count + m->joint_count, b = m->body_count;
-    long long n = links + stretching + b, r = 2 * (parts - b);
+    Addition result = {links, strains, links, strains, links + strains + 1, 2 * links + 4,
+                       links + strains};
+    return result;
+}
+
+static Addition addition_of(const Mechanism *m, const Flexure *flexure) {
+    const FlexureType *kind = kind_of(m, flexure);
+    return kind->order > 0 ? beam_addition(kind, flexure) : links_addition(m, flexure);
+}
+
+PRBM void count_coordinates(Reader *reader, Mechanism *m) {
+    long long b = m->body_count, links = 0, strains = 0, springs = 0;
+    long long arms = b, stretching = 0, masses = b, map = b;
+    for (int i = 0; i < m->flexure_count && !reader->wrong; i++) {
+        Addition more = addition_of(m, &m->flexures[i]);
+        links += more.links;
+        strains += more.strains;
+        arms += more.arms;
+        stretching += more.stretches;
+        springs += more.springs;
+        masses += more.masses;
+        map += more.map;
+        m->longest = more.arms > m->longest ? more.arms : m->longest;
+    }
+    long long parts = (long long)m->flexure_count + m->joint_count;
+    long long n = links + strains + b, r = 2 * (parts - b);
     if (!reader->wrong &&
-        (n > COORDINATES_MAX || r >= n || m->stop_count > STOPS_MAX ||
-         m->friction_count > STOPS_MAX || m->force_count > PLACES_MAX ||
-         m->probe_count > PLACES_MAX || m->ground_count > GROUND_POINTS_MAX)) {
+        (n > COORDINATES_MAX || arms + stretching > DIRECTIONS_MAX || map > DIRECTION_MAP_MAX ||
+         r >= n || m->stop_count > STOPS_MAX || m->friction_count > STOPS_MAX ||
+         m->force_count > PLACES_MAX || m->probe_count > PLACES_MAX ||
+         m->ground_count > GROUND_POINTS_MAX)) {
         reader->wrong = "more parts than the kernel supports, or loops that leave no degree of "
                         "freedom";
     } else if (!reader->wrong && (b < 1 || r < 0)) {
@@ -36,41 +75,125 @@ PRBM void count_coordinates(Reader *reader, Mechanism *m) {
     }
     if (!reader->wrong) {
         m->link_count = (int)links;
+        m->strain_count = (int)strains;
         m->stretch_count = (int)stretching;
         m->coordinate_count = (int)n;
+        m->direction_count = (int)(arms + stretching);
+        m->map.count = (int)map; /* An upper bound. */
         m->loop_count = (int)r;
-        m->spring_count = (int)(links + stretching + m->flexure_count);
-        m->mass_count = (int)(2 * links + 4LL * m->flexure_count + b);
+        m->spring_count = (int)springs;
+        m->mass_count = (int)masses;
     }
 }
 
-/* State of the assembly: connected bodies, visited parts, coordinates added so far. */
+/* State of the assembly: connected bodies with their coordinates, visited parts, coordinates and
+ * directions added so far. */
 typedef struct {
     bool *held, *walked;
+    int *body; /* (b + 1,) coordinates of the bodies */
     Coordinate *coordinates;
-    int *links, *stretches;
-    int added, link_count, stretch_count;
+    int *links, *strains, *arms, *stretches;
+    DirectionMap map;
+    int added, link_count, strain_count, directed, stretch_count;
 } Walk;
 
-static void add_coordinate(Walk *walk, int link, int body, int arm) {
-    Coordinate coordinate = {link, body, arm};
-    walk->coordinates[walk->added++] = coordinate;
+static int add_angle(Walk *walk) {
+    Coordinate coordinate = {walk->link_count, -1, 0};
+    walk->links[walk->link_count++] = walk->added;
+    walk->coordinates[walk->added] = coordinate;
+    return walk->added++;
 }
 
-/* Add the coordinates of a link: its angle and, if it stretches, its stretch. */
+static int add_strain(Walk *walk) {
+    Coordinate coordinate = {-1, walk->strain_count, 0};
+    walk->strains[walk->strain_count++] = walk->added;
+    walk->coordinates[walk->added] = coordinate;
+    return walk->added++;
+}
+
+static int add_body_angle(Walk *walk, int body) {
+    Coordinate coordinate = {-1, -1, body};
+    walk->held[body] = true;
+    walk->body[body] = walk->added;
+    walk->coordinates[walk->added] = coordinate;
+    return walk->added++;
+}
+
+/* Add a dependence of the last direction on a coordinate; FIXED: none. */
+static void depend(Walk *walk, int coordinate) {
+    DirectionMap *map = &walk->map;
+    if (coordinate != FIXED) {
+        map->mapped = map->mapped || map->count != walk->directed - 1 ||
+                      coordinate != walk->directed - 1;
+        map->coordinate[map->count++] = coordinate;
+        map->first[walk->directed] = map->count;
+    }
+}
+
+/* Add a direction that depends on no coordinate yet: an angle, or the stretch of an arm. */
+static int add_direction(Walk *walk, int arm) {
+    int j = walk->directed++;
+    walk->map.first[j + 1] = walk->map.count;
+    walk->arms[j] = arm == FIXED ? j : arm;
+    if (arm != FIXED) {
+        walk->stretches[walk->stretch_count++] = j;
+    }
+    return j;
+}
+
+/* Add a link: its angle and, if it stretches, its strain. */
 static void add_link(Walk *walk, bool stretching) {
-    int j = walk->added;
-    add_coordinate(walk, walk->link_count, 0, j);
-    walk->links[walk->link_count++] = j;
+    int angle = add_angle(walk), arm = add_direction(walk, FIXED);
+    depend(walk, angle);
     if (stretching) {
-        add_coordinate(walk, walk->link_count - 1, 0, j);
-        walk->stretches[walk->stretch_count++] = j + 1;
+        add_direction(walk, arm);
+        depend(walk, add_strain(walk));
+    }
+}
+
+/* Add a body and its direction. */
+static void add_body_direction(Walk *walk, int coordinate) {
+    add_direction(walk, FIXED);
+    depend(walk, coordinate);
+}
+
+/* Return the coordinate that rotates an end of a beam. */
+static int end_angle(const Walk *walk, int type, int pin, int body) {
+    return type == PIN ? pin : body == GROUND ? FIXED : walk->body[body];
+}
+
+/* Add a beam: pins, coefficients, strain, the body at its far end, and the directions of its nodes. */
+static void add_beam(const FlexureType *kind, const Flexure *flexure, Walk *walk, int reached) {
+    int start_pin = flexure->type_at_start == PIN ? add_angle(walk) : FIXED;
+    int end_pin = flexure->type_at_end == PIN ? add_angle(walk) : FIXED;
+    int first = walk->added;
+    for (int k = 0; k < kind->order; k++) {
+        add_angle(walk);
+    }
+    int strain = kind->axial ? add_strain(walk) : FIXED;
+    int body = reached != GROUND ? add_body_angle(walk, reached) : FIXED;
+    int start = end_angle(walk, flexure->type_at_start, start_pin, flexure->between.start);
+    int end = end_angle(walk, flexure->type_at_end, end_pin, flexure->between.end);
+    for (int i = 0; i < kind->nodes; i++) {
+        int arm = add_direction(walk, FIXED);
+        depend(walk, start);
+        depend(walk, end);
+        for (int k = 0; k < kind->order; k++) {
+            depend(walk, first + k);
+        }
+        if (strain != FIXED) {
+            add_direction(walk, arm);
+            depend(walk, strain);
+        }
+    }
+    if (body != FIXED) {
+        add_body_direction(walk, body);
     }
 }
 
 /* Return part i: the flexures come first, then the joints. */
 static Step part(const Mechanism *m, int i) {
-    Step step = {NULL, NULL, NULL, false, false, 0};
+    Step step = {NULL, NULL, NULL, false, false, 0, 0};
     if (i < m->flexure_count) {
         step.name = m->flexures[i].name;
         step.between = &m->flexures[i].between;
@@ -91,6 +214,7 @@ static bool walk_on(const Mechanism *m, Walk *walk, Step *step) {
             walk->walked[i] = true;
             step->backwards = !held[step->between->start];
             step->first = walk->added;
+            step->first_direction = walk->directed;
             return true;
         }
     }
@@ -98,16 +222,20 @@ static bool walk_on(const Mechanism *m, Walk *walk, Step *step) {
 }
 
 static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
-    int count = step->flexure ? link_count(m, step->flexure) : 0;
-    for (int k = 0; k < count; k++) {
-        int i = step->backwards ? count - 1 - k : k;
-        add_link(walk, stretches(kind_of(m, step->flexure), i, count));
-    }
+    const Flexure *flexure = step->flexure;
     int far = step->backwards ? step->between->start : step->between->end;
     step->closes = walk->held[far];
+    if (flexure && kind_of(m, flexure)->order > 0) {
+        add_beam(kind_of(m, flexure), flexure, walk, step->closes ? GROUND : far);
+        return;
+    }
+    int count = flexure ? link_count(m, flexure) : 0;
+    for (int k = 0; k < count; k++) {
+        int i = step->backwards ? count - 1 - k : k;
+        add_link(walk, stretches(kind_of(m, flexure), i, count));
+    }
     if (!step->closes) {
-        walk->held[far] = true;
-        add_coordinate(walk, -1, far, walk->added);
+        add_body_direction(walk, add_body_angle(walk, far));
     }
 }
 
@@ -115,9 +243,13 @@ static void add_coordinates(const Mechanism *m, Walk *walk, Step *step) {
 PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     size_t parts = (size_t)m->flexure_count + (size_t)m->joint_count;
     size_t n = (size_t)m->coordinate_count, b = (size_t)m->body_count;
+    size_t d = (size_t)m->direction_count;
+    DirectionMap map = {false, kept(reader, d + 1, sizeof(int)),
+                        kept(reader, (size_t)m->map.count, sizeof(int)), 0};
     Walk walk = {kept(reader, b + 1, sizeof(bool)), kept(reader, parts, sizeof(bool)),
-                 kept(reader, n, sizeof(Coordinate)), kept(reader, n, sizeof(int)),
-                 kept(reader, n, sizeof(int)), 0, 0, 0};
+                 kept(reader, b + 1, sizeof(int)), kept(reader, n, sizeof(Coordinate)),
+                 kept(reader, n, sizeof(int)), kept(reader, n, sizeof(int)),
+                 kept(reader, d, sizeof(int)), kept(reader, d, sizeof(int)), map, 0, 0, 0, 0, 0};
     Step *steps = kept(reader, parts, sizeof *steps);
     if (reader->wrong) {
         return;
@@ -125,6 +257,7 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     memset(walk.held, 0, (b + 1) * sizeof *walk.held);
     memset(walk.walked, 0, parts * sizeof *walk.walked);
     walk.held[GROUND] = true;
+    walk.map.first[0] = 0;
     size_t reached = 1;
     for (size_t i = 0; i < parts && walk_on(m, &walk, &steps[i]); i++) {
         add_coordinates(m, &walk, &steps[i]);
@@ -136,7 +269,11 @@ PRBM void lay_out_coordinates(Reader *reader, Mechanism *m) {
     m->steps = steps;
     m->coordinates = walk.coordinates;
     m->links = walk.links;
+    m->strains = walk.strains;
+    m->arms = walk.arms;
     m->stretches = walk.stretches;
+    walk.map.mapped = walk.map.mapped || walk.directed != walk.added;
+    m->map = walk.map;
 }
 
 /* Set the index of the first element of each group, for consecutive groups. */
@@ -183,7 +320,7 @@ PRBM void lay_out_slots(Mechanism *m) {
         [SLOTS_ENERGIES] = PER_ENERGY,
         [SLOTS_LATCHED] = PER_LATCHED * m->stop_count,
         [SLOTS_LINKS] = PER_LINK * m->link_count,
-        [SLOTS_STRETCHES] = PER_STRETCH * m->stretch_count,
+        [SLOTS_STRETCHES] = PER_STRETCH * m->strain_count,
         [SLOTS_PROBES] = PER_PROBE * m->probe_count,
         [SLOTS_FREQUENCY] = 1,
         [SLOTS_CALCULATED] = calculated_count(m),

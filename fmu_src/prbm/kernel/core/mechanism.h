@@ -33,6 +33,8 @@ typedef struct {
     bool lumped, rate_with_gamma, axial;
     int pivots; /* Pivots of a cantilever; 0 for a chain. */
     int links;  /* Links of a chain; 0 for a model with coefficients. */
+    int order;  /* Order of the bending moment of a beam; 0 for links. */
+    int nodes;  /* Nodes of a beam. */
     Expression thickness, width, youngs_modulus, density;
     const Expression *gamma, *K_theta; /* (pivots,) */
 } FlexureType;
@@ -124,13 +126,24 @@ typedef struct {
     bool backwards;         /* The part is added from its end to its start. */
     bool closes;            /* The part closes a loop: both its bodies are already placed. */
     int first;              /* The first coordinate that the part adds. */
+    int first_direction;    /* The first direction that the part adds. */
 } Step;
 
-/* A coordinate: the angle of a link, its stretch, or the angle of a body. */
+/* A coordinate: an angle or a strain of a flexure, or the angle of a body.  Two of the three numbers
+ * are -1, -1 and 0. */
 typedef struct {
-    int link, body; /* The link, counted from 0, or -1; the body, counted from 1, or 0. */
-    int arm;        /* The coordinate of the arm that this coordinate turns or stretches. */
+    int link;   /* Index among the angles of the flexures, or -1. */
+    int strain; /* Index among the strains, or -1. */
+    int body;   /* The body, counted from 1, or 0. */
 } Coordinate;
+
+/* The map from coordinates to directions, row by row: direction j depends on the coordinates with
+ * the indices first[j] to first[j + 1] - 1 in the list.  It is the identity unless mapped. */
+typedef struct {
+    bool mapped;
+    int *first, *coordinate; /* (d + 1,), (count,) */
+    int count;
+} DirectionMap;
 
 typedef struct {
     const char *token, *name;
@@ -154,14 +167,18 @@ typedef struct {
     InputGroups input;
     const Step *steps;             /* Flexures and joints in the order of the assembly. */
     const Coordinate *coordinates; /* (coordinate_count,) */
-    const int *links, *stretches;  /* Coordinates that are angles and stretches of links. */
+    const int *links, *strains;    /* Coordinates that are angles and strains of flexures. */
+    const int *arms;               /* (direction_count,) the arm that a direction turns or stretches */
+    const int *stretches;          /* Directions that are stretches. */
+    DirectionMap map;
     const int *independent; /* Coordinates that are states of model exchange. */
     Release release;
     int gravity[2], tolerance, damping_zeta, damping_beta; /* Indices of parameters. */
     double default_step; /* Step of the default experiment [s]; 0: unknown. */
     /* Sizes of the assembled system. */
-    int coordinate_count, loop_count, link_count, stretch_count, mass_count, spring_count;
-    int longest; /* Largest number of links of a flexure. */
+    int coordinate_count, direction_count, loop_count, link_count, strain_count, stretch_count,
+        mass_count, spring_count;
+    int longest; /* Largest number of links or nodes of a flexure. */
     Slots slots;
 } Mechanism;
 

@@ -4,7 +4,6 @@
 
 #include "core/constraints.h"
 #include "core/forces.h"
-#include "core/kinetics.h"
 #include "core/matrix.h"
 #include "core/modal.h"
 
@@ -80,9 +79,9 @@ static bool generalised_eigen(int n, double *K, double *M, double *w, double *Y,
     return true;
 }
 
-/* Set the row w (n,) of the loads of gravity, with columns for stretches. */
+/* Set the row w (d,) of the loads of gravity, with columns for stretches. */
 static void gravity_row(const System *system, Complex *w) {
-    field_row(system->n, system->S, system->gravity, w);
+    field_row(system->d, system->S, system->gravity, w);
     spread(system, 1, w, w);
 }
 
@@ -104,12 +103,12 @@ static bool modes_about(const System *system, const double *q, int r, const Comp
                         Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int n = system->n, k = n - system->r;
-    Complex *e = take_complex(scratch, 1, n), *w = take_complex(scratch, 1, n);
+    Complex *e = take_complex(scratch, 1, system->d), *w = take_complex(scratch, 1, system->d);
     double *K_t = take_matrix(scratch, n, n), *Z = take_matrix(scratch, n, k);
     double *K_z = take_matrix(scratch, k, k), *M_z = take_matrix(scratch, k, k);
     double *reduced = take_matrix(scratch, k, k);
     directions(system, q, e);
-    inertia(n, system->H, system->J, e, M, K_t); /* K_t is only memory here. */
+    mass_matrix(system, e, M, scratch);
     gravity_row(system, w);
     tangent_stiffness(system, r, w, B, lam, e, K_t);
     tangent_space(system, e, Z, scratch);
@@ -135,7 +134,7 @@ PRBM bool modes(const System *system, const Equilibrium *shape, double *frequenc
                 Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int n = system->n, r = system->r;
-    Complex *B = take_complex(scratch, r + 1, n);
+    Complex *B = take_complex(scratch, r + 1, system->d);
     double *lam = take(scratch, (size_t)r + 1), *M = take_matrix(scratch, n, n);
     stack_holding_at(system, shape->q, B, lam);
     copy(r, shape->lam, lam);
@@ -170,23 +169,19 @@ static bool resting_multipliers(const System *system, const double *q, const Com
                                 double *lam, double *M, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int n = system->n, r = system->r + 1, size = n + r;
-    Complex *e = take_complex(scratch, 1, n), *w = take_complex(scratch, 1, n);
+    Complex *e = take_complex(scratch, 1, system->d), *w = take_complex(scratch, 1, system->d);
     double *rows = take_matrix(scratch, r, n), *kkt = take_matrix(scratch, size, size);
-    double *right = take(scratch, (size_t)size), *C = take_matrix(scratch, n, n);
-    double *turned = take(scratch, (size_t)n), *load = take(scratch, (size_t)n);
+    double *right = take(scratch, (size_t)size), *turned = take(scratch, (size_t)n);
     directions(system, q, e);
-    inertia(n, system->H, system->J, e, M, C);
+    mass_matrix(system, e, M, scratch);
     Rows held = plain_rows(system, r, B, NULL);
     jacobian(&held, e, rows);
     gravity_row(system, w);
-    generalised(n, w, e, load);
     for (int j = 0; j < n; j++) {
         turned[j] = q[j] - system->q0[j];
     }
     springs(n, system->K, turned, right);
-    for (int j = 0; j < n; j++) {
-        right[j] += load[j];
-    }
+    add_loads(system, w, e, right);
     zeros(r, right + n);
     saddle(n, r, M, rows, rows, kkt);
     bool found = solve(size, kkt, right, scratch, problem);
@@ -201,7 +196,7 @@ PRBM bool fundamental_at(const System *system, const double *q, double *phi, dou
                          Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int n = system->n, r = system->r + 1, k = n - system->r;
-    Complex *B = take_complex(scratch, r, n);
+    Complex *B = take_complex(scratch, r, system->d);
     double *lam = take(scratch, (size_t)r), *frequency = take(scratch, (size_t)k);
     double *all = take_matrix(scratch, n, k);
     stack_holding_at(system, q, B, lam);

@@ -2,9 +2,9 @@
  * Equations.project_near in mechanics/dynamics.py. */
 #include <math.h>
 
-#include "core/kinetics.h"
 #include "core/matrix.h"
 #include "core/projection.h"
+#include "core/block_map.h"
 #include "core/vectors.h"
 
 /* The constant part of an active constraint at time t. */
@@ -27,8 +27,8 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
     const Equations *q = equations;
     size_t mark = scratch->used, n = (size_t)q->system->n, r = (size_t)q->r;
     double *c = take(scratch, r), *rates = take(scratch, r), *rows = take(scratch, r * n);
-    double *M = take(scratch, n * n), *C = take(scratch, n * n);
-    Complex *e = (Complex *)take(scratch, 2 * n);
+    double *M = take(scratch, n * n);
+    Complex *e = take_complex(scratch, q->system->d, 1);
     for (int k = 0; k < q->r; k++) {
         c[k] = offset(q, k, t);
         rates[k] = prescribed(q, k, t);
@@ -42,9 +42,9 @@ PRBM bool project_with_impulses(const Equations *equations, double t, double *y,
     bool ok = project_positions(q->system, &positions, y, c, e, scratch, problem);
     if (ok) {
         jacobian(&q->active, e, rows);
-        inertia((int)n, q->system->H, q->system->J, e, M, C);
+        mass_matrix(q->system, e, M, scratch);
         ok = project_velocities((int)n, q->r, M, rows, rates, y + n, impulses, scratch,
-                                problem);
+                                   problem);
     }
     scratch->used = mark;
     return ok;
@@ -60,17 +60,16 @@ PRBM void correction_place(Correction *correction, const System *system, Memory 
     size_t r = (size_t)system->r + 2 * (size_t)system->s + (size_t)system->f;
     correction->at = place_kinematics(system, memory);
     correction->rows = place(memory, r * even, sizeof(double));
+    correction->by_direction =
+        place(memory, system->mapped ? r * (size_t)system->wide : 0, sizeof(double));
     correction->convective = place(memory, r, sizeof(double));
     correction->residual = place(memory, r, sizeof(double));
     correction->change = place(memory, even + 2, sizeof(double));
     zero_placed(memory, begin);
 }
 
-/* The value of an active row without its constant. */
-SIZED double active_value(int even, const Equations *q, const Kinematics *at, int k) {
-    if (q->system->stretch_count > 0 || q->on[k] != FIXED) {
-        return row_value(&q->active, k, at->e);
-    }
+/* The value of an active row on the ground without its constant, if no arm stretches. */
+SIZED double active_sum(int even, const Equations *q, const Kinematics *at, int k) {
     Parts B = parts_from(q->B_conjugate, k * even), e = at->e_parts;
     Lanes sum[SUMS] = {NO_LANES};
     UNROLLED_BY_LANES
@@ -80,6 +79,14 @@ SIZED double active_value(int even, const Equations *q, const Kinematics *at, in
         sum[SUM_OF(j)] += re + im;
     }
     return total(sum);
+}
+
+/* The value of an active row without its constant. */
+SIZED double active_value(int even, const Equations *q, const Kinematics *at, int k) {
+    if (q->system->stretch_count > 0 || q->on[k] != FIXED) {
+        return row_value(&q->active, k, at->e);
+    }
+    return q->system->mapped ? active_sum(q->system->wide, q, at, k) : active_sum(even, q, at, k);
 }
 
 /* Compute the residuals of the positions, and return the largest magnitude. */
@@ -93,8 +100,23 @@ SIZED double position_residuals(int even, const Equations *q, const Kinematics *
     return worst;
 }
 
+/* Compute the rows by the coordinates, if they are not the directions. */
+RARE void mapped_rows(const Equations *q, Correction *c) {
+    const System *system = q->system;
+    rows_and_convection(q, &c->at, c->by_direction, c->convective);
+    zeros(q->r * system->even, c->rows);
+    for (int k = 0; k < q->r; k++) {
+        pull_directions(system, c->by_direction + k * system->wide, c->at.local,
+                        c->rows + k * system->even);
+    }
+}
+
 SIZED void velocity_residuals(int even, const Equations *q, double t, Correction *c) {
-    rows_dispatch(even, q, &c->at, c->rows, c->convective);
+    if (q->system->mapped) {
+        mapped_rows(q, c);
+    } else {
+        rows_dispatch(even, q, &c->at, c->rows, c->convective);
+    }
     for (int k = 0; k < q->r; k++) {
         double rate = even_dot(even, c->rows + k * even, c->at.speed);
         c->residual[k] = -(rate + prescribed(q, k, t));
@@ -121,7 +143,7 @@ SIZED bool corrected_of_length(int even, const Equations *q, const Evaluation *e
     position_residuals(even, q, &evaluation->at, t, c->residual);
     correct(even, q, &evaluation->factors, c, y);
     pad_of(even, n, y, c->at.angle);
-    directions_of(even, q->system, near, &c->at);
+    arms_at(even, q->system, near, &c->at);
     double worst = position_residuals(even, q, &c->at, t, c->residual);
     if (!(worst <= CONSTRAINT_RTOL * q->system->length)) {
         return false;

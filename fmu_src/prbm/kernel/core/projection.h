@@ -8,6 +8,7 @@
 typedef struct {
     Kinematics at;                   /* of the corrected state */
     double *rows, *convective;       /* (r, even), (r,) */
+    double *by_direction;            /* (r, wide) the rows by the directions, if mapped */
     double *residual, *change;       /* (r,), (even + 2,) */
 } Correction;
 

@@ -12,7 +12,8 @@ static bool displace(const System *system, const double *phi, int k, double move
                      double amplitude, double *q, Scratch *scratch, Problem *problem) {
     size_t used = scratch->used;
     int n = system->n, r = system->r, count = n - r;
-    Complex *B = take_complex(scratch, r + 1, n), *e = take_complex(scratch, 1, n);
+    Complex *B = take_complex(scratch, r + 1, system->d);
+    Complex *e = take_complex(scratch, 1, system->d);
     double *c = take(scratch, (size_t)r + 1);
     stack_release(system, B, c);
     Rows rows = plain_rows(system, r + 1, B, c);
@@ -35,7 +36,7 @@ static bool moved_by(const System *system, const double *q, const double *phi, i
                      double *moved, Scratch *scratch) {
     size_t used = scratch->used;
     int n = system->n, count = n - system->r;
-    Complex *e = take_complex(scratch, 1, n);
+    Complex *e = take_complex(scratch, 1, system->d);
     double *row = take(scratch, (size_t)n), turn = 0.0;
     Rows release = plain_rows(system, 1, system->release, NULL);
     directions(system, q, e);

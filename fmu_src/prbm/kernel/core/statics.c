@@ -8,17 +8,16 @@
 #include "core/constraints.h"
 #include "core/contact.h"
 #include "core/forces.h"
-#include "core/kinetics.h"
 #include "core/matrix.h"
 #include "core/statics.h"
 
 PRBM void stack_release(const System *system, Complex *B, double *c) {
-    int n = system->n, r = system->r;
-    for (int i = 0; i < r * n; i++) {
+    int d = system->d, r = system->r;
+    for (int i = 0; i < r * d; i++) {
         B[i] = system->loops[i];
     }
-    for (int j = 0; j < n; j++) {
-        B[r * n + j] = system->release[j];
+    for (int j = 0; j < d; j++) {
+        B[r * d + j] = system->release[j];
     }
     copy(r, system->loops_c, c);
     c[r] = system->release_c;
@@ -29,15 +28,15 @@ static bool turns(const System *system) {
 }
 
 PRBM void stack_holding(const System *system, double amount, Complex *B, double *c) {
-    int n = system->n, r = system->r, j = system->released.j;
+    int d = system->d, r = system->r, arm = system->released.arm;
     stack_release(system, B, c);
     c[r] -= amount;
     if (turns(system)) {
-        for (int k = 0; k < n; k++) {
-            B[r * n + k] = complex_of(0.0, 0.0);
+        for (int k = 0; k < d; k++) {
+            B[r * d + k] = complex_of(0.0, 0.0);
         }
-        double angle = system->q0[j] + amount;
-        B[r * n + j] = complex_of(-system->length * sin(angle), -system->length * cos(angle));
+        double angle = system->q0[system->released.j] + amount;
+        B[r * d + arm] = complex_of(-system->length * sin(angle), -system->length * cos(angle));
         c[r] = 0.0;
     }
 }
@@ -47,23 +46,32 @@ PRBM void stack_holding_at(const System *system, const double *q, Complex *B, do
     stack_holding(system, turns(system) ? q[j] - system->q0[j] : 0.0, B, c);
 }
 
-/* K_t is K + diag(Re(p)), with the pull p = (lam^T B - i w) e of each arm.  The diagonal element of
- * a stretch is -Re(p) of its arm; the elements of a stretch and the arm's angle are Im(p). */
+/* Add an element of the stiffness of the directions to that of the coordinates. */
+static void stiffen(const System *system, int i, int j, double x, double *K_t) {
+    if (system->mapped) {
+        pull_both(system, i, j, x, K_t);
+    } else {
+        K_t[i * system->n + j] += x;
+    }
+}
+
+/* K_t is K + Phi^T diag(Re(p)) Phi, with the pull p = (lam^T B - i w) e of each arm.  The diagonal
+ * element of a stretch is -Re(p) of its arm; those of a stretch and the arm's angle are Im(p). */
 PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const Complex *B,
                             const double *lam, const Complex *e, double *K_t) {
-    int n = system->n;
-    copy(n * n, system->K, K_t);
-    for (int j = 0; j < n; j++) {
+    int d = system->d;
+    copy(system->n * system->n, system->K, K_t);
+    for (int j = 0; j < d; j++) {
         int a = arm_of(system, j);
         Complex row = complex_of(w[a].im, -w[a].re);
         for (int i = 0; i < r; i++) {
-            row = plus(row, scaled(lam[i], B[i * n + a]));
+            row = plus(row, scaled(lam[i], B[i * d + a]));
         }
-        Complex pull = product(row, e[a]);
-        K_t[j * n + j] += a == j ? pull.re : -pull.re;
+        Complex stress = product(row, e[a]);
+        stiffen(system, j, j, a == j ? stress.re : -stress.re, K_t);
         if (a != j) {
-            K_t[j * n + a] += pull.im;
-            K_t[a * n + j] += pull.im;
+            stiffen(system, j, a, stress.im, K_t);
+            stiffen(system, a, j, stress.im, K_t);
         }
     }
 }
@@ -72,7 +80,7 @@ PRBM void tangent_stiffness(const System *system, int r, const Complex *w, const
 typedef struct {
     const System *system;
     Rows rows;
-    Complex *w; /* (n,) spread */
+    Complex *w; /* (d,) spread */
 } Balance;
 
 /* Compute the residual torques and constraints at (q, lam), and the constraint rows. */
@@ -81,15 +89,14 @@ static void unbalanced(const Balance *balance, const double *state, const Comple
     const System *system = balance->system;
     size_t used = scratch->used;
     int n = system->n, r = balance->rows.count;
-    double *turned = take(scratch, (size_t)n), *load = take(scratch, (size_t)n);
+    double *turned = take(scratch, (size_t)n);
     for (int j = 0; j < n; j++) {
         turned[j] = state[j] - system->q0[j];
     }
     springs(n, system->K, turned, torque);
-    generalised(n, balance->w, e, load);
+    add_loads(system, balance->w, e, torque);
     jacobian(&balance->rows, e, rows);
     for (int j = 0; j < n; j++) {
-        torque[j] += load[j];
         for (int i = 0; i < r; i++) {
             torque[j] += state[n + i] * rows[i * n + j];
         }
@@ -128,13 +135,13 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
     const System *system = balance->system;
     size_t used = scratch->used;
     int n = system->n, r = balance->rows.count;
-    Complex *e = take_complex(scratch, 1, n);
+    Complex *e = take_complex(scratch, 1, system->d);
     double *torque = take(scratch, (size_t)n), *open_by = take(scratch, (size_t)r);
     double *rows = take_matrix(scratch, r, n);
     double scale = STATICS_FORCE_RTOL * largest(n * n, system->K);
     double turn = HUGE_VAL;
     bool going = true, balanced = false, done = false;
-    for (int j = 0; j < n && scale == 0.0; j++) {
+    for (int j = 0; j < system->d && scale == 0.0; j++) {
         scale = greater(scale, STATICS_FORCE_RTOL * modulus(balance->w[j]));
     }
     for (int step = 0; step < STATICS_ITERATIONS_MAX && going && !done; step++) {
@@ -153,12 +160,12 @@ static bool balance_out(const Balance *balance, double *state, Scratch *scratch)
 static bool loaded(const System *system, bool held, double displacement, double fraction,
                    double *state, Scratch *scratch) {
     size_t used = scratch->used;
-    int n = system->n, r = system->r;
-    Complex *B = take_complex(scratch, r + 1, n);
+    int d = system->d, r = system->r;
+    Complex *B = take_complex(scratch, r + 1, d);
     double *c = take(scratch, (size_t)r + 1);
-    Balance balance = {system, plain_rows(system, r + held, B, c), take_complex(scratch, 1, n)};
+    Balance balance = {system, plain_rows(system, r + held, B, c), take_complex(scratch, 1, d)};
     stack_holding(system, fraction * displacement, B, c);
-    field_row(n, system->S, scaled(fraction, system->gravity), balance.w);
+    field_row(d, system->S, scaled(fraction, system->gravity), balance.w);
     spread(system, 1, balance.w, balance.w);
     bool balanced = balance_out(&balance, state, scratch);
     scratch->used = used;
@@ -182,7 +189,7 @@ static double jump(const System *system, const double *from, const double *to) {
 static bool turns_about_point(const System *system, Scratch *scratch) {
     size_t used = scratch->used;
     int n = system->n, r = system->r, size = n + r;
-    Complex *B = take_complex(scratch, r + 1, n);
+    Complex *B = take_complex(scratch, r + 1, system->d);
     double *rows = take_matrix(scratch, r + 1, n), *kkt = take_matrix(scratch, size, size);
     double *response = take(scratch, (size_t)size + 1);
     stack_release(system, B, response);
@@ -305,11 +312,11 @@ PRBM bool release_velocity(const System *system, const double *q, double speed, 
     if (speed == 0.0) {
         return true;
     }
-    Complex *e = take_complex(scratch, 1, n), *B = take_complex(scratch, r, n);
-    double *M = take_matrix(scratch, n, n), *C = take_matrix(scratch, n, n);
+    Complex *e = take_complex(scratch, 1, system->d), *B = take_complex(scratch, r, system->d);
+    double *M = take_matrix(scratch, n, n);
     double *rows = take_matrix(scratch, r, n), *rates = take(scratch, (size_t)r);
     directions(system, q, e);
-    inertia(n, system->H, system->J, e, M, C);
+    mass_matrix(system, e, M, scratch);
     stack_release(system, B, rates);
     Rows held = plain_rows(system, r, B, NULL);
     jacobian(&held, e, rows);

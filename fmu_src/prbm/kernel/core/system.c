@@ -2,76 +2,96 @@
  * mechanics/system.py.
  *
  * Each link and body has an arm E = exp(s + i theta).  Its derivative is E' = i w E, with the
- * complex rate w = theta' - i s'.  A point is at z = c + A E.  A coordinate is an angle theta or a
- * stretch s. The elements of e are E for angles and -i E for stretches, so that dE/dq = i e for
- * both.
+ * complex rate w = theta' - i s'.  A point is at z = c + A E.  A direction is an angle theta or a
+ * stretch s, and a linear function of the coordinates.  The elements of e are E for angles and -i E
+ * for stretches, so that the derivative of E by its direction is i e for both.
  */
 #include "core/system.h"
+#include "core/kinetics.h"
+#include "core/matrix.h"
 #include "core/vectors.h"
 
-static BodyFrame *place_frames(Memory *memory, size_t count, size_t n) {
+static BodyFrame *place_frames(Memory *memory, size_t count, size_t d) {
     BodyFrame *frames = place(memory, count, sizeof *frames);
-    Complex *rows = place(memory, count * n, sizeof *rows);
+    Complex *rows = place(memory, count * d, sizeof *rows);
     for (size_t i = 0; memory->base && i < count; i++) {
-        frames[i].A = rows + i * n;
+        frames[i].A = rows + i * d;
     }
     return frames;
 }
 
-static Place *place_origins(Memory *memory, size_t count, size_t n) {
+static Place *place_origins(Memory *memory, size_t count, size_t d) {
     Place *origins = place(memory, count, sizeof *origins);
-    Complex *rows = place(memory, count * n, sizeof *rows);
+    Complex *rows = place(memory, count * d, sizeof *rows);
     for (size_t i = 0; memory->base && i < count; i++) {
-        origins[i].A = rows + i * n;
+        origins[i].A = rows + i * d;
     }
     return origins;
+}
+
+/* Place the memory for the maps of all blocks, which belongs to the first map until it is divided. */
+static void place_maps(BlockMap *maps, const Mechanism *m, Memory *memory) {
+    size_t n = (size_t)m->coordinate_count, d = (size_t)m->direction_count;
+    int *coordinate = place(memory, (size_t)m->map.count, sizeof *coordinate);
+    double *change = place(memory, m->map.mapped ? d * (n + 1) : 0, sizeof *change);
+    if (memory->base) {
+        maps[0].coordinate = coordinate;
+        maps[0].change = change;
+    }
 }
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory) {
     const Mechanism *m = mechanism;
     size_t n = (size_t)m->coordinate_count, r = (size_t)m->loop_count;
     size_t p = (size_t)m->mass_count, s = (size_t)m->stop_count, f = (size_t)m->friction_count;
-    size_t b = (size_t)m->body_count;
+    size_t b = (size_t)m->body_count, d = (size_t)m->direction_count;
     System result = {0};
     result.mechanism = mechanism;
     result.n = (int)n;
     result.even = even_length((int)n);
+    result.d = (int)d;
+    result.wide = even_length((int)d);
+    result.mapped = m->map.mapped;
     result.r = (int)r;
     result.s = (int)s;
     result.f = (int)f;
     result.b = (int)b;
     result.q0 = place(memory, n, sizeof(double));
-    result.e0 = place(memory, n, sizeof(Complex));
-    result.J = place(memory, n, sizeof(double));
+    result.e0 = place(memory, d, sizeof(Complex));
+    result.J = place(memory, d, sizeof(double));
     result.K = place(memory, n * n, sizeof(double));
-    result.H = place(memory, n * n, sizeof(Complex));
-    result.A = place(memory, p * n, sizeof(Complex));
+    result.H = place(memory, d * d, sizeof(Complex));
+    result.A = place(memory, p * d, sizeof(Complex));
     result.c = place(memory, p, sizeof(Complex));
     result.m = place(memory, p, sizeof(double));
-    result.S = place(memory, n, sizeof(Complex));
-    result.loops = place(memory, r * n, sizeof(Complex));
+    result.S = place(memory, d, sizeof(Complex));
+    result.loops = place(memory, r * d, sizeof(Complex));
     result.loops_c = place(memory, r, sizeof(double));
-    result.gaps = place(memory, s * n, sizeof(Complex));
-    result.slides = place(memory, s * n, sizeof(Complex));
+    result.gaps = place(memory, s * d, sizeof(Complex));
+    result.slides = place(memory, s * d, sizeof(Complex));
     result.gaps_c = place(memory, s, sizeof(double));
     result.gaps_z = place(memory, s, sizeof(Complex));
     result.slides_z = place(memory, s, sizeof(Complex));
     result.on = place(memory, s, sizeof(int));
-    result.rubs = place(memory, f * n, sizeof(Complex));
-    result.lifts = place(memory, f * n, sizeof(Complex));
+    result.rubs = place(memory, f * d, sizeof(Complex));
+    result.lifts = place(memory, f * d, sizeof(Complex));
     result.lifts_c = place(memory, f, sizeof(double));
-    result.release = place(memory, n, sizeof(Complex));
-    result.released.A = place(memory, n, sizeof(Complex));
-    result.bodies = place_frames(memory, b, n);
-    result.pushed = place_frames(memory, (size_t)m->force_count, n);
-    result.probes = place_frames(memory, (size_t)m->probe_count, n);
-    result.origins = place_origins(memory, b + 1, n);
+    result.release = place(memory, d, sizeof(Complex));
+    result.released.A = place(memory, d, sizeof(Complex));
+    result.bodies = place_frames(memory, b, d);
+    result.pushed = place_frames(memory, (size_t)m->force_count, d);
+    result.probes = place_frames(memory, (size_t)m->probe_count, d);
+    result.origins = place_origins(memory, b + 1, d);
     result.stretch_count = m->stretch_count;
     result.stretches = m->stretches;
     result.spring = place(memory, (size_t)m->spring_count, sizeof(Spring));
-    result.blocks = place(memory, n, sizeof(Block));
-    result.coupling = place(memory, n * n, sizeof(Complex));
-    result.own = place(memory, n, sizeof(double));
+    result.factors = place(memory, (size_t)m->map.count, sizeof(double));
+    result.blocks = place(memory, d, sizeof(Block));
+    result.maps = place(memory, d, sizeof(BlockMap));
+    place_maps(result.maps, m, memory);
+    result.mass_blocks = place(memory, n, sizeof(Block));
+    result.coupling = place(memory, d * d, sizeof(Complex));
+    result.own = place(memory, d, sizeof(double));
     result.straight = place(memory, (size_t)result.even, sizeof(double));
     result.calculated = place(memory, (size_t)m->type_count, sizeof(double));
     *system = result;
@@ -80,29 +100,77 @@ PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memor
 /* --- arms ------------------------------------------------------------------------------------- */
 
 PRBM int arm_of(const System *system, int j) {
-    return system->mechanism->coordinates[j].arm;
+    return system->mechanism->arms[j];
 }
 
-PRBM void stretch(const System *system, const double *q, Complex *e) {
+PRBM double direction_of(const System *system, const double *x, int j) {
+    if (!system->mapped) {
+        return x[j];
+    }
+    const DirectionMap *map = &system->mechanism->map;
+    double sum = 0.0;
+    for (int k = map->first[j]; k < map->first[j + 1]; k++) {
+        sum += system->factors[k] * x[map->coordinate[k]];
+    }
+    return sum;
+}
+
+PRBM void pull(const System *system, int j, double x, double *sum) {
+    if (!system->mapped) {
+        sum[j] += x;
+        return;
+    }
+    const DirectionMap *map = &system->mechanism->map;
+    for (int k = map->first[j]; k < map->first[j + 1]; k++) {
+        sum[map->coordinate[k]] += system->factors[k] * x;
+    }
+}
+
+PRBM void pull_both(const System *system, int i, int j, double x, double *sum) {
+    const DirectionMap *map = &system->mechanism->map;
+    for (int k = map->first[i]; k < map->first[i + 1]; k++) {
+        pull(system, j, system->factors[k] * x, sum + map->coordinate[k] * system->n);
+    }
+}
+
+PRBM int angle_of(const System *system, int j) {
+    return system->mechanism->map.coordinate[system->mechanism->map.first[j]];
+}
+
+PRBM void stretch(const System *system, const double *theta, Complex *e) {
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);
-        e[a] = scaled(exponential(q[j]), e[a]);
+        e[a] = scaled(exponential(theta[j]), e[a]);
         e[j] = complex_of(e[a].im, -e[a].re);
     }
 }
 
 PRBM void directions(const System *system, const double *q, Complex *e) {
-    unit_vectors(system->n, q, e);
-    stretch(system, q, e);
+    if (!system->mapped) {
+        unit_vectors(system->d, q, e);
+        stretch(system, q, e);
+        return;
+    }
+    for (int j = 0; j < system->d; j++) {
+        double theta = direction_of(system, q, j);
+        if (arm_of(system, j) == j) {
+            unit_vectors(1, &theta, &e[j]);
+        }
+    }
+    for (int k = 0; k < system->stretch_count; k++) {
+        int j = system->stretches[k], a = arm_of(system, j);
+        e[a] = scaled(exponential(direction_of(system, q, j)), e[a]);
+        e[j] = complex_of(e[a].im, -e[a].re);
+    }
 }
 
 PRBM void turning(const System *system, const double *v, Complex *w) {
-    for (int j = 0; j < system->n; j++) {
-        w[j] = complex_of(v[j], 0.0);
+    for (int j = 0; j < system->d; j++) {
+        w[j] = complex_of(direction_of(system, v, j), 0.0);
     }
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k];
-        w[arm_of(system, j)].im = -v[j];
+        w[arm_of(system, j)].im = -w[j].re;
         w[j] = complex_of(0.0, 0.0);
     }
 }
@@ -110,27 +178,50 @@ PRBM void turning(const System *system, const double *v, Complex *w) {
 PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
                  Complex *displacement, Complex *velocity) {
     Complex at = minus(frame->c, frame->drawn), speed = {0.0, 0.0};
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->d; j++) {
         Complex arm = product(frame->A[j], e[j]);
+        double rate = direction_of(system, v, j);
         at = plus(at, arm);
-        speed.re -= arm.im * v[j];
-        speed.im += arm.re * v[j];
+        speed.re -= arm.im * rate;
+        speed.im += arm.re * rate;
     }
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k];
         Complex along_arm = product(frame->A[arm_of(system, j)], e[j]);
-        speed.re -= along_arm.im * v[j];
-        speed.im += along_arm.re * v[j];
+        double rate = direction_of(system, v, j);
+        speed.re -= along_arm.im * rate;
+        speed.im += along_arm.re * rate;
     }
     *displacement = at;
     *velocity = speed;
 }
 
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows) {
-    int n = system->n;
-    for (int i = 0; i < r * n; i += n) {
-        for (int j = 0; j < n; j++) {
+    int d = system->d;
+    for (int i = 0; i < r * d; i += d) {
+        for (int j = 0; j < d; j++) {
             rows[i + j] = B[i + arm_of(system, j)];
         }
     }
+}
+
+/* --- mass ------------------------------------------------------------------------------------- */
+
+PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch *scratch) {
+    size_t mark = scratch->used;
+    int n = system->n, d = system->d;
+    double *C = take_matrix(scratch, d, d);
+    if (!system->mapped) {
+        inertia(d, system->H, system->J, e, M, C);
+    } else {
+        double *own = take_matrix(scratch, d, d);
+        inertia(d, system->H, system->J, e, own, C);
+        zeros(n * n, M);
+        for (int i = 0; i < d * d; i++) {
+            if (own[i] != 0.0) {
+                pull_both(system, i / d, i % d, own[i], M);
+            }
+        }
+    }
+    scratch->used = mark;
 }

@@ -4,21 +4,22 @@
 
 #include "core/mechanism.h"
 
-/* Values in place of the coordinate of a body: not yet placed by the assembly, or the ground. */
+/* Values in place of the direction of a body: not yet placed by the assembly, or the ground. */
 enum { NOWHERE = -2, FIXED = -1 };
 
-/* A point of a body, z = c + A E, with the coordinate of the body and the drawn position. */
+/* A point of a body, z = c + A E, with the coordinate j and the direction arm of the body, and the
+ * drawn position. */
 typedef struct {
-    int j;
+    int j, arm;
     Complex c, drawn;
-    Complex *A; /* (n,) */
+    Complex *A; /* (d,) */
 } BodyFrame;
 
-/* A point of the mechanism, z = c + A E.  The origin of a body also has the coordinate j of the
- * body and the drawn position. */
+/* A point of the mechanism, z = c + A E.  The origin of a body also has the direction j of the body
+ * and the drawn position. */
 typedef struct {
     Complex c, drawn;
-    Complex *A; /* (n,) */
+    Complex *A; /* (d,) */
     int j;
     bool moves;
 } Place;
@@ -35,41 +36,55 @@ typedef struct {
     int start, size;
 } Block;
 
-/* The constant arrays of a mechanism, as in the twin.  There are n coordinates, r loop rows, p mass
- * points, s stops, f friction points and b bodies.  Columns of A and of the rows are zero at
- * stretches, see spread.  Vectors with the shape (even,) are padded to an even length. */
+/* The map from coordinates to the directions of a block of the mass matrix of the directions. */
+typedef struct {
+    int start, size; /* The directions. */
+    int count, even; /* The number of coordinates that they depend on, and its padded length. */
+    int *coordinate; /* (count,) in ascending order */
+    double *change;  /* (size, even) changes of the directions with these coordinates */
+} BlockMap;
+
+/* The constant arrays of a mechanism, as in the twin.  There are n coordinates, d directions, r loop
+ * rows, p mass points, s stops, f friction points and b bodies.  Columns of A and of the rows are
+ * zero at stretches, see spread.  Vectors with the shape (even,) or (wide,) have n or d elements, and
+ * are padded to an even length. */
 typedef struct {
     const Mechanism *mechanism;
     const double *values;
-    int n, even, r, p, s, f, b;
-    double *q0, *J, *K;       /* (n,), (n,), (n, n) */
-    Complex *e0;              /* (n,) directions of the straight shape */
-    Complex *H, *A, *c;       /* (n, n), (p, n), (p,) */
+    int n, even, d, wide, r, p, s, f, b;
+    bool mapped;              /* whether the map to the directions is not the identity */
+    double *factors;          /* (count,) of the map */
+    double *q0, *J, *K;       /* (n,), (d,), (n, n) */
+    Complex *e0;              /* (d,) directions of the straight shape */
+    Complex *H, *A, *c;       /* (d, d), (p, d), (p,) */
     double *m;                /* (p,) */
-    Complex *S;               /* (n,) first mass moments */
-    Complex *loops;           /* (r, n) */
+    Complex *S;               /* (d,) first mass moments */
+    Complex *loops;           /* (r, d) */
     double *loops_c;          /* (r,) */
-    Complex *gaps, *slides;   /* (s, n) */
+    Complex *gaps, *slides;   /* (s, d) */
     double *gaps_c;           /* (s,) */
     Complex *gaps_z, *slides_z; /* (s,) */
-    int *on;                  /* (s,) coordinate of the body that carries a wall, or FIXED */
-    Complex *rubs, *lifts;    /* (f, n) */
+    int *on;                  /* (s,) direction of the body that carries a wall, or FIXED */
+    Complex *rubs, *lifts;    /* (f, d) */
     double *lifts_c;          /* (f,) */
     BodyFrame released;       /* the released point */
-    Complex *release;         /* (n,) */
+    Complex *release;         /* (d,) */
     double release_c;
     BodyFrame *bodies;        /* (b,) */
     BodyFrame *pushed;        /* points of the forces */
     BodyFrame *probes;        /* points of the probes */
     Place *origins;           /* (b + 1,), the ground's first */
     int stretch_count;
-    const int *stretches;     /* coordinates that are stretches */
+    const int *stretches;     /* directions that are stretches */
     int spring_count;
     Spring *spring;           /* the springs whose rates make up K */
     int block_count;
-    Block *blocks;            /* of M */
+    Block *blocks;            /* of the mass matrix of the directions */
+    BlockMap *maps;           /* of the blocks, if mapped */
+    int mass_block_count;
+    Block *mass_blocks;       /* of M: the same, unless mapped */
     Complex *coupling;        /* the blocks of H, one after the other */
-    double *own;              /* (n,) the diagonal of M */
+    double *own;              /* (d,) the diagonal of the mass matrix of the directions */
     double *straight;         /* (even,) q0 */
     double *calculated;       /* gamma0 of the flexure types with several pivots */
     Complex anchor, gravity;
@@ -77,18 +92,29 @@ typedef struct {
 } System;
 
 PRBM void system_place(System *system, const Mechanism *mechanism, Memory *memory);
-/* Return the index of the arm that the coordinate j turns or stretches. */
+/* Return the arm that a direction turns or stretches. */
 PRBM int arm_of(const System *system, int j);
-/* Compute e (n,): the arms exp(s + i theta), and -i times the arm for stretches. */
+/* Return direction j of coordinates x (n,), or its rate if x are rates. */
+PRBM double direction_of(const System *system, const double *x, int j);
+/* Add x times the change of direction j with the coordinates to sum (n,). */
+PRBM void pull(const System *system, int j, double x, double *sum);
+/* Add x times the changes of the directions i and j with the coordinates to sum (n, n). */
+PRBM void pull_both(const System *system, int i, int j, double x, double *sum);
+/* Return the coordinate that is the direction of a body or a link. */
+PRBM int angle_of(const System *system, int j);
+/* Compute e (d,): the arms exp(s + i theta), and -i times the arm for stretches. */
 PRBM void directions(const System *system, const double *q, Complex *e);
-/* Compute w (n,): the complex rates theta' - i s' of the arms, zero for stretches. */
+/* Compute w (d,): the complex rates theta' - i s' of the arms, zero for stretches. */
 PRBM void turning(const System *system, const double *v, Complex *w);
 /* Compute the displacement of a point from the straight shape, and its velocity. */
 PRBM void motion(const System *system, const BodyFrame *frame, const Complex *e, const double *v,
                  Complex *displacement, Complex *velocity);
-/* Copy B (r, n) to rows, and repeat the column of each arm for its stretch.  rows may be B. */
+/* Copy B (r, d) to rows, and repeat the column of each arm for its stretch.  rows may be B. */
 PRBM void spread(const System *system, int r, const Complex *B, Complex *rows);
-/* Replace the unit vectors e (n,) by the directions of the coordinates. */
-PRBM void stretch(const System *system, const double *q, Complex *e);
+/* Replace the unit vectors e by the arms, and by -i times the arms for stretches.  theta (d,) are the
+ * directions. */
+PRBM void stretch(const System *system, const double *theta, Complex *e);
+/* Compute the mass matrix M (n, n). */
+PRBM void mass_matrix(const System *system, const Complex *e, double *M, Scratch *scratch);
 
 #endif

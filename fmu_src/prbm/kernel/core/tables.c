@@ -8,6 +8,8 @@
 enum {
     ROOM = 8,                /* Bytes of memory per byte of the tables, an upper bound. */
     ROOM_OF_COORDINATE = 32, /* Bytes of memory per coordinate. */
+    ROOM_OF_DIRECTION = 16,  /* Bytes of memory per direction. */
+    ROOM_OF_CHANGE = 8,      /* Bytes of memory per element of the map to the directions. */
 };
 
 /* --- parts ------------------------------------------------------------------------------------ */
@@ -93,9 +95,12 @@ static void read_types(Reader *reader, Mechanism *m) {
         t->axial = read_flag(reader);
         t->pivots = read_index(reader, 0, LINKS_MAX + 1);
         t->links = read_index(reader, 0, LINKS_MAX + 1);
-        if ((t->pivots == 0) == (t->links == 0)) {
+        t->order = read_index(reader, 0, ORDER_MAX + 1);
+        t->nodes = read_index(reader, 0, NODES_MAX + 1);
+        bool sampled = t->order > 0 ? t->nodes >= t->order + NODES_EXTRA_MIN : t->nodes == 0;
+        if ((t->pivots > 0) + (t->links > 0) + (t->order > 0) != 1 || !sampled) {
             reader->wrong = reader->wrong ? reader->wrong
-                                          : "a flexure type with neither pivots nor links, or both";
+                                          : "a flexure type without a model, or with several";
         }
         t->thickness = read_expression(reader, m);
         t->width = read_expression(reader, m);
@@ -350,7 +355,8 @@ PRBM Mechanism *mechanism_open(const unsigned char *bytes, size_t size, Problem 
     read_header(&reader, bytes, size);
     Mechanism *m = NULL;
     if (!reader.wrong) {
-        size_t room = sizeof *m + ROOM * size + COORDINATES_MAX * ROOM_OF_COORDINATE;
+        size_t room = sizeof *m + ROOM * size + COORDINATES_MAX * ROOM_OF_COORDINATE +
+                      DIRECTIONS_MAX * ROOM_OF_DIRECTION + DIRECTION_MAP_MAX * ROOM_OF_CHANGE;
         m = calloc(1, room);
         if (!m) {
             fail(problem, "there is not enough memory for the tables of the mechanism");

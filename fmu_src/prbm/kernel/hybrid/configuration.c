@@ -27,9 +27,12 @@ PRBM void set_scales(Configuration *configuration, double frequency) {
     Scales *scales = &configuration->scales;
     int n = system->n;
     double torsion = 0.0, stiffest = largest(n * n, system->K), heaviest = 0.0;
+    const Coordinate *coordinates = system->mechanism->coordinates;
     for (int i = 0; i < n * n; i++) {
-        bool turns = arm_of(system, i / n) == i / n && arm_of(system, i % n) == i % n;
+        bool turns = coordinates[i / n].strain < 0 && coordinates[i % n].strain < 0;
         torsion = turns ? greater(torsion, fabs(system->K[i])) : torsion;
+    }
+    for (int i = 0; i < system->d * system->d; i++) {
         heaviest = greater(heaviest, modulus(system->H[i]));
     }
     double spring_rate = stiffest > 0.0 ? sqrt(stiffest / heaviest) : SPRINGLESS_RATE;

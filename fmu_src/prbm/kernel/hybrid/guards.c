@@ -77,11 +77,27 @@ PRBM bool reversal_near(Simulation *sim) {
     return sim->equations.slipping_count > 0;
 }
 
-/* Bound the changes |dE| of the arms within the step.  The dense output bounds the changes dtheta
- * of angles and ds of stretches; then |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
+/* Bound the changes of the directions by those of the coordinates. */
+static void bound_directions(const System *system, const double *coordinates, double *reach) {
+    const DirectionMap *map = &system->mechanism->map;
+    for (int j = 0; j < system->d; j++) {
+        reach[j] = 0.0;
+        for (int k = map->first[j]; k < map->first[j + 1]; k++) {
+            reach[j] += fabs(system->factors[k]) * coordinates[map->coordinate[k]];
+        }
+    }
+}
+
+/* Bound the changes |dE| of the arms within the step.  The dense output bounds the changes of the
+ * coordinates, and hence dtheta of angles and ds of stretches; then
+ * |dE| <= |E| exp(|ds|) (|dtheta| + |ds|). */
 static void bound_arms(const Simulation *sim, double *reach) {
     const System *system = system_of(sim);
-    furthest(system->n, state_size(sim), sim->state.arc.k, sim->state.arc.h, reach);
+    double *coordinates = system->mapped ? reach + system->d : reach;
+    furthest(system->n, state_size(sim), sim->state.arc.k, sim->state.arc.h, coordinates);
+    if (system->mapped) {
+        bound_directions(system, coordinates, reach);
+    }
     for (int k = 0; k < system->stretch_count; k++) {
         int j = system->stretches[k], a = arm_of(system, j);
         double longest = modulus(sim->stepping.reference.e[a]) * exponential(reach[j]);
@@ -93,11 +109,11 @@ static void bound_arms(const Simulation *sim, double *reach) {
  * the rotation of the body that carries the wall. */
 static double gap_reach(const Simulation *sim, int stop, const Complex *e, const double *arms) {
     const System *system = system_of(sim);
-    const Complex *row = system->gaps + stop * system->n;
+    const Complex *row = system->gaps + stop * system->d;
     const Wall *wall = &sim->state.walls[stop];
     double reach = fabs(wall->rate) * sim->state.arc.h + 2.0 * fabs(wall->offset) +
                    fabs(wall->excess) * wall->span;
-    for (int j = 0; j < system->n; j++) {
+    for (int j = 0; j < system->d; j++) {
         reach += (fabs(row[j].re) + fabs(row[j].im)) * arms[j];
     }
     if (system->on[stop] != FIXED) {
@@ -314,14 +330,14 @@ PRBM void sample_arc(Simulation *sim) {
         for (int j = 0; j < 2 * n; j++) {
             y[j] = arc->y[j] + arc->h * y[j];
         }
-        directions(system_of(sim), y, stepping->sample_e + k * n);
+        directions(system_of(sim), y, stepping->sample_e + k * system_of(sim)->d);
     }
 }
 
 static Instant sample(const Simulation *sim, int k) {
     int n = system_of(sim)->n;
     const double *y = sim->stepping.sample_y + k * 2 * n;
-    Instant at = {sample_time(sim, k), y, y + n, sim->stepping.sample_e + k * n, NULL};
+    Instant at = {sample_time(sim, k), y, y + n, sim->stepping.sample_e + k * system_of(sim)->d, NULL};
     return at;
 }
 

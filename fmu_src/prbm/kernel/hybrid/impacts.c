@@ -13,13 +13,12 @@
 
 PRBM Inertia inertia_at(Simulation *sim, const double *q) {
     const System *system = system_of(sim);
-    Inertia at = {take_complex(&sim->scratch, system->n, 1),
+    Inertia at = {take_complex(&sim->scratch, system->d, 1),
                   take_matrix(&sim->scratch, system->n, system->n),
                   take_matrix(&sim->scratch, system->r, system->n)};
-    double *C = take_matrix(&sim->scratch, system->n, system->n);
     Rows loops = plain_rows(system, system->r, system->loops, system->loops_c);
     directions(system, q, at.e);
-    inertia(system->n, system->H, system->J, at.e, at.M, C);
+    mass_matrix(system, at.e, at.M, &sim->scratch);
     jacobian(&loops, at.e, at.loops);
     return at;
 }

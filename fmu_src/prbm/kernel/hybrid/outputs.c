@@ -79,8 +79,8 @@ static void output_links(const Simulation *sim, double *links, double *stretches
         links[PER_LINK * k + LINK_ANGLE] = q[j];
         links[PER_LINK * k + LINK_OMEGA] = v[j];
     }
-    for (int k = 0; k < system->stretch_count; k++) {
-        int j = system->stretches[k];
+    for (int k = 0; k < system->mechanism->strain_count; k++) {
+        int j = system->mechanism->strains[k];
         stretches[PER_STRETCH * k + STRETCH_STRAIN] = q[j];
         stretches[PER_STRETCH * k + STRETCH_STRAIN_RATE] = v[j];
     }

@@ -28,7 +28,7 @@ PRBM int contact_count(const Simulation *sim) {
 }
 
 PRBM Complex *directions_at(Simulation *sim, const double *q) {
-    Complex *e = take_complex(&sim->scratch, system_of(sim)->n, 1);
+    Complex *e = take_complex(&sim->scratch, system_of(sim)->d, 1);
     directions(system_of(sim), q, e);
     return e;
 }
@@ -75,8 +75,8 @@ static void place_state(State *state, const Mechanism *m, Memory *memory) {
 }
 
 static void place_scratch(Scratch *scratch, const Mechanism *m, Memory *memory) {
-    size_t n = (size_t)m->coordinate_count, s = (size_t)m->stop_count;
-    size_t size = n + (size_t)m->loop_count + 2 * s + (size_t)m->friction_count + 2;
+    size_t d = (size_t)m->direction_count, s = (size_t)m->stop_count; /* d is at least n. */
+    size_t size = d + (size_t)m->loop_count + 2 * s + (size_t)m->friction_count + 2;
     size_t drawn = (size_t)m->ground_count + (size_t)m->body_count, pieces = (size_t)m->longest;
     for (int i = 0; i < m->type_count; i++) {
         size_t pivots = (size_t)m->types[i].pivots;
@@ -104,16 +104,16 @@ static void place_stepping(Stepping *stepping, const System *system, Memory *mem
     stepping->error = place(memory, ny, d);
     stepping->coarse_error = place(memory, ny, d);
     stepping->sample_y = place(memory, samples * 2 * n, d);
-    stepping->sample_e = place(memory, samples * n, sizeof(Complex));
+    stepping->sample_e = place(memory, samples * (size_t)system->d, sizeof(Complex));
     stepping->located.y = place(memory, ny, d);
-    stepping->located.e = place(memory, n, sizeof(Complex));
+    stepping->located.e = place(memory, (size_t)system->d, sizeof(Complex));
     evaluation_place(&stepping->located.evaluation, system, memory);
     stepping->located.forces.least = place(memory, s, d);
     stepping->located.forces.largest = place(memory, s, d);
     stepping->located.k = place(memory, STAGES * ny, d);
     stepping->middle.y = place(memory, 2 * n, d);
     stepping->middle.a = place(memory, n, d);
-    stepping->reach = place(memory, n, d);
+    stepping->reach = place(memory, (size_t)system->d + n, d);
     stepping->torques = place(memory, (size_t)system->even + 2, d);
     stepping->response = place(memory, (size_t)system->even + 2, d);
     stepping->multipliers = place(memory, (size_t)system->r + 2 * s + (size_t)system->f, d);
@@ -123,7 +123,7 @@ static void place_present(Simulation *sim, const System *system, Memory *memory)
     size_t n = (size_t)system->n, ny = 2 * n + 2, d = sizeof(double);
     Present *present = &sim->present;
     present->y = place(memory, ny, d);
-    present->e = place(memory, n, sizeof(Complex));
+    present->e = place(memory, (size_t)system->d, sizeof(Complex));
     present->outputs = place(memory, (size_t)system->mechanism->slots.count, d);
     reference_place(&present->reference, system, memory);
     evaluation_place(&present->evaluation, system, memory);

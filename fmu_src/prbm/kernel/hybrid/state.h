@@ -126,11 +126,11 @@ typedef struct {
     double *error, *coarse_error; /* (ny,) */
     double weights[GUARD_INTERVALS + 1][STAGES]; /* of the dense output at the samples */
     double *sample_y;      /* (2 n,) of each sample */
-    Complex *sample_e;     /* (n,) of each sample */
+    Complex *sample_e;     /* (d,) of each sample */
     Located located;
     Node middle;           /* of the latest step */
     bool has_middle;       /* whether the middle has been computed */
-    double *reach;         /* (n,) bounds of the changes of the arms */
+    double *reach;         /* (d,), (n,) bounds of the changes of arms and coordinates */
     double *torques;       /* (even + 2,) of the springs in the fastest mode */
     double *response;      /* (even + 2,) accelerations by these torques */
     double *multipliers;   /* (r,) of that response */

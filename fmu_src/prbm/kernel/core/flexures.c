@@ -1,0 +1,235 @@
+/* Flexures as links or beams: the twin of mechanics/flexures.py. */
+#include <math.h>
+#include <string.h>
+
+#include "core/beam.h"
+#include "core/flexure.h"
+#include "core/flexures.h"
+#include "core/matrix.h"
+
+static double length_of(const System *system, const Flexure *flexure) {
+    const Connection *between = &flexure->between;
+    return modulus(minus(at_point(system, between->end_point),
+                         at_point(system, between->start_point)));
+}
+
+/* Bending stiffness [N m^2], axial stiffness [N] and mass per length [kg/m] of a flexure. */
+typedef struct {
+    double EI, EA, mass;
+} Section;
+
+static Section section_of(const System *system, const FlexureType *kind) {
+    double h = evaluate(kind->thickness, system->values);
+    double b = evaluate(kind->width, system->values);
+    double E = evaluate(kind->youngs_modulus, system->values);
+    double rho = evaluate(kind->density, system->values);
+    Section result = {E * b * (h * h * h) / 12, E * b * h, rho * b * h};
+    return result;
+}
+
+/* Return the coordinate that is a direction of a body or a link; FIXED: the ground. */
+static int coordinate_of(const System *system, int j) {
+    return j == FIXED ? FIXED : angle_of(system, j);
+}
+
+/* --- links ------------------------------------------------------------------------------------ */
+
+static void take_segments(Segments *pieces, int longest, Scratch *scratch) {
+    size_t most = (size_t)longest + 2;
+    pieces->lengths = take(scratch, most);
+    pieces->rates = take(scratch, most);
+    pieces->rods = take(scratch, most);
+    pieces->lumps = take(scratch, most);
+    pieces->axial = take(scratch, most);
+}
+
+static bool cut_flexure(const System *system, const Flexure *flexure, Segments *pieces,
+                        Scratch *scratch, Problem *problem) {
+    const FlexureType *kind = &system->mechanism->types[flexure->type];
+    double L = length_of(system, flexure);
+    size_t pivots = (size_t)kind->pivots;
+    double *gamma = take(scratch, pivots), *K_theta = take(scratch, pivots);
+    for (size_t i = 0; i < pivots; i++) {
+        gamma[i] = evaluate(kind->gamma[i], system->values);
+        K_theta[i] = evaluate(kind->K_theta[i], system->values);
+    }
+    Section section = section_of(system, kind);
+    take_segments(pieces, system->mechanism->longest, scratch);
+    return segments(kind, gamma, K_theta, flexure->type_at_start, flexure->type_at_end, L,
+                    section.EI, section.mass * L, section.EA, pieces, problem);
+}
+
+/* Set the angle of a link and, if it stretches, its axial spring; return the next direction. */
+static int lay_link(System *system, Complex direction, double length, double axial, bool stretching,
+                    int j) {
+    system->q0[angle_of(system, j)] = phase(direction);
+    if (stretching) {
+        add_spring(system, axial * (length * length), FIXED, angle_of(system, j + 1));
+    }
+    return stretching ? j + 2 : j + 1;
+}
+
+static bool is_stretch(const System *system, int j) {
+    return j < system->d && arm_of(system, j) != j;
+}
+
+static bool walk_links(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+    Segments pieces = {0, NULL, NULL, NULL, NULL, NULL};
+    if (!cut_flexure(system, step->flexure, &pieces, scratch, problem)) {
+        return false;
+    }
+    if (step->backwards) {
+        reversed(&pieces);
+    }
+    Span span = span_of(system, step);
+    Complex along_it = minus(span.z_end, span.z_start);
+    Complex direction = scaled(1.0 / modulus(along_it), along_it);
+    Place spot = new_place(system, scratch), spare = new_place(system, scratch);
+    on_body(system, span.root, span.z_start, &spot);
+    int *owners = take_integers(scratch, pieces.n + 2), next = step->first_direction;
+    owners[0] = system->origins[span.root].j;
+    for (int i = 1; i <= pieces.n; i++) {
+        owners[i] = next;
+        next = lay_link(system, direction, pieces.lengths[i], pieces.axial[i - 1],
+                        is_stretch(system, next + 1), next);
+    }
+    int last_one = owners[pieces.n + 1] = step->closes ? system->origins[span.far].j : next;
+    for (int i = 0; i <= pieces.n; i++) {
+        /* In the drawing the angle of a body is 0, that of a link its direction. */
+        Complex vector = i == 0 ? scaled(pieces.lengths[i], direction)
+                                : complex_of(pieces.lengths[i], 0.0);
+        add_rod(system, pieces.rods[i], &spot, owners[i], vector, &spare);
+        extend(&spot, owners[i], vector);
+        add_mass(system, &spot, pieces.lumps[i]);
+        add_spring(system, pieces.rates[i], coordinate_of(system, owners[i]),
+                   coordinate_of(system, owners[i + 1]));
+    }
+    Complex last = scaled(pieces.lengths[pieces.n + 1], direction);
+    if (step->closes) {
+        on_body(system, span.far, minus(span.z_end, last), &spare);
+        close_loop(system, &spot, &spare);
+        copy_place(system->d, &spot, &spare); /* The last stub is part of the far body. */
+    } else {
+        reach(system, span.far, &spot, minus(span.z_end, last), last_one);
+    }
+    add_rod(system, pieces.rods[pieces.n + 1], &spot, last_one, last, &spare);
+    return true;
+}
+
+/* --- beams ------------------------------------------------------------------------------------ */
+
+/* The coordinates of a beam, or FIXED: rotations of its ends, the first coefficient, the strain. */
+typedef struct {
+    int start, end, first, strain;
+} BeamCoordinates;
+
+static BeamCoordinates beam_coordinates(const System *system, const Step *step) {
+    const Flexure *flexure = step->flexure;
+    const FlexureType *kind = &system->mechanism->types[flexure->type];
+    BeamCoordinates at = {FIXED, FIXED, step->first, FIXED};
+    at.start = flexure->type_at_start == PIN ? at.first++ : FIXED;
+    at.end = flexure->type_at_end == PIN ? at.first++ : FIXED;
+    int next = at.first + kind->order;
+    at.strain = kind->axial ? next++ : FIXED;
+    int far = step->backwards ? flexure->between.start : flexure->between.end;
+    for (int side = 0; side < 2; side++) {
+        int body = side == 0 ? flexure->between.start : flexure->between.end;
+        int type = side == 0 ? flexure->type_at_start : flexure->type_at_end;
+        int turned = !step->closes && body == far
+                         ? next
+                         : coordinate_of(system, system->origins[body].j);
+        int *end = side == 0 ? &at.start : &at.end;
+        *end = type == PIN ? *end : turned;
+    }
+    return at;
+}
+
+/* Set the changes of the directions of the nodes with the coordinates. */
+static void turn_nodes(System *system, const Step *step, const Beam *beam,
+                       const BeamCoordinates *at, bool axial) {
+    const DirectionMap *map = &system->mechanism->map;
+    int j = step->first_direction;
+    for (int i = 0; i < beam->nodes; i++) {
+        const double *S = beam->S + i * (beam->order + 1);
+        int k = map->first[j++];
+        if (at->start != FIXED) {
+            system->factors[k++] = 1.0 - S[0];
+        }
+        if (at->end != FIXED) {
+            system->factors[k++] = S[0];
+        }
+        for (int l = 1; l <= beam->order; l++) {
+            system->factors[k++] = S[l];
+        }
+        if (axial) {
+            system->factors[map->first[j++]] = 1.0;
+        }
+    }
+}
+
+/* Set the place at the end of lengths (nodes,) along the nodes, from a root. */
+static void beam_place(const System *system, const Step *step, const Beam *beam, int stride,
+                       const Place *root, Complex direction, const double *lengths, Place *spot) {
+    copy_place(system->d, spot, root);
+    for (int i = 0; i < beam->nodes; i++) {
+        double length = lengths[i] - (step->backwards ? beam->whole[i] : 0.0);
+        extend(spot, step->first_direction + i * stride, scaled(length, direction));
+    }
+}
+
+static void place_beam(System *system, const Step *step, const Beam *beam, bool axial,
+                       Scratch *scratch) {
+    Place root = new_place(system, scratch), spot = new_place(system, scratch);
+    Span span = span_of(system, step);
+    int stride = axial ? 2 : 1, nodes = beam->nodes;
+    Complex along_it = minus(span.z_end, span.z_start);
+    Complex direction = scaled((step->backwards ? -1.0 : 1.0) / modulus(along_it), along_it);
+    on_body(system, span.root, span.z_start, &root);
+    for (int i = 0; i < nodes; i++) {
+        beam_place(system, step, beam, stride, &root, direction, beam->A + i * nodes, &spot);
+        add_mass(system, &spot, beam->masses[i]);
+    }
+    double *none = take(scratch, (size_t)nodes);
+    zeros(nodes, none);
+    beam_place(system, step, beam, stride, &root, direction,
+               step->backwards ? none : beam->whole, &spot);
+    if (step->closes) {
+        on_body(system, span.far, span.z_end, &root);
+        close_loop(system, &spot, &root);
+    } else {
+        reach(system, span.far, &spot, span.z_end, step->first_direction + nodes * stride);
+    }
+}
+
+static void walk_beam(System *system, const Step *step, Scratch *scratch) {
+    const Flexure *flexure = step->flexure;
+    const FlexureType *kind = &system->mechanism->types[flexure->type];
+    Section section = section_of(system, kind);
+    double L = length_of(system, flexure);
+    Beam beam = take_beam(kind->order, kind->nodes, scratch);
+    set_beam(&beam, L, section.EI, section.mass * L, scratch);
+    BeamCoordinates at = beam_coordinates(system, step);
+    turn_nodes(system, step, &beam, &at, kind->axial);
+    place_beam(system, step, &beam, kind->axial, scratch);
+    add_spring(system, beam.rates[0], at.start, at.end);
+    for (int k = 0; k < kind->order; k++) {
+        add_spring(system, beam.rates[k + 1], FIXED, at.first + k);
+    }
+    if (kind->axial) {
+        add_spring(system, section.EA * L, FIXED, at.strain);
+    }
+}
+
+PRBM bool walk_flexure(System *system, const Step *step, Scratch *scratch, Problem *problem) {
+    const Flexure *flexure = step->flexure;
+    double L = length_of(system, flexure);
+    if (!(L >= LENGTH_MIN)) {
+        return fail(problem, "flexure %s has the length %g m: move its ends apart", flexure->name,
+                    L);
+    }
+    if (system->mechanism->types[flexure->type].order == 0) {
+        return walk_links(system, step, scratch, problem);
+    }
+    walk_beam(system, step, scratch);
+    return true;
+}

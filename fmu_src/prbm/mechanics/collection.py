@@ -1,0 +1,170 @@
+"""Collection of the parts of a mechanism: coordinates, directions, masses, springs and loops."""
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..mechanism.description import Mechanism
+from ..mechanism.expressions import affine
+from ..mechanism.parts import GROUND, Flexure, Joint, Point
+from .arrays import Real
+from .direction_map import DirectionMap
+from .system import FIXED, BodyFrame, Place
+
+
+class Collection:
+    """The parts of a mechanism that have been added, from the ground to each connected body.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Description.
+    values : mapping
+        Values of all parameters.
+    """
+
+    def __init__(self, mechanism: Mechanism, values: Mapping[str, float]) -> None:
+        self.mechanism = mechanism
+        self.values = values
+        self.q0: list[float] = []
+        self.changes: list[dict[int, float]] = []  # The rows of Phi, one per direction.
+        self.arm: list[int] = []
+        self.J: list[float] = []
+        self.masses: list[tuple[Place, float]] = []
+        self.springs: list[tuple[float, int | None, int | None]] = []
+        self.loops: list[tuple[str, Place]] = []
+        self.origin: dict[str, Place] = {GROUND: Place()}
+        self.drawn: dict[str, complex] = {GROUND: 0j}
+        self.index: dict[str, int | None] = {GROUND: None}  # Directions of the bodies.
+        self.links: list[int] = []
+        self.link_count = 0
+        self.owners: list[str] = []
+        self.lines: list[tuple[str, str, list[Place]]] = []
+
+    # -- values and places --
+
+    def number(self, quantity: float | str) -> float:
+        """Return the value of a quantity."""
+        return affine(quantity)(self.values)
+
+    def at(self, point: Point) -> complex:
+        """Return the drawn position of a point [m]."""
+        return complex(self.number(point[0]), self.number(point[1]))
+
+    def end(self, part: Flexure | Joint, reference: str) -> complex:
+        """Return the drawn position of an end of a part [m]."""
+        return self.at(self.mechanism.point(reference, part.name))
+
+    def length(self, flexure: Flexure) -> float:
+        """Return the length of a flexure as drawn [m]."""
+        return abs(self.end(flexure, flexure.end) - self.end(flexure, flexure.start))
+
+    def size(self) -> float:
+        """Return the size of the mechanism as drawn [m].
+
+        It is the largest distance between any two ground points or centres of mass, or the length
+        of the longest flexure if that is larger.
+        """
+        points = [self.at(p) for p in self.mechanism.ground.values()]
+        points += [self.at(body.centre) for body in self.mechanism.bodies]
+        lengths = [self.length(flexure) for flexure in self.mechanism.flexures]
+        return max(*lengths, *(abs(a - b) for a in points for b in points))
+
+    def on(self, body: str, drawn: complex) -> Place:
+        """Return the place of a drawn point of a body."""
+        return self.origin[body].plus(self.index[body], drawn - self.drawn[body])
+
+    def frame(self, name: str, body: str, point: Point | None) -> BodyFrame:
+        """Return the position of a point of a body (default: its centre of mass)."""
+        if point is None:
+            point = next(b for b in self.mechanism.bodies if b.name == body).centre
+        drawn = self.at(point)
+        place, arm = self.on(body, drawn), self.index[body]
+        j = self.angle(arm)
+        row = place.row(len(self.arm))
+        if j is None or arm is None:
+            return BodyFrame(name, FIXED, FIXED, place.c, row, drawn)
+        return BodyFrame(name, j, arm, place.c, row, drawn)
+
+    # -- additions --
+
+    def coordinate(self, owner: str, start: float = 0.0) -> int:
+        """Add a coordinate of a part and return its index."""
+        self.q0.append(start)
+        self.owners.append(owner)
+        return len(self.q0) - 1
+
+    def angle_of_flexure(self, owner: str, start: float = 0.0) -> int:
+        """Add a coordinate that is an angle of a flexure, and return its index."""
+        self.links.append(self.coordinate(owner, start))
+        return self.links[-1]
+
+    def direction(self, changes: dict[int, float], arm: int | None = None) -> int:
+        """Add the angle of an arm, or the stretch of the given arm, and return its index.
+
+        Parameters
+        ----------
+        changes : dict of int to float
+            Changes of the direction with the coordinates [-].
+        arm : int or None
+            Arm that the direction stretches; None: a new arm, which it turns.
+        """
+        j = len(self.arm)
+        self.changes.append(changes)
+        self.arm.append(j if arm is None else arm)
+        self.J.append(0.0)
+        return j
+
+    def turn(self, owner: str) -> int:
+        """Add the arm of a body, whose angle is a coordinate, and return its direction."""
+        return self.direction({self.coordinate(owner): 1.0})
+
+    def angle(self, j: int | None) -> int | None:
+        """Return the coordinate that is a direction of a body or a link; None: the ground."""
+        return None if j is None else next(iter(self.changes[j]))
+
+    def reach(self, body: str, place: Place, drawn: complex, j: int | None) -> None:
+        """Register the place of a drawn point of a body that turns with a direction."""
+        self.origin[body], self.drawn[body], self.index[body] = place, drawn, j
+
+    def close(self, name: str, place: Place, other: Place) -> None:
+        """Close a loop: require that two places coincide."""
+        self.loops.append((name, place.minus(other)))
+
+    def spring(self, rate: float, a: int | None, b: int | None) -> None:
+        """Add a spring between two coordinates; None: the ground."""
+        self.springs.append((rate, a, b))
+
+    def rod(self, mass: float, start: Place, j: int | None, vector: complex) -> None:
+        """Add a uniform rod: two equal point masses with its centre and moment of inertia."""
+        for fraction in (0.5 - 0.5 / math.sqrt(3), 0.5 + 0.5 / math.sqrt(3)):
+            self.mass(start.plus(j, fraction * vector), mass / 2)
+
+    def mass(self, place: Place, mass: float) -> None:
+        """Add a point mass, unless it is part of the ground."""
+        if mass > 0.0 and place.A:
+            self.masses.append((place, mass))
+
+    # -- arrays --
+
+    def map(self) -> DirectionMap:
+        """Return the map from coordinates to directions."""
+        Phi = np.zeros((len(self.changes), len(self.q0)))
+        for row, changes in zip(Phi, self.changes, strict=True):
+            for j, change in changes.items():
+                row[j] = change
+        return DirectionMap(Phi)
+
+    def stiffness(self) -> Real:
+        """Return the matrix K of all springs, (n, n) [N m/rad], [N m]."""
+        n = len(self.q0)
+        K = np.zeros((n, n))
+        for rate, a, b in self.springs:
+            s = np.zeros(n)
+            if a is not None:
+                s[a] -= 1.0
+            if b is not None:
+                s[b] += 1.0
+            K += rate * np.outer(s, s)
+        return K

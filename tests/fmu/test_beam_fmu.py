@@ -1,0 +1,73 @@
+"""FMUs of a guide on beams: all versions and interfaces equal the engine."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+from fmpy.validation import validate_fmu
+
+from prbm.fmu import native_fmu, python_fmu
+from prbm.hybrid.simulation import Simulation
+from support import mechanism
+
+END, STEP = 0.06, 2e-3
+OUTPUTS = ("shuttle.x", "shuttle.vx", "stop.impact_count", "left_flexure.bend[1].angle")
+
+
+def guide():
+    """Return the guide of the thesis on beams of the order 3."""
+    thesis = mechanism("PRBDM2R")
+    kinds = (replace(kind, model="beam", coefficients={}) for kind in thesis.flexure_types)
+    return replace(thesis, name="BeamGuide", flexure_types=tuple(kinds))
+
+
+@pytest.fixture(scope="module")
+def expected():
+    """Return the rows of the engine, over the first impact."""
+    simulation, rows = Simulation(guide()), []
+    for k in range(round(END / STEP) + 1):
+        simulation.advance(k * STEP)
+        rows.append([simulation.outputs()[name] for name in OUTPUTS])
+    return np.array(rows, float)
+
+
+@pytest.fixture(scope="module", params=["python", "fmi2", "fmi3"])
+def fmu(request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("beam") / "BeamGuide.fmu"
+    if request.param == "python":
+        path.write_bytes(python_fmu.build(guide(), {}))
+    else:
+        path.write_bytes(native_fmu.build(guide(), {}, int(request.param[-1])))
+    return path
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+def test_fmus_of_beams_are_valid_and_simulate_like_the_engine(fmu, expected):
+    """The angles of the coefficients, the motion and the count of impacts are compared."""
+    assert not validate_fmu(str(fmu))
+    found = simulate_fmu(
+        str(fmu), fmi_type="CoSimulation", stop_time=END, output_interval=STEP,
+        output=list(OUTPUTS),
+    )  # fmt: skip
+    for k, name in enumerate(OUTPUTS):
+        values = np.asarray(found[name], float)
+        size = np.abs(expected[:, k]).max()
+        np.testing.assert_allclose(values, expected[:, k], rtol=0.0, atol=1e-6 * size)
+
+
+@pytest.mark.fmu
+@pytest.mark.native
+@pytest.mark.parametrize("version", [2, 3])
+def test_model_exchange_of_beams_equals_the_engine(version, expected, tmp_path):
+    path = tmp_path / "BeamGuide.fmu"
+    path.write_bytes(native_fmu.build(guide(), {}, version))
+    found = simulate_fmu(
+        str(path), fmi_type="ModelExchange", stop_time=END, output_interval=1e-3,
+        relative_tolerance=1e-8, output=list(OUTPUTS),
+    )  # fmt: skip
+    assert found["stop.impact_count"][-1] == expected[-1, 2]
+    for k, name in enumerate(OUTPUTS[:2]):
+        at_end = float(found[name][-1])
+        assert at_end == pytest.approx(expected[-1, k], abs=1e-5 * np.abs(expected[:, k]).max())
