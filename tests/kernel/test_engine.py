@@ -219,6 +219,8 @@ def test_a_damaged_saved_state_is_rejected():
         kernel.restore(KernelSimulation(mechanism("PRBDM2R")).snapshot())
     with pytest.raises(ParameterError, match="belongs to the Python engine"):
         kernel.restore(Simulation(mechanism("PRBDM")).snapshot())
+    with pytest.raises(ParameterError, match="belongs to the kernel"):
+        Simulation(mechanism("PRBDM")).restore(saved)
     assert kernel.snapshot() == saved
 
 

@@ -401,3 +401,10 @@ def test_a_wall_follows_a_signal_that_begins_after_a_constant_part(guide, step):
 def test_a_displacement_of_a_wall_that_jumps_is_rejected(guide, signal):
     with pytest.raises(ParameterError, match=r"stop.displacement jumps .* a wall cannot jump"):
         simulate(guide, inputs={"stop.displacement": signal}, stop_time=0.01)
+
+
+def test_a_table_may_begin_with_a_jump():
+    table = Table((0.0, 0.0, 1.0), (0.0, 1.0, 1.0))
+    assert after(table, 0.0) == 1.0
+    with pytest.raises(ParameterError, match="two equal ones are a jump"):
+        Table((0.0, 0.0, 0.0), (0.0, 1.0, 2.0))

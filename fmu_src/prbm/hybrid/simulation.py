@@ -456,8 +456,10 @@ class Simulation:
         Raises
         ------
         ParameterError
-            If the state belongs to another mechanism.
+            If the state belongs to another mechanism or engine.
         """
+        if "front" not in saved:
+            raise ParameterError("the saved state belongs to the kernel: restore it there")
         same_names = saved["values"].keys() == self.values.keys()
         if not same_names or len(saved["front"]["y"]) != len(self.front.y):
             raise ParameterError("the saved state belongs to another mechanism")
