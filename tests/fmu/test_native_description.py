@@ -283,7 +283,8 @@ def test_the_compiled_source_needs_no_resources(native, tmp_path, fmi):
     shutil.rmtree(tmp_path / "resources")
     result = simulate_fmu(str(tmp_path), output=["stop.impact_count"])
     assert result["stop.impact_count"][-1] == 14
-    subprocess.run([*command, "-c", "-o", "static.o"], cwd=sources, check=True)
+    prefix = ["-DFMI2_FUNCTION_PREFIX=PRBDM_"] if fmi == 2 else []
+    subprocess.run([*command, *prefix, "-c", "-o", "static.o"], cwd=sources, check=True)
     found = subprocess.check_output(["nm", "-g", "--defined-only", "static.o"], cwd=sources)
     shown = {line.split()[-1] for line in found.decode().splitlines()}
     assert shown

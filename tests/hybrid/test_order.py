@@ -309,10 +309,11 @@ def energy_error(twin, acceleration, step=1.3e-3, end=0.2):
 
 
 @pytest.mark.parametrize("twin", [Simulation, KernelSimulation])
-def test_inputs_that_change_within_integration_steps_cause_a_small_error_of_the_energy(twin):
-    """The work of the inputs is the change of the energy, up to a hundred times the tolerance.
+def test_inputs_that_change_within_integration_steps_cause_no_error_of_the_energy(twin):
+    """The work of the inputs is the change of the energy, as exactly as without inputs.
 
-    The integration restarts from the interpolation with the accuracy of the integration.  With the
-    dense output of the pair the error is seven hundred times the tolerance.
+    The integration restarts from the end of a step, not from the dense output of the pair, with
+    which the error is thirty times larger.
     """
-    assert energy_error(twin, lambda t: 3.0 * math.sin(44.0 * t)) < 1e-6
+    undisturbed = energy_error(twin, lambda t: 0.0)
+    assert energy_error(twin, lambda t: 3.0 * math.sin(44.0 * t)) < 2 * undisturbed

@@ -219,6 +219,8 @@ def test_a_damaged_saved_state_is_rejected():
         kernel.restore(KernelSimulation(mechanism("PRBDM2R")).snapshot())
     with pytest.raises(ParameterError, match="belongs to the Python engine"):
         kernel.restore(Simulation(mechanism("PRBDM")).snapshot())
+    with pytest.raises(ParameterError, match="belongs to the kernel"):
+        Simulation(mechanism("PRBDM")).restore(saved)
     assert kernel.snapshot() == saved
 
 
@@ -392,3 +394,29 @@ def test_a_damaged_copy_of_the_library_is_written_again(tmp_path, monkeypatch):
     with library_module._file(b"content", ".so") as path:
         assert path.read_bytes() == b"content"
     assert not path.exists()
+
+
+@pytest.mark.parametrize("times", [np.empty((2, 0)), [[0.001, 0.002]], 0.001])
+def test_times_with_another_shape_than_a_list_are_rejected(times):
+    with pytest.raises(ParameterError, match="give a list of times"):
+        KernelSimulation(mechanism("PRBDM")).sample(times, ["shuttle.x"])
+
+
+def test_the_order_of_names_in_a_saved_state_has_no_effect():
+    kernel = KernelSimulation(mechanism("PRBDM"))
+    kernel.restore(json.loads(json.dumps(kernel.snapshot(), sort_keys=True)))
+    kernel.set({"force.x": 0.5})
+    assert kernel.given["force.x"] == 0.5
+    with pytest.raises(ParameterError, match="damaged"):
+        kernel.restore({**kernel.snapshot(), "given": {}})
+    with pytest.raises(ParameterError, match="another mechanism"):
+        kernel.restore({**kernel.snapshot(), "numbers": [[]] * len(kernel.snapshot()["numbers"])})
+
+
+def test_impacts_before_an_error_are_recorded():
+    found = []
+    for one in both(mechanism("PRBDM")):
+        with pytest.raises(SimulationError):
+            one.sample([0.05, 0.1, 0.01], ["shuttle.x"])
+        found.append(len(one.record))
+    assert found[0] == found[1] > 0

@@ -384,3 +384,27 @@ def test_mistakes_in_signals_are_reported(guide, inputs, sentence, tmp_path, mon
 def test_an_input_has_either_a_constant_or_a_signal(guide):
     with pytest.raises(ParameterError, match=r"force\.x is given both as a constant and over time"):
         simulate(guide, {"force.x": 1.0}, inputs={"force.x": "1 N"}, stop_time=0.01)
+
+
+@pytest.mark.parametrize("step", [1e-3, 1e-4])
+def test_a_wall_follows_a_signal_that_begins_after_a_constant_part(guide, step):
+    """The steps of the constant part do not delay the wall: its error is below 1 um of 1 mm."""
+    result = simulate(
+        guide, {"stop.position": 0.02}, stop_time=0.012, step=step,
+        inputs={"stop.displacement": "half-sine(1 mm, 4 ms, 5 ms)"},
+    )  # fmt: skip
+    wall = result["stop.gap"] + result["stop.point.displacement"]
+    assert np.abs(wall - wall[0] - result["stop.displacement"]).max() < 1e-6
+
+
+@pytest.mark.parametrize("signal", ["step(1 mm, 5 ms)", "pulse(1 mm, 5 ms, 2 ms)"])
+def test_a_displacement_of_a_wall_that_jumps_is_rejected(guide, signal):
+    with pytest.raises(ParameterError, match=r"stop.displacement jumps .* a wall cannot jump"):
+        simulate(guide, inputs={"stop.displacement": signal}, stop_time=0.01)
+
+
+def test_a_table_may_begin_with_a_jump():
+    table = Table((0.0, 0.0, 1.0), (0.0, 1.0, 1.0))
+    assert after(table, 0.0) == 1.0
+    with pytest.raises(ParameterError, match="two equal ones are a jump"):
+        Table((0.0, 0.0, 0.0), (0.0, 1.0, 2.0))

@@ -300,7 +300,8 @@ def _modes_of(
     # Contacts that cannot move independently are left out: loops and held stops carry their load.
     at_rest = [c for c in rubbing if modes[c] is FRICTIONLESS and _mobile(front, contacts, c)]
     for c, rate in turning.items():
-        if modes[c] is FRICTIONLESS and c not in at_rest and abs(rate) > scales.zero_acceleration:
+        rests = modes.get(c) is FRICTIONLESS and c not in at_rest
+        if rests and abs(rate) > scales.zero_acceleration:
             # The other parts impose the motion, as where the links of a loop form a straight line.
             modes[c] = ContactMode.slipping(rate)
     for c in rubbing:

@@ -259,14 +259,15 @@ class Simulation:
 
     def _restart(self, moved: tuple[Wall, ...]) -> None:
         """Continue from the present state with the present inputs, walls and parameters."""
-        y, configuration = self.state(), self.prepared
+        given, configuration = self._impulses_given(), self.prepared
+        pushed = not np.array_equal(given, self.received)
+        y = self._end_of_step(shown=pushed)
         if configuration is not self.configuration:
             moved = walls.keeping_gaps(self.system, configuration.system, y, moved)
         inputs = Inputs.of(self.mechanism, self.given, moved)
         equations = configuration.equations(inputs, self.contacts)
         front = Front(self.time, y, equations, self.latched)
-        given = self._impulses_given()
-        if not np.array_equal(given, self.received):
+        if pushed:
             front = impacts.receive(front, given - self.received)
         front, struck = contact_modes.release_moving(configuration, front)
         counted: list[Impact] = []
@@ -276,6 +277,17 @@ class Simulation:
             front, counted = impacts.impact(configuration, front, struck)
         self.configuration, self.changed, self.received = configuration, False, given
         self._set_front(front, counted)
+
+    def _end_of_step(self, shown: bool) -> Real:
+        """Return the present state as the end of a step, whose error is below that of the arc.
+
+        Impulses act on the state that outputs show, so that they conserve the momentum of a
+        coupling exactly.
+        """
+        arc, t = self.arc, self.time
+        if shown or arc is None or not arc.start < t < self.front.time:
+            return self.state()
+        return closed(self.configuration, self.equations, t, arc.cut(self.equations.rate, t)[1])
 
     def _apply(self, event: Event) -> None:
         """Apply an event at the front."""
@@ -444,8 +456,10 @@ class Simulation:
         Raises
         ------
         ParameterError
-            If the state belongs to another mechanism.
+            If the state belongs to another mechanism or engine.
         """
+        if "front" not in saved:
+            raise ParameterError("the saved state belongs to the kernel: restore it there")
         same_names = saved["values"].keys() == self.values.keys()
         if not same_names or len(saved["front"]["y"]) != len(self.front.y):
             raise ParameterError("the saved state belongs to another mechanism")

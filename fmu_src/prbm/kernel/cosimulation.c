@@ -14,16 +14,20 @@
 
 /* --- communication steps ---------------------------------------------------------------------- */
 
-/* Make the present state the front, from which the integration continues.  It is the state that
- * outputs show, so that no momentum is lost in a coupling. */
-static bool leave_arc(Simulation *sim, Problem *problem) {
+/* Make the present state the front, from which the integration continues.  It is the end of a step,
+ * or the state that outputs show, so that impulses conserve the momentum of a coupling exactly. */
+static bool leave_arc(Simulation *sim, bool shown, Problem *problem) {
     State *state = &sim->state;
-    if (!arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem)) {
-        return false;
+    bool within = state->arc.valid && state->time < state->front_time;
+    bool ok = true;
+    if (within && !shown) {
+        ok = end_step(sim, state->time, problem);
+    } else {
+        ok = arc_state(sim, state->front, &sim->present.reference, &sim->at_front, problem);
+        state->front_time = state->time;
     }
-    state->front_time = state->time;
     state->arc.valid = state->has_k1 = false;
-    return true;
+    return ok;
 }
 
 /* Let the inputs act that have been set. */
@@ -84,7 +88,7 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
         copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
         return true;
     }
-    if (!leave_arc(sim, problem) || (set && !keep_gaps(sim, joined, problem))) {
+    if (!leave_arc(sim, impulses_changed(sim), problem) || (set && !keep_gaps(sim, joined, problem))) {
         return false;
     }
     memcpy(state->walls, joined, bytes);
@@ -182,7 +186,7 @@ PRBM bool simulation_advance(Simulation *simulation, double time, Problem *probl
  * stops follow their walls unless impulses act on the body, too. */
 static bool apply_here(Simulation *sim, bool event, bool impulses, Problem *problem) {
     bool moved = walls_changed(sim);
-    if (!event && !leave_arc(sim, problem)) {
+    if (!event && !leave_arc(sim, true, problem)) {
         return false;
     }
     sim->state.interrupted = sim->state.interrupted && !moved;

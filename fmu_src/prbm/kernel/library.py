@@ -70,7 +70,9 @@ def library() -> ctypes.CDLL:
         except OSError as error:
             raise LibraryError(f"the compiled kernel cannot be loaded ({error})") from None
     for name, (result, *arguments) in FUNCTIONS.items():
-        function = getattr(loaded, name)
+        function = getattr(loaded, name, None)
+        if function is None:
+            raise LibraryError(f"the compiled kernel has no function {name}")
         function.restype, function.argtypes = result, arguments
     return loaded
 

@@ -318,6 +318,8 @@ class KernelSimulation:
         Parameters and errors as for :meth:`prbm.hybrid.simulation.Simulation.sample`.
         """
         t, slots = np.array(times, float), self._slots(names)
+        if t.ndim != 1:
+            raise ParameterError(f"times have the shape {t.shape}: give a list of times in s")
         x = np.empty((len(t), len(slots)))
         with self._lock:
             count = self._library.prbm_sample(
@@ -325,7 +327,11 @@ class KernelSimulation:
                 x.ctypes.data, self._message,
             )  # fmt: skip
             if count < 0:
-                raise self._error()
+                error = self._error()
+                self._take_impacts(
+                    self._library.prbm_advance(self._address, self.time, self._message)
+                )
+                raise error
             self._take_impacts(count)
         return x
 
@@ -351,15 +357,22 @@ class KernelSimulation:
         """
         if saved.get("engine") != self.engine:
             raise ParameterError("the saved state belongs to the Python engine: restore it there")
-        numbers = np.array(saved["numbers"], float)
-        same_names = saved["values"].keys() == self.values.keys()
+        if saved["values"].keys() != self.values.keys():
+            raise ParameterError("the saved state belongs to another mechanism")
+        try:
+            numbers = np.array(saved["numbers"], float)
+            values = {name: saved["values"][name] for name in self.values}
+            given = {name: saved["given"][name] for name in self.given}
+            wanted = saved["tolerance"]
+        except (KeyError, TypeError, ValueError) as error:
+            raise ParameterError(f"the saved state is damaged: {error}") from None
         with self._lock:
-            if not same_names or len(numbers) != self._library.prbm_saved_count(self._address):
+            if numbers.shape != (self._library.prbm_saved_count(self._address),):
                 raise ParameterError("the saved state belongs to another mechanism")
             if not self._library.prbm_restore(self._address, numbers.ctypes.data, self._message):
                 raise ParameterError(self._message.value.decode(errors="replace"))
-            self.values, self.given = dict(saved["values"]), dict(saved["given"])
-            self._wanted, self._outputs = saved["tolerance"], None
+            self.values, self.given = values, given
+            self._wanted, self._outputs = wanted, None
             vars(self).pop("_configuration", None)
 
     def __getstate__(self) -> dict[str, Any]:
@@ -367,7 +380,7 @@ class KernelSimulation:
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         self.mechanism = state["mechanism"]
-        self.values = state["saved"]["values"]
+        self.values, self.given = state["saved"]["values"], state["saved"]["given"]
         self._open()
         self.restore(state["saved"])
         self.record = state["record"]

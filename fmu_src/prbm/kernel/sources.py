@@ -25,12 +25,8 @@ HEAD = """\
  * The C kernel of {tool} as one file, for FMI {version}.0.  It needs the C library only; all
  * functions except those of the standard are static.  {tables} contains the mechanism, so
  * that no file is read at run time.  Compile without -ffast-math and, for the same results on every
- * platform, with -ffp-contract=off.  Function names have the prefix {name}_, unless
- * {override} is defined.
- */
-#ifndef {prefix}
-#define {prefix} {name}_
-#endif
+ * platform, with -ffp-contract=off.
+{naming} */
 #ifndef PRBM_FMI
 #define PRBM_FMI {version}
 #endif
@@ -54,20 +50,30 @@ def _files(folder: Traversable, prefix: str) -> Iterator[tuple[str, bytes]]:
             yield path, entry.read_bytes()
 
 
+NAMING = {
+    2: " * Function names have a prefix if {prefix} is defined.\n",
+    3: " * Function names have the prefix {name}_, unless {override} is defined.\n",
+}
+PREFIX = "#ifndef {prefix}\n#define {prefix} {name}_\n#endif\n"
+"""Tools that compile source code of FMI 2.0 expect names without a prefix."""
+
+
 def amalgamation(name: str, title: str, version: int) -> str:
     """Return the kernel as one C file, with the wrapper for one version of FMI."""
     texts = {file: content.decode() for file, content in kernel().items()}
     left_out = {file for number in WRAPPERS if number != version for file in WRAPPERS[number]}
     left_out |= {ENGINE_UNIT}
+    prefix, override = f"FMI{version}_FUNCTION_PREFIX", OVERRIDE.format(version)
+    names = {"name": name, "prefix": prefix, "override": override}
     head = HEAD.format(
         name=name,
         title=printable(title).replace("*/", "* /"),
         tool=GENERATION_TOOL,
         version=version,
         tables=TABLES,
-        prefix=f"FMI{version}_FUNCTION_PREFIX",
-        override=OVERRIDE.format(version),
+        naming=NAMING[version].format(**names),
     )
+    head += PREFIX.format(**names) if version == 3 else ""
     return head + "\n".join(_lines(UNIT, texts, left_out)) + "\n"
 
 

@@ -30,6 +30,8 @@ IMPULSE = "impulse"  # Group of the inputs that are impulses, as in force.impuls
 SAMPLING_TOLERANCE_MIN = 1e-12
 LAST_PIECE_RTOL = 1e-6  # Duration of the last piece before a row, relative to the row spacing.
 SAMPLING_STEPS_MAX = 10_000_000  # More steps are a mistake in the unit of a frequency or a time.
+JUMP_ATOL = 1e-12  # m: a smaller jump of a wall is round-off.
+WALL_PIECES_MIN = 100  # Pieces of each interval between breaks in which a wall moves.
 GAUSS_NODE = math.sqrt(0.6)  # Nodes of Gauss' formula: 0 and +- this share of half a step.
 
 
@@ -71,6 +73,10 @@ class Driver:
         self.omega, self.share, self.now = 0.0, 1.0, start
         self.breaks = sorted({t for signal in signals.values() for t in signal.breaks if t > start})
         self.sampled = {name for name in signals if _is_sampled(name)}
+        self.wall_step = math.inf  # Longest step of a wall that is driven by a signal [s].
+        for name, signal in signals.items():
+            if name.endswith(".displacement"):
+                _check_continuity(name, signal, start)
 
     def values(self, t: float) -> dict[str, float]:
         """Return the values of the signals from time t [s] on."""
@@ -99,8 +105,19 @@ class Driver:
         self.omega = 2.0 * math.pi * frequency
         self.share = (SAMPLING_ERROR_FACTOR * max(tolerance, SAMPLING_TOLERANCE_MIN)) ** 0.25
         points = [self.now, *self._between(self.now, stop_time), stop_time]
+        walls = [s for name, s in self.signals.items() if _is_wall(name)]
+        driven = [
+            (a, b) for a, b in pairwise(points) if any(s.rate(a, b) is not None for s in walls)
+        ]
+        self.wall_step = min(
+            (min(self._step(walls, a, b), (b - a) / WALL_PIECES_MIN) for a, b in driven),
+            default=math.inf,
+        )
         for name, signal in self.signals.items():
-            steps = sum((b - a) / self._step((signal,), a, b) for a, b in pairwise(points))
+            longest = self.wall_step if _is_wall(name) else math.inf
+            steps = sum(
+                (b - a) / min(self._step((signal,), a, b), longest) for a, b in pairwise(points)
+            )
             if steps > SAMPLING_STEPS_MAX:
                 raise ParameterError(
                     f"the signal of {name} needs {steps:.3g} steps in {stop_time:g} s; check the "
@@ -125,7 +142,7 @@ class Driver:
             if all(signal.rate(a, b) is None for signal in signals):
                 self._hold(simulation, a, 0.5 * (a + b), b)
                 continue
-            steps = math.ceil((b - a) / self._step(signals, a, b))
+            steps = math.ceil((b - a) / min(self._step(signals, a, b), self.wall_step))
             grid = [*(a + k * (b - a) / steps for k in range(steps)), min(b, max(last, a))]
             for c, d in pairwise(grid):
                 if d > c:
@@ -141,6 +158,9 @@ class Driver:
     def _hold(self, simulation: Driveable, t: float, inside: float, end: float) -> None:
         """Advance to a time [s] with the values at time t, on the interval around ``inside``."""
         simulation.set({n: signal.value(t, inside) for n, signal in self.signals.items()})
+        pieces = math.ceil((end - t) / self.wall_step)
+        for k in range(1, pieces):
+            simulation.advance(t + k * (end - t) / pieces)
         simulation.advance(end)
 
     def _sample(self, simulation: Driveable, start: float, end: float) -> None:
@@ -158,3 +178,21 @@ class Driver:
         simulation.advance(middle)
         simulation.set(second)
         simulation.advance(end)
+
+
+def _is_wall(name: str) -> bool:
+    """Return whether an input moves the wall of a stop."""
+    return name.rpartition(".")[2] in WALL_INPUTS
+
+
+def _check_continuity(name: str, signal: Signal, start: float) -> None:
+    """Reject a displacement of a wall that jumps after the start [s]."""
+    times = [-math.inf, *signal.breaks, math.inf]
+    for before, t, behind in zip(times, times[1:], times[2:], strict=False):
+        left = signal.value(t, max(0.5 * (before + t), t - 1.0))
+        right = signal.value(t, min(0.5 * (t + behind), t + 1.0))
+        if t > start and abs(right - left) > JUMP_ATOL:
+            raise ParameterError(
+                f"the signal of {name} jumps from {left:.6g} m to {right:.6g} m at t = {t:.6g} s: "
+                "a wall cannot jump; give a ramp, such as the rows of a CSV file"
+            )

@@ -152,7 +152,7 @@ def kernel_available() -> bool:
     """Return whether the kernel can be loaded; log the reason if it cannot."""
     try:
         library()
-    except PrbmError as error:
+    except (PrbmError, OSError) as error:
         _warn(f"the Python engine is used, which is slower: {error}")
         return False
     return True

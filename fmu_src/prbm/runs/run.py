@@ -110,7 +110,7 @@ def simulate(
     """
     if not isinstance(mechanism, Mechanism):
         raise TypeError(f"mechanism = {mechanism!r} must be a Mechanism, as prbm.load returns")
-    values = _values(mechanism, changes)
+    values = in_si(mechanism, changes)
     driver = Driver(signals(mechanism, inputs or {}, values))
     values = {**values, **driver.values(0.0)}
     duration, spacing = (
@@ -171,7 +171,7 @@ def _check_steps(motion: Engine, steps_max: float, fraction: float) -> None:
         )
 
 
-def _values(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Mapping[str, float]:
+def in_si(mechanism: Mechanism, changes: Mapping[str, float | str] | None) -> Mapping[str, float]:
     """Return changes with texts converted to numbers in SI."""
     texts = {name: x for name, x in (changes or {}).items() if isinstance(x, str)}
     if not texts:

@@ -182,7 +182,8 @@ class Table:
                     "finite"
                 )
         for k in range(1, len(self.times)):
-            if self.times[k] < self.times[k - 1] or self.times[k] == self.times[max(k - 2, 0)]:
+            third = k > 1 and self.times[k] == self.times[k - 2]
+            if self.times[k] < self.times[k - 1] or third:
                 raise ParameterError(
                     f"the times must increase, two equal ones are a jump; row {k} has "
                     f"{self.times[k]:g} s after {self.times[k - 1]:g} s"

@@ -32,7 +32,7 @@ from ..runs.experiment import experiment
 from ..runs.inputs import Source, filled, placeholders, signals
 from ..runs.quantities import QUANTITIES
 from ..runs.result import names
-from ..runs.run import simulate
+from ..runs.run import in_si, simulate
 from ..runs.signals import Signal
 from .outputs import FAILED, OK, QUANTITY, Outcome, Output, SpecificationError, evaluate
 from .outputs import parse_output as parse
@@ -216,7 +216,8 @@ def study(
     wanted = minimise if maximise is None else maximise
     texts = list(dict.fromkeys([*outputs, *([] if wanted is None else [wanted])]))
     units = _units(mechanism)
-    given, end = dict(values or {}), _duration(mechanism, stop_time)
+    given = dict(values or {})
+    end = _duration(mechanism, given, stop_time)
     setup = Setup(
         mechanism, _outputs(texts, units), given, dict(inputs or {}),
         {"stop_time": end, "step": end / STEPS if step is None else step, "tolerance": tolerance},
@@ -243,13 +244,17 @@ def study(
     return Study(found.varied, points, found.outputs, found.units, found.messages, optimum)
 
 
-def _duration(mechanism: Mechanism, stop_time: float | str | None) -> float:
+def _duration(
+    mechanism: Mechanism, values: Mapping[str, Any], stop_time: float | str | None
+) -> float:
     """Return the duration of the simulations [s]."""
     if isinstance(stop_time, str):
         from ..files.settings import quantity  # imported here: pint takes half a second
 
         return quantity(stop_time, "s", "stop_time =")
-    return experiment(mechanism).stop_time if stop_time is None else float(stop_time)
+    if stop_time is None:
+        return experiment(mechanism, in_si(mechanism, values)).stop_time
+    return float(stop_time)
 
 
 # --- checks ---------------------------------------------------------------------------------------
@@ -268,6 +273,10 @@ def _checked(
     for name, sequence in vary.items():
         if name not in settable and name not in within:
             raise ParameterError(f"unknown variable {name!r}; {proposal(name, settable)}")
+        if name in settable and name in within:
+            raise ParameterError(
+                f"{{{name}}} in an input is also a parameter; choose another name in braces"
+            )
         x = np.array(sequence, float).ravel()
         if len(x) < 2 or not (np.isfinite(x).all() and (np.diff(x) > 0.0).all()):
             raise ParameterError(

@@ -19,6 +19,7 @@ from typing import Any
 
 import prbm
 from c_importer import compile_c, host_fmu
+from prbm.kernel.compiler import ENGINE, HOST, libraries
 from shared import once
 
 from .report import Part
@@ -48,15 +49,19 @@ def environment(**changes: str | None) -> dict[str, str]:
 
 
 def _compiler(folder: Path) -> str:
-    """Return a compiler that copies the library of a built FMU: it takes no time."""
+    """Return a compiler that copies compiled libraries: it takes no time."""
     with zipfile.ZipFile(host_fmu("PRBDM", 2)) as archive:
         name = next(n for n in archive.namelist() if n.endswith(".so"))
         (folder / "kernel.so").write_bytes(archive.read(name))
+    (engine,) = libraries([HOST], product=ENGINE).values()
+    (folder / "engine.so").write_bytes(engine)
     path = folder / "fast-cc"
     path.write_text(
         "#!/bin/sh\n"
-        'while [ $# -gt 0 ]; do case "$1" in --version) echo cc 1; exit;; -o) out=$2;; esac\n'
-        f'shift; done\ncp "{folder}/kernel.so" "$out"\n'
+        "kind=kernel\n"
+        'while [ $# -gt 0 ]; do case "$1" in --version) echo cc 1; exit;; -o) out=$2;; '
+        "-DPRBM_ENGINE) kind=engine;; esac\n"
+        f'shift; done\ncp "{folder}/$kind.so" "$out"\n'
     )
     path.chmod(0o755)
     return str(path)

@@ -38,9 +38,11 @@ def python(version: str) -> str | None:
 
 
 def requirements(which: str) -> list[str]:
-    """Return the requirements of the package and of sweeps; "lowest" pins them to the bounds."""
+    """Return the requirements of package, FMPy and sweeps; "lowest" pins them to the bounds."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    wanted = [*project["dependencies"], *project["optional-dependencies"]["sweep"]]
+    extras = project["optional-dependencies"]
+    wanted = [*project["dependencies"], *extras["fmpy"], *extras["sweep"]]
+    wanted = [name for name in wanted if not name.startswith(project["name"])]
     if which == "newest":
         return wanted
     return [f"{m[1]}=={m[2]}" for m in map(LOWER_BOUND.match, wanted) if m]

@@ -210,7 +210,7 @@ PRBM double violation(int k, int m, const double *W, const double *u, const doub
 static bool leave_out(int k, int size, const double *u, double tolerance, double *M, double *q) {
     bool found = false;
     for (int i = 0; i < k; i++) {
-        if (u[i] < -tolerance) {
+        if (!(u[i] >= -tolerance)) {
             continue;
         }
         found = true;

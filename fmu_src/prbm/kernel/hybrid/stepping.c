@@ -203,15 +203,32 @@ static bool find_step(Simulation *sim, double longest, double *h, Problem *probl
 
 /* --- steps ------------------------------------------------------------------------------------ */
 
-/* End the step at a time of its dense output. */
-static bool end_on_arc(Simulation *sim, double t, Problem *problem) {
+/* Project the end of a step, which is the front. */
+static bool project_end(Simulation *sim, Problem *problem) {
     State *state = &sim->state;
     double *y = sim->stepping.end;
+    copy(state_size(sim), state->front, y);
+    return project(&sim->equations, state->front_time, state->front, &sim->scratch, problem) &&
+           check_projection(sim, state->front_time, y, state->front, problem);
+}
+
+PRBM bool end_step(Simulation *sim, double t, Problem *problem) {
+    State *state = &sim->state;
     state->front_time = t;
-    arc_at(sim, t, y);
-    copy(state_size(sim), y, state->front);
-    return project(&sim->equations, t, state->front, &sim->scratch, problem) &&
-           check_projection(sim, t, y, state->front, problem);
+    if (t <= state->arc.start) {
+        copy(state_size(sim), state->arc.y, state->front);
+        return true;
+    }
+    state->arc.h = t - state->arc.start;
+    sim->stepping.has_middle = false;
+    return arc_cut(sim, t, state->arc.k, state->front, problem) && project_end(sim, problem);
+}
+
+/* End the step at a time of its dense output. */
+static bool end_on_arc(Simulation *sim, double t, Problem *problem) {
+    sim->state.front_time = t;
+    arc_at(sim, t, sim->state.front);
+    return project_end(sim, problem);
 }
 
 /* End the step at an event.  A reversal is delayed where the links of a loop form a straight line,

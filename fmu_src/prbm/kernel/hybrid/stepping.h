@@ -6,6 +6,9 @@
 
 PRBM double longest_step(const Simulation *sim);
 PRBM bool take_step(Simulation *sim, Problem *problem);
+/* Compute the latest step again up to a time in it, which becomes the front: with the error of a
+ * step, which is below that of the dense output. */
+PRBM bool end_step(Simulation *sim, double t, Problem *problem);
 
 /* Return the difference of the solution of lower order at the end of the latest step, relative to
  * the state. */
