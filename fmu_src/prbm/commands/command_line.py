@@ -396,7 +396,7 @@ def _sweep(commands: Commands) -> None:
 
 def _study(commands: Commands) -> None:
     parser = _command(
-        commands, "study", "study:studied",
+        commands, "study", "study:run_study",
         "simulate over one or two parameters, and find the optimum of an output",
         _examples(
             'prbm study PRBDM2R --vary "stop.position=-4:2 mm:25" --stop-time 0.5 \\\n'
@@ -469,7 +469,7 @@ def _validate(commands: Commands) -> None:
 
 def _completion(commands: Commands) -> None:
     parser = _command(
-        commands, "completion", "completion:printed",
+        commands, "completion", "completion:print_completion",
         "print a script for tab completion of commands, options and mechanisms",
         _examples("prbm completion bash"),
         details='In bash, eval "$(prbm completion bash)" in ~/.bashrc switches it on.',

@@ -31,7 +31,7 @@ complete -o default -F _prbm prbm
 MECHANISM = ("mechanism", "files")  # Positional arguments that may be a mechanism.
 
 
-def printed(options: argparse.Namespace) -> None:
+def print_completion(options: argparse.Namespace) -> None:
     """Print the script."""
     print(script(parser()), end="")
 

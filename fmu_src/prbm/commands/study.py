@@ -27,7 +27,7 @@ ROWS_PRINTED_MAX = 45  # Longer tables are only written.
 DIGITS = 5  # Significant digits of printed numbers.
 
 
-def studied(options: argparse.Namespace) -> None:
+def run_study(options: argparse.Namespace) -> None:
     """Run a study, print its table and its optimum."""
     mechanism = load(options.mechanism)
     values = settings(mechanism, options.set)

@@ -1,6 +1,5 @@
 """Builder of native FMUs: the C kernel, the tables of a mechanism and the files of the standard."""
 
-import hashlib
 import json
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,7 +11,7 @@ from ..interface.native import NativeInterface, native_interface
 from ..interface.tables import FILE, tables
 from ..interface.variables import CLOCK
 from ..kernel.compiler import HOST, Platform, libraries
-from ..kernel.sources import TABLES, amalgamation, kernel, tables_header
+from ..kernel.sources import TABLES, amalgamation, files_digest, kernel, tables_header
 from ..mechanics.independent import independent
 from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON
@@ -141,10 +140,7 @@ def _digest(
         "modelDescription.xml": description(fmi, heading, mechanism, native, source),
         FILE: tables(mechanism, native.variables, "", native.independent, heading.experiment.step),
     }
-    digest = hashlib.sha256()
-    for name in sorted(parts):
-        digest.update(name.encode() + b"\0" + hashlib.sha256(parts[name]).digest())
-    return digest.hexdigest()
+    return files_digest(parts)
 
 
 def _model(mechanism: Mechanism, native: NativeInterface, step: float) -> bytes:

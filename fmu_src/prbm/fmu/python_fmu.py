@@ -1,7 +1,6 @@
 """Python FMUs: the engine's own source, wrapped by pythonfmu, as FMI 2.0 co-simulation."""
 
 import ast
-import hashlib
 import json
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,6 +11,7 @@ from importlib.resources.abc import Traversable
 from ..base.errors import MechanismError
 from ..base.text import printable
 from ..interface.variables import Variable
+from ..kernel.sources import files_digest
 from ..mechanism.description import Mechanism
 from ..runs.engine import PYTHON
 from ..runs.experiment import experiment
@@ -102,27 +102,19 @@ def build(
     progress(f"collecting {len(listed)} variables and the engine")
     default = experiment(mechanism, changes, engine=PYTHON)
     sources = dict(_sources(mechanism, listed, default.step))
-    token = f"{mechanism.name}_{_digest(sources | {'': SCRIPT.encode()})[:TOKEN_DIGITS]}"
+    token = f"{mechanism.name}_{files_digest(sources | {'': SCRIPT.encode()})[:TOKEN_DIGITS]}"
     progress("drawing the icon and writing the documentation")
     contents = {f"resources/{path}": text for path, text in _named(mechanism, token, sources)}
     contents |= dict(_binaries(mechanism.name))
     contents |= dict(_licenses())
     heading = Heading(mechanism.name, mechanism.title, "", MechanismSlave.log_categories, default)
-    anonymous = _digest(sources | {"": model_description(heading, listed)})
+    anonymous = files_digest(sources | {"": model_description(heading, listed)})
     heading = replace(heading, guid=f"{{{uuid.uuid5(NAMESPACE, anonymous)}}}")
     contents["modelDescription.xml"] = model_description(heading, listed)
     contents["documentation/index.html"] = documentation.page(mechanism, listed, default).encode()
     contents["model.png"] = icon(mechanism, start_sample(mechanism, changes))
     progress("packing")
     return zipped(contents)
-
-
-def _digest(files: Mapping[str, bytes]) -> str:
-    """Return a hash of names and contents."""
-    digest = hashlib.sha256()
-    for name in sorted(files):
-        digest.update(name.encode() + b"\0" + hashlib.sha256(files[name]).digest())
-    return digest.hexdigest()
 
 
 def _sources(

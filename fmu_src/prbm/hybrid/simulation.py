@@ -458,7 +458,7 @@ class Simulation:
         ParameterError
             If the state belongs to another mechanism or engine.
         """
-        if "front" not in saved:
+        if saved.get("engine", self.engine) != self.engine:
             raise ParameterError("the saved state belongs to the kernel: restore it there")
         same_names = saved["values"].keys() == self.values.keys()
         if not same_names or len(saved["front"]["y"]) != len(self.front.y):

@@ -25,7 +25,7 @@ from ..base.atomic import write
 from ..base.errors import PrbmError
 from ..base.lock import locked
 from .prebuilt import prebuilt
-from .sources import UNIT, kernel
+from .sources import UNIT, files_digest, kernel
 
 HOST, ALL = "host", "all"
 FLAGS = (
@@ -156,27 +156,27 @@ def libraries(
     DamagedLibraryError
         If a library of the installed package is damaged.
     """
-    result = {}
+    result, files = {}, kernel()
     for name in platforms:
         if name == HOST:
             here = _host()
-            result[here] = _prebuilt(here, product) or _library(
-                here, _host_compilers(), product, progress
+            result[here] = _prebuilt(here, product, files) or _library(
+                here, _host_compilers(), product, files, progress
             )
     names = PLATFORMS if ALL in platforms else [name for name in platforms if name in PLATFORMS]
     for name in names:
         chosen = PLATFORMS[name]
-        result[chosen] = _prebuilt(chosen, product) or _library(
-            chosen, _zig(chosen), product, progress
+        result[chosen] = _prebuilt(chosen, product, files) or _library(
+            chosen, _zig(chosen), product, files, progress
         )
     return result
 
 
-def _prebuilt(wanted: Platform, product: Product) -> bytes | None:
+def _prebuilt(wanted: Platform, product: Product, files: Mapping[str, bytes]) -> bytes | None:
     """Return the library of the installed package, unless CC names a compiler."""
     if os.environ.get("CC", "").strip():
         return None
-    return prebuilt(f"{wanted.name}/{product.name}{wanted.suffix}", kernel())
+    return prebuilt(f"{wanted.name}/{product.name}{wanted.suffix}", files)
 
 
 def _host() -> Platform:
@@ -283,10 +283,10 @@ def _library(
     wanted: Platform,
     compilers: Iterable[Compiler],
     product: Product,
+    files: Mapping[str, bytes],
     progress: Callable[[str], None],
 ) -> bytes:
     """Return the library of a platform from the first compiler that succeeds."""
-    files = kernel()
     problem: CompilerError | None = None
     for compiler in compilers:
         try:
@@ -325,8 +325,7 @@ class Job:
             self.platform.name, compiler.identity, *compiler.command[1:], *self.arguments
         ):  # fmt: skip
             found.update(text.encode(errors="surrogateescape") + b"\0")
-        for name in sorted(self.files):
-            found.update(name.encode() + b"\0" + hashlib.sha256(self.files[name]).digest())
+        found.update(files_digest(self.files).encode())
         return found.hexdigest()
 
 

@@ -88,7 +88,8 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
         copy(sim->configuration.mechanism->input_count, state->given, state->acting_given);
         return true;
     }
-    if (!leave_arc(sim, impulses_changed(sim), problem) || (set && !keep_gaps(sim, joined, problem))) {
+    if (!leave_arc(sim, impulses_changed(sim), problem) ||
+        (set && !keep_gaps(sim, joined, problem))) {
         return false;
     }
     memcpy(state->walls, joined, bytes);

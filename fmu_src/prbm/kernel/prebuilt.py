@@ -11,6 +11,7 @@ from importlib.resources import files
 from typing import Any
 
 from ..base.errors import PrbmError
+from .sources import files_digest
 
 FOLDER = "libraries"
 LIST = "libraries.json"
@@ -18,14 +19,6 @@ LIST = "libraries.json"
 
 class DamagedLibraryError(PrbmError):
     """A library of the installed package is missing or differs from the one that was built."""
-
-
-def source_digest(sources: Mapping[str, bytes]) -> str:
-    """Return the SHA-256 of the names and contents of source files, as hexadecimal digits."""
-    digest = hashlib.sha256()
-    for name in sorted(sources):
-        digest.update(name.encode() + b"\0" + hashlib.sha256(sources[name]).digest())
-    return digest.hexdigest()
 
 
 def package_files(
@@ -44,7 +37,7 @@ def package_files(
     """
     listed = {
         "compiler": compiler,
-        "kernel": source_digest(sources),
+        "kernel": files_digest(sources),
         "libraries": {name: hashlib.sha256(libraries[name]).hexdigest() for name in libraries},
     }
     content = json.dumps(listed, indent=1, sort_keys=True) + "\n"
@@ -81,7 +74,7 @@ def prebuilt(name: str, sources: Mapping[str, bytes]) -> bytes | None:
         return None
     except (ValueError, TypeError, KeyError):
         raise _damaged(LIST) from None
-    if compiled != source_digest(sources):
+    if compiled != files_digest(sources):
         return None
     try:
         content = folder.joinpath(name).read_bytes()

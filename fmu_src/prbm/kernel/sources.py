@@ -1,5 +1,6 @@
 """The C source inside a native FMU: the kernel as one file, and its tables as a constant array."""
 
+import hashlib
 import re
 from collections.abc import Iterator, Mapping
 from importlib.resources import files
@@ -34,6 +35,14 @@ HEAD = """\
 #define PRBM_TABLES
 #endif
 """
+
+
+def files_digest(contents: Mapping[str, bytes]) -> str:
+    """Return the SHA-256 of the names and contents of files, as hexadecimal digits."""
+    digest = hashlib.sha256()
+    for name in sorted(contents):
+        digest.update(name.encode() + b"\0" + hashlib.sha256(contents[name]).digest())
+    return digest.hexdigest()
 
 
 def kernel() -> dict[str, bytes]:

@@ -206,20 +206,22 @@ PRBM double violation(int k, int m, const double *W, const double *u, const doub
     return worst;
 }
 
-/* Leave the contacts that do not close without forces out of a problem; false if there are none. */
-static bool leave_out(int k, int size, const double *u, double tolerance, double *M, double *q) {
-    bool found = false;
+/* Whether a contact closes without forces. */
+static bool closes(double rate, double tolerance) {
+    return !(rate >= -tolerance);
+}
+
+/* Leave the contacts that do not close without forces out of a problem. */
+static void leave_out(int k, int size, const double *u, double tolerance, double *M, double *q) {
     for (int i = 0; i < k; i++) {
-        if (!(u[i] >= -tolerance)) {
+        if (closes(u[i], tolerance)) {
             continue;
         }
-        found = true;
         q[i] = greater(q[i], 0.0);
         for (int j = 0; j < size; j++) {
             M[i * size + j] = M[j * size + i] = 0.0;
         }
     }
-    return found;
 }
 
 /* Follow the path of one covering vector to forces P; false if it ends in a ray. */
@@ -247,14 +249,18 @@ PRBM bool coulomb(int k, int m, const double *W, const double *u, const double *
     double *scale = take(scratch, (size_t)(k + m)), *M = take_matrix(scratch, size, size);
     double *q = take(scratch, (size_t)size), *limit = take(scratch, (size_t)m);
     bool solved = false;
+    int first = 1; /* The first attempt leaves contacts out, if there are any. */
+    for (int i = 0; i < k; i++) {
+        first = closes(u[i], tolerance) ? first : 0;
+    }
     for (int i = 0; i < k + m; i++) {
         double mobility = fabs(W[i * (k + m) + i]);
         scale[i] = mobility > 0.0 ? 1.0 / sqrt(mobility) : 1.0;
     }
-    for (int attempt = 0; !solved && attempt < 3; attempt++) {
+    for (int attempt = first; !solved && attempt < 3; attempt++) {
         set_problem(k, m, W, u, friction, fixed, normal, scale, M, q);
-        if (attempt == 0 && !leave_out(k, size, u, tolerance, M, q)) {
-            continue;
+        if (attempt == 0) {
+            leave_out(k, size, u, tolerance, M, q);
         }
         /* If only round-off excludes a solution: normal rates larger by half of the tolerance. */
         for (int i = 0; attempt == 2 && i < k; i++) {

@@ -165,7 +165,8 @@ static bool consistent(const Simulation *sim) {
            (state->tolerance >= TOLERANCE_MIN && state->tolerance <= TOLERANCE_USED_MAX &&
             state->frequency >= 0.0 && state->fastest_rate >= 0.0 &&
             (!state->arc.valid ||
-             (state->arc.h > 0.0 && state->arc.before.time <= state->arc.start)) && state->front_time >= state->time &&
+             (state->arc.h > 0.0 && state->arc.before.time <= state->arc.start)) &&
+            state->front_time >= state->time &&
             (!state->mode.exchange ||
              (state->angle >= NOMINAL_ANGLE_MIN && state->energy > 0.0)));
 }

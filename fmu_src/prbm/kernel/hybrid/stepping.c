@@ -132,7 +132,8 @@ PRBM double difference(Simulation *sim, const double *y, const double *z) {
 
 PRBM bool check_projection(Simulation *sim, double t, const double *y, const double *projected,
                            Problem *problem) {
-    double size = difference(sim, y, projected), most = PROJECTION_FACTOR * sqrt(sim->state.tolerance);
+    double size = difference(sim, y, projected);
+    double most = PROJECTION_FACTOR * sqrt(sim->state.tolerance);
     if (!(size <= most)) {
         return fail(problem,
                     "at t = %.9g s closing the loops would change the motion by %.3g of its size, "
