@@ -77,9 +77,12 @@ def finite(name: str, value: float, unit: str = "") -> float:
         If the value is not a finite number.
     """
     unit = f" {unit}" if unit else ""
-    if isinstance(value, bool | str | bytes) or not hasattr(value, "__float__"):
-        raise ParameterError(f"{name} = {value!r} must be a number{unit and ' in'}{unit}")
-    number = float(value)
+    try:
+        if isinstance(value, bool | str | bytes | bytearray):
+            raise TypeError
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{name} = {value!r} must be a number{unit and ' in'}{unit}") from None
     if not math.isfinite(number):
         raise ParameterError(f"{name} = {number}{unit} must be a finite number")
     return number
