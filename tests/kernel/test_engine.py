@@ -7,6 +7,7 @@ import json
 import math
 import pickle
 import re
+import tempfile
 import threading
 from contextlib import suppress
 from dataclasses import asdict, replace
@@ -19,7 +20,7 @@ from many_parts import elastic, two_stops
 from prbm.base.errors import MechanismError, ParameterError, PrbmError, SimulationError
 from prbm.hybrid.simulation import Simulation
 from prbm.kernel import library as library_module
-from prbm.kernel.library import FUNCTIONS, MESSAGE_LENGTH, library
+from prbm.kernel.library import FUNCTIONS, MESSAGE_LENGTH, LibraryError, library
 from prbm.kernel.simulation import IMPACT, KernelSimulation, tables_of
 from support import case, each_shipped, mechanism
 
@@ -394,6 +395,14 @@ def test_a_damaged_copy_of_the_library_is_written_again(tmp_path, monkeypatch):
     with library_module._file(b"content", ".so") as path:
         assert path.read_bytes() == b"content"
     assert not path.exists()
+
+
+def test_an_error_of_the_temporary_folder_is_one_of_the_library(tmp_path, monkeypatch):
+    monkeypatch.setattr(library_module, "private_cache", lambda: None)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    written = library_module._file(b"content", ".so")
+    with pytest.raises(LibraryError, match=r"temporary folder \(No such file .* TMPDIR"), written:
+        pytest.fail("no file has been written")
 
 
 @pytest.mark.parametrize("times", [np.empty((2, 0)), [[0.001, 0.002]], 0.001])

@@ -8,13 +8,13 @@ import hashlib
 import logging
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
 
 from ..base.atomic import write
 from ..base.errors import PrbmError
-from .compiler import ENGINE, HOST, libraries, private_cache, trusted
+from .compiler import ENGINE, HOST, OTHER_FOLDER, libraries, private_cache, trusted
 
 MESSAGE_LENGTH = 640  # Bytes of an error message, PROBLEM_LENGTH in C.
 
@@ -60,6 +60,8 @@ def library() -> ctypes.CDLL:
     ------
     CompilerError
         If there is no compiler, or it fails.
+    DamagedLibraryError
+        If the library of the installed package is damaged.
     LibraryError
         If the library cannot be loaded.
     """
@@ -86,10 +88,17 @@ def _file(content: bytes, suffix: str) -> Iterator[Path]:
         if _kept(path, content):
             yield path
             return
-    # A loaded library cannot be removed on Windows; it remains in the temporary folder there.
-    with tempfile.TemporaryDirectory(prefix="prbm_", ignore_cleanup_errors=True) as name:
-        path = Path(name) / f"prbm_engine{suffix}"
-        path.write_bytes(content)
+    with ExitStack() as stack:
+        try:
+            # A loaded library cannot be removed on Windows; it remains in the folder there.
+            temporary = tempfile.TemporaryDirectory(prefix="prbm_", ignore_cleanup_errors=True)
+            path = Path(stack.enter_context(temporary)) / f"prbm_engine{suffix}"
+            path.write_bytes(content)
+        except OSError as error:
+            raise LibraryError(
+                "the compiled kernel cannot be written to a temporary folder "
+                f"({error.strerror or error}): {OTHER_FOLDER}"
+            ) from None
         yield path
 
 

@@ -122,7 +122,7 @@ def simulation(
     ------
     ParameterError, EquilibriumError, TypeError
         As :class:`prbm.hybrid.simulation.Simulation`; or if the engine is unknown.
-    CompilerError, LibraryError
+    CompilerError, LibraryError, DamagedLibraryError
         If the kernel is chosen and cannot be compiled or loaded.
 
     Examples
@@ -163,7 +163,7 @@ def kernel_available() -> bool:
     """Return whether the kernel can be loaded; log the reason if it cannot."""
     try:
         library()
-    except (PrbmError, OSError) as error:
+    except PrbmError as error:
         _warn(f"the Python engine is used, which is slower: {error}")
         return False
     return True
