@@ -29,9 +29,10 @@ FUNCTIONS = {
     "prbm_start": (_bool, _address, _double, _double, _bytes),
     "prbm_check_step": (_bool, _address, _double, _bytes),
     "prbm_advance": (_int, _address, _double, _bytes),
+    "prbm_abandon": (None, _address),
     "prbm_values": (_bool, _address, _int, _address, _address, _bytes),
     "prbm_sample": (
-        _int, _address, _int, _address, _int, _address, _address, _bytes,
+        _int, _address, _int, _address, _int, _address, _address, _address, _bytes,
     ),
     "prbm_state": (_bool, _address, _address, _bytes),
     "prbm_time": (_double, _address),
@@ -66,7 +67,12 @@ def library() -> ctypes.CDLL:
         If the library cannot be loaded.
     """
     ((platform, content),) = libraries([HOST], log.warning, ENGINE).items()
-    with _file(content, platform.suffix) as path:
+    return _loaded(content, platform.suffix)
+
+
+def _loaded(content: bytes, suffix: str) -> ctypes.CDLL:
+    """Return a library from the content of its file, with the types of its functions."""
+    with _file(content, suffix) as path:
         try:
             loaded = ctypes.CDLL(str(path))
         except OSError as error:
