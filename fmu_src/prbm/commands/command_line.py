@@ -408,6 +408,7 @@ def _study(commands: Commands) -> None:
     set_argument(parser, "value of a parameter or input in all simulations")
     input_argument(parser)
     stop_time_argument(parser)
+    engine_argument(parser)
     _out(parser)
 
 

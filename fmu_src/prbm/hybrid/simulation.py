@@ -31,12 +31,13 @@ from ..mechanics.dynamics import Equations
 from ..mechanics.inputs import WALL_INPUTS, Inputs, Wall, impulse_names
 from ..mechanics.system import System
 from ..mechanism.description import Mechanism
+from ..mechanism.parameters import number
 from . import contact_modes, events, impacts, snapshot, walls
 from .arc import Arc, Node
 from .configuration import Configuration, Magnitudes
 from .events import Event, EventKind, EventWindow
 from .front import Front, Latched
-from .given import changed_values, start_values
+from .given import changed_values, checked_times, start_values
 from .guards import StepView
 from .impacts import Impact
 from .outputs import Outputs, all_outputs, motions
@@ -207,10 +208,13 @@ class Simulation:
 
         Raises
         ------
+        ParameterError
+            If the time is not a number.
         SimulationError
             If the target time is invalid, the step size becomes too small, too many events
             occur, or more than ``EFFORT_MAX`` integration steps are needed.
         """
+        time = number("time", time, "s")
         if not math.isfinite(time) or time < self.time:
             raise SimulationError(
                 f"cannot simulate from t = {self.time:.12g} s to t = {time:.12g} s: the target "
@@ -227,7 +231,7 @@ class Simulation:
         before, recorded = dict(vars(self)), len(self.record or ())
         try:
             self._advance(time)
-        except Exception:
+        except BaseException:  # Ctrl-C, too.
             vars(self).update(before)
             if self.record is not None:
                 del self.record[recorded:]
@@ -410,18 +414,18 @@ class Simulation:
         Raises
         ------
         ParameterError
-            If there is no such output.
+            If there is no such output, or the times are not a list of numbers.
         SimulationError
             As :meth:`advance`; the simulation has then reached the times before.
         """
-        outputs = self.outputs()
+        times, outputs = checked_times(times), self.outputs()
         for name in names:
             if name not in outputs:
                 raise ParameterError(unknown(name, outputs))
         moving = self.motions().keys() >= set(names)
         rows = np.empty((len(times), len(names)))
         for row, t in zip(rows, times, strict=True):
-            self.advance(float(t))
+            self.advance(t)
             out: Mapping[str, float] = self.motions() if moving else self.outputs()
             row[:] = [out[name] for name in names]
         return rows

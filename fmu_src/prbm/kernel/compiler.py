@@ -45,6 +45,7 @@ ERROR_LINES_MAX = 6  # Lines of a compiler's output in an error message.
 TEMPORARY = ("TMPDIR", "TMP", "TEMP")  # Variables that name the folder of a compiler's files.
 MAGIC = b"prbm library\n"
 OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
+OTHER_FOLDER = "set the environment variable TMPDIR to a folder that you can write to"
 INSTALL = (
     "install one (on Debian or Ubuntu 'apt install gcc', on macOS 'xcode-select --install'), or "
     "the compiler of the Python package ziglang with 'python -m pip install ziglang'"
@@ -156,7 +157,7 @@ def libraries(
     DamagedLibraryError
         If a library of the installed package is damaged.
     """
-    result, files = {}, kernel()
+    result, files = {}, _sources()
     for name in platforms:
         if name == HOST:
             here = _host()
@@ -170,6 +171,17 @@ def libraries(
             chosen, _zig(chosen), product, files, progress
         )
     return result
+
+
+def _sources() -> dict[str, bytes]:
+    """Return the files of the kernel."""
+    try:
+        return kernel()
+    except OSError as error:
+        raise CompilerError(
+            f"{error.filename} cannot be read ({error.strerror}): correct the permissions of the "
+            "installed package, or install it again"
+        ) from None
 
 
 def _prebuilt(wanted: Platform, product: Product, files: Mapping[str, bytes]) -> bytes | None:
@@ -337,33 +349,42 @@ def compiled(job: Job) -> bytes:
     Raises
     ------
     CompilerError
-        If the compiler fails.
+        If the compiler fails, or the temporary folder cannot be written.
     """
+    try:
+        with tempfile.TemporaryDirectory(prefix="prbm_") as name:
+            for file, content in job.files.items():
+                path = Path(name, file)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
+            return _run(job, Path(name))
+    except OSError as error:
+        raise CompilerError(
+            f"the kernel cannot be compiled in a temporary folder ({error.strerror or error}): "
+            f"{OTHER_FOLDER}"
+        ) from None
+
+
+def _run(job: Job, folder: Path) -> bytes:
+    """Return the library that a compiler makes of the sources in a folder."""
     compiler, libraries = job.compiler, () if job.platform.system == "windows" else ("-lm",)
-    with tempfile.TemporaryDirectory(prefix="prbm_") as name:
-        folder = Path(name)
-        for file, content in job.files.items():
-            (folder / file).parent.mkdir(parents=True, exist_ok=True)
-            (folder / file).write_bytes(content)
-        environment = os.environ | {"LC_ALL": "C"} | dict.fromkeys(TEMPORARY, name)
-        if compiler.name == "ziglang":
-            environment |= _zig_folders(folder)
-        try:
-            done = subprocess.run(
-                [*compiler.command, *job.arguments, *libraries], cwd=folder,
-                capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
-                errors="replace", env=environment,
-            )  # fmt: skip
-            made = (folder / job.output).read_bytes()
-        except FileNotFoundError:
-            made = b""
-        except OSError as error:
-            raise CompilerError(
-                f"{compiler.name} cannot be run ({error.strerror}); {INSTALL}"
-            ) from None
-    if done.returncode != 0 or not made:
+    environment = os.environ | {"LC_ALL": "C"} | dict.fromkeys(TEMPORARY, str(folder))
+    if compiler.name == "ziglang":
+        environment |= _zig_folders(folder)
+    try:
+        done = subprocess.run(
+            [*compiler.command, *job.arguments, *libraries], cwd=folder,
+            capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL,
+            errors="replace", env=environment,
+        )  # fmt: skip
+    except OSError as error:
+        raise CompilerError(
+            f"{compiler.name} cannot be run ({error.strerror}); {INSTALL}"
+        ) from None
+    made = folder / job.output
+    if done.returncode != 0 or not (made.is_file() and made.stat().st_size):
         raise CompilerError(_failure(job.platform, compiler, done))
-    return made
+    return made.read_bytes()
 
 
 def _zig_folders(folder: Path) -> dict[str, str]:

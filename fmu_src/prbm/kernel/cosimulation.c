@@ -1,4 +1,5 @@
 /* Co-simulation: the simulation integrates itself from one communication point to the next. */
+#include <limits.h>
 #include <math.h>
 #include <string.h>
 
@@ -96,10 +97,13 @@ static bool begin_step(Simulation *sim, double time, Problem *problem) {
     return restart(sim, problem);
 }
 
-/* Whether to return before the end of a communication step: after an internal step, at an event. */
+/* When to return before the end of a communication step. */
 typedef struct {
-    bool steps, events;
+    bool events; /* at an event */
+    int steps;   /* after so many integration steps */
 } Stops;
+
+typedef enum { REACHED, AT_EVENT, AFTER_STEPS } Ending;
 
 /* Reject a target time that has not been reached after the given number of integration steps. */
 static bool check_effort(const State *state, double time, int steps, Problem *problem) {
@@ -113,46 +117,61 @@ static bool check_effort(const State *state, double time, int steps, Problem *pr
                 time, EFFORT_MAX, state->front_time, state->step_size);
 }
 
-static bool advance(Simulation *sim, double time, Stops stops, bool *event, Problem *problem) {
+/* Continue a communication step that has begun.  *effort: integration steps since it began. */
+static bool proceed(Simulation *sim, double time, Stops stops, int *effort, Ending *ending,
+                    Problem *problem) {
     State *state = &sim->state;
-    *event = false;
-    if (!begin_step(sim, time, problem)) {
-        return false;
-    }
-    state->interrupted = false;
-    int effort = 0;
-    for (bool stepped = false;; stepped = true) {
+    for (int steps = 0;; steps++) {
         if (event_due(state, time)) {
+            *ending = AT_EVENT;
             if (stops.events) {
-                *event = true;
-                state->time = state->pending.time;
-                state->interrupted = state->time < time;
                 return true;
             }
             if (!apply_pending(sim, problem)) {
                 return false;
             }
         }
-        if (state->front_time >= time) {
-            break;
-        }
-        if (stops.steps && stepped) {
-            state->time = state->front_time;
-            state->interrupted = true;
+        *ending = state->front_time >= time ? REACHED : AFTER_STEPS;
+        if (*ending == REACHED || steps >= stops.steps) {
             return true;
         }
-        if (!check_effort(state, time, effort++, problem) || !take_step(sim, problem)) {
+        if (!check_effort(state, time, (*effort)++, problem) || !take_step(sim, problem)) {
             return false;
         }
     }
-    state->time = time;
+}
+
+/* Set the time at which a call ends that has not reached the end of the communication step. */
+static void interrupt(State *state, double now, double time) {
+    state->time = now;
+    state->interrupted = now < time;
+}
+
+static bool advance_some(Simulation *sim, double time, Stops stops, bool *event,
+                         Problem *problem) {
+    State *state = &sim->state;
+    Ending ending;
+    int effort = 0;
+    if (!begin_step(sim, time, problem)) {
+        return false;
+    }
+    state->interrupted = false;
+    if (!proceed(sim, time, stops, &effort, &ending, problem)) {
+        return false;
+    }
+    *event = ending == AT_EVENT;
+    switch (ending) {
+    case AT_EVENT: interrupt(state, state->pending.time, time); break;
+    case AFTER_STEPS: interrupt(state, state->front_time, time); break;
+    default: state->time = time;
+    }
     return true;
 }
 
 PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each, bool *event,
                                   Problem *problem) {
     Simulation *sim = simulation;
-    const Stops stops = {each, true};
+    const Stops stops = {true, each ? 1 : INT_MAX};
     *event = false;
     if (!check_time(sim, time, problem)) {
         return false;
@@ -163,22 +182,57 @@ PRBM bool simulation_advance_some(Simulation *simulation, double time, bool each
     }
     keep_backup(sim);
     sim->present.fresh = NOTHING;
-    return attempt(sim, advance(sim, time, stops, event, problem), problem);
+    return attempt(sim, advance_some(sim, time, stops, event, problem), problem);
+}
+
+/* Begin a communication step at its first part, and continue it by a number of steps. */
+static bool advance_part(Simulation *sim, double time, int steps, int *effort, bool *reached,
+                         Problem *problem) {
+    State *state = &sim->state;
+    Ending ending;
+    if (*effort == 0) {
+        if (!begin_step(sim, time, problem)) {
+            return false;
+        }
+        state->interrupted = false;
+    }
+    if (!proceed(sim, time, (Stops){false, steps}, effort, &ending, problem)) {
+        return false;
+    }
+    *reached = ending == REACHED;
+    if (*reached) {
+        state->time = time;
+    }
+    return true;
+}
+
+PRBM bool simulation_advance_part(Simulation *simulation, double time, int steps, int *effort,
+                                  bool *reached, Problem *problem) {
+    Simulation *sim = simulation;
+    *reached = false;
+    if (*effort == 0) {
+        if (!check_time(sim, time, problem)) {
+            return false;
+        }
+        if (time == sim->state.time) {
+            *reached = true;
+            return true;
+        }
+        keep_backup(sim);
+        sim->present.fresh = NOTHING;
+    }
+    return attempt(sim, advance_part(sim, time, steps, effort, reached, problem), problem);
+}
+
+PRBM void simulation_abandon(Simulation *simulation) {
+    Problem ignored;
+    (void)attempt(simulation, false, &ignored);
 }
 
 PRBM bool simulation_advance(Simulation *simulation, double time, Problem *problem) {
-    Simulation *sim = simulation;
-    const Stops never = {false, false};
-    bool event;
-    if (!check_time(sim, time, problem)) {
-        return false;
-    }
-    if (time == sim->state.time) {
-        return true;
-    }
-    keep_backup(sim);
-    sim->present.fresh = NOTHING;
-    return attempt(sim, advance(sim, time, never, &event, problem), problem);
+    int effort = 0;
+    bool reached;
+    return simulation_advance_part(simulation, time, INT_MAX, &effort, &reached, problem);
 }
 
 /* --- event mode ------------------------------------------------------------------------------- */

@@ -9,6 +9,7 @@
 #include "values.h"
 
 enum { FIRST_IMPACTS = 16 }; /* number of impacts for which there is memory at first */
+enum { CALL_STEPS = 50, CALL_COORDINATES = 30 }; /* steps of a call, up to so many coordinates */
 
 struct Engine {
     Simulation *simulation;
@@ -16,6 +17,8 @@ struct Engine {
     double *record;   /* (room, ENGINE_IMPACT + 3 n) */
     int count, room;  /* numbers of impacts */
     bool incomplete;  /* an impact could not be recorded */
+    int effort;       /* integration steps of an advance that is unfinished, 0: none is */
+    int before;       /* number of impacts before it */
 };
 
 static bool succeed(bool ok, const Problem *problem, char *message) {
@@ -140,20 +143,44 @@ EXPORTED bool prbm_check_step(const Engine *engine, double step, char *message) 
     return succeed(simulation_check_step(engine->simulation, step, &problem), &problem, message);
 }
 
+/* Integration steps in one call.  The time of a step grows with n^3. */
+static int steps_of_call(int n) {
+    double ratio = n / (double)CALL_COORDINATES;
+    return ratio > 1.0 ? 1 + (int)(CALL_STEPS / (ratio * ratio * ratio)) : CALL_STEPS;
+}
+
 EXPORTED int prbm_advance(Engine *engine, double time, char *message) {
     Problem problem = {""};
-    int before = engine->count;
-    engine->incomplete = false;
-    bool ok = simulation_advance(engine->simulation, time, &problem);
+    Simulation *sim = engine->simulation;
+    bool reached;
+    if (engine->effort == 0) {
+        engine->before = engine->count;
+        engine->incomplete = false;
+    }
+    bool ok = simulation_advance_part(sim, time, steps_of_call(engine->n), &engine->effort,
+                                      &reached, &problem);
     if (ok && engine->incomplete) {
+        simulation_abandon(sim);
         ok = fail(&problem, "there is not enough memory to record the impacts up to "
                             "t = %.9g s: simulate in shorter parts", time);
     }
+    if (ok && !reached) {
+        return ENGINE_UNFINISHED;
+    }
+    engine->effort = 0;
     if (!succeed(ok, &problem, message)) {
-        engine->count = before;
+        engine->count = engine->before;
         return -1;
     }
     return engine->count;
+}
+
+EXPORTED void prbm_abandon(Engine *engine) {
+    if (engine->effort > 0) {
+        simulation_abandon(engine->simulation);
+        engine->count = engine->before;
+        engine->effort = 0;
+    }
 }
 
 EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *values,
@@ -167,13 +194,22 @@ EXPORTED bool prbm_values(Engine *engine, int count, const int *slots, double *v
 }
 
 EXPORTED int prbm_sample(Engine *engine, int samples, const double *times, int count,
-                         const int *slots, double *values, char *message) {
-    for (int i = 0; i < samples; i++) {
-        double *row = values + (size_t)i * (size_t)count;
-        if (prbm_advance(engine, times[i], message) < 0 ||
-            !prbm_values(engine, count, slots, row, message)) {
+                         const int *slots, double *values, int *done, char *message) {
+    double first = simulation_steps(engine->simulation) + *done;
+    int most = steps_of_call(engine->n);
+    while (*done < samples) {
+        if (simulation_steps(engine->simulation) + *done - first >= most) {
+            return ENGINE_UNFINISHED;
+        }
+        int impacts = prbm_advance(engine, times[*done], message);
+        if (impacts < 0) {
+            return impacts;
+        }
+        double *row = values + (size_t)*done * (size_t)count;
+        if (!prbm_values(engine, count, slots, row, message)) {
             return -1;
         }
+        ++*done;
     }
     return engine->count;
 }

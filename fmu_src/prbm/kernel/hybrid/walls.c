@@ -7,9 +7,9 @@
 #include "hybrid/simulation.h"
 #include "hybrid/walls.h"
 
-/* The reference that the inputs of a stop define at the present time.  In model exchange, where walls
- * follow no cubic, the excess is the change of the wall's velocity by impulses.  It remains until
- * stop.velocity is set. */
+/* The reference that the inputs of a stop define at the present time.  In model exchange, where
+ * walls follow no cubic, the excess is the change of the wall's velocity by impulses.  It remains
+ * until stop.velocity is set. */
 static Wall given_reference(const Simulation *sim, int i) {
     const Mechanism *m = sim->configuration.mechanism;
     const double *given = wall_inputs(m, sim->state.given, i);
