@@ -12,7 +12,7 @@ from prbm.mechanics.assembly import assemble
 from prbm.mechanics.modal import modes
 from prbm.mechanics.statics import equilibrium
 from prbm.references.finite_elements import FiniteElements
-from support import SUPPORT, mechanism
+from support import PMMA, SUPPORT, mechanism
 
 pytest.importorskip("exudyn", reason="finite elements need exudyn: python -m pip install exudyn")
 
@@ -103,3 +103,30 @@ def test_the_impact_map_of_the_guide_on_beams_is_that_of_finite_elements():
     assert worst[0] < 0.003
     assert worst[1] < 0.7 * worst[0]
     assert worst[2] < 0.8 * worst[1]
+
+
+def test_with_the_order_a_rigid_impact_of_heavy_flexures_stops_the_body_alone():
+    """C of beams and of elements tends to (1 + eps) m/(m + 13/35 m_f) - 1 in the straight guide.
+
+    The flexures of the PMMA guide have a fifth of the mass of its shuttle.
+    """
+    known = GUIDE.values()
+    values = {name: x for name, x in PMMA.items() if name in known}
+    of = {name.removeprefix("flexure."): x for name, x in values.items()}
+    flexures = 2 * of["density"] * of["length"] * of["width"] * of["thickness"]
+    m = values["shuttle.mass"]
+    limit = 1.6 * m / (m + 13 / 35 * flexures) - 1.0
+    found = [
+        impact_map.algebraic(
+            stretching_beams(GUIDE, order), [0.0], [0.0], values
+        ).restitution.item()
+        for order in (3, 5, 7, 9, 12)
+    ]
+    assert all(after < before for before, after in pairwise(found))
+    assert found[0] - limit > 0.03
+    assert 0.0 < found[-1] - limit < 0.006
+    coarse, fine = (
+        impact_map.by_elements(GUIDE, [0.0], [0.0], values, elements=n).restitution.item()
+        for n in (8, 16)
+    )
+    assert 2 * fine - coarse == pytest.approx(limit, abs=5e-4)  # Errors of the first order.
