@@ -142,7 +142,8 @@ class Scene:
             if pivots <= CURVED_PIVOTS_MAX:
                 self.curves[name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
             self.links[name] = self._moving_line(
-                LINK, 1.3, zorder=4.0, marker="o", markerfacecolor="white", markevery=slice(1, -1),
+                LINK, 1.3, zorder=4.0, marker="o" if line.jointed else "", markerfacecolor="white",
+                markevery=slice(1, -1),
                 markersize=4.2 if pivots <= CURVED_PIVOTS_MAX else 2.0,
             )  # fmt: skip
 
