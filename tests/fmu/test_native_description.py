@@ -151,7 +151,8 @@ def test_states_derivatives_and_indicators_are_consistent(fmu, mechanisms):
     description = read_model_description(str(fmu.path))
     guide = mechanisms[fmu.name]
     loops = 2 * (len(guide.flexures) - len(guide.bodies))
-    moving = [v for v in description.modelVariables if re.match(r"link.*(angle|strain)$", v.name)]
+    bent = r"link.*(angle|strain)$|.*\.bend\[\d+\]\.angle$"
+    moving = [v for v in description.modelVariables if re.match(bent, v.name)]
     freedom = len(moving) + len(guide.bodies) - loops
     states = [u.variable.derivative for u in description.derivatives]
     assert len(states) == len({s.name for s in states}) == 2 * freedom + 2

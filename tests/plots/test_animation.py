@@ -217,6 +217,13 @@ def test_only_flexures_of_few_links_have_a_smooth_curve(result: Result) -> None:
     assert scene_of(result).curves.keys() == {"left_flexure", "right_flexure"}
 
 
+def test_a_beam_is_drawn_as_its_own_curve(mechanisms: dict[str, Mechanism]) -> None:
+    scene = scene_of(simulate(mechanisms["GuideBeam"], stop_time=0.02))
+    scene.frame(1)
+    for name, line in scene.links.items():
+        np.testing.assert_array_equal(places(scene.curves[name], scene), places(line, scene))
+
+
 def test_axes_are_to_scale_and_contain_the_whole_motion(result: Result) -> None:
     scene = scene_of(result)
     FigureCanvasAgg(scene.figure).draw()

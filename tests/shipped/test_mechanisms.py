@@ -14,7 +14,7 @@ from support import Run, guided_rate, mechanism, run
 LONG = ("FoldedSuspension", "PRBDM2RAxial", "PRBDM3R")
 """Mechanisms whose default experiment takes 5 to 20 s of computing time."""
 PRESSED = {
-    "Bistable": "far_stop", "Cantilever": "stop", "FoldedSuspension": "stop",
+    "Bistable": "far_stop", "Cantilever": "stop", "FoldedSuspension": "stop", "GuideBeam": "stop",
     "PRBDM": "stop", "PRBDM2R": "stop", "PRBDM2RAxial": "stop", "PRBDM3R": "stop",
 }  # fmt: skip
 """The stops on which mechanisms come to rest."""

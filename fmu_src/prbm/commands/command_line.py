@@ -158,6 +158,8 @@ def _list(commands: Commands) -> None:
         "shipped:print_list",
         "list the shipped mechanisms",
         _examples("prbm list"),
+        details="Beams are the most accurate model of flexures (GuideBeam). PRBDM, PRBDM2R and "
+        "PRBDM3R are the same guide by models with 1, 2 and 3 pivots, for comparison.",
     )
 
 

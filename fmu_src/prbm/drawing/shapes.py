@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull, QhullError
 from ..mechanics.arrays import Complex, Real
 from ..mechanics.system import FIXED, BodyFrame, Outline, System, unit
 from ..mechanism.expressions import affine
-from ..mechanism.flexure import PIN
+from ..mechanism.flexure import BEAM, PIN
 from ..mechanism.parts import GROUND, Flexure, Stop, body_of, value
 
 CURVE_POINTS = 40  # Points of the drawn curve of a flexure.
@@ -139,10 +139,11 @@ def _surrounds(around: Complex, distance: float) -> bool:
 
 @dataclass(frozen=True)
 class FlexureLine:
-    """A flexure and its outline."""
+    """A flexure and its outline; ``jointed`` unless it is a beam, which has no pivots."""
 
     flexure: Flexure
     outline: Outline
+    jointed: bool = True
 
     @property
     def guided(self) -> tuple[bool, bool]:
@@ -169,8 +170,11 @@ class Shapes:
         self.system = system
         self.straight = self.arms(system.q0)
         named = {flexure.name: flexure for flexure in system.mechanism.flexures}
+        beams = {kind.name for kind in system.mechanism.flexure_types if kind.model == BEAM}
         self.flexures = [
-            FlexureLine(named[o.name], o) for o in system.outlines if o.kind == "flexure"
+            FlexureLine(named[o.name], o, named[o.name].type not in beams)
+            for o in system.outlines
+            if o.kind == "flexure"
         ]
         self.joints = [o for o in system.outlines if o.kind == "joint"]
         self.hits = [self._hit(stop) for stop in system.mechanism.stops]

@@ -377,9 +377,9 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
     rigid = [
         f"{impact} The duration of a real impact (0.1 ms) is comparable to the period of the axial "
         "vibrations of the flexures (0.5 ms in the steel structure of source 1). This model has no "
-        "axial vibrations, because its links do not stretch.",
+        "axial vibrations, because its flexures do not stretch.",
         planar,
-        "Links that do not stretch keep a body on parallel, straight flexures from turning, so "
+        "Flexures that do not stretch keep a body on parallel, straight flexures from turning, so "
         "that the place of a hit has no effect there. With flexures that stretch, a rigid impact "
         "off the centre of mass loses more energy of the fundamental mode. The loss of a real "
         "impact depends on the duration of the contact.",
@@ -392,6 +392,11 @@ def _limits(mechanism: Mechanism, variables: tuple[Variable, ...], inputs: str) 
                 f"{MODELS[name].end_slope:.3f} times the exact slope. Transverse end forces are "
                 "modelled well."
             )
+    if BEAM in models:
+        items.append(
+            "Beams: the bending moment is a polynomial along each flexure. Vibrations of a flexure "
+            "with more waves than its polynomial are missing."
+        )
     straight = "kilohertz" if _stretches(mechanism) else "infinite stiffness"
     if "2R" in models:
         items.append(

@@ -264,7 +264,7 @@ class _Drawing:
             many = len(z) - 2 > CURVED_PIVOTS_MAX
             self.line(z if many else curve(z, line.guided), FLEXURE, 3.6, 2.0)
             self.line(z, LINK, 0.9, 2.5)
-            if pivots:
+            if pivots and line.jointed:
                 self.pivots(z[1:-1], 1.5 if many else 3.4, 4.0)
         for name in self.shapes.bodies:
             z = self.shapes.body(name, E) * self.factor

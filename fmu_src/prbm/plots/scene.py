@@ -139,10 +139,11 @@ class Scene:
         self.curves, self.links = {}, {}
         for line in self.shapes.flexures:
             pivots, name = len(line.outline.c) - 2, line.flexure.name
-            if pivots <= CURVED_PIVOTS_MAX:
+            if pivots <= CURVED_PIVOTS_MAX or not line.jointed:
                 self.curves[name] = self._moving_line(FLEXURE, 5.0, zorder=2.0)
             self.links[name] = self._moving_line(
-                LINK, 1.3, zorder=4.0, marker="o", markerfacecolor="white", markevery=slice(1, -1),
+                LINK, 1.3, zorder=4.0, marker="o" if line.jointed else "", markerfacecolor="white",
+                markevery=slice(1, -1),
                 markersize=4.2 if pivots <= CURVED_PIVOTS_MAX else 2.0,
             )  # fmt: skip
 
@@ -280,7 +281,7 @@ class Scene:
             z, name = corners(line.outline, E), line.flexure.name
             self._move(self.links[name], z)
             if name in self.curves:
-                self._move(self.curves[name], curve(z, line.guided))
+                self._move(self.curves[name], curve(z, line.guided) if line.jointed else z)
         for name, patch in self.bodies.items():
             z = self.shapes.body(name, E) * self.factor
             patch.set_xy(np.column_stack([z.real, z.imag]))
