@@ -504,6 +504,11 @@ SCHEMA_MISTAKES = (
     "type and section", "no type and no section", "section without width", "too dense",
     "unknown model", "n too large", "n of zero", "ends wrong", "three ends", "only one end", "huge",
     "damping out of bounds", "text as a number",
+    "mass and density", "plate without a thickness", "plate without an outline",
+    "plate without a material", "plate with material and density", "plate without density",
+    "plate of zero thickness", "mirror about an unknown axis", "mirror without a line",
+    "mirror with a number", "mirror with three lines", "repeat of zero parts",
+    "repeat of too many parts", "repeat with an unknown key", "repeat that is a number",
 )  # fmt: skip
 
 
