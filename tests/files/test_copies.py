@@ -116,6 +116,13 @@ name = "left_eye"
 start = "stage.left_ear"
 end = "left_arm.eye"
 mirror = "x = 0"
+
+[[flexures]]
+name = "left_tie"
+type = "leaf"
+start = "left_arm.right_end"
+end = "ground.left"
+mirror = "x = 0"
 """
 BY_HAND = """
 [ground]
@@ -185,6 +192,18 @@ end = "left_arm.eye"
 name = "right_eye"
 start = "stage.right_ear"
 end = "right_arm.eye"
+
+[[flexures]]
+name = "left_tie"
+type = "leaf"
+start = "left_arm.right_end"
+end = "ground.left"
+
+[[flexures]]
+name = "right_tie"
+type = "leaf"
+start = "right_arm.left_end"
+end = "ground.right"
 """
 
 
