@@ -49,7 +49,7 @@ def short(mechanisms: dict[str, Mechanism]) -> Result:
 
 def places(artist: object, scene: Scene) -> np.ndarray:
     """Return the points of an artist of a scene as complex numbers [m]."""
-    xy = artist.get_xydata() if hasattr(artist, "get_xydata") else artist.get_xy()[:4]
+    xy = artist.get_xydata() if hasattr(artist, "get_xydata") else artist.get_path().vertices[:4]
     return np.asarray(xy) @ np.array([1, 1j]) / scene.factor
 
 

@@ -20,8 +20,9 @@ from ..base import reading
 from ..base.errors import MechanismError, ParameterError, PrbmError
 from ..base.names import proposal
 from ..mechanism.description import Mechanism
-from .schema import NAME_LENGTH_MAX, TAGS, MechanismTable, Table, mechanism
+from .schema import MechanismTable, RepeatTable, Table, mechanism
 from .toml_lines import key_length, line_of, lines
+from .values import NAME_LENGTH_MAX, TAGS
 
 Item = TypeVar("Item")
 FILE_SIZE_MAX = 1 << 20  # bytes; a mechanism of a hundred flexures has 20 kB.
@@ -161,6 +162,8 @@ def _problem(error: dict[str, Any], data: Any) -> str:
         remedy = NAME_REMEDIES[str(loc[-1])]
     elif kind == "tuple_type" and len(loc) > 1:
         remedy = "write a pair, [..., ...]"
+    elif kind == "less_than_equal":
+        remedy = f"write a number of at most {error['ctx']['le']}"
     else:
         remedy = REMEDIES.get(kind, error["msg"])
     if remedy.startswith("cannot read the expression"):
@@ -170,6 +173,8 @@ def _problem(error: dict[str, Any], data: Any) -> str:
 
 def _keys(loc: Sequence[str | int]) -> list[str]:
     """Return the allowed keys of the table that has an unknown key."""
+    if "repeat" in loc[:-1]:
+        return [*RepeatTable.model_fields]
     return [*_table(str(loc[0]) if loc[1:] else "").model_fields]
 
 

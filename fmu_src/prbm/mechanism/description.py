@@ -405,6 +405,8 @@ class Mechanism:
             yield from ((f"{GROUND}.{name}", c) for c in point)
         for body in self.bodies:
             yield from ((f"{body.name}.centre", c) for c in body.centre)
+            for corners in (body.outline, *body.holes):
+                yield from ((f"{body.name}.outline", c) for corner in corners for c in corner)
             for name, point in body.points.items():
                 yield from ((f"{body.name}.{name}", c) for c in point)
         points: tuple[Stop | Friction | Force | Release, ...] = (*self.stops, *self.frictions)

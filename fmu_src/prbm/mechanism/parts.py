@@ -29,6 +29,11 @@ class Body:
         Centre of mass as drawn [m].
     points : mapping
         Points as drawn, by name [m].
+    outline : tuple of Point
+        Corners of the outline as drawn, in order [m]; empty if pictures show the hull of the
+        points.  The outline is drawn only: mass, inertia and contact do not depend on it.
+    holes : tuple of tuples of Point
+        Corners of the holes in the outline as drawn [m].
     """
 
     name: str
@@ -36,6 +41,8 @@ class Body:
     inertia: Quantity
     centre: Point
     points: Mapping[str, Point] = field(default_factory=dict)
+    outline: tuple[Point, ...] = ()
+    holes: tuple[tuple[Point, ...], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Polygon
+from matplotlib.patches import PathPatch
 from numpy.typing import NDArray
 
 from ..base.unit_text import length_unit, time_unit
@@ -29,6 +29,7 @@ from ..drawing.style import (
     REST,
     STRAIGHT,
     WALL,
+    area,
     own_style,
 )
 from ..mechanics.arrays import Complex
@@ -148,12 +149,12 @@ class Scene:
             )  # fmt: skip
 
     def _set_bodies(self) -> None:
-        self.bodies: dict[str, Polygon] = {}
+        self.bodies: dict[str, PathPatch] = {}
         self.centres: dict[str, Line2D] = {}
         for name in self.system.bodies:
-            patch = Polygon(
-                np.zeros((len(self.shapes.bodies[name]), 2)), facecolor=BODY, edgecolor=LINK,
-                linewidth=1.2, alpha=0.9, joinstyle="round", zorder=3.0,
+            patch = PathPatch(
+                area([self.shapes.bodies[name]]), facecolor=BODY, edgecolor=LINK, linewidth=1.2,
+                alpha=0.9, joinstyle="round", zorder=3.0,
             )  # fmt: skip
             self.stage.add_patch(patch)
             self.moving.append(patch)
@@ -283,8 +284,7 @@ class Scene:
             if name in self.curves:
                 self._move(self.curves[name], curve(z, line.guided) if line.jointed else z)
         for name, patch in self.bodies.items():
-            z = self.shapes.body(name, E) * self.factor
-            patch.set_xy(np.column_stack([z.real, z.imag]))
+            patch.set_path(area(self.shapes.areas(name, E), self.factor))
             self._move(self.centres[name], np.array([self.shapes.centre(name, E)]))
         self._move(self.pins, self.shapes.pins(E))
         self._move(self.probes, self.shapes.probes(E))
